@@ -1,0 +1,273 @@
+"""The frozen records that stages hand to each other. SI units inside; the unit ends the name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tribo.errors import Problem
+
+FloatArray = NDArray[np.float64]
+Regime = Literal["static", "sliding"]
+REGIMES: tuple[Regime, ...] = ("static", "sliding")
+STANDARD_GRAVITY = 9.80665  # m/s2, CGPM 1901
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Geometry of one cavity pattern, lengths in metres; ``cavity`` is none, circle, square or rectangle.
+
+    ``size_m`` is (x, y) of the cavity (the diameter twice for a circle); ``pitch_m`` the lattice spacing;
+    ``staggered`` shifts every other row by half a pitch in x. ``measured_area_fraction``, where given,
+    replaces the nominal one.
+    """
+
+    name: str
+    cavity: str = "none"
+    size_m: tuple[float, float] | None = None
+    pitch_m: tuple[float, float] | None = None
+    staggered: bool = False
+    measured_area_fraction: float | None = None
+
+    @property
+    def area_fraction(self) -> float:
+        """Contact area fraction AF: contact area over nominal area, 1 for a flat sample."""
+        if self.measured_area_fraction is not None:
+            return self.measured_area_fraction
+        if self.cavity == "none" or self.size_m is None or self.pitch_m is None:
+            return 1.0
+        share = np.pi / 4 if self.cavity == "circle" else 1.0
+        return float(1.0 - share * self.size_m[0] * self.size_m[1] / (self.pitch_m[0] * self.pitch_m[1]))
+
+
+@dataclass(frozen=True)
+class Test:
+    """One row of tests.csv: one pull, its load and its covariates."""
+
+    __test__ = False  # not a pytest class
+
+    test_id: str
+    file: str
+    sample: str
+    normal_load_N: float
+    specimen: str
+    direction: str = ""
+    speed_m_s: float | None = None
+    hold_s: float | None = None
+    repeat: int | None = None
+    run_order: int | None = None
+    specimen_run: int | None = None
+    started_at: str = ""
+    temperature_C: float | None = None
+    humidity_pct: float | None = None
+    operator: str = ""
+    exclude: str = ""
+    covariates: Mapping[str, str] = field(default_factory=dict)
+    row: int | None = None
+
+
+@dataclass(frozen=True)
+class SetAside:
+    """A test that takes no part in the results, and why."""
+
+    test_id: str
+    reason: str
+    problems: tuple[Problem, ...] = ()
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign as described by campaign.toml and tests.csv; nothing of raw/ is read yet.
+
+    ``tests`` are the usable rows, ``set_aside`` the rows with faults or an ``exclude`` reason.
+    ``samples`` maps each sample name to its pattern (``Sx`` is pattern S pulled along x).
+    """
+
+    title: str
+    root: Path
+    nominal_area_m2: float
+    tests: tuple[Test, ...]
+    samples: Mapping[str, Pattern]
+    material: str = ""
+    counterface: str = ""
+    slider_mass_kg: float = 0.0
+    pull_speed_m_s: float | None = None
+    set_aside: tuple[SetAside, ...] = ()
+    problems: tuple[Problem, ...] = ()
+    columns: Mapping[str, str] = field(default_factory=dict)
+    instrument: Mapping[str, float] = field(default_factory=dict)
+
+    def area_fraction(self, sample: str) -> float:
+        """Contact area fraction of a sample."""
+        return self.samples[sample].area_fraction
+
+    def nominal_pressure_Pa(self, normal_load_N: float) -> float:
+        """p = N / A with A the nominal area."""
+        return normal_load_N / self.nominal_area_m2
+
+
+@dataclass(frozen=True)
+class ExportFormat:
+    """How an export was read: enough to read it again by hand."""
+
+    family: str
+    encoding: str
+    delimiter: str
+    decimal: str
+    header_rows: int
+    columns: Mapping[str, str]  # quantity -> "name [unit]" as the file spells it
+    reasons: Mapping[str, str] = field(default_factory=dict)  # quantity -> why that column
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Force against time of one export, in SI units, samples as recorded (never resampled).
+
+    Arrays share one length n >= 1. ``columns`` holds further quantities by SI name ("normal_force_N"),
+    ``metadata`` the file's own header untouched, ``flags`` what a reader doubted.
+    """
+
+    name: str
+    time_s: FloatArray
+    force_N: FloatArray
+    displacement_m: FloatArray | None = None
+    columns: Mapping[str, FloatArray] = field(default_factory=dict)
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    source: ExportFormat | None = None
+    file: str = ""
+    flags: tuple[str, ...] = ()
+    problems: tuple[Problem, ...] = ()
+
+
+@dataclass(frozen=True)
+class Pull:
+    """Static peak and sliding mean read off one trace by a named rule. Times on the trace's own clock.
+
+    ``*_u_N`` are standard uncertainties (k = 1) of the reading within the trace. ``zero_N`` was subtracted
+    from every force. ``window_s`` is the sliding window (start, end). NaN where a trace cannot tell.
+    """
+
+    test_id: str
+    rule: str
+    static_N: float
+    static_u_N: float
+    sliding_N: float
+    sliding_u_N: float
+    zero_N: float
+    zero_u_N: float
+    onset_s: float
+    peak_s: float
+    window_s: tuple[float, float]
+    rise_N_per_s: float = float("nan")
+    rise_stiffness_N_per_m: float = float("nan")
+    stick_slip_amplitude_N: float = float("nan")
+    stick_slip_period_s: float = float("nan")
+    noise_N: float = float("nan")
+    drift_N_per_s: float = float("nan")
+    flags: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class LawFit:
+    """A friction law fitted to one sample in one regime, with the full covariance of its parameters.
+
+    ``values`` and ``covariance`` follow ``parameters`` (for T = mu N + tau0 A: mu, tau0_Pa). ``dof`` are the
+    degrees of freedom of the t interval (specimens minus one where specimens were combined).
+    """
+
+    sample: str
+    regime: Regime
+    law: str
+    parameters: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+    dof: float
+    n_specimens: int
+    n_tests: int
+    method: str
+    chi2_red: float
+    nominal_area_m2: float
+    specimens: Mapping[str, FloatArray] = field(default_factory=dict)  # specimen -> its own values
+    notes: tuple[str, ...] = ()
+
+    def value(self, parameter: str) -> float:
+        return float(self.values[self.parameters.index(parameter)])
+
+    def standard_uncertainty(self, parameter: str) -> float:
+        k = self.parameters.index(parameter)
+        return float(np.sqrt(self.covariance[k, k]))
+
+    def interval(self, parameter: str, level: float = 0.95) -> tuple[float, float]:
+        """Two-sided t interval at ``level``."""
+        from scipy.stats import t
+
+        half = float(t.ppf(0.5 + level / 2, self.dof)) * self.standard_uncertainty(parameter)
+        return self.value(parameter) - half, self.value(parameter) + half
+
+    def force_N(self, normal_load_N: float | FloatArray) -> FloatArray:
+        """T = mu N + tau0 A of the fitted law, N in newton (any shape)."""
+        n = np.asarray(normal_load_N, float)
+        return np.asarray(self.value("mu") * n + self.value("tau0_Pa") * self.nominal_area_m2)
+
+    def force_u_N(self, normal_load_N: float | FloatArray) -> FloatArray:
+        """Standard uncertainty of :meth:`force_N`, from the full covariance."""
+        n = np.asarray(normal_load_N, float)
+        a = self.nominal_area_m2
+        c = self.covariance
+        return np.asarray(np.sqrt(c[0, 0] * n**2 + 2 * c[0, 1] * n * a + c[1, 1] * a**2))
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of the spring-block model: force of the slider along the pull, and what was read off it.
+
+    ``static_friction`` and ``sliding_friction`` are T/N (dimensionless), ``window_s`` the sliding window,
+    ``parameters`` every input with its unit in the name, ``moving`` the number of moving blocks.
+    """
+
+    sample: str
+    pressure_Pa: float
+    angle_deg: float
+    seed: int
+    time_s: FloatArray
+    force_N: FloatArray
+    moving: NDArray[np.int64]
+    normal_load_N: float
+    static_friction: float
+    sliding_friction: float
+    peak_s: float
+    window_s: tuple[float, float]
+    engine: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ComparisonRow:
+    """Measured and simulated friction force of one sample at one load, standard uncertainties beside them."""
+
+    sample: str
+    regime: Regime
+    normal_load_N: float
+    measured_N: float
+    measured_u_N: float
+    simulated_N: float
+    simulated_u_N: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Experiment against model: fits of both, and the forces at each measured load."""
+
+    campaign_title: str
+    nominal_area_m2: float
+    area_fractions: Mapping[str, float]
+    measured: tuple[LawFit, ...]
+    simulated: tuple[LawFit, ...]
+    rows: tuple[ComparisonRow, ...]
+    calibration: Mapping[str, float] = field(default_factory=dict)
+    flat: str = "F"
