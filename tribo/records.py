@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tribo.errors import Problem
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FloatArray = NDArray[np.float64]
 Regime = Literal["static", "sliding"]
@@ -271,3 +274,52 @@ class Comparison:
     rows: tuple[ComparisonRow, ...]
     calibration: Mapping[str, float] = field(default_factory=dict)
     flat: str = "F"
+
+
+@dataclass(frozen=True)
+class Ingested:
+    """A campaign with its exports read: one trace and one pull per usable test, the rest set aside."""
+
+    campaign: Campaign
+    traces: Mapping[str, Trace]
+    pulls: Mapping[str, Pull]
+    set_aside: tuple[SetAside, ...]
+
+    def table(self) -> pd.DataFrame:
+        """One row a usable test: test_id, sample, specimen, normal_load_N and what the pull says."""
+        import pandas as pd
+
+        rows = [
+            {
+                "test_id": test.test_id,
+                "sample": test.sample,
+                "specimen": test.specimen,
+                "normal_load_N": test.normal_load_N,
+                "static_N": pull.static_N,
+                "static_u_N": pull.static_u_N,
+                "sliding_N": pull.sliding_N,
+                "sliding_u_N": pull.sliding_u_N,
+            }
+            for test in self.campaign.tests
+            if (pull := self.pulls.get(test.test_id)) is not None
+        ]
+        return pd.DataFrame(rows)
+
+
+@dataclass(frozen=True)
+class Study:
+    """One campaign walked down the whole street.
+
+    ``fits`` holds the measured law of every sample and regime (T = mu N + tau0 A, the default weights),
+    ``other_fits`` the same under other weights or laws. ``simulated`` is the ensemble, one row a run: sample,
+    pressure_Pa, normal_load_N (p times the nominal area of the campaign), angle_deg, seed, static_N,
+    sliding_N. ``example_runs`` keeps a full force trace of the model per sample.
+    """
+
+    ingested: Ingested
+    fits: tuple[LawFit, ...] = ()
+    other_fits: tuple[LawFit, ...] = ()
+    comparison: Comparison | None = None
+    simulated: pd.DataFrame | None = None
+    example_runs: tuple[Run, ...] = ()
+    notes: tuple[str, ...] = ()
