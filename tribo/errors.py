@@ -44,9 +44,9 @@ class Problem:
             parts.append(f"; allowed: {self.allowed}")
         return "".join(parts)
 
-    def at(self, **place: str | int | None) -> Problem:
-        """The same problem with its place filled in; what is already known stays."""
-        return replace(self, **{k: v for k, v in place.items() if getattr(self, k) is None})
+    def at(self, *, file: str | None = None, test_id: str | None = None) -> Problem:
+        """The same problem with its file and test filled in; what is already known stays."""
+        return replace(self, file=self.file or file, test_id=self.test_id or test_id)
 
 
 class TriboError(Exception):
