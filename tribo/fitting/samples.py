@@ -1,0 +1,192 @@
+"""mu and tau0 of every sample: each specimen fitted first, then the specimens combined.
+
+Pulls of one specimen are not independent of each other: they share the specimen. The scatter that counts for
+another specimen of the same pattern is therefore that of the specimens' own values. With G specimens the
+interval of their mean by t(G-1) is exact for Gaussian specimens of equal precision, whatever the scatter of
+mu, of tau0 and of repeats; where precisions differ it is conservative at 95 % and above (Bakirov and Szekely,
+Zap. Nauchn. Sem. POMI 328 (2005) 5; Ibragimov and Mueller, J. Bus. Econ. Stat. 28 (2010) 453).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from tribo.errors import FitError, Problem
+from tribo.fitting.linear import LinearFit, least_squares
+from tribo.fitting.rows import Rows, sample_rows
+from tribo.fitting.weighting import WEIGHTS, Weights, weights_of
+from tribo.laws.table import LAWS
+from tribo.records import FloatArray, LawFit, Regime
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+LAW = LAWS["coulomb_adhesion"]
+LACK_OF_FIT_LEVEL = 0.01
+
+
+def fit_samples(
+    table: pd.DataFrame,
+    regime: Regime,
+    nominal_area_m2: float,
+    *,
+    weights: Weights = "relative",
+    by: Literal["specimens", "tests"] = "specimens",
+) -> tuple[LawFit, ...]:
+    """T = mu N + tau0 A of every sample, samples in alphabetical order.
+
+    Parameters
+    ----------
+    table : DataFrame
+        As returned by ``Ingested.table()``: sample, specimen, normal_load_N, static_N, sliding_N. Tests
+        without a force (NaN) are left out.
+    regime : "static" or "sliding"
+    nominal_area_m2 : float
+        A, in m2.
+    weights : "relative", "ratio" or "force"
+        Which scatter is constant over the loads; see :mod:`tribo.fitting.weighting`.
+    by : "specimens" or "tests"
+        "tests" pools all pulls as if they were independent; offered for comparison, its intervals are too
+        narrow wherever specimens differ.
+
+    Returns
+    -------
+    tuple of LawFit
+        ``covariance`` of (mu, tau0_Pa) is that of the mean over specimens, ``dof`` = G - 1. One specimen:
+        its own covariance, dof = n - 2, and a note. tau0 is never clamped. A sample whose tests cannot fix
+        the law has NaN values and a note that says why. ``chi2_red`` is the reduced chi-squared of the load
+        means about each specimen's line, the variance of a mean taken from its repeats (NaN without repeats).
+
+    Raises
+    ------
+    FitError
+        Missing columns, impossible loads or area, or no sample at all that can be fitted.
+    """
+    if not (np.isfinite(nominal_area_m2) and nominal_area_m2 > 0):
+        found = f"{nominal_area_m2:g} m2"
+        raise FitError(Problem("bad_area", "an impossible nominal area", found=found, allowed="above zero"))
+    samples = sample_rows(table, regime)
+    fits = tuple(_fit_sample(rows, regime, nominal_area_m2, weights, by) for rows in samples)
+    if not any(np.isfinite(fit.values).all() for fit in fits):
+        reasons = [Problem("too_few_loads", f"sample {fit.sample}: {fit.notes[-1]}") for fit in fits]
+        raise FitError(reasons or Problem("no_tests", "the table holds no test"))
+    return fits
+
+
+def combine(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean (k,) over specimens and its covariance (k, k) from their scatter; ``values`` is (G, k), G > 1."""
+    return values.mean(axis=0), np.atleast_2d(np.cov(values, rowvar=False)) / len(values)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Mean, its covariance and degrees of freedom, and how they came about."""
+
+    values: FloatArray
+    covariance: FloatArray
+    dof: float
+    method: str
+    notes: tuple[str, ...] = ()
+
+
+def _fit_sample(rows: Rows, regime: Regime, area: float, weights: Weights, by: str) -> LawFit:
+    notes: tuple[str, ...] = ()
+    if rows.n_missing:
+        notes = (f"{rows.n_missing} of {rows.n_missing + len(rows)} tests have no {regime} force",)
+    empty = LawFit(
+        rows.sample, regime, LAW.name, LAW.parameter_names, np.full(2, np.nan), np.full((2, 2), np.nan),
+        0.0, len(rows.specimens), len(rows), "none", float("nan"), area, notes=notes,
+    )  # fmt: skip
+    if len(np.unique(rows.load_N)) < 2:
+        return replace(empty, notes=(*notes, "tests at fewer than two loads cannot part mu from tau0"))
+    weight = weights_of(rows, area, weights)
+    own = {name: _line(rows, weight, rows.specimen == name, area) for name in rows.specimens}
+    usable = {name: fit for name, fit in own.items() if fit is not None}
+    part = _pooled(rows, weight, area) if by == "tests" else _specimens(rows, weight, area, usable)
+    ratio, bend = lack_of_fit(rows, weight, usable)
+    left_out = [name for name in own if name not in usable]
+    if left_out and usable:
+        notes += (f"left out, pulled at fewer than two loads: {', '.join(left_out)}",)
+    return replace(
+        empty,
+        values=part.values,
+        covariance=part.covariance,
+        dof=part.dof,
+        n_specimens=len(usable) or len(own),
+        method=f"{part.method}; weighted least squares, {WEIGHTS[weights]}",
+        chi2_red=ratio,
+        specimens={name: fit.values for name, fit in usable.items()},
+        notes=(*notes, *part.notes, *bend),
+    )
+
+
+def _line(rows: Rows, weight: FloatArray, keep: np.ndarray, area: float) -> LinearFit | None:
+    """The law of the kept rows, or None where they stand at fewer than two loads."""
+    load = rows.load_N[keep]
+    if len(np.unique(load)) < 2:
+        return None
+    return least_squares(LAW.design_matrix(load, area), rows.force_N[keep], weight[keep])
+
+
+def _specimens(rows: Rows, weight: FloatArray, area: float, own: dict[str, LinearFit]) -> _Part:
+    if not own:
+        return _one_load_each(rows, weight, area)
+    if len(own) == 1:
+        (fit,) = own.values()
+        note = "one specimen: the interval holds for it alone, not for the pattern"
+        method = "one specimen, scatter of its tests"
+        return _Part(fit.values, fit.covariance, float(fit.dof), method, (note,))
+    values, covariance = combine(np.array([fit.values for fit in own.values()]))
+    method = f"each specimen fitted, mean of {len(own)} specimens, t({len(own) - 1})"
+    return _Part(values, covariance, float(len(own) - 1), method)
+
+
+def _one_load_each(rows: Rows, weight: FloatArray, area: float) -> _Part:
+    """Every specimen stands at one load: the line through the specimens' means."""
+    index = [np.flatnonzero(rows.specimen == name) for name in rows.specimens]
+    load, force, w = (np.array([a[k].mean() for k in index]) for a in (rows.load_N, rows.force_N, weight))
+    fit = least_squares(LAW.design_matrix(load, area), force, w)
+    note = "each specimen was pulled at one load: its scatter cannot be told from that of its line"
+    return _Part(fit.values, fit.covariance, float(fit.dof), "line through the specimens' means", (note,))
+
+
+def _pooled(rows: Rows, weight: FloatArray, area: float) -> _Part:
+    fit = least_squares(LAW.design_matrix(rows.load_N, area), rows.force_N, weight)
+    note = "tests pooled as if independent: too narrow where specimens differ"
+    return _Part(fit.values, fit.covariance, float(fit.dof), "all tests pooled", (note,))
+
+
+def lack_of_fit(rows: Rows, weight: FloatArray, lines: dict[str, LinearFit]) -> tuple[float, tuple[str, ...]]:
+    """Reduced chi-squared of load means about the specimens' lines, and a note where they bend away.
+
+    The classical lack-of-fit ratio: weighted mean square of (cell mean - line) over that of the repeats about
+    their cell mean; a cell is one specimen at one load. NaN without repeats or with two loads only.
+    """
+    from scipy.stats import f as f_distribution
+
+    residual, cell, cells = [], [], 0
+    for name, fit in lines.items():
+        loads, index = np.unique(rows.load_N[rows.specimen == name], return_inverse=True)
+        residual.append(fit.residuals)
+        cell.append(index + cells)
+        cells += len(loads)
+    if not residual:
+        return float("nan"), ()
+    r, c = np.concatenate(residual), np.concatenate(cell)
+    count = np.bincount(c)
+    mean = np.bincount(c, r) / count
+    dof_line, dof_repeat = cells - 2 * len(lines), len(r) - cells
+    if dof_line < 1 or dof_repeat < 1:
+        return float("nan"), ()
+    repeat = float(((r - mean[c]) ** 2).sum()) / dof_repeat
+    if repeat == 0:
+        return float("nan"), ()
+    ratio = float((count * mean**2).sum()) / dof_line / repeat
+    p = float(f_distribution.sf(ratio, dof_line, dof_repeat))
+    if p >= LACK_OF_FIT_LEVEL:
+        return ratio, ()
+    note = f"the load means bend away from a straight line: chi2_red {ratio:.2f}, p = {p:.1g}"
+    return ratio, (note,)

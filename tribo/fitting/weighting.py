@@ -1,0 +1,60 @@
+"""What is assumed about the scatter of repeats, as weights of a least-squares fit.
+
+The law is one, T = mu N + tau0 A; what differs is which scatter is held constant over the loads:
+
+"relative"  the coefficient of variation of T: weights 1/T^2, with T from the fit itself (the default)
+"ratio"     the scatter of T/N: weights 1/N^2, the fit T/N = mu + tau0/p of the paper's Fig. 4
+"force"     the scatter of T: equal weights, the fit T = mu N + tau0 A of the paper's Figs. 6 and 7
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from tribo.errors import FitError, Problem
+from tribo.fitting.linear import least_squares
+from tribo.fitting.rows import Rows
+from tribo.laws.table import LAWS
+from tribo.records import FloatArray
+
+Weights = Literal["relative", "ratio", "force"]
+WEIGHTS: dict[str, str] = {
+    "relative": "constant relative scatter of T",
+    "ratio": "constant scatter of T/N",
+    "force": "constant scatter of T",
+}
+_ROUNDS = 4  # the weights move the fit by less than its error, and the fit moves the weights by far less
+_SMALLEST_SHARE = 0.05  # of the median force: where the fitted force nears zero its weight must not diverge
+
+
+def weights_of(rows: Rows, nominal_area_m2: float, weights: Weights) -> FloatArray:
+    """Weights (n,) in 1/N^2, shared by all specimens of a sample so that none gets its own.
+
+    Raises
+    ------
+    FitError
+        An unknown name; "ratio" with a load of zero, where T/N is singular.
+    """
+    if weights == "force":
+        return np.ones(len(rows))
+    if weights == "ratio":
+        if not rows.load_N.all():
+            what, allowed = "T/N has no value at zero load", "weights relative or force"
+            raise FitError(Problem("zero_load", what, column="normal_load_N", allowed=allowed))
+        return rows.load_N**-2.0
+    if weights == "relative":
+        return _relative(rows, nominal_area_m2)
+    allowed = ", ".join(WEIGHTS)
+    raise FitError(Problem("unknown_weights", "no such weights", found=str(weights), allowed=allowed))
+
+
+def _relative(rows: Rows, nominal_area_m2: float) -> FloatArray:
+    design = LAWS["coulomb_adhesion"].design_matrix(rows.load_N, nominal_area_m2)
+    floor = _SMALLEST_SHARE * float(np.median(np.abs(rows.force_N))) or 1.0
+    expected = np.full(len(rows), floor)
+    for _ in range(_ROUNDS):
+        fit = least_squares(design, rows.force_N, expected**-2.0)
+        expected = np.maximum(np.abs(design @ fit.values), floor)
+    return expected**-2.0
