@@ -1,0 +1,181 @@
+"""campaign.toml: what may stand in it, and every fault of it at once with its row."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from tribo.errors import Problem
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class CampaignTable(_Strict):
+    """[campaign]: what the whole campaign has in common."""
+
+    title: str
+    material: str = ""
+    counterface: str = ""
+    nominal_area_mm2: Positive
+    slider_mass_g: NotNegative = 0.0
+    pull_speed_mm_s: Positive | None = None
+
+
+class PatternTable(_Strict):
+    """[patterns.NAME]: geometry of one pattern, lengths in micrometre; one number is x and y alike."""
+
+    cavity: Literal["none", "circle", "square", "rectangle"]
+    diameter_um: Positive | None = None
+    size_um: Positive | list[Positive] | None = None
+    pitch_um: Positive | list[Positive] | None = None
+    staggered: bool = False
+    area_fraction: Annotated[float, Field(gt=0, le=1)] | None = None
+
+    @property
+    def size(self) -> tuple[float, float] | None:
+        """(x, y) of a cavity in micrometre."""
+        return _pair(self.diameter_um if self.cavity == "circle" else self.size_um)
+
+    @property
+    def pitch(self) -> tuple[float, float] | None:
+        """(x, y) of the lattice in micrometre."""
+        return _pair(self.pitch_um)
+
+    @model_validator(mode="after")
+    def _keys_fit_the_cavity(self) -> PatternTable:
+        wanted = {"none": (), "circle": ("diameter_um", "pitch_um")}.get(self.cavity, ("size_um", "pitch_um"))
+        given = [key for key in ("diameter_um", "size_um", "pitch_um") if getattr(self, key) is not None]
+        missing = [key for key in wanted if key not in given]
+        unused = [key for key in given if key not in wanted]
+        if missing:
+            raise ValueError(f"a cavity of kind {self.cavity} needs {' and '.join(missing)}")
+        if unused:
+            raise ValueError(f"a cavity of kind {self.cavity} takes no {' and no '.join(unused)}")
+        return self
+
+    @model_validator(mode="after")
+    def _cavities_stand_apart(self) -> PatternTable:
+        if self.cavity == "none":
+            return self
+        if self.size is None or self.pitch is None:
+            raise ValueError("size_um and pitch_um are one number or [x, y]")
+        if self.cavity == "square" and self.size[0] != self.size[1]:
+            raise ValueError("a square has one size_um; take cavity = rectangle")
+        if self.size[0] >= self.pitch[0] or self.size[1] >= self.pitch[1]:
+            raise ValueError("the pitch must be larger than the cavity, or cavities touch")
+        return self
+
+
+class InstrumentTable(_Strict):
+    """[instrument]: standard uncertainties (k = 1) and properties of the rig."""
+
+    load_cell_u_percent: NotNegative | None = None
+    load_cell_u_N: NotNegative | None = None
+    load_cell_range_N: Positive | None = None
+    mass_u_g: NotNegative | None = None
+    normal_load_u_percent: NotNegative | None = None
+    area_u_percent: NotNegative | None = None
+    wire_angle_deg: Annotated[float, Field(gt=-90, lt=90)] | None = None
+    wire_angle_u_deg: NotNegative | None = None
+    stiffness_N_per_m: Positive | None = None
+    sampling_rate_Hz: Positive | None = None
+
+
+class CampaignFile(_Strict):
+    """The whole of campaign.toml."""
+
+    campaign: CampaignTable
+    patterns: Annotated[dict[str, PatternTable], Field(min_length=1)]
+    columns: dict[str, str] = {}
+    instrument: InstrumentTable = InstrumentTable()
+
+
+def _pair(value: float | list[float] | None) -> tuple[float, float] | None:
+    if isinstance(value, list):
+        return (value[0], value[1]) if len(value) == 2 else None
+    return None if value is None else (value, value)
+
+
+def read_description(path: Path, file: str, problems: list[Problem]) -> CampaignFile | None:
+    """campaign.toml as checked tables; None where it cannot be used; every fault goes to ``problems``."""
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+        return CampaignFile.model_validate(tomllib.loads(text))
+    except FileNotFoundError:
+        problems.append(Problem("missing_file", f"a campaign needs a {file}", file=file))
+    except UnicodeDecodeError as why:
+        row = why.object[: why.start].count(b"\n") + 1
+        problems.append(Problem("not_utf8", "TOML files are UTF-8", file=file, row=row))
+    except tomllib.TOMLDecodeError as why:
+        row_said = re.search(r"line (\d+)", str(why))
+        row = int(row_said.group(1)) if row_said else text.count("\n") + 1
+        problems.append(Problem("not_toml", f"not TOML: {why}", file=file, row=row))
+    except ValidationError as why:
+        problems.extend(_problem(error, text, file) for error in why.errors())
+    return None
+
+
+def _problem(error: Any, text: str, file: str) -> Problem:
+    path = [str(part) for part in error["loc"] if not _is_branch(part)]
+    row = _row_of(path, text)
+    column = ".".join(path)
+    found = None if error["type"] == "missing" else _shown(error["input"])
+    if error["type"] == "extra_forbidden":
+        allowed = _allowed_keys(path)
+        near = difflib.get_close_matches(path[-1], allowed, 1, 0.5)
+        hint = f"did you mean {near[0]}?" if near else ", ".join(allowed)
+        return Problem("unknown_key", "no such key", file, row, column, path[-1], hint)
+    if error["type"] == "missing":
+        return Problem("missing_key", "this key is required", file, row, column)
+    what = error["msg"].removeprefix("Value error, ")
+    return Problem("wrong_value", what[:1].lower() + what[1:], file, row, column, found)
+
+
+def _is_branch(part: object) -> bool:
+    """pydantic names the branch of a union in its path: "float", "list[float]"."""
+    return isinstance(part, str) and (part in {"float", "int", "str"} or "[" in part)
+
+
+def _shown(value: object) -> str | None:
+    return None if isinstance(value, dict) else str(value)
+
+
+def _allowed_keys(path: Sequence[str]) -> list[str]:
+    """Keys of the table that holds ``path``."""
+    tables: dict[str, type[BaseModel]] = {
+        "campaign": CampaignTable,
+        "patterns": PatternTable,
+        "instrument": InstrumentTable,
+    }
+    table = CampaignFile if len(path) == 1 else tables[path[0]]
+    return list(table.model_fields)
+
+
+def _row_of(path: Sequence[str], text: str) -> int | None:
+    """Line of the deepest part of ``path`` that stands in the file: the key in its table, else the table."""
+    lines = text.split("\n")
+    for depth in range(len(path), 0, -1):
+        dotted = r"\s*\.\s*".join(f'"?{re.escape(part)}"?' for part in path[:depth])
+        header = re.compile(rf"\s*\[\s*{dotted}\s*\]")
+        start = next((k for k, line in enumerate(lines) if header.match(line)), None)
+        if start is None:
+            continue
+        for k in range(start + 1, len(lines)):
+            if re.match(r"\s*\[", lines[k]):
+                break
+            if depth < len(path) and re.match(rf'\s*"?{re.escape(path[depth])}"?\s*=', lines[k]):
+                return k + 1
+        return start + 1
+    key = re.compile(rf'\s*"?{re.escape(path[0])}"?\s*=') if path else None
+    return next((k + 1 for k, line in enumerate(lines) if key and key.match(line)), None)

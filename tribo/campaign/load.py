@@ -1,0 +1,278 @@
+"""From campaign.toml and tests.csv to a Campaign in SI units."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path, PurePosixPath
+
+from tribo.campaign.described import CampaignFile, PatternTable, read_description
+from tribo.campaign.table import COUNTS, KNOWN, LOADS, NUMBERS, TestRow, read_tests_table
+from tribo.errors import CampaignError, Problem
+from tribo.records import STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
+
+_NOT_WORTH_A_NOTE = (".", "~$", "Thumbs.db")
+TOML = "campaign.toml"
+TESTS = "tests.csv"
+RAW = "raw"
+_MM2, _GRAM, _MM, _UM = 1e-6, 1e-3, 1e-3, 1e-6
+_NUMBER_ROW = re.compile(rb'^\s*"?[-+]?[.,]?\d+[.,\d]*"?\s*[,;\t|]', re.M)
+
+
+def load_campaign(folder: Path | str) -> Campaign:
+    """Read campaign.toml and tests.csv of a folder; of raw/ only which files there are.
+
+    Returns
+    -------
+    Campaign
+        SI units. ``tests`` are the usable rows, ``set_aside`` those with a fault or an ``exclude`` reason,
+        ``problems`` every fault and note.
+
+    Raises
+    ------
+    CampaignError
+        campaign.toml is wrong, a required column is missing, or no test is usable: with the faults of both
+        files.
+    """
+    root = Path(folder)
+    problems: list[Problem] = []
+    described = read_description(root / TOML, TOML, problems)
+    rows = read_tests_table(root / TESTS, TESTS, problems)
+    if described is None or rows is None:
+        raise CampaignError(problems)
+    patterns = {name: _pattern(name, table) for name, table in described.patterns.items()}
+    usable, set_aside = _sort_rows(root, rows, patterns)
+    problems += [p for s in set_aside for p in s.problems]
+    if not usable:
+        nothing = Problem("no_usable_test", "no test of this campaign can be used", file=TESTS)
+        raise CampaignError([*problems, nothing])
+    problems += _unlisted(root, rows)
+    tests = tuple(_test(row, described) for row in usable)
+    return _campaign(root, described, patterns, tests, set_aside, problems)
+
+
+def _campaign(
+    root: Path,
+    described: CampaignFile,
+    patterns: Mapping[str, Pattern],
+    tests: tuple[Test, ...],
+    set_aside: tuple[SetAside, ...],
+    problems: Sequence[Problem],
+) -> Campaign:
+    general = described.campaign
+    order = list(patterns)
+    names = sorted({t.sample for t in tests}, key=lambda n: (order.index(_pattern_of(n, patterns)), n))
+    return Campaign(
+        title=general.title,
+        root=root,
+        nominal_area_m2=general.nominal_area_mm2 * _MM2,
+        tests=tests,
+        samples={name: patterns[_pattern_of(name, patterns)] for name in names},
+        material=general.material,
+        counterface=general.counterface,
+        slider_mass_kg=general.slider_mass_g * _GRAM,
+        pull_speed_m_s=None if general.pull_speed_mm_s is None else general.pull_speed_mm_s * _MM,
+        set_aside=set_aside,
+        problems=tuple(problems),
+        columns=described.columns,
+        instrument=described.instrument.model_dump(exclude_none=True),
+    )
+
+
+def _pattern(name: str, table: PatternTable) -> Pattern:
+    def metres(pair: tuple[float, float] | None) -> tuple[float, float] | None:
+        return None if pair is None else (pair[0] * _UM, pair[1] * _UM)
+
+    return Pattern(
+        name=name,
+        cavity=table.cavity,
+        size_m=metres(table.size),
+        pitch_m=metres(table.pitch),
+        staggered=table.staggered,
+        measured_area_fraction=table.area_fraction,
+    )
+
+
+def _pattern_of(sample: str, patterns: Mapping[str, Pattern]) -> str:
+    """Name of the pattern of a sample ("S" for "Sx"); "" where there is none."""
+    if sample in patterns:
+        return sample
+    return sample[:-1] if sample[-1:] in ("x", "y") and sample[:-1] in patterns else ""
+
+
+def _sort_rows(
+    root: Path, rows: Sequence[TestRow], patterns: Mapping[str, Pattern]
+) -> tuple[list[TestRow], tuple[SetAside, ...]]:
+    """Usable rows, and the others with all their faults; rows that share a test_id are one set-aside test."""
+    places: dict[str, list[int]] = {}
+    for row in rows:
+        places.setdefault(row.test_id, []).append(row.row)
+    usable, set_aside = [], []
+    for row in rows:
+        test_id = row.test_id
+        if row.row != places[test_id][0]:
+            continue
+        problems = _row_faults(root, row, patterns)
+        if len(places[test_id]) > 1:
+            problems.append(_duplicate(test_id, places[test_id]))
+        if problems:
+            problems = [p.at(test_id=test_id) for p in problems]
+            set_aside.append(SetAside(test_id, "; ".join(map(str, problems)), tuple(problems)))
+        elif row.cells.get("exclude"):
+            set_aside.append(SetAside(test_id, f"excluded by hand: {row.cells['exclude']}"))
+        else:
+            usable.append(row)
+    return usable, tuple(set_aside)
+
+
+def _duplicate(test_id: str, rows: Sequence[int]) -> Problem:
+    what = f"this test_id stands in rows {', '.join(map(str, rows))}; none of them is used"
+    return Problem("duplicate_row", what, TESTS, rows[1], "test_id", test_id, "one row a test")
+
+
+def _row_faults(root: Path, row: TestRow, patterns: Mapping[str, Pattern]) -> list[Problem]:
+    if row.fault is not None:
+        return [row.fault]
+    problems = []
+    if not row.cells["test_id"]:
+        problems.append(Problem("no_test_id", "a test needs a test_id", TESTS, row.row, "test_id"))
+    problems += _sample_faults(row, patterns)
+    problems += _number_faults(row)
+    problems += _file_faults(root, row)
+    return problems
+
+
+def _sample_faults(row: TestRow, patterns: Mapping[str, Pattern]) -> list[Problem]:
+    sample = row.cells["sample"]
+    if _pattern_of(sample, patterns):
+        return []
+    near = difflib.get_close_matches(sample, patterns, 1)
+    hint = f"; did you mean {near[0]}?" if near else ""
+    allowed = f"{', '.join(patterns)}, or one of them with x or y{hint}"
+    return [Problem("unknown_sample", "no pattern of this name", TESTS, row.row, "sample", sample, allowed)]
+
+
+def _number(row: TestRow, column: str) -> float | None:
+    """A cell as a number; None where it is empty. ValueError where it is none."""
+    cell = row.cells.get(column, "")
+    if not cell:
+        return None
+    if "_" in cell:
+        raise ValueError(cell)
+    value = float(cell.replace(",", ".") if row.decimal_comma and "." not in cell else cell)
+    if not math.isfinite(value):
+        raise ValueError(cell)
+    return value
+
+
+def _number_faults(row: TestRow) -> list[Problem]:
+    problems, loads, at = [], [], (TESTS, row.row)
+    for column in (*NUMBERS, *COUNTS):
+        cell = row.cells.get(column, "")
+        try:
+            value = _number(row, column)
+        except ValueError:
+            kind = "load_not_a_number" if column in LOADS else "not_a_number"
+            problems.append(Problem(kind, "not a number", *at, column, cell, "a number"))
+            continue
+        if column in LOADS and value is not None:
+            loads.append((column, value))
+        if column in COUNTS and value is not None and value != int(value):
+            problems.append(Problem("not_a_number", "not a count", *at, column, cell, "1, 2, ..."))
+        if column in ("speed_mm_s", "hold_s") and value is not None and value < 0:
+            problems.append(Problem("negative", "cannot be negative", *at, column, cell, "0 or more"))
+    return problems + _load_faults(row, dict(loads))
+
+
+def _load_faults(row: TestRow, loads: Mapping[str, float]) -> list[Problem]:
+    """normal_load_N must be positive; a sled may carry no mass of its own, but none may be negative."""
+    at = (TESTS, row.row)
+    if not loads and not any(row.cells.get(column) for column in LOADS):
+        return [Problem("no_load", "no load", *at, " or ".join(LOADS), None, "mass_g or normal_load_N")]
+    if loads.get("normal_load_N", 1.0) <= 0:
+        found, what = row.cells["normal_load_N"], "a load must be positive"
+        return [Problem("load_not_positive", what, *at, "normal_load_N", found, "more than 0 N")]
+    if "normal_load_N" not in loads and loads.get("mass_g", 1.0) < 0:
+        found, what = row.cells["mass_g"], "a mass cannot be negative"
+        return [Problem("load_not_positive", what, *at, "mass_g", found, "0 g or more")]
+    return []
+
+
+def _file_faults(root: Path, row: TestRow) -> list[Problem]:
+    name = row.cells["file"]
+    place = (TESTS, row.row, "file", name)
+    path = _relative(name)
+    if path is None or not (root / path).resolve().is_relative_to(root.resolve()):
+        what = "the path points outside the campaign"
+        return [Problem("path_outside_campaign", what, *place, "a path below the campaign folder")]
+    if (root / path).is_file():
+        return []
+    folder = (root / path).parent
+    beside = [p.name for p in folder.iterdir()] if folder.is_dir() else []
+    near = [n for n in beside if n.lower() == path.name.lower()]
+    near = near or difflib.get_close_matches(path.name, beside, 1, 0.9)
+    hint = f"a file of the campaign{f' (there is {near[0]})' if near else ''}"
+    return [Problem("missing", "no such file" if name else "no file given", *place, hint)]
+
+
+def _relative(name: str) -> PurePosixPath | None:
+    """A path inside the campaign, "/" between its parts; None for one that leaves it."""
+    path = PurePosixPath(name.replace("\\", "/"))
+    if path.is_absolute() or ".." in path.parts or "\0" in name or re.match(r"[A-Za-z]:", name):
+        return None
+    return path
+
+
+def _test(row: TestRow, described: CampaignFile) -> Test:
+    """A row without faults as a Test. N = normal_load_N, or (mass + slider mass) g."""
+    cells = row.cells
+    numbers = {column: _number(row, column) for column in NUMBERS}
+    counts = {c: None if (v := _number(row, c)) is None else int(v) for c in COUNTS}
+    speed = numbers["speed_mm_s"] if numbers["speed_mm_s"] is not None else described.campaign.pull_speed_mm_s
+    load = numbers["normal_load_N"]
+    if load is None:
+        load = ((numbers["mass_g"] or 0.0) + described.campaign.slider_mass_g) * _GRAM * STANDARD_GRAVITY
+    sample = cells["sample"]
+    directed = sample[-1:] if sample not in described.patterns else ""
+    return Test(
+        test_id=cells["test_id"],
+        file=str(_relative(cells["file"])),
+        sample=sample,
+        normal_load_N=load,
+        specimen=cells.get("specimen") or sample,
+        direction=cells.get("direction") or directed,
+        speed_m_s=None if speed is None else speed * _MM,
+        hold_s=numbers["hold_s"],
+        repeat=counts["repeat"],
+        run_order=counts["run_order"],
+        specimen_run=counts["specimen_run"],
+        started_at=cells.get("started_at", ""),
+        temperature_C=numbers["temperature_C"],
+        humidity_pct=numbers["humidity_pct"],
+        operator=cells.get("operator", ""),
+        covariates={name: cell for name, cell in cells.items() if name and name not in KNOWN},
+        row=row.row,
+    )
+
+
+def _unlisted(root: Path, rows: Sequence[TestRow]) -> list[Problem]:
+    """Notes on files of raw/ that no row names."""
+    named = {str(_relative(row.cells.get("file", ""))) for row in rows}
+    notes = []
+    for path in sorted((root / RAW).rglob("*")) if (root / RAW).is_dir() else []:
+        name = path.relative_to(root).as_posix()
+        if not path.is_file() or name in named or path.name.startswith(_NOT_WORTH_A_NOTE):
+            continue
+        if _holds_numbers(path):
+            notes.append(Problem("not_listed", f"an export that {TESTS} does not name; not read", file=name))
+        else:
+            what = f"no export, and {TESTS} does not name it; not read"
+            notes.append(Problem("not_an_export_and_not_listed", what, file=name))
+    return notes
+
+
+def _holds_numbers(path: Path) -> bool:
+    with path.open("rb") as stream:
+        return len(_NUMBER_ROW.findall(stream.read(8000))) > 2

@@ -1,0 +1,109 @@
+"""tests.csv: rows of cells by column name, whatever its delimiter, and the faults of the table itself."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from tribo.errors import Problem
+
+REQUIRED = ("test_id", "file", "sample")
+LOADS = ("mass_g", "normal_load_N")
+NUMBERS = ("mass_g", "normal_load_N", "speed_mm_s", "hold_s", "temperature_C", "humidity_pct")
+COUNTS = ("repeat", "run_order", "specimen_run")
+TEXTS = ("specimen", "direction", "started_at", "operator", "exclude")
+KNOWN = (*REQUIRED, *NUMBERS, *COUNTS, *TEXTS)
+
+
+@dataclass(frozen=True)
+class TestRow:
+    """One line of tests.csv: ``row`` counts lines from 1, ``fault`` says that its cells cannot be trusted."""
+
+    __test__ = False
+
+    row: int
+    cells: Mapping[str, str]
+    decimal_comma: bool
+    fault: Problem | None = None
+
+    @property
+    def test_id(self) -> str:
+        return self.cells.get("test_id") or f"row {self.row}"
+
+
+def read_tests_table(path: Path, file: str, problems: list[Problem]) -> list[TestRow] | None:
+    """The rows of tests.csv; None where the table cannot be used, with every fault added to ``problems``."""
+    try:
+        text = _decoded(path.read_bytes())
+    except FileNotFoundError:
+        problems.append(Problem("missing_file", f"a campaign needs a {file}", file=file))
+        return None
+    lines = text.splitlines()
+    first = next((k for k, line in enumerate(lines) if line.strip()), None)
+    if first is None:
+        problems.append(Problem("empty", "no header and no test", file=file))
+        return None
+    delimiter = max(",;\t|", key=lines[first].count)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
+    names: list[str] | None = None
+    rows = []
+    for cells in reader:
+        stripped = [cell.strip() for cell in cells]
+        if not any(stripped):
+            continue
+        if names is None:
+            names, header_row = stripped, reader.line_num
+            continue
+        rows.append(_row(stripped, names, reader.line_num, delimiter, file))
+    found = _header_faults(names or [], file, header_row)
+    problems.extend(found)
+    return None if any(p.kind != "resembles_a_column" for p in found) else rows
+
+
+def _decoded(raw: bytes) -> str:
+    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return raw.decode("utf-16", errors="replace")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("cp1252", errors="replace")
+
+
+def _row(cells: list[str], names: list[str], row: int, delimiter: str, file: str) -> TestRow:
+    while len(cells) > len(names) and not cells[-1]:
+        cells.pop()
+    fault = None
+    if len(cells) != len(names):
+        what = f"{len(cells)} cells under {len(names)} column names"
+        fault = Problem("wrong_number_of_cells", what, file, row, found=delimiter.join(cells)[:80])
+    return TestRow(row, dict(zip(names, cells, strict=False)), delimiter != ",", fault)
+
+
+def _header_faults(names: list[str], file: str, row: int) -> list[Problem]:
+    problems = []
+    unknown = [n for n in names if n not in KNOWN]
+    for name in sorted({n for n in names if n and names.count(n) > 1}):
+        problems.append(Problem("duplicate_column", "this column stands twice", file, row, name))
+    wanted = [*(n for n in REQUIRED if n not in names)]
+    if not any(n in names for n in LOADS):
+        wanted.append(" or ".join(LOADS))
+    for name in wanted:
+        near = difflib.get_close_matches(name.split(" or ")[0], unknown, 1)
+        found = f"{near[0]} (did you mean {name}?)" if near else ", ".join(names)
+        problems.append(Problem("missing_column", "this column is required", file, row, name, found))
+    if not problems:
+        problems += [_resembling(n, names, file, row) for n in unknown if _near(n, names)]
+    return problems
+
+
+def _near(name: str, names: list[str]) -> list[str]:
+    return difflib.get_close_matches(name, [n for n in KNOWN if n not in names], 1, 0.8)
+
+
+def _resembling(name: str, names: list[str], file: str, row: int) -> Problem:
+    what = f"kept as a covariate; did you mean {_near(name, names)[0]}?"
+    return Problem("resembles_a_column", what, file, row, name)
