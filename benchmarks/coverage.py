@@ -107,7 +107,7 @@ def _sample(name: str, mu: float, tau0_Pa: float, design: Design, rng: np.random
 
 
 def specimens_first(table: pd.DataFrame, weights: str) -> Iterator[LawFit]:
-    yield from fit_samples(table, "static", AREA_M2, weights=weights)  # type: ignore[arg-type]
+    yield from fit_samples(table, "static", AREA_M2, weights=weights)
 
 
 def pooled(table: pd.DataFrame) -> Iterator[LawFit]:

@@ -206,7 +206,9 @@ def test_t_over_n_is_refused_at_zero_load_and_the_other_weights_take_it() -> Non
 
 def test_unknown_weights_are_refused_with_what_is_allowed() -> None:
     with pytest.raises(FitError, match="relative, ratio, force"):
-        fit_samples(campaign({"F": THREE}), "static", AREA, weights="heavy")  # type: ignore[arg-type]
+        fit_samples(campaign({"F": THREE}), "static", AREA, weights="heavy")
+    with pytest.raises(FitError, match="specimens, tests"):
+        fit_samples(campaign({"F": THREE}), "static", AREA, by="days")
 
 
 def test_pooling_the_tests_is_narrower_than_the_specimens_where_specimens_differ() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from tribo.errors import FitError, Problem
 from tribo.fitting.rows import sample_rows
-from tribo.fitting.weighting import WEIGHTS, Weights, weights_of
+from tribo.fitting.weighting import WEIGHTS, weights_of
 from tribo.laws.table import LAWS
 from tribo.records import LawFit, Regime
 
@@ -24,7 +24,7 @@ def mixed_model(
     regime: Regime,
     nominal_area_m2: float,
     *,
-    weights: Weights = "relative",
+    weights: str = "relative",
 ) -> LawFit | None:
     """One sample's T = mu N + tau0 A with random mu and tau0 per specimen (statsmodels MixedLM, REML).
 

@@ -10,14 +10,14 @@ Zap. Nauchn. Sem. POMI 328 (2005) 5; Ibragimov and Mueller, J. Bus. Econ. Stat. 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tribo.errors import FitError, Problem
 from tribo.fitting.linear import LinearFit, least_squares
 from tribo.fitting.rows import Rows, sample_rows
-from tribo.fitting.weighting import WEIGHTS, Weights, weights_of
+from tribo.fitting.weighting import WEIGHTS, weights_of
 from tribo.laws.table import LAWS
 from tribo.records import FloatArray, LawFit, Regime
 
@@ -33,8 +33,8 @@ def fit_samples(
     regime: Regime,
     nominal_area_m2: float,
     *,
-    weights: Weights = "relative",
-    by: Literal["specimens", "tests"] = "specimens",
+    weights: str = "relative",
+    by: str = "specimens",
 ) -> tuple[LawFit, ...]:
     """T = mu N + tau0 A of every sample, samples in alphabetical order.
 
@@ -63,8 +63,10 @@ def fit_samples(
     Raises
     ------
     FitError
-        Missing columns, impossible loads or area, or no sample at all that can be fitted.
+        Missing columns, impossible loads or area, unknown weights, or no sample that can be fitted.
     """
+    if by not in ("specimens", "tests"):
+        raise FitError(Problem("unknown_nesting", "no such way to combine", found=by, allowed="specimens, tests"))
     if not (np.isfinite(nominal_area_m2) and nominal_area_m2 > 0):
         found = f"{nominal_area_m2:g} m2"
         raise FitError(Problem("bad_area", "an impossible nominal area", found=found, allowed="above zero"))
@@ -92,7 +94,7 @@ class _Part:
     notes: tuple[str, ...] = ()
 
 
-def _fit_sample(rows: Rows, regime: Regime, area: float, weights: Weights, by: str) -> LawFit:
+def _fit_sample(rows: Rows, regime: Regime, area: float, weights: str, by: str) -> LawFit:
     notes: tuple[str, ...] = ()
     if rows.n_missing:
         notes = (f"{rows.n_missing} of {rows.n_missing + len(rows)} tests have no {regime} force",)

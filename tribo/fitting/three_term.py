@@ -10,7 +10,7 @@ import numpy as np
 from tribo.errors import FitError, Problem
 from tribo.fitting.linear import LinearFit, least_squares
 from tribo.fitting.rows import Rows, sample_rows
-from tribo.fitting.weighting import WEIGHTS, Weights, weights_of
+from tribo.fitting.weighting import WEIGHTS, weights_of
 from tribo.laws.table import LAWS
 from tribo.records import FloatArray, LawFit, Regime
 
@@ -26,7 +26,7 @@ def fit_three_term(
     nominal_area_m2: float,
     area_fractions: Mapping[str, float],
     *,
-    weights: Weights = "relative",
+    weights: str = "relative",
 ) -> LawFit:
     """T = mu N + (a AF + b) A, one mu, a and b for all samples; ``sample`` of the result is "all".
 
@@ -69,7 +69,7 @@ def fit_three_term(
 
 
 def _stack(
-    used: list[Rows], area: float, area_fractions: Mapping[str, float], weights: Weights
+    used: list[Rows], area: float, area_fractions: Mapping[str, float], weights: str
 ) -> tuple[FloatArray, FloatArray, FloatArray, np.ndarray]:
     design = [LAW.design_matrix(rows.load_N, area, area_fractions[rows.sample]) for rows in used]
     weight = [weights_of(rows, area, weights) for rows in used]

@@ -9,8 +9,6 @@ The law is one, T = mu N + tau0 A; what differs is which scatter is held constan
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 
 from tribo.errors import FitError, Problem
@@ -19,7 +17,6 @@ from tribo.fitting.rows import Rows
 from tribo.laws.table import LAWS
 from tribo.records import FloatArray
 
-Weights = Literal["relative", "ratio", "force"]
 WEIGHTS: dict[str, str] = {
     "relative": "constant relative scatter of T",
     "ratio": "constant scatter of T/N",
@@ -29,7 +26,7 @@ _ROUNDS = 4  # the weights move the fit by less than its error, and the fit move
 _SMALLEST_SHARE = 0.05  # of the median force: where the fitted force nears zero its weight must not diverge
 
 
-def weights_of(rows: Rows, nominal_area_m2: float, weights: Weights) -> FloatArray:
+def weights_of(rows: Rows, nominal_area_m2: float, weights: str) -> FloatArray:
     """Weights (n,) in 1/N^2, shared by all specimens of a sample so that none gets its own.
 
     Raises
@@ -47,7 +44,7 @@ def weights_of(rows: Rows, nominal_area_m2: float, weights: Weights) -> FloatArr
     if weights == "relative":
         return _relative(rows, nominal_area_m2)
     allowed = ", ".join(WEIGHTS)
-    raise FitError(Problem("unknown_weights", "no such weights", found=str(weights), allowed=allowed))
+    raise FitError(Problem("unknown_weights", "no such weights", found=weights, allowed=allowed))
 
 
 def _relative(rows: Rows, nominal_area_m2: float) -> FloatArray:
