@@ -173,6 +173,7 @@ class Pull:
     noise_N: float = float("nan")
     drift_N_per_s: float = float("nan")
     flags: tuple[str, ...] = ()
+    problems: tuple[Problem, ...] = ()
 
 
 @dataclass(frozen=True)

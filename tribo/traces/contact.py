@@ -1,0 +1,130 @@
+"""Before motion: the zero of the force, the onset of the pull and the slope of its rise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tribo.records import FloatArray
+from tribo.traces.statistics import mean, median, running_mean, wander
+
+_LOW, _HIGH = 0.25, 0.75  # share of the first half-way level between which the slope of the rise is taken
+_DETECTABLE = 12.0  # a pull rises by at least this many times the sample noise
+_FEWEST_FOR_ZERO = 5
+
+
+@dataclass(frozen=True)
+class Zero:
+    """Force before contact: mean, standard uncertainty, middle of the time it was seen, variance rate of its wander."""
+
+    force_N: float
+    u_N: float
+    time_s: float
+    wander_rate: float = 0.0
+
+    @property
+    def seen(self) -> bool:
+        return not math.isnan(self.u_N)
+
+
+@dataclass(frozen=True)
+class Rise:
+    """The loading line: ``rate`` in N/s through (time, force), and the indices it was fitted between."""
+
+    rate: float
+    time_s: float
+    force_N: float
+    first: int
+    last: int
+
+    def at(self, time_s: FloatArray) -> FloatArray:
+        return self.force_N + self.rate * (time_s - self.time_s)
+
+    def reaches(self, force_N: float) -> float:
+        """Time at which the loading line passes ``force_N``."""
+        return self.time_s + (force_N - self.force_N) / self.rate
+
+
+def line(time_s: FloatArray, force_N: FloatArray) -> tuple[float, float, float]:
+    """Least-squares line as (slope, mean time, mean force); slope 0 where all times are equal."""
+    t = mean(time_s)
+    f = mean(force_N)
+    away = time_s - t
+    spread = float(away @ away)
+    return (float(away @ force_N) / spread if spread > 0 else 0.0), t, f
+
+
+def smoothing_width(samples: int) -> int:
+    """Samples averaged before levels are searched: none up to 2000 samples, then a two-thousandth of the trace."""
+    return max(1, samples // 2000)
+
+
+def first_rise(time_s: FloatArray, smooth: FloatArray, noise: float) -> Rise | None:
+    """The first climb through a quarter to three quarters of the first maximum-like level, or None without one.
+
+    The level is refined once: the half-way crossing of the whole range finds the climb, and what the force
+    reaches where it stops climbing at that pace sets the level.
+    """
+    start = median(smooth[: max(_FEWEST_FOR_ZERO, smooth.size // 50)])
+    full = float(smooth.max()) - start
+    if full < _DETECTABLE * noise:
+        return None
+    for _ in range(2):
+        high = int(np.argmax(smooth >= start + _HIGH * full))
+        below = np.flatnonzero(smooth[:high] <= start + _LOW * full)
+        low = int(below[-1]) + 1 if below.size else 0
+        low, high = (low, high) if high > low else (max(low - 1, 0), max(high, low, 1))
+        slope, t, f = line(time_s[low : high + 1], smooth[low : high + 1])
+        if slope <= 0:
+            return None
+        rise = Rise(slope, t, f, low, high)
+        full = float(smooth[: departure(time_s, smooth, rise, 0.1 * full) + 1].max()) - start
+    return rise
+
+
+def departure(time_s: FloatArray, smooth: FloatArray, rise: Rise, margin: float) -> int:
+    """Index of the first sample after the rise that lies more than ``margin`` below the loading line; else the last."""
+    lag = rise.at(time_s[rise.last :]) - smooth[rise.last :]
+    beyond = lag > margin
+    return rise.last + (int(np.argmax(beyond)) if beyond.any() else beyond.size - 1)
+
+
+def zero_before(time_s: FloatArray, force: FloatArray, rise: Rise, noise: float) -> Zero:
+    """Zero from the samples before contact: their median and its uncertainty, correlation counted.
+
+    The zero phase ends a tenth of the rise before the loading line comes down to its level, so that a rounded toe
+    does not enter. With fewer than five samples, or if the force climbs all the way, no zero is seen.
+    """
+    last = rise.first
+    level = median(force[: max(_FEWEST_FOR_ZERO, last // 2)])
+    for _ in range(2):
+        climb = time_s[rise.last] - rise.reaches(level)
+        last = int(np.searchsorted(time_s, rise.reaches(level) - 0.1 * climb))
+        if last < _FEWEST_FOR_ZERO:
+            return Zero(0.0, math.nan, float(time_s[0]))
+        level = median(force[:last])
+    before = force[:last]
+    slope = line(time_s[:last], before)[0]
+    if abs(slope) > 0.3 * rise.rate:
+        return Zero(0.0, math.nan, float(time_s[0]))
+    kept = before[np.abs(before - level) <= 4.0 * max(noise, _spread(before))]
+    slow = wander(kept, float(time_s[last - 1] - time_s[0]))
+    u = max(slow.mean_u, noise / math.sqrt(last))
+    return Zero(mean(kept), u, mean(time_s[:last]), slow.rate)
+
+
+def _spread(values: FloatArray) -> float:
+    away = values - mean(values)
+    return math.sqrt(float(away @ away) / values.size)
+
+
+def onset_time(time_s: FloatArray, rise: Rise, zero: Zero) -> float:
+    """Where the loading line leaves the zero; the first sample if it does so before the record begins."""
+    return float(max(rise.reaches(zero.force_N), time_s[0]))
+
+
+def smoothed(force: FloatArray) -> FloatArray:
+    """Force averaged over :func:`smoothing_width` samples."""
+    return running_mean(force, smoothing_width(force.size))

@@ -1,0 +1,120 @@
+"""What is wrong with a trace before any friction is read off it: spikes, clipping, sign, order of time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tribo.errors import Problem
+from tribo.records import FloatArray, Trace
+from tribo.traces.statistics import sample_noise
+
+MINIMUM_SAMPLES = 20
+SPIKE_OVER_NOISE = 10.0
+SPIKE_OVER_NEIGHBOURS = 4.0
+SPIKE_WIDTHS = (1, 2)
+_NEIGHBOURS = 4
+_CHANCE_OF_FLAT_TOP = 1e-4
+_SHORTEST_FLAT_TOP = 4
+
+
+def file_row(trace: Trace, index: int) -> int:
+    """Line of the export (from 1) that sample ``index`` stands on, as far as the reader said."""
+    return index + 1 + (trace.source.header_rows if trace.source else 0)
+
+
+def unreadable(trace: Trace) -> list[Problem]:
+    """Faults that leave no signal to read: too few samples, gaps, numbers that are none, time running back."""
+    n = trace.force_N.size
+    if n < MINIMUM_SAMPLES:
+        what = f"a pull of {n} samples cannot be read"
+        return [Problem("too_short", what, trace.file, found=str(n), allowed=f"{MINIMUM_SAMPLES} or more")]
+    problems = []
+    for name, values in (("time", trace.time_s), ("force", trace.force_N)):
+        finite = np.isfinite(values)
+        if not finite.all():
+            at = int(np.argmin(finite))
+            what = f"{int(n - finite.sum())} values of the {name} are missing"
+            problems.append(Problem("nan_gap", what, trace.file, file_row(trace, at), name))
+    back = np.diff(trace.time_s) < 0
+    if back.any():
+        at = int(np.argmax(back)) + 1
+        found = f"{trace.time_s[at]:g} s after {trace.time_s[at - 1]:g} s"
+        problems.append(
+            Problem("time_goes_back", "the time runs back", trace.file, file_row(trace, at), "time", found)
+        )
+    return problems
+
+
+def impulse_spikes(force: FloatArray, noise: float) -> NDArray[np.bool_]:
+    """Mask (n,) of one- or two-sample impulses: out and back by far more than noise and than the samples around.
+
+    A sample belongs to an impulse if the steps into and out of it have opposite signs and the smaller of the two
+    exceeds ``SPIKE_OVER_NOISE`` times the noise and ``SPIKE_OVER_NEIGHBOURS`` times the largest step within
+    ``_NEIGHBOURS`` samples on either side. The apex of a pull and stick-slip have like steps beside them.
+    """
+    steps = np.diff(force)
+    mask = np.zeros(force.size, bool)
+    for width in SPIKE_WIDTHS:
+        into, out = steps[:-width], steps[width:]
+        height = np.where(into * out < 0, np.minimum(np.abs(into), np.abs(out)), 0.0)
+        for k in np.flatnonzero(height > SPIKE_OVER_NOISE * noise):
+            around = np.abs(
+                np.concatenate((steps[max(0, k - _NEIGHBOURS) : k], steps[k + width + 1 :][:_NEIGHBOURS]))
+            )
+            if around.size and height[k] > SPIKE_OVER_NEIGHBOURS * around.max():
+                mask[k + 1 : k + 1 + width] = True
+    return mask
+
+
+def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ...]:
+    """One Problem of kind ``spike`` a spiked sample, naming its row, time and value."""
+    return tuple(
+        Problem(
+            "spike",
+            f"an impulse at {trace.time_s[k]:.6g} s; the sample is left out",
+            trace.file or None,
+            file_row(trace, int(k)),
+            "force",
+            f"{trace.force_N[k]:.6g} N",
+        )
+        for k in np.flatnonzero(spikes)
+    )
+
+
+def without_spikes(force: FloatArray, spikes: NDArray[np.bool_]) -> FloatArray:
+    """The force with spiked samples replaced by a straight line between their neighbours."""
+    if not spikes.any():
+        return force
+    index = np.arange(force.size)
+    return np.interp(index, index[~spikes], force[~spikes])
+
+
+def flat_top(force: FloatArray) -> tuple[int, int] | None:
+    """(first index, length) of a run of equal samples at the largest force that chance does not give, or None.
+
+    Chance is the share of equal neighbours elsewhere in the trace: a coarse resolution repeats values everywhere,
+    clipping only at the top.
+    """
+    top = force >= force.max() - 1e-9 * float(np.ptp(force))
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], top, [False]))))
+    starts, lengths = edges[::2], edges[1::2] - edges[::2]
+    longest = int(np.argmax(lengths))
+    run = int(lengths[longest])
+    if run < _SHORTEST_FLAT_TOP:
+        return None
+    pairs = force[1:] == force[:-1]
+    inside = top[1:] & top[:-1]
+    elsewhere = max(int((~inside).sum()), 1)
+    share = (int((pairs & ~inside).sum()) + 1.0) / (elsewhere + 2.0)
+    if (run - 1) * math.log(share) + math.log(force.size) > math.log(_CHANCE_OF_FLAT_TOP):
+        return None
+    return int(starts[longest]), run
+
+
+def noise_of(force: FloatArray) -> float:
+    """Sample noise, or a sliver of the range where the trace has none, so that it can stand in a denominator."""
+    floor = 1e-6 * float(np.ptp(force))
+    return max(sample_noise(force), floor)

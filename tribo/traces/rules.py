@@ -1,0 +1,138 @@
+"""Named rules by which static and sliding friction are read off a pull, as a plain table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tribo.errors import Problem, TraceError
+from tribo.traces.apex import Apex, rounded_apex
+from tribo.traces.motion import Motion
+from tribo.traces.sliding import settled
+
+Parameters = Mapping[str, float]
+Window = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A rule: what it takes as static and as sliding friction, in words and as functions, and where it stands.
+
+    ``static(motion, parameters)`` returns the peak, ``sliding(motion, parameters)`` the range of samples to average.
+    Lengths are in metres, shares dimensionless.
+    """
+
+    name: str
+    static_part: str
+    sliding_part: str
+    source: str
+    static: Callable[[Motion, Parameters], Apex]
+    sliding: Callable[[Motion, Parameters], Window]
+    parameters: Parameters = field(default_factory=dict)
+
+
+def first_peak(motion: Motion, parameters: Parameters) -> Apex:
+    """The first maximum of the force."""
+    return motion.apex
+
+
+def highest_in_skip(motion: Motion, parameters: Parameters) -> Apex:
+    """The highest force in the skipped length after the onset: the first peak unless a later one tops it."""
+    end = _after(motion, parameters["skip_m"], motion.onset_s)
+    first = motion.sliding[0]
+    later = motion.smooth_N[first:end]
+    if later.size < 3 or float(later.max()) <= motion.apex.force_N + 3.0 * motion.noise_N:
+        return motion.apex
+    return rounded_apex(motion.time_s, motion.force_N, first + int(np.argmax(later)), 3, motion.noise_N)
+
+
+def once_stabilised(motion: Motion, parameters: Parameters) -> Window:
+    """From when the force has stabilised (MSER-5) to the end of sliding."""
+    first, end = motion.sliding
+    return first + settled(motion.force_N[first:end]), end
+
+
+def stabilised_length(motion: Motion, parameters: Parameters) -> Window:
+    """From when the force has stabilised to ``length_m`` of travel after the static peak."""
+    start, end = once_stabilised(motion, parameters)
+    return start, min(end, _after(motion, parameters["length_m"], motion.apex.time_s))
+
+
+def length_after_skip(motion: Motion, parameters: Parameters) -> Window:
+    """``length_m`` of travel after ``skip_m`` of travel since the onset."""
+    start = _after(motion, parameters["skip_m"], motion.onset_s)
+    end = _after(motion, parameters["skip_m"] + parameters["length_m"], motion.onset_s)
+    return max(start, motion.sliding[0]), min(end, motion.sliding[1])
+
+
+def middle_share(motion: Motion, parameters: Parameters) -> Window:
+    """The middle ``share`` of the stroke, which runs from the onset to the end of sliding."""
+    onset = int(np.searchsorted(motion.time_s, motion.onset_s))
+    end = motion.sliding[1]
+    margin = int((end - onset) * (1.0 - parameters["share"]) / 2.0)
+    return max(onset + margin, motion.sliding[0]), end - margin
+
+
+def _after(motion: Motion, length_m: float, since_s: float) -> int:
+    """Index of the first sample ``length_m`` of travel after the time ``since_s``."""
+    if motion.travel_m is None:
+        what = "this rule counts travel, and neither a displacement nor a speed is known"
+        raise TraceError(
+            Problem("no_displacement", what, allowed="a displacement column, or speed_mm_s in tests.csv")
+        )
+    start = float(np.interp(since_s, motion.time_s, motion.travel_m))
+    beyond = motion.travel_m >= start + length_m
+    return int(np.argmax(beyond)) if beyond.any() else int(motion.travel_m.size)
+
+
+RULES: dict[str, Rule] = {
+    rule.name: rule
+    for rule in (
+        Rule(
+            "seed",
+            "first maximum of the force",
+            "mean from when the force has stabilised (MSER-5) to the end of sliding",
+            "Berardo et al. 2019, Materials & Design 107930; stabilised: White 1997, Simulation 69, 323",
+            first_peak,
+            once_stabilised,
+        ),
+        Rule(
+            "astm_d1894",
+            "initial maximum of the force",
+            "mean during uniform sliding, up to 130 mm of travel",
+            "ASTM D1894 (the travel recalled, not checked against the standard)",
+            first_peak,
+            stabilised_length,
+            {"length_m": 0.130},
+        ),
+        Rule(
+            "iso_8295",
+            "maximum at the start of motion",
+            "mean over the first 60 mm, the static peak and what follows until it has stabilised left out",
+            "ISO 8295 (the travel recalled, not checked against the standard)",
+            first_peak,
+            stabilised_length,
+            {"length_m": 0.060},
+        ),
+        Rule(
+            "skip_length",
+            "highest force in the skipped travel",
+            "mean over a given travel after the skip",
+            "as in ASTM D2534",
+            highest_in_skip,
+            length_after_skip,
+            {"skip_m": 0.013, "length_m": 0.150},
+        ),
+        Rule(
+            "middle_share",
+            "maximum at the start of motion",
+            "mean over the middle share of the stroke",
+            "common practice on reciprocating rigs",
+            first_peak,
+            middle_share,
+            {"share": 0.4},
+        ),
+    )
+}

@@ -1,0 +1,134 @@
+"""Noise, wander and the uncertainty of a mean whose samples are correlated."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tribo.records import FloatArray
+
+BLOCKS = (
+    16  # blocks a window is cut into; enough for a variogram, few enough to be longer than the correlation
+)
+_LAGS = np.arange(1, BLOCKS // 4 + 1)
+_SLOPE_U = (
+    0.35  # standard uncertainty of a variogram's slope over BLOCKS blocks, as a share of level over mean lag
+)
+_MEDIAN_TO_SD = 1.4826  # of a normal distribution
+
+
+def median(values: FloatArray) -> float:
+    """Median of a non-empty array; np.median without its overhead on short arrays."""
+    n = values.size
+    half = n // 2
+    if n % 2:
+        return float(np.partition(values, half)[half])
+    ordered = np.partition(values, half)
+    return 0.5 * float(ordered[half] + ordered[:half].max())
+
+
+def sample_noise(values: FloatArray) -> float:
+    """Standard deviation of the sample-to-sample noise, blind to levels, slopes and single jumps.
+
+    Median of the absolute second differences, scaled for white normal noise (factor sqrt 6). Where more than half
+    of them vanish (a coarse resolution), their root mean square. NaN for fewer than three samples.
+    """
+    if values.size < 3:
+        return math.nan
+    second = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
+    typical = _MEDIAN_TO_SD * median(second)
+    if typical <= 0.0:
+        typical = math.sqrt(float(second @ second) / second.size)
+    return typical / math.sqrt(6.0)
+
+
+def mean(values: FloatArray) -> float:
+    """Mean of a non-empty array, without the overhead of np.mean on short arrays."""
+    return float(np.add.reduce(values)) / values.size
+
+
+def _mean_square(values: FloatArray) -> float:
+    return float(values @ values) / values.size
+
+
+def block_means(values: FloatArray, blocks: int = BLOCKS) -> FloatArray:
+    """Means of ``blocks`` consecutive equal blocks (fewer where there are fewer samples); a remainder is left out."""
+    length = max(1, values.size // blocks)
+    count = values.size // length
+    return np.asarray(np.add.reduce(values[: count * length].reshape(count, length), axis=1) / length)
+
+
+def condense(values: FloatArray, factor: int) -> FloatArray:
+    """Means of ``factor`` consecutive samples; a remainder is left out."""
+    if factor <= 1:
+        return values
+    count = values.size // factor
+    return np.asarray(np.add.reduce(values[: count * factor].reshape(count, factor), axis=1) / factor)
+
+
+def running_mean(values: FloatArray, width: int) -> FloatArray:
+    """Centred mean over ``width`` samples (made odd), shorter at the ends; same length as ``values``."""
+    half = width // 2
+    if half == 0:
+        return values
+    total = np.concatenate(([0.0], np.cumsum(values)))
+    index = np.arange(values.size)
+    low = np.maximum(index - half, 0)
+    high = np.minimum(index + half + 1, values.size)
+    return np.asarray((total[high] - total[low]) / (high - low))
+
+
+@dataclass(frozen=True)
+class Wander:
+    """How a steady signal departs from its mean: ``mean_u`` from short-lived noise, ``rate`` from a slow walk.
+
+    ``mean_u`` is the standard uncertainty of the mean from correlated but stationary noise; ``rate`` the variance
+    a random walk gathers per second (unit of the signal squared, per second).
+    """
+
+    mean_u: float
+    rate: float
+
+
+def wander(values: FloatArray, duration_s: float) -> Wander:
+    """Split the departures of ``values`` (spread evenly over ``duration_s``) into stationary noise and a slow walk.
+
+    The mean squared difference of block means h blocks apart is 2 s^2 + q (h - 1/3) t_block for noise of block
+    variance s^2 on top of a random walk of variance rate q (the 1/3 is what averaging within blocks takes off).
+    A straight line through the variogram at lags of 1 to a quarter of the blocks gives both. So few blocks leave
+    the slope uncertain: the rate returned lies half-way between the slope's expectation and a walk that explains
+    all the variance that white noise leaves, never a lucky zero.
+    """
+    means = block_means(values)
+    count = means.size
+    if count < 4:
+        spread = float(values.std(ddof=1)) / math.sqrt(values.size) if values.size > 1 else math.nan
+        return Wander(spread, 0.0)
+    lags = _LAGS[: max(2, count // 4)]
+    squares = np.array([_mean_square(means[h:] - means[:-h]) for h in lags])
+    weights = (count - lags) / lags  # long lags overlap, so they tell less
+    weights /= weights.sum()
+    x = lags - 1.0 / 3.0
+    centre = float(weights @ x)
+    level = float(weights @ squares)
+    away = weights * (x - centre)
+    slope = float(away @ squares) / float(away @ x)
+    white = sample_noise(values) ** 2 * count / values.size
+    most = max(level - 2.0 * white, 0.0) / centre
+    slope = (_mean_within(slope, _SLOPE_U * level / centre, most) + most) / 2.0
+    noise = max(level - slope * centre, 2.0 * white) / 2.0
+    return Wander(math.sqrt(noise / count), slope * count / duration_s if duration_s > 0 else 0.0)
+
+
+def _mean_within(estimate: float, u: float, most: float) -> float:
+    """Mean of a normal distribution (estimate, u) cut off below 0 and above ``most``: what the bounds leave to expect."""
+    if most <= 0.0 or u <= 0.0:
+        return 0.0
+    low, high = -estimate / u, (most - estimate) / u
+    mass = 0.5 * (math.erf(high / math.sqrt(2.0)) - math.erf(low / math.sqrt(2.0)))
+    if mass < 1e-6:
+        return min(max(estimate, 0.0), most)
+    density = (math.exp(-low * low / 2.0) - math.exp(-high * high / 2.0)) / math.sqrt(2.0 * math.pi)
+    return estimate + u * density / mass
