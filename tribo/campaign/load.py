@@ -107,8 +107,10 @@ def _sort_rows(
 ) -> tuple[list[TestRow], tuple[SetAside, ...]]:
     """Usable rows, and the others with all their faults; rows that share a test_id are one set-aside test."""
     places: dict[str, list[int]] = {}
+    users: dict[str, list[str]] = {}
     for row in rows:
         places.setdefault(row.test_id, []).append(row.row)
+        users.setdefault(row.cells.get("file", ""), []).append(row.test_id)
     usable, set_aside = [], []
     for row in rows:
         test_id = row.test_id
@@ -117,6 +119,11 @@ def _sort_rows(
         problems = _row_faults(root, row, patterns)
         if len(places[test_id]) > 1:
             problems.append(_duplicate(test_id, places[test_id]))
+        others = [other for other in users[row.cells.get("file", "")] if other != test_id]
+        if others and row.cells["file"]:
+            what = f"this export is given for {', '.join(others)} too; none of them is used"
+            place = (TESTS, row.row, "file", row.cells["file"])
+            problems.append(Problem("duplicate_file", what, *place, "one export a test"))
         if problems:
             problems = [p.at(test_id=test_id) for p in problems]
             set_aside.append(SetAside(test_id, "; ".join(map(str, problems)), tuple(problems)))

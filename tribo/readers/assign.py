@@ -1,4 +1,4 @@
-"""Which column is which quantity, in what unit. Nothing is guessed: a doubt is an error that says what to do."""
+"""Which column is which quantity, in what unit. Nothing is guessed: a doubt is an error."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from tribo.records import FloatArray
 _FOR_PANDAS_BYTES = 300_000  # numpy starts faster, pandas runs faster; both round to the nearest double
 _MOST_PROBLEMS = 50
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-_TWO_MARKS = re.compile(r"[-+]?\d+(?:[.,' \u202f\xa0]\d+)*[.,]\d*(?:[.,]\d*)+")
+_OTHER_MARK = "another decimal mark, or more than one"
 _NOTHING = frozenset({"", "nan", "n/a", "na", "#n/a", "--", "---", "-", "null", "none"})
 
 
@@ -105,7 +105,8 @@ def _cut_short(source: Source, layout: Layout) -> bool:
     """Whether the last row breaks off inside its last number: no line end, fewer decimals than all others."""
     if source.data.endswith((b"\n", b" ")):
         return False
-    tail = source.text(source.data[-4000:]).split("\n")[1:]
+    start = max(source.line_start(layout.header_rows), len(source.data) - 4000)
+    tail = source.text(source.data[start:]).split("\n")[1:]
     last_cells = [cut(line, layout.delimiter)[-1] for line in tail if line.strip()]
     decimals = [len(cell.partition(layout.decimal)[2]) for cell in last_cells]
     return len(decimals) > 4 and len(set(decimals[:-1])) == 1 and decimals[-1] < decimals[0]
@@ -158,15 +159,23 @@ def _cell_faults(
             start, count = gaps.get(index, (k, 0))
             gaps[index] = (start, count + 1)
             continue
-        if _NUMBER.fullmatch(cell.replace(",", ".") if layout.decimal == "," and "." not in cell else cell):
+        fault = _not_a_number(cell, layout.decimal)
+        if fault is None:
             continue
-        kind, what = "text_in_numbers", "letters where a number should be"
-        if _TWO_MARKS.fullmatch(cell) or (layout.decimal == "," and "." in cell) or "," in cell:
-            kind, what = "two_decimal_marks", "more than one kind of decimal mark"
+        kind, what = fault
         allowed = f"a number with decimal {'comma' if layout.decimal == ',' else 'point'}"
         place: dict[str, Any] = {"file": source.file, "row": k + 1, "column": _name(layout, index)}
         problems.append(Problem(kind, what, found=cell, allowed=allowed, **place))
     return problems
+
+
+def _not_a_number(cell: str, decimal: str) -> tuple[str, str] | None:
+    """(kind, what) of a cell that is no number with this decimal mark, None where it is one."""
+    if _NUMBER.fullmatch(cell.replace(",", ".") if decimal == "," and "." not in cell else cell):
+        return None if decimal == "." or "." not in cell else ("two_decimal_marks", _OTHER_MARK)
+    if re.fullmatch(r"[-+\d.,'\s]+", cell):
+        return "two_decimal_marks", _OTHER_MARK
+    return "text_in_numbers", "letters where a number should be"
 
 
 def _gap_problems(source: Source, layout: Layout, gaps: dict[int, tuple[int, int]]) -> list[Problem]:

@@ -43,7 +43,10 @@ def cut(line: str, delimiter: str) -> list[str]:
         return line.replace('"', "").split()
     if '"' not in line:
         return [cell.strip() for cell in line.split(delimiter)]
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+    except csv.Error:
+        return [cell.strip(' "') for cell in line.split(delimiter)]
 
 
 def sniff(source: Source, named: Callable[[str], bool]) -> Layout:

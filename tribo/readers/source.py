@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import codecs
-import re
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 from tribo.errors import Problem, ReadError
 
-HEAD_BYTES = 6_000
+HEAD_BYTES = 2_500
 LARGEST_HEAD_BYTES = 400_000
 LARGEST_FILE_BYTES = 1_000_000_000
 _WIDE_BOMS = {
@@ -19,13 +18,14 @@ _WIDE_BOMS = {
     codecs.BOM_UTF16_LE: "utf-16",
     codecs.BOM_UTF16_BE: "utf-16",
 }
+_ASCII = bytes(range(128))
 # Letters and signs that western machines write; anything else makes cp1252 an unlikely reading.
 _PLAUSIBLE = frozenset("äöüÄÖÜßéèêëàâçîïôùûÉÈÀÇñÑåÅøØæÆáíóúìòãõµ°²³±·×«»‘’“”–—…€ \xa0")
 
 
 @dataclass(frozen=True)
 class Source:
-    """An export as bytes: no BOM, wide encodings made UTF-8, lines ending in ``\\n`` (or ``\\r\\n``)."""
+    """An export as bytes: no BOM, wide encodings made UTF-8, lines ending in ``\\n``."""
 
     path: Path
     file: str
@@ -40,7 +40,7 @@ class Source:
         head = self.data[: self.head_bytes]
         if len(self.data) > self.head_bytes:
             head = head[: head.rfind(b"\n") + 1] or head
-        return tuple(line.rstrip("\r") for line in self.text(head).split("\n"))
+        return tuple(self.text(head).split("\n"))
 
     @property
     def has_more(self) -> bool:
@@ -80,8 +80,8 @@ def open_source(path: Path, file: str) -> Source:
         if b"\0" in raw[:HEAD_BYTES]:
             raise ReadError(Problem("binary", "not a text export", file=file, allowed="a text export"))
         encoding, data = _narrow_encoding(raw), raw
-    if b"\r" in data and b"\n" not in data:
-        data = data.replace(b"\r", b"\n")
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     return Source(path, file, data, encoding)
 
 
@@ -106,7 +106,7 @@ def _narrow_encoding(raw: bytes) -> str:
         return "utf-8"
     except UnicodeDecodeError:
         pass
-    strange = b"".join(re.findall(rb"[\x80-\xff]+", raw[:LARGEST_HEAD_BYTES]))
+    strange = raw.translate(None, delete=_ASCII)
     try:
         if set(strange.decode("cp1252")) <= _PLAUSIBLE:
             return "cp1252"

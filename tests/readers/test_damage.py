@@ -1,0 +1,238 @@
+"""Every kind of damage is named with its row and column, and nothing changes silently."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tribo.campaign import load_campaign
+from tribo.errors import Problem, ReadError
+from tribo.readers import read_export
+
+from .tables import Dialect, ramp, written
+
+NAMES = ("Time", "Extension", "Load")
+UNITS = ("s", "mm", "N")
+HEADER_ROWS = 2
+DIALECTS = {
+    "quoted": Dialect(quoted=True, line_end="\r\n"),
+    "semicolon": Dialect(delimiter=";", decimal=","),
+    "tab": Dialect(delimiter="\t", encoding="utf-8-sig"),
+    "plain": Dialect(),
+}
+
+
+def problems_of(path: Path, data: bytes) -> tuple[Problem, ...]:
+    path.write_bytes(data)
+    with pytest.raises(ReadError) as caught:
+        read_export(path)
+    assert all(p.file == str(path) for p in caught.value.problems)
+    return caught.value.problems
+
+
+@pytest.fixture(params=DIALECTS)
+def dialect(request: pytest.FixtureRequest) -> Dialect:
+    return DIALECTS[request.param]
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "T1.csv"
+
+
+def test_an_empty_file_is_empty(path: Path) -> None:
+    assert problems_of(path, b"")[0].kind == "empty"
+    assert problems_of(path, b" \r\n\n")[0].kind == "empty"
+
+
+def test_a_byte_order_mark_alone_is_no_export(path: Path) -> None:
+    assert problems_of(path, b"\xef\xbb\xbf")[0].kind == "bom_only"
+    assert problems_of(path, b"\xff\xfe")[0].kind == "bom_only"
+
+
+def test_a_missing_file_is_missing(path: Path) -> None:
+    with pytest.raises(ReadError) as caught:
+        read_export(path)
+    assert caught.value.problems[0].kind == "missing"
+
+
+def test_a_header_without_rows_is_named_with_its_row(path: Path, dialect: Dialect) -> None:
+    found = problems_of(path, written([], NAMES, UNITS, dialect))
+    assert [(p.kind, p.row) for p in found] == [("header_only", 1)]
+
+
+def test_a_note_is_no_export(path: Path) -> None:
+    assert problems_of(path, b"call the supplier\nbefore noon\n")[0].kind == "not_an_export"
+
+
+def test_a_binary_file_is_no_export(path: Path) -> None:
+    assert problems_of(path, b"\x89PNG\r\n\0\0\0\r1234")[0].kind == "binary"
+
+
+@pytest.mark.parametrize("keep", [5, 9, 15])
+def test_a_last_row_that_breaks_off_is_truncated(path: Path, dialect: Dialect, keep: int) -> None:
+    whole = written(ramp(), NAMES, UNITS, dialect)
+    end = dialect.line_end.encode()
+    start = whole.rstrip().rfind(end) + len(end)
+    found = problems_of(path, whole[: start + keep])
+    assert [(p.kind, p.row) for p in found] == [("truncated_mid_row", HEADER_ROWS + 20)]
+
+
+def test_a_last_number_cut_short_is_truncated_where_all_others_have_more_digits(path: Path) -> None:
+    whole = written(ramp(), NAMES, UNITS, Dialect(last_line_end=False))
+    found = problems_of(path, whole[:-2])
+    assert [(p.kind, p.row, p.column) for p in found] == [("truncated_mid_row", 22, "Load")]
+
+
+def test_letters_in_numbers_are_each_named(path: Path, dialect: Dialect) -> None:
+    rows = ramp()
+    rows[3][2] = rows[3][2].replace("0", "O")
+    rows[7][0] = rows[7][0].replace("0", "O", 1)
+    found = problems_of(path, written(rows, NAMES, UNITS, dialect))
+    assert [(p.kind, p.row, p.column) for p in found] == [
+        ("text_in_numbers", HEADER_ROWS + 4, "Load"),
+        ("text_in_numbers", HEADER_ROWS + 8, "Time"),
+    ]
+
+
+def test_letters_in_the_first_row_do_not_turn_it_into_a_header(path: Path, dialect: Dialect) -> None:
+    rows = ramp()
+    rows[0][1] = "0.0O000"
+    found = problems_of(path, written(rows, NAMES, UNITS, dialect))
+    assert [(p.kind, p.row, p.column) for p in found] == [("text_in_numbers", HEADER_ROWS + 1, "Extension")]
+
+
+@pytest.mark.parametrize("nothing", ["NaN", "", "n/a", "inf"])
+def test_a_gap_is_one_problem_with_its_first_row_and_length(
+    path: Path, dialect: Dialect, nothing: str
+) -> None:
+    rows = ramp()
+    for k in range(6, 11):
+        rows[k][2] = nothing
+    found = problems_of(path, written(rows, NAMES, UNITS, dialect))
+    assert [(p.kind, p.row, p.column) for p in found] == [("nan_gap", HEADER_ROWS + 7, "Load")]
+    assert found[0].what.startswith("5 rows")
+
+
+@pytest.mark.parametrize("change", [lambda row: row[:2], lambda row: [*row, "1.0"]])
+def test_a_row_of_another_length_is_named(path: Path, dialect: Dialect, change: Callable) -> None:
+    rows = ramp()
+    rows[9] = change(rows[9])
+    found = problems_of(path, written(rows, NAMES, UNITS, dialect))
+    assert [(p.kind, p.row) for p in found] == [("wrong_number_of_cells", HEADER_ROWS + 10)]
+
+
+def test_time_that_runs_back_is_named_at_the_first_earlier_row(path: Path, dialect: Dialect) -> None:
+    rows = ramp()
+    found = problems_of(path, written(rows[:12] + rows[6:], NAMES, UNITS, dialect))
+    assert [(p.kind, p.row) for p in found] == [("time_goes_back", HEADER_ROWS + 13)]
+
+
+def test_repeated_times_are_read_and_flagged(path: Path) -> None:
+    rows = ramp()
+    rows[5][0] = rows[4][0]
+    path.write_bytes(written(rows, NAMES, UNITS))
+    assert "time_repeats" in read_export(path).flags
+
+
+@pytest.mark.parametrize("number", ["1.234,5", "1,234.5", "1.2.3"])
+def test_two_decimal_marks_in_a_number_are_named(path: Path, number: str) -> None:
+    rows = ramp()
+    rows[4][2] = number
+    text = "\n".join(["Time\tExtension\tLoad", "s\tmm\tN", *("\t".join(r) for r in rows)]) + "\n"
+    found = problems_of(path, text.encode())
+    assert [(p.kind, p.row, p.column, p.found) for p in found] == [("two_decimal_marks", 7, "Load", number)]
+
+
+def test_a_point_in_a_table_of_decimal_commas_is_named(path: Path) -> None:
+    rows = ramp()
+    data = written(rows, NAMES, UNITS, DIALECTS["semicolon"]).replace(b";0,02700", b";0.02700")
+    assert [(p.kind, p.row) for p in problems_of(path, data)] == [("two_decimal_marks", 6)]
+
+
+def test_a_comma_that_is_both_delimiter_and_decimal_mark_is_refused(path: Path) -> None:
+    data = written(ramp(), NAMES, UNITS, Dialect(delimiter=",", decimal=","))
+    assert problems_of(path, data)[0].kind == "decimal_is_delimiter"
+
+
+@pytest.mark.parametrize("unit", ["foo", "mm", "V"])
+def test_an_unknown_unit_is_an_error_with_row_and_column(path: Path, unit: str) -> None:
+    found = problems_of(path, written(ramp(), NAMES, ("s", "mm", unit)))
+    assert [(p.kind, p.row, p.column, p.found) for p in found] == [("unknown_unit", 2, "Load", unit)]
+
+
+def test_a_missing_unit_is_an_error_and_all_faults_come_at_once(path: Path) -> None:
+    found = problems_of(path, written(ramp(), NAMES, ("", "furlongs per day", "N")))
+    assert {(p.kind, p.column) for p in found} == {("missing_unit", "Time"), ("unknown_unit", "Extension")}
+
+
+def test_a_missing_column_says_how_to_name_it(path: Path) -> None:
+    found = problems_of(path, written(ramp(), ("Time", "Extension", "Voltage"), ("s", "mm", "V")))
+    assert [p.kind for p in found] == ["missing_column"]
+    assert "friction_force =" in (found[0].allowed or "")
+    assert "Voltage" in (found[0].allowed or "")
+
+
+def test_an_override_that_names_nothing_offers_the_nearest_column(path: Path) -> None:
+    path.write_bytes(written(ramp(), NAMES, UNITS))
+    with pytest.raises(ReadError, match="did you mean Load"):
+        read_export(path, columns={"force": "Laod [N]"})
+    with pytest.raises(ReadError, match="did you mean displacement"):
+        read_export(path, columns={"displacment": "Extension"})
+
+
+def test_the_spoiled_campaign_is_named_fault_by_fault_and_the_rest_reads_as_in_the_clean_one(
+    shared: Path, practice: Callable[[str], Path]
+) -> None:
+    truth = json.loads((shared / "campaigns" / "series-11-spoiled.truth.json").read_text())
+    of_traces = {"stopped_before_peak", "spike", "sign_flipped", "saturated"}
+    spoiled, clean = load_campaign(practice("11-spoiled")), practice("11-clean")
+    named = {s.test_id: {p.kind for p in s.problems} for s in spoiled.set_aside}
+    named |= {p.file: {p.kind} for p in spoiled.problems if p.test_id is None}
+    for test in spoiled.tests:
+        try:
+            trace = read_export(spoiled.root / test.file, name=test.test_id, file=test.file)
+        except ReadError as why:
+            named[test.test_id] = {p.kind for p in why.problems}
+            continue
+        if test.test_id not in truth:
+            unspoiled = read_export(clean / test.file)
+            np.testing.assert_array_equal(trace.force_N, unspoiled.force_N)
+            np.testing.assert_array_equal(trace.time_s, unspoiled.time_s)
+    assert named == {where: {kind} for where, kind in truth.items() if kind not in of_traces}
+
+
+WHOLE = written(ramp(30), NAMES, UNITS, Dialect(quoted=True, above=("Specimen label,1",)))
+
+
+@settings(deadline=None, max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.data())
+def test_a_mutated_export_is_read_or_refused(tmp_path: Path, data: st.DataObject) -> None:
+    mutant = bytearray(WHOLE)
+    for _ in range(data.draw(st.integers(1, 6))):
+        at = data.draw(st.integers(0, len(mutant) - 1))
+        match data.draw(st.sampled_from(["change", "drop", "insert", "cut"])):
+            case "change":
+                mutant[at] = data.draw(st.integers(0, 255))
+            case "drop":
+                del mutant[at : at + data.draw(st.integers(1, 40))]
+            case "insert":
+                mutant[at:at] = data.draw(st.binary(min_size=1, max_size=20))
+            case "cut":
+                del mutant[at:]
+        if not mutant:
+            break
+    path = tmp_path / "mutant.csv"
+    path.write_bytes(bytes(mutant))
+    try:
+        trace = read_export(path)
+    except ReadError:
+        return
+    assert trace.time_s.size == trace.force_N.size > 0
+    assert np.isfinite(trace.force_N).all()
