@@ -94,8 +94,8 @@ def departure(time_s: FloatArray, smooth: FloatArray, rise: Rise, margin: float)
 def zero_before(time_s: FloatArray, force: FloatArray, rise: Rise, noise: float) -> Zero:
     """Zero from the samples before contact: their median and its uncertainty, correlation counted.
 
-    The zero phase ends a tenth of the rise before the loading line comes down to its level, so that a rounded toe
-    does not enter. With fewer than five samples, or if the force climbs all the way, no zero is seen.
+    The zero phase ends a tenth of the rise before the loading line comes down to its level, so that a rounded
+    toe does not enter. With fewer than five samples, or if the force climbs all the way, no zero is seen.
     """
     last = rise.first
     level = median(force[: max(_FEWEST_FOR_ZERO, last // 2)])

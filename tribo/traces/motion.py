@@ -24,8 +24,9 @@ _BACK_AT_LEVEL = 0.9
 class Motion:
     """A pull in motion; arrays (n,) share the trace's samples, ``force_N`` is zeroed and free of impulses.
 
-    ``sliding`` is the range of indices after the static peak and before any unloading, ``fallen`` the first of them at
-    which the force has come down to its median over that range; ``travel_m`` the distance since the onset, where the trace or the test's speed tells it.
+    ``sliding`` is the range of indices after the static peak and before any unloading, ``fallen`` the first
+    of them at which the force has come down to its median over that range; ``travel_m`` the distance since
+    the onset, where the trace or the test's speed tells it.
     """
 
     time_s: FloatArray
@@ -48,7 +49,8 @@ def lay_out(trace: Trace, speed_m_s: float | None = None) -> Motion:
     Raises
     ------
     TraceError
-        Kinds ``too_short``, ``nan_gap``, ``time_goes_back``, ``sign_flipped``, ``stopped_before_peak``, ``saturated``.
+        Kinds ``too_short``, ``nan_gap``, ``time_goes_back``, ``sign_flipped``, ``stopped_before_peak``,
+        ``saturated``.
     """
     if faults := quality.unreadable(trace):
         raise TraceError(faults)
@@ -58,7 +60,7 @@ def lay_out(trace: Trace, speed_m_s: float | None = None) -> Motion:
     spikes = quality.impulse_spikes(raw, noise)
     problems = quality.spike_problems(trace, spikes)
     force = quality.without_spikes(raw, spikes)
-    noise = min(noise, noise_of(force))
+    noise = min(noise, noise_of(force)) if problems else noise
     smooth = smoothed(force)
     rise = first_rise(time, smooth, noise)
     start = median(smooth[: max(5, smooth.size // 50)])
@@ -68,14 +70,10 @@ def lay_out(trace: Trace, speed_m_s: float | None = None) -> Motion:
     if clipped := quality.flat_top(force):
         raise TraceError([_saturated(trace, clipped), *problems])
     zero = zero_before(time, force, rise, noise)
-    return _with_peak(
-        trace, time, force - zero.force_N, smooth - zero.force_N, rise, zero, noise, speed_m_s, problems
-    )
+    return _with_peak(trace, time, force - zero.force_N, smooth - zero.force_N, rise, zero, noise, speed_m_s, problems)
 
 
-def _no_pull(
-    trace: Trace, smooth: FloatArray, start: float, rise: Rise | None, noise: float
-) -> list[Problem]:
+def _no_pull(trace: Trace, smooth: FloatArray, start: float, rise: Rise | None, noise: float) -> list[Problem]:
     """Why no rise was found, if none was: the force went the other way, or the record ends before the peak."""
     down, up = start - float(smooth.min()), float(smooth.max()) - start
     if down > 3.0 * up and down > _DETECTABLE * noise:
@@ -96,8 +94,8 @@ def _saturated(trace: Trace, clipped: tuple[int, int]) -> Problem:
 
 
 def _with_peak(
-    trace: Trace, time: FloatArray, force: FloatArray, smooth: FloatArray, rise: Rise, zero: Zero, noise: float,
-    speed_m_s: float | None, problems: tuple[Problem, ...],
+    trace: Trace, time: FloatArray, force: FloatArray, smooth: FloatArray, rise: Rise, zero: Zero, noise:
+    float, speed_m_s: float | None, problems: tuple[Problem, ...],
 ) -> Motion:  # fmt: skip
     rise = Rise(rise.rate, rise.time_s, rise.force_N - zero.force_N, rise.first, rise.last)
     reached = float(smooth[rise.last])
@@ -127,7 +125,7 @@ def _fallen(smooth: FloatArray, first: int, end: int) -> int:
 
 
 def _before_unloading(smooth: FloatArray, peak: int) -> int:
-    """End (exclusive) of the part after the peak in which the force holds its level: a tail of unloading is left out."""
+    """End (exclusive) of the part after the peak in which the force holds its level, a tail of unloading left out."""
     level = median(smooth[peak:])
     held = np.flatnonzero(smooth[peak:] >= _UNLOADED * level)
     if level <= 0 or held.size == 0 or held[-1] >= smooth.size - peak - 3:

@@ -28,11 +28,12 @@ def read_pull(
 ) -> Pull:
     """Read static and sliding friction off one trace.
 
-    ``rule`` names an entry of ``RULES``; ``parameters`` replace its own (``length_m``, ``skip_m``, ``share``). ``test``
-    gives the pull its id and, where the trace has no displacement, its speed.
+    ``rule`` names an entry of ``RULES``; ``parameters`` replace its own (``length_m``, ``skip_m``,
+    ``share``). ``test`` gives the pull its id and, where the trace has no displacement, its speed.
 
-    The standard uncertainties hold the scatter of the reading (correlation counted), that of the zero, and how far
-    a slow wander of the size seen while sliding may have carried the signal since the zero was last seen.
+    The standard uncertainties hold the scatter of the reading (correlation counted), that of the zero, and
+    how far a slow wander of the size seen while sliding may have carried the signal since the zero was last
+    seen.
 
     Raises
     ------
@@ -40,18 +41,18 @@ def read_pull(
         The rule is unknown, or the trace holds no readable pull; every problem found is listed.
     """
     chosen = _rule(rule, parameters)
-    place = {"test_id": test.test_id if test else None, "file": trace.file or None}
+    test_id, file = (test.test_id if test else None), trace.file or None
     try:
         motion = lay_out(trace, test.speed_m_s if test else None)
         static = chosen.static(motion, chosen.parameters)
         window = chosen.sliding(motion, chosen.parameters)
     except TraceError as fault:
-        raise TraceError([p.at(**place) for p in fault.problems]) from None
+        raise TraceError([p.at(file=file, test_id=test_id) for p in fault.problems]) from None
     pull = _reduce(motion, static, window, chosen)
     return replace(
         pull,
         test_id=test.test_id if test else trace.name,
-        problems=tuple(p.at(**place) for p in motion.problems),
+        problems=tuple(p.at(file=file, test_id=test_id) for p in motion.problems),
     )
 
 
@@ -61,9 +62,7 @@ def _rule(name: str, parameters: Mapping[str, float] | None) -> Rule:
     rule = RULES[name]
     if unknown := sorted(set(parameters or {}) - set(rule.parameters)):
         allowed = ", ".join(rule.parameters) or "none"
-        raise TraceError(
-            Problem("unknown_parameter", f"not of rule {name}", found=", ".join(unknown), allowed=allowed)
-        )
+        raise TraceError(Problem("unknown_parameter", f"not of rule {name}", found=", ".join(unknown), allowed=allowed))
     return replace(rule, parameters={**rule.parameters, **(parameters or {})})
 
 
@@ -101,8 +100,9 @@ def _reduce(motion: Motion, static: Apex, window: Window, rule: Rule) -> Pull:
 def _wander(motion: Motion, static: Apex, window_s: tuple[float, float]) -> tuple[float, float]:
     """Variances that a slow wander has gathered since the zero was seen: of static and of sliding.
 
-    What the zero wanders may have moved the static peak; sliding friction wanders by itself as well, and the whole
-    record after the fall tells how much (the window alone was chosen for its steadiness, so it would tell less).
+    What the zero wanders may have moved the static peak; sliding friction wanders by itself as well, and the
+    whole record after the fall tells how much (the window alone was chosen for its steadiness, so it would
+    tell less).
     """
     since = motion.zero.time_s
     static_variance = motion.zero.wander_rate * max(static.time_s - since, 0.0)
@@ -129,9 +129,7 @@ def _rise_stiffness(motion: Motion) -> float:
     return motion.rise.rate / slope if slope > 0 else math.nan
 
 
-def _flags(
-    motion: Motion, static: Apex, sliding: Steady, window: Window, rule: Rule, period: float
-) -> tuple[str, ...]:
+def _flags(motion: Motion, static: Apex, sliding: Steady, window: Window, rule: Rule, period: float) -> tuple[str, ...]:
     enough = not math.isnan(sliding.mean_N)
     asked = rule.parameters.get("length_m", 0.0)
     travel = motion.travel_m

@@ -42,18 +42,17 @@ def unreadable(trace: Trace) -> list[Problem]:
     if back.any():
         at = int(np.argmax(back)) + 1
         found = f"{trace.time_s[at]:g} s after {trace.time_s[at - 1]:g} s"
-        problems.append(
-            Problem("time_goes_back", "the time runs back", trace.file, file_row(trace, at), "time", found)
-        )
+        problems.append(Problem("time_goes_back", "the time runs back", trace.file, file_row(trace, at), "time", found))
     return problems
 
 
 def impulse_spikes(force: FloatArray, noise: float) -> NDArray[np.bool_]:
     """Mask (n,) of one- or two-sample impulses: out and back by far more than noise and than the samples around.
 
-    A sample belongs to an impulse if the steps into and out of it have opposite signs and the smaller of the two
-    exceeds ``SPIKE_OVER_NOISE`` times the noise and ``SPIKE_OVER_NEIGHBOURS`` times the largest step within
-    ``_NEIGHBOURS`` samples on either side. The apex of a pull and stick-slip have like steps beside them.
+    A sample belongs to an impulse if the steps into and out of it have opposite signs and the smaller of the
+    two exceeds ``SPIKE_OVER_NOISE`` times the noise and ``SPIKE_OVER_NEIGHBOURS`` times the largest step
+    within ``_NEIGHBOURS`` samples on either side. The apex of a pull and stick-slip have like steps beside
+    them.
     """
     steps = np.diff(force)
     mask = np.zeros(force.size, bool)
@@ -61,9 +60,7 @@ def impulse_spikes(force: FloatArray, noise: float) -> NDArray[np.bool_]:
         into, out = steps[:-width], steps[width:]
         height = np.where(into * out < 0, np.minimum(np.abs(into), np.abs(out)), 0.0)
         for k in np.flatnonzero(height > SPIKE_OVER_NOISE * noise):
-            around = np.abs(
-                np.concatenate((steps[max(0, k - _NEIGHBOURS) : k], steps[k + width + 1 :][:_NEIGHBOURS]))
-            )
+            around = np.abs(np.concatenate((steps[max(0, k - _NEIGHBOURS) : k], steps[k + width + 1 :][:_NEIGHBOURS])))
             if around.size and height[k] > SPIKE_OVER_NEIGHBOURS * around.max():
                 mask[k + 1 : k + 1 + width] = True
     return mask
@@ -95,8 +92,8 @@ def without_spikes(force: FloatArray, spikes: NDArray[np.bool_]) -> FloatArray:
 def flat_top(force: FloatArray) -> tuple[int, int] | None:
     """(first index, length) of a run of equal samples at the largest force that chance does not give, or None.
 
-    Chance is the share of equal neighbours elsewhere in the trace: a coarse resolution repeats values everywhere,
-    clipping only at the top.
+    Chance is the share of equal neighbours elsewhere in the trace: a coarse resolution repeats values
+    everywhere, clipping only at the top.
     """
     top = force >= force.max() - 1e-9 * float(np.ptp(force))
     edges = np.flatnonzero(np.diff(np.concatenate(([False], top, [False]))))

@@ -20,8 +20,8 @@ Window = tuple[int, int]
 class Rule:
     """A rule: what it takes as static and as sliding friction, in words and as functions, and where it stands.
 
-    ``static(motion, parameters)`` returns the peak, ``sliding(motion, parameters)`` the range of samples to average.
-    Lengths are in metres, shares dimensionless.
+    ``static(motion, parameters)`` returns the peak, ``sliding(motion, parameters)`` the range of samples to
+    average. Lengths are in metres, shares dimensionless.
     """
 
     name: str
@@ -79,9 +79,7 @@ def _after(motion: Motion, length_m: float, since_s: float) -> int:
     """Index of the first sample ``length_m`` of travel after the time ``since_s``."""
     if motion.travel_m is None:
         what = "this rule counts travel, and neither a displacement nor a speed is known"
-        raise TraceError(
-            Problem("no_displacement", what, allowed="a displacement column, or speed_mm_s in tests.csv")
-        )
+        raise TraceError(Problem("no_displacement", what, allowed="a displacement column, or speed_mm_s in tests.csv"))
     start = float(np.interp(since_s, motion.time_s, motion.travel_m))
     beyond = motion.travel_m >= start + length_m
     return int(np.argmax(beyond)) if beyond.any() else int(motion.travel_m.size)

@@ -9,7 +9,7 @@ import numpy as np
 
 from tribo.records import FloatArray
 from tribo.traces.contact import line
-from tribo.traces.statistics import condense, mean, sample_noise, wander
+from tribo.traces.statistics import condense, mean, wander
 
 _BATCH = 5
 _MOST_BATCHES = 2000
@@ -32,9 +32,10 @@ class Steady:
 def settled(force: FloatArray) -> int:
     """Index from which a force that relaxes towards a steady level has stabilised.
 
-    The marginal standard error rule on batches of five (MSER-5, White 1997, Simulation 69): leave out the first d
-    samples so that the squared standard error of the mean of the rest, sum (f - mean)^2 / (n - d)^2, is smallest;
-    d at most half the record. It trades the bias of a transient against the loss of samples and has no threshold.
+    The marginal standard error rule on batches of five (MSER-5, White 1997, Simulation 69): leave out the
+    first d samples so that the squared standard error of the mean of the rest, sum (f - mean)^2 / (n - d)^2,
+    is smallest; d at most half the record. It trades the bias of a transient against the loss of samples and
+    has no threshold.
     """
     batch = max(_BATCH, force.size // _MOST_BATCHES)
     means = condense(force, batch) if force.size >= 4 * batch else force
@@ -51,17 +52,19 @@ def settled(force: FloatArray) -> int:
 def steady(time_s: FloatArray, force: FloatArray) -> Steady:
     """Mean over a window of samples with the uncertainty that their correlation leaves."""
     slow = wander(force, float(time_s[-1] - time_s[0]))
-    return Steady(mean(force), slow.mean_u, line(time_s, force)[0], sample_noise(force))
+    return Steady(mean(force), slow.mean_u, line(time_s, force)[0], slow.noise)
 
 
 def stick_slip(time_s: FloatArray, force: FloatArray, noise: float) -> tuple[float, float]:
     """(peak-to-peak amplitude N, period s) of stick-slip: medians over its cycles, NaN where none stands out.
 
-    The force about its straight line is followed through a band of ``_VISIBLE`` times the noise either way
-    (a Schmitt trigger); a cycle runs from one upward passage to the next. Fewer than three cycles, or cycle times
-    that scatter, are no stick-slip.
+    The force about its straight line is followed through a band of ``_VISIBLE`` times the noise either way (a
+    Schmitt trigger); a cycle runs from one upward passage to the next. Fewer than three cycles, or cycle
+    times that scatter, are no stick-slip.
     """
     none = (math.nan, math.nan)
+    if float(np.ptp(force)) < 2.0 * _VISIBLE * noise:
+        return none
     slope, t0, f0 = line(time_s, force)
     about = force - f0 - slope * (time_s - t0)
     state = np.where(about > _VISIBLE * noise, 1, np.where(about < -_VISIBLE * noise, -1, 0))

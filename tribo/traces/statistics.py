@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tribo.records import FloatArray
 
-BLOCKS = (
-    16  # blocks a window is cut into; enough for a variogram, few enough to be longer than the correlation
-)
-_LAGS = np.arange(1, BLOCKS // 4 + 1)
-_SLOPE_U = (
-    0.35  # standard uncertainty of a variogram's slope over BLOCKS blocks, as a share of level over mean lag
-)
+BLOCKS = 16  # blocks a window is cut into; enough for a variogram, few enough to be longer than the correlation
+_SLOPE_U = 0.35  # standard uncertainty of a variogram's slope over BLOCKS blocks, as a share of level over mean lag
 _MEDIAN_TO_SD = 1.4826  # of a normal distribution
 
 
@@ -32,8 +29,8 @@ def median(values: FloatArray) -> float:
 def sample_noise(values: FloatArray) -> float:
     """Standard deviation of the sample-to-sample noise, blind to levels, slopes and single jumps.
 
-    Median of the absolute second differences, scaled for white normal noise (factor sqrt 6). Where more than half
-    of them vanish (a coarse resolution), their root mean square. NaN for fewer than three samples.
+    Median of the absolute second differences, scaled for white normal noise (factor sqrt 6). Where more than
+    half of them vanish (a coarse resolution), their root mean square. NaN for fewer than three samples.
     """
     if values.size < 3:
         return math.nan
@@ -47,10 +44,6 @@ def sample_noise(values: FloatArray) -> float:
 def mean(values: FloatArray) -> float:
     """Mean of a non-empty array, without the overhead of np.mean on short arrays."""
     return float(np.add.reduce(values)) / values.size
-
-
-def _mean_square(values: FloatArray) -> float:
-    return float(values @ values) / values.size
 
 
 def block_means(values: FloatArray, blocks: int = BLOCKS) -> FloatArray:
@@ -82,48 +75,79 @@ def running_mean(values: FloatArray, width: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class Wander:
-    """How a steady signal departs from its mean: ``mean_u`` from short-lived noise, ``rate`` from a slow walk.
+    """How a steady signal departs from its mean.
 
-    ``mean_u`` is the standard uncertainty of the mean from correlated but stationary noise; ``rate`` the variance
-    a random walk gathers per second (unit of the signal squared, per second).
+    ``mean_u`` is the standard uncertainty of the mean from correlated but stationary noise, ``rate`` the
+    variance a random walk gathers per second (unit of the signal squared, per second), ``noise`` that of
+    single samples.
     """
 
     mean_u: float
     rate: float
+    noise: float
 
 
 def wander(values: FloatArray, duration_s: float) -> Wander:
     """Split the departures of ``values`` (spread evenly over ``duration_s``) into stationary noise and a slow walk.
 
-    The mean squared difference of block means h blocks apart is 2 s^2 + q (h - 1/3) t_block for noise of block
-    variance s^2 on top of a random walk of variance rate q (the 1/3 is what averaging within blocks takes off).
-    A straight line through the variogram at lags of 1 to a quarter of the blocks gives both. So few blocks leave
-    the slope uncertain: the rate returned lies half-way between the slope's expectation and a walk that explains
-    all the variance that white noise leaves, never a lucky zero.
+    The mean squared difference of block means h blocks apart is 2 s^2 + q (h - 1/3) t_block for noise of
+    block variance s^2 on top of a random walk of variance rate q (the 1/3 is what averaging within blocks
+    takes off). A straight line through the variogram at lags of 1 to a quarter of the blocks gives both. So
+    few blocks leave the slope uncertain: the rate returned lies half-way between the slope's expectation and
+    a walk that explains all the variance that white noise leaves, never a lucky zero.
     """
+    noise = sample_noise(values)
     means = block_means(values)
     count = means.size
     if count < 4:
         spread = float(values.std(ddof=1)) / math.sqrt(values.size) if values.size > 1 else math.nan
-        return Wander(spread, 0.0)
-    lags = _LAGS[: max(2, count // 4)]
-    squares = np.array([_mean_square(means[h:] - means[:-h]) for h in lags])
-    weights = (count - lags) / lags  # long lags overlap, so they tell less
-    weights /= weights.sum()
+        return Wander(spread, 0.0, noise)
+    line = _variogram_line(count)
+    squares = (means[line.later] - means[line.earlier]) ** 2
+    level, slope = float(line.level @ squares), float(line.slope @ squares)
+    white = noise**2 * count / values.size
+    most = max(level - 2.0 * white, 0.0) / line.centre
+    slope = (_mean_within(slope, _SLOPE_U * level / line.centre, most) + most) / 2.0
+    stationary = max(level - slope * line.centre, 2.0 * white) / 2.0
+    rate = slope * count / duration_s if duration_s > 0 else 0.0
+    return Wander(math.sqrt(stationary / count), rate, noise)
+
+
+@dataclass(frozen=True)
+class _VariogramLine:
+    """Weights that turn squared differences of block means into the level and slope of their variogram."""
+
+    later: NDArray[np.int64]
+    earlier: NDArray[np.int64]
+    level: FloatArray
+    slope: FloatArray
+    centre: float
+
+
+@lru_cache(maxsize=BLOCKS * 2)
+def _variogram_line(count: int) -> _VariogramLine:
+    """Weighted straight line over lags of 1 to a quarter of ``count`` blocks; long lags overlap and count less."""
+    earlier, later = np.triu_indices(count, 1)
+    lags = np.arange(1, max(2, count // 4) + 1)
+    near = later - earlier <= lags[-1]
+    earlier, later = earlier[near], later[near]
+    weights = (count - lags) / lags
+    weights = weights / weights.sum()
     x = lags - 1.0 / 3.0
     centre = float(weights @ x)
-    level = float(weights @ squares)
     away = weights * (x - centre)
-    slope = float(away @ squares) / float(away @ x)
-    white = sample_noise(values) ** 2 * count / values.size
-    most = max(level - 2.0 * white, 0.0) / centre
-    slope = (_mean_within(slope, _SLOPE_U * level / centre, most) + most) / 2.0
-    noise = max(level - slope * centre, 2.0 * white) / 2.0
-    return Wander(math.sqrt(noise / count), slope * count / duration_s if duration_s > 0 else 0.0)
+    lag = later - earlier
+    return _VariogramLine(
+        later,
+        earlier,
+        (weights / (count - lags))[lag - 1],
+        (away / (away @ x) / (count - lags))[lag - 1],
+        centre,
+    )
 
 
 def _mean_within(estimate: float, u: float, most: float) -> float:
-    """Mean of a normal distribution (estimate, u) cut off below 0 and above ``most``: what the bounds leave to expect."""
+    """Mean of a normal distribution (estimate, u) cut off below 0 and above ``most``."""
     if most <= 0.0 or u <= 0.0:
         return 0.0
     low, high = -estimate / u, (most - estimate) / u
