@@ -1,0 +1,221 @@
+"""Every figure shows exactly its numbers, and its numbers say what the study holds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.figure import Figure
+from report.synthetic import AREA_M2, make_study
+
+from tribo.figures import select
+from tribo.figures.catalogue import FIGURES
+from tribo.figures.style import SAMPLE_COLOURS, SAMPLE_MARKERS, house_style, sample_mark
+from tribo.records import Pattern, Study
+
+NAMES = list(FIGURES)
+
+
+def drawn_points(figure: Figure) -> set[tuple[float, float]]:
+    """Every finite point of every line in the figure, rounded."""
+    points = [line.get_xydata() for ax in figure.axes for line in ax.lines]
+    xy = np.concatenate([np.asarray(p, float) for p in points if len(p)])
+    return {(float(f"{x:.6g}"), float(f"{y:.6g}")) for x, y in xy[np.isfinite(xy).all(axis=1)]}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_numbers_of_a_figure_are_what_it_draws(name: str, study: Study) -> None:
+    numbers = FIGURES[name].numbers(study)
+    x, y = {
+        "agreement": ("normal_load_N", "ratio"),
+        "fig3": ("time_s", "T_over_peak"),
+        "fig4": ("pressure_kPa", "T_over_N"),
+        "fig5": ("time_ms", "T_over_N"),
+        "fig6": ("normal_load_N", "T_N"),
+        "fig7": ("normal_load_N", "T_N"),
+        "fig8": ("area_fraction", "value"),
+    }[name]
+    expected = {(float(f"{a:.6g}"), float(f"{b:.6g}")) for a, b in numbers[[x, y]].to_numpy(float)}
+    assert expected <= drawn_points(FIGURES[name].draw(numbers))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_study_of_other_samples_is_drawn_too(name: str) -> None:
+    study = make_study(samples=("flat", "grid"), n_samples=60)
+    numbers = FIGURES[name].numbers(study)
+    assert set(numbers["sample"].dropna()) == {"flat", "grid"}
+    assert FIGURES[name].draw(numbers).axes
+
+
+@pytest.mark.parametrize("name", ["agreement", "fig5"])
+def test_a_study_without_a_model_has_no_numbers_for_the_model(name: str, study: Study) -> None:
+    assert FIGURES[name].numbers(replace(study, comparison=None, example_runs=())).empty
+
+
+@pytest.mark.parametrize("name", ["fig3", "fig4", "fig6", "fig7", "fig8"])
+def test_a_study_without_a_model_still_shows_the_measurement(name: str, study: Study) -> None:
+    numbers = FIGURES[name].numbers(replace(study, comparison=None, simulated=None, example_runs=()))
+    assert not numbers.empty
+    assert "simulated" not in set(numbers["mark"])
+    assert FIGURES[name].draw(numbers).axes
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_label_lies_outside_the_figure_or_on_another(name: str, study: Study) -> None:
+    figure = FIGURES[name].draw(FIGURES[name].numbers(study))
+    with house_style():
+        figure.draw_without_rendering()
+    page = figure.bbox
+    boxes = [
+        text.get_window_extent()
+        for ax in figure.axes
+        for text in (
+            *(t for t in ax.get_xticklabels() if ax.get_xlim()[0] <= t.get_position()[0] <= ax.get_xlim()[1]),
+            ax.xaxis.label, ax.yaxis.label, ax.title, *ax.texts,
+        )
+        if text.get_text() and text.get_visible()
+    ]  # fmt: skip
+    boxes += [text.get_window_extent() for legend in figure.legends for text in legend.get_texts()]
+    assert all(page.x0 <= b.x0 and b.x1 <= page.x1 and page.y0 <= b.y0 and b.y1 <= page.y1 for b in boxes)
+    assert not [1 for k, a in enumerate(boxes) for b in boxes[k + 1 :] if a.overlaps(b)]
+
+
+def test_fig4_means_have_the_standard_deviation_of_the_mean(study: Study) -> None:
+    numbers = FIGURES["fig4"].numbers(study)
+    table = study.ingested.table()
+    load = table["normal_load_N"].min()
+    cell = table[(table["sample"] == "B") & (table["normal_load_N"] == load)]
+    ratio = cell["static_N"] / cell["normal_load_N"]
+    row = numbers[(numbers["sample"] == "B") & (numbers["regime"] == "static") & (numbers["mark"] == "mean")].iloc[0]
+    assert row["pressure_kPa"] == pytest.approx(load / AREA_M2 / 1e3)
+    assert row["T_over_N"] == pytest.approx(ratio.mean())
+    assert row["T_over_N_u"] == pytest.approx(ratio.std(ddof=1) / np.sqrt(len(ratio)))
+    assert row["n_pulls"] == len(cell)
+
+
+def test_fig4_curve_is_mu_plus_tau0_over_p(study: Study) -> None:
+    numbers = FIGURES["fig4"].numbers(study)
+    fit = select.fit_of(study.fits, "C", "sliding")
+    assert fit is not None
+    curve = numbers[(numbers["sample"] == "C") & (numbers["regime"] == "sliding") & (numbers["mark"] == "fit")]
+    expected = fit.value("mu") + fit.value("tau0_Pa") / 1e3 / curve["pressure_kPa"]
+    assert curve["T_over_N"].to_numpy(float) == pytest.approx(expected.to_numpy(float))
+
+
+def test_the_area_prediction_is_the_flat_force_times_the_area_fraction(study: Study) -> None:
+    numbers = FIGURES["fig6"].numbers(study)
+    flat = select.fit_of(study.fits, "F", "static")
+    assert flat is not None
+    line = numbers[(numbers["sample"] == "C") & (numbers["mark"] == "AF prediction")]
+    expected = flat.force_N(line["normal_load_N"].to_numpy(float)) * study.ingested.campaign.area_fraction("C")
+    assert line["T_N"].to_numpy(float) == pytest.approx(expected)
+
+
+def test_the_line_in_area_fraction_recovers_a_linear_law(study: Study) -> None:
+    fits = tuple(
+        replace(f, values=np.array([1 + 2 * af, 1e3 * (3 + 4 * af)]))
+        for f in study.fits
+        if (af := study.ingested.campaign.area_fraction(f.sample))
+    )
+    numbers = FIGURES["fig8"].numbers(replace(study, fits=fits))
+    line = numbers[(numbers["mark"] == "fit") & (numbers["regime"] == "static")]
+    for parameter, intercept, slope in (("mu", 1, 2), ("tau0_kPa", 3, 4)):
+        part = line[line["parameter"] == parameter]
+        assert part["value"].to_numpy() == pytest.approx(intercept + slope * part["area_fraction"].to_numpy())
+
+
+def test_the_example_pull_is_one_without_flags_at_a_middle_load(study: Study) -> None:
+    numbers = FIGURES["fig3"].numbers(study)
+    loads = sorted({t.normal_load_N for t in study.ingested.campaign.tests})
+    for test_id, pull in numbers.groupby("test_id"):
+        assert pull["normal_load_N"].iloc[0] in loads[2:4]
+        assert not study.ingested.pulls[str(test_id)].flags
+
+
+def test_the_ratio_interval_without_model_error_is_the_t_interval_of_the_measurement(study: Study) -> None:
+    from scipy.stats import t
+
+    assert study.comparison is not None
+    row = replace(study.comparison.rows[0], simulated_u_N=0.0)
+    numbers = FIGURES["agreement"].numbers(replace(study, comparison=replace(study.comparison, rows=(row,))))
+    half = t.ppf(0.975, 2) * row.measured_u_N / row.measured_N
+    assert np.log(numbers["ratio_high"].iloc[0] / numbers["ratio"].iloc[0]) == pytest.approx(half)
+    assert np.log(numbers["ratio_low"].iloc[0] / numbers["ratio"].iloc[0]) == pytest.approx(-half)
+
+
+def test_samples_are_told_apart_by_marker_and_by_colour() -> None:
+    n = len(SAMPLE_COLOURS) * len(SAMPLE_MARKERS)
+    marks = [sample_mark(k) for k in range(n)]
+    assert len({(m.colour, m.marker) for m in marks}) == n
+    assert all(a.colour != b.colour and a.marker != b.marker for a, b in pairwise(marks))
+
+
+def test_a_sample_keeps_its_colour_where_others_are_missing(study: Study) -> None:
+    fewer = replace(study, example_runs=tuple(r for r in study.example_runs if r.sample != "A"))
+    numbers = FIGURES["fig5"].numbers(fewer)
+    assert dict(zip(numbers["sample"], numbers["sample_number"], strict=True))["B"] == 2
+
+
+def test_drawing_leaves_the_settings_of_matplotlib_as_they_were(study: Study) -> None:
+    import matplotlib
+
+    before = dict(matplotlib.rcParams)
+    FIGURES["fig8"].draw(FIGURES["fig8"].numbers(study))
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_loads_within_two_percent_are_one_level() -> None:
+    loads = np.array([1.00, 0.5, 1.01, 2.0, 0.502])
+    assert select.load_levels(loads) == pytest.approx([1.005, 0.501, 1.005, 2.0, 0.501])
+    assert select.load_levels(np.array([])).shape == (0,)
+
+
+def test_a_thinned_trace_keeps_its_spikes_its_ends_and_its_order() -> None:
+    t = np.arange(100_000.0)
+    force = np.sin(t / 1e4)
+    force[[31_234, 77_777]] = [9.0, -9.0]
+    time, thin = select.thin_trace(t, force, 400)
+    assert len(thin) <= 402
+    assert {9.0, -9.0} <= set(thin)
+    assert (time[0], time[-1]) == (0.0, 99_999.0)
+    assert (np.diff(time) > 0).all()
+
+
+def test_a_short_trace_is_left_alone() -> None:
+    t = np.arange(10.0)
+    assert select.thin_trace(t, t)[1] is not None
+    assert (select.thin_trace(t, t)[1] == t).all()
+
+
+@pytest.mark.parametrize(
+    ("pattern", "expected"),
+    [
+        (Pattern("F"), False),
+        (Pattern("A", "circle", (5e-6, 5e-6), (2e-5, 2e-5)), False),
+        (Pattern("S", "rectangle", (2e-4, 4e-5), (2.2e-4, 1.2e-4)), True),
+        (Pattern("G", "square", (5e-6, 5e-6), (2e-5, 3e-5)), True),
+    ],
+)
+def test_a_pattern_is_anisotropic_if_its_cavities_or_spacing_are(pattern: Pattern, expected: bool) -> None:
+    assert select.is_anisotropic(pattern) is expected
+
+
+def test_numbers_name_their_units(study: Study) -> None:
+    unitless = {
+        "sample_number", "sample", "regime", "group", "mark", "test_id", "n_pulls", "seed", "parameter", "value",
+        "value_u", "area_fraction", "ratio", "ratio_low", "ratio_high", "T_over_N", "T_over_N_u", "T_over_peak",
+    }  # fmt: skip
+    for figure in FIGURES.values():
+        for column in set(figure.numbers(study).columns) - unitless:
+            assert column.rsplit("_", 1)[-1] in {"N", "s", "ms", "kPa", "deg"}, (figure.name, column)
+
+
+def test_an_empty_campaign_has_empty_numbers(study: Study) -> None:
+    nothing = replace(study.ingested, pulls={}, traces={})
+    empty = replace(study, ingested=nothing, fits=(), comparison=None, example_runs=())
+    for name in ("fig3", "fig4", "fig6"):
+        assert isinstance(FIGURES[name].numbers(empty), pd.DataFrame)
+        assert FIGURES[name].numbers(empty).empty

@@ -1,0 +1,139 @@
+"""Measured over simulated friction force at each load, with its 95 % interval.
+
+mu and tau0 trade off against each other in a fit, so a model is judged by T at a load, not by either alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
+
+from tribo.figures import select, style
+from tribo.records import REGIMES, ComparisonRow, Study
+
+COLUMNS = ["sample_number", "sample", "regime", "normal_load_N", "ratio", "ratio_low", "ratio_high"]
+LEVEL = 0.95
+RATIO_TICKS = (
+    (0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4),
+    (0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.2, 1.5, 2.0),
+    (0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0),
+    (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3, 1e12),
+)
+REGIME_STYLE = {"static": (style.BLUE, "o", -1), "sliding": (style.VERMILLION, "s", 1)}
+DODGE_POINTS = 1.8
+
+
+def numbers(study: Study) -> pd.DataFrame:
+    """T measured over T simulated at each load (N), with the 95 % interval of the ratio.
+
+    The interval is symmetric in the logarithm of the ratio, with Student's t and the degrees of freedom of
+    the measured fit carried through Welch-Satterthwaite (GUM G.4); the model's own are taken as many.
+    """
+    comparison = study.comparison
+    if comparison is None or not comparison.rows:
+        return pd.DataFrame(columns=COLUMNS)
+    order = select.sample_numbers(study)
+    rows = [
+        {
+            "sample_number": order.get(row.sample, len(order)),
+            "sample": row.sample,
+            "regime": row.regime,
+            "normal_load_N": row.normal_load_N,
+            **_ratio(row, _dof(study, row)),
+        }
+        for row in comparison.rows
+    ]
+    table = pd.DataFrame(rows, columns=COLUMNS)
+    table = table[np.isfinite(table["ratio"])]
+    return table.sort_values(["sample_number", "regime", "normal_load_N"], ascending=[True, False, True])
+
+
+def _dof(study: Study, row: ComparisonRow) -> float:
+    fit = select.fit_of(study.fits, row.sample, row.regime)
+    return fit.dof if fit is not None else float("inf")
+
+
+def _ratio(row: ComparisonRow, measured_dof: float) -> dict[str, float]:
+    from scipy.stats import t
+
+    if not (row.measured_N > 0 and row.simulated_N > 0):
+        return dict.fromkeys(("ratio", "ratio_low", "ratio_high"), float("nan"))
+    ratio = row.measured_N / row.simulated_N
+    measured, simulated = row.measured_u_N / row.measured_N, row.simulated_u_N / row.simulated_N
+    u = float(np.hypot(measured, simulated))
+    dof = measured_dof * (u / measured) ** 4 if measured > 0 else float("inf")
+    half = float(t.ppf(0.5 + LEVEL / 2, dof)) * u
+    return {"ratio": ratio, "ratio_low": ratio * np.exp(-half), "ratio_high": ratio * np.exp(half)}
+
+
+@style.in_house_style
+def draw(numbers: pd.DataFrame) -> Figure:
+    """One panel a sample, static beside sliding at each load; the line at 1 is perfect agreement."""
+    groups = style.by_sample(numbers)
+    figure, axes = style.panel_grid(len(groups), 45, sharex=True, sharey=True)
+    for ax, (_, sample) in zip(axes, groups, strict=True):
+        ax.axhline(1, color="0.4", lw=0.8)
+        for regime, part in sample.groupby("regime"):
+            colour, marker, side = REGIME_STYLE[str(regime)]
+            aside = style.moved_aside(ax, side * DODGE_POINTS)
+            bars = np.abs(part[["ratio_low", "ratio_high"]].to_numpy(float) - part[["ratio"]].to_numpy(float)).T
+            style.cover(ax, part["normal_load_N"], part["ratio"], part["ratio"])
+            ax.errorbar(
+                part["normal_load_N"], part["ratio"], bars, fmt=marker, color=colour, elinewidth=0.8,
+                ms=3.5, transform=aside,
+            )  # fmt: skip
+        ax.set_xscale("log" if _spread(numbers) > 5 else "linear")
+        style.panel_title(ax, str(sample["sample"].iloc[0]))
+        ax.set_xlabel("Normal load N (N)")
+        ax.tick_params(labelbottom=True)
+        if style.is_leftmost(ax):
+            ax.set_ylabel("T measured / T simulated")
+    _ratio_axis(axes, numbers)
+    style.legend_below(
+        figure,
+        [
+            Line2D(
+                [],
+                [],
+                color=REGIME_STYLE[r][0],
+                marker=REGIME_STYLE[r][1],
+                lw=0.8,
+                ms=3.5,
+                label=f"{r} friction, 95 %",
+            )
+            for r in REGIMES
+        ],
+    )
+    return figure
+
+
+def _spread(numbers: pd.DataFrame) -> float:
+    lowest = float(numbers["normal_load_N"].min())
+    return float(numbers["normal_load_N"].max()) / lowest if lowest > 0 else 1.0
+
+
+def _ratio_axis(axes: list[Axes], numbers: pd.DataFrame) -> None:
+    """A logarithmic axis on which twice and half lie equally far from 1."""
+    low = np.nanmin([0.85, 0.95 * numbers["ratio_low"].quantile(0.05), 0.95 * numbers["ratio"].min()])
+    high = np.nanmax([1.18, 1.05 * numbers["ratio_high"].quantile(0.95), 1.05 * numbers["ratio"].max()])
+    ticks = np.array(next(t for t in RATIO_TICKS if high / low < t[-1] / t[0]))
+    for ax in axes:
+        ax.set_yscale("log")
+        ax.set_ylim(low, high)
+        ax.yaxis.set_major_locator(FixedLocator(ticks[(ticks >= low) & (ticks <= high)]))
+        ax.yaxis.set_minor_locator(NullLocator())
+        ax.yaxis.set_major_formatter(FuncFormatter(_plain))
+        if ax.get_xscale() == "log":
+            ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            ax.xaxis.set_minor_locator(NullLocator())
+            ax.xaxis.set_major_formatter(FuncFormatter(_plain))
+        else:
+            ax.set_xlim(left=0)
+
+
+def _plain(value: float, _: int) -> str:
+    return f"{value:g}"

@@ -1,0 +1,131 @@
+"""Figs. 6 and 7 of Berardo et al. (2019): friction force against load, experiment and model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from tribo.figures import select, style
+from tribo.records import FloatArray, LawFit, Regime, Study
+
+COLUMNS = [
+    "sample_number",
+    "sample",
+    "regime",
+    "area_fraction",
+    "mark",
+    "normal_load_N",
+    "T_N",
+    "T_low_N",
+    "T_high_N",
+]
+LINE_POINTS = 25
+
+
+def numbers(regime: Regime) -> Callable[[Study], pd.DataFrame]:
+    """The ``numbers`` of Fig. 6 (static) or Fig. 7 (sliding): loads and forces in newton."""
+
+    def of_study(study: Study) -> pd.DataFrame:
+        table = study.ingested.table()
+        if table.empty:
+            return pd.DataFrame(columns=COLUMNS)
+        frames = [
+            _one_sample(study, sample, regime, table[table["sample"] == sample]).assign(
+                sample_number=number,
+                sample=sample,
+                regime=regime,
+                area_fraction=_area_fraction(study, sample),
+            )
+            for sample, number in select.sample_numbers(study).items()
+        ]
+        return pd.concat(frames, ignore_index=True).reindex(columns=COLUMNS)
+
+    return of_study
+
+
+def _area_fraction(study: Study, sample: str) -> float:
+    pattern = study.ingested.campaign.samples.get(sample)
+    return pattern.area_fraction if pattern is not None else float("nan")
+
+
+def _one_sample(study: Study, sample: str, regime: Regime, pulls: pd.DataFrame) -> pd.DataFrame:
+    pulls = pulls[np.isfinite(pulls[f"{regime}_N"])]
+    loads = pulls["normal_load_N"].to_numpy(float)
+    points = pd.DataFrame({"mark": "measured", "normal_load_N": loads, "T_N": pulls[f"{regime}_N"].to_numpy(float)})
+    if not len(loads):
+        return points
+    line = np.linspace(0.0, 1.05 * loads.max(), LINE_POINTS)
+    simulated = study.comparison.simulated if study.comparison is not None else ()
+    frames = [points, *_fit_line("fit", select.fit_of(study.fits, sample, regime), line, band=True)]
+    frames += _fit_line("simulated", select.fit_of(simulated, sample, regime), line)
+    flat = select.fit_of(study.fits, select.flat_sample(study), regime)
+    if flat is not None:
+        forces = flat.force_N(line) * _area_fraction(study, sample)
+        frames.append(pd.DataFrame({"mark": "AF prediction", "normal_load_N": line, "T_N": forces}))
+    return pd.concat(frames, ignore_index=True)
+
+
+def _fit_line(mark: str, fit: LawFit | None, loads_N: FloatArray, band: bool = False) -> list[pd.DataFrame]:
+    from scipy.stats import t
+
+    if fit is None:
+        return []
+    force = fit.force_N(loads_N)
+    frame = pd.DataFrame({"mark": mark, "normal_load_N": loads_N, "T_N": force})
+    if band:
+        half = t.ppf(0.975, fit.dof) * fit.force_u_N(loads_N)
+        frame = frame.assign(T_low_N=force - half, T_high_N=force + half)
+    return [frame]
+
+
+@style.in_house_style
+def draw(numbers: pd.DataFrame) -> Figure:
+    """One panel a sample, all on the same axes, so that samples can be compared by eye."""
+    groups = style.by_sample(numbers)
+    figure, axes = style.panel_grid(len(groups), 52, sharex=True, sharey=True)
+    for ax, (_, sample) in zip(axes, groups, strict=True):
+        _panel(ax, sample)
+        first = sample.iloc[0]
+        style.panel_title(ax, first["sample"], f"AF = {first['area_fraction']:.2f}")
+    highest = numbers.groupby("mark")["T_N"].max()
+    axes[0].set_ylim(0, 1.03 * min(highest.max(), 2.5 * highest.get("measured", highest.max())))
+    axes[0].set_xlim(left=0)
+    regime = str(numbers["regime"].iloc[0]).capitalize()
+    for ax in axes:
+        if style.is_leftmost(ax):
+            ax.set_ylabel(f"{regime} friction force T (N)")
+        ax.set_xlabel("Normal load N (N)")
+        ax.tick_params(labelbottom=True)
+    style.legend_below(figure, _handles(numbers))
+    return figure
+
+
+def _panel(ax: Axes, sample: pd.DataFrame) -> None:
+    by_mark = dict(list(sample.groupby("mark")))
+    if "fit" in by_mark:
+        fit = by_mark["fit"]
+        ax.fill_between(fit["normal_load_N"], fit["T_low_N"], fit["T_high_N"], color=style.VERMILLION, alpha=0.15, lw=0)
+        ax.plot(fit["normal_load_N"], fit["T_N"], color=style.VERMILLION)
+    if "simulated" in by_mark:
+        ax.plot(by_mark["simulated"]["normal_load_N"], by_mark["simulated"]["T_N"], color=style.GREEN, ls="--")
+    if "AF prediction" in by_mark:
+        area = by_mark["AF prediction"]
+        ax.plot(area["normal_load_N"], area["T_N"], color=style.ORANGE, ls=":", lw=1.4)
+    if "measured" in by_mark:
+        points = by_mark["measured"]
+        ax.plot(points["normal_load_N"], points["T_N"], "o", color=style.BLUE, mfc="none", ms=3, mew=0.6)
+
+
+def _handles(numbers: pd.DataFrame) -> list[Line2D]:
+    handles = {
+        "measured": Line2D([], [], color=style.BLUE, marker="o", mfc="none", ls="", ms=3.5, label="measured pulls"),
+        "fit": Line2D([], [], color=style.VERMILLION, label="fit T = μN + τ₀A, 95 % band"),
+        "simulated": Line2D([], [], color=style.GREEN, ls="--", label="spring-block model"),
+        "AF prediction": Line2D([], [], color=style.ORANGE, ls=":", lw=1.4, label=r"T = T$_\mathrm{flat}$ · AF"),
+    }
+    return [handle for mark, handle in handles.items() if (numbers["mark"] == mark).any()]

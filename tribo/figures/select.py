@@ -1,0 +1,74 @@
+"""What the figures ask of a study: its samples in order, its loads, its fits, traces thinned for drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from tribo.records import FloatArray, LawFit, Pattern, Study
+
+LOAD_TOLERANCE = 0.02  # loads closer than this (relative) are repeats of one load
+PAGE_POINTS = 1200  # a page is 190 mm wide: more points along a line cannot be seen
+
+
+def flat_sample(study: Study) -> str:
+    """The flat sample: as the comparison says, else the first one whose area fraction is 1."""
+    if study.comparison is not None:
+        return study.comparison.flat
+    samples = study.ingested.campaign.samples
+    return next((s for s, pattern in samples.items() if pattern.area_fraction == 1.0), "")
+
+
+def sample_numbers(study: Study) -> dict[str, int]:
+    """Each sample with its place, the flat one first, then in the order of the campaign."""
+    campaign = study.ingested.campaign
+    tested = {test.sample for test in campaign.tests}
+    named = [s for s in campaign.samples if s in tested]
+    rest = sorted(tested - set(named))
+    order = sorted([*named, *rest], key=lambda s: s != flat_sample(study))
+    return {sample: k for k, sample in enumerate(order)}
+
+
+def is_anisotropic(pattern: Pattern) -> bool:
+    """True where the cavities or their spacing differ between x and y."""
+    unequal_size = pattern.size_m is not None and pattern.size_m[0] != pattern.size_m[1]
+    unequal_pitch = pattern.pitch_m is not None and pattern.pitch_m[0] != pattern.pitch_m[1]
+    return unequal_size or unequal_pitch
+
+
+def fit_of(fits: Iterable[LawFit], sample: str, regime: str) -> LawFit | None:
+    """The fit of one sample in one regime, None where there is none."""
+    return next((f for f in fits if f.sample == sample and f.regime == regime), None)
+
+
+def load_levels(normal_load_N: FloatArray, tolerance: float = LOAD_TOLERANCE) -> FloatArray:
+    """The mean load of the level each load belongs to: loads within ``tolerance`` are one level."""
+    loads = np.asarray(normal_load_N, float)
+    order = np.argsort(loads, kind="stable")
+    ordered = loads[order]
+    new_level = np.diff(ordered) > tolerance * np.abs(ordered[1:])
+    level = np.concatenate([[0], np.cumsum(new_level)]).astype(int)[: len(loads)]
+    means = np.bincount(level, ordered) / np.bincount(level) if len(loads) else ordered
+    levels = np.empty_like(loads)
+    levels[order] = means[level]
+    return levels
+
+
+def thin_trace(time: FloatArray, force: FloatArray, points: int = PAGE_POINTS) -> tuple[FloatArray, FloatArray]:
+    """At most about ``points`` samples that look the same: lowest and highest of each stretch, in order.
+
+    No spike or dip is lost, as it would be by taking every n-th sample.
+    """
+    n = len(force)
+    if n <= points:
+        return np.asarray(time), np.asarray(force)
+    stretch = -(-n // (points // 2))
+    finite = np.where(np.isfinite(force), force, np.nan)
+    keep: set[int] = {0, n - 1}
+    for start in range(0, n, stretch):
+        part = finite[start : start + stretch]
+        if np.isfinite(part).any():
+            keep |= {start + int(np.nanargmin(part)), start + int(np.nanargmax(part))}
+    index = np.array(sorted(keep))
+    return np.asarray(time)[index], np.asarray(force)[index]

@@ -1,0 +1,122 @@
+"""One look for all figures: style sheet, palette, a marker for each sample, sizes for a journal page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import wraps
+from importlib.resources import as_file, files
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+import pandas as pd
+from matplotlib import style
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.transforms import ScaledTranslation, Transform
+
+COLUMN_WIDTH_MM = 190.0
+MM_PER_INCH = 25.4
+
+# Okabe and Ito (2008), without the yellow, which is lost on white paper.
+BLACK, VERMILLION, BLUE, GREEN = "#000000", "#D55E00", "#0072B2", "#009E73"
+PURPLE, ORANGE, SKY = "#CC79A7", "#E69F00", "#56B4E9"
+SAMPLE_COLOURS = (BLACK, VERMILLION, BLUE, GREEN, PURPLE, ORANGE, SKY)
+SAMPLE_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", "*")
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class SampleMark:
+    """How one sample is drawn in every figure."""
+
+    colour: str
+    marker: str
+
+
+def sample_mark(sample_number: int) -> SampleMark:
+    """Colour and marker of a sample by its place in the campaign; 63 samples before a pair comes again."""
+    return SampleMark(
+        SAMPLE_COLOURS[sample_number % len(SAMPLE_COLOURS)],
+        SAMPLE_MARKERS[sample_number % len(SAMPLE_MARKERS)],
+    )
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """The style sheet for drawing and for rendering; matplotlib's own settings return afterwards."""
+    with as_file(files("tribo.figures") / "tribo.mplstyle") as sheet, style.context(["default", sheet]):
+        yield
+
+
+def in_house_style(draw: Callable[P, R]) -> Callable[P, R]:
+    """Decorate a draw function so that it draws in the house style."""
+
+    @wraps(draw)
+    def drawn(*args: P.args, **kwargs: P.kwargs) -> R:
+        with house_style():
+            return draw(*args, **kwargs)
+
+    return drawn
+
+
+def panel_grid(
+    n_panels: int, panel_height_mm: float, columns: int | None = None, **subplots: Any
+) -> tuple[Figure, list[Axes]]:
+    """A figure as wide as the page with ``n_panels`` axes in reading order; places left over stay empty."""
+    columns = columns or _columns_for(n_panels)
+    rows = -(-n_panels // columns)
+    legend_mm = 12.0
+    size = (COLUMN_WIDTH_MM / MM_PER_INCH, (rows * panel_height_mm + legend_mm) / MM_PER_INCH)
+    figure = Figure(figsize=size, layout="constrained")
+    axes = list(figure.subplots(rows, columns, squeeze=False, **subplots).flat)
+    for empty in axes[n_panels:]:
+        empty.remove()
+    return figure, axes[:n_panels]
+
+
+def _columns_for(n_panels: int) -> int:
+    if n_panels <= 3:
+        return max(n_panels, 1)
+    return {4: 2}.get(n_panels, 3 if n_panels <= 9 else 4)
+
+
+def panel_title(ax: Axes, name: str, detail: str = "") -> None:
+    """The name in bold at the left of a panel's head, what belongs to it in plain type at the right."""
+    ax.set_title(name, loc="left")
+    ax.set_title(detail, loc="right", fontweight="normal", fontsize=7.5)
+
+
+def by_sample(numbers: pd.DataFrame) -> list[tuple[int, pd.DataFrame]]:
+    """The numbers of each sample with its place in the campaign, in that order."""
+    return [(int(str(number)), part) for number, part in numbers.groupby("sample_number")]
+
+
+def is_leftmost(ax: Axes) -> bool:
+    """True for the first panel of a row."""
+    spec = ax.get_subplotspec()
+    return spec is not None and spec.is_first_col()
+
+
+def moved_aside(ax: Axes, points: float) -> Transform:
+    """Data coordinates shifted right on paper by so many points, for marks that would hide each other."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    return ax.transData + ScaledTranslation(points / 72, 0, figure.dpi_scale_trans)
+
+
+def cover(ax: Axes, x: Any, low: Any, high: Any) -> None:
+    """Let the axes reach over points that autoscaling does not see because they are moved aside on paper."""
+    points = [(a, b) for a, b in zip([*x, *x], [*low, *high], strict=True) if np.isfinite(a) and np.isfinite(b)]
+    if points:
+        ax.update_datalim(points)
+        ax.autoscale_view()
+
+
+def legend_below(figure: Figure, handles: list[Any], columns: int = 6) -> None:
+    """One legend for all panels, outside them at the foot, so that it covers no point."""
+    if handles:
+        figure.legend(handles=handles, loc="outside lower center", ncols=min(columns, len(handles)))

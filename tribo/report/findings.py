@@ -1,0 +1,221 @@
+"""What agrees and what does not between experiment and model, as records; the words are in ``wording``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+import pandas as pd
+
+from tribo.figures import agreement, select
+from tribo.records import REGIMES, LawFit, Regime, Study
+
+Verdict = Literal["agrees", "model too high", "model too low", "cannot tell"]
+TELLING_FACTOR = 1.2  # an interval wider than a factor 1.2 either way cannot speak for the model
+
+
+@dataclass(frozen=True)
+class LoadRatio:
+    """Measured over simulated friction force at one load, with its 95 % interval."""
+
+    normal_load_N: float
+    ratio: float
+    low: float
+    high: float
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the interval says of the model; "cannot tell" where it holds 1 and much else."""
+        if not (math.isfinite(self.low) and math.isfinite(self.high)):
+            return "cannot tell"
+        if self.high < 1:
+            return "model too high"
+        if self.low > 1:
+            return "model too low"
+        wide = math.log(self.high / self.low) / 2 > math.log(TELLING_FACTOR)
+        return "cannot tell" if wide else "agrees"
+
+    @property
+    def deviation(self) -> float:
+        """(simulated - measured) / measured: above zero where the model predicts too much friction."""
+        return 1 / self.ratio - 1
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """One sample in one regime at all its loads."""
+
+    sample: str
+    regime: Regime
+    loads: tuple[LoadRatio, ...]
+    calibrated: bool
+
+    def count(self, *verdicts: Verdict) -> int:
+        return sum(load.verdict in verdicts for load in self.loads)
+
+    @property
+    def worst(self) -> LoadRatio:
+        """The load where ratio is farthest from 1."""
+        return max(self.loads, key=lambda load: abs(math.log(load.ratio)))
+
+    @property
+    def mean_deviation(self) -> float:
+        """Geometric mean over the loads of simulated over measured, less 1."""
+        return math.exp(-float(np.mean([math.log(load.ratio) for load in self.loads]))) - 1
+
+    @property
+    def verdict(self) -> Verdict | Literal["mixed"]:
+        """All loads together: a difference if any load shows one, "agrees" if at least half can tell."""
+        high, low = self.count("model too high"), self.count("model too low")
+        if high and low:
+            return "mixed"
+        if high or low:
+            return "model too high" if high else "model too low"
+        return "agrees" if 2 * self.count("agrees") >= len(self.loads) else "cannot tell"
+
+
+def agreements(study: Study) -> list[Agreement]:
+    """Every sample in both regimes, static first; empty without a comparison."""
+    ratios = agreement.numbers(study)
+    flat = select.flat_sample(study)
+    return [
+        Agreement(str(sample), regime, tuple(_load_ratios(part)), sample == flat)
+        for regime in REGIMES
+        for sample, part in ratios[ratios["regime"] == regime].groupby("sample", sort=False)
+    ]
+
+
+def _load_ratios(part: pd.DataFrame) -> Iterable[LoadRatio]:
+    columns = ["normal_load_N", "ratio", "ratio_low", "ratio_high"]
+    return (LoadRatio(*map(float, row)) for row in part[columns].to_numpy(float))
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Samples from most to least friction at one load, measured and simulated.
+
+    ``told_apart`` are the pairs (higher, lower) that the measurement parts with 95 % confidence; ``reversed``
+    those of them which the model has the other way round.
+    """
+
+    regime: Regime
+    normal_load_N: float
+    measured: tuple[str, ...]
+    simulated: tuple[str, ...]
+    told_apart: tuple[tuple[str, str], ...]
+    reversed: tuple[tuple[str, str], ...]
+
+    @property
+    def n_pairs(self) -> int:
+        return math.comb(len(self.measured), 2)
+
+
+def common_loads(study: Study) -> tuple[float, float, float]:
+    """Lowest, middle and highest load level of the campaign, in newton."""
+    levels = np.unique(select.load_levels(np.array([t.normal_load_N for t in study.ingested.campaign.tests])))
+    return float(levels[0]), float(levels[len(levels) // 2]), float(levels[-1])
+
+
+def rankings(study: Study) -> list[Ranking]:
+    """The order of the samples at the middle load, static and sliding; empty for fewer than two."""
+    if study.comparison is None:
+        return []
+    load = common_loads(study)[1]
+    found = [_ranking(study.fits, study.comparison.simulated, regime, load) for regime in REGIMES]
+    return [ranking for ranking in found if len(ranking.measured) > 1]
+
+
+def _ranking(fits: Iterable[LawFit], simulated: Iterable[LawFit], regime: Regime, load: float) -> Ranking:
+    model = {f.sample: float(f.force_N(load)) for f in simulated if f.regime == regime}
+    both = {f.sample: f for f in fits if f.regime == regime and f.sample in model}
+    order = sorted(both, key=lambda s: -float(both[s].force_N(load)))
+    apart = tuple((a, b) for a, b in combinations(order, 2) if _differ(both[a], both[b], load))
+    wrong = tuple((a, b) for a, b in apart if model[a] < model[b])
+    return Ranking(
+        regime, load, tuple(order), tuple(sorted(model.keys() & both, key=lambda s: -model[s])), apart, wrong
+    )
+
+
+def _differ(a: LawFit, b: LawFit, load: float) -> bool:
+    """Whether two fitted forces differ at 95 %, by Welch's t with the fits' degrees of freedom."""
+    from scipy.stats import t
+
+    variance_a, variance_b = float(a.force_u_N(load)) ** 2, float(b.force_u_N(load)) ** 2
+    total = variance_a + variance_b
+    if total <= 0:
+        return float(a.force_N(load)) != float(b.force_N(load))
+    dof = total**2 / (variance_a**2 / a.dof + variance_b**2 / b.dof)
+    return bool(abs(float(a.force_N(load) - b.force_N(load))) > t.ppf(0.975, dof) * math.sqrt(total))
+
+
+@dataclass(frozen=True)
+class DirectionRatio:
+    """T pulled along x over T pulled along y of one pattern at one load, with 95 % interval."""
+
+    pattern: str
+    pair: tuple[str, str]
+    regime: Regime
+    normal_load_N: float
+    measured: float
+    low: float
+    high: float
+    simulated: float
+
+
+def direction_pairs(study: Study) -> list[tuple[str, str, str]]:
+    """(pattern, sample along x, sample along y) for every pattern pulled both ways."""
+    samples = study.ingested.campaign.samples
+    names = {pattern.name for pattern in samples.values()}
+    return [(n, f"{n}x", f"{n}y") for n in sorted(names) if f"{n}x" in samples and f"{n}y" in samples]
+
+
+def direction_ratios(study: Study) -> list[DirectionRatio]:
+    """The anisotropy of every pattern pulled both ways, at the lowest, middle and highest load."""
+    if study.comparison is None:
+        return []
+    found = [
+        _direction_ratio(study, names, regime, load)
+        for names in direction_pairs(study)
+        for regime in REGIMES
+        for load in dict.fromkeys(common_loads(study))
+    ]
+    return [ratio for ratio in found if ratio is not None]
+
+
+def _direction_ratio(study: Study, names: tuple[str, str, str], regime: Regime, load: float) -> DirectionRatio | None:
+    from scipy.stats import t
+
+    assert study.comparison is not None
+    pattern, x, y = names
+    measured = [select.fit_of(study.fits, s, regime) for s in (x, y)]
+    model = [select.fit_of(study.comparison.simulated, s, regime) for s in (x, y)]
+    if any(f is None for f in measured + model):
+        return None
+    (fx, fy), (mx, my) = [[f for f in pair if f is not None] for pair in (measured, model)]
+    ratio = float(fx.force_N(load) / fy.force_N(load))
+    if ratio <= 0:
+        return None
+    ux, uy = (float(f.force_u_N(load) / f.force_N(load)) for f in (fx, fy))
+    u = math.hypot(ux, uy)
+    dof = u**4 / (ux**4 / fx.dof + uy**4 / fy.dof) if u > 0 else math.inf
+    half = float(t.ppf(0.975, dof)) * u
+    simulated = float(mx.force_N(load) / my.force_N(load))
+    return DirectionRatio(
+        pattern, (x, y), regime, load, ratio, ratio * math.exp(-half), ratio * math.exp(half), simulated
+    )
+
+
+def parameter_correlations(fits: Iterable[LawFit]) -> list[float]:
+    """Correlation coefficient of mu and tau0 in each fit."""
+    found = []
+    for fit in fits:
+        if "tau0_Pa" in fit.parameters:
+            scale = fit.standard_uncertainty("mu") * fit.standard_uncertainty("tau0_Pa")
+            i, j = fit.parameters.index("mu"), fit.parameters.index("tau0_Pa")
+            if scale > 0:
+                found.append(float(fit.covariance[i, j]) / scale)
+    return found

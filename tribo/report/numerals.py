@@ -1,0 +1,66 @@
+"""Numbers as people write them."""
+
+from __future__ import annotations
+
+import math
+import re
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """``value`` to so many significant digits, never in powers of ten; a dash where there is none."""
+    if not math.isfinite(value):
+        return "–"
+    if value == 0:
+        return "0"
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    return _signed(f"{value:.{decimals}f}")
+
+
+def with_uncertainty(value: float, u: float) -> str:
+    """ "4.76 ± 0.73": the uncertainty to two significant digits, the value to the same place."""
+    if not (math.isfinite(value) and math.isfinite(u)) or u <= 0:
+        return significant(value)
+    decimals = min(6, max(0, 1 - math.floor(math.log10(u))))
+    return _signed(f"{value:.{decimals}f} ± {u:.{decimals}f}")
+
+
+def span(values: list[float], digits: int = 2) -> str:
+    """ "0.55 to 0.58", or one number where all are the same at this precision."""
+    finite = [v for v in values if math.isfinite(v)]
+    if not finite:
+        return "–"
+    low, high = f"{min(finite):.{digits}f}", f"{max(finite):.{digits}f}"
+    return _signed(low if low == high else f"{low} to {high}")
+
+
+def ratio_text(value: float) -> str:
+    """Two decimals, three where two would hide on which side of 1 a ratio lies."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.3f}" if 0 < abs(value - 1) < 0.005 else f"{value:.2f}"
+
+
+def unbroken(sentence: str) -> str:
+    """The sentence with unbreakable spaces around = and ± and between a number and its unit."""
+    sentence = re.sub(r" ([=±]) ", "\u00a0\\1\u00a0", sentence)
+    return re.sub(r"(?<=\d) (?=(?:N|kPa|mm|s)\b|%)", "\u00a0", sentence)
+
+
+def percent(fraction: float) -> str:
+    """A fraction in whole percent, one decimal below 3 %."""
+    value = 100 * fraction
+    return _signed(f"{value:.1f} %" if abs(value) < 2.95 else f"{value:.0f} %")
+
+
+def joined(words: list[str]) -> str:
+    """ "A, B and C"."""
+    return ", ".join(words[:-1]) + " and " + words[-1] if len(words) > 1 else "".join(words)
+
+
+def counted(number: int, noun: str) -> str:
+    """ "1 test", "3 tests"."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def _signed(text: str) -> str:
+    return text.replace("-", "−")
