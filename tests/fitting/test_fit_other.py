@@ -43,8 +43,7 @@ def test_the_three_term_law_counts_a_specimen_pulled_both_ways_once() -> None:
 
 def test_the_three_term_covariance_is_the_scatter_over_repeated_campaigns() -> None:
     fits = [
-        fit_three_term(pulls(between=0.05, within=0.07, seed=s), "static", AREA, AREA_FRACTIONS)
-        for s in range(150)
+        fit_three_term(pulls(between=0.05, within=0.07, seed=s), "static", AREA, AREA_FRACTIONS) for s in range(150)
     ]
     scatter = np.var([f.values for f in fits], axis=0, ddof=1)
     stated = np.mean([np.diag(f.covariance) for f in fits], axis=0)

@@ -64,9 +64,7 @@ def test_the_covariance_is_that_of_the_mean_over_specimens_with_t_of_g_minus_1()
 
 @given(shift=st.floats(-40e3, 40e3), gain=st.floats(0.1, 10))
 @settings(max_examples=30, deadline=None)
-def test_force_weights_follow_an_added_adhesion_and_a_gain_of_the_force_exactly(
-    shift: float, gain: float
-) -> None:
+def test_force_weights_follow_an_added_adhesion_and_a_gain_of_the_force_exactly(shift: float, gain: float) -> None:
     table = campaign({"F": THREE}, scatter=0.1)
     plain = only(fit_samples(table, "static", AREA, weights="force"))
     moved = table.assign(static_N=gain * table["static_N"] + shift * AREA)

@@ -1,4 +1,4 @@
-"""The flat law of the practice campaigns lies in the intervals of the fit, from the forces behind the traces."""
+"""The flat law of the practice campaigns lies in the intervals of the fit to the forces behind the traces."""
 
 from __future__ import annotations
 

@@ -6,13 +6,43 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tribo.fitting.both_variables import fit_errors_in_both
+    from tribo.fitting.budget import campaign_budgets, uncertainty_budget
+    from tribo.fitting.curves import fit_power_law
     from tribo.fitting.mixed import mixed_model
+    from tribo.fitting.outlying import outlying_pulls, outlying_specimens
+    from tribo.fitting.power import power_of_campaign
+    from tribo.fitting.repeats import repeat_scatter
     from tribo.fitting.samples import fit_samples
     from tribo.fitting.three_term import fit_three_term
 
-__all__ = ["fit_samples", "fit_three_term", "mixed_model"]
+__all__ = [
+    "campaign_budgets",
+    "fit_errors_in_both",
+    "fit_power_law",
+    "fit_samples",
+    "fit_three_term",
+    "mixed_model",
+    "outlying_pulls",
+    "outlying_specimens",
+    "power_of_campaign",
+    "repeat_scatter",
+    "uncertainty_budget",
+]
 
-_HOME = {"fit_samples": "samples", "fit_three_term": "three_term", "mixed_model": "mixed"}
+_HOME = {
+    "campaign_budgets": "budget",
+    "fit_errors_in_both": "both_variables",
+    "fit_power_law": "curves",
+    "fit_samples": "samples",
+    "fit_three_term": "three_term",
+    "mixed_model": "mixed",
+    "outlying_pulls": "outlying",
+    "outlying_specimens": "outlying",
+    "power_of_campaign": "power",
+    "repeat_scatter": "repeats",
+    "uncertainty_budget": "budget",
+}
 
 
 def __getattr__(name: str) -> Any:

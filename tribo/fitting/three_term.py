@@ -43,13 +43,9 @@ def fit_three_term(
     """
     samples = sample_rows(table, regime)
     used = [rows for rows in samples if rows.sample in area_fractions and len(rows)]
-    notes = tuple(
-        f"sample {rows.sample} has no area fraction" for rows in samples if rows.sample not in area_fractions
-    )
+    notes = tuple(f"sample {rows.sample} has no area fraction" for rows in samples if rows.sample not in area_fractions)
     if len({area_fractions[rows.sample] for rows in used}) < 2:
-        raise FitError(
-            Problem("too_few_samples", "one area fraction cannot part a from b", allowed="two or more")
-        )
+        raise FitError(Problem("too_few_samples", "one area fraction cannot part a from b", allowed="two or more"))
     design, force, weight, specimen = _stack(used, nominal_area_m2, area_fractions, weights)
     names = np.unique(specimen)
     if len(names) <= len(LAW.parameters):

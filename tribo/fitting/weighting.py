@@ -5,6 +5,7 @@ The law is one, T = mu N + tau0 A; what differs is which scatter is held constan
 "relative"  the coefficient of variation of T: weights 1/T^2, with T from the fit itself (the default)
 "ratio"     the scatter of T/N: weights 1/N^2, the fit T/N = mu + tau0/p of the paper's Fig. 4
 "force"     the scatter of T: equal weights, the fit T = mu N + tau0 A of the paper's Figs. 6 and 7
+"repeats"   nothing: a constant and a share of T, both estimated from the repeats of the sample
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 
 from tribo.errors import FitError, Problem
 from tribo.fitting.linear import least_squares
+from tribo.fitting.repeats import repeat_scatter
 from tribo.fitting.rows import Rows
 from tribo.laws.table import LAWS
 from tribo.records import FloatArray
@@ -21,6 +23,7 @@ WEIGHTS: dict[str, str] = {
     "relative": "constant relative scatter of T",
     "ratio": "constant scatter of T/N",
     "force": "constant scatter of T",
+    "repeats": "scatter of T as its repeats show it",
 }
 _ROUNDS = 4  # the weights move the fit by less than its error, and the fit moves the weights by far less
 _SMALLEST_SHARE = 0.05  # of the median force: where the fitted force nears zero its weight must not diverge
@@ -42,16 +45,21 @@ def weights_of(rows: Rows, nominal_area_m2: float, weights: str) -> FloatArray:
             raise FitError(Problem("zero_load", what, column="normal_load_N", allowed=allowed))
         return rows.load_N**-2.0
     if weights == "relative":
-        return _relative(rows, nominal_area_m2)
+        return expected_force_N(rows, nominal_area_m2) ** -2.0
+    if weights == "repeats":
+        expected = expected_force_N(rows, nominal_area_m2)
+        scatter = repeat_scatter((rows,))
+        return expected**-2.0 if scatter is None else 1 / scatter.variance(expected)
     allowed = ", ".join(WEIGHTS)
     raise FitError(Problem("unknown_weights", "no such weights", found=weights, allowed=allowed))
 
 
-def _relative(rows: Rows, nominal_area_m2: float) -> FloatArray:
+def expected_force_N(rows: Rows, nominal_area_m2: float) -> FloatArray:
+    """Force (n,) of the sample's line at each load, kept above a share of the median force."""
     design = LAWS["coulomb_adhesion"].design_matrix(rows.load_N, nominal_area_m2)
     floor = _SMALLEST_SHARE * float(np.median(np.abs(rows.force_N))) or 1.0
     expected = np.full(len(rows), floor)
     for _ in range(_ROUNDS):
         fit = least_squares(design, rows.force_N, expected**-2.0)
         expected = np.maximum(np.abs(design @ fit.values), floor)
-    return expected**-2.0
+    return expected

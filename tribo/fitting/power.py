@@ -1,0 +1,211 @@
+"""What difference between two samples a campaign could have shown, and what would show a wanted one.
+
+Two samples are compared by the two-sided t test of their specimens' means, the power by the noncentral t
+distribution (Cohen, Statistical Power Analysis for the Behavioral Sciences, 1988). The scatter of specimens
+and of repeats is pooled over the samples of the campaign: three specimens say too little about it.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tribo.errors import FitError, Problem
+from tribo.fitting.budget import NUMBERS, PRESSURE_PA, sensitivities
+from tribo.fitting.linear import least_squares
+from tribo.fitting.rows import Rows, sample_rows
+from tribo.fitting.samples import fit_samples
+from tribo.fitting.weighting import weights_of
+from tribo.laws.table import LAWS
+from tribo.records import FloatArray, LawFit, Regime
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+LAW = LAWS["coulomb_adhesion"]
+MOST_SPECIMENS = 100
+MOST_REPEATS = 50
+
+
+@dataclass(frozen=True)
+class Power:
+    """Power of one campaign for one number ("mu", "tau0_kPa", "T_N" at ``pressure_Pa``) in one regime.
+
+    All in percent of ``reference``, the mean of |number| over the samples. ``specimen_sd_pct`` is the scatter
+    of specimens beyond that of their repeats, ``repeat_sd_pct`` what repeats would give one specimen's number
+    with one pull at each load. ``smallest_difference_pct`` is the difference of two samples that a test at
+    ``level`` finds with probability ``power`` in this design; ``specimens_needed`` and ``repeats_needed``
+    would find ``wanted_pct``, each with the other left as it is (None: not within 100 specimens or 50
+    repeats, however many).
+    """
+
+    regime: Regime
+    number: str
+    reference: float
+    specimens: float
+    repeats: float
+    specimen_sd_pct: float
+    repeat_sd_pct: float
+    smallest_difference_pct: float
+    wanted_pct: float
+    specimens_needed: int | None
+    repeats_needed: int | None
+    level: float
+    power: float
+    pressure_Pa: float
+
+    def text(self) -> str:
+        """The same in words."""
+        label = NUMBERS[self.number].replace("at p", f"at {self.pressure_Pa / 1e3:g} kPa")
+        more = (
+            f"{self.specimens_needed} specimens a sample"
+            if self.specimens_needed
+            else f"more than {MOST_SPECIMENS} specimens a sample"
+        )
+        repeats = (
+            f"or {self.repeats_needed} repeats at each load" if self.repeats_needed else "more repeats alone would not"
+        )
+        return (
+            f"{self.regime} {label}: two samples {self.smallest_difference_pct:.0f} % apart would have been "
+            f"told apart with probability {self.power:g} at level {self.level:g}; "
+            f"{self.wanted_pct:g} % takes {more}, {repeats}."
+        )
+
+
+def power_of_campaign(
+    table: pd.DataFrame,
+    regime: Regime,
+    nominal_area_m2: float,
+    *,
+    weights: str = "relative",
+    wanted_pct: float = 10.0,
+    level: float = 0.05,
+    power: float = 0.8,
+    pressure_Pa: float = PRESSURE_PA,
+) -> tuple[Power, ...]:
+    """Power for mu, tau0 and T at ``pressure_Pa`` of the campaign in ``table`` (as for ``fit_samples``).
+
+    Raises
+    ------
+    FitError
+        No sample with two specimens: the scatter between specimens is unknown.
+    """
+    fits = [
+        fit
+        for fit in fit_samples(table, regime, nominal_area_m2, weights=weights)
+        if len(fit.specimens) > 1 and np.isfinite(fit.covariance).all()
+    ]
+    if not fits:
+        what = "the scatter between specimens is unknown"
+        raise FitError(Problem("too_few_specimens", what, allowed="a sample with two specimens or more"))
+    rows = {r.sample: r for r in sample_rows(table, regime)}
+    within = [_one_pull_covariance(rows[fit.sample], fit, weights) for fit in fits]
+    repeats = float(np.mean([w.repeats for w in within]))
+    specimens = float(np.mean([len(fit.specimens) for fit in fits]))
+    powers = []
+    for number in NUMBERS:
+        scatter = _pooled(fits, within, number, pressure_Pa, repeats)
+        smallest = smallest_difference(scatter.specimen_mean_sd(repeats), specimens, level, power)
+        powers.append(
+            Power(
+                regime, number, scatter.reference, specimens, repeats,
+                100 * scatter.specimen_sd, 100 * scatter.repeat_sd, 100 * smallest, wanted_pct,
+                _specimens_needed(scatter, repeats, wanted_pct / 100, level, power),
+                _repeats_needed(scatter, specimens, wanted_pct / 100, level, power),
+                level, power, pressure_Pa,
+            )
+        )  # fmt: skip
+    return tuple(powers)
+
+
+def smallest_difference(sd: float, specimens: float, level: float = 0.05, power: float = 0.8) -> float:
+    """Difference of two means of ``specimens`` values each that is found with probability ``power``.
+
+    In the unit of ``sd``, the standard deviation of the values; two-sided t test at ``level`` with
+    2 (specimens - 1) degrees of freedom. Infinite for fewer than two specimens.
+    """
+    return sd * np.sqrt(2 / specimens) * _noncentrality(2 * (specimens - 1), level, power)
+
+
+@lru_cache(maxsize=4096)
+def _noncentrality(dof: float, level: float, power: float) -> float:
+    from scipy.optimize import brentq
+    from scipy.stats import nct, t
+
+    if dof <= 0:
+        return float("inf")
+    critical = float(t.ppf(1 - level / 2, dof))
+    # the far tail adds nothing at any power worth asking for
+    return float(brentq(lambda shift: float(nct.sf(critical, dof, shift)) - power, 0.0, 10 * critical + 10))
+
+
+@dataclass(frozen=True)
+class _WithinSpecimen:
+    """Mean covariance (2, 2) of one specimen's (mu, tau0_Pa) with one pull a load; mean pulls at a load."""
+
+    covariance: FloatArray
+    repeats: float
+
+
+def _one_pull_covariance(rows: Rows, fit: LawFit, weights: str) -> _WithinSpecimen:
+    weight = weights_of(rows, fit.nominal_area_m2, weights)
+    covariances, repeats = [], []
+    for name in fit.specimens:
+        own = rows.specimen == name
+        design = LAW.design_matrix(rows.load_N[own], fit.nominal_area_m2)
+        line = least_squares(design, rows.force_N[own], weight[own])
+        repeats.append(own.sum() / len(np.unique(rows.load_N[own])))
+        if line.dof:
+            covariances.append(line.covariance * repeats[-1])
+    covariance = np.mean(covariances, axis=0) if covariances else np.zeros((2, 2))
+    return _WithinSpecimen(covariance, float(np.mean(repeats)))
+
+
+@dataclass(frozen=True)
+class _Scatter:
+    reference: float
+    specimen_sd: float
+    repeat_sd: float
+
+    def specimen_mean_sd(self, repeats: float) -> float:
+        """Standard deviation of one specimen's number with ``repeats`` pulls at each load."""
+        return float(np.sqrt(self.specimen_sd**2 + self.repeat_sd**2 / repeats))
+
+
+def _pooled(
+    fits: list[LawFit], within: list[_WithinSpecimen], number: str, pressure_Pa: float, repeats: float
+) -> _Scatter:
+    """Pooled over samples, as shares of the mean |number|: T and mu scatter by shares, tau0 by kPa."""
+    by = [sensitivities(fit, pressure_Pa)[number] for fit in fits]
+    size = np.array([abs(float(b @ fit.values)) for b, fit in zip(by, fits, strict=True)])
+    reference = float(size.mean())
+    unit = np.full(len(fits), reference) if number == "tau0_kPa" else size
+    dof = np.array([fit.dof for fit in fits])
+    seen = np.array([float(b @ fit.covariance @ b) * len(fit.specimens) for b, fit in zip(by, fits, strict=True)])
+    pulls = np.array([float(b @ w.covariance @ b) for b, w in zip(by, within, strict=True)])
+    total = float(dof @ (seen / unit**2) / dof.sum())
+    repeat = float(dof @ (pulls / unit**2) / dof.sum())
+    return _Scatter(reference, float(np.sqrt(max(total - repeat / repeats, 0.0))), float(np.sqrt(repeat)))
+
+
+def _specimens_needed(scatter: _Scatter, repeats: float, wanted: float, level: float, power: float) -> int | None:
+    sd = scatter.specimen_mean_sd(repeats)
+    return _fewest(lambda g: smallest_difference(sd, g, level, power) <= wanted, range(2, MOST_SPECIMENS + 1))
+
+
+def _repeats_needed(scatter: _Scatter, specimens: float, wanted: float, level: float, power: float) -> int | None:
+    def enough(repeats: int) -> bool:
+        return smallest_difference(scatter.specimen_mean_sd(repeats), specimens, level, power) <= wanted
+
+    return _fewest(enough, range(1, MOST_REPEATS + 1))
+
+
+def _fewest(enough: Callable[[int], bool], counts: range) -> int | None:
+    """The first count that is enough, by bisection: what is enough stays so with more."""
+    at = bisect_left(counts, True, key=enough)
+    return counts[at] if at < len(counts) else None
