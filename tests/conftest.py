@@ -35,3 +35,19 @@ def practice(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable
         return next(folder.rglob("campaign.toml")).parent
 
     return unzip
+
+
+@pytest.fixture(scope="session")
+def small_campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A campaign of 24 pulls of the virtual tribometer: samples F and B, three specimens, two loads, two repeats."""
+    from tribo.simulate.instrument import SledDesign, SledLaw, write_campaign
+
+    folder = tmp_path_factory.mktemp("small") / "campaign"
+    laws = {"F": SledLaw(4.8, 23e3, 2.9, 12e3), "B": SledLaw(3.6, 10e3, 2.9, 6e3)}
+    toml = (
+        '[campaign]\ntitle = "small"\nnominal_area_mm2 = 55.0\nslider_mass_g = 1.5\n'
+        '[patterns.F]\ncavity = "none"\n'
+        '[patterns.B]\ncavity = "circle"\ndiameter_um = 10.0\npitch_um = [15.0, 15.0]\n'
+    )
+    write_campaign(folder, SledDesign(laws, masses_g=(25.0, 138.5)), toml, seed=7)
+    return folder

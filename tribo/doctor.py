@@ -1,0 +1,58 @@
+"""What this installation has: versions, cores, optional parts."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from importlib import metadata
+from typing import Any
+
+NEEDED = (
+    "numpy", "scipy", "pandas", "statsmodels", "xarray", "h5py", "h5netcdf", "matplotlib", "numba", "pydantic",
+    "click", "rich", "pint", "jinja2", "odrpack", "charset-normalizer",
+)  # fmt: skip
+OPTIONAL = {
+    "distributed": "simulations on a dask cluster (--scheduler)",
+    "openpyxl": "exports saved as .xlsx",
+    "typst": "report.pdf",
+    "snakemake": "the pipelines",
+}
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def examine() -> dict[str, Any]:
+    """Versions of everything tribo needs or can use; ``healthy`` is False where something needed is missing."""
+    from tribo import __version__
+    from tribo.published import data_dir
+
+    needed = {p: _version(p) for p in NEEDED}
+    example = (data_dir() / "example" / "campaign.toml").is_file()
+    return {
+        "tribo": __version__,
+        "python": platform.python_version(),
+        "executable": sys.executable,
+        "system": platform.platform(),
+        "cores": os.cpu_count(),
+        "needed": needed,
+        "optional": {p: _version(p) for p in OPTIONAL},
+        "bundled_example": example,
+        "healthy": example and all(needed.values()),
+    }
+
+
+def in_words(found: dict[str, Any]) -> str:
+    """The examination as lines for people."""
+    lines = [f"tribo {found['tribo']}, Python {found['python']}, {found['cores']} cores, {found['system']}"]
+    lines += [f"  {p:<20} {v or 'MISSING: pip install ' + p}" for p, v in found["needed"].items()]
+    lines += [
+        f"  {p:<20} {v or 'not installed; only needed for ' + OPTIONAL[p]}" for p, v in found["optional"].items()
+    ]
+    lines.append(f"  {'bundled example':<20} {'found' if found['bundled_example'] else 'MISSING'}")
+    return "\n".join(lines)
