@@ -10,6 +10,7 @@ from tribo.fitting.rows import Rows
 from tribo.records import FloatArray
 
 _ROUNDS = 20
+_ROUNDING = 1e-24  # relative variance that rounding alone gives
 _TOO_FAR = 1e-3  # a cell of repeats that chance gives so rarely holds an outlier and does not count
 
 
@@ -27,13 +28,13 @@ class RepeatScatter:
 
 
 def repeat_scatter(samples: tuple[Rows, ...]) -> RepeatScatter | None:
-    """Variance function of the repeats (same specimen, same load) of all ``samples``; None without repeats.
+    """Variance function of the repeats (same specimen, same load) of ``samples``; None without scatter.
 
     Weighted least squares of the cell variances on the squared cell means, the weights their own expected
     scatter 2 sigma^4 / dof, both terms held at zero or above. Cells too scattered for chance are left out.
     """
     mean, variance, dof = (np.concatenate(parts) for parts in zip(*map(_cells, samples), strict=True))
-    if not dof.sum() or not variance.any():
+    if not (variance > _ROUNDING * mean**2).any():
         return None
     from scipy.stats import chi2
 
@@ -63,9 +64,9 @@ def _cells(rows: Rows) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _not_negative(square: FloatArray, variance: FloatArray, weight: FloatArray) -> FloatArray:
     """Terms of variance = a + b square, both at least zero and not both zero."""
-    root = np.sqrt(weight)
     from scipy.optimize import nnls
 
+    root = np.sqrt(weight)
     length = np.array([1.0, max(float(square.max(initial=0.0)), 1e-300)])
     design = np.column_stack([np.ones_like(square), square / length[1]]) * root[:, None]
     terms, _ = nnls(design, variance * root)
