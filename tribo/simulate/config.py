@@ -1,0 +1,318 @@
+"""What one run of the spring-block model is made of, checked before anything is computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, Literal
+
+from tribo.errors import Problem, SimulationError
+from tribo.records import Pattern
+from tribo.simulate.masks import contact_mask, pattern_of
+
+NormalForce = Literal["redistributed", "uniform"]
+Edges = Literal["free", "periodic"]
+Engine = Literal["fast", "dense", "reference"]
+Rotation = Literal["small", "finite"]
+
+
+@dataclass(frozen=True)
+class LocalFriction:
+    """Friction of single blocks: Gaussian coefficients and adhesion per area (Berardo 2019, Model parameters).
+
+    A block of normal force F_n holds up to mu_s F_n + F_as and slides against mu_d F_n + F_ad; the adhesion
+    tractions here are F_as / l2 and F_ad / l2 in Pa. Coefficients drawn below zero are set to zero.
+    """
+
+    mu_s: float = 5.5
+    mu_s_sd: float = 0.195
+    mu_d: float = 2.9
+    mu_d_sd: float = 0.15
+    static_adhesion_Pa: float = 23.45e3
+    sliding_adhesion_Pa: float = 11.60e3
+
+
+PAPER = LocalFriction()
+"""The local friction of Berardo 2019, fitted there to the flat sample."""
+
+
+@dataclass(frozen=True)
+class SimConfig:
+    """One run. Lengths, times and pressures in SI units; the defaults are the baseline of Berardo 2019.
+
+    Parameters
+    ----------
+    sample, pattern
+        Name of the sample, and its cavities; without ``pattern`` the paper's pattern of that name.
+    pressure_Pa, angle_deg
+        Nominal pressure, and pull direction against x.
+    seed
+        Draws the local friction. Equal seeds give equal numbers on every sample.
+    blocks, spacing_m, thickness_m
+        Blocks along x and y, their distance l, and the layer thickness l_z (l by default).
+    shear_factor
+        K_s over K_int (l / l_z)^2. The paper prints 1; G = 3/8 E would give 0.5.
+    normal_force
+        "redistributed": contact blocks carry p l2 / AF and cavities nothing; "uniform": p l2 on every block.
+    edges, pattern_first, cavity_shape
+        Free or periodic edges, first block of the first cavity, and whether circles become squares.
+    rotation
+        "small" for linearised springs, "finite" for the full r_ij of the paper (not on the fast engine).
+    dt_s
+        Time step. 5e-8 s moves the sliding mean by under 1 % against 1e-8 s; docs/simulator.md has the figures.
+    duration_s, duration_peaks
+        The run ends at ``duration_s``, or where that is None at ``duration_peaks`` times the time of the peak.
+    window_start_peaks, window_end_peaks
+        Sliding window in units of the peak time; the end is that of the run by default.
+    peak_rule
+        "highest" takes the largest force of the run as static friction, "first" the first maximum after which
+        the force fell by ``peak_drop``.
+    rest_tolerance
+        A cavity block rests once its force is below this share of the mean sliding threshold.
+    """
+
+    sample: str = "F"
+    pressure_Pa: float = 10e3
+    angle_deg: float = 0.0
+    seed: int = 0
+    pattern: Pattern | None = None
+    friction: LocalFriction = PAPER
+    blocks: tuple[int, int] = (85, 85)
+    spacing_m: float = 5e-6
+    thickness_m: float | None = None
+    modulus_Pa: float = 0.8e6
+    density_kg_m3: float = 1012.0
+    damping_per_s: float = 5e5
+    speed_m_s: float = 0.2e-3
+    shear_factor: float = 1.0
+    normal_force: NormalForce = "redistributed"
+    edges: Edges = "free"
+    pattern_first: tuple[int, int] | None = None
+    cavity_shape: Literal["square", "round"] = "square"
+    rotation: Rotation = "small"
+    engine: Engine = "fast"
+    dt_s: float = 5e-8
+    duration_s: float | None = None
+    duration_peaks: float = 3.0
+    window_start_peaks: float = 1.05
+    window_end_peaks: float | None = None
+    peak_rule: Literal["highest", "first"] = "highest"
+    peak_drop: float = 0.01
+    rest_tolerance: float = 5e-3
+    sample_interval_s: float = 1e-6
+
+    def with_(self, **changes: Any) -> SimConfig:
+        """A copy with some fields changed."""
+        return replace(self, **changes)
+
+    @property
+    def cavities(self) -> Pattern:
+        """The pattern of this run; raises SimulationError where neither pattern nor sample names one."""
+        pattern = self.pattern or pattern_of(self.sample)
+        if pattern is None:
+            raise SimulationError(_unknown_sample(self.sample))
+        return pattern
+
+    @property
+    def layer_m(self) -> float:
+        return self.spacing_m if self.thickness_m is None else self.thickness_m
+
+    @property
+    def stiffness_N_m(self) -> float:
+        """K_int = 3/4 E l_z, of the springs along the axes; the diagonals have half of it."""
+        return 0.75 * self.modulus_Pa * self.layer_m
+
+    @property
+    def shear_stiffness_N_m(self) -> float:
+        """K_s = K_int (l / l_z)^2, times ``shear_factor``."""
+        return self.shear_factor * self.stiffness_N_m * (self.spacing_m / self.layer_m) ** 2
+
+    @property
+    def mass_kg(self) -> float:
+        return self.density_kg_m3 * self.spacing_m**2 * self.layer_m
+
+    @property
+    def normal_load_N(self) -> float:
+        """Nominal load p l2 Nx Ny of the whole domain."""
+        return self.pressure_Pa * self.spacing_m**2 * self.blocks[0] * self.blocks[1]
+
+    @property
+    def largest_dt_s(self) -> float:
+        """Where the explicit step turns unstable: the stiffest lattice mode with its damping."""
+        # x-zigzag against the axis springs (4 K) and the diagonals (2 K), plus the shear spring
+        omega2 = (6.0 * self.stiffness_N_m + self.shear_stiffness_N_m) / self.mass_kg
+        # v' = (1 - g dt) v - w2 dt x, x' = x + dt v' is stable while (w dt)^2 < 4 - 2 g dt
+        g = self.damping_per_s
+        return (math.sqrt(g**2 + 4.0 * omega2) - g) / omega2
+
+    def check(self) -> SimConfig:
+        """This configuration, or SimulationError with everything that is wrong with it."""
+        problems = list(_problems(self))
+        if problems:
+            raise SimulationError(problems)
+        return self
+
+    def parameters(self) -> dict[str, Any]:
+        """Every input as a flat mapping of plain values, units in the names."""
+        flat: dict[str, Any] = {}
+        for name, value in asdict(replace(self, pattern=None)).items():
+            if isinstance(value, dict):
+                flat |= {f"{name}_{k}": v for k, v in value.items()}
+            elif value is not None:
+                flat[name] = value
+        pattern = self.cavities
+        flat["pattern"] = pattern.name
+        flat["cavity"] = pattern.cavity
+        if pattern.size_m is not None and pattern.pitch_m is not None:
+            flat |= {"cavity_size_m": pattern.size_m, "cavity_pitch_m": pattern.pitch_m}
+            flat["cavity_staggered"] = pattern.staggered
+        flat["thickness_m"] = self.layer_m
+        return flat
+
+
+def _unknown_sample(sample: str) -> Problem:
+    return Problem(
+        "unknown_sample", "no such sample in the paper, and no pattern given", column="sample", found=sample,
+        allowed="F, A, B, C, Sx, Sy, or a pattern",
+    )  # fmt: skip
+
+
+_POSITIVE = (
+    "pressure_Pa", "spacing_m", "thickness_m", "modulus_Pa", "density_kg_m3", "speed_m_s", "shear_factor", "dt_s",
+    "duration_s", "sample_interval_s", "rest_tolerance",
+)  # fmt: skip
+_NOT_NEGATIVE = ("damping_per_s",)
+_CHOICES: dict[str, tuple[str, ...]] = {
+    "normal_force": ("redistributed", "uniform"),
+    "edges": ("free", "periodic"),
+    "cavity_shape": ("square", "round"),
+    "rotation": ("small", "finite"),
+    "engine": ("fast", "dense", "reference"),
+    "peak_rule": ("highest", "first"),
+}
+_ABOVE = {"duration_peaks": 1.0, "window_start_peaks": 1.0, "window_end_peaks": 1.0}
+
+
+def _problems(config: SimConfig) -> Iterator[Problem]:
+    """Every fault of a configuration; later checks only run on numbers the earlier ones let through."""
+    faults = [*_number_problems(config), *_choice_problems(config), *_friction_problems(config.friction)]
+    yield from faults
+    if faults:
+        return
+    yield from _geometry_problems(config)
+    if config.dt_s > config.largest_dt_s:
+        yield Problem(
+            "unstable_step", "the time step is beyond the stability limit", column="dt_s",
+            found=f"{config.dt_s:g}", allowed=f"at most {config.largest_dt_s:.3g} s for these springs and masses",
+        )  # fmt: skip
+    end = config.window_end_peaks
+    if end is not None and end <= config.window_start_peaks:
+        yield Problem(
+            "empty_window", "the sliding window ends before it starts", column="window_end_peaks",
+            found=f"{end:g}", allowed=f"more than {config.window_start_peaks:g}",
+        )  # fmt: skip
+    if config.rotation == "finite" and config.engine == "fast":
+        yield Problem(
+            "unsupported", "the fast engine linearises the springs", column="rotation", found="finite",
+            allowed="small, or engine dense or reference",
+        )  # fmt: skip
+
+
+def _number_problems(config: SimConfig) -> Iterator[Problem]:
+    for field in fields(config):
+        value = getattr(config, field.name)
+        if isinstance(value, float | int) and not isinstance(value, bool) and not math.isfinite(value):
+            yield Problem("not_finite", "not a finite number", column=field.name, found=str(value), allowed="a number")
+            continue
+        if value is None:
+            continue
+        if field.name in _POSITIVE and not value > 0:
+            yield Problem("not_positive", "must be positive", column=field.name, found=f"{value:g}", allowed="> 0")
+        if field.name in _NOT_NEGATIVE and value < 0:
+            yield Problem("negative", "must not be negative", column=field.name, found=f"{value:g}", allowed=">= 0")
+        if field.name in _ABOVE and not value > _ABOVE[field.name]:
+            yield Problem(
+                "too_short", "must reach beyond the peak", column=field.name, found=f"{value:g}",
+                allowed=f"> {_ABOVE[field.name]:g}",
+            )  # fmt: skip
+    if not (isinstance(config.seed, int) and config.seed >= 0):
+        yield Problem("seed", "not a seed", column="seed", found=str(config.seed), allowed="a whole number >= 0")
+    if not 0 < config.peak_drop < 1:
+        yield Problem("share", "not a share", column="peak_drop", found=f"{config.peak_drop:g}", allowed="0 to 1")
+
+
+def _choice_problems(config: SimConfig) -> Iterator[Problem]:
+    for name, allowed in _CHOICES.items():
+        value = getattr(config, name)
+        if value not in allowed:
+            yield Problem(
+                "unknown_choice", f"no such {name}", column=name, found=str(value), allowed=" or ".join(allowed)
+            )
+
+
+def _friction_problems(friction: LocalFriction) -> Iterator[Problem]:
+    for field in fields(friction):
+        value = getattr(friction, field.name)
+        if not math.isfinite(value):
+            yield Problem("not_finite", "not a finite number", column=field.name, found=str(value), allowed="a number")
+        elif field.name.startswith("mu") and value < 0:
+            yield Problem("negative", "must not be negative", column=field.name, found=f"{value:g}", allowed=">= 0")
+
+
+def _geometry_problems(config: SimConfig) -> Iterator[Problem]:
+    nx, ny = config.blocks
+    if not (isinstance(nx, int) and isinstance(ny, int) and min(nx, ny) >= 3):
+        yield Problem(
+            "too_small", "too few blocks for a lattice", column="blocks", found=f"{nx} x {ny}", allowed="3 x 3 or more"
+        )
+        return
+    pattern = config.pattern or pattern_of(config.sample)
+    if pattern is None:
+        yield _unknown_sample(config.sample)
+        return
+    if pattern.cavity == "none":
+        return
+    if pattern.size_m is None or pattern.pitch_m is None:
+        yield Problem("no_geometry", "cavities without size or pitch", column="pattern", found=pattern.name)
+        return
+    domain = (nx * config.spacing_m, ny * config.spacing_m)
+    for axis, size, pitch, width in zip("xy", pattern.size_m, pattern.pitch_m, domain, strict=True):
+        if not (0 < size < pitch):
+            yield Problem(
+                "impossible_geometry", f"cavities do not fit their pitch along {axis}", column="pattern",
+                found=f"{size * 1e6:g} um in {pitch * 1e6:g} um", allowed="0 < size < pitch",
+            )  # fmt: skip
+        elif size < 0.5 * config.spacing_m:
+            yield Problem(
+                "too_coarse", f"cavities are smaller than half a block along {axis}", column="spacing_m",
+                found=f"{config.spacing_m * 1e6:g} um", allowed=f"at most {size * 1e6:g} um",
+            )  # fmt: skip
+        elif size >= width:
+            yield Problem(
+                "too_small", f"no whole cavity fits the domain along {axis}", column="blocks",
+                found=f"{width * 1e6:g} um", allowed=f"more than {size * 1e6:g} um",
+            )  # fmt: skip
+    if config.edges == "periodic":
+        yield from _periodic_problems(config, pattern)
+
+
+def _periodic_problems(config: SimConfig, pattern: Pattern) -> Iterator[Problem]:
+    """Under periodic edges a whole number of pitches must fit (two rows of a staggered pattern)."""
+    assert pattern.pitch_m is not None
+    repeat = (pattern.pitch_m[0], pattern.pitch_m[1] * (2 if pattern.staggered else 1))
+    for axis, blocks, length in zip("xy", config.blocks, repeat, strict=True):
+        periods = blocks * config.spacing_m / length
+        if abs(periods - round(periods)) > 1e-6:
+            yield Problem(
+                "impossible_geometry", f"the pattern does not repeat over periodic edges along {axis}",
+                column="blocks", found=str(blocks),
+                allowed=f"multiples of {length / config.spacing_m:g}",
+            )  # fmt: skip
+
+
+def mask_of(config: SimConfig) -> Any:
+    """Contact mask of a configuration, shape (ny, nx), True where a block touches the counterface."""
+    return contact_mask(
+        config.cavities, config.blocks, config.spacing_m, config.pattern_first, config.cavity_shape
+    )

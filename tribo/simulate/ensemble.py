@@ -1,0 +1,143 @@
+"""Many runs: a design of samples, pressures and stratified angles, and threads that work it off."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tribo.errors import Problem, SimulationError
+from tribo.records import Pattern, Run
+from tribo.simulate.config import SimConfig
+from tribo.simulate.masks import pattern_of
+from tribo.simulate.run import simulate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Progress = Callable[[int, int], None]
+ANGLE_SPREAD_DEG = 10.0  # around the nominal direction of an anisotropic sample (Berardo 2019)
+
+
+def angle_range_deg(sample: str, pattern: Pattern | None = None) -> tuple[float, float]:
+    """Range of pull angles of a sample: nominal +-10 deg where its name ends in a direction, else 0 to 90.
+
+    A name is a direction of a pattern when it ends in x or y and the pattern's own name (or the paper's) is the
+    name without that letter, as ``Sx`` is S along x.
+    """
+    known = pattern or pattern_of(sample)
+    direction = re.fullmatch(r"(.+?)[_ -]?([xy])", sample)
+    if direction and (known is None or known.name != sample):
+        nominal = 0.0 if direction[2] == "x" else 90.0
+        return nominal - ANGLE_SPREAD_DEG, nominal + ANGLE_SPREAD_DEG
+    return 0.0, 90.0
+
+
+def run_seed(seed: int, sample: str, pressure_Pa: float, repeat: int) -> int:
+    """Seed of one run, from what the run is and not from its place in the list."""
+    key = [seed, zlib.crc32(sample.encode()), round(pressure_Pa * 1000), repeat]
+    return int(np.random.SeedSequence(key).generate_state(1)[0])
+
+
+def stratified_design(
+    samples: Mapping[str, Pattern | None] | Sequence[str],
+    pressures_Pa: Sequence[float] | Mapping[str, Sequence[float]],
+    repeats: int = 4,
+    seed: int = 0,
+    base: SimConfig | None = None,
+) -> list[SimConfig]:
+    """Configurations of an ensemble: every sample at every pressure, ``repeats`` times.
+
+    The angle range of a sample is cut into as many strata as there are repeats, with one angle drawn in each.
+
+    Parameters
+    ----------
+    samples : mapping of name to Pattern, or names of the paper's samples
+    pressures_Pa : nominal pressures, the same for all samples or by sample
+    base : everything else, defaults included
+    """
+    base = base or SimConfig()
+    patterns = dict(samples) if isinstance(samples, Mapping) else dict.fromkeys(samples)
+    design = []
+    for sample, pattern in patterns.items():
+        low, high = angle_range_deg(sample, pattern)
+        pressures = pressures_Pa[sample] if isinstance(pressures_Pa, Mapping) else pressures_Pa
+        for pressure in pressures:
+            for repeat in range(repeats):
+                own = run_seed(seed, sample, pressure, repeat)
+                stratum = (repeat + np.random.default_rng([own, 1]).random()) / repeats
+                angle = float(low + (high - low) * stratum)
+                design.append(
+                    base.with_(
+                        sample=sample, pattern=pattern, pressure_Pa=float(pressure), angle_deg=angle, seed=own
+                    )
+                )
+    return design
+
+
+def run_row(run: Run) -> dict[str, Any]:
+    """What the table of an ensemble keeps of a run."""
+    return {
+        "sample": run.sample,
+        "pressure_Pa": run.pressure_Pa,
+        "angle_deg": run.angle_deg,
+        "seed": run.seed,
+        "static_friction": run.static_friction,
+        "sliding_friction": run.sliding_friction,
+        "peak_s": run.peak_s,
+        "first_failure_s": run.parameters["first_failure_s"],
+        "window_start_s": run.window_s[0],
+        "window_end_s": run.window_s[1],
+        "area_fraction": run.parameters["area_fraction"],
+        "normal_load_N": run.normal_load_N,
+        "engine": run.engine,
+    }
+
+
+def check_all(configs: Iterable[SimConfig]) -> None:
+    """Refuse a design with every distinct fault of its configurations."""
+    found: dict[str, Problem] = {}
+    for config in configs:
+        try:
+            config.check()
+        except SimulationError as refused:
+            found |= {str(problem): problem for problem in refused.problems}
+    if found:
+        raise SimulationError(list(found.values()))
+
+
+def run_ensemble(
+    design: Sequence[SimConfig], jobs: int = 2, progress: Progress | None = None
+) -> pd.DataFrame:
+    """Run a list of configurations on ``jobs`` threads; one row a run, in the order of the list.
+
+    The rows do not depend on the number of threads. ``progress(done, total)`` is called after each run.
+
+    Raises
+    ------
+    SimulationError
+        A configuration is impossible (all of them are checked first), or a run failed.
+    """
+    import pandas as pd
+
+    check_all(design)
+    rows: list[dict[str, Any] | None] = [None] * len(design)
+    with ThreadPoolExecutor(max(1, jobs)) as pool:
+        pending = {pool.submit(simulate, config): k for k, config in enumerate(design)}
+        done = 0
+        try:
+            while pending:
+                finished, _ = wait(pending, return_when=FIRST_COMPLETED)
+                for future in finished:
+                    rows[pending.pop(future)] = run_row(future.result())
+                    done += 1
+                    if progress is not None:
+                        progress(done, len(design))
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return pd.DataFrame(rows)

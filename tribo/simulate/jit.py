@@ -1,0 +1,59 @@
+"""Compiled functions whose cache can never answer for older sources.
+
+numba's ``cache=True`` looks only at the file a function stands in, so an edit of something it calls is missed.
+Here the cache directory carries a hash of every source file of this package: a changed file means a new
+directory. ``TRIBO_CACHE_DIR`` moves it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from numba import config, njit
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+@lru_cache(maxsize=1)
+def cache_directory() -> Path:
+    """The directory of compiled code for exactly these sources, created where it can be written."""
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.name.encode() + b"\0" + source.read_bytes())
+    name = f"numba-{digest.hexdigest()[:16]}"
+    for base in _cache_bases():
+        folder = base / name
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder
+        except OSError:
+            continue
+    return Path(tempfile.mkdtemp(prefix=name))
+
+
+def _cache_bases() -> list[Path]:
+    chosen = os.environ.get("TRIBO_CACHE_DIR")
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return ([Path(chosen)] if chosen else []) + [Path(home) / "tribo", Path(tempfile.gettempdir()) / "tribo-cache"]
+
+
+def compiled(function: Function) -> Function:
+    """``numba.njit`` without the global interpreter lock, cached under :func:`cache_directory`.
+
+    No fastmath: it would let the compiler drop the checks for NaN.
+    """
+    settings: Any = config
+    before = settings.CACHE_DIR
+    settings.CACHE_DIR = str(cache_directory())
+    try:
+        dispatcher: Any = njit(cache=True, nogil=True, error_model="numpy")(function)
+    finally:
+        settings.CACHE_DIR = before
+    return cast(Function, dispatcher)
