@@ -64,11 +64,11 @@ def thin_trace(time: FloatArray, force: FloatArray, points: int = PAGE_POINTS) -
     if n <= points:
         return np.asarray(time), np.asarray(force)
     stretch = -(-n // (points // 2))
-    finite = np.where(np.isfinite(force), force, np.nan)
-    keep: set[int] = {0, n - 1}
-    for start in range(0, n, stretch):
-        part = finite[start : start + stretch]
-        if np.isfinite(part).any():
-            keep |= {start + int(np.nanargmin(part)), start + int(np.nanargmax(part))}
-    index = np.array(sorted(keep))
+    padded = np.full(-(-n // stretch) * stretch, np.nan)
+    padded[:n] = force
+    rows = padded.reshape(-1, stretch)
+    starts = np.arange(len(rows)) * stretch
+    lowest = starts + np.argmin(np.where(np.isnan(rows), np.inf, rows), axis=1)
+    highest = starts + np.argmax(np.where(np.isnan(rows), -np.inf, rows), axis=1)
+    index = np.unique(np.concatenate([[0, n - 1], lowest, highest]))
     return np.asarray(time)[index], np.asarray(force)[index]

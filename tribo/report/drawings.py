@@ -7,6 +7,8 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from tribo.figures.catalogue import FIGURES
@@ -18,6 +20,7 @@ from tribo.report.tables import to_csv
 
 Progress = Callable[[str, int, int], None]
 STAGE = "drawing figures"
+PNG_DPI = 300
 
 
 def write_figures(study: Study, out: Path, progress: Progress | None = None) -> dict[str, str]:
@@ -54,7 +57,9 @@ def draw_all(study: Study) -> dict[str, str]:
     for record in FIGURES.values():
         numbers = record.numbers(study)
         if not numbers.empty:
-            drawn[record.name] = svg_text(record.draw(numbers))
+            figure = record.draw(numbers)
+            _settle(figure)
+            drawn[record.name] = svg_text(figure)
     return drawn
 
 
@@ -65,19 +70,21 @@ def _settle(figure: Figure) -> None:
         figure.set_layout_engine("none")
 
 
+# The canvases are called directly: Figure.savefig draws every figure once more than it needs to.
 def svg_text(figure: Figure) -> str:
-    """The figure as SVG without a date and without random names."""
+    """A settled figure as SVG without a date and without random names."""
     buffer = io.StringIO()
     with house_style():
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": "tribo"})
+        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": "tribo"})
     return buffer.getvalue()
 
 
 def png_bytes(figure: Figure) -> bytes:
-    """The figure as PNG at print resolution, without the version of the program that drew it."""
+    """A settled figure as PNG at print resolution, without the version of the program that drew it."""
     buffer = io.BytesIO()
     with house_style():
-        figure.savefig(buffer, format="png", metadata={"Software": None})
+        figure.set_dpi(PNG_DPI)
+        FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None})
     return buffer.getvalue()
 
 

@@ -1,0 +1,140 @@
+"""A file under its final name is whole; the same study gives the same bytes."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+
+from tribo.records import Study
+from tribo.report import Provenance, gather_provenance, write_report, write_until
+from tribo.report.files import whole_file, write_text
+from tribo.report.store import unit_of, write_store
+
+FIGURES = ["agreement", *(f"fig{k}" for k in range(3, 9))]
+
+
+@pytest.fixture(scope="module")
+def twice(study: Study, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    base = tmp_path_factory.mktemp("twice")
+    for name in ("first", "second"):
+        write_report(study, base / name, provenance=Provenance("tribo report x -o y", "2026-01-01", 3))
+    return base / "first", base / "second"
+
+
+def test_out_holds_the_agreed_files(twice: tuple[Path, Path]) -> None:
+    found = {str(p.relative_to(twice[0])) for p in twice[0].rglob("*") if p.is_file()}
+    figures = {f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png", "csv")}
+    tables = {"tests.csv", "fits.csv", "other_fits.csv", "comparison.csv"}
+    assert found == figures | tables | {"campaign.nc", "report.html", "provenance.json"}
+
+
+def test_the_same_study_gives_the_same_bytes(twice: tuple[Path, Path]) -> None:
+    first, second = twice
+    names = [p.relative_to(first) for p in first.rglob("*") if p.is_file() and p.suffix != ".nc"]
+    assert len(names) > 20
+    assert not [name for name in names if (first / name).read_bytes() != (second / name).read_bytes()]
+
+
+def test_an_error_while_writing_leaves_the_old_file_and_no_part(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "a.txt", "old")
+
+    def write_half() -> None:
+        with whole_file(path) as part:
+            part.write_text("ha")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        write_half()
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("a.txt", "old")]
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
+def test_a_killed_run_leaves_no_half_written_file_under_a_final_name(tmp_path: Path) -> None:
+    program = (
+        "import os, signal, sys\nfrom pathlib import Path\nfrom tribo.report.files import whole_file\n"
+        "with whole_file(Path(sys.argv[1]) / 'a.txt') as part:\n"
+        "    part.write_text('ha')\n    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    run = subprocess.run([sys.executable, "-c", program, str(tmp_path)], check=False)
+    assert run.returncode == -signal.SIGKILL
+    assert [p.name for p in tmp_path.iterdir() if not p.name.startswith(".")] == []
+
+
+@pytest.mark.parametrize(
+    ("until", "expected"),
+    [("ingest", {"tests.csv"}), ("fit", {"tests.csv", "fits.csv", "other_fits.csv"})],
+)
+def test_a_walk_that_stops_early_writes_less(until: str, expected: set[str], study: Study, tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    short = replace(study, comparison=None, fits=study.fits if until == "fit" else ())
+    write_until(short, tmp_path, until)
+    assert {p.name for p in tmp_path.iterdir()} == expected | {"campaign.nc"}
+
+
+def test_progress_is_told_of_every_figure(study: Study, tmp_path: Path) -> None:
+    told: list[tuple[str, int, int]] = []
+    write_until(study, tmp_path, "compare", lambda *step: told.append(step))
+    assert [done for _, done, _ in told] == list(range(1, len(FIGURES) + 1))
+    assert not (tmp_path / "report.html").exists()
+
+
+@pytest.fixture(scope="module")
+def store(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_store(study, tmp_path_factory.mktemp("store"))
+
+
+def test_xarray_reads_every_trace_back_to_the_same_bits(store: Path, study: Study) -> None:
+    with xr.open_datatree(store, engine="h5netcdf") as tree:
+        traces = tree["traces"]
+        for k, test_id in enumerate(traces["test_id"].values[:5]):
+            start, size = int(traces["row_start"][k]), int(traces["row_size"][k])
+            part = slice(start, start + size)
+            assert (traces["force_N"].values[part] == study.ingested.traces[test_id].force_N).all()
+            assert (traces["time_s"].values[part] == study.ingested.traces[test_id].time_s).all()
+        assert int(traces["row_size"].sum()) == traces.sizes["sample"]
+
+
+def test_plain_h5py_reads_names_numbers_and_units(store: Path, study: Study) -> None:
+    with h5py.File(store) as file:
+        assert file["traces/force_N"].attrs["units"] in ("N", b"N")
+        assert file["fits/tau0_kPa"].attrs["units"] in ("kPa", b"kPa")
+        assert file["tests/test_id"][0].decode() == "T0001"
+        assert np.isnan(file["tests/static_N"][-1])
+        assert file.attrs["title"] == study.ingested.campaign.title
+        assert set(file) >= {"tests", "fits", "other_fits", "comparison", "simulated", "traces"}
+
+
+@pytest.mark.parametrize(
+    ("column", "unit"),
+    [
+        ("static_u_N", "N"), ("rise_N_per_s", "N/s"), ("rise_stiffness_N_per_m", "N/m"), ("speed_m_s", "m/s"),
+        ("tau0_u_kPa", "kPa"), ("displacement_m", "m"), ("mu", "1"), ("sample", None), ("temperature_C", "degC"),
+    ],
+)  # fmt: skip
+def test_the_unit_ends_the_name(column: str, unit: str | None) -> None:
+    assert unit_of(column) == unit
+
+
+def test_provenance_hashes_what_is_there(study: Study, tmp_path: Path) -> None:
+    from dataclasses import replace
+    from hashlib import sha256
+
+    (tmp_path / "raw").mkdir()
+    (tmp_path / "campaign.toml").write_bytes(b"title")
+    (tmp_path / "raw" / "T0001.csv").write_bytes(b"export")
+    campaign = replace(study.ingested.campaign, root=tmp_path)
+    moved = replace(study, ingested=replace(study.ingested, campaign=campaign))
+    before = gather_provenance(moved, "tribo report")
+    assert before.inputs["raw/T0001.csv"] == sha256(b"export").hexdigest()
+    assert before.inputs.keys() == {"campaign.toml", "raw/T0001.csv"}
+    assert before.versions["numpy"] == np.__version__
+    (tmp_path / "raw" / "T0001.csv").write_bytes(b"Export")
+    assert gather_provenance(moved).inputs_digest != before.inputs_digest

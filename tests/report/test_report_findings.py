@@ -1,0 +1,164 @@
+"""What the report says in words follows from the intervals, and says no more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tribo.records import REGIMES, LawFit, Study
+from tribo.report import findings, wording
+from tribo.report.findings import Agreement, LoadRatio, Ranking
+from tribo.report.numerals import percent, significant, span, with_uncertainty
+from tribo.report.text import set_aside_text, summary_text, table2_text
+
+
+def ratio(value: float, low: float, high: float, load: float = 1.0) -> LoadRatio:
+    return LoadRatio(load, value, low, high)
+
+
+@pytest.mark.parametrize(
+    ("load", "verdict"),
+    [
+        (ratio(1.02, 0.95, 1.09), "agrees"),
+        (ratio(0.8, 0.7, 0.9), "model too high"),
+        (ratio(1.3, 1.1, 1.5), "model too low"),
+        (ratio(0.9, 0.5, 1.6), "cannot tell"),
+        (ratio(1.0, float("nan"), float("nan")), "cannot tell"),
+    ],
+)
+def test_an_interval_has_one_verdict(load: LoadRatio, verdict: str) -> None:
+    assert load.verdict == verdict
+
+
+def test_a_model_twice_the_measurement_is_a_hundred_percent_too_high() -> None:
+    assert ratio(0.5, 0.4, 0.6).deviation == pytest.approx(1.0)
+    agreement = Agreement("C", "static", (ratio(0.5, 0.4, 0.6, 1), ratio(0.4, 0.3, 0.5, 2)), False)
+    assert agreement.verdict == "model too high"
+    assert agreement.mean_deviation == pytest.approx(1 / np.sqrt(0.5 * 0.4) - 1)
+    assert agreement.worst.normal_load_N == 2
+
+
+def test_loads_off_on_both_sides_are_mixed() -> None:
+    agreement = Agreement("C", "static", (ratio(0.5, 0.4, 0.6), ratio(2, 1.8, 2.2)), False)
+    assert agreement.verdict == "mixed"
+    assert "too high at some loads and too low at others for C" in wording.in_short([agreement], "F")[0]
+
+
+def test_wide_intervals_cannot_tell() -> None:
+    agreement = Agreement("C", "static", (ratio(1.1, 0.5, 2.4), ratio(1, 0.5, 2)), False)
+    assert agreement.verdict == "cannot tell"
+    assert "too wide to tell" in wording.in_short([agreement], "F")[0]
+    assert "cannot tell at every load" in wording.agreement_sentence(agreement)
+
+
+def test_the_sentence_counts_loads_and_names_the_worst() -> None:
+    loads = (ratio(1.0, 0.9, 1.1, 1), ratio(0.8, 0.7, 0.9, 2), ratio(0.5, 0.4, 0.6, 3))
+    sentence = wording.agreement_sentence(Agreement("B", "sliding", loads, False))
+    assert "agrees within the 95 % interval at 1 of 3 loads" in sentence
+    assert "too high at 2 of 3 loads" in sentence
+    assert "farthest off at 3.00 N, by 100 %" in sentence
+
+
+def test_the_calibrated_sample_is_no_evidence(study: Study) -> None:
+    agreements = findings.agreements(study)
+    assert {a.sample for a in agreements if a.calibrated} == {"F"}
+    assert all(" F " not in s.split("the model", 1)[1] for s in wording.in_short(agreements, "F"))
+    flat = next(a for a in agreements if a.calibrated)
+    assert "no test of it" in wording.agreement_sentence(flat)
+
+
+def test_the_synthetic_model_is_found_where_it_was_put(study: Study) -> None:
+    from report.synthetic import MODEL_FACTOR
+
+    for agreement in findings.agreements(study):
+        assert 1 + agreement.mean_deviation == pytest.approx(MODEL_FACTOR[agreement.sample], rel=0.06)
+    verdicts = {(a.sample, a.regime): a.verdict for a in findings.agreements(study)}
+    assert verdicts["C", "static"] == verdicts["Sy", "sliding"] == "model too high"
+
+
+def fit(sample: str, mu: float, mu_u: float, dof: float = 20.0) -> LawFit:
+    return LawFit(
+        sample, "static", "mu_tau0", ("mu", "tau0_Pa"), np.array([mu, 0.0]), np.diag([mu_u**2, 1e-6]), dof, 3, 9,
+        "specimens", 1.0, 1e-4,
+    )  # fmt: skip
+
+
+def order(measured: list[LawFit], simulated: list[LawFit]) -> Ranking:
+    return findings._ranking(measured, simulated, "static", 1.0)
+
+
+def test_only_pairs_the_measurement_can_part_judge_the_order() -> None:
+    measured = [fit("A", 3.0, 0.01), fit("B", 2.0, 0.01), fit("C", 2.001, 0.5)]
+    found = order(measured, [fit("A", 1, 0.1), fit("B", 2, 0.1), fit("C", 0.5, 0.1)])
+    assert found.told_apart == (("A", "B"),)
+    assert found.reversed == (("A", "B"),)
+    assert "reverses A over B" in wording.ranking_sentence(found)
+
+
+def test_samples_that_cannot_be_parted_judge_nothing() -> None:
+    found = order([fit("A", 3.0, 5.0), fit("B", 2.0, 5.0)], [fit("A", 1, 0.1), fit("B", 2, 0.1)])
+    assert "cannot tell any two samples apart" in wording.ranking_sentence(found)
+
+
+def test_the_direction_ratio_is_that_of_the_fitted_forces(study: Study) -> None:
+    ratios = findings.direction_ratios(study)
+    assert {(r.pattern, r.pair) for r in ratios} == {("S", ("Sx", "Sy"))}
+    assert len(ratios) == 3 * len(REGIMES)
+    x, y = (next(f for f in study.fits if f.sample == s and f.regime == "static") for s in ("Sx", "Sy"))
+    first = ratios[0]
+    assert first.measured == pytest.approx(float(x.force_N(first.normal_load_N) / y.force_N(first.normal_load_N)))
+    assert first.low < first.measured < first.high
+    sentence = wording.direction_sentences(ratios)[0]
+    assert sentence.startswith("Sx over Sy, static")
+    assert "outside its interval at 3 of them" in sentence
+
+
+def test_a_campaign_without_directions_says_nothing_of_them(study: Study) -> None:
+    campaign = study.ingested.campaign
+    samples = {s: p for s, p in campaign.samples.items() if s != "Sy"}
+    without = replace(study, ingested=replace(study.ingested, campaign=replace(campaign, samples=samples)))
+    assert findings.direction_ratios(without) == []
+
+
+def test_the_correlation_of_mu_and_tau0_is_that_of_the_covariance(study: Study) -> None:
+    expected = [f.covariance[0, 1] / np.sqrt(f.covariance[0, 0] * f.covariance[1, 1]) for f in study.fits]
+    assert findings.parameter_correlations(study.fits) == pytest.approx(expected)
+    assert "correlated" in wording.correlation_note(study)
+
+
+def test_what_was_measured_counts_pulls_specimens_samples_and_loads(study: Study) -> None:
+    sentence = wording.what_was_measured(study)
+    assert "107 pulls of 18 specimens of 6 samples (F, A, B, C, Sx and Sy) at 6 loads" in sentence
+    assert "2 tests were set aside" in sentence
+
+
+def test_the_terminal_table_has_every_sample_twice_and_is_aligned(study: Study) -> None:
+    lines = table2_text(study).splitlines()
+    assert [line.split()[0] for line in lines if line].count("Sy") == 2
+    static = lines[1:8]
+    assert len({len(line) for line in static}) == 1
+    assert "specimens" in lines[1]
+
+
+def test_set_aside_tests_are_listed_with_their_reason(study: Study) -> None:
+    assert "T9001: excluded by hand" in set_aside_text(study)
+    assert len(summary_text(study).splitlines()) >= 5
+
+
+@pytest.mark.parametrize(
+    ("value", "u", "text"),
+    [(4.7612, 0.73, "4.76 ± 0.73"), (-0.5, 0.01234, "−0.500 ± 0.012"), (1234.5, 56.7, "1234 ± 57"), (2.0, 0.0, "2.00")],
+)
+def test_an_uncertainty_has_two_digits_and_its_value_the_same_place(value: float, u: float, text: str) -> None:
+    assert with_uncertainty(value, u) == text
+
+
+def test_numbers_as_people_write_them() -> None:
+    assert significant(0.0637432) == "0.0637"
+    assert significant(float("nan")) == "–"
+    assert span([0.55, 0.581]) == "0.55 to 0.58"
+    assert span([0.55, 0.551]) == "0.55"
+    assert percent(0.0123) == "1.2 %"
+    assert percent(-0.345) == "−34 %"

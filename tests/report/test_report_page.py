@@ -1,0 +1,125 @@
+"""report.html is one file that needs nothing else, says what the study says and escapes what it did not write."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import pytest
+
+from tribo.records import Study
+from tribo.report import Provenance
+from tribo.report.page import html
+from tribo.report.pulls import trace_picture
+
+VOID = {"meta", "br", "link", "img", "hr", "input"}
+
+
+class Outline(HTMLParser):
+    """Open tags, ids and links of a page, and whether every tag was closed in order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.targets: list[str] = []
+        self.tags: Counter[str] = Counter()
+        self.sources: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags[tag] += 1
+        found = dict(attrs)
+        self.ids += [v for k, v in found.items() if k == "id" and v]
+        self.targets += [v for k, v in found.items() if k in ("href", "xlink:href") and v]
+        self.sources += [v for k, v in found.items() if k in ("src", "srcset", "data") and v]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+@pytest.fixture(scope="module")
+def page(study: Study) -> str:
+    return html(study, Provenance("tribo report 'a b' -o out", "2026-01-01T00:00:00", 3, {"rule": "seed"}))
+
+
+@pytest.fixture(scope="module")
+def outline(page: str) -> Outline:
+    parser = Outline()
+    parser.feed(page)
+    return parser
+
+
+def test_every_tag_is_closed_in_order(outline: Outline) -> None:
+    assert outline.open == []
+
+
+def test_no_id_stands_twice_and_no_link_leads_nowhere(outline: Outline) -> None:
+    assert not [i for i, n in Counter(outline.ids).items() if n > 1]
+    assert {t[1:] for t in outline.targets} <= set(outline.ids)
+
+
+def test_the_page_fetches_nothing_and_runs_nothing(page: str, outline: Outline) -> None:
+    assert all(target.startswith("#") for target in outline.targets)
+    assert outline.sources == []
+    assert outline.tags["script"] == 0
+    assert "@import" not in page
+    assert not re.search(r"url\((?!#)", page)
+
+
+def test_names_from_the_campaign_are_escaped(page: str) -> None:
+    assert "<synthetic>" not in page
+    assert "&lt;synthetic&gt;" in page
+    assert "excluded by hand: &lt;wire&gt;" in page
+
+
+def test_every_pull_and_every_test_set_aside_is_on_the_page(page: str, study: Study) -> None:
+    for test in study.ingested.campaign.tests:
+        assert f'<th scope="row">{test.test_id}</th>' in page
+    assert page.count('class="trace"') == len(study.ingested.traces)
+
+
+def test_figures_take_the_colours_of_the_theme(page: str, outline: Outline) -> None:
+    assert outline.tags["figure"] == 7
+    assert "fill: #ffffff" not in page
+    assert "stroke: #000000" not in page
+    assert "prefers-color-scheme: dark" in page
+    assert 'name="viewport"' in page
+
+
+def test_provenance_is_told(page: str) -> None:
+    assert "tribo report &#39;a b&#39; -o out" in page
+    assert "2026-01-01T00:00:00" in page
+
+
+def test_the_page_holds_no_undefined_numbers(page: str) -> None:
+    words = re.sub(r"<svg.*?</svg>|<style>.*?</style>", "", page, flags=re.DOTALL)
+    assert not re.search(r"\b(nan|inf|None)\b", words)
+
+
+def test_a_study_without_a_model_says_nothing_of_it(study: Study) -> None:
+    page = html(replace(study, comparison=None, simulated=None, example_runs=()))
+    assert 'id="agreement"' not in page
+    assert "Simulated" not in page
+    assert 'id="table2"' in page
+
+
+def test_an_ingested_campaign_alone_has_a_page(study: Study) -> None:
+    page = html(Study(study.ingested), drawn={})
+    assert 'id="pulls"' in page
+    assert 'id="table2"' not in page
+
+
+def test_a_trace_of_one_sample_has_no_picture(study: Study) -> None:
+    trace, pull = study.ingested.traces["T0001"], study.ingested.pulls["T0001"]
+    one = replace(trace, time_s=trace.time_s[:1], force_N=trace.force_N[:1])
+    assert trace_picture(one, pull) == ""
+    assert trace_picture(trace, replace(pull, peak_s=float("nan"))).count("<circle") == 0
