@@ -1,4 +1,4 @@
-"""The static peak: where and how high, below the resolution of the samples and not lifted by their noise."""
+"""The apex of a static peak: shapes fitted in closed form, below the resolution of the samples."""
 
 from __future__ import annotations
 
@@ -8,60 +8,32 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribo.records import FloatArray
-from tribo.traces.contact import Rise
-from tribo.traces.statistics import condense, mean
+from tribo.traces.statistics import mean
 
-_DROP = 5.0  # a fall by this many times the noise ends the search for the first maximum
-_DROP_SHARE = 0.015  # or by this share of the force reached, whichever is more
-_FLAT_SHARE = 0.05  # the climb has ended where its pace is below this share of the loading line's
-_MOST_SAMPLES = 48  # on either side of the apex; more are averaged together first
-_FEWEST_SAMPLES = 4
+FEWEST_SAMPLES = 4
 _FEWEST_FOR_PARABOLA = 8
 _POSITIONS = np.linspace(0.0, 1.0, 9)  # of the apex between two samples
 _FALL_TIMES = np.append(np.geomspace(0.1, 2.0, 8), math.inf)  # as shares of the time looked at
-_PAIRS_BEFORE, _PAIRS_AFTER = (
-    4,
-    3,
-)  # pairs of neighbours about the presumed apex between which it is looked for
+_MORE_FALL_TIMES = np.append(np.geomspace(0.1, 2.0, 24), math.inf)
+_MANY = 200  # samples from which on a fit tells the finer series apart
 _LARGEST_POWER = 100.0  # of e; only samples that take no part would reach it
-_ROUNDED = 4.0  # misfit per degree of freedom above which a shape is not a sharp apex
+_FITS = 1.5  # misfit per degree of freedom up to which a parabola fits
 
 
 @dataclass(frozen=True)
 class Apex:
-    """A peak: time, force and standard uncertainty; ``chi2_red`` of the shape fitted and which shape that was."""
+    """A peak: time and force with standard uncertainties, misfit per degree of freedom and the shape fitted."""
 
     time_s: float
+    time_u_s: float
     force_N: float
     u_N: float
     chi2_red: float
     shape: str
 
-
-def first_maximum(smooth: FloatArray, start: int, depart: int, width: int, rise_per_sample: float, noise: float) -> int:
-    """Index of the first maximum after ``start``: the highest force before it falls, or before it stops climbing.
-
-    It has fallen once it lies ``_DROP`` times the noise and ``_DROP_SHARE`` of the force below the highest so
-    far; it has stopped climbing once, after the departure from the loading line, the pace over ``width``
-    samples is below ``_FLAT_SHARE`` of the loading line's.
-    """
-    after = smooth[start:]
-    highest = np.maximum.accumulate(after)
-    fallen = highest - after > np.maximum(_DROP * noise, _DROP_SHARE * (highest - smooth[: start + 1].min()))
-    end = int(np.argmax(fallen)) if fallen.any() else after.size - 1
-    pace = (smooth[depart + width :] - smooth[depart:-width]) / width if depart + width < smooth.size else np.empty(0)
-    slow = pace < _FLAT_SHARE * rise_per_sample
-    if slow.any():
-        end = min(end, max(depart + int(np.argmax(slow)) + width - start, 1))
-    return start + int(np.argmax(after[: end + 1]))
-
-
-def fall_length(smooth: FloatArray, peak: int, level: float, shortest: int, longest: int) -> int:
-    """Samples after ``peak`` until 80 % of the way down to ``level`` is gone, within the given bounds."""
-    target = level + 0.2 * (smooth[peak] - level)
-    down = smooth[peak : peak + longest + 1] <= target
-    length = int(np.argmax(down)) if down.any() else longest
-    return max(min(length, longest, smooth.size - 1 - peak), min(shortest, smooth.size - 1 - peak))
+    @property
+    def fits(self) -> bool:
+        return self.chi2_red < _FITS
 
 
 @dataclass(frozen=True)
@@ -73,8 +45,8 @@ class _Side:
     misfit: FloatArray
 
 
-def sharp_apex(time_s: FloatArray, force: FloatArray, centre: int, noise: float) -> Apex | None:
-    """Apex of a smooth rise that turns into a fall, anywhere between the samples around ``centre``.
+def sharp_apex(time_s: FloatArray, force: FloatArray, first: int, last: int, noise: float) -> Apex | None:
+    """Apex of a smooth rise that turns into a fall, anywhere between samples ``first`` and ``last``.
 
     For every pair of neighbours the apex may lie between, a parabola is fitted to the samples before and a
     level plus an exponential to those after, for a series of fall times and for no fall at all. Rise and fall
@@ -84,16 +56,16 @@ def sharp_apex(time_s: FloatArray, force: FloatArray, centre: int, noise: float)
     so the uncertainty holds what the shape leaves open. Closed form, no iteration. None if too few samples
     stand on a side.
     """
-    t = time_s - time_s[centre]
-    pairs = np.arange(centre - _PAIRS_BEFORE, centre + _PAIRS_AFTER)
-    pairs = pairs[(pairs >= _FEWEST_SAMPLES - 1) & (pairs < t.size - _FEWEST_SAMPLES)]
+    pairs = np.arange(max(first, FEWEST_SAMPLES - 1), min(last, time_s.size - FEWEST_SAMPLES))
     if pairs.size == 0:
         return None
+    origin = float(time_s[pairs[-1]])
+    t = time_s - origin
     at = t[pairs, None] + _POSITIONS * (t[pairs + 1] - t[pairs])[:, None]  # (J, S)
     before = np.arange(t.size) <= pairs[:, None]  # (J, n)
     rise = _rise_side(t, force, before.astype(float), at)  # arrays (J, S)
     fall = _fall_side(t, force, (~before).astype(float), at)  # arrays (K, J, S)
-    return _weigh(t, force, at, rise, fall, noise, float(time_s[centre]))
+    return _weigh(t, force, at, rise, fall, noise, origin)
 
 
 def _weigh(
@@ -121,8 +93,10 @@ def _weigh(
         np.vdot(smooth, scale * rise.variance * fall.variance / both + (met - height) ** 2)
         + np.vdot(sudden, scale * rise.variance + (rise.value - height) ** 2)
     ) / total
-    when = np.vdot(smooth.sum(axis=0) + sudden, at) / total
-    return Apex(float(when) + origin, float(height), math.sqrt(variance), chi2_red, "sharp")
+    weight = smooth.sum(axis=0) + sudden
+    when = float(np.vdot(weight, at)) / total
+    when_u = math.sqrt(float(np.vdot(weight, (at - when) ** 2)) / total)
+    return Apex(when + origin, when_u, float(height), math.sqrt(variance), chi2_red, "sharp")
 
 
 def _rise_side(t: FloatArray, f: FloatArray, before: FloatArray, at: FloatArray) -> _Side:
@@ -147,7 +121,8 @@ def _fall_side(t: FloatArray, f: FloatArray, after: FloatArray, at: FloatArray) 
 
     The last fall time is infinite: a level. A fit that climbs instead of falling is given an infinite misfit.
     """
-    fall_s = np.maximum(_FALL_TIMES * float(t[-1]), 0.3 * float(t[-1] - t[-2]))[:, None]
+    shares = _FALL_TIMES if t.size < _MANY else _MORE_FALL_TIMES
+    fall_s = np.maximum(shares * float(t[-1]), 0.3 * float(t[-1] - t[-2]))[:, None]
     u = np.exp(np.minimum((t[-1] - t) / fall_s, _LARGEST_POWER))  # (K, n), 1 at the last sample
     n, sf, sff = after.sum(axis=1), after @ f, after @ (f * f)
     su, suu, suf = u @ after.T, (u * u) @ after.T, (u * f) @ after.T  # (K, J)
@@ -161,78 +136,31 @@ def _fall_side(t: FloatArray, f: FloatArray, after: FloatArray, at: FloatArray) 
 
 
 def rounded_apex(time_s: FloatArray, force: FloatArray, peak: int, half: int, noise: float) -> Apex:
-    """Highest point of a parabola through the samples within ``half`` of ``peak``."""
+    """Top of a parabola through the samples within ``half`` of ``peak``, or closer until a parabola fits."""
+    apex = _parabola_top(time_s, force, peak, half, noise)
+    while not apex.fits and half > FEWEST_SAMPLES:
+        half //= 2
+        apex = _parabola_top(time_s, force, peak, half, noise)
+    return apex
+
+
+def _parabola_top(time_s: FloatArray, force: FloatArray, peak: int, half: int, noise: float) -> Apex:
     low, high = max(peak - half, 0), min(peak + half, force.size - 1)
-    t = time_s[low : high + 1] - time_s[peak]
-    f = force[low : high + 1]
-    if t.size < _FEWEST_SAMPLES:
-        return Apex(float(time_s[peak]), float(f.mean()), noise / math.sqrt(max(t.size, 1)), math.nan, "rounded")
-    reach = float(np.abs(t).max()) or 1.0
-    x = np.stack((np.ones_like(t), t / reach, (t / reach) ** 2), axis=1)
-    inverse = np.linalg.pinv(x.T @ x)
-    c = inverse @ (x.T @ f)
-    misfit = f - x @ c
-    chi2_red = float(misfit @ misfit) / max(t.size - 3, 1) / noise**2
+    t, f = time_s[low : high + 1] - time_s[peak], force[low : high + 1]
+    reach = max(-float(t[0]), float(t[-1]))
+    if t.size < FEWEST_SAMPLES or reach <= 0:
+        return Apex(float(time_s[peak]), reach, mean(f), noise / math.sqrt(t.size), math.inf, "rounded")
+    x = t / reach
+    basis = np.array((np.ones_like(x), x, x * x))
+    inverse = np.linalg.pinv(basis @ basis.T)
+    c = inverse @ (basis @ f)
+    fitted = c @ basis
+    chi2_red = float((f - fitted) @ (f - fitted)) / max(t.size - 3, 1) / noise**2
     top = -c[1] / (2.0 * c[2]) if c[2] < 0 else math.inf
-    if not t[0] / reach <= top <= t[-1] / reach:
-        top = float(t[int(np.argmax(x @ c))] / reach)
-    row = np.array([1.0, top, top * top])
-    u = noise * math.sqrt(max(chi2_red, 1.0) * float(row @ inverse @ row))
-    return Apex(float(time_s[peak] + top * reach), float(row @ c), u, chi2_red, "rounded")
-
-
-def find_apex(
-    time_s: FloatArray,
-    force: FloatArray,
-    smooth: FloatArray,
-    rise: Rise,
-    depart: int,
-    peak: int,
-    level: float,
-    noise: float,
-) -> Apex:
-    """The static peak of a pull: a sharp apex where the shape is one, else the top of a rounded one.
-
-    ``depart`` is the first sample below the loading line, ``peak`` the first maximum of the smoothed force,
-    ``level`` the force it falls to. The apex is looked for where the loading line ends and, if that fits
-    badly, at the maximum.
-    """
-    climb = max(depart - rise.first, 2 * _FEWEST_SAMPLES)
-    length = fall_length(smooth, peak, level, 2 * _FEWEST_SAMPLES, max(climb, 3 * _FEWEST_SAMPLES))
-    candidates = []
-    for centre in dict.fromkeys((min(depart, peak + 1), peak)):
-        first = max(centre - climb, 0)
-        factor = max(1, length // _MOST_SAMPLES)
-        last = min(centre + length, force.size - 1)
-        ts, fs = condense(time_s[first : last + 1], factor), condense(force[first : last + 1], factor)
-        middle = (centre - first) // factor
-        skipped = _smooth_from(ts, fs, middle, noise / math.sqrt(factor))
-        apex = sharp_apex(ts[skipped:], fs[skipped:], middle - skipped, noise / math.sqrt(factor))
-        if apex is not None:
-            candidates.append(apex)
-            if apex.chi2_red < _ROUNDED:
-                return apex
-    candidates.append(rounded_apex(time_s, force, peak, max(length // 2, 2), noise))
-    return min(candidates, key=lambda a: a.chi2_red if not math.isnan(a.chi2_red) else math.inf)
-
-
-def _smooth_from(t: FloatArray, f: FloatArray, centre: int, noise: float) -> int:
-    """First sample of the longest stretch up to the apex that a parabola fits: all, half or a quarter of the rise."""
-    end = max(centre - 1, 0)
-    first = 0
-    for share in (1.0, 0.5, 0.25):
-        first = round(end * (1.0 - share))
-        if end - first <= _FEWEST_FOR_PARABOLA:
-            return max(min(first, end - _FEWEST_SAMPLES), 0)
-        if _parabola_misfit(t[first:end], f[first:end]) < 2.0 * noise**2 * (end - first):
-            break
-    return first
-
-
-def _parabola_misfit(t: FloatArray, f: FloatArray) -> float:
-    """Sum of squared departures from the least-squares parabola."""
-    x = (t - t[0]) / (t[-1] - t[0])
-    basis = np.stack((np.ones_like(x), x, x * x))
-    c = np.linalg.solve(basis @ basis.T, basis @ f)
-    away = f - c @ basis
-    return float(away @ away)
+    if not x[0] <= top <= x[-1]:
+        top = float(x[int(np.argmax(fitted))])
+    row = np.array((1.0, top, top * top))
+    variance = noise**2 * max(chi2_red, 1.0) * float(row @ inverse @ row)
+    return Apex(
+        float(time_s[peak] + top * reach), reach / 2.0, float(row @ c), math.sqrt(variance), chi2_red, "rounded"
+    )

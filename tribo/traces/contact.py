@@ -13,6 +13,10 @@ from tribo.traces.statistics import mean, median, running_mean, wander
 _LOW, _HIGH = 0.25, 0.75  # share of the first half-way level between which the slope of the rise is taken
 _DETECTABLE = 12.0  # a pull rises by at least this many times the sample noise
 _FEWEST_FOR_ZERO = 5
+_SUBSTANTIAL = (
+    0.3  # share of the range of a trace that a climb reaches at least to be the pull and not a touch before it
+)
+_CLEAR_FALL = 0.1  # share of its height that a force loses in a clear fall
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,7 @@ def first_rise(time_s: FloatArray, smooth: FloatArray, noise: float) -> Rise | N
     full = float(smooth.max()) - start
     if full < _DETECTABLE * noise:
         return None
+    full = _first_height(smooth - start, full, noise)
     for _ in range(2):
         high = int(np.argmax(smooth >= start + _HIGH * full))
         below = np.flatnonzero(smooth[:high] <= start + _LOW * full)
@@ -82,6 +87,15 @@ def first_rise(time_s: FloatArray, smooth: FloatArray, noise: float) -> Rise | N
         rise = Rise(slope, t, f, low, high)
         full = float(smooth[: departure(time_s, smooth, rise, 0.1 * full) + 1].max()) - start
     return rise
+
+
+def _first_height(height: FloatArray, full: float, noise: float) -> float:
+    """Highest force before the first clear fall from a substantial height; ``full`` if it never falls."""
+    highest = np.maximum.accumulate(height)
+    fallen = (highest > _SUBSTANTIAL * full) & (
+        highest - height > np.maximum(_CLEAR_FALL * highest, _DETECTABLE * noise)
+    )
+    return float(highest[np.argmax(fallen)]) if fallen.any() else full
 
 
 def departure(time_s: FloatArray, smooth: FloatArray, rise: Rise, margin: float) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,13 +10,15 @@ import numpy as np
 from tribo.errors import Problem, TraceError
 from tribo.records import FloatArray, Trace
 from tribo.traces import quality
-from tribo.traces.apex import Apex, find_apex, first_maximum
-from tribo.traces.contact import Rise, Zero, departure, first_rise, smoothed, smoothing_width, zero_before
+from tribo.traces.apex import Apex
+from tribo.traces.contact import Rise, Zero, departure, first_rise, smoothed, zero_before
+from tribo.traces.peak import find_apex, first_maximum
 from tribo.traces.quality import noise_of
-from tribo.traces.statistics import median
+from tribo.traces.statistics import median, running_mean
 
 _DETECTABLE = 12.0  # times the noise
 _FEWEST_SLIDING = 10
+_RISE_OVER_SMOOTHING = 80  # samples of the rise per two samples of smoothing
 _UNLOADED = 0.5  # share of the sliding level below which a trace's tail is taken as unloading
 _BACK_AT_LEVEL = 0.9
 
@@ -70,7 +73,7 @@ def lay_out(trace: Trace, speed_m_s: float | None = None) -> Motion:
     if clipped := quality.flat_top(force):
         raise TraceError([_saturated(trace, clipped), *problems])
     zero = zero_before(time, force, rise, noise)
-    return _with_peak(trace, time, force - zero.force_N, smooth - zero.force_N, rise, zero, noise, speed_m_s, problems)
+    return _with_peak(trace, time, force - zero.force_N, rise, zero, noise, speed_m_s, problems)
 
 
 def _no_pull(trace: Trace, smooth: FloatArray, start: float, rise: Rise | None, noise: float) -> list[Problem]:
@@ -94,22 +97,25 @@ def _saturated(trace: Trace, clipped: tuple[int, int]) -> Problem:
 
 
 def _with_peak(
-    trace: Trace, time: FloatArray, force: FloatArray, smooth: FloatArray, rise: Rise, zero: Zero, noise:
+    trace: Trace, time: FloatArray, force: FloatArray, rise: Rise, zero: Zero, noise:
     float, speed_m_s: float | None, problems: tuple[Problem, ...],
 ) -> Motion:  # fmt: skip
     rise = Rise(rise.rate, rise.time_s, rise.force_N - zero.force_N, rise.first, rise.last)
+    width = 1 + 2 * ((rise.last - rise.first) // _RISE_OVER_SMOOTHING)
+    smooth = running_mean(force, width)
+    local = noise / math.sqrt(width)
     reached = float(smooth[rise.last])
-    width = smoothing_width(force.size)
-    local = noise / width**0.5
-    depart = departure(time, smooth, rise, max(5.0 * local, 0.02 * reached))
+    margin = max(5.0 * local, 0.02 * reached)
+    depart = departure(time, smooth, rise, margin)
     step = float(time[rise.last] - time[rise.first]) / max(rise.last - rise.first, 1)
     pause = max(3, (rise.last - rise.first) // 2)
+    lag = math.ceil(margin / (rise.rate * step)) + 2
     peak = first_maximum(smooth, rise.last, depart, pause, rise.rate * step, local)
     end = _before_unloading(smooth, peak)
     if end - peak < 3 and end == force.size:
         raise TraceError([*_no_pull(trace, smooth, 0.0, None, noise), *problems])
     level = median(smooth[(peak + end) // 2 : end])
-    apex = find_apex(time[:end], force[:end], smooth[:end], rise, depart, peak, level, noise)
+    apex = find_apex(time[:end], force[:end], smooth[:end], rise.first, depart, lag, peak, level, noise)
     onset = max(rise.reaches(0.0), float(time[0]))
     first = int(np.searchsorted(time, apex.time_s, side="right"))
     travel = _travel(trace, time, onset, speed_m_s)

@@ -13,11 +13,12 @@ from tribo.traces.statistics import sample_noise
 
 MINIMUM_SAMPLES = 20
 SPIKE_OVER_NOISE = 10.0
-SPIKE_OVER_NEIGHBOURS = 4.0
+SPIKE_OVER_NEIGHBOURS = 3.0
 SPIKE_WIDTHS = (1, 2)
 _NEIGHBOURS = 4
 _CHANCE_OF_FLAT_TOP = 1e-4
 _SHORTEST_FLAT_TOP = 4
+_COARSE = 0.5  # share of equal neighbours from which on a resolution is too coarse to tell clipping
 
 
 def file_row(trace: Trace, index: int) -> int:
@@ -54,8 +55,9 @@ def impulse_spikes(force: FloatArray, noise: float) -> NDArray[np.bool_]:
     within ``_NEIGHBOURS`` samples on either side. The apex of a pull and stick-slip have like steps beside
     them.
     """
-    steps = np.diff(force)
-    mask = np.zeros(force.size, bool)
+    mirrored = np.concatenate((force[1:2], force, force[-2:-1]))  # so that the ends have steps on both sides
+    steps = np.diff(mirrored)
+    mask = np.zeros(mirrored.size, bool)
     for width in SPIKE_WIDTHS:
         into, out = steps[:-width], steps[width:]
         height = np.where(into * out < 0, np.minimum(np.abs(into), np.abs(out)), 0.0)
@@ -63,7 +65,7 @@ def impulse_spikes(force: FloatArray, noise: float) -> NDArray[np.bool_]:
             around = np.abs(np.concatenate((steps[max(0, k - _NEIGHBOURS) : k], steps[k + width + 1 :][:_NEIGHBOURS])))
             if around.size and height[k] > SPIKE_OVER_NEIGHBOURS * around.max():
                 mask[k + 1 : k + 1 + width] = True
-    return mask
+    return mask[1:-1]
 
 
 def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ...]:
@@ -106,6 +108,8 @@ def flat_top(force: FloatArray) -> tuple[int, int] | None:
     inside = top[1:] & top[:-1]
     elsewhere = max(int((~inside).sum()), 1)
     share = (int((pairs & ~inside).sum()) + 1.0) / (elsewhere + 2.0)
+    if share > _COARSE:
+        return None
     if (run - 1) * math.log(share) + math.log(force.size) > math.log(_CHANCE_OF_FLAT_TOP):
         return None
     return int(starts[longest]), run

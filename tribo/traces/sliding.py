@@ -14,9 +14,9 @@ from tribo.traces.statistics import condense, mean, wander
 _BATCH = 5
 _MOST_BATCHES = 2000
 _LATEST = 0.5  # at most this share of the record after the peak is taken as unsettled
-_VISIBLE = 4.0  # stick-slip swings by at least this many times the noise either way
+_BEYOND_NOISE = 1.5  # stick-slip swings further from its line than noise does in so many samples, by this many times it
 _FEWEST_CYCLES = 3
-_REGULAR = 0.5  # largest spread of the cycle times over their mean that still counts as stick-slip
+_REGULAR = 0.4  # largest spread of the cycle times over their mean that still counts as stick-slip
 
 
 @dataclass(frozen=True)
@@ -58,16 +58,17 @@ def steady(time_s: FloatArray, force: FloatArray) -> Steady:
 def stick_slip(time_s: FloatArray, force: FloatArray, noise: float) -> tuple[float, float]:
     """(peak-to-peak amplitude N, period s) of stick-slip: medians over its cycles, NaN where none stands out.
 
-    The force about its straight line is followed through a band of ``_VISIBLE`` times the noise either way (a
+    The force about its straight line is followed through a band that noise does not leave (a
     Schmitt trigger); a cycle runs from one upward passage to the next. Fewer than three cycles, or cycle
     times that scatter, are no stick-slip.
     """
     none = (math.nan, math.nan)
-    if float(np.ptp(force)) < 2.0 * _VISIBLE * noise:
+    band = noise * (math.sqrt(2.0 * math.log(force.size)) + _BEYOND_NOISE)  # noise alone reaches about the root
+    if float(np.ptp(force)) < 2.0 * band:
         return none
     slope, t0, f0 = line(time_s, force)
     about = force - f0 - slope * (time_s - t0)
-    state = np.where(about > _VISIBLE * noise, 1, np.where(about < -_VISIBLE * noise, -1, 0))
+    state = np.where(about > band, 1, np.where(about < -band, -1, 0))
     outside = np.flatnonzero(state)
     if outside.size < 2 * _FEWEST_CYCLES:
         return none

@@ -1,0 +1,103 @@
+"""What a spoiled trace gets: a named problem, and nothing for a healthy one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tribo.errors import TraceError
+from tribo.records import ExportFormat, Trace
+from tribo.traces import read_pull
+
+from .synthetic import Shape, with_samples
+
+SHAPE = Shape(noise_N=0.01)
+
+
+def kind_of(trace: Trace) -> str:
+    with pytest.raises(TraceError) as fault:
+        read_pull(trace)
+    return fault.value.problems[0].kind
+
+
+def test_a_pull_against_the_sign_is_named() -> None:
+    trace = SHAPE.trace()
+    assert kind_of(replace(trace, force_N=-trace.force_N)) == "sign_flipped"
+
+
+@pytest.mark.parametrize("end_s", [1.0, 1.9, 2.5, 3.2])
+def test_a_record_that_ends_before_the_peak_is_named(end_s: float) -> None:
+    trace = SHAPE.trace()
+    kept = trace.time_s < end_s
+    assert kind_of(Trace("short", trace.time_s[kept], trace.force_N[kept])) == "stopped_before_peak"
+
+
+@pytest.mark.parametrize("share", [0.9, 0.7, 0.5])
+def test_a_clipped_peak_is_named_with_its_row(share: float) -> None:
+    trace = SHAPE.trace()
+    clipped = replace(trace, force_N=np.minimum(trace.force_N, share * 2.0), file="a.csv")
+    first = int(np.argmax(clipped.force_N))
+    with pytest.raises(TraceError) as fault:
+        read_pull(clipped)
+    (problem,) = fault.value.problems
+    assert (problem.kind, problem.file) == ("saturated", "a.csv")
+    assert first < problem.row <= first + 4  # noise may part the first samples at the limit from the rest
+
+
+def test_a_coarse_resolution_is_not_taken_for_clipping() -> None:
+    for step in (0.01, 0.05, 0.1):
+        for shape in (SHAPE, Shape(sliding_N=2.0, noise_N=0.01)):
+            trace = shape.trace()
+            read_pull(replace(trace, force_N=np.round(trace.force_N / step) * step))
+
+
+def test_gaps_and_time_that_runs_back_are_all_listed() -> None:
+    trace = SHAPE.trace()
+    time = trace.time_s.copy()
+    time[300:] -= 2.0
+    force = trace.force_N.copy()
+    force[100:104] = np.nan
+    with pytest.raises(TraceError) as fault:
+        read_pull(replace(trace, time_s=time, force_N=force))
+    assert [(p.kind, p.row) for p in fault.value.problems] == [("nan_gap", 101), ("time_goes_back", 301)]
+
+
+@pytest.mark.parametrize("samples", [0, 1, 2, 19])
+def test_too_few_samples_are_named(samples: int) -> None:
+    trace = SHAPE.trace()
+    assert kind_of(Trace("few", trace.time_s[:samples], trace.force_N[:samples])) == "too_short"
+
+
+@pytest.mark.parametrize(
+    "force", [np.zeros(300), np.full(300, 2.0), 0.01 * np.random.default_rng(0).standard_normal(300)]
+)
+def test_a_force_that_never_rises_holds_no_pull(force: np.ndarray) -> None:
+    assert kind_of(Trace("flat", np.arange(300) / 50, force)) == "stopped_before_peak"
+
+
+@pytest.mark.parametrize("index", [5, 120, 174, 175, 176, 400])
+@pytest.mark.parametrize("height", [0.5, 3.0, -3.0, 60.0])
+def test_an_impulse_is_listed_with_its_row_and_does_not_take_the_peak(index: int, height: float) -> None:
+    trace = SHAPE.trace()
+    layout = ExportFormat("plain", "utf-8", ",", ".", 7, {})
+    spiked = replace(with_samples(trace, {index: trace.force_N[index] + height}), source=layout)
+    pull = read_pull(spiked)
+    assert [(p.kind, p.row) for p in pull.problems] == [("spike", index + 8)]
+    assert "spike" in pull.flags
+    assert pull.static_N == pytest.approx(2.0, rel=0.01)
+
+
+def test_two_spiked_neighbours_and_several_impulses_are_listed() -> None:
+    trace = with_samples(SHAPE.trace(), {100: 9.0, 101: 8.5, 300: -4.0, 500: 12.0})
+    pull = read_pull(trace)
+    assert [p.row for p in pull.problems] == [101, 102, 301, 501]
+    assert pull.static_N == pytest.approx(2.0, rel=0.01)
+    assert pull.sliding_N == pytest.approx(1.2, rel=0.01)
+
+
+def test_a_sharp_apex_and_stick_slip_are_no_spikes() -> None:
+    for shape in (Shape(fall_s=0.005), Shape(rise_s=0.1, noise_N=0.01), Shape(swing_N=1.0, swing_s=0.2, noise_N=0.01)):
+        for seed in range(10):
+            assert read_pull(shape.trace(seed)).problems == ()
