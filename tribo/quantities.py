@@ -30,7 +30,10 @@ _ALIASES = {
     "time": """
         time
         test time
+        step time
         elapsed time
+        timestamp
+        time stamp
         total time
         run(ning)? time
         zeit
@@ -39,12 +42,15 @@ _ALIASES = {
         versuchszeit
         temps
         temps d essai
+        duree
         t
     """,
     "friction force": """
         friction force
         friction
         tangential force
+        traction force
+        frictionforce
         lateral force
         reibkraft
         reibungskraft
@@ -62,6 +68,10 @@ _ALIASES = {
         f
         load cell
         axial force
+        traction force 1
+        daq fx force
+        effort
+        last
     """,
     "displacement": """
         extension
@@ -72,30 +82,43 @@ _ALIASES = {
         position
         standard travel
         standardweg
-        weg
-        traverse abs
-        traverse
-        traverse absolue
         course standard
+        weg
+        hub
+        course
         deplacement
         axial displacement
+        traverse
+        traverse abs
+        traverse absolue
+        maschine
+        maschinenweg
+        machine displacement
+        sliding distance
+        distance
+        x position
         x
         dx
-        distance
     """,
     "normal force": """
         normal force
         normal load
         vertical force
+        normal force fz
+        ball load
+        contact force
         normalkraft
         force normale
         fz
         fn
+        daq fz force
     """,
     "friction coefficient": """
         cof
         friction coefficient
         coefficient of friction
+        traction coeff
+        daq cof
         mu
         reibwert
     """,
@@ -111,6 +134,8 @@ _ALIASES = {
         feuchte
     """,
     "speed": """
+        sliding velocity
+        sliding speed
         speed
         velocity
         geschwindigkeit
@@ -166,19 +191,29 @@ _SPELLINGS = {
     "um": "micrometer",
     "in": "inch",
     '"': "inch",
-    "mm/min": "mm/minute",
     "%": "percent",
     "°c": "degC",
     "degc": "degC",
     "c": "degC",
     "°f": "degF",
 }
-_CASE_MATTERS = {"mN": "millinewton", "MN": "meganewton", "Mm": "megameter"}
+_CASE_MATTERS = {"mN": "millinewton", "MN": "meganewton", "Mm": "megameter", "Nm": "newton * meter"}
+_MASSES_AS_FORCES = {"g": "gram_force", "kg": "kilogram_force"}
+_NO_UNIT = {"", "-", "1"}
+_LONGEST_UNIT = 40
+# A product of words and numbers with powers of one digit: nothing that could take long to work out.
+_FACTOR = r"\(?[\d.]*\s*[^\W\d_]+[²³]?(?:\^-?\d)?\)?"
+_UNIT_EXPRESSION = re.compile(rf"{_FACTOR}(?:\s*[/*· ]\s*{_FACTOR})*")
+_NUMBER_BELOW = re.compile(r"/\s*([\d.]+\s*[^\W\d_]+)")
+
+
+_CHANNEL = re.compile(r"^\s*(?:c|ch|channel|kanal)[ _]?\d+[ _]", re.I)
 
 
 def plain_name(text: str) -> str:
     """A column name without case, accents, units in brackets or punctuation: "Prüfzeit [s]" -> "prufzeit"."""
     text = re.sub(r"[\[(].*?[\])]", " ", text)
+    text = _CHANNEL.sub("", text)
     text = unicodedata.normalize("NFKD", text)
     text = "".join(c for c in text if not unicodedata.combining(c)).lower()
     return re.sub(r"[^a-z0-9%]+", " ", text).strip()
@@ -195,27 +230,46 @@ def _registry() -> Any:
 def unit_factor(unit: str, quantity: str) -> tuple[float, float]:
     """(factor, offset) with SI value = factor * value + offset.
 
+    A unit may be a product and carry a number: "30.7 gf", "N m / 2.5 mm".
+
     Raises
     ------
     ReadError
         The unit is unknown, empty, or not one of this quantity: never a guess.
     """
-    target = QUANTITIES[quantity].si_unit
+    target = QUANTITIES[quantity].si_unit or "dimensionless"
     text = unit.strip()
-    name = _CASE_MATTERS.get(text) or _SPELLINGS.get(text.lower()) or text
-    if "force" in quantity and text.lower() in {"g", "kg"}:
-        name = {"g": "gram_force", "kg": "kilogram_force"}[text.lower()]
-    if not text and target:
+    if not text and target != "dimensionless":
         raise ReadError(Problem("missing_unit", f"the {quantity} has no unit", allowed=f"such as {target}"))
     try:
-        ureg = _registry()
-        zero = float(ureg.Quantity(0.0, name).to(target or "dimensionless").magnitude)
-        one = float(ureg.Quantity(1.0, name).to(target or "dimensionless").magnitude)
+        zero, one = _in_unit(0.0, text, quantity, target), _in_unit(1.0, text, quantity, target)
     except Exception as why:  # pint raises many kinds, tokenizer errors among them
         raise ReadError(
             Problem("unknown_unit", f"not a unit of {quantity}", found=unit, allowed=f"such as {target}")
         ) from why
     return one - zero, zero
+
+
+def _in_unit(value: float, text: str, quantity: str, target: str) -> float:
+    """``value`` times the unit ``text``, in ``target``."""
+    if target == "dimensionless" and text in _NO_UNIT:
+        return value
+    ureg = _registry()
+    name = _spelled_out(text, quantity)
+    if re.fullmatch(r"\w+", name):
+        return float(ureg.Quantity(value, name).to(target).magnitude)
+    if len(text) > _LONGEST_UNIT or not _UNIT_EXPRESSION.fullmatch(text):
+        raise ValueError(text)
+    text = _NUMBER_BELOW.sub(r"/(\1)", text)
+    expression = re.sub(r"[^\W\d_]+", lambda word: f"({_spelled_out(word[0], quantity)})", text)
+    return float((value * ureg.parse_expression(expression)).to(target).magnitude)
+
+
+def _spelled_out(word: str, quantity: str) -> str:
+    """A unit in pint's spelling; g and kg are forces where a force is meant."""
+    if "force" in quantity and word.lower() in _MASSES_AS_FORCES:
+        return _MASSES_AS_FORCES[word.lower()]
+    return _CASE_MATTERS.get(word) or _SPELLINGS.get(word.lower()) or word
 
 
 @lru_cache(maxsize=1024)

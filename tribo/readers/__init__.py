@@ -5,14 +5,23 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tribo.readers.export import READERS, read_export
+    from tribo.readers.export import read_blocks, read_export
+    from tribo.readers.families import READERS
+    from tribo.readers.inspect import Inspection, inspect_export
 
-__all__ = ["READERS", "read_export"]
+_HOME = {
+    "READERS": "families",
+    "Inspection": "inspect",
+    "inspect_export": "inspect",
+    "read_blocks": "export",
+    "read_export": "export",
+}
+__all__ = ["READERS", "Inspection", "inspect_export", "read_blocks", "read_export"]
 
 
 def __getattr__(name: str) -> Any:
-    if name in __all__:
-        from tribo.readers import export
+    if name in _HOME:
+        from importlib import import_module
 
-        return getattr(export, name)
+        return getattr(import_module(f"tribo.readers.{_HOME[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

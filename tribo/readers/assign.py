@@ -12,9 +12,20 @@ from tribo.errors import Problem, ReadError
 from tribo.quantities import QUANTITIES, match_quantity, unit_factor
 
 NEEDED = ("time", "friction force")
-_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
-_AFTER_SLASH = re.compile(r"^(.*\S)\s*(?:\s/|\sin\s|,\s|_)\s*([A-Za-zµμ°%][\w/µμ°%^·²-]*)$")
+ASKED = "asked for"
+_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^\[\]()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
+_AFTER_MARK = re.compile(r"^(.*\S)\s*(?:\s/|\sin\s|,\s|_)\s*([A-Za-zµμ°%][\w/µμ°%^·²-]*)$")
 _SHORT_NAMES = {"force": "friction force", "friction": "friction force", "load": "normal force"}
+_MEANS_NORMAL_BESIDE_FRICTION = {"load", "last", "applied load", "charge"}
+
+
+@dataclass(frozen=True)
+class Hint:
+    """A column for a quantity, by name and unit ("Fx [gf]") or position ("#3 [N]"), and who says so."""
+
+    quantity: str
+    wanted: str
+    reason: str = ASKED
 
 
 @dataclass(frozen=True)
@@ -29,6 +40,14 @@ class Column:
     reason: str
 
 
+@dataclass(frozen=True)
+class Assignment:
+    """The column of each quantity, time and friction force first, and what was left out for want of a unit."""
+
+    columns: tuple[Column, ...]
+    left_out: tuple[Problem, ...] = ()
+
+
 def quantity_named(key: str) -> str | None:
     """The quantity meant by a key such as "force", "normal_force", "time_s"; None where there is none."""
     plain = key.strip().replace("_", " ").lower()
@@ -40,8 +59,8 @@ def quantity_named(key: str) -> str | None:
     return None
 
 
-def parse_overrides(columns: Mapping[str, str] | None) -> tuple[tuple[str, str], ...]:
-    """User's ``{quantity: "name [unit]"}`` with the quantities' own names.
+def parse_columns(columns: Mapping[str, str] | None) -> tuple[Hint, ...]:
+    """``{quantity: "name [unit]"}`` as hints.
 
     Raises
     ------
@@ -54,43 +73,45 @@ def parse_overrides(columns: Mapping[str, str] | None) -> tuple[tuple[str, str],
         if quantity is None:
             names = [name.replace(" ", "_") for name in QUANTITIES]
             near = difflib.get_close_matches(key, names, 1)
-            hint = f"{', '.join(names)}{f' (did you mean {near[0]}?)' if near else ''}"
-            problems.append(Problem("unknown_quantity", "columns names no quantity", found=key, allowed=hint))
+            allowed = f"{', '.join(names)}{f' (did you mean {near[0]}?)' if near else ''}"
+            problems.append(Problem("unknown_quantity", "columns names no quantity", found=key, allowed=allowed))
         else:
-            found.append((quantity, value))
+            found.append(Hint(quantity, value.strip()))
     if problems:
         raise ReadError(problems)
     return tuple(found)
 
 
-def is_override(name: str, overrides: Sequence[tuple[str, str]]) -> bool:
-    """Whether the user asked for a column of this name."""
-    return any(name in (value, _split_unit(value)[0]) for _, value in overrides)
+def is_asked_for(name: str, hints: Sequence[Hint]) -> bool:
+    """Whether a hint names this column."""
+    return any(name in (hint.wanted, split_unit(hint.wanted)[0]) for hint in hints)
 
 
 @lru_cache(maxsize=512)
 def assign(
-    names: tuple[str, ...], units: tuple[str, ...], overrides: tuple[tuple[str, str], ...] = ()
-) -> tuple[Column, ...]:
-    """The column of each quantity, time and friction force first.
+    names: tuple[str, ...], units: tuple[str, ...], filled: tuple[bool, ...], hints: tuple[Hint, ...] = ()
+) -> Assignment:
+    """The column of each quantity. Where a quantity that a trace can do without has no unit, it is left out.
 
     Raises
     ------
     ReadError
-        missing_column, ambiguous_column, missing_unit or unknown_unit; all of them at once.
+        missing_column, missing_unit or unknown_unit; all of them at once.
     """
     problems: list[Problem] = []
+    left_out: list[Problem] = []
     chosen: dict[str, tuple[int, str | None, str]] = {}
-    for quantity, wanted in overrides:
+    for hint in hints:
         try:
-            chosen[quantity] = _wanted_column(quantity, wanted, names)
+            chosen.setdefault(hint.quantity, _wanted_column(hint, names))
         except ReadError as why:
             problems.extend(why.problems)
     taken = {index for index, _, _ in chosen.values()}
-    for quantity, index, reason in _matches(names, taken):
+    asked_in_vain = {hint.quantity for hint in hints} - set(chosen)
+    for quantity, index, reason in _matches(names, filled, taken):
         chosen.setdefault(quantity, (index, None, reason))
     for quantity in NEEDED:
-        if quantity not in chosen:
+        if quantity not in chosen and quantity not in asked_in_vain:
             problems.append(_missing(quantity, names))
     columns = []
     for quantity in sorted(chosen, key=list(QUANTITIES).index):
@@ -98,70 +119,109 @@ def assign(
         try:
             columns.append(_column(quantity, index, unit, reason, names, units))
         except ReadError as why:
-            problems.extend(replace(p, column=names[index] or f"#{index + 1}") for p in why.problems)
+            found = [_placed(p, quantity, names[index] or f"#{index + 1}") for p in why.problems]
+            optional = quantity not in NEEDED and all(p.kind == "missing_unit" for p in found)
+            (left_out if optional else problems).extend(found)
     if problems:
         raise ReadError(problems)
-    return tuple(columns)
+    return Assignment(tuple(columns), tuple(left_out))
 
 
-def _matches(names: Sequence[str], taken: set[int]) -> list[tuple[str, int, str]]:
+def _matches(names: Sequence[str], filled: Sequence[bool], taken: set[int]) -> list[tuple[str, int, str]]:
     """(quantity, index, reason) of the best-named column of each quantity; the first of equal ones."""
     best: dict[str, tuple[int, int]] = {}
-    for index, name in enumerate(names):
-        if not name or index in taken:
-            continue
-        hit = match_quantity(name) or match_quantity(_split_unit(name)[0])
-        if hit is not None and (hit[0] not in best or hit[1] < best[hit[0]][0]):
-            best[hit[0]] = (hit[1], index)
+    hits = {
+        index: hit
+        for index, name in enumerate(names)
+        if name and index not in taken and filled[index] and (hit := match_column(name))
+    }
+    for index, (quantity, rank) in hits.items():
+        if quantity not in best or rank < best[quantity][0]:
+            best[quantity] = (rank, index)
+    friction = best.get("friction force")
+    for index, (quantity, _) in hits.items():
+        plain = split_unit(names[index])[0].strip().lower()
+        beside = quantity == "friction force" and friction and index != friction[1]
+        if beside and plain in _MEANS_NORMAL_BESIDE_FRICTION and "normal force" not in best:
+            best["normal force"] = (0, index)
     return [(q, index, f'named "{names[index]}"') for q, (_, index) in best.items()]
 
 
-def _wanted_column(quantity: str, wanted: str, names: Sequence[str]) -> tuple[int, str | None, str]:
-    name, unit = (wanted, None) if wanted in names else _split_unit(wanted)
+def match_column(name: str) -> tuple[str, int] | None:
+    """(quantity, rank) of a column name with or without its unit in it."""
+    return match_quantity(name) or match_quantity(split_unit(name)[0])
+
+
+def _wanted_column(hint: Hint, names: Sequence[str]) -> tuple[int, str | None, str]:
+    wanted = hint.wanted
+    name, unit = (wanted, None) if wanted in names else split_unit(wanted)
     if re.fullmatch(r"#\d+", name) and 1 <= int(name[1:]) <= len(names):
-        return int(name[1:]) - 1, unit, "asked for by position"
-    bare = [_split_unit(n)[0] for n in names]
+        return int(name[1:]) - 1, unit, f"{hint.reason} by position" if hint.reason == ASKED else hint.reason
+    bare = [split_unit(n)[0] for n in names]
     for have in (list(names), bare):
         if name in have:
-            return have.index(name), unit, "asked for by name"
+            return have.index(name), unit, f"{hint.reason} by name" if hint.reason == ASKED else hint.reason
     near = difflib.get_close_matches(name, [n for n in names if n], 1)
-    hint = f"{_listed(names)}{f' (did you mean {near[0]}?)' if near else ''}"
-    raise ReadError(
-        Problem("missing_column", f"no such column for the {quantity}", found=wanted, allowed=hint)
-    )
+    allowed = f"{_listed(names)}{f' (did you mean {near[0]}?)' if near else ''}"
+    what = f"no such column for the {hint.quantity}"
+    raise ReadError(Problem("missing_column", what, found=wanted, allowed=allowed))
 
 
 def _column(
     quantity: str, index: int, unit: str | None, reason: str, names: Sequence[str], units: Sequence[str]
 ) -> Column:
     if unit is None:
-        unit = _bare(units[index]) or _split_unit(names[index])[1] or ""
+        unit = _bare(units[index]) or split_unit(names[index])[1] or ""
     factor, offset = unit_factor(unit, quantity)
-    label = f"{_split_unit(names[index])[0] or f'#{index + 1}'} [{unit}]"
+    label = split_unit(names[index])[0] or f"#{index + 1}"
+    label = f"{label} [{unit}]" if unit else label
     return Column(quantity, index, label, factor, offset, reason)
+
+
+def _placed(problem: Problem, quantity: str, name: str) -> Problem:
+    """A fault of a unit with its column, and how to give the unit."""
+    si = QUANTITIES[quantity].si_unit
+    way = f'{_key(quantity)} = "{split_unit(name)[0]} [unit]" in columns, the unit such as {si}'
+    return replace(problem, column=name, allowed=way)
+
+
+def _key(quantity: str) -> str:
+    return quantity.replace(" ", "_")
 
 
 def _bare(unit: str) -> str:
     """ "(mm)" and "[mm]" -> "mm"."""
     found = _BRACKETS.fullmatch(unit.strip())
-    return found.group(1) if found else unit.strip()
+    return found.group(1).strip() if found else unit.strip()
 
 
-def _split_unit(name: str) -> tuple[str, str | None]:
+@lru_cache(maxsize=1024)
+def split_unit(name: str) -> tuple[str, str | None]:
     """("Kraft", "kN") of "Kraft [kN]", "Kraft (kN)", "Kraft / kN", "Kraft in kN", "Kraft_kN"."""
     found = _BRACKETS.search(name)
     if found:
-        return name[: found.start()].strip(), found.group(1)
-    found = _AFTER_SLASH.match(name)
-    if found and match_quantity(found.group(1)) is not None and match_quantity(name) is None:
+        return name[: found.start()].strip(), found.group(1).strip()
+    found = _AFTER_MARK.match(name)
+    hit = match_quantity(found.group(1)) if found and match_quantity(name) is None else None
+    if found and hit and _is_unit(found.group(2), hit[0]):
         return found.group(1).strip(), found.group(2)
     return name, None
 
 
+def _is_unit(text: str, quantity: str) -> bool:
+    try:
+        unit_factor(text, quantity)
+    except ReadError:
+        return False
+    return True
+
+
 def _missing(quantity: str, names: Sequence[str]) -> Problem:
-    key = quantity.replace(" ", "_")
-    how = f'give it as {key} = "NAME [unit]" in columns; columns here: {_listed(names)}'
-    return Problem("missing_column", f"no column for the {quantity}", allowed=how)
+    here = f"columns here: {_listed(names)}" if any(names) else f"{len(names)} columns without names"
+    example = '"NAME [unit]"' if any(names) else '"#2 [unit]"'
+    return Problem(
+        "missing_column", f"no column for the {quantity}", allowed=f"{_key(quantity)} = {example} in columns; {here}"
+    )
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -1,4 +1,7 @@
-"""Instron Bluehill: quoted cells, "Specimen label" above the table, units in brackets in their own row."""
+"""Instron Bluehill 3 and Universal: quoted cells, units in brackets in a row of their own.
+
+One specimen a file, or results tables and several specimens one below the other.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,12 @@ import re
 from tribo.readers.family import Family
 from tribo.readers.source import Source
 
-_KEYS = re.compile(r'^"?(specimen label|results table|sample description|test method)\b', re.I | re.M)
-_UNITS_ROW = re.compile(r'^"?\(s\)"?[,;\t]|[,;\t]"?\((?:mm|N|kN|s|m|gf)\)"?', re.M)
+_KEYS = re.compile(r'^"?(specimen label|results table|sample description|test method|specimen)\b', re.I | re.M)
+_UNITS_ROW = re.compile(r'^"?\(s\)"?[,;\t]|[,;\t]"?\((?:mm|m?N|kN|s|m|gf|kgf)\)"?', re.M)
 
 
 def recognises(source: Source) -> bool:
-    head = "\n".join(source.lines[:40])
+    head = source.head_text
     return bool(_KEYS.search(head)) and bool(_UNITS_ROW.search(head))
 
 

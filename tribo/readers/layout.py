@@ -1,28 +1,33 @@
-"""Where the header ends and how the rows are cut: delimiter, decimal mark, names, units."""
+"""Where a header ends and how rows are cut: delimiter, decimal mark, names, units."""
 
 from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from tribo.errors import Problem, ReadError
-from tribo.quantities import match_quantity
-from tribo.readers.source import LARGEST_HEAD_BYTES, Source
+from tribo.readers.assign import match_column
+from tribo.readers.source import HEAD_BYTES, LARGEST_HEAD_BYTES, Source
 
-_NUMBER_START = re.compile(r"[-+\u2212]?[.,]?\d")
-_ROW_OF_NUMBERS = re.compile(r'[\s";,|\t]*[-+]?[.,]?\d[-+\d\s.,;|"/:eEnaNA]*')
-_COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
-_DOT_NUMBER = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
+Named = Callable[[str], bool]
+_NUMBER_START = re.compile(r"[-+]?[.,]?\d")
+_ROW_OF_NUMBERS = re.compile(r'[\s";,|]*[-+]?[.,]?\d[-+\d\s.,;|"/:eEnaNA]*')
+_COMMA_NUMBER = re.compile(r"[-+]?(?:\d+,\d*|,\d+)(?:[eE][-+]?\d+)?")
+_DOT_NUMBER = re.compile(r"[-+]?(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _ROWS_LOOKED_AT = 12
+_BLANK = ' \t;,"|'
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How a table stands in a file. ``names`` and ``units`` have ``n_cells`` entries, "" where there is none.
+    """How a table stands in a file. ``names``, ``units`` and ``filled`` have ``n_cells`` entries.
 
-    ``header_rows`` counts the lines before the first data row; ``names_row`` and ``units_row`` count from 1.
+    ``header_rows`` counts the lines of the file above the first data row; ``names_row`` and ``units_row`` count
+    from 1. ``filled`` is False for a column that is empty in the first rows.
     """
 
     delimiter: str
@@ -31,10 +36,15 @@ class Layout:
     n_cells: int
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
+    filled: tuple[bool, ...] = ()
     names_row: int | None = None
     units_row: int | None = None
     metadata: dict[str, str] = field(default_factory=dict)
-    footer: str = ""  # pattern of closing lines that hold no data
+
+    def name(self, index: int) -> str:
+        """What a column is called, or its position where it has no name."""
+        named = 0 <= index < len(self.names) and self.names[index]
+        return named or f"#{index + 1}"
 
 
 def cut(line: str, delimiter: str) -> list[str]:
@@ -43,43 +53,65 @@ def cut(line: str, delimiter: str) -> list[str]:
         return line.replace('"', "").split()
     if '"' not in line:
         return [cell.strip() for cell in line.split(delimiter)]
+    cells = line[1:-1].split(f'"{delimiter}"')
+    if line[0] == line[-1] == '"' and line.count('"') == 2 * len(cells):
+        return [cell.strip() for cell in cells]
     try:
         return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
     except csv.Error:
         return [cell.strip(' "') for cell in line.split(delimiter)]
 
 
-def sniff(source: Source, named: Callable[[str], bool]) -> Layout:
-    """The layout of the first table of a delimited export.
+def sniff(source: Source, named: Named, start: int = 0, rows_above: int = 0) -> Layout:
+    """The layout of the first table below the line at offset ``start``, which has ``rows_above`` lines above it.
 
-    ``named(name)`` says that a column name was asked for by the user.
+    ``named(name)`` says that a column of this name was asked for.
 
     Raises
     ------
     ReadError
         header_only, not_an_export, one_column or decimal_is_delimiter.
     """
+    size = HEAD_BYTES
     while True:
-        first = _first_row_of_numbers(source.lines)
-        if first is not None and (first + 3 < len(source.lines) or not source.has_more):
+        at_start = start == source.start and size == HEAD_BYTES
+        lines, more = source.beginning if at_start else source.lines(start, size)
+        first = _first_row_of_numbers(lines)
+        if first is not None and (first + 3 < len(lines) or not more):
             break
-        if not source.has_more or source.head_bytes > LARGEST_HEAD_BYTES:
-            raise ReadError(_no_numbers(source, named))
-        source = replace(source, head_bytes=4 * source.head_bytes)
-    rows = [line for line in source.lines[first : first + _ROWS_LOOKED_AT] if line.strip()]
-    delimiter = _delimiter(rows, source)
-    decimal = _decimal(rows, delimiter)
-    n_cells = _usual_count(rows, delimiter)
-    first = _step_back_over_damage(source.lines, first, delimiter, n_cells)
-    return _with_header(source, Layout(delimiter, decimal, first, n_cells), named)
+        if not more or size > LARGEST_HEAD_BYTES:
+            raise ReadError(_no_numbers(lines, named, source.file, rows_above))
+        size *= 4
+    rows = [line for line in lines[first : first + _ROWS_LOOKED_AT] if line.strip(_BLANK)]
+    delimiter = _delimiter(rows, source.file)
+    cells = [cut(row, delimiter) for row in rows]
+    n_cells = Counter(map(len, cells)).most_common(1)[0][0]
+    while len(cut(lines[first], delimiter)) == 1 < n_cells and first + 1 < len(lines):
+        first += 1  # a line of settings in another delimiter belongs to the header
+    first = _step_back_over_damage(lines, first, delimiter, n_cells)
+    layout = Layout(delimiter, _decimal(cells), first, n_cells, filled=_filled(cells, n_cells))
+    _refuse_decimal_comma_as_delimiter(lines, layout, source.file, rows_above)
+    return _below(_with_header(lines, layout, named), rows_above)
+
+
+def _below(layout: Layout, rows_above: int) -> Layout:
+    def shifted(row: int | None) -> int | None:
+        return None if row is None else row + rows_above
+
+    return replace(
+        layout,
+        header_rows=layout.header_rows + rows_above,
+        names_row=shifted(layout.names_row),
+        units_row=shifted(layout.units_row),
+    )
 
 
 def _first_row_of_numbers(lines: Sequence[str]) -> int | None:
-    """First of two neighbouring lines made of numbers (of one at the end of the file), or None."""
+    """First of two neighbouring lines made of numbers (of one at the end of the lines), or None."""
     for k, line in enumerate(lines):
         if not _ROW_OF_NUMBERS.fullmatch(line):
             continue
-        following = next((other for other in lines[k + 1 :] if other.strip()), None)
+        following = next((other for other in lines[k + 1 :] if other.strip(_BLANK)), None)
         if following is None or _ROW_OF_NUMBERS.fullmatch(following) or _mostly_numbers(line, following):
             return k
     return None
@@ -91,44 +123,42 @@ def _mostly_numbers(line: str, following: str) -> bool:
     return len(starts) > 1 and starts[0] and 2 * sum(starts) >= len(starts) and line[:1] == following[:1]
 
 
-def _no_numbers(source: Source, named: Callable[[str], bool]) -> Problem:
-    for k, line in enumerate(source.lines):
+def _no_numbers(lines: Sequence[str], named: Named, file: str, rows_above: int) -> Problem:
+    for k, line in enumerate(lines):
         for delimiter in "\t;,|":
-            cells = cut(line, delimiter)
-            if sum(_known(cell, named) for cell in cells) >= 2:
-                return Problem("header_only", "a header and no data row", file=source.file, row=k + 1)
+            if sum(_known(cell, named) for cell in cut(line, delimiter)) >= 2:
+                return Problem("header_only", "a header and no data row", file=file, row=rows_above + k + 1)
     what, allowed = "no table of numbers in it", "an export of a test"
-    return Problem("not_an_export", what, file=source.file, allowed=allowed)
+    return Problem("not_an_export", what, file=file, allowed=allowed)
 
 
-def _known(name: str, named: Callable[[str], bool]) -> bool:
-    return bool(name) and (match_quantity(name) is not None or named(name))
+def _known(name: str, named: Named) -> bool:
+    return bool(name) and (match_column(name) is not None or named(name))
 
 
-def _delimiter(rows: Sequence[str], source: Source) -> str:
-    row = rows[0]
+def _delimiter(rows: Sequence[str], file: str) -> str:
     for delimiter in "\t;|":
-        if delimiter in row.strip():
+        if 2 * sum(delimiter in row.strip() for row in rows) > len(rows):
             return delimiter
+    row = rows[-1] if len(rows) < 3 else rows[1]
     words = row.replace('"', "").split()
     if "," in row and not (len(words) > 1 and all(_COMMA_NUMBER.fullmatch(w) or w.isdigit() for w in words)):
         return ","
     if len(words) > 1:
         return " "
     what = "one column only: a trace needs time and force"
-    raise ReadError(Problem("one_column", what, file=source.file, found=row[:60]))
+    raise ReadError(Problem("one_column", what, file=file, found=row[:60]))
 
 
-def _decimal(rows: Sequence[str], delimiter: str) -> str:
-    cells = [cell for row in rows for cell in cut(row, delimiter)]
-    commas = sum(bool(_COMMA_NUMBER.fullmatch(cell)) for cell in cells)
-    dots = sum(bool(_DOT_NUMBER.fullmatch(cell)) for cell in cells)
+def _decimal(rows: Sequence[Sequence[str]]) -> str:
+    cells = [cell for row in rows for cell in row]
+    commas = sum(1 for cell in cells if "," in cell and _COMMA_NUMBER.fullmatch(cell))
+    dots = sum(1 for cell in cells if "." in cell and _DOT_NUMBER.fullmatch(cell))
     return "," if commas > dots else "."
 
 
-def _usual_count(rows: Sequence[str], delimiter: str) -> int:
-    counts = [len(cut(row, delimiter)) for row in rows]
-    return max(set(counts), key=lambda n: (counts.count(n), n))
+def _filled(rows: Sequence[Sequence[str]], n_cells: int) -> tuple[bool, ...]:
+    return tuple(any(k < len(row) and row[k] for row in rows[:3]) for k in range(n_cells))
 
 
 def _step_back_over_damage(lines: Sequence[str], first: int, delimiter: str, n_cells: int) -> int:
@@ -142,51 +172,63 @@ def _step_back_over_damage(lines: Sequence[str], first: int, delimiter: str, n_c
     return first
 
 
-def _with_header(source: Source, layout: Layout, named: Callable[[str], bool]) -> Layout:
+def _with_header(lines: Sequence[str], layout: Layout, named: Named) -> Layout:
     """Names and units are the two lines nearest above the data; the rest of the header is metadata."""
-    above = [k for k in range(layout.header_rows) if source.lines[k].strip(' \t;,"')]
-    cells = {k: _fit(cut(source.lines[k], layout.delimiter), layout.n_cells) for k in above[-2:]}
+    above = [k for k in range(layout.header_rows) if lines[k].strip(_BLANK)]
+    if above and len(cut(lines[above[-1]], layout.delimiter)) == 1 < layout.n_cells:
+        return replace(layout, **_nameless(lines, above, layout))
+    cells = {k: _fit(cut(lines[k], layout.delimiter), layout.n_cells) for k in above[-2:]}
     hits = {k: sum(_known(cell, named) for cell in row) for k, row in cells.items()}
     names_row = units_row = None
     if above:
         names_row = above[-1]
         if len(above) > 1 and hits[above[-2]] > hits[above[-1]]:
             names_row, units_row = above[-2], above[-1]
-    names = cells[names_row] if names_row is not None else ("",) * layout.n_cells
-    units = cells[units_row] if units_row is not None else ("",) * layout.n_cells
-    _refuse_decimal_comma_as_delimiter(source, layout, names)
+    nothing = ("",) * layout.n_cells
     before = [k for k in above if names_row is None or k < names_row]
     return replace(
         layout,
-        names=names,
-        units=units,
+        names=nothing if names_row is None else cells[names_row],
+        units=nothing if units_row is None else cells[units_row],
         names_row=None if names_row is None else names_row + 1,
         units_row=None if units_row is None else units_row + 1,
-        metadata=_metadata(source.lines, before, layout.delimiter),
+        metadata=metadata(lines, before, layout.delimiter),
     )
+
+
+def _nameless(lines: Sequence[str], above: Sequence[int], layout: Layout) -> dict[str, Any]:
+    """A title or settings right above the numbers: the columns have no names."""
+    nothing = ("",) * layout.n_cells
+    return {"names": nothing, "units": nothing, "metadata": metadata(lines, above, layout.delimiter)}
 
 
 def _fit(cells: Sequence[str], n: int) -> tuple[str, ...]:
     return tuple(cells[:n]) + ("",) * (n - len(cells))
 
 
-def _refuse_decimal_comma_as_delimiter(source: Source, layout: Layout, names: Sequence[str]) -> None:
-    given = sum(bool(name) for name in names)
-    row = source.lines[layout.header_rows]
-    if layout.delimiter == "," and 1 < given < layout.n_cells - 1 and '"' not in row and "." not in row:
+def _refuse_decimal_comma_as_delimiter(lines: Sequence[str], layout: Layout, file: str, rows_above: int) -> None:
+    row = lines[layout.header_rows]
+    if layout.delimiter != "," or '"' in row or "." in row:
+        return
+    above = [line for line in lines[: layout.header_rows] if line.strip(_BLANK)]
+    given = max((sum(bool(c) for c in cut(line, ",")) for line in above[-2:]), default=0)
+    if 1 < given < layout.n_cells - 1:
         what = "the comma is both delimiter and decimal mark: the columns cannot be told apart"
-        place = (source.file, layout.header_rows + 1)
+        place = (file, rows_above + layout.header_rows + 1)
         raise ReadError(Problem("decimal_is_delimiter", what, *place, found=row[:60]))
 
 
-def _metadata(lines: Sequence[str], rows: Sequence[int], delimiter: str) -> dict[str, str]:
-    """The file's own header lines: first cell, then the rest as it stands ("12.000 mm/min")."""
+def metadata(lines: Sequence[str], rows: Sequence[int], delimiter: str) -> dict[str, str]:
+    """Header lines as the file has them: first cell, then the rest as it stands ("12.000 mm/min")."""
     found: dict[str, str] = {}
     for k in rows:
-        key, *rest = cut(lines[k].strip("\r"), delimiter)
+        key, *rest = cut(lines[k], delimiter)
         if not any(rest):
-            key, _, value = key.partition(":")
-            rest = [value.strip()]
-        key = key.rstrip(": ") or f"line {k + 1}"
+            for mark in (":", "="):
+                if mark in key:
+                    key, _, value = key.partition(mark)
+                    rest = [value.strip()]
+                    break
+        key = key.strip().rstrip(":") or f"line {k + 1}"
         found[key if key not in found else f"{key} (line {k + 1})"] = " ".join(r for r in rest if r)
     return found

@@ -1,17 +1,22 @@
-"""From a file to bytes with one line ending, and to the text of its head."""
+"""From a file to bytes with one line ending, and to the text of any stretch of it."""
 
 from __future__ import annotations
 
 import codecs
-from dataclasses import dataclass, field
+import mmap
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 from tribo.errors import Problem, ReadError
+from tribo.records import FloatArray
 
 HEAD_BYTES = 2_500
 LARGEST_HEAD_BYTES = 400_000
-LARGEST_FILE_BYTES = 1_000_000_000
+LARGEST_FILE_BYTES = 2 << 30
+MAPPED_BYTES = 64 << 20  # larger files are mapped and read in pieces, so that memory holds the numbers only
+CHUNK_BYTES = 16 << 20
 _WIDE_BOMS = {
     codecs.BOM_UTF32_LE: "utf-32",
     codecs.BOM_UTF32_BE: "utf-32",
@@ -25,72 +30,119 @@ _PLAUSIBLE = frozenset("äöüÄÖÜßéèêëàâçîïôùûÉÈÀÇñÑåÅø
 
 @dataclass(frozen=True)
 class Source:
-    """An export as bytes: no BOM, wide encodings made UTF-8, lines ending in ``\\n``."""
+    """An export as bytes without BOM, wide encodings made UTF-8, lines ending in ``\\n``.
+
+    A mapped source (a large file) keeps its bytes as they are on disk. ``arrays`` holds the columns where the
+    file is no text but named arrays (MATLAB), ``names`` their names; ``part`` the sheet of a workbook.
+    """
 
     path: Path
     file: str
-    data: bytes
+    data: bytes | mmap.mmap
     encoding: str
-    head_bytes: int = HEAD_BYTES
-    notes: tuple[str, ...] = field(default=())
+    start: int = 0
+    part: str = ""
+    names: tuple[str, ...] = ()
+    arrays: tuple[FloatArray, ...] = ()
+
+    def lines(self, start: int, size: int) -> tuple[tuple[str, ...], bool]:
+        """Whole lines of the ``size`` bytes from ``start``, and whether the file goes on after them."""
+        piece = self.data[start : start + size]
+        more = start + size < len(self.data)
+        if more:
+            piece = piece[: piece.rfind(b"\n") + 1] or piece
+        text = self.text(piece)
+        if isinstance(self.data, mmap.mmap):
+            text = text.replace("\r\n", "\n")
+        return tuple(text.split("\n")), more
 
     @cached_property
-    def lines(self) -> tuple[str, ...]:
-        """The first lines as text, each whole (the last one too where the file ends inside the head)."""
-        head = self.data[: self.head_bytes]
-        if len(self.data) > self.head_bytes:
-            head = head[: head.rfind(b"\n") + 1] or head
-        return tuple(self.text(head).split("\n"))
+    def beginning(self) -> tuple[tuple[str, ...], bool]:
+        """The first lines, and whether the file goes on after them."""
+        return self.lines(self.start, HEAD_BYTES)
 
     @property
-    def has_more(self) -> bool:
-        return len(self.data) > self.head_bytes
+    def head(self) -> tuple[str, ...]:
+        """The first lines, enough to recognise a family by."""
+        return self.beginning[0]
+
+    @cached_property
+    def head_text(self) -> str:
+        """The first lines as one text."""
+        return "\n".join(self.head)
 
     def text(self, piece: bytes) -> str:
         """Bytes of this file as text; bytes that the encoding does not know become U+FFFD."""
         return piece.decode("utf-8" if self.encoding.startswith("utf") else self.encoding, errors="replace")
 
-    def line_start(self, line: int) -> int:
-        """Offset of a line, counted from 0."""
-        start = 0
-        for _ in range(line):
-            start = self.data.index(b"\n", start) + 1
+    def offset(self, start: int, lines: int) -> int:
+        """Where the line stands that is ``lines`` lines below the one at ``start``."""
+        for _ in range(lines):
+            start = self.data.find(b"\n", start) + 1
+            if start == 0:
+                return len(self.data)
         return start
 
+    def chunks(self, start: int, end: int) -> Iterator[bytes]:
+        """Whole lines from ``start`` to ``end`` in pieces of bounded size, lines ending in ``\\n``."""
+        while start < end:
+            stop = end
+            if end - start > CHUNK_BYTES:
+                stop = self.data.rfind(b"\n", start, start + CHUNK_BYTES) + 1
+                stop = stop if stop > start else end
+            piece = bytes(self.data[start:stop])
+            yield piece.replace(b"\r\n", b"\n") if isinstance(self.data, mmap.mmap) else piece
+            start = stop
 
-def open_source(path: Path, file: str) -> Source:
-    """Read a file and settle its encoding.
+
+def open_text(path: Path, file: str, raw: bytes | mmap.mmap) -> Source:
+    """A text export, read as bytes, with its encoding settled.
 
     Raises
     ------
     ReadError
-        missing, empty, bom_only, binary or too_large.
+        empty, bom_only, binary or too_large.
     """
-    raw = _read_bytes(path, file)
-    bom = next((b for b in (*_WIDE_BOMS, codecs.BOM_UTF8) if raw.startswith(b)), b"")
-    if not raw[len(bom) :].strip():
+    bom = next((b for b in (*_WIDE_BOMS, codecs.BOM_UTF8) if raw[:4].startswith(b)), b"")
+    if not raw[len(bom) : LARGEST_HEAD_BYTES].strip():
         kind, what = ("bom_only", "nothing but a byte order mark") if bom else ("empty", "the file is empty")
         raise ReadError(Problem(kind, what, file=file, allowed="an export with data rows"))
     if bom in _WIDE_BOMS:
+        if isinstance(raw, mmap.mmap):
+            raise _too_large(len(raw), MAPPED_BYTES, file)
         encoding = _WIDE_BOMS[bom]
-        data = raw.decode(encoding, errors="replace").encode("utf-8")
-    elif bom:
-        encoding, data = "utf-8-sig", raw[len(bom) :]
+        data: bytes | mmap.mmap = raw.decode(encoding, errors="replace").encode("utf-8")
+    elif b"\0" in raw[:HEAD_BYTES]:
+        raise ReadError(Problem("binary", "not a text export", file=file, allowed="a text export"))
     else:
-        if b"\0" in raw[:HEAD_BYTES]:
-            raise ReadError(Problem("binary", "not a text export", file=file, allowed="a text export"))
-        encoding, data = _narrow_encoding(raw), raw
+        encoding, data = ("utf-8-sig" if bom else _narrow_encoding(raw)), raw
+    source = Source(path, file, data, encoding, start=len(bom) if bom == codecs.BOM_UTF8 else 0)
+    return source if isinstance(data, mmap.mmap) else _with_one_line_ending(source, data)
+
+
+def _with_one_line_ending(source: Source, data: bytes) -> Source:
+    if source.start:
+        data = data[source.start :]
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    return Source(path, file, data, encoding)
+    return replace(source, data=data, start=0)
 
 
-def _read_bytes(path: Path, file: str) -> bytes:
+def read_bytes(path: Path, file: str) -> bytes | mmap.mmap:
+    """A file's bytes, mapped where they are many.
+
+    Raises
+    ------
+    ReadError
+        missing, unreadable or too_large.
+    """
     try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            size = f"{path.stat().st_size} bytes"
-            allowed = f"at most {LARGEST_FILE_BYTES} bytes"
-            raise ReadError(Problem("too_large", "too large to read", file=file, found=size, allowed=allowed))
+        size = path.stat().st_size
+        if size > LARGEST_FILE_BYTES:
+            raise _too_large(size, LARGEST_FILE_BYTES, file)
+        if size > MAPPED_BYTES:
+            with path.open("rb") as stream:
+                return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
         return path.read_bytes()
     except FileNotFoundError as why:
         raise ReadError(Problem("missing", "no such file", file=file)) from why
@@ -98,15 +150,21 @@ def _read_bytes(path: Path, file: str) -> bytes:
         raise ReadError(Problem("unreadable", f"cannot be opened ({why.strerror})", file=file)) from why
 
 
-def _narrow_encoding(raw: bytes) -> str:
-    if raw.isascii():
+def _too_large(size: int, limit: int, file: str) -> ReadError:
+    found, allowed = f"{size} bytes", f"at most {limit} bytes of this encoding"
+    return ReadError(Problem("too_large", "too large to read", file=file, found=found, allowed=allowed))
+
+
+def _narrow_encoding(raw: bytes | mmap.mmap) -> str:
+    looked_at = raw if isinstance(raw, bytes) else raw[:CHUNK_BYTES]
+    if looked_at.isascii():
         return "ascii"
     try:
-        raw.decode("utf-8")
+        looked_at[: looked_at.rfind(b"\n") + 1 or None].decode("utf-8")
         return "utf-8"
     except UnicodeDecodeError:
         pass
-    strange = raw.translate(None, delete=_ASCII)
+    strange = looked_at.translate(None, delete=_ASCII)
     try:
         if set(strange.decode("cp1252")) <= _PLAUSIBLE:
             return "cp1252"
@@ -114,5 +172,5 @@ def _narrow_encoding(raw: bytes) -> str:
         pass
     from charset_normalizer import from_bytes
 
-    best = from_bytes(raw[:HEAD_BYTES]).best()
+    best = from_bytes(looked_at[:HEAD_BYTES]).best()
     return best.encoding if best is not None else "cp1252"

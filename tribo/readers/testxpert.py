@@ -1,4 +1,4 @@
-"""Zwick testXpert: quoted key rows, then a row of names and a row of units, both quoted, numbers bare."""
+"""Zwick testXpert, CSV and TRA: quoted key rows, a row of names and a row of units, both quoted, bare numbers."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from tribo.readers.family import Family
 from tribo.readers.source import Source
 
 _NAMES = re.compile(
-    r'^"(?:prüfzeit|zeit|temps|test time|time)"[;,\t].*'
-    r'"(?:standardkraft|kraft|force standard|standard force|force)"',
+    r'^"(?:prüfzeit|zeit|temps|temps d.essai|test time|time|standardweg|standard travel)"[;,\t].*'
+    r'"(?:standardkraft|kraft|force standard|standard force|force)"|'
+    r'^"(?:prüfzeit|zeit|temps|test time)"[;,\t]"(?:standardweg|traverse absolue|course standard|standard travel)"',
     re.I | re.M,
 )
-_UNITS = re.compile(r'^"m?s"[;,\t]"', re.M)
+_UNITS = re.compile(r'^"(?:m?s|min|mm|m?N)"[;,\t]"', re.M)
 
 
 def recognises(source: Source) -> bool:
-    head = "\n".join(source.lines)
+    head = source.head_text
     return bool(_NAMES.search(head)) and bool(_UNITS.search(head))
 
 

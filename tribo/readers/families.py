@@ -1,0 +1,71 @@
+"""The table of format families, and the way from a path to the sources in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tribo.readers.bam import BAM
+from tribo.readers.bluehill import BLUEHILL
+from tribo.readers.csm import CSM
+from tribo.readers.delimited import DELIMITED
+from tribo.readers.family import Family
+from tribo.readers.labview import LABVIEW
+from tribo.readers.matlab import MATLAB, is_matlab, open_matlab
+from tribo.readers.mts import MTS793, TESTSUITE
+from tribo.readers.newport import NEWPORT
+from tribo.readers.pcs import PCS
+from tribo.readers.rheocompass import RHEOCOMPASS
+from tribo.readers.rtec import RTEC
+from tribo.readers.shimadzu import TRAPEZIUM
+from tribo.readers.source import Source, open_text, read_bytes
+from tribo.readers.te67 import TE67
+from tribo.readers.testxpert import TESTXPERT
+from tribo.readers.umt import UMT
+from tribo.readers.walterbai import WALTERBAI
+from tribo.readers.workbook import is_workbook, open_workbook
+
+# Tried in this order; the last one takes what nobody else recognised.
+READERS: dict[str, Family] = {
+    f.name: f
+    for f in (
+        MATLAB,
+        BLUEHILL,
+        TESTXPERT,
+        TESTSUITE,
+        MTS793,
+        TRAPEZIUM,
+        WALTERBAI,
+        BAM,
+        UMT,
+        TE67,
+        CSM,
+        PCS,
+        LABVIEW,
+        RHEOCOMPASS,
+        NEWPORT,
+        RTEC,
+        DELIMITED,
+    )
+}
+
+
+def family_of(source: Source) -> Family:
+    """The first family that recognises the content."""
+    return next(f for f in READERS.values() if f.recognises(source))
+
+
+def open_sources(path: Path, file: str) -> tuple[Source, ...]:
+    """The sheets of a workbook, the variables of a .mat file, or the one text of any other export.
+
+    Raises
+    ------
+    ReadError
+        The file is missing, empty, binary, too large, or damaged as a whole.
+    """
+    raw = read_bytes(path, file)
+    head = raw[:16]
+    if is_workbook(head):
+        return open_workbook(path, file)
+    if is_matlab(head):
+        return (open_matlab(path, file),)
+    return (open_text(path, file, raw),)

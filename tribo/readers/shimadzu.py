@@ -1,0 +1,17 @@
+"""Shimadzu Trapezium: all cells quoted, a specimen row above the names; specimens may stand side by side."""
+
+from __future__ import annotations
+
+import re
+
+from tribo.readers.family import Family
+from tribo.readers.source import Source
+
+_NAMES = re.compile(r'^"(?:Temps|Time|Zeit)"[,;\t]"(?:Force|Kraft)"[,;\t]"(?:Stroke|Disp\.?|Hub|Course)"', re.M)
+
+
+def recognises(source: Source) -> bool:
+    return bool(_NAMES.search(source.head_text))
+
+
+TRAPEZIUM = Family("trapezium", "Shimadzu Trapezium, quoted CSV, one or several specimens", recognises)
