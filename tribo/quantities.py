@@ -16,7 +16,7 @@ from tribo.errors import Problem, ReadError
 
 @dataclass(frozen=True)
 class Quantity:
-    """A physical quantity; ``column`` is its SI column name, ``aliases`` patterns of a plain name."""
+    """A physical quantity; ``column`` is its SI column name, ``aliases`` plain names it goes by."""
 
     name: str
     symbol: str
@@ -25,7 +25,7 @@ class Quantity:
     aliases: tuple[str, ...]
 
 
-# Aliases are matched in full against plain_name(); earlier quantities win, earlier aliases are preferred.
+# Plain names (see plain_name) of columns; of several that fit, the one standing first here is preferred.
 _ALIASES = {
     "time": """
         time
@@ -35,7 +35,8 @@ _ALIASES = {
         timestamp
         time stamp
         total time
-        run(ning)? time
+        run time
+        running time
         zeit
         prufzeit
         laufzeit
@@ -163,6 +164,10 @@ QUANTITIES: dict[str, Quantity] = {
     )
 }
 
+_RANKS: dict[str, tuple[str, int]] = {
+    alias: (q.name, rank) for q in QUANTITIES.values() for rank, alias in enumerate(q.aliases)
+}
+
 # Spellings that pint does not know, or knows as something else.
 _SPELLINGS = {
     "sec": "s",
@@ -275,9 +280,4 @@ def _spelled_out(word: str, quantity: str) -> str:
 @lru_cache(maxsize=1024)
 def match_quantity(name: str) -> tuple[str, int] | None:
     """(quantity, rank of the alias) for a column name, or None where nothing fits."""
-    plain = plain_name(name)
-    for q in QUANTITIES.values():
-        for rank, alias in enumerate(q.aliases):
-            if re.fullmatch(alias, plain):
-                return q.name, rank
-    return None
+    return _RANKS.get(plain_name(name))

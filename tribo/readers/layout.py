@@ -18,7 +18,7 @@ _NUMBER_START = re.compile(r"[-+]?[.,]?\d")
 _ROW_OF_NUMBERS = re.compile(r'[\s";,|]*[-+]?[.,]?\d[-+\d\s.,;|"/:eEnaNA]*')
 _COMMA_NUMBER = re.compile(r"[-+]?(?:\d+,\d*|,\d+)(?:[eE][-+]?\d+)?")
 _DOT_NUMBER = re.compile(r"[-+]?(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?")
-_ROWS_LOOKED_AT = 12
+_ROWS_LOOKED_AT = 6
 _BLANK = ' \t;,"|'
 
 

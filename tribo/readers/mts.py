@@ -7,7 +7,7 @@ from tribo.readers.source import Source
 
 
 def is_testsuite(source: Source) -> bool:
-    return any(line.startswith("Data Acquisition:") for line in source.head)
+    return "\nData Acquisition:" in source.head_text
 
 
 def is_mts793(source: Source) -> bool:

@@ -7,7 +7,7 @@ from tribo.readers.source import Source
 
 
 def recognises(source: Source) -> bool:
-    return any(line.startswith("Interval data:") for line in source.head)
+    return "\nInterval data:" in source.head_text
 
 
 RHEOCOMPASS = Family("rheocompass", "Anton Paar RheoCompass, a table an interval", recognises)

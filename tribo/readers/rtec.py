@@ -7,13 +7,13 @@ import re
 from tribo.readers.family import Family
 from tribo.readers.source import Source
 
-_STEP = re.compile(r"^\W*(?:step|recipe step)\W*\d+\b", re.I | re.M)
-_FORCES = re.compile(r"\bF[xz]\b.*\bF[xz]\b|\bDAQ\.F[xz]\b|\bCOF\b")
+_STEP = re.compile(r"\n\W{0,3}(?:recipe )?step\W{0,3}\d+\b", re.I)
+_FORCES = re.compile(r"F[xz].*F[xz]|COF")
 
 
 def recognises(source: Source) -> bool:
     head = source.head_text
-    return bool(_STEP.search(head)) and bool(_FORCES.search(head))
+    return bool(_FORCES.search(head)) and bool(_STEP.search(head))
 
 
 RTEC = Family("rtec", "Rtec-like, a table a step, columns in any order", recognises)

@@ -68,8 +68,8 @@ class Source:
 
     @cached_property
     def head_text(self) -> str:
-        """The first lines as one text."""
-        return "\n".join(self.head)
+        """The first lines as one text, a line end before each."""
+        return "\n" + "\n".join(self.head)
 
     def text(self, piece: bytes) -> str:
         """Bytes of this file as text; bytes that the encoding does not know become U+FFFD."""

@@ -18,7 +18,7 @@ _UNITS = re.compile(r'^"(?:m?s|min|mm|m?N)"[;,\t]"', re.M)
 
 def recognises(source: Source) -> bool:
     head = source.head_text
-    return bool(_NAMES.search(head)) and bool(_UNITS.search(head))
+    return '"' in head and bool(_NAMES.search(head)) and bool(_UNITS.search(head))
 
 
 TESTXPERT = Family("testxpert", "Zwick testXpert, CSV and TRA, German, French or English names", recognises)
