@@ -1,14 +1,35 @@
-"""One synthetic study for the tests of the report."""
+"""One synthetic study for the tests of the report, and one report of it, written once."""
 
 from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
 from report.synthetic import make_study
 from tribo.records import Study
+from tribo.report import Provenance, write_report
+
+PROVENANCE = Provenance("tribo report 'a b' -o out", "2026-01-01T00:00:00", 3, {"rule": "seed"})
+
+
+class Written(NamedTuple):
+    """A written report: its folder and what progress was told meanwhile."""
+
+    out: Path
+    told: list[tuple[str, int, int]]
 
 
 @pytest.fixture(scope="session")
 def study() -> Study:
     """Six samples, six loads, one repeat of three specimens; the last test and T9001 are set aside."""
     return make_study()
+
+
+@pytest.fixture(scope="session")
+def written(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Written:
+    """The whole report of the study."""
+    out, told = tmp_path_factory.mktemp("written"), []
+    write_report(study, out, lambda *step: told.append(step), PROVENANCE)
+    return Written(out, told)

@@ -12,34 +12,27 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from report.conftest import PROVENANCE, Written
 from tribo.records import Study
-from tribo.report import Provenance, gather_provenance, write_report, write_until
+from tribo.report import gather_provenance, write_report, write_until
 from tribo.report.files import whole_file, write_text
-from tribo.report.store import unit_of, write_store
+from tribo.report.store import unit_of
 
 FIGURES = ["agreement", *(f"fig{k}" for k in range(3, 9))]
 
 
-@pytest.fixture(scope="module")
-def twice(study: Study, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    base = tmp_path_factory.mktemp("twice")
-    for name in ("first", "second"):
-        write_report(study, base / name, provenance=Provenance("tribo report x -o y", "2026-01-01", 3))
-    return base / "first", base / "second"
-
-
-def test_out_holds_the_agreed_files(twice: tuple[Path, Path]) -> None:
-    found = {str(p.relative_to(twice[0])) for p in twice[0].rglob("*") if p.is_file()}
+def test_out_holds_the_agreed_files(written: Written) -> None:
+    found = {str(p.relative_to(written.out)) for p in written.out.rglob("*") if p.is_file()}
     figures = {f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png", "csv")}
     tables = {"tests.csv", "fits.csv", "other_fits.csv", "comparison.csv"}
     assert found == figures | tables | {"campaign.nc", "report.html", "provenance.json"}
 
 
-def test_the_same_study_gives_the_same_bytes(twice: tuple[Path, Path]) -> None:
-    first, second = twice
-    names = [p.relative_to(first) for p in first.rglob("*") if p.is_file() and p.suffix != ".nc"]
+def test_the_same_study_gives_the_same_bytes(written: Written, study: Study, tmp_path: Path) -> None:
+    write_report(study, tmp_path, provenance=PROVENANCE)
+    names = [p.relative_to(tmp_path) for p in tmp_path.rglob("*") if p.is_file() and p.suffix != ".nc"]
     assert len(names) > 20
-    assert not [name for name in names if (first / name).read_bytes() != (second / name).read_bytes()]
+    assert not [name for name in names if (tmp_path / name).read_bytes() != (written.out / name).read_bytes()]
 
 
 def test_an_error_while_writing_leaves_the_old_file_and_no_part(tmp_path: Path) -> None:
@@ -79,16 +72,14 @@ def test_a_walk_that_stops_early_writes_less(until: str, expected: set[str], stu
     assert {p.name for p in tmp_path.iterdir()} == expected | {"campaign.nc"}
 
 
-def test_progress_is_told_of_every_figure(study: Study, tmp_path: Path) -> None:
-    told: list[tuple[str, int, int]] = []
-    write_until(study, tmp_path, "compare", lambda *step: told.append(step))
-    assert [done for _, done, _ in told] == list(range(1, len(FIGURES) + 1))
-    assert not (tmp_path / "report.html").exists()
+def test_progress_is_told_of_every_figure(written: Written) -> None:
+    assert [done for _, done, _ in written.told] == list(range(1, len(FIGURES) + 1))
+    assert {total for _, _, total in written.told} == {len(FIGURES)}
 
 
-@pytest.fixture(scope="module")
-def store(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_store(study, tmp_path_factory.mktemp("store"))
+@pytest.fixture
+def store(written: Written) -> Path:
+    return written.out / "campaign.nc"
 
 
 def test_xarray_reads_every_trace_back_to_the_same_bits(store: Path, study: Study) -> None:

@@ -46,6 +46,13 @@ def test_loads_off_on_both_sides_are_mixed() -> None:
     assert "too high at some loads and too low at others for C" in wording.in_short([agreement], "F")[0]
 
 
+def test_one_load_of_six_outside_is_agreement_with_an_exception() -> None:
+    loads = (*(ratio(1.0, 0.9, 1.1, k) for k in range(5)), ratio(0.8, 0.7, 0.9, 6))
+    agreement = Agreement("B", "static", loads, False)
+    assert agreement.verdict == "agrees"
+    assert "agrees with the measurement for B (but not at 1 of 6 loads)" in wording.in_short([agreement], "F")[0]
+
+
 def test_wide_intervals_cannot_tell() -> None:
     agreement = Agreement("C", "static", (ratio(1.1, 0.5, 2.4), ratio(1, 0.5, 2)), False)
     assert agreement.verdict == "cannot tell"

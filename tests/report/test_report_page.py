@@ -9,8 +9,8 @@ from html.parser import HTMLParser
 
 import pytest
 
+from report.conftest import Written
 from tribo.records import Study
-from tribo.report import Provenance
 from tribo.report.page import html
 from tribo.report.pulls import trace_picture
 
@@ -47,8 +47,8 @@ class Outline(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def page(study: Study) -> str:
-    return html(study, Provenance("tribo report 'a b' -o out", "2026-01-01T00:00:00", 3, {"rule": "seed"}))
+def page(written: Written) -> str:
+    return (written.out / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -87,6 +87,12 @@ def test_every_pull_and_every_test_set_aside_is_on_the_page(page: str, study: St
     assert page.count('class="trace"') == len(study.ingested.traces)
 
 
+def test_the_page_draws_its_figures_itself_where_none_are_given(study: Study, page: str) -> None:
+    few = replace(study, comparison=None, fits=(), other_fits=(), example_runs=())
+    assert html(few).count("<figure") == 4
+    assert page.count("<figure") == 7
+
+
 def test_figures_take_the_colours_of_the_theme(page: str, outline: Outline) -> None:
     assert outline.tags["figure"] == 7
     assert "fill: #ffffff" not in page
@@ -106,7 +112,7 @@ def test_the_page_holds_no_undefined_numbers(page: str) -> None:
 
 
 def test_a_study_without_a_model_says_nothing_of_it(study: Study) -> None:
-    page = html(replace(study, comparison=None, simulated=None, example_runs=()))
+    page = html(replace(study, comparison=None, simulated=None, example_runs=()), drawn={})
     assert 'id="agreement"' not in page
     assert "Simulated" not in page
     assert 'id="table2"' in page

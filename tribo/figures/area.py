@@ -68,6 +68,8 @@ def _area_fraction(study: Study, sample: str, mark: str) -> float:
 
 def _line(points: pd.DataFrame) -> pd.DataFrame:
     """Straight line through the points, each weighted by one over its variance."""
+    if points.empty:
+        return points
     usable = points[np.isfinite(points["area_fraction"]) & np.isfinite(points["value"])]
     if usable["area_fraction"].nunique() < 2:
         return pd.DataFrame(columns=COLUMNS)

@@ -69,13 +69,19 @@ class Agreement:
 
     @property
     def verdict(self) -> Verdict | Literal["mixed"]:
-        """All loads together: a difference if any load shows one, "agrees" if at least half can tell."""
-        high, low = self.count("model too high"), self.count("model too low")
-        if high and low:
-            return "mixed"
-        if high or low:
-            return "model too high" if high else "model too low"
-        return "agrees" if 2 * self.count("agrees") >= len(self.loads) else "cannot tell"
+        """All loads together: what at least half of them say.
+
+        One load of twenty lies outside its interval by chance, so a single one does not make a difference.
+        """
+        high, low, half = self.count("model too high"), self.count("model too low"), len(self.loads) / 2
+        if high + low >= half:
+            return "mixed" if high and low else "model too high" if high else "model too low"
+        return "agrees" if self.count("agrees") >= half else "cannot tell"
+
+    @property
+    def n_outside(self) -> int:
+        """Number of loads at which the interval excludes the model."""
+        return self.count("model too high", "model too low")
 
 
 def agreements(study: Study) -> list[Agreement]:

@@ -79,7 +79,7 @@ def _verdicts(agreements: list[Agreement]) -> str:
     clauses = []
     by_verdict = {v: [a for a in agreements if a.verdict == v] for v in dict.fromkeys(a.verdict for a in agreements)}
     if agreeing := by_verdict.get("agrees"):
-        clauses.append(f"agrees with the measurement for {joined([a.sample for a in agreeing])}")
+        clauses.append(f"agrees with the measurement for {joined([_inside(a) for a in agreeing])}")
     for verdict, side in SIDE.items():
         if off := by_verdict.get(verdict):
             clauses.append(f"is {side} for {joined([_off_by(a) for a in off])}")
@@ -93,8 +93,14 @@ def _verdicts(agreements: list[Agreement]) -> str:
     return "; it ".join(clauses)
 
 
+def _inside(agreement: Agreement) -> str:
+    if not agreement.n_outside:
+        return agreement.sample
+    return f"{agreement.sample} (but not at {_at(agreement.n_outside, len(agreement.loads))})"
+
+
 def _off_by(agreement: Agreement) -> str:
-    count, n = len(agreement.loads) - agreement.count("agrees", "cannot tell"), len(agreement.loads)
+    count, n = agreement.n_outside, len(agreement.loads)
     off = percent(abs(agreement.mean_deviation))
     return f"{agreement.sample} (by {off}{'' if count == n else ' on average'}, at {_at(count, n)})"
 
