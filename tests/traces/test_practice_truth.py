@@ -64,6 +64,5 @@ def test_every_kind_of_spoiled_trace_is_named_and_its_clean_twin_is_not(
 def test_no_healthy_trace_raises_an_alarm(number: str, practice: Callable[[str], Path]) -> None:
     pulls = pulls_of(practice(number))
     assert len(pulls) == 324
-    assert not [
-        p.test_id for p in pulls.values() if p.problems or set(p.flags) - {"stick_slip", "no_drop", "rounded_peak"}
-    ]
+    described = {"stick_slip", "no_drop", "rounded_peak"}
+    assert not [p.test_id for p in pulls.values() if p.problems or set(p.flags) - described]

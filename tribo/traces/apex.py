@@ -16,7 +16,6 @@ _POSITIONS = np.linspace(0.0, 1.0, 9)  # of the apex between two samples
 _FALL_TIMES = np.append(np.geomspace(0.1, 2.0, 8), math.inf)  # as shares of the time looked at
 _MORE_FALL_TIMES = np.append(np.geomspace(0.1, 2.0, 24), math.inf)
 _MANY = 200  # samples from which on a fit tells the finer series apart
-_LARGEST_POWER = 100.0  # of e; only samples that take no part would reach it
 _FITS = 1.5  # misfit per degree of freedom up to which a parabola fits
 
 
@@ -62,9 +61,11 @@ def sharp_apex(time_s: FloatArray, force: FloatArray, first: int, last: int, noi
     origin = float(time_s[pairs[-1]])
     t = time_s - origin
     at = t[pairs, None] + _POSITIONS * (t[pairs + 1] - t[pairs])[:, None]  # (J, S)
-    before = np.arange(t.size) <= pairs[:, None]  # (J, n)
-    rise = _rise_side(t, force, before.astype(float), at)  # arrays (J, S)
-    fall = _fall_side(t, force, (~before).astype(float), at)  # arrays (K, J, S)
+    before = (np.arange(t.size) <= pairs[:, None]).astype(float)  # (J, n)
+    rise_end, fall_start = int(pairs[-1]) + 1, int(pairs[0]) + 1
+    rise = _rise_side(t[:rise_end], force[:rise_end], before[:, :rise_end], at)  # arrays (J, S)
+    shares = _FALL_TIMES if t.size < _MANY else _MORE_FALL_TIMES
+    fall = _fall_side(t[fall_start:], force[fall_start:], 1.0 - before[:, fall_start:], at, shares)  # arrays (K, J, S)
     return _weigh(t, force, at, rise, fall, noise, origin)
 
 
@@ -116,21 +117,21 @@ def _rise_side(t: FloatArray, f: FloatArray, before: FloatArray, at: FloatArray)
     return _Side(value, ((basis @ inverse) * basis).sum(axis=-1), misfit[:, None])
 
 
-def _fall_side(t: FloatArray, f: FloatArray, after: FloatArray, at: FloatArray) -> _Side:
+def _fall_side(t: FloatArray, f: FloatArray, after: FloatArray, at: FloatArray, shares: FloatArray) -> _Side:
     """Exponential falls through the samples of each row of ``after`` (J, n), one a fall time: arrays (K, J, S).
 
-    The last fall time is infinite: a level. A fit that climbs instead of falling is given an infinite misfit.
+    ``shares`` (K,) are the fall times as shares of the time looked at, the last infinite: a level. A fit that climbs
+    instead of falling is given an infinite misfit.
     """
-    shares = _FALL_TIMES if t.size < _MANY else _MORE_FALL_TIMES
     fall_s = np.maximum(shares * float(t[-1]), 0.3 * float(t[-1] - t[-2]))[:, None]
-    u = np.exp(np.minimum((t[-1] - t) / fall_s, _LARGEST_POWER))  # (K, n), 1 at the last sample
-    n, sf, sff = after.sum(axis=1), after @ f, after @ (f * f)
-    su, suu, suf = u @ after.T, (u * u) @ after.T, (u * f) @ after.T  # (K, J)
+    u = np.exp((t[-1] - t) / fall_s)  # (K, n), 1 at the last sample
+    n, sf, sff = np.array((np.ones_like(f), f, f * f)) @ after.T  # (J,) each
+    su, suu, suf = np.array((u, u * u, u * f)) @ after.T  # (K, J) each
     spread, joint = suu - su * su / n, suf - su * sf / n
     spread[-1], joint[-1] = 1.0, 0.0
     slope = joint / spread
     misfit = np.where(slope >= 0, np.maximum(sff - sf * sf / n - slope * joint, 0.0), np.inf)
-    away = np.exp(np.minimum((t[-1] - at) / fall_s[:, :, None], _LARGEST_POWER)) - (su / n)[:, :, None]
+    away = np.exp((t[-1] - at) / fall_s[:, :, None]) - (su / n)[:, :, None]
     value = (sf / n)[:, None] + slope[:, :, None] * away
     return _Side(value, (1.0 / n)[:, None] + away * away / spread[:, :, None], misfit[:, :, None])
 

@@ -13,6 +13,8 @@ from tribo.traces.statistics import mean, median, running_mean, wander
 _LOW, _HIGH = 0.25, 0.75  # share of the first half-way level between which the slope of the rise is taken
 _DETECTABLE = 12.0  # a pull rises by at least this many times the sample noise
 _FEWEST_FOR_ZERO = 5
+_TOE = 0.1  # share of the rise left out before the loading line meets the zero
+_CLIMBING = 0.3  # share of the loading line's pace above which a force before contact is no zero
 _SUBSTANTIAL = (
     0.3  # share of the range of a trace that a climb reaches at least to be the pull and not a touch before it
 )
@@ -68,8 +70,8 @@ def smoothing_width(samples: int) -> int:
 def first_rise(time_s: FloatArray, smooth: FloatArray, noise: float) -> Rise | None:
     """The first climb through a quarter to three quarters of the first maximum-like level, or None without one.
 
-    The level is refined once: the half-way crossing of the whole range finds the climb, and what the force
-    reaches where it stops climbing at that pace sets the level.
+    That level is the highest force before the first clear fall; where the force climbs on without one, what it reaches
+    when it leaves the pace of the first climb.
     """
     start = median(smooth[: max(_FEWEST_FOR_ZERO, smooth.size // 50)])
     full = float(smooth.max()) - start
@@ -85,7 +87,10 @@ def first_rise(time_s: FloatArray, smooth: FloatArray, noise: float) -> Rise | N
         if slope <= 0:
             return None
         rise = Rise(slope, t, f, low, high)
-        full = float(smooth[: departure(time_s, smooth, rise, 0.1 * full) + 1].max()) - start
+        reached = float(smooth[: departure(time_s, smooth, rise, 0.1 * full) + 1].max()) - start
+        if reached > _HIGH * full:
+            break
+        full = reached
     return rise
 
 
@@ -106,37 +111,25 @@ def departure(time_s: FloatArray, smooth: FloatArray, rise: Rise, margin: float)
 
 
 def zero_before(time_s: FloatArray, force: FloatArray, rise: Rise, noise: float) -> Zero:
-    """Zero from the samples before contact: their median and its uncertainty, correlation counted.
+    """Zero from the samples before contact: their mean without outliers and its uncertainty, correlation counted.
 
     The zero phase ends a tenth of the rise before the loading line comes down to its level, so that a rounded
     toe does not enter. With fewer than five samples, or if the force climbs all the way, no zero is seen.
     """
-    last = rise.first
-    level = median(force[: max(_FEWEST_FOR_ZERO, last // 2)])
-    for _ in range(2):
-        climb = time_s[rise.last] - rise.reaches(level)
-        last = int(np.searchsorted(time_s, rise.reaches(level) - 0.1 * climb))
-        if last < _FEWEST_FOR_ZERO:
-            return Zero(0.0, math.nan, float(time_s[0]))
-        level = median(force[:last])
-    before = force[:last]
-    slope = line(time_s[:last], before)[0]
-    if abs(slope) > 0.3 * rise.rate:
+    level = median(force[: max(_FEWEST_FOR_ZERO, rise.first // 2)])
+    contact = rise.reaches(level)
+    last = int(np.searchsorted(time_s, contact - _TOE * (time_s[rise.last] - contact)))
+    if last < _FEWEST_FOR_ZERO:
         return Zero(0.0, math.nan, float(time_s[0]))
-    kept = before[np.abs(before - level) <= 4.0 * max(noise, _spread(before))]
+    before = force[:last]
+    slope, middle, level = line(time_s[:last], before)
+    if abs(slope) > _CLIMBING * rise.rate:
+        return Zero(0.0, math.nan, float(time_s[0]))
+    away = np.abs(before - level)
+    kept = before[away <= 4.0 * max(noise, math.sqrt(float(away @ away) / last))]
     slow = wander(kept, float(time_s[last - 1] - time_s[0]))
     u = max(slow.mean_u, noise / math.sqrt(last))
-    return Zero(mean(kept), u, mean(time_s[:last]), slow.rate)
-
-
-def _spread(values: FloatArray) -> float:
-    away = values - mean(values)
-    return math.sqrt(float(away @ away) / values.size)
-
-
-def onset_time(time_s: FloatArray, rise: Rise, zero: Zero) -> float:
-    """Where the loading line leaves the zero; the first sample if it does so before the record begins."""
-    return float(max(rise.reaches(zero.force_N), time_s[0]))
+    return Zero(mean(kept), u, middle, slow.rate)
 
 
 def smoothed(force: FloatArray) -> FloatArray:

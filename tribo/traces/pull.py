@@ -48,25 +48,23 @@ def read_pull(
         window = chosen.sliding(motion, chosen.parameters)
     except TraceError as fault:
         raise TraceError([p.at(file=file, test_id=test_id) for p in fault.problems]) from None
-    pull = _reduce(motion, static, window, chosen)
-    return replace(
-        pull,
-        test_id=test.test_id if test else trace.name,
-        problems=tuple(p.at(file=file, test_id=test_id) for p in motion.problems),
-    )
+    problems = tuple(p.at(file=file, test_id=test_id) for p in motion.problems)
+    return _reduce(motion, static, window, chosen, test_id or trace.name, problems)
 
 
 def _rule(name: str, parameters: Mapping[str, float] | None) -> Rule:
     if name not in RULES:
         raise TraceError(Problem("unknown_rule", "no such rule", found=name, allowed=", ".join(RULES)))
     rule = RULES[name]
-    if unknown := sorted(set(parameters or {}) - set(rule.parameters)):
+    if not parameters:
+        return rule
+    if unknown := sorted(set(parameters) - set(rule.parameters)):
         allowed = ", ".join(rule.parameters) or "none"
         raise TraceError(Problem("unknown_parameter", f"not of rule {name}", found=", ".join(unknown), allowed=allowed))
-    return replace(rule, parameters={**rule.parameters, **(parameters or {})})
+    return replace(rule, parameters={**rule.parameters, **parameters})
 
 
-def _reduce(motion: Motion, static: Apex, window: Window, rule: Rule) -> Pull:
+def _reduce(motion: Motion, static: Apex, window: Window, rule: Rule, name: str, problems: tuple[Problem, ...]) -> Pull:
     start, end = window
     time, force = motion.time_s, motion.force_N
     enough = end - start >= _FEWEST_SLIDING
@@ -76,7 +74,7 @@ def _reduce(motion: Motion, static: Apex, window: Window, rule: Rule) -> Pull:
     static_wander, sliding_wander = _wander(motion, static, times)
     swing, period = _stick_slip(motion)
     return Pull(
-        test_id="",
+        test_id=name,
         rule=rule.name,
         static_N=static.force_N,
         static_u_N=math.sqrt(static.u_N**2 + zero_u**2 + static_wander),
@@ -94,6 +92,7 @@ def _reduce(motion: Motion, static: Apex, window: Window, rule: Rule) -> Pull:
         noise_N=sliding.noise_N if enough else motion.noise_N,
         drift_N_per_s=sliding.drift_N_per_s,
         flags=_flags(motion, static, sliding, window, rule, period),
+        problems=problems,
     )
 
 
