@@ -1,0 +1,219 @@
+"""The diagnosis of a campaign: does the model fail beyond chance, and what is behind it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tribo.diagnose.fit import fit
+from tribo.diagnose.gain import gain
+from tribo.diagnose.instrument import Evidence, rise_stiffening, zero_drift, zero_offset
+from tribo.diagnose.looks import all_looks
+from tribo.diagnose.model import ModelFit, setup
+from tribo.diagnose.naming import Named, name_causes, weights_of
+from tribo.diagnose.next_test import next_test
+from tribo.diagnose.observations import Observations, observe
+from tribo.diagnose.predictor import Predictor, tabled_predictor
+from tribo.diagnose.screen import Progress, Screen, screen
+from tribo.diagnose.sentences import (
+    cause_from_evidence,
+    cause_of,
+    exclusions,
+    misfits_of,
+    smallest_effects,
+    summary,
+)
+from tribo.diagnose.verdict import Cause, Excluded, Misfit, Outcome, Verdict
+from tribo.diagnose.weigh import unseen
+from tribo.records import Ingested
+
+REPLICATES = 120
+REPLICATES_LEFT = 60
+FEWEST_TESTS = 12
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A verdict with what it rests on, for figures and tables."""
+
+    verdict: Verdict
+    baseline: ModelFit
+    screened: Screen
+    named: Named | None
+
+
+def diagnose(
+    ingested: Ingested,
+    *,
+    seed: int = 0,
+    level: float = 0.01,
+    predictor: Predictor | None = None,
+    progress: Progress | None = None,
+) -> Verdict:
+    """Name what the calibrated model gets wrong in a campaign, or say that nothing is, or that it cannot be told.
+
+    Parameters
+    ----------
+    ingested : Ingested
+        A campaign with its exports read.
+    seed : int
+        Of the simulated campaigns that stand for chance.
+    level : float
+        Chance of seeing a misfit where nothing is hidden.
+    predictor : Predictor, optional
+        Shares of the flat law per sample; those tabulated from simulations by default.
+    progress : callable, optional
+        Called with a stage, the steps done and the steps there are.
+
+    Returns
+    -------
+    Verdict
+        The record behind verdict.json.
+    """
+    return examine(ingested, seed=seed, level=level, predictor=predictor, progress=progress).verdict
+
+
+def examine(
+    ingested: Ingested,
+    *,
+    seed: int = 0,
+    level: float = 0.01,
+    predictor: Predictor | None = None,
+    progress: Progress | None = None,
+    replicates: tuple[int, int] = (REPLICATES, REPLICATES_LEFT),
+) -> Diagnosis:
+    """:func:`diagnose`, with the fitted models and screens kept. Raises FitError below twelve usable tests."""
+    rng = np.random.default_rng(seed)
+    observations = observe(ingested)
+    _enough(observations)
+    s = setup(observations, predictor or tabled_predictor(observations.patterns))
+    baseline = fit(s)
+    screened = screen(baseline, all_looks(baseline), replicates=replicates[0], rng=rng, progress=progress)
+    evidence = _evidence(observations)
+    barred = _barred(baseline, evidence)
+    named = None
+    if screened.p_adjusted() < level:
+        named = name_causes(
+            baseline, screened, [e.mechanism for e in barred],
+            level=level, replicates=replicates[1], rng=rng, progress=progress,
+        )  # fmt: skip
+    verdict = _verdict(baseline, screened, named, evidence, barred, level, rng)
+    return Diagnosis(verdict, baseline, screened, named)
+
+
+def _enough(o: Observations) -> None:
+    from tribo.errors import FitError, Problem
+
+    if o.n < FEWEST_TESTS or len(np.unique(o.conditions.normal_load_N)) < 2:
+        raise FitError(
+            Problem(
+                "too_few_tests", "too few usable tests to diagnose anything",
+                found=f"{o.n} tests at {len(np.unique(o.conditions.normal_load_N))} loads",
+                allowed=f"at least {FEWEST_TESTS} tests at two loads",
+            )
+        )  # fmt: skip
+
+
+def _evidence(o: Observations) -> dict[str, Evidence]:
+    found = {
+        "load_cell_offset": zero_offset(o),
+        "load_cell_drift": zero_drift(o),
+        "bulk_viscoelasticity": rise_stiffening(o),
+    }
+    return {name: e for name, e in found.items() if e is not None}
+
+
+def _barred(baseline: ModelFit, evidence: dict[str, Evidence]) -> list[Excluded]:
+    """What direct evidence or the design keeps out of the weighing."""
+    return exclusions(baseline, evidence, unseen(baseline))
+
+
+def _verdict(
+    baseline: ModelFit,
+    screened: Screen,
+    named: Named | None,
+    evidence: dict[str, Evidence],
+    barred: list[Excluded],
+    level: float,
+    rng: np.random.Generator,
+) -> Verdict:
+    direct = [cause_from_evidence(n, e, evidence) for n, e in _certain(evidence).items()]
+    misfits = [m for _, m in direct] + misfits_of(screened, level)
+    outcome = _outcome(named, bool(direct), level)
+    causes = [c for c, _ in direct] + (_causes(named) if outcome in ("named", "undetermined") else [])
+    left = misfits_of(named.left, level) if named is not None and outcome == "unknown" and named.causes else []
+    smallest = smallest_effects(baseline, screened, level, {e.mechanism for e in barred})
+    extended = named.model if named is not None and named.causes else None
+    tied = _tied(named) if outcome in ("named", "undetermined") else []
+    return Verdict(
+        verdict=outcome,
+        misfits=(*left, *misfits),
+        causes=tuple(causes),
+        equivalent=_equivalent(named) if outcome == "named" else (),
+        excluded=tuple(_excluded(named, barred, causes)),
+        gain=gain(baseline, extended, rng) if extended is not None and outcome != "unknown" else None,
+        set_aside=baseline.setup.observations.set_aside,
+        next_test=next_test(tied),
+        text=summary(outcome, causes, misfits, left, smallest),
+        smallest_effects=smallest,
+    )
+
+
+def _certain(evidence: dict[str, Evidence]) -> dict[str, Evidence]:
+    """Direct evidence that stands by itself; a wandering zero is a drift, not an offset as well."""
+    certain = {n: e for n, e in evidence.items() if e.certain}
+    if "load_cell_drift" in certain:
+        certain.pop("load_cell_offset", None)
+    return certain
+
+
+def _outcome(named: Named | None, direct: bool, level: float) -> Outcome:
+    if named is None:
+        return "named" if direct else "no_misfit"
+    if named.rivals:
+        return "undetermined"
+    if not named.causes or named.p_left < level:
+        return "unknown"
+    return "named"
+
+
+def _causes(named: Named | None) -> list[Cause]:
+    if named is None:
+        return []
+    found = []
+    for k, alike in enumerate(named.causes):
+        shown = [*alike, *(named.rivals if k == len(named.causes) - 1 else ())]
+        found += [cause_of(c, float(w)) for c, w in zip(shown, weights_of(shown), strict=True)]
+    return sorted(found, key=lambda c: -c.weight)
+
+
+def _equivalent(named: Named | None) -> tuple[tuple[str, ...], ...]:
+    if named is None:
+        return ()
+    return tuple(tuple(c.name for c in alike) for alike in named.causes if len(alike) > 1)
+
+
+def _tied(named: Named | None) -> list:
+    if named is None or not named.causes:
+        return []
+    for alike in named.causes:
+        if len(alike) > 1:
+            return list(alike)
+    return [named.causes[-1][0], *named.rivals]
+
+
+def _excluded(named: Named | None, barred: list[Excluded], causes: list[Cause]) -> list[Excluded]:
+    """What was barred, and what lost the weighing by more than the rest."""
+    shown = {c.mechanism for c in causes}
+    found = [e for e in barred if e.mechanism not in shown]
+    if named is None or not named.weighed or not causes:
+        return found
+    best = named.weighed[0].gain
+    for c in named.weighed:
+        if c.name not in shown and c.name not in {e.mechanism for e in found}:
+            found.append(Excluded(c.name, f"explains less: its log likelihood is {best - c.gain:.1f} lower"))
+    return found
+
+
+__all__ = ["Diagnosis", "Misfit", "diagnose", "examine"]

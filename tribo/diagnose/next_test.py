@@ -1,0 +1,130 @@
+"""Which further test best parts what is still tied, per hour at the bench."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tribo.diagnose.model import ModelFit, log_forces
+from tribo.diagnose.verdict import NextTest
+from tribo.diagnose.weigh import Candidate, effect
+from tribo.records import FloatArray
+
+HOURS_PER_PULL = 7.0 / 60.0
+PULLS = 18
+
+
+@dataclass(frozen=True)
+class Direct:
+    """A measurement that reads the amplitude of a mechanism itself, with a standard uncertainty in its unit."""
+
+    mechanism: str
+    text: str
+    uncertainty: float
+    hours: float
+
+
+DIRECT = (
+    Direct("normal_load_error", "Weigh the sled with everything that rests on it, the wire attached.", 0.005, 0.25),
+    Direct("load_cell_offset", "Record two seconds of force before contact and after lift-off.", 0.003, 0.5),
+    Direct("load_cell_drift", "Record the unloaded cell every hour for a day.", 2e-4, 1.0),
+    Direct("pattern_geometry", "Measure the area fraction of the pattern under a microscope.", 0.02, 1.0),
+    Direct("mislabelled_specimen", "Look at the specimens under a microscope.", 0.1, 0.5),
+    Direct("tilt", "Measure the height of the wire over the interface.", 0.002, 0.25),
+    Direct("sampling_clip", "Repeat twelve pulls at ten times the sampling rate.", 0.2, 1.5),
+    Direct("cavity_collapse", "Image a weak pattern through the counterface at the highest load.", 0.1, 2.0),
+)
+
+
+def next_test(tied: Sequence[Candidate]) -> NextTest | None:
+    """The test with the most expected bits per hour between the two best of ``tied``; None for fewer than two."""
+    if len(tied) < 2:
+        return None
+    first, second = tied[0], tied[1]
+    options = [*_direct(first, second), *_without(first, second), *_loads(first, second)]
+    best = max(options, key=lambda option: option.expected_bits / float(option.design["hours"]))
+    return best
+
+
+def bits(distance2: float) -> float:
+    """Expected information of one test between two equally likely laws whose predictions differ.
+
+    ``distance2`` is the squared difference in units of its noise; 0 gives 0 bits, much gives 1.
+    """
+    nodes, node_weights = np.polynomial.hermite_e.hermegauss(41)
+    half = 0.5 * distance2 + np.sqrt(distance2) * nodes
+    lost = node_weights @ np.logaddexp(0.0, -half) / node_weights.sum() / np.log(2)
+    return float(np.clip(1.0 - lost, 0.0, 1.0))
+
+
+def _direct(first: Candidate, second: Candidate) -> list[NextTest]:
+    """Reading the amplitude of one of the two by itself: it is there, or it is not."""
+    found = []
+    for d in DIRECT:
+        for candidate in (first, second):
+            if candidate.acting.mechanism.name == d.mechanism:
+                information = bits(float((candidate.values[0] / d.uncertainty) ** 2))
+                found.append(_named(first, second, d.text, {"hours": d.hours}, information))
+    return found
+
+
+def _without(first: Candidate, second: Candidate) -> list[NextTest]:
+    """Repeating the strongest sample with the cause of one of the two taken away (vented, controlled, fresh)."""
+    found = []
+    for candidate in (first, second):
+        f, change = candidate.fit, effect(candidate.fit)
+        conditions = f.setup.observations.conditions
+        strongest = max(set(conditions.sample.tolist()), key=lambda n: np.abs(change[conditions.sample == n]).mean())
+        rows = np.flatnonzero(conditions.sample == strongest)
+        rows = rows[np.argsort(-np.abs(change[rows]).sum(axis=1))][:PULLS]
+        for remedy in candidate.acting.mechanism.silenced_by:
+            text = f"{remedy[0].upper()}{remedy[1:]}: {len(rows)} pulls of {strongest}."
+            design = {"sample": strongest, "pulls": len(rows), "hours": 1.0 + len(rows) * HOURS_PER_PULL}
+            found.append(_named(first, second, text, design, bits(_distance2(f, change[rows], rows))))
+    return found
+
+
+def _loads(first: Candidate, second: Candidate) -> list[NextTest]:
+    """More pulls of one sample at one load, also half the lowest and twice the highest measured."""
+    conditions = first.fit.setup.observations.conditions
+    loads = np.unique(np.round(conditions.normal_load_N, 5))
+    found = []
+    for sample in np.unique(conditions.sample):
+        rows = np.resize(np.flatnonzero(conditions.sample == sample), PULLS)
+        for load in (loads[0] / 2, loads[0], loads[-1], loads[-1] * 2):
+            difference = _predicted_at(first.fit, rows, load) - _predicted_at(second.fit, rows, load)
+            text = f"{PULLS} further pulls of {sample} at {1e3 * load:.0f} mN."
+            design = {"sample": str(sample), "normal_load_N": float(load), "pulls": PULLS}
+            design["hours"] = PULLS * HOURS_PER_PULL
+            found.append(_named(first, second, text, design, bits(_distance2(first.fit, difference, rows))))
+    return found
+
+
+def _named(first: Candidate, second: Candidate, text: str, design: dict, information: float) -> NextTest:
+    return NextTest(text, (first.name, second.name), design, information)
+
+
+def _predicted_at(f: ModelFit, rows: np.ndarray, load_N: float) -> FloatArray:
+    """ln T of the tests ``rows`` had they been made under another load."""
+    s = f.setup
+    observations = s.observations.take(rows)
+    conditions = replace(observations.conditions, normal_load_N=np.full(len(rows), load_N))
+    base = replace(s, observations=replace(observations, conditions=conditions), shares=s.shares[rows]).base(f.law)
+    before = log_forces(base.forces(conditions.normal_load_N))
+    total = before.copy()
+    for a, v in zip(f.acting, f.values, strict=True):
+        total += log_forces(a.mechanism.law(v, base, conditions, a.choice)) - before
+    return total
+
+
+def _distance2(f: ModelFit, difference: FloatArray, rows: np.ndarray) -> float:
+    """Squared difference of two predictions in units of the noise of further pulls on the same specimens."""
+    s = f.setup
+    noise = np.kron(np.eye(len(rows)), f.noise.repeat)
+    flat = s.random[rows].reshape(-1, s.random.shape[2])
+    q = s.random.shape[2]
+    total = noise + flat @ f.covariance[-q:, -q:] @ flat.T
+    vector = difference.ravel()
+    return float(vector @ np.linalg.solve(total, vector))

@@ -1,0 +1,204 @@
+"""The diagnosis in words: misfits, causes, exclusions, and what a campaign could have shown."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from tribo.diagnose.instrument import Evidence
+from tribo.diagnose.looks import OBSERVABLES, Look, candidates
+from tribo.diagnose.model import ModelFit, predict
+from tribo.diagnose.screen import Screen, cleared
+from tribo.diagnose.verdict import Cause, Estimate, Excluded, Misfit, Outcome
+from tribo.diagnose.weigh import Candidate, effect
+from tribo.mechanisms.table import MECHANISMS
+
+SHOWN = 8
+WHAT = {
+    "static": "static friction", "sliding": "sliding friction",
+    "both": "static and sliding friction alike", "drop": "the drop from static to sliding",
+}  # fmt: skip
+
+
+def misfits_of(screened: Screen, level: float) -> list[Misfit]:
+    """The looks that chance does not explain, the strongest first; mechanisms speak for themselves elsewhere."""
+    found: list[Misfit] = []
+    order = np.argsort(-screened.strength)
+    seen: set[tuple[str, str]] = set()
+    for k in order:
+        look = screened.looks[k]
+        p = screened.p_adjusted(float(screened.strength[k]))
+        key = (_covariate(look), look.sample)
+        if p >= level or len(found) >= SHOWN:
+            break
+        if look.kind != "mechanism" and key not in seen:
+            seen.add(key)
+            found.append(_misfit(look, float(screened.size[k]), screened.coefficients[k], p))
+    if not found and len(order) and screened.p_adjusted() < level:
+        k = order[0]
+        look = screened.looks[k]
+        found.append(_misfit(look, float(screened.size[k]), screened.coefficients[k], screened.p_adjusted()))
+    return found
+
+
+def _covariate(look: Look) -> str:
+    """The column a look follows; a mechanism is said by what it needs."""
+    if look.acting is None:
+        return look.covariate.split(",")[0]
+    if look.acting.mechanism.name == "mislabelled_specimen":
+        return "specimen"
+    return look.acting.choice or ", ".join(look.acting.mechanism.needs)
+
+
+def _misfit(look: Look, size: float, coefficients: np.ndarray, p: float) -> Misfit:
+    percent = 100.0 * float(np.expm1(min(size, 5.0)))
+    where = f" of {look.sample}" if look.sample else ""
+    shape = _shape(look, coefficients)
+    follows = look.covariate if look.acting is None else f"{look.covariate} {look.acting.choice}".strip()
+    text = f"{WHAT[look.observable][0].upper()}{WHAT[look.observable][1:]}{where} follows {follows}"
+    text += f"{shape}: {percent:.0f} % from end to end (adjusted p {_p(p)})."
+    return Misfit(look.observable, look.sample, _covariate(look), percent, p, text)
+
+
+def _shape(look: Look, coefficients: np.ndarray) -> str:
+    if look.kind == "trend":
+        return ", rising" if coefficients[0] > 0 else ", falling"
+    if look.kind == "period":
+        return ", as a wave"
+    if look.kind == "shape":
+        steps = np.diff(np.concatenate([[0.0], coefficients]))
+        if np.all(steps > 0):
+            return ", rising throughout"
+        if np.all(steps < 0):
+            return ", falling throughout"
+        middle = coefficients[:-1].mean() if len(coefficients) > 1 else coefficients[0]
+        return ", highest in the middle" if middle > 0.5 * coefficients[-1] else ", lowest in the middle"
+    return ""
+
+
+def _p(p: float) -> str:
+    return "below 0.001" if p < 1e-3 else f"{p:.3f}"
+
+
+def cause_of(candidate: Candidate, weight: float) -> Cause:
+    """A weighed mechanism with its parameters and 90 % intervals."""
+    parameters = estimates(candidate.fit, len(candidate.fit.acting) - 1)
+    mechanism = candidate.acting.mechanism
+    size = 100.0 * float(np.expm1(np.clip(np.ptp(effect(candidate.fit)), 0.0, 5.0)))
+    first = next(iter(parameters.items()))
+    choice = f" ({candidate.acting.choice})" if candidate.acting.choice else ""
+    text = (
+        f"{candidate.name}{choice}: {first[0]} = {first[1].value:.3g} {first[1].unit}".rstrip()
+        + f" (90 % {first[1].low:.3g} to {first[1].high:.3g}), moving T by up to {size:.0f} % between tests."
+        + f" It shows in {mechanism.shows}. What separates it: {mechanism.separates}."
+    )
+    return Cause(candidate.name, weight, parameters, text)
+
+
+def estimates(f: ModelFit, index: int) -> dict[str, Estimate]:
+    """Parameters of one mechanism of a fit with 90 % intervals, kept inside their bounds."""
+    offset = 4 + sum(len(v) for v in f.values[:index])
+    found = {}
+    for k, p in enumerate(f.acting[index].mechanism.parameters):
+        value = float(f.values[index][k])
+        half = 1.645 * float(np.sqrt(max(f.covariance[offset + k, offset + k], 0.0)))
+        found[p.name] = Estimate(value, max(value - half, p.low), min(value + half, p.high), p.unit)
+    return found
+
+
+def cause_from_evidence(name: str, e: Evidence, others: dict[str, Evidence]) -> tuple[Cause, Misfit]:
+    """A mechanism that direct evidence shows by itself."""
+    low, high = e.interval
+    mechanism = MECHANISMS[name]
+    parameter = mechanism.amplitude
+    observable = "rise" if name == "bulk_viscoelasticity" else "zero"
+    covariate = {"load_cell_offset": "", "load_cell_drift": "started_at"}.get(name, "speed_mm_s")
+    text = f"{name}: {parameter.name} = {e.value:.3g} {e.unit}".rstrip() + f" (90 % {low:.3g} to {high:.3g})"
+    text += {
+        "load_cell_offset": ", read off the force before contact; it was subtracted from every force.",
+        "load_cell_drift": ", read off the force before contact; the zero of each pull was subtracted.",
+    }.get(name, ", read off the slope of the rise.")
+    cause = Cause(name, 1.0, {parameter.name: Estimate(e.value, low, high, e.unit)}, text)
+    percent = 100.0 * e.change if observable == "rise" else float("nan")
+    return cause, Misfit(observable, "", covariate, percent, 1e-6, text)
+
+
+def exclusions(
+    baseline: ModelFit, evidence: dict[str, Evidence], unseen: dict[str, float]
+) -> list[Excluded]:
+    """What the design cannot show, and what direct evidence rules out or takes over."""
+    conditions = baseline.setup.observations.conditions
+    found = []
+    for name, mechanism in MECHANISMS.items():
+        if name in evidence and name != "bulk_viscoelasticity":
+            found.append(Excluded(name, _zero_reason(evidence[name])))
+        elif name in unseen:
+            taken = "cannot be told from this design: the free flat law takes it up"
+            found.append(Excluded(name, f"{taken}; {mechanism.separates}"))
+        elif not mechanism.applies(conditions):
+            what = ", ".join(mechanism.needs)
+            found.append(Excluded(name, f"cannot be told from this design: {what} does not vary or is not recorded"))
+        elif name == "bulk_viscoelasticity" and name in evidence and not evidence[name].certain:
+            e = evidence[name]
+            found.append(Excluded(name, f"the rise stiffens by {100 * e.value:.1f} % per e-fold of speed at most"))
+        elif name == "machine_compliance":
+            found.append(Excluded(name, "cannot be told from this design: no pull of a rigid dummy to compare with"))
+    return found
+
+
+def _zero_reason(e: Evidence) -> str:
+    state = "is" if e.certain else "is no more than"
+    return (
+        f"the force before contact {state} {e.value:.2g} +- {e.standard_error:.1g} {e.unit}, "
+        "and each pull's own zero was subtracted, so it cannot be behind the friction forces"
+    )
+
+
+def smallest_effects(
+    baseline: ModelFit, screened: Screen, level: float, unseen: Collection[str]
+) -> dict[str, float]:
+    """Peak-to-peak effect in percent that each mechanism would need to be found half the time."""
+    need = float(np.quantile(screened.chance, 1.0 - level)) if len(screened.chance) else 3.7
+    found: dict[str, float] = {}
+    s = baseline.setup
+    before = predict(s, baseline.law, (), ())
+    acting = candidates(s, baseline.law)
+    columns = np.stack(
+        [predict(s, baseline.law, (a,), (a.mechanism.start(),)) - before for a in acting], axis=2
+    )
+    left = np.sqrt(np.sum(cleared(baseline, columns)[0] ** 2, axis=0))
+    for k, a in enumerate(acting):
+        if left[k] > 1e-6 and a.name not in unseen:
+            percent = 100.0 * float(np.ptp(columns[:, :, k])) * need / left[k]
+            found[a.name] = min(percent, found.get(a.name, np.inf))
+    return {n: round(float(v), 2) for n, v in found.items() if v < 300.0}
+
+
+def summary(
+    outcome: Outcome,
+    causes: Sequence[Cause],
+    misfits: Sequence[Misfit],
+    left: Sequence[Misfit],
+    smallest: dict[str, float],
+) -> str:
+    """The verdict in two or three sentences."""
+    if outcome == "no_misfit":
+        weak = sorted(smallest.items(), key=lambda kv: kv[1])
+        shown = ", ".join(f"{n} {v:.0f} %" for n, v in weak[:6])
+        return (
+            "Nothing beyond chance: the model calibrated on the flat sample describes this campaign within its "
+            f"own error. Effects this campaign would have shown half the time (peak to peak): {shown}."
+        )
+    if outcome == "named":
+        names = " and ".join(dict.fromkeys(c.mechanism for c in causes))
+        return f"The model fails beyond chance, and {names} explains it; what is left is within chance."
+    if outcome == "undetermined":
+        names = ", ".join(c.mechanism for c in causes)
+        return f"The model fails beyond chance, but several mechanisms explain it about equally: {names}."
+    worst = [*left, *misfits][:1]
+    where = worst[0].text if worst else "no single column stands out."
+    return f"The model fails beyond chance and nothing in the library explains it. {where}"
+
+
+__all__ = ["OBSERVABLES", "cause_of", "exclusions", "misfits_of", "summary"]

@@ -1,0 +1,126 @@
+"""The verdict: what a diagnosis hands on, and its JSON form (schema tribo.verdict/1)."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+from tribo.records import SetAside
+
+SCHEMA = "tribo.verdict/1"
+Outcome = Literal["no_misfit", "named", "undetermined", "unknown"]
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Where the model fails: which observable follows which covariate, by how much, and how surely."""
+
+    observable: str
+    sample: str
+    covariate: str
+    effect_percent: float
+    p_adjusted: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A recovered parameter with its 90 % interval."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A mechanism that explains the misfit. ``weight`` is its share among all that were weighed."""
+
+    mechanism: str
+    weight: float
+    parameters: Mapping[str, Estimate]
+    text: str
+
+
+@dataclass(frozen=True)
+class Excluded:
+    """A mechanism that was left out of the weighing or lost, and why."""
+
+    mechanism: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What the extended model gains on tests it has not seen: log scores per test, and RMSE of ln T."""
+
+    held_out: str
+    log_score_baseline: float
+    log_score_extended: float
+    difference: float
+    se: float
+    rmse_percent_before: float
+    rmse_percent_after: float
+
+
+@dataclass(frozen=True)
+class NextTest:
+    """The test that best parts what is still tied."""
+
+    text: str
+    separates: tuple[str, ...]
+    design: Mapping[str, Any]
+    expected_bits: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The outcome of a diagnosis."""
+
+    verdict: Outcome
+    misfits: tuple[Misfit, ...] = ()
+    causes: tuple[Cause, ...] = ()
+    equivalent: tuple[tuple[str, ...], ...] = ()
+    excluded: tuple[Excluded, ...] = ()
+    gain: Gain | None = None
+    set_aside: tuple[SetAside, ...] = ()
+    next_test: NextTest | None = None
+    text: str = ""
+    smallest_effects: Mapping[str, float] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The verdict as plain types, in the order of the schema; numbers that do not exist are null."""
+        plain = {
+            "schema": SCHEMA,
+            "verdict": self.verdict,
+            "text": self.text,
+            "misfits": [asdict(m) for m in self.misfits],
+            "causes": [asdict(c) for c in self.causes],
+            "equivalent": [list(names) for names in self.equivalent],
+            "excluded": [asdict(e) for e in self.excluded],
+            "gain": asdict(self.gain) if self.gain else None,
+            "set_aside": [{"test_id": s.test_id, "reason": s.reason} for s in self.set_aside],
+            "next_test": asdict(self.next_test) if self.next_test else None,
+            "smallest_effects_percent": dict(self.smallest_effects),
+        }
+        clean: dict[str, Any] = _finite(plain)
+        return clean
+
+    def to_json(self) -> str:
+        """verdict.json."""
+        return json.dumps(self.as_dict(), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(k): _finite(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(v) for v in value]
+    if isinstance(value, str | bool) or value is None:
+        return value
+    number = float(value)
+    return number if math.isfinite(number) else None

@@ -1,0 +1,114 @@
+"""Weighing the mechanisms: fitting each, penalising freedom, and finding which cannot be told apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tribo.diagnose.fit import fit
+from tribo.diagnose.looks import candidates
+from tribo.diagnose.model import Acting, ModelFit, log_forces, predict
+from tribo.diagnose.screen import cleared
+from tribo.records import FloatArray
+
+PER_PARAMETER = 1.0  # log likelihood that a further parameter has to earn
+CHOICES_FITTED = 4  # of a mechanism with many choices, how many are fitted in full
+LABEL_SD = 0.15  # a wrong label is all or nothing
+ALIKE = 0.95  # cosine from which two mechanisms cannot be told apart
+SEEN = 1e-3  # share of a mechanism's effect that must be left once the flat law is free
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A mechanism fitted on top of a model; ``gain`` is the log likelihood it earns net of its freedom, ``raw``
+    the same before the choices it had are paid for."""
+
+    acting: Acting
+    fit: ModelFit
+    gain: float
+    raw: float
+
+    @property
+    def name(self) -> str:
+        return self.acting.name
+
+    @property
+    def values(self) -> FloatArray:
+        return self.fit.values[-1]
+
+
+def weigh(start: ModelFit, excluded: Sequence[str] = ()) -> list[Candidate]:
+    """Every mechanism that is not excluded, added to ``start``; the best choice of each, best first."""
+    groups: dict[str, list[Acting]] = {}
+    for acting in candidates(start.setup, start.law):
+        if acting.name not in excluded and acting not in start.acting:
+            groups.setdefault(acting.mechanism.name, []).append(acting)
+    found = []
+    for group in groups.values():
+        chosen = _most_promising(start, group)
+        fitted = [_candidate(start, acting, len(group)) for acting in chosen]
+        best = {c.name: c for c in sorted(fitted, key=lambda c: c.gain)}
+        found += list(best.values())
+    return sorted(found, key=lambda c: -c.gain)
+
+
+def _most_promising(start: ModelFit, group: list[Acting]) -> list[Acting]:
+    """All of a small group; of a large one those whose score test is strongest in the right direction."""
+    if len(group) <= CHOICES_FITTED:
+        return group
+    before = predict(start.setup, start.law, (), ())
+    columns = [predict(start.setup, start.law, (a,), (a.mechanism.start(),)) - before for a in group]
+    left, target = cleared(start, np.stack(columns, axis=2))
+    pull = left.T @ target
+    # log likelihood of the whole effect: a wrong label is not half wrong
+    whole = pull - 0.5 * np.sum(left**2, axis=0)
+    small = 0.5 * pull * np.abs(pull) / (np.sum(left**2, axis=0) + 1e-12)
+    rank = whole if group[0].mechanism.name == "mislabelled_specimen" else np.abs(small)
+    return [group[i] for i in np.argsort(-rank)[:CHOICES_FITTED]]
+
+
+def _candidate(start: ModelFit, acting: Acting, choices: int) -> Candidate:
+    fitted = fit(start.setup, (*start.acting, acting), start=start)
+    raw = fitted.score - start.score - PER_PARAMETER * (len(acting.mechanism.parameters) - 1)
+    if acting.mechanism.name == "mislabelled_specimen":
+        raw -= 0.5 * ((fitted.values[-1][0] - 1.0) / LABEL_SD) ** 2
+    return Candidate(acting, fitted, float(raw - np.log(choices)), float(raw))
+
+
+def effect(f: ModelFit, index: int = -1) -> FloatArray:
+    """Change of ln T by one mechanism of a fit, (n, 2)."""
+    base = f.setup.base(f.law)
+    conditions = f.setup.observations.conditions
+    acting = f.acting[index]
+    after = acting.mechanism.law(f.values[index], base, conditions, acting.choice)
+    return log_forces(after) - log_forces(base.forces(conditions.normal_load_N))
+
+
+def likeness(start: ModelFit, best: Candidate, others: Sequence[Candidate]) -> FloatArray:
+    """Cosine between what ``best`` changes in the fitted ln T and what each other changes, (others,).
+
+    Every model has its own flat law fitted, so what the flat law can take up is already out; the sample error
+    and the specimens are taken out here.
+    """
+    ground = replace(best.fit, acting=best.fit.acting[:-1], values=best.fit.values[:-1])
+    changes = [c.fit.predicted - start.predicted for c in (best, *others)]
+    left = cleared(ground, np.stack(changes, axis=2))[0]
+    length = np.sqrt(np.sum(left**2, axis=0)) + 1e-12
+    return np.asarray((left[:, 1:].T @ left[:, 0]) / (length[1:] * length[0]))
+
+
+def unseen(start: ModelFit) -> dict[str, float]:
+    """Mechanisms that the free flat law takes up almost wholly, and the share of their effect that is left."""
+    found = {}
+    before = predict(start.setup, start.law, (), ())
+    for acting in candidates(start.setup, start.law):
+        if acting.choice:
+            continue
+        change = predict(start.setup, start.law, (acting,), (acting.mechanism.start(),)) - before
+        kept = float(np.sum(cleared(start, change[:, :, None])[0] ** 2))
+        whole = float(np.sum(change**2) / np.mean(np.diag(start.noise.repeat)))
+        if kept < SEEN * max(whole, 1e-30):
+            found[acting.name] = kept / max(whole, 1e-30)
+    return found

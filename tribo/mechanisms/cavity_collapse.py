@@ -1,0 +1,48 @@
+"""Above a pressure the floors of the cavities touch down."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Parameter, Values, amplitude
+
+REFERENCE_WIDTH_M = 15e-6
+SHARPNESS = 6.0  # a collapse is spread over about a third of its pressure
+
+
+def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
+    """T goes from the pattern's law to the flat law around p = p_c (15 um / width)^k.
+
+    ``values`` = [share of the cavity area that touches down, p_c in Pa, k].
+    """
+    open_N = base.forces(conditions.normal_load_N)
+    closed_N = base.as_sample(base.flat).forces(conditions.normal_load_N)
+    width = np.maximum(conditions.cavity_width_m, 1e-9)
+    collapse_Pa = values[1] * (REFERENCE_WIDTH_M / width) ** values[2]
+    down = 1.0 / (1.0 + (collapse_Pa / conditions.pressure_Pa) ** SHARPNESS)
+    share = values[0] * np.where(conditions.cavity_width_m > 0, down, 0.0)
+    return Forces(
+        open_N.static_N + share * (closed_N.static_N - open_N.static_N),
+        open_N.sliding_N + share * (closed_N.sliding_N - open_N.sliding_N),
+    )
+
+
+MECHANISM = Mechanism(
+    name="cavity_collapse",
+    kind="pattern",
+    formula="T -> flat law above p_c (15 um / width)^k",
+    parameters=(
+        amplitude("share", "", 0.0, 1.0, 0.5, "share of the cavity area that touches down"),
+        Parameter("p_c", "Pa", 2e3, 5e4, 1e4, "collapse pressure of a cavity 15 um wide", tries=(5e3, 2e4)),
+        Parameter("k", "", 0.0, 1.5, 0.3, "how fast a wider cavity is weaker"),
+    ),
+    law=law,
+    sign=0,
+    regimes=("static", "sliding"),
+    enters="the mask: cavity blocks become contact blocks",
+    shows="T rises towards the flat sample above a load, weak patterns first",
+    confused_with="pressure_dependent_friction",
+    separates="a series of depths, or unloading after loading",
+    silenced_by=("the same pattern with deeper cavities",),
+    needs=("area_fraction", "normal_load_N"),
+)

@@ -1,0 +1,31 @@
+"""Static friction grows with the time of rest (Dieterich-Ruina)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tribo.mechanisms.record import REFERENCE_HOLD_S, Base, Conditions, Forces, Mechanism, Values, amplitude
+
+
+def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
+    """T_s = T_b (1 + b ln(1 + t_hold / t_0)), t_0 = 1 s; ``values`` = [b] relative to the fresh contact."""
+    before = base.forces(conditions.normal_load_N)
+    gain = 1.0 + values[0] * np.log1p(conditions.hold_s / REFERENCE_HOLD_S)
+    return Forces(before.static_N * gain, before.sliding_N)
+
+
+MECHANISM = Mechanism(
+    name="contact_ageing",
+    kind="interface",
+    formula="T_s = T_b (1 + b ln(1 + t_hold / 1 s))",
+    parameters=(amplitude("b", "", 0.0, 0.4, 0.03, "relative growth per e-fold of hold"),),
+    law=law,
+    sign=1,
+    regimes=("static",),
+    enters="block static thresholds, by the time of rest",
+    shows="static only, against ln of the hold",
+    confused_with="humidity",
+    separates="holds of 0.1 to 1000 s in random order",
+    silenced_by=("holds of 0.1 to 1000 s in random order",),
+    needs=("hold_s",),
+)

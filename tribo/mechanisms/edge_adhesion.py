@@ -1,0 +1,32 @@
+"""Extra static traction along the rims of the cavities."""
+
+from __future__ import annotations
+
+from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Parameter, Values, amplitude
+
+
+def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
+    """T_s -> T_s + e (rim length); ``values`` = [e in N/m, share of it left while sliding]."""
+    before = base.forces(conditions.normal_load_N)
+    extra_N = values[0] * conditions.rim_per_m * conditions.nominal_area_m2
+    return Forces(before.static_N + extra_N, before.sliding_N + values[1] * extra_N)
+
+
+MECHANISM = Mechanism(
+    name="edge_adhesion",
+    kind="pattern",
+    formula="T_s -> T_s + e (rim length)",
+    parameters=(
+        amplitude("e", "N/m", 0.0, 1.0, 0.03, "static force per rim length"),
+        Parameter("share", "", 0.0, 0.4, 0.1, "share of it left while sliding"),
+    ),
+    law=law,
+    sign=1,
+    regimes=("static", "sliding"),
+    enters="static adhesion of the contact blocks beside a cavity",
+    shows="rank B > C >> A > S, mostly static",
+    confused_with="suction",
+    separates="equal area fraction at another pitch",
+    silenced_by=("a pattern of the same area fraction at twice the pitch",),
+    needs=("rim_per_m",),
+)

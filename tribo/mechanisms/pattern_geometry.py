@@ -1,0 +1,46 @@
+"""The true area fraction of one pattern differs from the nominal one (moulding, etching)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+
+
+def law(values: Values, base: Base, conditions: Conditions, choice: str) -> Forces:
+    """tau0 A of one pattern scales with its area fraction; ``values`` = [dAF], ``choice`` names the pattern."""
+    here = pattern_of(conditions.sample) == choice
+    scale = 1.0 + np.where(here, np.maximum(values[0] / conditions.area_fraction, -0.95), 0.0)
+    load = conditions.normal_load_N
+    return Forces(
+        base.static_mu * load + base.static_adhesion_N * scale,
+        base.sliding_mu * load + base.sliding_adhesion_N * scale,
+    )
+
+
+def pattern_of(samples: np.ndarray) -> np.ndarray:
+    """The pattern of each sample name: ``Sx`` and ``Sy`` are both S."""
+    return np.array([s[:-1] if len(s) > 1 and s[-1] in "xy" else s for s in samples])
+
+
+def patterns(base: Base, conditions: Conditions) -> tuple[str, ...]:
+    """Every pattern with cavities."""
+    return tuple(sorted(set(pattern_of(conditions.sample[conditions.area_fraction < 1.0]))))
+
+
+MECHANISM = Mechanism(
+    name="pattern_geometry",
+    kind="pattern",
+    formula="tau0 A of one pattern scales by 1 + dAF / AF",
+    parameters=(amplitude("dAF", "", -0.5, 0.5, 0.1, "true minus nominal area fraction"),),
+    law=law,
+    sign=0,
+    regimes=("static", "sliding"),
+    enters="the mask of one pattern",
+    shows="one pattern at all loads, most at low load",
+    confused_with="a batch of specimens",
+    separates="measure the area fraction under a microscope",
+    silenced_by=("measure the area fraction under a microscope",),
+    needs=("area_fraction",),
+    choices=patterns,
+)
