@@ -67,8 +67,8 @@ def ingest_against_pandas(path: Path) -> Ratio:
             trace = ingested.traces.get(test.test_id)
             if trace is None or trace.source is None:
                 continue
-            source = trace.source
-            known.append((campaign.root / test.file, source.delimiter, source.decimal, source.encoding, source.header_rows))
+            form = trace.source
+            known.append((campaign.root / test.file, form.delimiter, form.decimal, form.encoding, form.header_rows))
 
         def load_all() -> None:
             for file, sep, decimal, encoding, skip in known:

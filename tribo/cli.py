@@ -1,0 +1,260 @@
+"""The command line. Thin: each command reads options, walks the street, and hands the records to the report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tribo import __version__
+from tribo.console import Console, command_options, set_aside_record, set_aside_text, status_of
+
+if TYPE_CHECKING:
+    from tribo.records import Study
+    from tribo.stages import Until
+
+CAMPAIGN = click.argument("campaign", type=click.Path(exists=True, path_type=Path))
+FOLDER = click.Path(file_okay=False, path_type=Path)
+OUT = click.option("-o", "--out", type=FOLDER, required=True, help="Output folder.")
+DRY_RUN = click.option("--dry-run", is_flag=True, help="Say what would be done, and do nothing.")
+
+
+def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    for option in (
+        click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off."),
+        click.option(
+            "--weights",
+            type=click.Choice(["relative", "ratio", "force"]),
+            default="relative",
+            show_default=True,
+            help="Which scatter is alike at all loads: of T over its own size, of T/N = mu + tau0/p, or of T.",
+        ),
+    ):
+        function = option(function)
+    return function
+
+
+def _model_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    for option in (
+        click.option("--flat", default="F", show_default=True, help="The sample that calibrates the model."),
+        click.option(
+            "--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulated runs a load."
+        ),
+    ):
+        function = option(function)
+    return function
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="tribo")
+def main() -> None:
+    """From raw friction exports to mu and tau0, beside a calibrated spring-block model.
+
+    \b
+    Start with:  tribo demo -o out
+                 tribo init my-campaign
+                 tribo report my-campaign -o out
+    """
+
+
+@main.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@command_options
+def init(console: Console, folder: Path, **_: Any) -> None:
+    """Write a commented campaign into FOLDER, to fill in."""
+    from tribo.campaign import write_template
+
+    write_template(folder)
+    console.result({"folder": str(folder)}, f"{folder}: fill in campaign.toml and tests.csv, put the exports into raw/")
+
+
+@main.command()
+@CAMPAIGN
+@OUT
+@DRY_RUN
+@_fit_options
+@command_options
+def ingest(console: Console, campaign: Path, out: Path, dry_run: bool, rule: str, **options: Any) -> int:
+    """Traces and per-test features of CAMPAIGN: tests.csv and campaign.nc."""
+    return _walk(console, campaign, out, "ingest", dry_run, rule=rule, **options)
+
+
+@main.command()
+@CAMPAIGN
+@OUT
+@DRY_RUN
+@_fit_options
+@command_options
+def fit(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
+    """mu and tau0 of every sample with uncertainties: fits.csv."""
+    return _walk(console, campaign, out, "fit", dry_run, **options)
+
+
+@main.command()
+@CAMPAIGN
+@OUT
+@DRY_RUN
+@_fit_options
+@_model_options
+@command_options
+def compare(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
+    """Experiment against the model calibrated on the flat sample: comparison.csv and the figures."""
+    return _walk(console, campaign, out, "compare", dry_run, **options)
+
+
+@main.command()
+@CAMPAIGN
+@OUT
+@DRY_RUN
+@_fit_options
+@_model_options
+@command_options
+def report(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
+    """All of the above, and report.html."""
+    return _walk(console, campaign, out, "report", dry_run, **options)
+
+
+@main.command()
+@click.option("-o", "--out", type=FOLDER, default="out/demo", show_default=True, help="Output folder.")
+@_fit_options
+@_model_options
+@command_options
+def demo(console: Console, out: Path, **options: Any) -> int:
+    """The report on the bundled example."""
+    from tribo.published import data_dir
+
+    status = _walk(console, data_dir() / "example", out, "report", False, **options)
+    console.say(f"open {out / 'report.html'}")
+    return status
+
+
+@main.command()
+@click.argument("files", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@command_options
+def inspect(console: Console, files: tuple[Path, ...], **_: Any) -> int:
+    """What an export is: format, encoding, columns, units, time base, doubts."""
+    from tribo.readers import inspect_export
+
+    found = [inspect_export(file) for file in files]
+    console.result({"files": [f.record() for f in found]}, "\n\n".join(f.in_words() for f in found))
+    return 1 if all(f.refused for f in found) else 0
+
+
+@main.command()
+@click.option("--sample", required=True, help="F, A, B, C, Sx or Sy, the samples of the paper.")
+@click.option("--pressure", "pressure_kPa", type=float, required=True, help="Nominal pressure in kPa.")
+@click.option("--angle", "angle_deg", type=float, help="Pull direction against x in degrees (the sample's own).")
+@click.option("--blocks", type=int, default=85, show_default=True, help="Blocks a side.")
+@click.option("--dt", "dt_s", type=float, default=5e-8, show_default=True, help="Time step in s.")
+@click.option("--duration", "duration_ms", type=float, help="Length of the run in ms (three times the peak time).")
+@click.option("--engine", default="fast", show_default=True, help="fast, dense or reference.")
+@click.option("-o", "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="FILE.nc to write.")
+@command_options
+def simulate(
+    console: Console, sample: str, pressure_kPa: float, angle_deg: float | None, blocks: int, dt_s: float,
+    duration_ms: float | None, engine: Any, out: Path, seed: int, **_: Any,
+) -> None:  # fmt: skip
+    """One run of the spring-block model with the paper's parameters."""
+    from tribo.simulate import SimConfig, angle_range_deg, write_run
+    from tribo.simulate import simulate as run_model
+
+    low, high = angle_range_deg(sample)
+    nominal = (low + high) / 2 if (low, high) != (0.0, 90.0) else 0.0
+    run = run_model(
+        SimConfig(
+            sample=sample,
+            pressure_Pa=pressure_kPa * 1e3,
+            angle_deg=nominal if angle_deg is None else angle_deg,
+            seed=seed,
+            blocks=(blocks, blocks),
+            dt_s=dt_s,
+            duration_s=None if duration_ms is None else duration_ms * 1e-3,
+            engine=engine,
+        )
+    )
+    write_run(run, out)
+    record = {
+        "out": str(out),
+        "static_friction": run.static_friction,
+        "sliding_friction": run.sliding_friction,
+        "window_s": run.window_s,
+    }
+    start, end = (1e3 * t for t in run.window_s)
+    console.result(
+        record,
+        f"{sample} at {pressure_kPa:g} kPa: static T/N {run.static_friction:.4f}, "
+        f"sliding T/N {run.sliding_friction:.4f} (mean from {start:.2f} to {end:.2f} ms), written to {out}",
+    )
+
+
+@main.command()
+@command_options
+def doctor(console: Console, **_: Any) -> int:
+    """Versions, cores, optional parts found or missing."""
+    from tribo.doctor import examine, in_words
+
+    found = examine()
+    console.result(found, in_words(found))
+    return 0 if found["healthy"] else 1
+
+
+def _walk(console: Console, path: Path, out: Path, until: Until, dry_run: bool, **options: Any) -> int:
+    """Walk the street with one campaign as far as ``until`` and write what that yields."""
+    from tribo import stages
+    from tribo.campaign import open_campaign
+    from tribo.report import gather_provenance, write_until
+
+    chosen = stages.StudyOptions(ensemble=None if dry_run else out / "ensemble.nc", **options)
+    with open_campaign(path) as campaign:
+        if dry_run:
+            planned = stages.plan(campaign, chosen, until)
+            console.result(planned, _plan_text(planned, out))
+            return status_of(campaign.set_aside)
+        with console.progress() as progress:
+            study = stages.study(campaign, chosen, until=until, progress=progress)
+            provenance = gather_provenance(
+                study, command=_command_line(), seed=chosen.seed, started_at=_now(), options=chosen.as_words()
+            )
+            write_until(study, out, until, progress=progress, provenance=provenance)
+    return _conclude(console, study, out)
+
+
+def _conclude(console: Console, study: Study, out: Path) -> int:
+    """Say what came out, what was set aside, and with what status it ends."""
+    from tribo.report import summary_text, table2_text
+    from tribo.report.tables import fits_table
+
+    set_aside = study.ingested.set_aside
+    fits = fits_table(study.fits).astype(object)
+    record = {
+        "out": str(out),
+        "tests": len(study.ingested.pulls),
+        "set_aside": set_aside_record(set_aside),
+        "notes": [str(p) for p in study.ingested.campaign.problems] + list(study.notes),
+        "fits": fits.where(fits.notna(), None).to_dict("records"),
+    }
+    words = [table2_text(study)] if study.fits else []
+    console.result(record, "\n\n".join([*words, summary_text(study)]))
+    if set_aside:
+        console.say(f"{len(set_aside)} tests set aside:\n{set_aside_text(set_aside)}", level=-1)
+    return status_of(set_aside)
+
+
+def _plan_text(planned: dict[str, Any], out: Path) -> str:
+    lines = [f"would {step}" for step in planned["steps"]]
+    return "\n".join([*lines, f"would write into {out}", *(f"set aside: {s}" for s in planned["set_aside"])])
+
+
+def _command_line() -> str:
+    import shlex
+    import sys
+
+    return shlex.join(["tribo", *sys.argv[1:]])
+
+
+def _now() -> str:
+    from datetime import UTC, datetime
+
+    return datetime.now(UTC).isoformat(timespec="seconds")

@@ -1,0 +1,140 @@
+"""What the commands share: common options, progress, faults in words or JSON, exit statuses."""
+
+from __future__ import annotations
+
+import functools
+import json
+import logging
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import click
+
+from tribo.errors import Problem, TriboError
+from tribo.records import SetAside
+
+DONE, UNUSABLE, SOME_SET_ASIDE = 0, 1, 3
+
+
+@dataclass(frozen=True)
+class Console:
+    """Where results and talk go: results to standard output, everything else to standard error."""
+
+    as_json: bool = False
+    verbosity: int = 0
+
+    def say(self, text: str, *, level: int = 0) -> None:
+        """A line for people on standard error; level 1 needs -v, level -1 survives -q."""
+        if self.verbosity >= level:
+            click.echo(text, err=True)
+
+    def result(self, record: dict[str, Any], text: str) -> None:
+        """The result itself: JSON where asked for, else ``text``."""
+        click.echo(json.dumps(record, indent=1, default=str, allow_nan=False) if self.as_json else text)
+
+    @contextmanager
+    def progress(self) -> Iterator[Callable[[str, int, int], None]]:
+        """A function (stage, done, total): a bar with the time left on a terminal, plain lines elsewhere."""
+        if self.verbosity < 0:
+            yield lambda stage, done, total: None
+        elif sys.stderr.isatty():
+            with _bars() as report:
+                yield report
+        else:
+            yield _PlainLines(self)
+
+
+class _PlainLines:
+    """A line every ten seconds while a stage lasts, and when it ends."""
+
+    def __init__(self, console: Console):
+        self._console = console
+        self._started: dict[str, float] = {}
+        self._last: dict[str, float] = {}
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        now = time.monotonic()
+        start = self._started.setdefault(stage, now)
+        if done < total and now - self._last.setdefault(stage, now) < 10.0:
+            return
+        self._last[stage] = now
+        spent = now - start
+        left = f", {spent / done * (total - done):.0f} s left" if 0 < done < total else ""
+        self._console.say(f"{stage}: {done} of {total} ({spent:.0f} s{left})")
+
+
+@contextmanager
+def _bars() -> Iterator[Callable[[str, int, int], None]]:
+    from rich.console import Console as RichConsole
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import TimeRemainingColumn as TimeLeft
+
+    columns = (TextColumn("{task.description:<28}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeLeft())
+    with Progress(*columns, console=RichConsole(stderr=True)) as bars:
+        tasks: dict[str, Any] = {}
+
+        def report(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=total)
+            bars.update(tasks[stage], completed=done, total=total)
+
+        yield report
+
+
+def faults_text(problems: Sequence[Problem]) -> str:
+    """All problems, one line each."""
+    return "\n".join(f"  {p.test_id + ': ' if p.test_id else ''}{p}" for p in problems)
+
+
+def set_aside_text(set_aside: Sequence[SetAside]) -> str:
+    """The tests that take no part, one line each."""
+    return "\n".join(f"  {fault.test_id}: {fault.reason}" for fault in set_aside)
+
+
+def set_aside_record(set_aside: Sequence[SetAside]) -> list[dict[str, Any]]:
+    """The same for JSON, with every problem in full."""
+    return [
+        {"test_id": s.test_id, "reason": s.reason, "problems": [asdict(p) for p in s.problems]} for s in set_aside
+    ]
+
+
+def status_of(set_aside: Sequence[SetAside]) -> int:
+    """Exit status of finished work: 3 where a fault set a test aside, 0 where only the user's ``exclude`` did."""
+    return SOME_SET_ASIDE if any(s.problems for s in set_aside) else DONE
+
+
+def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
+    """--json, --seed, --jobs, -v, -q; faults become a list and exit status 1, never a traceback."""
+
+    @click.option("--json", "as_json", is_flag=True, help="Result as JSON on standard output.")
+    @click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything random.")
+    @click.option("--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, help="Threads (all cores).")
+    @click.option("-v", "--verbose", count=True, help="Say more.")
+    @click.option("-q", "--quiet", is_flag=True, help="Say nothing but results and faults.")
+    @functools.wraps(function)
+    def command(as_json: bool, verbose: int, quiet: bool, **options: Any) -> None:
+        console = Console(as_json, -1 if quiet else verbose)
+        logging.basicConfig(level=logging.INFO if verbose else logging.ERROR, stream=sys.stderr)
+        try:
+            status = function(console=console, **options)
+        except TriboError as why:
+            _report_faults(console, why)
+            status = UNUSABLE
+        except (KeyboardInterrupt, click.Abort):
+            console.say("interrupted; finished results stand, nothing is half written", level=-1)
+            status = 130
+        sys.exit(status or DONE)
+
+    return command
+
+
+def _report_faults(console: Console, why: TriboError) -> None:
+    count = len(why.problems)
+    console.say(f"{count} problem{'s' if count != 1 else ''}:\n{faults_text(why.problems)}", level=-1)
+    if console.as_json:
+        click.echo(json.dumps({"problems": [asdict(p) for p in why.problems]}, indent=1, default=str))

@@ -1,0 +1,242 @@
+"""The street, walked by one campaign: ingest, fit, compare. Pure computing on records; nothing is written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from tribo.errors import CampaignError, FitError, Problem, TriboError
+from tribo.records import (
+    REGIMES,
+    Campaign,
+    Comparison,
+    ComparisonRow,
+    Ingested,
+    LawFit,
+    Pull,
+    Regime,
+    SetAside,
+    Study,
+    Test,
+    Trace,
+)
+
+Progress = Callable[[str, int, int], None]
+Weights = Literal["relative", "ratio", "force"]
+Until = Literal["ingest", "fit", "compare", "report"]
+
+
+def _silent(stage: str, done: int, total: int) -> None:
+    """Report nothing."""
+
+
+@dataclass(frozen=True)
+class StudyOptions:
+    """What a user may choose; every choice is written into the results."""
+
+    rule: str = "seed"
+    weights: Weights = "relative"
+    flat: str = "F"
+    runs: int = 4
+    seed: int = 0
+    jobs: int = 2
+    ensemble: Path | None = None  # where finished simulations are kept, so that an interrupted run resumes
+
+    def as_words(self) -> dict[str, str]:
+        """What was chosen, for the provenance."""
+        return {"rule": self.rule, "weights": self.weights, "flat": self.flat, "runs": str(self.runs)}
+
+
+def _read_one(campaign: Campaign, test: Test, rule: str) -> tuple[Trace, Pull] | SetAside:
+    from tribo.readers import read_export
+    from tribo.traces import read_pull
+
+    try:
+        trace = read_export(campaign.root / test.file, columns=campaign.columns or None, name=test.test_id)
+        return trace, read_pull(trace, rule=rule, test=test)
+    except TriboError as why:
+        problems = tuple(replace(p, file=test.file, test_id=test.test_id) for p in why.problems)
+        return SetAside(test.test_id, "; ".join(str(p) for p in problems), problems)
+
+
+def ingest(campaign: Campaign, *, rule: str = "seed", progress: Progress = _silent) -> Ingested:
+    """Read every usable test of a campaign into a trace and a pull.
+
+    A test that cannot be read is set aside with its problems; the rest goes on.
+
+    Raises
+    ------
+    CampaignError
+        Not one test could be read.
+    """
+    traces: dict[str, Trace] = {}
+    pulls: dict[str, Pull] = {}
+    set_aside = list(campaign.set_aside)
+    for done, test in enumerate(campaign.tests, start=1):
+        match _read_one(campaign, test, rule):
+            case SetAside() as fault:
+                set_aside.append(fault)
+            case (trace, pull):
+                traces[test.test_id], pulls[test.test_id] = trace, pull
+        progress("reading exports", done, len(campaign.tests))
+    if not pulls:
+        raise CampaignError(
+            [p for fault in set_aside for p in fault.problems]
+            or [Problem("no_usable_test", "no test of this campaign can be used", file=str(campaign.root))]
+        )
+    return Ingested(campaign, traces, pulls, tuple(set_aside))
+
+
+def fit(ingested: Ingested, *, weights: Weights = "relative") -> tuple[LawFit, ...]:
+    """mu and tau0 of every sample, static and sliding: specimens first, then combined.
+
+    Raises
+    ------
+    FitError
+        No sample has enough loads for the law.
+    """
+    from tribo.fitting import fit_samples
+
+    table = ingested.table()
+    area = ingested.campaign.nominal_area_m2
+    return tuple(f for regime in REGIMES for f in fit_samples(table, regime, area, weights=weights))
+
+
+def flat_sample(campaign: Campaign, wanted: str = "F") -> str:
+    """Name of the sample the model is calibrated on: ``wanted``, or else the only one without cavities.
+
+    Raises
+    ------
+    CampaignError
+        The campaign measured no flat sample, or several and none of that name.
+    """
+    measured = {t.sample for t in campaign.tests}
+    if wanted in measured and campaign.samples[wanted].cavity == "none":
+        return wanted
+    flat = sorted(s for s in measured if campaign.samples[s].cavity == "none")
+    if len(flat) == 1:
+        return flat[0]
+    raise CampaignError(
+        Problem(
+            "no_flat_sample",
+            "the model is calibrated on one flat sample",
+            file="tests.csv",
+            column="sample",
+            found=", ".join(flat) or "no sample whose pattern has cavity none",
+            allowed="one flat sample, or --flat NAME",
+        )
+    )
+
+
+def load_means(ingested: Ingested, sample: str, regime: Regime) -> list[tuple[float, float, float]]:
+    """(normal load, mean force, its standard uncertainty) of a sample at each load, in newton.
+
+    Specimens are averaged first, so that the uncertainty is that of the mean over specimens; with one
+    specimen at a load it is that of the mean over its repeats, with one pull that of the reading.
+    """
+    table = ingested.table()
+    rows = table[(table["sample"] == sample) & np.isfinite(table[f"{regime}_N"])]
+    means = []
+    for load, cell in rows.groupby("normal_load_N", sort=True):
+        by_specimen = cell.groupby("specimen")[f"{regime}_N"].mean().to_numpy()
+        values = by_specimen if by_specimen.size > 1 else cell[f"{regime}_N"].to_numpy()
+        spread = float(values.std(ddof=1) / np.sqrt(values.size)) if values.size > 1 else float("nan")
+        alone = float(cell[f"{regime}_u_N"].iloc[0])
+        means.append((float(load), float(by_specimen.mean()), spread if values.size > 1 else alone))
+    return means
+
+
+def compare(
+    ingested: Ingested, fits: tuple[LawFit, ...], options: StudyOptions, *, progress: Progress = _silent
+) -> Study:
+    """Calibrate the model on the flat sample, predict every sample at its loads, and put both side by side.
+
+    Raises
+    ------
+    CampaignError
+        No flat sample to calibrate on.
+    FitError, SimulationError
+        The flat sample gives no law, or the model cannot be run for a pattern.
+    """
+    from tribo.prediction import predict
+
+    campaign = ingested.campaign
+    flat = flat_sample(campaign, options.flat)
+    prediction = predict(
+        campaign, fits, flat, weights=options.weights, runs=options.runs, seed=options.seed, jobs=options.jobs,
+        progress=progress,
+    )  # fmt: skip
+    rows = [
+        ComparisonRow(sample, regime, load, mean, u, *prediction.force_N(sample, regime, load))
+        for regime in REGIMES
+        for sample in prediction.samples
+        for load, mean, u in load_means(ingested, sample, regime)
+    ]
+    comparison = Comparison(
+        campaign.title,
+        campaign.nominal_area_m2,
+        {s: campaign.area_fraction(s) for s in prediction.samples},
+        fits,
+        prediction.fits,
+        tuple(rows),
+        prediction.calibration,
+        flat,
+    )
+    return Study(ingested, fits, (), comparison, prediction.table, prediction.example_runs, prediction.notes)
+
+
+def study(
+    campaign: Campaign, options: StudyOptions, *, until: Until = "report", progress: Progress = _silent
+) -> Study:
+    """Walk the street with one campaign as far as ``until``."""
+    ingested = ingest(campaign, rule=options.rule, progress=progress)
+    if until == "ingest":
+        return Study(ingested)
+    fits = fit(ingested, weights=options.weights)
+    others = _other_fits(ingested, options)
+    if until == "fit":
+        return Study(ingested, fits, others)
+    return replace(compare(ingested, fits, options, progress=progress), other_fits=others)
+
+
+def _other_fits(ingested: Ingested, options: StudyOptions) -> tuple[LawFit, ...]:
+    """The same law under the other weights, mixed models where they converge, and the three-term law."""
+    from tribo.fitting import fit_samples, fit_three_term, mixed_model
+
+    table, area = ingested.table(), ingested.campaign.nominal_area_m2
+    fractions = {s: ingested.campaign.area_fraction(s) for s in sorted(set(table["sample"]))}
+    found: list[LawFit] = []
+    for regime in REGIMES:
+        for weights in get_args(Weights):
+            if weights != options.weights:
+                found += fit_samples(table, regime, area, weights=weights)
+        mixed = (mixed_model(rows, regime, area) for _, rows in table.groupby("sample"))
+        found += [fit for fit in mixed if fit is not None]
+        with suppress(FitError):
+            found.append(fit_three_term(table, regime, area, fractions))
+    return tuple(found)
+
+
+def plan(campaign: Campaign, options: StudyOptions, until: Until) -> dict[str, Any]:
+    """What a walk would do, without doing it: ``steps`` in words, ``set_aside``, and the faults in full."""
+    from tribo.prediction import loads_to_simulate
+
+    steps = [f"read {len(campaign.tests)} exports of {campaign.root} by rule {options.rule}"]
+    samples = sorted({t.sample for t in campaign.tests})
+    if until != "ingest":
+        steps.append(f"fit mu and tau0 of {len(samples)} samples ({', '.join(samples)}), weights {options.weights}")
+    if until in ("compare", "report"):
+        loads = loads_to_simulate(campaign)
+        flat = flat_sample(campaign, options.flat)
+        runs = len(samples) * len(loads) * options.runs
+        steps.append(f"calibrate the model on sample {flat} and run it {runs} times at {len(loads)} loads")
+    return {
+        "steps": steps,
+        "set_aside": [f"{s.test_id}: {s.reason}" for s in campaign.set_aside],
+        "problems": [asdict(p) for p in campaign.problems],
+    }
