@@ -1,6 +1,6 @@
 """How often do 95 % intervals hold the law? Simulated campaigns of known law, several designs and methods.
 
-    python benchmarks/coverage.py [--campaigns 200] [--seed 1] [--design NAME ...] [--csv FILE]
+    python benchmarks/coverage.py [--campaigns 200] [--seed 1] [--design NAME] [--method NAME] [--csv FILE]
 
 Every campaign has six samples whose population laws T = mu N + tau0 A stand in Table 2 of Berardo et al.
 (2019). A specimen has its own mu and tau0, scattered about the population's; a pull scatters by a share of T
@@ -29,6 +29,7 @@ AREA_M2 = 55e-6
 LOADS_N = (0.0638, 0.1324, 0.26, 0.5052, 0.8976, 1.388)  # 5 to 140 g on a sled of 1.5 g
 AT_PRESSURE_PA = 10e3
 LEVEL = 0.95
+DEFAULT = "specimens first, relative"
 QUANTITIES = ("mu", "tau0", "T at 10 kPa")
 
 
@@ -148,6 +149,7 @@ def methods() -> dict[str, Method]:
         "specimens first, relative": partial(specimens_first, weights="relative"),
         "specimens first, ratio": partial(specimens_first, weights="ratio"),
         "specimens first, force": partial(specimens_first, weights="force"),
+        "specimens first, repeats": partial(specimens_first, weights="repeats"),
         "pooled least squares": pooled,
         "MixedLM": mixed,
     }
@@ -165,13 +167,15 @@ def judged(fit: LawFit, law: tuple[float, float]) -> tuple[np.ndarray, np.ndarra
     return (found - truth) / truth, t.ppf(0.5 + LEVEL / 2, fit.dof) * u / truth
 
 
-def coverage(name: str, design: Design, campaigns: int, seed: int) -> pd.DataFrame:
+def coverage(name: str, design: Design, campaigns: int, seed: int, wanted: list[str] | None) -> pd.DataFrame:
     """One row a method and quantity: share of intervals that hold the law, and the size of errors."""
     true = laws(design.laws)
     rng = np.random.default_rng([seed, *name.encode()])
     tables = [campaign(design, rng) for _ in range(campaigns)]
     rows = []
     for method, fitter in methods().items():
+        if wanted and method not in wanted:
+            continue
         started = time.perf_counter()
         results = [judged(fit, true[fit.sample]) for table in tables for fit in _fits(fitter, table)]
         seconds = time.perf_counter() - started
@@ -213,19 +217,44 @@ def show(result: pd.DataFrame) -> str:
     return "\n".join(lines)
 
 
+def of_default(result: pd.DataFrame) -> str:
+    """Markdown: coverage of the default fit, one row a design."""
+    own = result[result["method"] == DEFAULT]
+    lines = [f"| design | intervals | {' | '.join(QUANTITIES)} |", "|---|---|" + "---|" * len(QUANTITIES)]
+    for design, group in own.groupby("design", sort=False):
+        held = " | ".join(f"{c:.1f} ± {s:.1f}" for c, s in zip(group.coverage_pct, group.se_pct, strict=True))
+        lines.append(f"| {design} | {group.intervals.iloc[0]} | {held} |")
+    return "\n".join(lines)
+
+
+def of_methods(result: pd.DataFrame) -> str:
+    """Markdown: coverage and median half width of T at 10 kPa, one row a design, one column a method."""
+    force = result[result["quantity"] == QUANTITIES[2]]
+    names = list(dict.fromkeys(force["method"]))
+    lines = [f"| design | {' | '.join(names)} |", "|---|" + "---|" * len(names)]
+    for design, group in force.groupby("design", sort=False):
+        by = group.set_index("method")
+        cells = (f"{by.coverage_pct[m]:.1f} ({by.half_width_pct[m]:.0f})" if m in by.index else "" for m in names)
+        lines.append(f"| {design} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--campaigns", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--design", action="append", choices=list(DESIGNS), help="default: all")
+    parser.add_argument("--method", action="append", choices=list(methods()), help="default: all")
     parser.add_argument("--csv", help="write the figures to this file")
     options = parser.parse_args()
     results = []
     for name in options.design or DESIGNS:
-        results.append(coverage(name, DESIGNS[name], options.campaigns, options.seed))
+        results.append(coverage(name, DESIGNS[name], options.campaigns, options.seed, options.method))
         print(show(results[-1]) if len(results) == 1 else show(results[-1]).split("\n", 2)[2], flush=True)
+    everything = pd.concat(results)
+    print(f"\nThe default fit\n\n{of_default(everything)}\n\nT at 10 kPa\n\n{of_methods(everything)}")
     if options.csv:
-        pd.concat(results).round(3).to_csv(options.csv, index=False)
+        everything.round(3).to_csv(options.csv, index=False)
 
 
 if __name__ == "__main__":
