@@ -109,9 +109,7 @@ def test_letters_in_the_first_row_do_not_turn_it_into_a_header(path: Path, diale
 
 
 @pytest.mark.parametrize("nothing", ["NaN", "", "n/a", "inf"])
-def test_a_gap_is_one_problem_with_its_first_row_and_length(
-    path: Path, dialect: Dialect, nothing: str
-) -> None:
+def test_a_gap_is_one_problem_with_its_first_row_and_length(path: Path, dialect: Dialect, nothing: str) -> None:
     rows = ramp()
     for k in range(6, 11):
         rows[k][2] = nothing

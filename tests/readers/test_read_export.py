@@ -16,9 +16,7 @@ from tribo.readers import READERS, read_export
 
 from .tables import Dialect, ramp, written
 
-FIXTURE_IS_FINE = settings(
-    deadline=None, max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+FIXTURE_IS_FINE = settings(deadline=None, max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 NAMES = ("Time", "Extension", "Load")
 UNITS = ("s", "mm", "N")
 TO_SI = {
@@ -58,9 +56,7 @@ def tables(draw: st.DrawFn) -> tuple[bytes, dict[str, np.ndarray]]:
         quoted=quoted,
         units_row=draw(st.booleans()),
         brackets=draw(st.sampled_from(["()", "[]", ""])),
-        above=tuple(
-            draw(st.lists(st.sampled_from(["Specimen 3", "# made by hand", "", "Rate: 12"]), max_size=4))
-        ),
+        above=tuple(draw(st.lists(st.sampled_from(["Specimen 3", "# made by hand", "", "Rate: 12"]), max_size=4))),
         last_line_end=draw(st.booleans()),
     )
     rows = [[texts[q][k] for q in quantities] for k in range(n)]
