@@ -1,0 +1,197 @@
+"""Exports that nobody here wrote: each is read to the right columns and units, or refused with what to give.
+
+The numbers were computed from the files independently of tribo; they stand in the index beside the files.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tribo.errors import ReadError
+from tribo.readers import inspect_export, read_blocks, read_export
+from tribo.records import Trace
+
+GRAM_FORCE = 9.80665e-3
+
+# file: family, rows of each trace, (time, force, displacement) columns as the file spells them
+READ = {
+    "fr_cetr_umt2_2N_stroke001.csv": ("umt", (110, 107), "T [sec]", "Fx [g]", "X [mm]"),
+    "fr_cetr_umt2_2N_stroke050.csv": ("umt", (107, 108), "T [sec]", "Fx [g]", "X [mm]"),
+    "fr_labview_lvm_demo2.txt": ("labview", (6, 6, 6), "X_Value [s]", "fx [N]", "dx [um]"),
+    "fr_pcs_ehd2_demo3.txt": ("pcs", (21, 21), "Step Time [s]", "Traction Force 1 [N]", None),
+    "fr_pcs_mtm_output.txt": ("pcs", (300,) * 24, "Step Time [s]", "Traction Force [N]", None),
+    "fr_te67_PPS_100N_1.tsv": ("te67", (1801,), "Test Time [s]", "Friction Force [N]", None),
+    "fr_te67_PPS_60N_1.tsv": ("te67", (1801,), "Test Time [s]", "Friction Force [N]", None),
+    "fr_te67_PPS_60N_2.tsv": ("te67", (1801,), "Test Time [s]", "Friction Force [N]", None),
+    "ten_bam_42CrMoS4_46NT71.csv": ("bam", (768,), "Time [s]", "Force [kN]", "Displacement [mm]"),
+    "ten_instron8852_de_semicolonline_tab.csv": ("bam", (712,), "Zeit [s]", "Kraft [kN]", "Maschine [mm]"),
+    "ten_mts793_DEU_latin1_comma.dat": ("mts793", (1024, 192), "Laufzeit [s]", "Ch 1 Kraft [kN]", "Ch 1 Weg [mm]"),
+    "ten_shimadzu_quoted_fr.csv": ("trapezium", (22387,), "Temps [sec]", "Force [N]", "Stroke [mm]"),
+    "ten_walterbai_semicolon.csv": (
+        "walterbai", (1667,), "C_1_Temps [s]", "C_1_Force [kN]", "C_1_Déplacement [mm]",
+    ),
+    "ten_zwick_fr_Allong1.TRA": ("testxpert", (2184,), "Temps [s]", "Force standard [N]", "Course standard [mm]"),
+    "ten_zwick_testxpert_de_tab.csv": (
+        "testxpert", (18876,), "Prüfzeit [s]", "Standardkraft [N]", "Standardweg [mm]",
+    ),
+}  # fmt: skip
+# file: what must be given, and how
+REFUSED = {
+    "fr_afm_trace_retrace_profile.txt": ("without names", {"time": "#1 [s]", "force": "#2 [N]"}),
+    "fr_csm_trib_c1.csv": ("carries no units", {"time": "Time [s]", "force": "FrictionForce [N]"}),
+    "fr_csm_trib_c2.csv": ("carries no units", {"time": "Time [s]", "force": "FrictionForce [N]"}),
+    **{
+        f"fr_newport_1rps{load}N.txt": ("give its lever", {"force": "#4 [N m / 2.6667 mm]"})
+        for load in ("0-3", "1", "3", "5", "10", "15")
+    },
+    **{
+        f"fr_paper_stickslip_{name}.mat": ("carry no units", {"time": "t [s]", "force": "Fnorm [30.7 gf]"})
+        for name in ("k168Nm_v42", "k168Nm_v1100", "k1002Nm_v4300")
+    },
+}
+
+
+@pytest.fixture(scope="module")
+def exports(shared: Path) -> Path:
+    folder = shared / "exports"
+    if not folder.is_dir():
+        pytest.skip("no real exports beside this checkout")
+    return folder
+
+
+def test_every_export_is_accounted_for(exports: Path) -> None:
+    names = {path.name for path in exports.iterdir() if path.name != "INDEX.md"}
+    assert names == set(READ) | set(REFUSED)
+    assert len(names) == 27
+
+
+@pytest.mark.parametrize("name", READ)
+def test_an_export_is_read_to_the_right_columns(exports: Path, name: str) -> None:
+    family, sizes, time, force, displacement = READ[name]
+    traces = read_blocks(exports / name)
+    assert tuple(t.time_s.size for t in traces) == sizes
+    for trace in traces:
+        assert trace.source is not None
+        assert trace.source.family == family
+        taken = trace.source.columns
+        assert (taken["time"], taken["friction force"], taken.get("displacement")) == (time, force, displacement)
+        assert np.all(np.diff(trace.time_s) >= 0)
+        assert np.isfinite(trace.force_N).all()
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_an_export_that_does_not_say_enough_is_refused_with_what_to_give(exports: Path, name: str) -> None:
+    sentence, columns = REFUSED[name]
+    with pytest.raises(ReadError, match=sentence):
+        read_export(exports / name)
+    seen = inspect_export(exports / name)
+    assert seen.refused
+    assert sentence in seen.in_words()
+    assert read_export(exports / name, columns=columns).time_s.size > 20
+
+
+def test_units_of_the_tensile_exports_are_si(exports: Path) -> None:
+    """Largest forces and travels against what the raw cells say in their own unit."""
+    zwick = read_export(exports / "ten_zwick_testxpert_de_tab.csv")
+    assert zwick.force_N.max() == pytest.approx(86.5222)
+    assert zwick.displacement_m is not None
+    assert zwick.displacement_m[-1] == pytest.approx(0.247389)
+    bam = read_export(exports / "ten_bam_42CrMoS4_46NT71.csv")
+    assert bam.force_N[0] == pytest.approx(117.967)
+    assert bam.displacement_m is not None
+    assert bam.displacement_m[-1] == pytest.approx(3.757264381767434e-3)
+    compression = read_blocks(exports / "ten_mts793_DEU_latin1_comma.dat")[0]
+    assert compression.force_N[0] == pytest.approx(-1571.9645)
+    walterbai = read_export(exports / "ten_walterbai_semicolon.csv")
+    assert walterbai.force_N[0] == pytest.approx(2.871407661587)
+
+
+def _late(trace: Trace) -> np.ndarray:
+    return np.abs(trace.force_N[trace.force_N.size // 2 :])
+
+
+@pytest.mark.parametrize(
+    ("stroke", "means_gf", "coefficients"),
+    [("001", (134, 173), (0.67, 0.87)), ("050", (137, 171), (0.69, 0.85))],
+)
+def test_both_strokes_of_the_umt_have_their_friction(
+    exports: Path, stroke: str, means_gf: tuple[float, float], coefficients: tuple[float, float]
+) -> None:
+    traces = read_blocks(exports / f"fr_cetr_umt2_2N_stroke{stroke}.csv")
+    assert [_late(t).mean() / GRAM_FORCE for t in traces] == pytest.approx(means_gf, abs=0.6)
+    for trace, expected in zip(traces, coefficients, strict=True):
+        normal = np.abs(trace.columns["normal_force_N"][trace.force_N.size // 2 :])
+        assert (_late(trace) / normal).mean() == pytest.approx(expected, abs=0.0055)
+    assert np.sign([np.mean(t.force_N[t.force_N.size // 2 :]) for t in traces]).tolist() == [-1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "load_N", "highest_N", "mean_N", "sd_N"),
+    [
+        ("PPS_60N_1", 59.841, 9.7, 7.16, 0.32),
+        ("PPS_60N_2", 59.841, 15.4, 8.05, 0.39),
+        ("PPS_100N_1", 98.1, 18.1, 13.86, 1.78),
+    ],
+)
+def test_pin_on_disc_runs_have_their_friction(
+    exports: Path, name: str, load_N: float, highest_N: float, mean_N: float, sd_N: float
+) -> None:
+    trace = read_export(exports / f"fr_te67_{name}.tsv")
+    assert trace.columns["normal_force_N"].mean() == pytest.approx(load_N)
+    assert trace.force_N[trace.time_s < trace.time_s[0] + 60].max() == pytest.approx(highest_N)
+    assert (_late(trace).mean(), _late(trace).std()) == pytest.approx((mean_N, sd_N), abs=0.0051)
+
+
+@pytest.mark.parametrize(("name", "mean"), [("c1", 0.401), ("c2", 0.409)])
+def test_friction_over_load_of_the_csm_runs_is_three_newton(exports: Path, name: str, mean: float) -> None:
+    columns = {"time": "Time [s]", "force": "FrictionForce [N]", "friction_coefficient": "#4"}
+    trace = read_export(exports / f"fr_csm_trib_{name}.csv", columns=columns)
+    assert trace.columns["friction_coefficient"].mean() == pytest.approx(mean, abs=5e-4)
+    ratio = trace.force_N / trace.columns["friction_coefficient"]
+    assert np.median(ratio) == pytest.approx(3.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "mean", "sd"),
+    [("k168Nm_v42", 0.304, None), ("k168Nm_v1100", 0.334, 0.037), ("k1002Nm_v4300", 0.292, 0.050)],
+)
+def test_paper_on_paper_has_its_friction(exports: Path, name: str, mean: float, sd: float | None) -> None:
+    columns = {"time": "t [s]", "force": "Fnorm [30.7 gf]"}
+    trace = read_export(exports / f"fr_paper_stickslip_{name}.mat", columns=columns)
+    ratio = trace.force_N / (30.7 * GRAM_FORCE)
+    assert ratio.mean() == pytest.approx(mean, abs=5e-4)
+    if sd is not None:
+        assert ratio.std() == pytest.approx(sd, abs=5e-4)
+    assert 1 / np.median(np.diff(trace.time_s)) == pytest.approx(2000, rel=1e-3)
+
+
+def test_stick_phases_load_with_the_slope_of_spring_and_drive(exports: Path) -> None:
+    """k v / (m g) with k = 168 N/m, v = 42 um/s, m = 30.7 g is 0.0234 /s; the stick phases rise by 0.0237 /s."""
+    columns = {"time": "t [s]", "force": "Fnorm [30.7 gf]"}
+    trace = read_export(exports / "fr_paper_stickslip_k168Nm_v42.mat", columns=columns)
+    ratio = trace.force_N / (30.7 * GRAM_FORCE)
+    step = round(0.2 / float(np.median(np.diff(trace.time_s))))
+    slopes = (ratio[step::step] - ratio[:-step:step]) / (trace.time_s[step::step] - trace.time_s[:-step:step])
+    assert np.median(slopes[slopes > 0]) == pytest.approx(168 * 42e-6 / (0.0307 * 9.80665), rel=0.03)
+
+
+@pytest.mark.parametrize("name", [*READ, *REFUSED])
+def test_inspection_says_what_a_file_is(exports: Path, name: str) -> None:
+    seen = inspect_export(exports / name)
+    assert seen.refused == (name in REFUSED)
+    assert seen.family
+    assert seen.encoding
+    assert seen.record()["columns"]
+    if name in READ:
+        assert {c.quantity for c in seen.columns} >= {"time", "friction force"}
+        assert all(c.reason for c in seen.columns if c.quantity)
+        assert sum(t.rows for t in seen.tables) == sum(READ[name][1])
+
+
+def test_inspection_doubts_what_a_tensile_test_lacks_of_a_pull(exports: Path) -> None:
+    seen = inspect_export(exports / "ten_zwick_fr_Allong1.TRA")
+    assert {d.kind for d in seen.doubts} >= {"no_zero_phase", "time_gap"}
+    assert any("no normal load" in text for text in seen.missing)
