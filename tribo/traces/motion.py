@@ -14,7 +14,7 @@ from tribo.traces.apex import Apex
 from tribo.traces.contact import Rise, Zero, departure, first_rise, smoothed, zero_before
 from tribo.traces.peak import find_apex, first_maximum
 from tribo.traces.quality import noise_of
-from tribo.traces.statistics import median, running_mean
+from tribo.traces.statistics import median, median_of_three, running_mean
 
 _DETECTABLE = 12.0  # times the noise
 _FEWEST_SLIDING = 10
@@ -64,7 +64,8 @@ def lay_out(trace: Trace, speed_m_s: float | None = None) -> Motion:
     problems = quality.spike_problems(trace, spikes)
     force = quality.without_spikes(raw, spikes)
     noise = min(noise, noise_of(force)) if problems else noise
-    smooth = smoothed(force)
+    calm = median_of_three(force)
+    smooth = smoothed(calm)
     rise = first_rise(time, smooth, noise)
     start = median(smooth[: max(5, smooth.size // 50)])
     if faults := _no_pull(trace, smooth, start, rise, noise):
@@ -73,7 +74,7 @@ def lay_out(trace: Trace, speed_m_s: float | None = None) -> Motion:
     if clipped := quality.flat_top(force):
         raise TraceError([_saturated(trace, clipped), *problems])
     zero = zero_before(time, force, rise, noise)
-    return _with_peak(trace, time, force - zero.force_N, rise, zero, noise, speed_m_s, problems)
+    return _with_peak(trace, time, force - zero.force_N, calm - zero.force_N, rise, zero, noise, speed_m_s, problems)
 
 
 def _no_pull(trace: Trace, smooth: FloatArray, start: float, rise: Rise | None, noise: float) -> list[Problem]:
@@ -97,12 +98,12 @@ def _saturated(trace: Trace, clipped: tuple[int, int]) -> Problem:
 
 
 def _with_peak(
-    trace: Trace, time: FloatArray, force: FloatArray, rise: Rise, zero: Zero, noise:
+    trace: Trace, time: FloatArray, force: FloatArray, calm: FloatArray, rise: Rise, zero: Zero, noise:
     float, speed_m_s: float | None, problems: tuple[Problem, ...],
 ) -> Motion:  # fmt: skip
     rise = Rise(rise.rate, rise.time_s, rise.force_N - zero.force_N, rise.first, rise.last)
     width = 1 + 2 * ((rise.last - rise.first) // _RISE_OVER_SMOOTHING)
-    smooth = running_mean(force, width)
+    smooth = running_mean(calm, width)
     local = noise / math.sqrt(width)
     reached = float(smooth[rise.last])
     margin = max(5.0 * local, 0.02 * reached)

@@ -12,7 +12,7 @@ from tribo.records import FloatArray, Trace
 from tribo.traces.statistics import sample_noise
 
 MINIMUM_SAMPLES = 20
-SPIKE_OVER_NOISE = 10.0
+SPIKE_OVER_NOISE = 8.0
 SPIKE_OVER_NEIGHBOURS = 3.0
 SPIKE_WIDTHS = (1, 2)
 _NEIGHBOURS = 4
@@ -55,9 +55,8 @@ def impulse_spikes(force: FloatArray, noise: float) -> NDArray[np.bool_]:
     within ``_NEIGHBOURS`` samples on either side. The apex of a pull and stick-slip have like steps beside
     them.
     """
-    mirrored = np.concatenate((force[1:2], force, force[-2:-1]))  # so that the ends have steps on both sides
-    steps = np.diff(mirrored)
-    mask = np.zeros(mirrored.size, bool)
+    steps = np.diff(force)
+    mask = np.zeros(force.size, bool)
     for width in SPIKE_WIDTHS:
         into, out = steps[:-width], steps[width:]
         height = np.where(into * out < 0, np.minimum(np.abs(into), np.abs(out)), 0.0)
@@ -65,7 +64,10 @@ def impulse_spikes(force: FloatArray, noise: float) -> NDArray[np.bool_]:
             around = np.abs(np.concatenate((steps[max(0, k - _NEIGHBOURS) : k], steps[k + width + 1 :][:_NEIGHBOURS])))
             if around.size and height[k] > SPIKE_OVER_NEIGHBOURS * around.max():
                 mask[k + 1 : k + 1 + width] = True
-    return mask[1:-1]
+    low, high = float(force[1:-1].min()), float(force[1:-1].max())
+    for end in (0, -1):  # nothing shows whether the force came back: only what lies far beyond all else counts
+        mask[end] = not low - (high - low) < force[end] < high + (high - low)
+    return mask
 
 
 def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ...]:

@@ -61,6 +61,13 @@ def condense(values: FloatArray, factor: int) -> FloatArray:
     return np.asarray(np.add.reduce(values[: count * factor].reshape(count, factor), axis=1) / factor)
 
 
+def median_of_three(values: FloatArray) -> FloatArray:
+    """Median of every sample and its two neighbours, the ends as beside them: takes out what lasts one sample."""
+    low, high = np.minimum(values[:-1], values[1:]), np.maximum(values[:-1], values[1:])
+    middle = np.maximum(np.minimum(high[:-1], values[2:]), low[:-1])
+    return np.concatenate((middle[:1], middle, middle[-1:]))
+
+
 def running_mean(values: FloatArray, width: int) -> FloatArray:
     """Centred mean over ``width`` samples (made odd), shorter at the ends; same length as ``values``."""
     half = width // 2
