@@ -11,7 +11,6 @@ part where it is installed; it is no dependency of tribo.
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -176,9 +175,7 @@ def coverage(name: str, design: Design, campaigns: int, seed: int, wanted: list[
     for method, fitter in methods().items():
         if wanted and method not in wanted:
             continue
-        started = time.perf_counter()
         results = [judged(fit, true[fit.sample]) for table in tables for fit in _fits(fitter, table)]
-        seconds = time.perf_counter() - started
         error, half = (np.array(part) for part in zip(*results, strict=True))
         usable = np.isfinite(half).all(axis=1)
         hit = (np.abs(error) <= half)[usable]
@@ -190,7 +187,6 @@ def coverage(name: str, design: Design, campaigns: int, seed: int, wanted: list[
                     "coverage_pct": 100 * share, "se_pct": 100 * np.sqrt(share * (1 - share) / len(hit)),
                     "rms_error_pct": 100 * np.sqrt((error[usable, k] ** 2).mean()),
                     "half_width_pct": 100 * np.median(half[usable, k]),
-                    "ms_per_campaign": 1e3 * seconds / campaigns,
                 }
             )  # fmt: skip
     return pd.DataFrame(rows)
