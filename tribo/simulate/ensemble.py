@@ -6,7 +6,7 @@ import re
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -39,8 +39,8 @@ def angle_range_deg(sample: str, pattern: Pattern | None = None) -> tuple[float,
 
 def run_seed(seed: int, sample: str, pressure_Pa: float, repeat: int) -> int:
     """Seed of one run, from what the run is and not from its place in the list."""
-    key = [seed, zlib.crc32(sample.encode()), round(pressure_Pa * 1000), repeat]
-    return int(np.random.SeedSequence(key).generate_state(1)[0])
+    case = zlib.crc32(f"{sample} {pressure_Pa:.9g}".encode())
+    return int(np.random.SeedSequence([seed, case, repeat]).generate_state(1)[0])
 
 
 def stratified_design(
@@ -49,10 +49,12 @@ def stratified_design(
     repeats: int = 4,
     seed: int = 0,
     base: SimConfig | None = None,
+    angles: Literal["midpoints", "random"] = "midpoints",
 ) -> list[SimConfig]:
     """Configurations of an ensemble: every sample at every pressure, ``repeats`` times.
 
-    The angle range of a sample is cut into as many strata as there are repeats, with one angle drawn in each.
+    The angle range of a sample is cut into as many strata as there are repeats. One angle stands in each: its
+    middle, which averages the uniform law of the paper best, or a random one.
 
     Parameters
     ----------
@@ -69,8 +71,8 @@ def stratified_design(
         for pressure in pressures:
             for repeat in range(repeats):
                 own = run_seed(seed, sample, pressure, repeat)
-                stratum = (repeat + np.random.default_rng([own, 1]).random()) / repeats
-                angle = float(low + (high - low) * stratum)
+                within = 0.5 if angles == "midpoints" else np.random.default_rng([own, 1]).random()
+                angle = float(low + (high - low) * (repeat + within) / repeats)
                 design.append(
                     base.with_(
                         sample=sample, pattern=pattern, pressure_Pa=float(pressure), angle_deg=angle, seed=own

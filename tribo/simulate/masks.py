@@ -45,8 +45,8 @@ def contact_mask(
     blocks : (int, int)
         Blocks along x and y.
     first : (int, int), optional
-        Index of the first block of the first cavity in x and y. By default the pattern is centred so that no
-        cavity touches the edge; sample S keeps the reference position (4, 11).
+        Index of the first block of the first cavity in x and y. By default the pattern is centred over as many
+        whole cavities as fit; sample S keeps the reference position (4, 11).
 
     Returns
     -------
@@ -73,7 +73,7 @@ def contact_mask(
 def first_cavity(
     blocks: tuple[int, int], size: tuple[float, float], pitch: tuple[float, float]
 ) -> tuple[int, int]:
-    """First block of the first cavity, so that whole cavities lie centred inside the domain."""
+    """First block of the first cavity, such that as many whole ones as fit lie centred."""
     reference = _REFERENCE_FIRST.get((size, pitch))
     if reference is not None:
         return reference

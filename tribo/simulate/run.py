@@ -38,12 +38,15 @@ def run_of(config: SimConfig, trajectory: Trajectory, area_fraction: float) -> R
     )
     time = trajectory.time_s
     start = config.window_start_peaks * peak_s
-    end = time[-1] if config.window_end_peaks is None else min(config.window_end_peaks * peak_s, time[-1])
+    # a jump over a quiet stretch can end beyond what was asked for
+    finish = min(time[-1], config.duration_s or config.duration_peaks * peak_s)
+    end = finish if config.window_end_peaks is None else min(config.window_end_peaks * peak_s, finish)
+    kept = slice(0, int(np.searchsorted(time, finish, side="right")))
     if not end > start:
         raise SimulationError(
             Problem(
                 "too_short", "the run ends before its sliding window begins", column="duration_s",
-                found=f"{time[-1]:.4g} s", allowed=f"more than {start:.4g} s",
+                found=f"{finish:.4g} s", allowed=f"more than {start:.4g} s",
             )
         )
     from_impulse, to_impulse = np.interp([start, end], time, trajectory.impulse_Ns)
@@ -53,9 +56,9 @@ def run_of(config: SimConfig, trajectory: Trajectory, area_fraction: float) -> R
         pressure_Pa=config.pressure_Pa,
         angle_deg=config.angle_deg,
         seed=config.seed,
-        time_s=time,
-        force_N=trajectory.force_N,
-        moving=trajectory.moving,
+        time_s=time[kept],
+        force_N=trajectory.force_N[kept],
+        moving=trajectory.moving[kept],
         normal_load_N=load,
         static_friction=peak_N / load,
         sliding_friction=float((to_impulse - from_impulse) / (end - start)) / load,
