@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from report.synthetic import AREA_M2, make_study
 
 from tribo.figures import select
@@ -74,7 +75,7 @@ def test_no_label_lies_outside_the_figure_or_on_another(name: str, study: Study)
         for ax in figure.axes
         for text in (
             *(t for t in ax.get_xticklabels() if ax.get_xlim()[0] <= t.get_position()[0] <= ax.get_xlim()[1]),
-            ax.xaxis.label, ax.yaxis.label, ax.title, *ax.texts,
+            ax.xaxis.label, ax.yaxis.label, *(c for c in ax.get_children() if isinstance(c, Text)),
         )
         if text.get_text() and text.get_visible()
     ]  # fmt: skip

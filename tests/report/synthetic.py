@@ -135,12 +135,13 @@ def make_simulated(campaign: Campaign, samples: Sequence[str]) -> pd.DataFrame:
 
 def make_run(sample: str, area_fraction: float) -> Run:
     t = np.linspace(0, 20e-3, 4001)
-    load_N = 10e3 * (85 * 5e-6) ** 2
+    load_N = 9185.82 * (85 * 5e-6) ** 2
     scale = (0.4 + 0.6 * area_fraction) * load_N
     force = np.where(t < 6e-3, 7 * t / 6e-3, 4 + 3 * np.exp(-(t - 6e-3) / 5e-4) * np.cos(9e3 * (t - 6e-3)))
     moving = np.where(t < 6e-3, 0, 7000)
     return Run(
-        sample, 10e3, 45.0, 1, t, force * scale, moving, load_N, 7.0, 4.0, 6e-3, (8e-3, 20e-3), "fast",
+        sample, 9185.82, 45.0 if area_fraction == 1 else -7.8, 1, t,
+        force * scale, moving, load_N, 7.0, 4.0, 6e-3, (8e-3, 20e-3), "fast",
         {"dt_s": 5e-8, "area_fraction": area_fraction},
     )  # fmt: skip
 

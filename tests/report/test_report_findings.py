@@ -57,7 +57,7 @@ def test_wide_intervals_cannot_tell() -> None:
     agreement = Agreement("C", "static", (ratio(1.1, 0.5, 2.4), ratio(1, 0.5, 2)), False)
     assert agreement.verdict == "cannot tell"
     assert "too wide to tell" in wording.in_short([agreement], "F")[0]
-    assert "cannot tell at every load" in wording.agreement_sentence(agreement)
+    assert "cannot tell at any load" in wording.agreement_sentence(agreement)
 
 
 def test_the_sentence_counts_loads_and_names_the_worst() -> None:
@@ -132,7 +132,7 @@ def test_a_campaign_without_directions_says_nothing_of_them(study: Study) -> Non
 def test_the_correlation_of_mu_and_tau0_is_that_of_the_covariance(study: Study) -> None:
     expected = [f.covariance[0, 1] / np.sqrt(f.covariance[0, 0] * f.covariance[1, 1]) for f in study.fits]
     assert findings.parameter_correlations(study.fits) == pytest.approx(expected)
-    assert "correlated" in wording.correlation_note(study)
+    assert "not independent" in wording.correlation_note(study)
 
 
 def test_what_was_measured_counts_pulls_specimens_samples_and_loads(study: Study) -> None:
@@ -156,7 +156,13 @@ def test_set_aside_tests_are_listed_with_their_reason(study: Study) -> None:
 
 @pytest.mark.parametrize(
     ("value", "u", "text"),
-    [(4.7612, 0.73, "4.76 ± 0.73"), (-0.5, 0.01234, "−0.500 ± 0.012"), (1234.5, 56.7, "1234 ± 57"), (2.0, 0.0, "2.00")],
+    [
+        (4.7612, 0.73, "4.76 ± 0.73"),
+        (-0.5, 0.01234, "−0.500 ± 0.012"),
+        (1234.5, 56.7, "1234 ± 57"),
+        (2.409781, 0.0009, "2.4098 ± 0.0009"),
+        (2.0, 0.0, "2.00"),
+    ],
 )
 def test_an_uncertainty_has_two_digits_and_its_value_the_same_place(value: float, u: float, text: str) -> None:
     assert with_uncertainty(value, u) == text

@@ -25,13 +25,15 @@ RATIO_TICKS = (
 )
 REGIME_STYLE = {"static": (style.BLUE, "o", -1), "sliding": (style.VERMILLION, "s", 1)}
 DODGE_POINTS = 1.8
+MOST_BAR = 3.0  # an error bar beyond this factor runs off the panel, so that the others can be read
 
 
 def numbers(study: Study) -> pd.DataFrame:
     """T measured over T simulated at each load (N), with the 95 % interval of the ratio.
 
     The interval is symmetric in the logarithm of the ratio, with Student's t and the degrees of freedom of
-    the measured fit carried through Welch-Satterthwaite (GUM G.4); the model's own are taken as many.
+    both sides carried through Welch-Satterthwaite (GUM G.4): those of the sample's own fit, and for the model
+    those of the measured flat sample, on whose calibration it rests.
     """
     comparison = study.comparison
     if comparison is None or not comparison.rows:
@@ -43,7 +45,7 @@ def numbers(study: Study) -> pd.DataFrame:
             "sample": row.sample,
             "regime": row.regime,
             "normal_load_N": row.normal_load_N,
-            **_ratio(row, _dof(study, row)),
+            **_ratio(row, _dof(study, row.sample, row), _dof(study, comparison.flat, row)),
         }
         for row in comparison.rows
     ]
@@ -52,12 +54,12 @@ def numbers(study: Study) -> pd.DataFrame:
     return table.sort_values(["sample_number", "regime", "normal_load_N"], ascending=[True, False, True])
 
 
-def _dof(study: Study, row: ComparisonRow) -> float:
-    fit = select.fit_of(study.fits, row.sample, row.regime)
+def _dof(study: Study, sample: str, row: ComparisonRow) -> float:
+    fit = select.fit_of(study.fits, sample, row.regime)
     return fit.dof if fit is not None else float("inf")
 
 
-def _ratio(row: ComparisonRow, measured_dof: float) -> dict[str, float]:
+def _ratio(row: ComparisonRow, measured_dof: float, simulated_dof: float) -> dict[str, float]:
     from scipy.stats import t
 
     if not (row.measured_N > 0 and row.simulated_N > 0):
@@ -65,7 +67,8 @@ def _ratio(row: ComparisonRow, measured_dof: float) -> dict[str, float]:
     ratio = row.measured_N / row.simulated_N
     measured, simulated = row.measured_u_N / row.measured_N, row.simulated_u_N / row.simulated_N
     u = float(np.hypot(measured, simulated))
-    dof = measured_dof * (u / measured) ** 4 if measured > 0 else float("inf")
+    parts = measured**4 / measured_dof + simulated**4 / simulated_dof
+    dof = u**4 / parts if parts > 0 else float("inf")
     half = float(t.ppf(0.5 + LEVEL / 2, dof)) * u
     return {"ratio": ratio, "ratio_low": ratio * np.exp(-half), "ratio_high": ratio * np.exp(half)}
 
@@ -118,8 +121,9 @@ def _spread(numbers: pd.DataFrame) -> float:
 
 def _ratio_axis(axes: list[Axes], numbers: pd.DataFrame) -> None:
     """A logarithmic axis on which twice and half lie equally far from 1."""
-    low = np.nanmin([0.85, 0.95 * numbers["ratio_low"].quantile(0.05), 0.95 * numbers["ratio"].min()])
-    high = np.nanmax([1.18, 1.05 * numbers["ratio_high"].quantile(0.95), 1.05 * numbers["ratio"].max()])
+    lowest, highest = numbers["ratio"].min(), numbers["ratio"].max()
+    low = np.nanmin([0.85, 0.95 * lowest, 0.97 * max(numbers["ratio_low"].min(), lowest / MOST_BAR)])
+    high = np.nanmax([1.18, 1.05 * highest, 1.03 * min(numbers["ratio_high"].max(), highest * MOST_BAR)])
     ticks = np.array(next(t for t in RATIO_TICKS if high / low < t[-1] / t[0]))
     for ax in axes:
         ax.set_yscale("log")

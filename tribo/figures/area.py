@@ -67,16 +67,18 @@ def _area_fraction(study: Study, sample: str, mark: str) -> float:
 
 
 def _line(points: pd.DataFrame) -> pd.DataFrame:
-    """Straight line through the points, each weighted by one over its variance."""
+    """Straight line through the points, all with the same weight.
+
+    Weights from the uncertainties would let chance decide: with three specimens they are known to a factor
+    of two at best, and the smallest would draw the line to itself.
+    """
     if points.empty:
         return points
     usable = points[np.isfinite(points["area_fraction"]) & np.isfinite(points["value"])]
     if usable["area_fraction"].nunique() < 2:
         return pd.DataFrame(columns=COLUMNS)
-    u = usable["value_u"].to_numpy(float)
-    weights = 1 / u if np.all(np.isfinite(u) & (u > 0)) else np.ones(len(u))
     af, value = usable["area_fraction"].to_numpy(float), usable["value"].to_numpy(float)
-    slope, intercept = np.polyfit(af, value, 1, w=weights)
+    slope, intercept = np.polyfit(af, value, 1)
     ends = np.array([af.min(), af.max()])
     return pd.DataFrame({"mark": "fit", "area_fraction": ends, "value": intercept + slope * ends})
 

@@ -43,11 +43,17 @@ def draw(numbers: pd.DataFrame) -> Figure:
         first = run.iloc[0]
         handles += ax.plot(
             window["time_ms"], window["T_over_N"], ls=":", marker=mark.marker, mfc="white", color=mark.colour,
-            label=f"{first['sample']} ({first['pressure_kPa']:g} kPa, {first['angle_deg']:.0f}°)",
+            label=f"{first['sample']} ({_angle(first['angle_deg'])})",
         )  # fmt: skip
+    pressures = " and ".join(f"{p:.3g}" for p in sorted(numbers["pressure_kPa"].unique()))
+    style.panel_title(ax, "", f"p = {pressures} kPa, angle of pull in the legend")
     ax.set_xlabel("Time (ms)")
     ax.set_ylabel("Simulated T / N")
     ax.set_ylim(bottom=0)
     ax.set_xlim(left=0)
-    style.legend_below(figure, handles)
+    style.legend_below(figure, handles, columns=8)
     return figure
+
+
+def _angle(angle_deg: float) -> str:
+    return f"{angle_deg:.0f}°".replace("-", "−")

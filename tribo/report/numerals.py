@@ -20,7 +20,9 @@ def with_uncertainty(value: float, u: float) -> str:
     """ "4.76 ± 0.73": the uncertainty to two significant digits, the value to the same place."""
     if not (math.isfinite(value) and math.isfinite(u)) or u <= 0:
         return significant(value)
-    decimals = min(6, max(0, 1 - math.floor(math.log10(u))))
+    decimals = max(0, 1 - math.floor(math.log10(u)))
+    if value:
+        decimals = min(decimals, max(0, 4 - math.floor(math.log10(abs(value)))))
     return _signed(f"{value:.{decimals}f} ± {u:.{decimals}f}")
 
 

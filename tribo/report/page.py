@@ -153,7 +153,7 @@ def _agreement_table(agreements: list[findings.Agreement], regime: Regime) -> di
 def _calibration(study: Study) -> list[tuple[str, str]]:
     if study.comparison is None:
         return []
-    return [(name, significant(float(value), 5)) for name, value in study.comparison.calibration.items()]
+    return [(name, f"{float(value):.5g}".replace("-", "−")) for name, value in study.comparison.calibration.items()]
 
 
 def _flag_counts(study: Study) -> list[tuple[str, int, list[str]]]:

@@ -15,11 +15,11 @@ from tribo.report.tables import PA_PER_KPA, all_set_aside
 
 SIDE: dict[Verdict, str] = {"model too high": "too high", "model too low": "too low"}
 HOW_TO_READ = (
-    "The ratio is measured over simulated friction force, with its 95 % interval. The model agrees at a "
-    "load where the interval holds 1 and reaches no further than a factor of 1.2 either way; where it "
-    "holds 1 but is wider than that, the measurement cannot tell. The loads of one sample share their "
-    "specimens, so their verdicts are not independent of each other; and of twenty intervals, one misses "
-    "by chance."
+    "The ratio is measured over simulated friction force, with its 95 % interval. The model agrees at a load "
+    "where the interval holds 1 and reaches no further than a factor of 1.2 to either side of the ratio; where "
+    "it holds 1 but is wider than that, the measurement cannot tell. A sample as a whole is given the verdict "
+    "of at least half of its loads. The loads of one sample share their specimens, so their verdicts are not "
+    "independent of each other; and of twenty intervals, one misses by chance."
 )
 
 
@@ -109,13 +109,14 @@ def agreement_sentence(agreement: Agreement) -> str:
     """One sample in one regime: the ratio, where the model agrees, by how much it is off, where worst."""
     loads, n = agreement.loads, len(agreement.loads)
     parts = [f"T measured over T simulated is {span([load.ratio for load in loads])}."]
-    if (inside := agreement.count("agrees")) or agreement.verdict == "cannot tell":
+    if inside := agreement.count("agrees"):
         parts.append(f"The model agrees within the 95 % interval at {_at(inside, n)}.")
     for verdict, side in SIDE.items():
         if count := agreement.count(verdict):
             parts.append(f"The model is {side} at {_at(count, n)}.")
     if unclear := agreement.count("cannot tell"):
-        parts.append(f"The measurement cannot tell at {_at(unclear, n)}.")
+        where = "any load" if unclear == n else _at(unclear, n)
+        parts.append(f"The measurement cannot tell at {where}.")
     if agreement.verdict in ("model too high", "model too low", "mixed"):
         worst = agreement.worst
         parts.append(
@@ -185,10 +186,10 @@ def correlation_note(study: Study) -> str:
     if not values:
         return ""
     return (
-        f"Within one fit μ and τ₀ are correlated (coefficient {span(values)}): a fit that takes a little "
-        "more μ takes less τ₀ and describes the same forces. A difference in μ alone or τ₀ alone "
-        "therefore says little; the comparison here is of the friction force at each load, with the "
-        "covariance taken into account."
+        f"The μ and τ₀ of one fit are not independent: their correlation coefficient is {span(values)} over the "
+        "fits above (from few specimens it is itself poorly known). Two fits can differ in both and still give the "
+        "same forces, so a difference in μ alone or in τ₀ alone says little. What is compared here is the friction "
+        "force at each load, with the covariance taken into account."
     )
 
 
