@@ -20,7 +20,7 @@ import pandas as pd
 from scipy.stats import t
 
 from tribo.errors import FitError
-from tribo.fitting import fit_samples, mixed_model
+from tribo.fitting import fit_samples, mixed_model, pool_specimen_scatter
 from tribo.published import load_table2
 from tribo.records import LawFit
 
@@ -47,6 +47,7 @@ class Design:
     missing_pulls: float = 0.0
     missing_cells: float = 0.0
     laws: str = "simulation"
+    unlike_sample: str = ""  # its specimens scatter three times as much as those of the others
 
 
 STANDARD = Design()
@@ -61,6 +62,7 @@ DESIGNS: dict[str, Design] = {
     "missing cells": replace(STANDARD, missing_pulls=0.1, missing_cells=0.2),
     "heavy tails": replace(STANDARD, heavy_tails=True),
     "heavy, missing": replace(STANDARD, heavy_tails=True, missing_pulls=0.1, missing_cells=0.2),
+    "one unlike sample": replace(STANDARD, unlike_sample="B"),
     "weak adhesion": replace(STANDARD, laws="experiment"),
 }
 
@@ -84,7 +86,7 @@ def campaign(design: Design, rng: np.random.Generator) -> pd.DataFrame:
 
 def _sample(name: str, mu: float, tau0_Pa: float, design: Design, rng: np.random.Generator) -> pd.DataFrame:
     g, n, r = design.specimens, len(design.loads_N), design.repeats
-    z = noise(rng, design, (2, g))
+    z = noise(rng, design, (2, g)) * (3 if name == design.unlike_sample else 1)
     rho = design.specimen_correlation
     own_mu = mu * (1 + design.specimen_cv[0] * z[0])
     own_tau0 = tau0_Pa * (1 + design.specimen_cv[1] * (rho * z[0] + np.sqrt(1 - rho**2) * z[1]))
@@ -108,6 +110,10 @@ def _sample(name: str, mu: float, tau0_Pa: float, design: Design, rng: np.random
 
 def specimens_first(table: pd.DataFrame, weights: str) -> Iterator[LawFit]:
     yield from fit_samples(table, "static", AREA_M2, weights=weights)
+
+
+def pooled_scatter(table: pd.DataFrame) -> Iterator[LawFit]:
+    yield from pool_specimen_scatter(fit_samples(table, "static", AREA_M2))
 
 
 def pooled(table: pd.DataFrame) -> Iterator[LawFit]:
@@ -149,6 +155,7 @@ def methods() -> dict[str, Method]:
         "specimens first, ratio": partial(specimens_first, weights="ratio"),
         "specimens first, force": partial(specimens_first, weights="force"),
         "specimens first, repeats": partial(specimens_first, weights="repeats"),
+        "specimens first, pooled scatter": pooled_scatter,
         "pooled least squares": pooled,
         "MixedLM": mixed,
     }

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from tribo.fitting.curves import fit_power_law
     from tribo.fitting.mixed import mixed_model
     from tribo.fitting.outlying import outlying_pulls, outlying_specimens
+    from tribo.fitting.pooled_scatter import pool_specimen_scatter
     from tribo.fitting.power import power_of_campaign
     from tribo.fitting.repeats import repeat_scatter
     from tribo.fitting.samples import fit_samples
@@ -25,6 +26,7 @@ __all__ = [
     "mixed_model",
     "outlying_pulls",
     "outlying_specimens",
+    "pool_specimen_scatter",
     "power_of_campaign",
     "repeat_scatter",
     "uncertainty_budget",
@@ -39,6 +41,7 @@ _HOME = {
     "mixed_model": "mixed",
     "outlying_pulls": "outlying",
     "outlying_specimens": "outlying",
+    "pool_specimen_scatter": "pooled_scatter",
     "power_of_campaign": "power",
     "repeat_scatter": "repeats",
     "uncertainty_budget": "budget",

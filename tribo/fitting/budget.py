@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 LAW = LAWS["coulomb_adhesion"]
-NUMBERS = {"mu": "mu", "tau0_kPa": "tau0", "T_N": "T at p"}
+NUMBERS = ("mu", "tau0_kPa", "T_N")
 PRESSURE_PA = 10e3  # where T/A is judged unless asked otherwise: the middle of the paper's 3 to 25 kPa
 
 
@@ -124,11 +124,16 @@ class Budget:
     def text(self) -> str:
         """What dominates, in one sentence."""
         said = []
-        for number, label in NUMBERS.items():
+        for number in NUMBERS:
             top = self.dominant(number)
-            said.append(f"{label} {top.name} ({self.share_pct(top, number):.0f} % of the variance)")
-        at = f"T at {self.pressure_Pa / 1e3:g} kPa"
-        return f"{self.fit.sample}, {self.fit.regime}: largest for {', for '.join(said)}.".replace("T at p", at)
+            share = self.share_pct(top, number)
+            said.append(f"{label(number, self.pressure_Pa)} {top.name} ({share:.0f} % of the variance)")
+        return f"{self.fit.sample}, {self.fit.regime}: largest for {', for '.join(said)}."
+
+
+def label(number: str, pressure_Pa: float) -> str:
+    """A number in words: mu, tau0, T at 10 kPa."""
+    return {"mu": "mu", "tau0_kPa": "tau0", "T_N": f"T at {pressure_Pa / 1e3:g} kPa"}[number]
 
 
 def uncertainty_budget(

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.errors import FitError, Problem
-from tribo.fitting.budget import NUMBERS, PRESSURE_PA, sensitivities
+from tribo.fitting.budget import NUMBERS, PRESSURE_PA, label, sensitivities
 from tribo.fitting.linear import least_squares
 from tribo.fitting.rows import Rows, sample_rows
 from tribo.fitting.samples import fit_samples
@@ -61,7 +61,6 @@ class Power:
 
     def text(self) -> str:
         """The same in words."""
-        label = NUMBERS[self.number].replace("at p", f"at {self.pressure_Pa / 1e3:g} kPa")
         more = (
             f"{self.specimens_needed} specimens a sample"
             if self.specimens_needed
@@ -70,8 +69,9 @@ class Power:
         repeats = (
             f"or {self.repeats_needed} repeats at each load" if self.repeats_needed else "more repeats alone would not"
         )
+        what = f"{self.regime} {label(self.number, self.pressure_Pa)}"
         return (
-            f"{self.regime} {label}: two samples {self.smallest_difference_pct:.0f} % apart would have been "
+            f"{what}: two samples {self.smallest_difference_pct:.0f} % apart would have been "
             f"told apart with probability {self.power:g} at level {self.level:g}; "
             f"{self.wanted_pct:g} % takes {more}, {repeats}."
         )

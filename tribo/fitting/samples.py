@@ -102,6 +102,10 @@ def _fit_sample(rows: Rows, regime: Regime, area: float, weights: str, by: str) 
         rows.sample, regime, LAW.name, LAW.parameter_names, np.full(2, np.nan), np.full((2, 2), np.nan),
         0.0, len(rows.specimens), len(rows), "none", float("nan"), area, notes=notes,
     )  # fmt: skip
+    if weights == "ratio" and not rows.load_N.all():
+        notes += (f"{int((rows.load_N == 0).sum())} tests at zero load left out: they have no T/N",)
+        rows = rows.take(rows.load_N > 0)
+        empty = replace(empty, n_tests=len(rows), n_specimens=len(rows.specimens))
     if len(np.unique(rows.load_N)) < 2:
         return replace(empty, notes=(*notes, "tests at fewer than two loads cannot part mu from tau0"))
     weight = weights_of(rows, area, weights)
