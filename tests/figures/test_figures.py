@@ -220,3 +220,21 @@ def test_an_empty_campaign_has_empty_numbers(study: Study) -> None:
     for name in ("fig3", "fig4", "fig6"):
         assert isinstance(FIGURES[name].numbers(empty), pd.DataFrame)
         assert FIGURES[name].numbers(empty).empty
+
+
+def test_degrees_of_freedom_join_by_welch_and_satterthwaite() -> None:
+    assert select.welch_dof((1.0, 2.0), (1.0, 2.0)) == pytest.approx(4.0)
+    assert select.welch_dof((1.0, 5.0), (0.0, 0.0)) == pytest.approx(5.0)
+    assert select.welch_dof((0.0, 3.0)) == float("inf")
+    assert np.isnan(select.welch_dof((1.0, 0.0), (1.0, 4.0)))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_sample_that_could_not_be_fitted_does_not_stop_the_others(name: str, study: Study) -> None:
+    nan = np.full(2, np.nan)
+    broken = tuple(
+        replace(f, values=nan, covariance=np.full((2, 2), np.nan), dof=0.0) if f.sample == "B" else f
+        for f in study.fits
+    )
+    figure = FIGURES[name]
+    assert figure.draw(figure.numbers(replace(study, fits=broken))).axes

@@ -7,6 +7,7 @@ from collections import Counter
 from dataclasses import replace
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 
 from report.conftest import Written
@@ -129,3 +130,15 @@ def test_a_trace_of_one_sample_has_no_picture(study: Study) -> None:
     one = replace(trace, time_s=trace.time_s[:1], force_N=trace.force_N[:1])
     assert trace_picture(one, pull) == ""
     assert trace_picture(trace, replace(pull, peak_s=float("nan"))).count("<circle") == 0
+
+
+def test_a_sample_that_could_not_be_fitted_leaves_dashes(study: Study) -> None:
+    broken = tuple(
+        replace(f, values=np.full(2, np.nan), covariance=np.full((2, 2), np.nan), dof=0.0) if f.sample == "B" else f
+        for f in study.fits
+    )
+    words = re.sub(
+        r"<svg.*?</svg>|<style>.*?</style>", "", html(replace(study, fits=broken), drawn={}), flags=re.DOTALL
+    )
+    assert not re.search(r"\b(nan|inf)\b", words)
+    assert "<td>–</td>" in words

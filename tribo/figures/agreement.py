@@ -67,8 +67,7 @@ def _ratio(row: ComparisonRow, measured_dof: float, simulated_dof: float) -> dic
     ratio = row.measured_N / row.simulated_N
     measured, simulated = row.measured_u_N / row.measured_N, row.simulated_u_N / row.simulated_N
     u = float(np.hypot(measured, simulated))
-    parts = measured**4 / measured_dof + simulated**4 / simulated_dof
-    dof = u**4 / parts if parts > 0 else float("inf")
+    dof = select.welch_dof((measured, measured_dof), (simulated, simulated_dof))
     half = float(t.ppf(0.5 + LEVEL / 2, dof)) * u
     return {"ratio": ratio, "ratio_low": ratio * np.exp(-half), "ratio_high": ratio * np.exp(half)}
 

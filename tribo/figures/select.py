@@ -42,6 +42,18 @@ def fit_of(fits: Iterable[LawFit], sample: str, regime: str) -> LawFit | None:
     return next((f for f in fits if f.sample == sample and f.regime == regime), None)
 
 
+def welch_dof(*components: tuple[float, float]) -> float:
+    """Degrees of freedom of a sum of (standard uncertainty, degrees of freedom), Welch-Satterthwaite (GUM G.4).
+
+    NaN where a part has an uncertainty without degrees of freedom, infinite where no part is uncertain.
+    """
+    uncertain = [(u, dof) for u, dof in components if u != 0]
+    if not all(dof > 0 for _, dof in uncertain):
+        return float("nan")
+    parts = sum(u**4 / dof for u, dof in uncertain)
+    return float(sum(u**2 for u, _ in uncertain) ** 2 / parts) if parts > 0 else float("inf")
+
+
 def load_levels(normal_load_N: FloatArray, tolerance: float = LOAD_TOLERANCE) -> FloatArray:
     """The mean load of the level each load belongs to: loads within ``tolerance`` are one level."""
     loads = np.asarray(normal_load_N, float)

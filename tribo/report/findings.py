@@ -136,8 +136,9 @@ def rankings(study: Study) -> list[Ranking]:
 
 
 def _ranking(fits: Iterable[LawFit], simulated: Iterable[LawFit], regime: Regime, load: float) -> Ranking:
-    model = {f.sample: float(f.force_N(load)) for f in simulated if f.regime == regime}
-    both = {f.sample: f for f in fits if f.regime == regime and f.sample in model}
+    usable = [f for f in simulated if f.regime == regime and math.isfinite(f.force_N(load))]
+    model = {f.sample: float(f.force_N(load)) for f in usable}
+    both = {f.sample: f for f in fits if f.regime == regime and math.isfinite(f.force_N(load)) and f.sample in model}
     order = sorted(both, key=lambda s: -float(both[s].force_N(load)))
     apart = tuple((a, b) for a, b in combinations(order, 2) if _differ(both[a], both[b], load))
     wrong = tuple((a, b) for a, b in apart if model[a] < model[b])
@@ -150,12 +151,9 @@ def _differ(a: LawFit, b: LawFit, load: float) -> bool:
     """Whether two fitted forces differ at 95 %, by Welch's t with the fits' degrees of freedom."""
     from scipy.stats import t
 
-    variance_a, variance_b = float(a.force_u_N(load)) ** 2, float(b.force_u_N(load)) ** 2
-    total = variance_a + variance_b
-    if total <= 0:
-        return float(a.force_N(load)) != float(b.force_N(load))
-    dof = total**2 / (variance_a**2 / a.dof + variance_b**2 / b.dof)
-    return bool(abs(float(a.force_N(load) - b.force_N(load))) > t.ppf(0.975, dof) * math.sqrt(total))
+    u_a, u_b = float(a.force_u_N(load)), float(b.force_u_N(load))
+    half = float(t.ppf(0.975, select.welch_dof((u_a, a.dof), (u_b, b.dof)))) * math.hypot(u_a, u_b)
+    return abs(float(a.force_N(load) - b.force_N(load))) > half
 
 
 @dataclass(frozen=True)
@@ -203,12 +201,10 @@ def _direction_ratio(study: Study, names: tuple[str, str, str], regime: Regime, 
         return None
     (fx, fy), (mx, my) = [[f for f in pair if f is not None] for pair in (measured, model)]
     ratio = float(fx.force_N(load) / fy.force_N(load))
-    if ratio <= 0:
+    if not ratio > 0:
         return None
     ux, uy = (float(f.force_u_N(load) / f.force_N(load)) for f in (fx, fy))
-    u = math.hypot(ux, uy)
-    dof = u**4 / (ux**4 / fx.dof + uy**4 / fy.dof) if u > 0 else math.inf
-    half = float(t.ppf(0.975, dof)) * u
+    half = float(t.ppf(0.975, select.welch_dof((ux, fx.dof), (uy, fy.dof)))) * math.hypot(ux, uy)
     simulated = float(mx.force_N(load) / my.force_N(load))
     return DirectionRatio(
         pattern, (x, y), regime, load, ratio, ratio * math.exp(-half), ratio * math.exp(half), simulated

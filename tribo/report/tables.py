@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -50,11 +51,20 @@ def tests_table(study: Study) -> pd.DataFrame:
     """One row a test in the order of the campaign, used or set aside; its own covariates come last."""
     ingested = study.ingested
     aside = all_set_aside(study)
-    rows = [_test_row(t, ingested.pulls.get(t.test_id), aside.pop(t.test_id, None)) for t in ingested.campaign.tests]
-    rows += [{"test_id": fault.test_id, "set_aside": fault.reason} for fault in aside.values()]
+    placed = [
+        (t.row, _test_row(t, ingested.pulls.get(t.test_id), aside.pop(t.test_id, None)))
+        for t in ingested.campaign.tests
+    ]
+    placed += [(_faulty_row(fault), {"test_id": fault.test_id, "set_aside": fault.reason}) for fault in aside.values()]
+    rows = [row for _, row in sorted(placed, key=lambda item: math.inf if item[0] is None else item[0])]
     covariates = list(dict.fromkeys(name for t in ingested.campaign.tests for name in t.covariates))
     extra = [name for name in covariates if name not in TESTS_COLUMNS]
     return pd.DataFrame(rows, columns=[*TESTS_COLUMNS, *extra])
+
+
+def _faulty_row(fault: SetAside) -> int | None:
+    """The row of tests.csv that a test set aside before its export was read stands in, where it is known."""
+    return next((p.row for p in fault.problems if p.row is not None), None)
 
 
 def _test_row(test: Test, pull: Pull | None, fault: SetAside | None) -> dict[str, object]:

@@ -31,10 +31,18 @@ def _regime_block(study: Study, regime: Regime, load: float) -> str:
             rows.append((sample, *fit_cells(measured, load), *fit_cells(model, load), *counts))
     if not rows:
         return ""
-    widths = [max(len(row[k]) for row in (HEAD, *rows)) for k in range(len(HEAD))]
-    left, right = sum(widths[1:4]) + 4, sum(widths[4:7]) + 4
-    title = f"{regime.upper():<{widths[0]}}  {'measured':^{left}}  {'simulated':^{right}}".rstrip()
-    return "\n".join([title, *(_line(row, widths) for row in (HEAD, *rows))])
+    if not simulated:
+        return "\n".join([regime.upper(), *_aligned([(*row[:4], *row[7:]) for row in (HEAD, *rows)])])
+    lines = _aligned([HEAD, *rows])
+    measured, model = lines[0].index(" mu") + 1, lines[0].rindex(" mu") + 1
+    head = f"{regime.upper():<{measured}}measured"
+    return "\n".join([f"{head:<{model}}simulated", *lines])
+
+
+def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
+    """Columns of equal width, the first to the left, the others to the right."""
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    return [_line(row, widths) for row in rows]
 
 
 def _line(row: tuple[str, ...], widths: list[int]) -> str:

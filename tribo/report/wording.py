@@ -188,7 +188,7 @@ def correlation_note(study: Study) -> str:
     return (
         f"The μ and τ₀ of one fit are not independent: their correlation coefficient is {span(values)} over the "
         "fits above (from few specimens it is itself poorly known). Two fits can differ in both and still give the "
-        "same forces, so a difference in μ alone or in τ₀ alone says little. What is compared here is the friction "
+        "same forces, so a difference in μ alone or in τ₀ alone says little. Compare the friction "
         "force at each load, with the covariance taken into account."
     )
 
