@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 LAW = LAWS["three_term"]
+_ROUNDS = 4
+_SMALLEST_SHARE = 0.05  # of the median force, below which no fitted force may set a weight
 
 
 def fit_three_term(
@@ -51,6 +53,8 @@ def fit_three_term(
     if len(names) <= len(LAW.parameters):
         found, allowed = str(len(names)), f"more than {len(LAW.parameters)}"
         raise FitError(Problem("too_few_specimens", "too few specimens", found=found, allowed=allowed))
+    if weights == "relative":
+        weight = _relative_to_the_law(design, force, weight)
     whole = least_squares(design, force, weight)
     without = np.array([_without(design, force, weight, specimen == name).values for name in names])
     spread = without - without.mean(axis=0)
@@ -75,6 +79,14 @@ def _stack(
         np.concatenate(weight),
         np.concatenate([rows.specimen for rows in used]),
     )
+
+
+def _relative_to_the_law(design: FloatArray, force: FloatArray, weight: FloatArray) -> FloatArray:
+    """Weights 1/T^2 with T of the common law: a sample's own T would weigh lucky specimens less."""
+    floor = _SMALLEST_SHARE * float(np.median(np.abs(force)))
+    for _ in range(_ROUNDS):
+        weight = np.maximum(np.abs(design @ least_squares(design, force, weight).values), floor) ** -2.0
+    return weight
 
 
 def _without(design: FloatArray, force: FloatArray, weight: FloatArray, out: np.ndarray) -> LinearFit:
