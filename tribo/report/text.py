@@ -34,9 +34,9 @@ def _regime_block(study: Study, regime: Regime, load: float) -> str:
     if not simulated:
         return "\n".join([regime.upper(), *_aligned([(*row[:4], *row[7:]) for row in (HEAD, *rows)])])
     lines = _aligned([HEAD, *rows])
-    measured, model = lines[0].index(" mu") + 1, lines[0].rindex(" mu") + 1
-    head = f"{regime.upper():<{measured}}measured"
-    return "\n".join([f"{head:<{model}}simulated", *lines])
+    left, right = lines[0].index(" mu") + 1, lines[0].rindex(" mu") + 1
+    head = f"{regime.upper():<{left}}measured"
+    return "\n".join([f"{head:<{right}}simulated", *lines])
 
 
 def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
