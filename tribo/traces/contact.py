@@ -67,13 +67,19 @@ def smoothing_width(samples: int) -> int:
     return max(1, samples // 2000)
 
 
+def starting_level(smooth: FloatArray) -> float:
+    """Force a trace begins at: the median of its first five samples or of its first fiftieth, whichever is lower."""
+    first = median(smooth[:_FEWEST_FOR_ZERO])
+    return min(first, median(smooth[: smooth.size // 50])) if smooth.size >= 50 * _FEWEST_FOR_ZERO else first
+
+
 def first_rise(time_s: FloatArray, smooth: FloatArray, noise: float) -> Rise | None:
     """The first climb through a quarter to three quarters of the first maximum-like level, or None without one.
 
     That level is the highest force before the first clear fall; where the force climbs on without one, what it reaches
     when it leaves the pace of the first climb.
     """
-    start = median(smooth[: max(_FEWEST_FOR_ZERO, smooth.size // 50)])
+    start = starting_level(smooth)
     full = float(smooth.max()) - start
     if full < _DETECTABLE * noise:
         return None

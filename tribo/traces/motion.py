@@ -11,7 +11,7 @@ from tribo.errors import Problem, TraceError
 from tribo.records import FloatArray, Trace
 from tribo.traces import quality
 from tribo.traces.apex import Apex
-from tribo.traces.contact import Rise, Zero, departure, first_rise, smoothed, zero_before
+from tribo.traces.contact import Rise, Zero, departure, first_rise, smoothed, starting_level, zero_before
 from tribo.traces.peak import find_apex, first_maximum
 from tribo.traces.quality import noise_of
 from tribo.traces.statistics import median, median_of_three, running_mean
@@ -46,8 +46,8 @@ class Motion:
     problems: tuple[Problem, ...]
 
 
-def lay_out(trace: Trace, speed_m_s: float | None = None) -> Motion:
-    """Find the phases of a pull.
+def lay_out(trace: Trace, speed_m_s: float | None = None, zero: tuple[float, float] | None = None) -> Motion:
+    """Find the phases of a pull. ``zero`` (force, standard uncertainty), where known, replaces that before contact.
 
     Raises
     ------
@@ -67,14 +67,14 @@ def lay_out(trace: Trace, speed_m_s: float | None = None) -> Motion:
     calm = median_of_three(force)
     smooth = smoothed(calm)
     rise = first_rise(time, smooth, noise)
-    start = median(smooth[: max(5, smooth.size // 50)])
+    start = starting_level(smooth)
     if faults := _no_pull(trace, smooth, start, rise, noise):
         raise TraceError([*faults, *problems])
     assert rise is not None
     if clipped := quality.flat_top(force):
         raise TraceError([_saturated(trace, clipped), *problems])
-    zero = zero_before(time, force, rise, noise)
-    return _with_peak(trace, time, force - zero.force_N, calm - zero.force_N, rise, zero, noise, speed_m_s, problems)
+    known = Zero(*zero, time_s=float(time[0])) if zero else zero_before(time, force, rise, noise)
+    return _with_peak(trace, time, force - known.force_N, calm - known.force_N, rise, known, noise, speed_m_s, problems)
 
 
 def _no_pull(trace: Trace, smooth: FloatArray, start: float, rise: Rise | None, noise: float) -> list[Problem]:

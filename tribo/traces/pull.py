@@ -25,11 +25,14 @@ def read_pull(
     rule: str = "seed",
     test: Test | None = None,
     parameters: Mapping[str, float] | None = None,
+    zero: tuple[float, float] | None = None,
 ) -> Pull:
     """Read static and sliding friction off one trace.
 
     ``rule`` names an entry of ``RULES``; ``parameters`` replace its own (``length_m``, ``skip_m``,
-    ``share``). ``test`` gives the pull its id and, where the trace has no displacement, its speed.
+    ``share``, ``start_s``). ``test`` gives the pull its id and, where the trace has no displacement, its speed.
+    ``zero`` is the zero of the force with its standard uncertainty (N) where it is known otherwise than from the
+    force before contact, such as from the asymmetry of strokes.
 
     The standard uncertainties hold the scatter of the reading (correlation counted), that of the zero, and
     how far a slow wander of the size seen while sliding may have carried the signal since the zero was last
@@ -43,7 +46,7 @@ def read_pull(
     chosen = _rule(rule, parameters)
     test_id, file = (test.test_id if test else None), trace.file or None
     try:
-        motion = lay_out(trace, test.speed_m_s if test else None)
+        motion = lay_out(trace, test.speed_m_s if test else None, zero)
         static = chosen.static(motion, chosen.parameters)
         window = chosen.sliding(motion, chosen.parameters)
     except TraceError as fault:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -48,6 +49,13 @@ def highest_in_skip(motion: Motion, parameters: Parameters) -> Apex:
     return rounded_apex(motion.time_s, motion.force_N, first + int(np.argmax(later)), 3, motion.noise_N)
 
 
+def highest_early(motion: Motion, parameters: Parameters) -> Apex:
+    """The highest force, impulses left out, in the first ``start_s`` of the record."""
+    end = int(np.searchsorted(motion.time_s, motion.time_s[0] + parameters["start_s"], side="right"))
+    at = int(np.argmax(motion.force_N[:end]))
+    return Apex(float(motion.time_s[at]), 0.0, float(motion.force_N[at]), motion.noise_N, math.nan, "highest")
+
+
 def once_stabilised(motion: Motion, parameters: Parameters) -> Window:
     """From when the force has stabilised (MSER-5) to the end of sliding."""
     first, end = motion.sliding
@@ -73,6 +81,12 @@ def middle_share(motion: Motion, parameters: Parameters) -> Window:
     end = motion.sliding[1]
     margin = int((end - onset) * (1.0 - parameters["share"]) / 2.0)
     return max(onset + margin, motion.sliding[0]), end - margin
+
+
+def last_share(motion: Motion, parameters: Parameters) -> Window:
+    """The last ``share`` of the record, a tail of unloading left out."""
+    end = motion.sliding[1]
+    return max(end - int(parameters["share"] * end), motion.sliding[0]), end
 
 
 def _after(motion: Motion, length_m: float, since_s: float) -> int:
@@ -131,6 +145,15 @@ RULES: dict[str, Rule] = {
             first_peak,
             middle_share,
             {"share": 0.4},
+        ),
+        Rule(
+            "last_share",
+            "highest force in the first minute",
+            "mean over the last share of the record",
+            "common practice on rotary rigs, where the force runs in for long",
+            highest_early,
+            last_share,
+            {"start_s": 60.0, "share": 0.5},
         ),
     )
 }
