@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.mechanisms.test_contract import LAWS, base, conditions
 from tribo.mechanisms.mislabelled_specimen import moves
 from tribo.mechanisms.record import Forces
 from tribo.mechanisms.table import MECHANISMS
+
+from .test_contract import LAWS, base, conditions
 
 
 def forces(name: str, values: list[float], choice: str = "") -> Forces:

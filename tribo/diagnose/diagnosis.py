@@ -25,7 +25,7 @@ from tribo.diagnose.sentences import (
     summary,
 )
 from tribo.diagnose.verdict import Cause, Excluded, Misfit, Outcome, Verdict
-from tribo.diagnose.weigh import unseen
+from tribo.diagnose.weigh import Candidate, unseen
 from tribo.records import Ingested
 
 REPLICATES = 120
@@ -141,7 +141,7 @@ def _verdict(
     direct = [cause_from_evidence(n, e, evidence) for n, e in _certain(evidence).items()]
     misfits = [m for _, m in direct] + misfits_of(screened, level)
     outcome = _outcome(named, bool(direct), level)
-    causes = [c for c, _ in direct] + (_causes(named) if outcome in ("named", "undetermined") else [])
+    causes = [c for c, _ in direct] + (_causes(named, baseline) if outcome in ("named", "undetermined") else [])
     left = misfits_of(named.left, level) if named is not None and outcome == "unknown" and named.causes else []
     smallest = smallest_effects(baseline, screened, level, {e.mechanism for e in barred})
     extended = named.model if named is not None and named.causes else None
@@ -178,13 +178,13 @@ def _outcome(named: Named | None, direct: bool, level: float) -> Outcome:
     return "named"
 
 
-def _causes(named: Named | None) -> list[Cause]:
+def _causes(named: Named | None, baseline: ModelFit) -> list[Cause]:
     if named is None:
         return []
     found = []
     for k, alike in enumerate(named.causes):
         shown = [*alike, *(named.rivals if k == len(named.causes) - 1 else ())]
-        found += [cause_of(c, float(w)) for c, w in zip(shown, weights_of(shown), strict=True)]
+        found += [cause_of(c, float(w), baseline) for c, w in zip(shown, weights_of(shown), strict=True)]
     return sorted(found, key=lambda c: -c.weight)
 
 
@@ -194,7 +194,7 @@ def _equivalent(named: Named | None) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(c.name for c in alike) for alike in named.causes if len(alike) > 1)
 
 
-def _tied(named: Named | None) -> list:
+def _tied(named: Named | None) -> list[Candidate]:
     if named is None or not named.causes:
         return []
     for alike in named.causes:
@@ -212,8 +212,16 @@ def _excluded(named: Named | None, barred: list[Excluded], causes: list[Cause]) 
     best = named.weighed[0].gain
     for c in named.weighed:
         if c.name not in shown and c.name not in {e.mechanism for e in found}:
-            found.append(Excluded(c.name, f"explains less: its log likelihood is {best - c.gain:.1f} lower"))
+            found.append(Excluded(c.name, _lost(c, best)))
     return found
+
+
+def _lost(c: Candidate, best: float) -> str:
+    """Why a weighed mechanism is not among the causes."""
+    m = c.acting.mechanism
+    if c.values[0] == m.amplitude.zero and m.amplitude.zero in (m.amplitude.low, m.amplitude.high):
+        return "by its sign: it can only act one way, and the campaign goes the other"
+    return f"explains less: its log likelihood is {best - c.gain:.1f} lower"
 
 
 __all__ = ["Diagnosis", "Misfit", "diagnose", "examine"]

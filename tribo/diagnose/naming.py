@@ -120,7 +120,12 @@ def with_form_error(model: ModelFit) -> Setup:
 
 
 def weights_of(candidates: Sequence[Candidate]) -> FloatArray:
-    """Shares of candidates by likelihood, adding to one."""
+    """Shares of candidates by likelihood, adding to one; the likelihood is trusted as far as the laws are.
+
+    Between laws that may each be wrong in form, a large log likelihood parts less than it seems: differences
+    count in units of the tie that :data:`TIED` allows.
+    """
     gains = np.array([c.gain for c in candidates])
-    share = np.exp(gains - gains.max())
+    unit = max(1.0, TIED[1] * gains.max() / CLOSE)
+    share = np.exp((gains - gains.max()) / unit)
     return np.asarray(share / share.sum())

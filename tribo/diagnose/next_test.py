@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -102,7 +103,7 @@ def _loads(first: Candidate, second: Candidate) -> list[NextTest]:
     return found
 
 
-def _named(first: Candidate, second: Candidate, text: str, design: dict, information: float) -> NextTest:
+def _named(first: Candidate, second: Candidate, text: str, design: Mapping[str, Any], information: float) -> NextTest:
     return NextTest(text, (first.name, second.name), design, information)
 
 

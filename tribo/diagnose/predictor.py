@@ -119,15 +119,17 @@ def _shares(name: str, pattern: Pattern) -> Shares:
 
 def _interpolated(area_fraction: float) -> Shares:
     """Between the tabulated patterns by area fraction: the efficiency of a pattern falls with its cavities."""
-    table = sorted((_area_fraction(key), np.array(v) / np.array(_FLAT)) for key, v in _SIMULATED.items())
-    known = np.array([a for a, _ in table] + [1.0])
-    values = np.array([v / [1.0, a, 1.0, a] for a, v in table] + [np.ones(4)])
-    at = [float(np.interp(area_fraction, known, column)) for column in values.T]
+    keys = sorted(_SIMULATED, key=_area_fraction)
+    known = np.array([*(_area_fraction(key) for key in keys), 1.0])
+    rows = [np.array(_SIMULATED[key]) / _FLAT / [1.0, a, 1.0, a] for key, a in zip(keys, known[:-1], strict=True)]
+    at = [float(np.interp(area_fraction, known, column)) for column in np.array([*rows, np.ones(4)]).T]
     return (at[0], at[1] * area_fraction, at[2], at[3] * area_fraction)
 
 
 def _area_fraction(key: tuple[float, float, float, float, str]) -> float:
-    return 1.0 - key[0] * key[1] / (key[2] * key[3])
+    """Nominal area fraction: cavities as wide as long are round."""
+    share = np.pi / 4 if key[0] == key[1] else 1.0
+    return float(1.0 - share * key[0] * key[1] / (key[2] * key[3]))
 
 
 def _key(name: str, pattern: Pattern) -> tuple[float, float, float, float, str] | None:

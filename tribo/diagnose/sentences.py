@@ -11,7 +11,7 @@ from tribo.diagnose.looks import OBSERVABLES, Look, candidates
 from tribo.diagnose.model import ModelFit, predict
 from tribo.diagnose.screen import Screen, cleared
 from tribo.diagnose.verdict import Cause, Estimate, Excluded, Misfit, Outcome
-from tribo.diagnose.weigh import Candidate, effect
+from tribo.diagnose.weigh import Candidate
 from tribo.mechanisms.table import MECHANISMS
 
 SHOWN = 8
@@ -55,8 +55,10 @@ def _misfit(look: Look, size: float, coefficients: np.ndarray, p: float) -> Misf
     percent = 100.0 * float(np.expm1(min(size, 5.0)))
     where = f" of {look.sample}" if look.sample else ""
     shape = _shape(look, coefficients)
-    follows = look.covariate if look.acting is None else f"{look.covariate} {look.acting.choice}".strip()
-    text = f"{WHAT[look.observable][0].upper()}{WHAT[look.observable][1:]}{where} follows {follows}"
+    follows = f"follows {look.covariate}"
+    if look.acting is not None:
+        follows = f"has the shape that {look.acting.mechanism.name} {look.acting.choice}".rstrip() + " would give"
+    text = f"{WHAT[look.observable][0].upper()}{WHAT[look.observable][1:]}{where} {follows}"
     text += f"{shape}: {percent:.0f} % from end to end (adjusted p {_p(p)})."
     return Misfit(look.observable, look.sample, _covariate(look), percent, p, text)
 
@@ -81,17 +83,18 @@ def _p(p: float) -> str:
     return "below 0.001" if p < 1e-3 else f"{p:.3f}"
 
 
-def cause_of(candidate: Candidate, weight: float) -> Cause:
-    """A weighed mechanism with its parameters and 90 % intervals."""
+def cause_of(candidate: Candidate, weight: float, baseline: ModelFit) -> Cause:
+    """A weighed mechanism with its parameters and 90 % intervals, its effect beyond what ``baseline`` fits."""
     parameters = estimates(candidate.fit, len(candidate.fit.acting) - 1)
     mechanism = candidate.acting.mechanism
-    size = 100.0 * float(np.expm1(np.clip(np.ptp(effect(candidate.fit)), 0.0, 5.0)))
+    moved = candidate.fit.predicted - baseline.predicted
+    size = 100.0 * float(np.expm1(np.clip(np.ptp(moved), 0.0, 5.0)))
     first = next(iter(parameters.items()))
     choice = f" ({candidate.acting.choice})" if candidate.acting.choice else ""
     text = (
         f"{candidate.name}{choice}: {first[0]} = {first[1].value:.3g} {first[1].unit}".rstrip()
-        + f" (90 % {first[1].low:.3g} to {first[1].high:.3g}), moving T by up to {size:.0f} % between tests."
-        + f" It shows in {mechanism.shows}. What separates it: {mechanism.separates}."
+        + f" (90 % {first[1].low:.3g} to {first[1].high:.3g}), moving T by {size:.0f} % from end to end."
+        + f" Sign: {mechanism.shows}. What separates it: {mechanism.separates}."
     )
     return Cause(candidate.name, weight, parameters, text)
 

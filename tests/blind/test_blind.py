@@ -1,0 +1,60 @@
+"""Campaigns with something hidden in them: the code under test sees only the files.
+
+The quick share of what ``benchmarks/blind.py`` runs in full. Laws and instrument are in tribometer.py, apart
+from the library that is tested.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tribo.campaign import load_campaign
+from tribo.diagnose import examine
+from tribo.diagnose.verdict import Verdict
+from tribo.stages import ingest
+
+from .tribometer import Design, hide, write
+
+QUICK = Design(samples=("F", "A", "B", "C"), masses_g=(5.0, 25.0, 90.0, 138.5))
+LADDER = Design(samples=("F", "B", "C"), masses_g=(12.0, 50.0, 138.5), speeds_mm_s=(0.05, 0.2, 0.8))
+
+
+def verdict_on(folder: Path, seed: int, *effects: tuple[str, float], design: Design = QUICK) -> Verdict:
+    campaign = load_campaign(write(hide(seed, list(effects), design), folder / "campaign", seed))
+    return examine(ingest(campaign), seed=seed, replicates=(60, 40)).verdict
+
+
+@pytest.mark.parametrize("seed", [201, 202])
+def test_nothing_hidden_is_said_to_be_nothing(tmp_path: Path, seed: int) -> None:
+    v = verdict_on(tmp_path, seed)
+    assert v.verdict == "no_misfit"
+    assert v.causes == ()
+    assert "would have shown" in v.text
+    assert 0 < v.smallest_effects["run_in"] < 40
+
+
+@pytest.mark.parametrize(
+    ("effect", "design"),
+    [("run_in", QUICK), ("contact_area_loss", QUICK), ("velocity_dependence", LADDER), ("load_cell_offset", QUICK)],
+)
+def test_a_clear_effect_is_named(tmp_path: Path, effect: str, design: Design) -> None:
+    v = verdict_on(tmp_path, 211, (effect, 1.5), design=design)
+    assert v.verdict == "named"
+    assert [c.mechanism for c in v.causes] == [effect]
+
+
+def test_a_tied_pair_is_named_as_a_pair_with_a_test_that_parts_it(tmp_path: Path) -> None:
+    v = verdict_on(tmp_path, 221, ("suction", 1.0))
+    assert v.verdict == "named"
+    assert {c.mechanism for c in v.causes} == {"suction", "normal_load_error"}
+    assert v.next_test is not None
+    assert v.next_test.expected_bits > 0.5
+
+
+def test_an_effect_outside_the_library_is_unknown_with_the_column_it_follows(tmp_path: Path) -> None:
+    v = verdict_on(tmp_path, 231, ("outside:day", 1.5))
+    assert v.verdict == "unknown"
+    assert v.causes == ()
+    assert v.misfits[0].covariate == "time of day"

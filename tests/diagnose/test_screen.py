@@ -1,0 +1,62 @@
+"""Looks, their strength, and what chance gives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, norm
+
+from tribo.diagnose.fit import fit
+from tribo.diagnose.looks import all_looks
+from tribo.diagnose.model import ModelFit, setup
+from tribo.diagnose.observations import observe
+from tribo.diagnose.predictor import tabled_predictor
+from tribo.diagnose.screen import cleared, deviate, replicate, screen
+
+from .synthetic import hidden
+
+
+def baseline(*effects: tuple[str, float], seed: int = 3) -> ModelFit:
+    o = observe(hidden(*effects, seed=seed))
+    return fit(setup(o, tabled_predictor(o.patterns)))
+
+
+def test_deviates_are_as_rare_as_the_chi_squared_they_stand_for() -> None:
+    freedom = np.array([1, 2, 5])
+    values = np.array([9.0, 12.0, 20.0])
+    assert norm.sf(deviate(values, freedom)) * 2 == pytest.approx(chi2.sf(values, freedom), rel=1e-6)
+    assert np.all(np.diff(deviate(np.linspace(1, 4000, 300), np.full(300, 4))) > -0.6)
+
+
+def test_columns_of_the_law_itself_are_cleared_away() -> None:
+    from tribo.diagnose.fit import jacobian_at
+
+    f = baseline()
+    left = cleared(f, jacobian_at(f))[0]
+    assert np.abs(left).max() < 1e-3 * np.abs(jacobian_at(f)).max() / 0.05
+
+
+def test_an_effect_is_the_strongest_look_at_its_own_column() -> None:
+    f = baseline(("run_in", 1.0))
+    looks = all_looks(f)
+    found = screen(f, looks, replicates=0, rng=np.random.default_rng(0))
+    strongest = looks[int(found.strength.argmax())]
+    assert strongest.acting is not None
+    assert strongest.acting.name == "run_in"
+
+
+def test_the_null_is_simulated_from_the_fitted_model() -> None:
+    """Scores of a trend in simulated campaigns are standard normal, specimens and sample errors included."""
+    f = baseline()
+    rng = np.random.default_rng(1)
+    trend = [look for look in all_looks(f) if look.covariate == "run_order" and look.kind == "trend"][:1]
+    strengths = [screen(replicate(f, rng), trend, replicates=0, rng=rng).strength[0] for _ in range(40)]
+    assert 0.6 < np.sqrt(np.mean(np.square(strengths))) < 1.4
+
+
+def test_a_p_value_beyond_all_replicates_is_small_and_finite() -> None:
+    f = baseline(("run_in", 1.0))
+    looks = [look for look in all_looks(f) if look.kind == "trend"]
+    found = screen(f, looks, replicates=30, rng=np.random.default_rng(2))
+    assert 0.0 < found.p_adjusted() < 1e-3
+    assert found.p_adjusted(0.0) == 1.0

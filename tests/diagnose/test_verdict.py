@@ -1,0 +1,96 @@
+"""The verdict keeps its schema, whatever the outcome."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from tribo.diagnose import examine
+from tribo.diagnose.diagnosis import Diagnosis
+from tribo.diagnose.next_test import bits
+from tribo.diagnose.verdict import Misfit, Verdict
+from tribo.errors import FitError
+from tribo.records import SetAside
+
+from .synthetic import hidden
+
+KEYS = {"schema", "verdict", "misfits", "causes", "equivalent", "excluded", "gain", "set_aside", "next_test"}
+FEW = (60, 40)
+
+
+@pytest.fixture(scope="module")
+def tied() -> Diagnosis:
+    return examine(hidden(("suction", 1.0)), replicates=FEW)
+
+
+def test_the_json_has_every_key_of_the_schema(tied: Diagnosis) -> None:
+    plain = json.loads(tied.verdict.to_json())
+    assert set(plain) >= KEYS
+    assert plain["schema"] == "tribo.verdict/1"
+    assert set(plain["misfits"][0]) == {"observable", "sample", "covariate", "effect_percent", "p_adjusted", "text"}
+    assert set(plain["causes"][0]) == {"mechanism", "weight", "parameters", "text"}
+    assert set(plain["causes"][0]["parameters"]["dp"]) == {"value", "low", "high", "unit"}
+    assert set(plain["gain"]) == {
+        "held_out", "log_score_baseline", "log_score_extended", "difference", "se",
+        "rmse_percent_before", "rmse_percent_after",
+    }  # fmt: skip
+    assert set(plain["next_test"]) == {"text", "separates", "design", "expected_bits"}
+
+
+def test_numbers_that_do_not_exist_are_null_not_nan() -> None:
+    v = Verdict("unknown", misfits=(Misfit("zero", "", "", float("nan"), 0.0, ""),), set_aside=(SetAside("T1", "x"),))
+    plain = json.loads(v.to_json())
+    assert plain["misfits"][0]["effect_percent"] is None
+    assert plain["set_aside"] == [{"test_id": "T1", "reason": "x"}]
+    assert plain["gain"] is None
+
+
+def test_suction_and_a_load_error_are_named_together_with_a_test_that_parts_them(tied: Diagnosis) -> None:
+    v = tied.verdict
+    assert v.verdict == "named"
+    assert {c.mechanism for c in v.causes} == {"suction", "normal_load_error"}
+    assert set(v.equivalent[0]) == {"suction", "normal_load_error"}
+    assert v.next_test is not None
+    assert set(v.next_test.separates) == {"suction", "normal_load_error"}
+    assert v.next_test.expected_bits > 0.5
+
+
+def test_the_named_cause_gains_on_samples_it_has_not_seen(tied: Diagnosis) -> None:
+    g = tied.verdict.gain
+    assert g is not None
+    assert g.held_out == "samples"
+    assert g.difference > 2 * g.se > 0
+    assert g.rmse_percent_after < g.rmse_percent_before
+
+
+def test_every_mechanism_is_either_a_cause_or_excluded_with_a_reason(tied: Diagnosis) -> None:
+    from tribo.mechanisms.table import NAMES
+
+    v = tied.verdict
+    spoken_of = {c.mechanism for c in v.causes} | {e.mechanism.split(":")[0] for e in v.excluded}
+    assert spoken_of == set(NAMES)
+    reasons = {e.mechanism: e.reason for e in v.excluded}
+    assert "before contact" in reasons["load_cell_offset"]
+    assert "cannot be told" in reasons["velocity_dependence"]
+    assert "cannot be told" in reasons["pulley_friction"]
+
+
+def test_the_same_seed_gives_the_same_verdict_to_the_bit() -> None:
+    ingested = hidden(seed=8)
+    first, second = (examine(ingested, seed=4, replicates=(20, 10)).verdict.to_json() for _ in range(2))
+    assert first == second
+
+
+def test_too_few_tests_are_refused_with_what_is_needed() -> None:
+    ingested = hidden()
+    few = replace(ingested.campaign, tests=ingested.campaign.tests[:5])
+    with pytest.raises(FitError, match="at least 12"):
+        examine(replace(ingested, campaign=few))
+
+
+def test_no_difference_tells_nothing_and_a_large_one_tells_all() -> None:
+    assert bits(0.0) == pytest.approx(0.0, abs=1e-9)
+    assert 0.05 < bits(1.0) < 0.2
+    assert bits(400.0) == pytest.approx(1.0, abs=1e-3)
