@@ -100,9 +100,7 @@ def test_only_id_file_sample_and_a_load_are_required(folder: Path) -> None:
 
 
 def test_a_sample_is_a_pattern_or_a_pattern_with_its_direction(folder: Path) -> None:
-    write(
-        folder, ["T1,raw/T1.csv,Sx,S1,50,,,1,", "T2,raw/T2.csv,A,A1,50,,,1,", "T3,raw/T3.csv,Sy,S1,50,,,1,"]
-    )
+    write(folder, ["T1,raw/T1.csv,Sx,S1,50,,,1,", "T2,raw/T2.csv,A,A1,50,,,1,", "T3,raw/T3.csv,Sy,S1,50,,,1,"])
     campaign = load_campaign(folder)
     assert list(campaign.samples) == ["A", "Sx", "Sy"]
     assert campaign.samples["Sx"].name == "S"
@@ -166,9 +164,7 @@ def test_a_hand_written_reason_excludes_a_test(folder: Path) -> None:
         ("T2,raw/T2.csv,F,F1,50,,0.1", "wrong_number_of_cells", None),
     ],
 )
-def test_a_fault_of_one_row_sets_that_test_aside(
-    folder: Path, row: str, kind: str, column: str | None
-) -> None:
+def test_a_fault_of_one_row_sets_that_test_aside(folder: Path, row: str, kind: str, column: str | None) -> None:
     found = faults_of_a_row(folder, row)
     assert [(p.kind, p.row, p.column) for p in found] == [(kind, 3, column)]
 
@@ -193,6 +189,13 @@ def test_an_export_given_for_two_tests_is_used_for_none(folder: Path) -> None:
         ("duplicate_file", 2),
         ("duplicate_file", 3),
     }
+
+
+def test_tests_may_share_an_export_of_several_tables(folder: Path) -> None:
+    write(folder, ["T1,raw/T1.csv#1,F,F1,50,,,1,", "T2,raw/T1.csv#2,F,F1,50,,,2,"])
+    campaign = load_campaign(folder)
+    assert [t.file for t in campaign.tests] == ["raw/T1.csv#1", "raw/T1.csv#2"]
+    assert "raw/T1.csv" not in {p.file for p in campaign.problems}
 
 
 def test_a_link_that_leads_out_of_the_campaign_is_refused(
@@ -327,9 +330,7 @@ def _hostile(archive: Path, entry: zipfile.ZipInfo, data: bytes = b"x") -> tuple
     return caught.value.problems
 
 
-@pytest.mark.parametrize(
-    "name", ["../evil.txt", "/evil.txt", "raw/../../evil.txt", "C:/evil.txt", "..\\evil.txt"]
-)
+@pytest.mark.parametrize("name", ["../evil.txt", "/evil.txt", "raw/../../evil.txt", "C:/evil.txt", "..\\evil.txt"])
 def test_an_entry_that_leaves_the_folder_is_refused(folder: Path, tmp_path: Path, name: str) -> None:
     archive = zipped(folder, tmp_path / "c.zip")
     assert [p.kind for p in _hostile(archive, zipfile.ZipInfo(name))] == ["entry_outside"]

@@ -185,6 +185,76 @@ def test_an_override_that_names_nothing_offers_the_nearest_column(path: Path) ->
         read_export(path, columns={"displacment": "Extension"})
 
 
+@pytest.mark.parametrize("factor", [10.0, 0.1])
+def test_a_stretch_ten_times_off_its_neighbours_is_named(path: Path, dialect: Dialect, factor: float) -> None:
+    rows = ramp(40)
+    for k in range(20, 27):
+        rows[k][2] = f"{float(rows[k][2]) * factor:.5f}"
+    found = problems_of(path, written(rows, NAMES, UNITS, dialect))
+    assert [(p.kind, p.row, p.column) for p in found] == [("scale_jump", HEADER_ROWS + 21, "Load [N]")]
+
+
+def test_one_sample_ten_times_off_is_a_spike_and_not_for_the_reader(path: Path) -> None:
+    rows = ramp(40)
+    rows[20][2] = f"{float(rows[20][2]) * 10:.5f}"
+    path.write_bytes(written(rows, NAMES, UNITS))
+    assert read_export(path).flags == ()
+
+
+def test_a_gap_in_time_is_read_and_flagged_with_its_row(path: Path) -> None:
+    rows = ramp(40)
+    path.write_bytes(written(rows[:20] + rows[30:], NAMES, UNITS))
+    trace = read_export(path)
+    assert trace.flags == ("time_gap",)
+    assert [(p.kind, p.row, p.column) for p in trace.problems] == [("time_gap", HEADER_ROWS + 21, "Time [s]")]
+
+
+def test_wherever_an_export_breaks_off_it_is_noticed(path: Path, dialect: Dialect) -> None:
+    """Cut at every byte of the last rows; only a cut between two rows leaves a whole export."""
+    whole = written(ramp(), NAMES, UNITS, dialect)
+    text = whole.rstrip()
+    for cut in range(len(text) - 60, len(text)):
+        between_rows = whole[cut - 1 : cut] in b"\r\n" or whole[cut : cut + 1] in b"\r\n"
+        path.write_bytes(whole[:cut])
+        if between_rows:
+            read_export(path)
+            continue
+        with pytest.raises(ReadError) as caught:
+            read_export(path)
+        assert {p.kind for p in caught.value.problems} == {"truncated_mid_row"}
+
+
+@pytest.fixture
+def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files above 2 kB count as large: they are mapped, and read in pieces of 1 kB."""
+    monkeypatch.setattr("tribo.readers.source.MAPPED_BYTES", 2000)
+    monkeypatch.setattr("tribo.readers.source.CHUNK_BYTES", 1000)
+
+
+@pytest.mark.usefixtures("small_pieces")
+def test_a_large_file_read_in_pieces_gives_the_same_numbers(path: Path, dialect: Dialect) -> None:
+    rows = ramp(500)
+    path.write_bytes(written(rows, NAMES, UNITS, dialect))
+    np.testing.assert_array_equal(read_export(path).force_N, [float(row[2]) for row in rows])
+
+
+@pytest.mark.usefixtures("small_pieces")
+def test_damage_in_a_large_file_is_named_with_its_row(path: Path, dialect: Dialect) -> None:
+    rows = ramp(500)
+    rows[431][2] = "O.5"
+    rows[77][0] = rows[76][0] = ""
+    found = problems_of(path, written(rows, NAMES, UNITS, dialect))
+    assert [(p.kind, p.row) for p in found] == [
+        ("nan_gap", HEADER_ROWS + 77),
+        ("text_in_numbers", HEADER_ROWS + 432),
+    ]
+
+
+def test_a_file_above_the_limit_is_refused_without_reading_it(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tribo.readers.source.LARGEST_FILE_BYTES", 100)
+    assert [p.kind for p in problems_of(path, written(ramp(), NAMES, UNITS))] == ["too_large"]
+
+
 def test_the_spoiled_campaign_is_named_fault_by_fault_and_the_rest_reads_as_in_the_clean_one(
     shared: Path, practice: Callable[[str], Path]
 ) -> None:

@@ -211,7 +211,7 @@ def _file_faults(root: Path, row: TestRow) -> list[Problem]:
     name = row.cells["file"]
     place = (TESTS, row.row, "file", name)
     path = _relative(name)
-    if path is None or not (root / path).resolve().is_relative_to(root.resolve()):
+    if path is None or not (root / path).resolve().is_relative_to(root.resolve()):  # links are followed
         what = "the path points outside the campaign"
         return [Problem("path_outside_campaign", what, *place, "a path below the campaign folder")]
     if (root / path).is_file():
@@ -225,11 +225,17 @@ def _file_faults(root: Path, row: TestRow) -> list[Problem]:
 
 
 def _relative(name: str) -> PurePosixPath | None:
-    """A path inside the campaign, "/" between its parts; None for one that leaves it."""
-    path = PurePosixPath(name.replace("\\", "/"))
+    """A path inside the campaign, "/" between its parts, a "#2" (second table) dropped; None if it leaves it."""
+    path = PurePosixPath(re.sub(r"#\d+$", "", name.replace("\\", "/")))
     if path.is_absolute() or ".." in path.parts or "\0" in name or re.match(r"[A-Za-z]:", name):
         return None
     return path
+
+
+def _table_choice(name: str) -> str:
+    """The "#2" of "raw/all.csv#2", the second table of an export that holds several."""
+    found = re.search(r"#\d+$", name)
+    return found.group() if found else ""
 
 
 def _test(row: TestRow, described: CampaignFile) -> Test:
@@ -245,7 +251,7 @@ def _test(row: TestRow, described: CampaignFile) -> Test:
     directed = sample[-1:] if sample not in described.patterns else ""
     return Test(
         test_id=cells["test_id"],
-        file=str(_relative(cells["file"])),
+        file=f"{_relative(cells['file'])}{_table_choice(cells['file'])}",
         sample=sample,
         normal_load_N=load,
         specimen=cells.get("specimen") or sample,

@@ -16,6 +16,7 @@ from tribo.readers.source import Source
 from tribo.records import FloatArray
 
 _FOR_PANDAS_BYTES = 200_000  # numpy starts faster, pandas runs faster; both round to the nearest double
+_COMMA_TO_POINT = bytes.maketrans(b",", b".")
 _EXACT_BY_DEFAULT = (3, 1)  # from this pandas on; earlier ones are asked for the nearest double
 
 
@@ -34,7 +35,7 @@ def parse_block(source: Source, block: Block, used: Sequence[int]) -> FloatArray
     for chunk in source.chunks(block.start, block.end):
         values = parse_rows(chunk, block.layout, used)
         if values is None or not np.isfinite(values).all():
-            problems += find_damage(source.text(chunk), block.layout, used, source.file, row)
+            problems += find_damage(source.text(chunk).replace("\r\n", "\n"), block.layout, used, source.file, row)
             values = parse_rows(_without_blank_lines(chunk), block.layout, used) if not problems else None
             if values is None and not problems:
                 what = "the table cannot be read as numbers"
@@ -46,10 +47,29 @@ def parse_block(source: Source, block: Block, used: Sequence[int]) -> FloatArray
             pieces.append(values)
     if not problems and cut_short(source, block):
         chunk = bytes(source.data[block.start : block.end])
-        problems = find_damage(source.text(chunk), block.layout, used, source.file, block.layout.header_rows + 1, True)
+        problems = find_damage(
+            source.text(chunk).replace("\r\n", "\n"),
+            block.layout,
+            used,
+            source.file,
+            block.layout.header_rows + 1,
+            True,
+        )
     if problems:
         raise ReadError(problems)
-    return np.ascontiguousarray((pieces[0] if len(pieces) == 1 else np.concatenate(pieces)).T)
+    return _by_column(pieces)
+
+
+def _by_column(pieces: list[FloatArray]) -> FloatArray:
+    """Pieces of rows by columns as one array of columns by rows; each piece is let go once it is copied."""
+    joined = np.empty((pieces[0].shape[1], sum(len(piece) for piece in pieces)))
+    start = 0
+    pieces.reverse()
+    while pieces:
+        piece = pieces.pop()
+        joined[:, start : start + len(piece)] = piece.T
+        start += len(piece)
+    return joined
 
 
 def _without_blank_lines(chunk: bytes) -> bytes:
@@ -58,31 +78,21 @@ def _without_blank_lines(chunk: bytes) -> bytes:
 
 def parse_rows(rows: bytes, layout: Layout, used: Sequence[int]) -> FloatArray | None:
     """Rows by used columns, or None where a row or a cell is not as the others."""
-    plain = _plain(rows, layout)
-    if plain is None:
+    if b'"' in rows and rows.count(b'"') % 2:
         return None
     delimiter = None if layout.delimiter == " " else layout.delimiter
-    if layout.decimal == layout.delimiter == ",":
-        delimiter = ";"
+    if layout.decimal == ",":
+        if b"." in rows:
+            return None
+        if delimiter == ",":
+            rows, delimiter = rows.replace(b'","', b'";"'), ";"
+        rows = rows.translate(_COMMA_TO_POINT)
     try:
-        if len(plain) > _FOR_PANDAS_BYTES and delimiter is not None:
-            return _parse_many(plain, delimiter, layout.n_cells, used)
-        return _parse_few(plain, delimiter, layout.n_cells, used)
+        if len(rows) > _FOR_PANDAS_BYTES and delimiter is not None:
+            return _parse_many(rows, delimiter, layout.n_cells, used)
+        return _parse_few(rows.translate(None, delete=b'"'), delimiter, layout.n_cells, used)
     except (ValueError, OverflowError, IndexError):
         return None
-
-
-def _plain(rows: bytes, layout: Layout) -> bytes | None:
-    """Rows with decimal points and without quotes, or None where that cannot be done bytewise."""
-    if b'"' in rows:
-        if rows.count(b'"') % 2:
-            return None
-        if layout.decimal == layout.delimiter == ",":
-            rows = rows.replace(b'","', b'";"')
-        rows = rows.replace(b'"', b"")
-    if layout.decimal == ",":
-        return None if b"." in rows else rows.replace(b",", b".")
-    return rows
 
 
 def _parse_few(rows: bytes, delimiter: str | None, n_cells: int, used: Sequence[int]) -> FloatArray | None:

@@ -37,9 +37,11 @@ def find_damage(
     """Cells without a number and rows with too many or too few cells; runs of empty cells are one problem.
 
     ``first_row`` is the line of the file, from 1, that ``text`` begins with; ``breaks_off`` says that the last
-    row is known to be cut.
+    row is known to be cut. A last row without a line end that lacks its last number is cut as well.
     """
     lines = text.split("\n")
+    unfinished = bool(lines[-1].strip()) and layout.filled[-1] and not _ends_in_a_number(lines[-1], layout)
+    breaks_off = breaks_off or unfinished
     last = max((k for k, line in enumerate(lines) if line.strip()), default=-1)
     gaps: dict[int, list[int]] = {}
     problems: list[Problem] = []
@@ -56,6 +58,11 @@ def find_damage(
             problems += _cell_faults(lines[k], layout, used, file, first_row + k, gaps)
     problems += _gap_problems(layout, gaps, file)
     return sorted(problems, key=lambda p: p.row or 0)
+
+
+def _ends_in_a_number(line: str, layout: Layout) -> bool:
+    cell = cut(line, layout.delimiter)[-1]
+    return _not_a_number(cell, layout.decimal) is None
 
 
 def _row_fault(line: str, layout: Layout, file: str, row: int, is_last: bool, breaks_off: bool) -> Problem | None:

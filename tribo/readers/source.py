@@ -84,14 +84,13 @@ class Source:
         return start
 
     def chunks(self, start: int, end: int) -> Iterator[bytes]:
-        """Whole lines from ``start`` to ``end`` in pieces of bounded size, lines ending in ``\\n``."""
+        """Whole lines from ``start`` to ``end`` in pieces of bounded size."""
         while start < end:
             stop = end
             if end - start > CHUNK_BYTES:
                 stop = self.data.rfind(b"\n", start, start + CHUNK_BYTES) + 1
                 stop = stop if stop > start else end
-            piece = bytes(self.data[start:stop])
-            yield piece.replace(b"\r\n", b"\n") if isinstance(self.data, mmap.mmap) else piece
+            yield bytes(self.data[start:stop])
             start = stop
 
 
