@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tribo.report.diagnosis import write_verdict
     from tribo.report.drawings import write_figures
     from tribo.report.page import write_html
     from tribo.report.provenance import Provenance, gather_provenance
@@ -26,6 +27,7 @@ __all__ = [
     "write_store",
     "write_tables",
     "write_until",
+    "write_verdict",
 ]
 
 _HOME = {
@@ -40,6 +42,7 @@ _HOME = {
     "write_store": "store",
     "write_tables": "tables",
     "write_until": "write",
+    "write_verdict": "diagnosis",
 }
 
 

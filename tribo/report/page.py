@@ -17,6 +17,7 @@ from tribo.figures import select
 from tribo.figures.catalogue import FIGURES
 from tribo.records import REGIMES, Regime, Study
 from tribo.report import findings, wording
+from tribo.report.diagnosis import verdict_in_words
 from tribo.report.drawings import draw_all, inline_svg
 from tribo.report.files import write_text
 from tribo.report.numerals import ratio_text, significant, unbroken
@@ -34,13 +35,23 @@ def write_html(
     out: Path,
     provenance: Provenance | None = None,
     drawn: Mapping[str, str] | None = None,
+    verdict: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Write out/report.html. ``drawn`` are SVG texts by figure name where they are at hand already."""
-    return write_text(out / "report.html", html(study, provenance, drawn))
+    """Write out/report.html.
+
+    ``drawn`` are SVG texts by figure name where they are at hand already, ``verdict`` the diagnosis in the form
+    of verdict.json.
+    """
+    return write_text(out / "report.html", html(study, provenance, drawn, verdict))
 
 
-def html(study: Study, provenance: Provenance | None = None, drawn: Mapping[str, str] | None = None) -> str:
-    """The page as text: the same bytes for the same study and provenance."""
+def html(
+    study: Study,
+    provenance: Provenance | None = None,
+    drawn: Mapping[str, str] | None = None,
+    verdict: Mapping[str, Any] | None = None,
+) -> str:
+    """The page as text: the same bytes for the same study, provenance and verdict."""
     drawings = draw_all(study) if drawn is None else drawn
     shown = [_shown(name, svg) for name, svg in drawings.items() if name in FIGURES]
     return (
@@ -49,6 +60,7 @@ def html(study: Study, provenance: Provenance | None = None, drawn: Mapping[str,
         .render(
             study=study,
             campaign=study.ingested.campaign,
+            verdict=verdict_in_words(verdict) if verdict is not None else None,
             summary=_summary(study),
             table2=_table2(study),
             agreement=_agreement_tables(study),

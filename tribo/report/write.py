@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from tribo.records import Study
+from tribo.report.diagnosis import write_verdict
 from tribo.report.drawings import write_figures
 from tribo.report.provenance import Provenance, write_provenance
 from tribo.report.store import write_store
@@ -22,6 +23,7 @@ def write_until(
     until: str = "report",
     progress: Progress | None = None,
     provenance: Provenance | None = None,
+    verdict: Mapping[str, Any] | None = None,
 ) -> None:
     """Write what a walk as far as ``until`` (ingest, fit, compare or report) yields.
 
@@ -32,17 +34,23 @@ def write_until(
     write_store(study, out)
     if provenance is not None:
         write_provenance(provenance, out)
+    if verdict is not None:
+        write_verdict(verdict, out)
     if until not in ("compare", "report"):
         return
     drawn = write_figures(study, out, progress)
     if until == "report":
         from tribo.report.page import write_html
 
-        write_html(study, out, provenance=provenance, drawn=drawn)
+        write_html(study, out, provenance=provenance, drawn=drawn, verdict=verdict)
 
 
 def write_report(
-    study: Study, out: Path, progress: Progress | None = None, provenance: Provenance | None = None
+    study: Study,
+    out: Path,
+    progress: Progress | None = None,
+    provenance: Provenance | None = None,
+    verdict: Mapping[str, Any] | None = None,
 ) -> None:
-    """All of OUT: tables, campaign.nc, figures, report.html."""
-    write_until(study, out, "report", progress, provenance)
+    """All of OUT: tables, campaign.nc, figures, verdict.json where there is a verdict, report.html."""
+    write_until(study, out, "report", progress, provenance, verdict)

@@ -1,0 +1,39 @@
+"""verdict.json, and the verdict in words for a terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tribo.diagnose.verdict import Cause, Verdict
+from tribo.report.files import write_text
+from tribo.report.numerals import significant
+
+
+def write_verdict(verdict: Verdict, out: Path) -> Path:
+    """verdict.json (schema tribo.verdict/1), whole or not at all."""
+    return write_text(out / "verdict.json", verdict.to_json() + "\n")
+
+
+def verdict_text(verdict: Verdict) -> str:
+    """The verdict, its causes with intervals, what else was excluded or tied, the gain and the next test."""
+    lines = [f"{verdict.verdict.upper()}: {verdict.text}"]
+    lines += [f"  misfit: {m.text}" for m in verdict.misfits]
+    lines += [f"  cause: {_cause_line(c)}" for c in verdict.causes]
+    lines += [f"  cannot be parted by this design: {', '.join(names)}" for names in verdict.equivalent]
+    if verdict.gain is not None:
+        gain = verdict.gain
+        lines.append(
+            f"  gain on {gain.held_out} not seen: {gain.difference:.2f} +- {gain.se:.2f} in log score a test, "
+            f"RMSE {gain.rmse_percent_before:.1f} % before, {gain.rmse_percent_after:.1f} % after"
+        )
+    if verdict.next_test is not None:
+        lines.append(f"  next test: {verdict.next_test.text}")
+    return "\n".join(lines)
+
+
+def _cause_line(cause: Cause) -> str:
+    values = ", ".join(
+        f"{name} = {significant(e.value)} ({significant(e.low)} to {significant(e.high)}) {e.unit}".rstrip()
+        for name, e in cause.parameters.items()
+    )
+    return f"{cause.text} [{cause.mechanism}, weight {cause.weight:.2f}; 90 %: {values}]"
