@@ -25,8 +25,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "simulate": {"laws"},
     "mechanisms": {"laws"},
     "diagnose": {"laws", "fitting", "simulate", "mechanisms"},
-    "figures": {"laws", "published"},
-    "report": {"laws", "figures", "published"},
+    "figures": {"laws", "diagnose", "published"},
+    "report": {"laws", "diagnose", "figures", "published"},
 }
 EVERYONE = {"errors", "quantities", "records"}
 TOP = {"stages", "cli", "console", "bench", "__init__"}

@@ -107,6 +107,30 @@ def compare(console: Console, campaign: Path, out: Path, dry_run: bool, **option
 @main.command()
 @CAMPAIGN
 @OUT
+@click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off.")
+@command_options
+def diagnose(console: Console, campaign: Path, out: Path, rule: str, seed: int, **_: Any) -> int:
+    """What the calibrated model gets wrong, and why, or that it cannot be told: verdict.json."""
+    from tribo import stages
+    from tribo.campaign import open_campaign
+    from tribo.diagnose import diagnose as name_the_cause
+    from tribo.report import write_until
+    from tribo.report.verdict import verdict_text, write_verdict
+
+    with open_campaign(campaign) as opened, console.progress() as progress:
+        ingested = stages.ingest(opened, rule=rule, progress=progress)
+        verdict = name_the_cause(ingested, seed=seed, progress=progress)
+        write_until(stages.Study(ingested), out, "ingest")
+        write_verdict(verdict, out)
+    console.result(verdict.as_dict(), verdict_text(verdict))
+    if ingested.set_aside:
+        console.say(f"{len(ingested.set_aside)} tests set aside:\n{set_aside_text(ingested.set_aside)}", level=-1)
+    return status_of(ingested.set_aside)
+
+
+@main.command()
+@CAMPAIGN
+@OUT
 @DRY_RUN
 @_fit_options
 @_model_options
