@@ -63,9 +63,11 @@ FIGURES: dict[str, StudyFigure] = {
         StudyFigure(
             "fig8",
             "μ and τ₀ against contact area fraction",
-            "Fitted μ and τ₀ with their standard uncertainties, and a straight line in AF through the measured "
-            "values, all of the same weight. Points that would hide each other are moved aside a little. μ and "
-            "τ₀ of one fit are not independent: judge the model by the force at a load, not by these one by one.",
+            "Fitted μ and τ₀ with their standard uncertainties, and a straight line in AF through the "
+            "measured values, all of the same weight. Points that would hide each other are moved aside "
+            "a little; the simulated ones stand at the area fraction of the model's own lattice. μ and "
+            "τ₀ of one fit are not independent: judge the model by the force at a load, not by these one "
+            "by one.",
             area.numbers,
             area.draw,
         ),

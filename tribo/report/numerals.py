@@ -23,7 +23,8 @@ def with_uncertainty(value: float, u: float) -> str:
     decimals = max(0, 1 - math.floor(math.log10(u)))
     if value:
         decimals = min(decimals, max(0, 4 - math.floor(math.log10(abs(value)))))
-    return _signed(f"{value:.{decimals}f} ± {u:.{decimals}f}")
+    shown_u = f"{u:.{decimals}f}" if u >= 0.5 * 10.0**-decimals else f"<{10.0**-decimals:.{decimals}f}"
+    return _signed(f"{value:.{decimals}f} ± {shown_u}")
 
 
 def span(values: list[float], digits: int = 2) -> str:
