@@ -115,13 +115,12 @@ def diagnose(console: Console, campaign: Path, out: Path, rule: str, seed: int, 
     from tribo.campaign import open_campaign
     from tribo.diagnose import diagnose as name_the_cause
     from tribo.report import write_until
-    from tribo.report.verdict import verdict_text, write_verdict
+    from tribo.report.verdict import verdict_text
 
     with open_campaign(campaign) as opened, console.progress() as progress:
         ingested = stages.ingest(opened, rule=rule, progress=progress)
         verdict = name_the_cause(ingested, seed=seed, progress=progress)
-        write_until(stages.Study(ingested), out, "ingest")
-        write_verdict(verdict, out)
+        write_until(stages.Study(ingested), out, "ingest", verdict=verdict.as_dict())
     console.result(verdict.as_dict(), verdict_text(verdict))
     if ingested.set_aside:
         console.say(f"{len(ingested.set_aside)} tests set aside:\n{set_aside_text(ingested.set_aside)}", level=-1)
@@ -230,7 +229,7 @@ def _walk(console: Console, path: Path, out: Path, until: Until, dry_run: bool, 
     from tribo.campaign import open_campaign
     from tribo.report import gather_provenance, write_until
 
-    chosen = stages.StudyOptions(ensemble=None if dry_run else out / "ensemble.nc", **options)
+    chosen = stages.StudyOptions(**options)
     with open_campaign(path) as campaign:
         if dry_run:
             planned = stages.plan(campaign, chosen, until)

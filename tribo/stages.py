@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -45,7 +44,6 @@ class StudyOptions:
     runs: int = 4
     seed: int = 0
     jobs: int = 2
-    ensemble: Path | None = None  # where finished simulations are kept, so that an interrupted run resumes
 
     def as_words(self) -> dict[str, str]:
         """What was chosen, for the provenance."""

@@ -1,17 +1,9 @@
-"""verdict.json, and the verdict in words for a terminal."""
+"""The verdict in words for a terminal."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from tribo.diagnose.verdict import Cause, Verdict
-from tribo.report.files import write_text
 from tribo.report.numerals import significant
-
-
-def write_verdict(verdict: Verdict, out: Path) -> Path:
-    """verdict.json (schema tribo.verdict/1), whole or not at all."""
-    return write_text(out / "verdict.json", verdict.to_json() + "\n")
 
 
 def verdict_text(verdict: Verdict) -> str:
