@@ -36,6 +36,16 @@ def test_columns_of_the_law_itself_are_cleared_away() -> None:
     assert np.abs(left).max() < 1e-3 * np.abs(jacobian_at(f)).max() / 0.05
 
 
+def test_the_quick_score_is_that_of_the_cleared_columns() -> None:
+    f = baseline()
+    looks = [look for look in all_looks(f) if look.freedom == 1][:60]
+    left, target = cleared(f, np.concatenate([look.columns for look in looks], axis=2))
+    size = np.sqrt(np.sum(left**2, axis=0))
+    seen = size > 1e-3
+    quick = screen(f, looks, replicates=0, rng=np.random.default_rng(0)).strength
+    assert quick[seen] == pytest.approx(np.abs(left.T @ target / size)[seen], rel=1e-4, abs=1e-5)
+
+
 def test_an_effect_is_the_strongest_look_at_its_own_column() -> None:
     f = baseline(("run_in", 1.0))
     looks = all_looks(f)

@@ -10,8 +10,14 @@ _HOME = {
     "examine": "diagnosis",
     "Diagnosis": "diagnosis",
     "Verdict": "verdict",
+    "Plan": "plan",
+    "look_table": "tables",
+    "misfit_map": "tables",
+    "plan_design": "plan",
+    "residual_table": "tables",
     "tabled_predictor": "predictor",
     "simulated_predictor": "predictor",
+    "weighing_table": "tables",
 }
 __all__ = list(_HOME)
 

@@ -179,9 +179,14 @@ def prior_precision(s: Setup, noise: Noise) -> FloatArray:
 
 
 def whitened(s: Setup, noise: Noise, weight: FloatArray, columns: FloatArray) -> FloatArray:
-    """Columns (n, 2, k) in units of the weighted noise, shape (2n, k)."""
-    scaled = whitener(s, noise) * np.sqrt(weight)[:, None, None]
-    return (scaled @ columns).reshape(-1, columns.shape[2])
+    """Columns (n, 2, k) in units of the weighted noise, shape (2n, k), static rows first."""
+    factor = whitener(s, noise) * np.sqrt(weight)[:, None, None]
+    n = len(columns)
+    white = np.empty((2 * n, columns.shape[2]))
+    np.multiply(columns[:, 0], factor[:, 0, :1], out=white[:n])
+    np.multiply(columns[:, 1], factor[:, 1, 1:], out=white[n:])
+    white[n:] += columns[:, 0] * factor[:, 1, :1]
+    return white
 
 
 def _solve(

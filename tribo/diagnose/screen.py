@@ -108,19 +108,44 @@ def _strengths(
     f: ModelFit, stacked: FloatArray, spans: Sequence[slice]
 ) -> tuple[FloatArray, list[FloatArray]]:
     """Score test of each group of columns given the fitted model, as normal deviates, and its coefficients."""
-    left, target = cleared(f, stacked)
-    pull, squares = left.T @ target, np.sum(left**2, axis=0) + 1e-12
+    extra, crossed, target = _whitened_system(f, stacked)
+    pull = extra.T @ target - crossed[:, :-1].T @ crossed[:, -1]
+    squares = np.sum(extra**2, axis=0) - np.sum(crossed[:, :-1] ** 2, axis=0)
+    squares = np.maximum(squares, 1e-9 * np.sum(extra**2, axis=0) + 1e-12)
     freedom = np.array([span.stop - span.start for span in spans])
     chi2, coefficients = np.zeros(len(spans)), []
     for k, span in enumerate(spans):
         if freedom[k] == 1:
             solution = pull[span] / squares[span]
         else:
-            own = left[:, span].T @ left[:, span]
+            inner = crossed[:, span]
+            own = extra[:, span].T @ extra[:, span] - inner.T @ inner
             solution = np.linalg.solve(own + np.diag(1e-9 * squares[span]), pull[span])
         coefficients.append(solution)
         chi2[k] = pull[span] @ solution
     return deviate(chi2, freedom), coefficients
+
+
+def _whitened_system(f: ModelFit, stacked: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Whitened columns (2n, k), their part (q, k + 1) along the model, and the whitened residual (2n,).
+
+    The model's columns are law, mechanisms and random effects, these with their penalty; the last column of the
+    part is that of the residual. Inner products of whitened columns less those of their parts are scores and
+    informations of the marginal model.
+    """
+    from scipy.linalg import solve_triangular
+
+    s = f.setup
+    weight = weights(s, f.noise, f.residual - s.random @ f.effects)
+    model = np.concatenate([jacobian_at(f), s.random, f.residual[:, :, None]], axis=2)
+    white, extra = whitened(s, f.noise, weight, model), whitened(s, f.noise, weight, stacked)
+    columns, target = white[:, :-1], white[:, -1]
+    n_law = columns.shape[1] - s.random.shape[2]
+    normal = columns.T @ columns + np.diag(np.concatenate([np.zeros(n_law), prior_precision(s, f.noise)]))
+    scale = 1.0 / np.sqrt(np.diag(normal) + 1e-300)
+    root = np.linalg.cholesky(normal * scale[:, None] * scale[None, :] + 1e-9 * np.eye(len(scale)))
+    along = np.column_stack([columns.T @ extra, columns.T @ target]) * scale[:, None]
+    return extra, solve_triangular(root, along, lower=True, check_finite=False), target
 
 
 def cleared(f: ModelFit, stacked: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,141 @@
+"""Before anything is measured: which mechanisms a design would find, of which size, and which it confuses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tribo.diagnose.looks import candidates
+from tribo.diagnose.model import Acting, ModelFit, Noise, Setup, predict, setup
+from tribo.diagnose.observations import Observations, conditions_of, flat_sample
+from tribo.diagnose.predictor import Predictor, tabled_predictor
+from tribo.diagnose.screen import cleared
+from tribo.diagnose.weigh import ALIKE, unseen
+from tribo.mechanisms.table import MECHANISMS
+from tribo.records import Campaign, FloatArray
+
+PAPER_LAW = np.array([4.78, 23.44, 2.879, 11.89])  # mu and tau0 in kPa of the flat sample, Berardo 2019, Table 2
+TYPICAL = Noise(repeat=np.diag([0.09**2, 0.07**2]), specimen=np.array([0.05, 0.05]))
+FOUND = 3.6  # strength that chance reaches in one campaign of a hundred, over all looks
+NINE_IN_TEN = FOUND + 1.28
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a design would show of one mechanism.
+
+    ``amplitude`` (in ``unit``) and ``effect_percent`` (peak to peak of T) are found nine times in ten; both are
+    NaN where the design cannot show it, and ``why`` says so. ``confused_with`` looks the same in this design.
+    """
+
+    mechanism: str
+    amplitude: float
+    unit: str
+    effect_percent: float
+    confused_with: tuple[str, ...]
+    why: str
+    separates: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a design can tell, mechanism by mechanism, the easiest first."""
+
+    n_tests: int
+    findings: tuple[Finding, ...]
+
+    @property
+    def tied(self) -> tuple[tuple[str, ...], ...]:
+        """Sets that this design cannot tell apart."""
+        sets = {tuple(sorted((f.mechanism, *f.confused_with))) for f in self.findings if f.confused_with}
+        return tuple(sorted(sets))
+
+
+def plan_design(
+    campaign: Campaign, *, noise: Noise = TYPICAL, law: FloatArray = PAPER_LAW, predictor: Predictor | None = None
+) -> Plan:
+    """Sensitivity of a design to every mechanism, from tests.csv alone: no export has to exist.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The planned tests with the conditions under which they will be made.
+    noise : Noise
+        Expected standard deviations of ln T: repeats (2, 2) and specimens (2,).
+    law : array (4,)
+        Expected flat law: mu and tau0 in kPa, static then sliding.
+    """
+    f = _expected(campaign, noise, law, predictor)
+    s = f.setup
+    acting = _one_each(s, f.law)
+    columns = _changes(s, f.law, acting)
+    left = cleared(f, columns)[0]
+    size = np.sqrt(np.sum(left**2, axis=0))
+    cosine = (left.T @ left) / np.maximum(size[:, None] * size[None, :], 1e-12)
+    hidden = unseen(f)
+    found = [
+        _finding(k, acting, columns, size, cosine, hidden) for k in np.argsort(-size / np.ptp(columns, axis=(0, 1)))
+    ]
+    return Plan(s.observations.n, (*found, *_not_applying(s)))
+
+
+def _expected(campaign: Campaign, noise: Noise, law: FloatArray, predictor: Predictor | None) -> ModelFit:
+    """The model as it would be fitted if the campaign came out exactly as expected."""
+    tests = list(campaign.tests)
+    n, patterns = len(tests), dict(campaign.samples)
+    nothing = np.full(n, np.nan)
+    hours = np.array([8.0 + 0.1 * (k % 80) for k in range(n)])
+    o = Observations(
+        test_ids=np.array([t.test_id for t in tests], str), conditions=conditions_of(campaign, tests),
+        patterns=patterns, log_force=np.zeros((n, 2)), reading=np.full((n, 2), 0.005), zero_N=nothing,
+        zero_u_N=nothing, zero_slope_N_per_s=nothing, rise_N_per_m=nothing, stick_slip_N=nothing,
+        noise_N=nothing, clock_h=hours, day=np.array([t.started_at[:10] for t in tests], str),
+        flat=flat_sample(patterns),
+    )  # fmt: skip
+    s = setup(o, predictor or tabled_predictor(patterns))
+    q = s.random.shape[2]
+    s = replace(s, observations=replace(o, log_force=predict(s, law, (), ())))
+    return ModelFit(
+        s, (), law, (), noise, np.zeros(q), np.zeros((n, 2)), np.ones(n), 0.0, np.zeros((4 + q, 4 + q))
+    )  # fmt: skip
+
+
+def _one_each(s: Setup, law: FloatArray) -> list[Acting]:
+    """The first choice of every mechanism; every covariate by itself."""
+    seen: dict[str, Acting] = {}
+    for a in candidates(s, law):
+        seen.setdefault(a.name, a)
+    return list(seen.values())
+
+
+def _changes(s: Setup, law: FloatArray, acting: list[Acting]) -> FloatArray:
+    before = predict(s, law, (), ())
+    return np.stack([predict(s, law, (a,), (a.mechanism.start(),)) - before for a in acting], axis=2)
+
+
+def _finding(
+    k: int, acting: list[Acting], columns: FloatArray, size: FloatArray, cosine: FloatArray, hidden: dict[str, float]
+) -> Finding:
+    a = acting[k]
+    m = a.mechanism
+    if a.name in hidden:
+        why = "the free flat law takes it up"
+        return Finding(a.name, float("nan"), m.amplitude.unit, float("nan"), (), why, m.separates)
+    times = NINE_IN_TEN / max(float(size[k]), 1e-12)
+    alike = [
+        acting[j].name for j in np.flatnonzero(np.abs(cosine[k]) >= ALIKE) if j != k and acting[j].name not in hidden
+    ]
+    percent = 100.0 * float(np.expm1(min(times * float(np.ptp(columns[:, :, k])), 5.0)))
+    return Finding(a.name, times * m.amplitude.start, m.amplitude.unit, percent, tuple(alike), "", m.separates)
+
+
+def _not_applying(s: Setup) -> list[Finding]:
+    """Mechanisms whose columns this design does not vary, or that do not show in the friction forces."""
+    found = []
+    for m in MECHANISMS.values():
+        if m.name == "covariate" or (m.applies(s.observations.conditions) and m.regimes != ("rise",)):
+            continue
+        why = f"{', '.join(m.needs)} does not vary" if m.needs else "it shows in the shape of the trace only"
+        found.append(Finding(m.name, float("nan"), m.amplitude.unit, float("nan"), (), why, m.separates))
+    return found
