@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tribo.errors import TraceError
 from tribo.records import ExportFormat, Trace
-from tribo.traces import read_pull
+from tribo.traces import RULES, read_pull, read_pulls, split_pulls
 
 from .synthetic import Shape, with_samples
 
@@ -101,3 +104,37 @@ def test_a_sharp_apex_and_stick_slip_are_no_spikes() -> None:
     for shape in (Shape(fall_s=0.005), Shape(rise_s=0.1, noise_N=0.01), Shape(swing_N=1.0, swing_s=0.2, noise_N=0.01)):
         for seed in range(10):
             assert read_pull(shape.trace(seed)).problems == ()
+
+
+finite = st.floats(-1e6, 1e6)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    force=st.one_of(
+        st.lists(finite, min_size=20, max_size=300),
+        st.lists(st.sampled_from([0.0, 1.0, -1.0, 2.5]), min_size=20, max_size=300),
+    ),
+    even=st.booleans(),
+)
+def test_any_numbers_give_a_pull_or_a_named_problem(force: list[float], even: bool) -> None:
+    n = len(force)
+    time = np.arange(n) / 10 if even else np.sort(np.random.default_rng(n).random(n))
+    trace = Trace("any", time, np.array(force), displacement_m=np.linspace(0, 0.01, n))
+    for rule in RULES:
+        with suppress(TraceError):
+            pull = read_pull(trace, rule=rule)
+            assert np.isfinite(pull.static_N)
+            assert pull.static_u_N >= 0
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.sampled_from([0.0, 1.0, -1.0, 2.5, 2.6, -0.9]), min_size=20, max_size=400))
+def test_any_record_is_cut_into_pieces_in_order(force: list[float]) -> None:
+    record = Trace(
+        "any", np.arange(len(force)) / 10, np.array(force), columns={"normal_force_N": np.array(force[::-1])}
+    )
+    starts = [piece.time_s[0] for piece in split_pulls(record)]
+    assert starts == sorted(starts)
+    with suppress(TraceError):
+        read_pulls(record)

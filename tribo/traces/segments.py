@@ -18,6 +18,7 @@ _OF_SPAN = 0.2  # a step is at least this share of the span of its channel,
 _OF_LEVEL = 0.05  # this share of its level,
 _OF_NOISE = 6.0  # and this many times the noise of the difference
 _AT_REST = 0.05  # share of the largest speed below which nothing moves
+_FRAGMENT = 0.2  # share of the median piece below which a piece is what a cut left over
 _MIDDLE = (0.3, 0.7)  # share of a stroke in which its force is taken to tell its direction and zero
 
 
@@ -41,8 +42,8 @@ def split_pulls(trace: Trace) -> tuple[Trace, ...]:
 
     Load and speed are looked up in ``columns`` ("normal_force_N", "speed_m_s"). The passage from one steady load or
     speed to the next belongs to no pull. A start from rest is no step: what stands before it is the pull's zero. A
-    record without any of these comes back alone. Pieces are named ``name/1``, ``name/2``; pieces under twenty samples
-    are left out.
+    record without any of these comes back alone. Pieces are named ``name/1``, ``name/2``; those under twenty samples or
+    a fifth of the median are left out.
     """
     cuts = [(k, k) for k in reversals(trace.force_N)]
     if (load := trace.columns.get("normal_force_N")) is not None:
@@ -53,7 +54,9 @@ def split_pulls(trace: Trace) -> tuple[Trace, ...]:
         cuts += [(a, b) for a, b in steps(moving) if moving[max(a - 1, 0)] > rest]
     if not cuts:
         return (trace,)
-    kept = [(a, b) for a, b in between(cuts, trace.time_s.size) if b - a >= MINIMUM_SAMPLES]
+    stretches = [(a, b) for a, b in between(cuts, trace.time_s.size) if b - a >= MINIMUM_SAMPLES]
+    shortest = _FRAGMENT * float(np.median([b - a for a, b in stretches])) if stretches else 0.0
+    kept = [(a, b) for a, b in stretches if b - a >= shortest]
     return tuple(_piece(trace, a, b, f"{trace.name}/{k}") for k, (a, b) in enumerate(kept, start=1))
 
 
@@ -98,13 +101,13 @@ def steps(values: FloatArray) -> list[tuple[int, int]]:
     """
     n = values.size
     found: list[tuple[int, int]] = []
-    for width in (max(5, n // 100), max(5, n // 25)):
+    for width, sharp in ((max(5, n // 100), True), (max(5, n // 25), False)):
         span = float(np.ptp(np.percentile(running_mean(values, width), (1.0, 99.0)))) if n else 0.0
         least = max(_OF_SPAN * span, _OF_LEVEL * float(np.abs(values).max(initial=0.0)))
         found += [
             (start + a, start + b)
             for start, end in between(found, n)
-            for a, b in _steps_over(values[start:end], width, least)
+            for a, b in _steps_over(values[start:end], width, least, sharp)
         ]
     return sorted(found)
 
@@ -115,8 +118,8 @@ def between(passages: Sequence[tuple[int, int]], samples: int) -> list[tuple[int
     return list(zip([0, *(b for _, b in ordered)], [*(a for a, _ in ordered), samples], strict=True))
 
 
-def _steps_over(values: FloatArray, width: int, least: float) -> list[tuple[int, int]]:
-    """Steps of one stretch as means over ``width`` samples show them."""
+def _steps_over(values: FloatArray, width: int, least: float, sharp: bool) -> list[tuple[int, int]]:
+    """Steps of one stretch as means over ``width`` samples show them; a ``sharp`` one is a cut, a ramp is left out."""
     if values.size < 4 * width:
         return []
     before, after = _means_beside(values, width)
@@ -124,7 +127,8 @@ def _steps_over(values: FloatArray, width: int, least: float) -> list[tuple[int,
     noise = max(sample_noise(values) * math.sqrt(2.0 / width), median(jump))
     over = np.concatenate(([False], jump > max(least, _OF_NOISE * noise), [False]))
     edges = np.flatnonzero(np.diff(over))
-    return [_passage(jump, int(a), int(b), width) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    passages = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return [_cut(jump, a, b) if sharp and b - a <= 2 * width else (a, b) for a, b in passages]
 
 
 def _means_beside(values: FloatArray, width: int) -> tuple[FloatArray, FloatArray]:
@@ -135,12 +139,10 @@ def _means_beside(values: FloatArray, width: int) -> tuple[FloatArray, FloatArra
     return means[np.clip(index - width, 0, means.size - 1)], means[np.clip(index, 0, means.size - 1)]
 
 
-def _passage(jump: FloatArray, start: int, end: int, width: int) -> tuple[int, int]:
-    """A step, seen over two widths at most, is a cut at its steepest; a longer ramp is left out with its ends."""
-    if end - start <= 2 * width:
-        at = start + int(np.argmax(jump[start:end]))
-        return at, at
-    return start, end
+def _cut(jump: FloatArray, start: int, end: int) -> tuple[int, int]:
+    """A passage of no length where the step is steepest."""
+    at = start + int(np.argmax(jump[start:end]))
+    return at, at
 
 
 def orient_strokes(strokes: Sequence[Trace]) -> Strokes:

@@ -11,11 +11,14 @@ import numpy as np
 from tribo.errors import Problem, TraceError
 from tribo.records import Pull, Test, Trace
 from tribo.traces import quality
+from tribo.traces.contact import starting_level
 from tribo.traces.pull import read_pull
 from tribo.traces.segments import Strokes, orient_strokes, split_pulls
 from tribo.traces.sliding import settled, steady
+from tribo.traces.statistics import median_of_three
 
-_NO_PEAK = {"stopped_before_peak", "sign_flipped"}
+_NO_PEAK = {"stopped_before_peak", "sign_flipped", "spike"}
+_CLIMB_OVER_SWING = 5.0
 
 
 def read_pulls(
@@ -63,12 +66,21 @@ def pieces_of(traces: Trace | Sequence[Trace]) -> Strokes:
 def _read_piece(
     piece: Trace, rule: str, test: Test | None, parameters: Mapping[str, float] | None, zero: tuple[float, float] | None
 ) -> Pull:
+    if zero is None and _slides_at_once(piece):
+        return read_sliding(piece, zero=zero, rule=rule)
     try:
         return read_pull(piece, rule=rule, test=test, parameters=parameters, zero=zero)
     except TraceError as fault:
         if not {p.kind for p in fault.problems} <= _NO_PEAK:
             raise
     return read_sliding(piece, zero=zero, rule=rule)
+
+
+def _slides_at_once(piece: Trace) -> bool:
+    """Whether a piece begins near the force it keeps: above half its maximum, and climbing little for its swing."""
+    force = median_of_three(piece.force_N)
+    start, top = starting_level(force), float(force.max())
+    return start > 0.5 * top and top - start < _CLIMB_OVER_SWING * float(force[force.size // 2 :].std())
 
 
 def read_sliding(trace: Trace, *, zero: tuple[float, float] | None = None, rule: str = "seed") -> Pull:

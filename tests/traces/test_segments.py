@@ -1,0 +1,156 @@
+"""Records of many pulls: cut where they should be, brought to one sign, their zero from the asymmetry of strokes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tribo.errors import TraceError
+from tribo.records import Trace
+from tribo.traces import orient_strokes, read_pulls, split_pulls
+from tribo.traces.segments import reversals, steps
+from tribo.traces.strokes import load_of, pieces_of, sampling_clip_N, sampling_rate_Hz
+
+from .synthetic import Shape
+
+RATE = 100.0
+
+
+def reciprocating(
+    strokes: int = 6, friction: float = 1.0, zero: float = 0.2, noise: float = 0.01, seed: int = 0
+) -> Trace:
+    """Strokes of 4 s with a static peak 20 % above sliding, the force starting from where the last stroke left it."""
+    one = np.arange(int(4 * RATE)) / RATE
+    load = np.minimum(-friction + 2.2 * friction * one / 0.5, 1.2 * friction)
+    stroke = np.where(one < 0.5, load, friction * (1 + 0.2 * np.exp(-(one - 0.5) / 0.1)))
+    force = np.concatenate([(-1) ** k * stroke for k in range(strokes)])
+    time = np.arange(force.size) / RATE
+    return Trace("rig", time, force + zero + noise * np.random.default_rng(seed).standard_normal(force.size))
+
+
+def loaded_pulls(loads: tuple[float, ...], mu: float, tau0_A: float, seed: int = 0) -> Trace:
+    """Pulls from rest under one load after another in one record: mu N + tau0 A at the peak, 60 % of it sliding."""
+    rng = np.random.default_rng(seed)
+    force, load, speed = [], [], []
+    for n in loads:
+        shape = Shape(static_N=mu * n + tau0_A, sliding_N=0.6 * (mu * n + tau0_A), rate_Hz=RATE, zero_s=3, sliding_s=10)
+        time = np.arange(int(14.5 * RATE)) / RATE
+        force.append(shape.force(time))
+        load.append(np.full(time.size, n))
+        speed.append(np.where(time < 3.0, 0.0, 2e-4))
+    f, n, v = (np.concatenate(x) for x in (force, load, speed))
+    noisy = f + 0.01 * rng.standard_normal(f.size)
+    columns = {"normal_force_N": n + 0.005 * rng.standard_normal(n.size), "speed_m_s": v}
+    return Trace("several", np.arange(f.size) / RATE, noisy, columns=columns)
+
+
+def test_a_single_pull_comes_back_alone() -> None:
+    trace = Shape(noise_N=0.01, swing_N=0.3).trace()
+    assert split_pulls(trace) == (trace,)
+    load = 1.0 + 0.01 * np.random.default_rng(1).standard_normal(trace.time_s.size)
+    speed = np.where(trace.time_s < 2.0, 0.0, 2e-4)
+    pulled = replace(trace, columns={"normal_force_N": load, "speed_m_s": speed})
+    assert split_pulls(pulled) == (pulled,)
+
+
+@pytest.mark.parametrize("zero", [0.0, 0.2, -0.5])
+@pytest.mark.parametrize("strokes", [2, 3, 8])
+def test_strokes_are_cut_where_the_force_passes_its_middle(strokes: int, zero: float) -> None:
+    pieces = split_pulls(reciprocating(strokes, zero=zero))
+    assert len(pieces) == strokes
+    for k, piece in enumerate(pieces[1:], start=1):
+        assert 4.0 * k < piece.time_s[0] < 4.0 * k + 0.5
+    assert all(370 <= p.time_s.size <= 402 for p in pieces)
+
+
+@pytest.mark.parametrize("zero", [0.0, 0.2, -0.5])
+def test_the_zero_is_half_the_asymmetry_of_the_strokes(zero: float) -> None:
+    strokes = pieces_of(reciprocating(zero=zero))
+    assert strokes.zero_N == pytest.approx(zero, abs=0.01)
+    assert strokes.directions == (1, -1, 1, -1, 1, -1)
+    assert abs(strokes.zero_N - zero) < 4 * strokes.zero_u_N
+    for piece in strokes.traces:
+        assert float(np.median(piece.force_N)) == pytest.approx(1.0, rel=0.02)
+
+
+def test_strokes_of_both_directions_give_the_same_friction() -> None:
+    pulls = read_pulls(reciprocating(zero=0.3))
+    assert [p.test_id for p in pulls] == [f"rig/{k}" for k in range(1, 7)]
+    assert [p.sliding_N for p in pulls] == pytest.approx([1.0] * 6, rel=0.01)
+    assert [p.static_N for p in pulls] == pytest.approx([1.2] * 6, rel=0.03)
+    assert {p.zero_N for p in pulls} == {pieces_of(reciprocating(zero=0.3)).zero_N}
+    assert "forward" in pulls[0].flags
+    assert "backward" in pulls[1].flags
+
+
+def test_strokes_all_one_way_have_no_zero() -> None:
+    strokes = orient_strokes([Shape(noise_N=0.01, offset_N=0.3).trace()])
+    assert math.isnan(strokes.zero_N)
+    with pytest.raises(TraceError, match="no stroke"):
+        orient_strokes([])
+
+
+def test_several_loads_in_one_record_give_the_law() -> None:
+    loads = (0.5, 1.0, 2.0, 4.0)
+    record = loaded_pulls(loads, mu=0.8, tau0_A=0.4)
+    pieces = split_pulls(record)
+    pulls = read_pulls(record, rule="seed")
+    n = np.array([load_of(p)[0] for p in pieces])
+    assert n == pytest.approx(loads, rel=0.01)
+    mu, tau0_area = np.polyfit(n, [p.static_N for p in pulls], 1)
+    assert (mu, tau0_area) == pytest.approx((0.8, 0.4), rel=0.03)
+    mu, tau0_area = np.polyfit(n, [p.sliding_N for p in pulls], 1)
+    assert (mu, tau0_area) == pytest.approx((0.48, 0.24), rel=0.03)
+
+
+def test_a_step_of_load_while_sliding_gives_sliding_friction_without_a_static_peak() -> None:
+    time = np.arange(4000) / RATE
+    load = np.where(time < 10, 1.0, np.where(time < 20, 2.0, 4.0)) + 0.005 * np.sin(time)
+    force = 0.5 * np.where(time < 10, 1.0, np.where(time < 20, 2.0, 4.0)) + 0.02 * np.sin(40 * time)
+    pulls = read_pulls(Trace("steps", time, force, columns={"normal_force_N": load}))
+    assert [p.sliding_N for p in pulls] == pytest.approx([0.5, 1.0, 2.0], rel=0.01)
+    assert all(math.isnan(p.static_N) and "no_static" in p.flags for p in pulls)
+
+
+def test_a_step_of_speed_cuts_and_a_start_from_rest_does_not() -> None:
+    time = np.arange(3000) / RATE
+    speed = np.where(time < 5, 0.0, np.where(time < 15, 1e-3, 3e-3))
+    force = np.where(time < 5, 0.0, np.where(time < 15, 1.0, 1.3)) + 0.01 * np.random.default_rng(0).standard_normal(
+        3000
+    )
+    first, second = split_pulls(Trace("speeds", time, force, columns={"speed_m_s": speed}))
+    assert (first.time_s[0], second.time_s[0]) == pytest.approx((0.0, 15.0), abs=0.1)
+
+
+def test_the_passage_of_a_slow_ramp_belongs_to_neither_level() -> None:
+    values = np.concatenate([np.zeros(300), np.linspace(0, 10, 60), np.full(600, 10.0)])
+    ((end, start),) = steps(values)
+    assert 250 <= end <= 320
+    assert 340 <= start <= 410
+
+
+def test_noise_drift_and_oscillation_are_no_steps() -> None:
+    rng = np.random.default_rng(3)
+    index = np.arange(2000)
+    for values in (
+        1 + 0.1 * rng.standard_normal(2000),
+        1 + 0.02 * index / 2000,
+        1 + 0.3 * np.sin(index / 3),
+        np.full(2000, 3.0),
+    ):
+        assert steps(values) == []
+
+
+def test_a_force_of_one_sign_is_not_reversed() -> None:
+    assert reversals(Shape(noise_N=0.05).trace().force_N) == []
+
+
+def test_sampling_clip_is_half_the_rise_between_two_samples() -> None:
+    trace = Shape(rate_Hz=50).trace()
+    assert sampling_rate_Hz(trace) == pytest.approx(50)
+    assert sampling_clip_N(2.0, 50) == pytest.approx(0.02)
+    lost = [Shape(rate_Hz=50, zero_s=2 + k / 5000).trace().force_N.max() for k in range(100)]
+    assert 2.0 - np.mean(lost) < sampling_clip_N(2.0 / 1.5, 50) * 1.05
