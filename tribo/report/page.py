@@ -22,7 +22,7 @@ from tribo.report.drawings import draw_all, inline_svg
 from tribo.report.files import write_text
 from tribo.report.numerals import ratio_text, significant, unbroken
 from tribo.report.provenance import Provenance
-from tribo.report.pulls import pull_groups
+from tribo.report.pulls import odd_rows, pull_groups
 from tribo.report.tables import all_set_aside
 from tribo.report.text import fit_cells
 
@@ -69,6 +69,7 @@ def html(
             calibration=_calibration(study),
             set_aside=list(all_set_aside(study).values()),
             flags=_flag_counts(study),
+            odd_pulls=odd_rows(study),
             pull_groups=pull_groups(study),
             provenance=provenance,
             version=__version__,

@@ -10,9 +10,11 @@ from markupsafe import Markup
 from tribo.figures import select
 from tribo.records import Pull, Study, Test, Trace
 from tribo.report.numerals import significant, with_uncertainty
-from tribo.report.wording import flags_in_words
+from tribo.report.oddness import odd_pulls
+from tribo.report.wording import flags_in_words, odd_sentence
 
 WIDTH, HEIGHT = 120, 26
+MOST_ODD, ODD_POINTS = 24, 240
 PICTURE_BYTES = 3_000_000  # all pictures together, so that the page stays easy to send
 
 
@@ -21,6 +23,7 @@ class PullRow:
     """One pull as the page shows it."""
 
     test_id: str
+    sample: str
     specimen: str
     load: str
     static: str
@@ -46,10 +49,22 @@ def pull_groups(study: Study) -> list[tuple[str, list[PullRow]]]:
     return groups
 
 
+def odd_rows(study: Study) -> list[tuple[PullRow, str]]:
+    """The pulls that stand far from their siblings, the oddest first, each with a larger picture and the reason."""
+    tests = {t.test_id: t for t in study.ingested.campaign.tests}
+    found = [(tests[odd.test_id], odd) for odd in odd_pulls(study)[:MOST_ODD]]
+    ingested = study.ingested
+    return [
+        (_row(t, ingested.pulls[t.test_id], ingested.traces.get(t.test_id), ODD_POINTS), odd_sentence(odd))
+        for t, odd in found
+    ]
+
+
 def _row(test: Test, pull: Pull, trace: Trace | None, points: int) -> PullRow:
     start, end = pull.window_s
     return PullRow(
         test.test_id,
+        test.sample,
         test.specimen,
         significant(test.normal_load_N),
         with_uncertainty(pull.static_N, pull.static_u_N),
@@ -76,7 +91,7 @@ def trace_picture(trace: Trace, pull: Pull, points: int = 120) -> Markup:
     def y(f: float | np.ndarray) -> np.ndarray:
         return np.asarray(2 + (high - f) / (high - low) * (HEIGHT - 4))
 
-    path = "L".join(f"{a:.0f} {b:.1f}" for a, b in zip(x(time), y(force), strict=True))
+    path = "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(x(time), y(force), strict=True))
     marks = ""
     if np.isfinite([pull.peak_s, pull.static_N]).all():
         marks += f'<circle class="k" cx="{x(pull.peak_s):.0f}" cy="{y(pull.static_N):.1f}" r="2"/>'

@@ -11,6 +11,7 @@ from tribo.records import REGIMES, LawFit, Regime, Study
 from tribo.report import findings
 from tribo.report.findings import Agreement, DirectionRatio, Ranking, Verdict
 from tribo.report.numerals import counted, joined, percent, significant, span, with_uncertainty
+from tribo.report.oddness import OddPull
 from tribo.report.tables import PA_PER_KPA, all_set_aside
 
 SIDE: dict[Verdict, str] = {"model too high": "too high", "model too low": "too low"}
@@ -190,6 +191,15 @@ def correlation_note(study: Study) -> str:
         "fits above (from few specimens it is itself poorly known). Two fits can differ in both and still give the "
         "same forces, so a difference in μ alone or in τ₀ alone says little. Compare the friction "
         "force at each load, with the covariance taken into account."
+    )
+
+
+def odd_sentence(pull: OddPull) -> str:
+    """How far a pull stands from its siblings."""
+    side = "above" if pull.deviation > 0 else "below"
+    return (
+        f"{pull.regime.capitalize()} force {percent(abs(pull.deviation))} {side} the median of the {pull.siblings} "
+        f"other pulls of this sample at this load, {abs(pull.score):.1f} robust standard deviations."
     )
 
 

@@ -1,0 +1,67 @@
+"""Pulls that stand far from their siblings: same sample, same load. They are shown, never dropped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from tribo.figures import select
+from tribo.records import REGIMES, Regime, Study
+
+ODD_SCORE = 3.5  # modified z-score of Iglewicz and Hoaglin (1993)
+MAD_TO_SD = 1.4826  # of a normal distribution
+FEWEST_SIBLINGS = 2
+
+
+@dataclass(frozen=True)
+class OddPull:
+    """A pull, how far its force lies from the median of its siblings, and how many robust SDs that is."""
+
+    test_id: str
+    regime: Regime
+    deviation: float
+    score: float
+    siblings: int
+
+
+def odd_pulls(study: Study) -> list[OddPull]:
+    """Pulls with a modified z-score beyond 3.5, the oddest first; a pull odd in both regimes stands once.
+
+    Deviations are taken in ln T from the median of the other pulls of the sample at the load, and scaled by the
+    median absolute deviation over the whole campaign: one cell has too few pulls for a scale of its own.
+    """
+    table = study.ingested.table()
+    if table.empty:
+        return []
+    found: dict[str, OddPull] = {}
+    for regime in REGIMES:
+        for pull in _odd_in(table, regime):
+            if pull.test_id not in found or abs(pull.score) > abs(found[pull.test_id].score):
+                found[pull.test_id] = pull
+    return sorted(found.values(), key=lambda pull: (-abs(pull.score), pull.test_id))
+
+
+def _odd_in(table: pd.DataFrame, regime: Regime) -> list[OddPull]:
+    table = table[table[f"{regime}_N"] > 0]
+    level_N = select.load_levels(table["normal_load_N"].to_numpy(float))
+    log_force = np.log(table[f"{regime}_N"])
+    cells = log_force.groupby([table["sample"], level_N])
+    siblings = cells.transform("size") - 1
+    deviation = cells.transform(_from_the_others)
+    judged = siblings >= FEWEST_SIBLINGS
+    scale = MAD_TO_SD * float(deviation[judged].abs().median())
+    if not scale > 0:
+        return []
+    odd = judged & (deviation.abs() > ODD_SCORE * scale)
+    rows = zip(table["test_id"][odd], deviation[odd], siblings[odd], strict=True)
+    return [OddPull(str(i), regime, float(np.expm1(d)), float(d) / scale, int(n)) for i, d, n in rows]
+
+
+def _from_the_others(values: pd.Series) -> np.ndarray:
+    """Each value less the median of all the others; NaN for a value alone."""
+    x = values.to_numpy(float)
+    if len(x) < 2:
+        return np.full(len(x), np.nan)
+    return x - np.array([np.median(np.delete(x, k)) for k in range(len(x))])
