@@ -6,6 +6,7 @@ Files are shortened to their head and tail first, so that many mutants fit into 
 
 - refused: a ReadError, with problems;
 - same: read, with time and force from the same columns in the same units as the original;
+- another export spliced in: read as what the rest of another export says it is;
 - other columns: read, but from other columns or in other units. Where the mutation did not touch the header,
   this is a silent wrong column and a failure;
 - broken: any other exception, or more than SLOW_S seconds. A failure.
@@ -30,7 +31,7 @@ from tribo.errors import ReadError
 from tribo.readers import read_blocks
 
 SLOW_S = 5.0
-KEEP_HEAD_BYTES, KEEP_TAIL_BYTES = 7000, 1500
+KEEP_HEAD_BYTES, KEEP_TAIL_BYTES, LARGEST_BYTES = 7000, 1500, 200_000
 BY_POSITION = {"time": "#1 [s]", "friction force": "#2 [N]"}
 Mutation = Callable[[bytes, random.Random, list[bytes]], bytes]
 
@@ -136,7 +137,7 @@ def shortened(path: Path) -> bytes:
     """Head and tail of a file, cut at line ends; a binary file as it is."""
     data = path.read_bytes()
     if len(data) <= KEEP_HEAD_BYTES + KEEP_TAIL_BYTES or b"\0" in data[:2000]:
-        return data
+        return data[:LARGEST_BYTES]
     head, tail = data[:KEEP_HEAD_BYTES], data[-KEEP_TAIL_BYTES:]
     return head[: head.rfind(b"\n") + 1] + tail[tail.find(b"\n") + 1 :]
 
@@ -169,7 +170,7 @@ def load_seed(path: Path, scratch: Path) -> Seed:
     return Seed(path.name, data, len(header), columns, options)
 
 
-def judge(seed: Seed, mutant: bytes, scratch: Path) -> str:
+def judge(seed: Seed, mutant: bytes, spliced: bool, scratch: Path) -> str:
     scratch.write_bytes(mutant)
     began = time.perf_counter()
     try:
@@ -181,8 +182,10 @@ def judge(seed: Seed, mutant: bytes, scratch: Path) -> str:
         return "broken"
     if not columns:
         return "refused"
-    if columns <= seed.columns:
+    if columns <= seed.columns or seed.options:
         return "same"
+    if spliced:
+        return "another export spliced in"
     header_touched = mutant[: seed.header_bytes] != seed.data[: seed.header_bytes]
     return "other columns, header changed" if header_touched or not seed.columns else "other columns"
 
@@ -210,7 +213,7 @@ def main() -> int:
                 mutation = rng.choice(MUTATIONS)
                 mutant = mutation(mutant, rng, pool)
                 done.append(mutation.__name__)
-            verdict = judge(seed, mutant, scratch)
+            verdict = judge(seed, mutant, "splice" in done, scratch)
             counts[verdict] += 1
             if verdict in ("broken", "other columns"):
                 failed[f"{verdict}: {seed.name} after {', '.join(done)}"] += 1

@@ -45,6 +45,13 @@ _ALIASES = {
         temps d essai
         duree
         t
+        test zeit
+        temps ecoule
+        tiempo
+        tempo
+        tijd
+        total elapsed time
+        cycle elapsed time
     """,
     "friction force": """
         friction force
@@ -70,9 +77,29 @@ _ALIASES = {
         load cell
         axial force
         traction force 1
-        daq fx force
         effort
         last
+        tangential load
+        tangentialkraft
+        force tangentielle
+        horizontal force
+        pull force
+        pulling force
+        tensile force
+        sled force
+        fuerza de friccion
+        forza di attrito
+        fuerza
+        forza
+        forca
+        kracht
+        carga
+        force x
+        fx force
+        daq fx
+        tensile load
+        zugkraft
+        charge
     """,
     "displacement": """
         extension
@@ -100,6 +127,22 @@ _ALIASES = {
         x position
         x
         dx
+        tensile extension
+        tensile displacement
+        crosshead displacement
+        crosshead travel
+        axial extension
+        actuator displacement
+        sled displacement
+        travel
+        desplazamiento
+        spostamento
+        deslocamento
+        verplaatsing
+        extension en traction
+        disp
+        displ
+        xyz x position
     """,
     "normal force": """
         normal force
@@ -112,7 +155,13 @@ _ALIASES = {
         force normale
         fz
         fn
-        daq fz force
+        fz force
+        daq fz
+        nominal load
+        force z
+        carga normal
+        forza normale
+        fuerza normal
     """,
     "friction coefficient": """
         cof
@@ -122,17 +171,29 @@ _ALIASES = {
         daq cof
         mu
         reibwert
+        coefficient de frottement
+        reibungskoeffizient
+        reibzahl
+        reibungszahl
+        coefficiente di attrito
+        coeficiente de friccion
+        cof mu
     """,
     "temperature": """
         temperature
         temp
         temperatur
+        ambient temperature
+        room temperature
+        raumtemperatur
     """,
     "humidity": """
         humidity
         relative humidity
         rh
         feuchte
+        luftfeuchte
+        humidite
     """,
     "speed": """
         sliding velocity
@@ -212,6 +273,7 @@ _UNIT_EXPRESSION = re.compile(rf"{_FACTOR}(?:\s*[/*· ]\s*{_FACTOR})*")
 _NUMBER_BELOW = re.compile(r"/\s*([\d.]+\s*[^\W\d_]+)")
 
 
+_LONGEST_NAME = 80  # characters; longer cells are no column names
 _CHANNEL = re.compile(r"^\s*(?:c|ch|channel|kanal)[ _]?\d+[ _]", re.I)
 
 
@@ -219,7 +281,7 @@ def plain_name(text: str) -> str:
     """A column name without case, accents, units in brackets or punctuation: "Prüfzeit [s]" -> "prufzeit"."""
     text = re.sub(r"[\[(].*?[\])]", " ", text)
     text = _CHANNEL.sub("", text)
-    text = unicodedata.normalize("NFKD", text)
+    text = unicodedata.normalize("NFKD", text).replace("μ", "mu ")
     text = "".join(c for c in text if not unicodedata.combining(c)).lower()
     return re.sub(r"[^a-z0-9%]+", " ", text).strip()
 
@@ -280,4 +342,6 @@ def _spelled_out(word: str, quantity: str) -> str:
 @lru_cache(maxsize=1024)
 def match_quantity(name: str) -> tuple[str, int] | None:
     """(quantity, rank of the alias) for a column name, or None where nothing fits."""
+    if len(name) > _LONGEST_NAME:
+        return None
     return _RANKS.get(plain_name(name))

@@ -306,6 +306,32 @@ def test_a_torque_needs_its_lever(tmp_path: Path) -> None:
     np.testing.assert_allclose(trace.time_s, 0.1 * np.arange(8) + 0.05)
 
 
+SIDECARS = {
+    "toml": 'columns = ["Step", "Time [s]", {name = "Normal force", unit = "N"}, "Force [mN]", "x [um]", "n", "v"]',
+    "json": '{"columns": ["Step", "Time [s]", "Normal force [N]", "Force [mN]", "x [um]", "n", "v"]}',
+    "hdr": "# names\nStep\nTime [s]\nNormal force [N]\nForce [mN]\nx [um]\nn\nv\n",
+}
+
+
+@pytest.mark.parametrize("suffix", SIDECARS)
+def test_a_sidecar_names_the_columns_of_a_nameless_export(tmp_path: Path, suffix: str) -> None:
+    path = saved(tmp_path, NEWPORT)
+    path.with_suffix(f".{suffix}").write_text(SIDECARS[suffix])
+    trace = read_export(path)
+    np.testing.assert_allclose(trace.force_N, 0.002e-3 * np.arange(8), atol=1e-15)
+    assert trace.displacement_m is not None
+    np.testing.assert_allclose(trace.displacement_m, 499.725e-6)
+    assert trace.metadata["names of columns from"] == f"export.{suffix}"
+
+
+@pytest.mark.parametrize("text", ["{", '{"columns": 3}', '{"columns": ["Time [s]"]}'])
+def test_a_sidecar_that_does_not_fit_is_not_used(tmp_path: Path, text: str) -> None:
+    path = saved(tmp_path, NEWPORT)
+    path.with_suffix(".json").write_text(text)
+    with pytest.raises(ReadError, match="give its lever"):
+        read_export(path)
+
+
 def test_a_time_that_starts_again_cuts_a_table_into_traces(tmp_path: Path) -> None:
     lines = ["Step,Time (s),Fx (N)", *(f"{s},{0.1 * k:.2f},{0.01 * k * s:.3f}" for s in (1, 2, 3) for k in range(5))]
     path = saved(tmp_path, lines)

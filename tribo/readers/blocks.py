@@ -52,11 +52,11 @@ def split_blocks(source: Source, layout: Layout, named: Named) -> tuple[tuple[Bl
             footer = [text for text in source.text(bytes(source.data[start:])).split("\n") if text.strip()][:20]
             current = replace(current, end=start)
             break
+        begin = source.offset(start, following.header_rows - rows_above)
         if not any(named(name) or (name and match_column(name)) for name in following.names):
-            searched = found.end()
+            searched = max(begin, found.end())
             continue
         blocks.append(replace(current, end=start))
-        begin = source.offset(start, following.header_rows - rows_above)
         current = Block(following, begin, len(source.data))
         searched = begin
     blocks.append(current)

@@ -19,6 +19,7 @@ _ROW_OF_NUMBERS = re.compile(r'[\s";,|]*[-+]?[.,]?\d[-+\d\s.,;|"/:eEnaNA]*')
 _COMMA_NUMBER = re.compile(r"[-+]?(?:\d+,\d*|,\d+)(?:[eE][-+]?\d+)?")
 _DOT_NUMBER = re.compile(r"[-+]?(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _ROWS_LOOKED_AT = 6
+_HEADER_LINES_LOOKED_AT = 200
 _BLANK = ' \t;,"|'
 
 
@@ -124,7 +125,7 @@ def _mostly_numbers(line: str, following: str) -> bool:
 
 
 def _no_numbers(lines: Sequence[str], named: Named, file: str, rows_above: int) -> Problem:
-    for k, line in enumerate(lines):
+    for k, line in enumerate(lines[:_HEADER_LINES_LOOKED_AT]):
         for delimiter in "\t;,|":
             if sum(_known(cell, named) for cell in cut(line, delimiter)) >= 2:
                 return Problem("header_only", "a header and no data row", file=file, row=rows_above + k + 1)

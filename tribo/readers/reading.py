@@ -16,6 +16,7 @@ from tribo.readers.checks import Finding, check_scale, check_time
 from tribo.readers.families import family_of
 from tribo.readers.family import Family
 from tribo.readers.layout import Layout, cut, sniff
+from tribo.readers.sidecar import names_beside
 from tribo.readers.source import Source
 from tribo.records import FloatArray
 
@@ -62,7 +63,7 @@ def read_source(source: Source, asked: tuple[Hint, ...]) -> Contents:
         layout = _layout_of_variables(source)
         return Contents((_read_block(source, family, Block(layout, 0, 0), asked),))
     named = partial(is_asked_for, hints=asked)
-    layout = sniff(source, named, source.start)
+    layout = _named_from_beside(source, sniff(source, named, source.start))
     beside = list(side_by_side(layout))
     if beside:
         parts = [_specimen(source, layout, columns, label) for label, columns in beside]
@@ -75,6 +76,14 @@ def read_source(source: Source, asked: tuple[Hint, ...]) -> Contents:
         if len(blocks) == 1 and blocks[0].end == whole.end:
             raise
     return replace(_gather([(source, block) for block in blocks], family, asked), footer=footer)
+
+
+def _named_from_beside(source: Source, layout: Layout) -> Layout:
+    """The layout with the names of a sidecar where the file itself has none."""
+    found = None if any(layout.names) or source.part else names_beside(source.path, layout.n_cells)
+    if found is None:
+        return layout
+    return replace(layout, names=found[0], metadata={**layout.metadata, "names of columns from": found[1]})
 
 
 def _gather(parts: Sequence[tuple[Source, Block]], family: Family, asked: tuple[Hint, ...]) -> Contents:
