@@ -192,13 +192,17 @@ EFFECTS: dict[str, Effect] = {
 }  # fmt: skip
 
 
+# These change what the law is given, so they come before those that change what it gives.
+FIRST = ("mislabelled_specimen", "suction", "normal_load_error", "pressure_dependent_friction")
+
+
 def hide(seed: int, effects: list[tuple[str, float]], design: Design = Design()) -> Bench:
     """A bench with the named effects at work, specimens and repeats drawn from ``seed``."""
     rng = np.random.default_rng(seed)
     tests = _table(design, rng)
     law = (rng.normal(4.8, 0.35), rng.normal(23, 1.8), rng.normal(3.0, 0.2), rng.normal(11.6, 0.5))
     bench = Bench(tests, law, _shares(rng))
-    for name, size in effects:
+    for name, size in sorted(effects, key=lambda e: e[0] not in FIRST):
         EFFECTS[name](bench, size, rng)
     specimens = {s: np.exp(rng.normal(0, design.specimen_sd, 2)) for s in sorted(set(tests["specimen"]))}
     gains = np.array([specimens[s] for s in tests["specimen"]])
