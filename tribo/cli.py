@@ -26,10 +26,10 @@ def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
         click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off."),
         click.option(
             "--weights",
-            type=click.Choice(["relative", "ratio", "force"]),
+            type=click.Choice(["relative", "ratio", "force", "repeats"]),
             default="relative",
             show_default=True,
-            help="Which scatter is alike at all loads: of T over its own size, of T/N = mu + tau0/p, or of T.",
+            help="What scatters alike at all loads: T over its own size, T/N = mu + tau0/p, T, or as repeats say.",
         ),
     ):
         function = option(function)
@@ -257,9 +257,12 @@ def _conclude(console: Console, study: Study, out: Path) -> int:
         "set_aside": set_aside_record(set_aside),
         "notes": [str(p) for p in study.ingested.campaign.problems] + list(study.notes),
         "fits": fits.where(fits.notna(), None).to_dict("records"),
+        "power": list(study.power),
+        "outlying": list(study.outlying),
     }
     words = [table2_text(study)] if study.fits else []
-    console.result(record, "\n\n".join([*words, summary_text(study)]))
+    looks = ["\n".join(lines) for lines in (study.power, study.outlying) if lines]
+    console.result(record, "\n\n".join([*words, summary_text(study), *looks]))
     if set_aside:
         console.say(f"{len(set_aside)} tests set aside:\n{set_aside_text(set_aside)}", level=-1)
     return status_of(set_aside)

@@ -314,7 +314,9 @@ class Study:
     ``fits`` holds the measured law of every sample and regime (T = mu N + tau0 A, the default weights),
     ``other_fits`` the same under other weights or laws. ``simulated`` is the ensemble, one row a run: sample,
     pressure_Pa, normal_load_N (p times the nominal area of the campaign), angle_deg, seed, static_N,
-    sliding_N. ``example_runs`` keeps a full force trace of the model per sample.
+    sliding_N. ``example_runs`` keeps a full force trace of the model per sample. ``budget`` is the uncertainty
+    budget of every fitted number, one row a component; ``power`` says what this campaign could have shown and
+    ``outlying`` which pulls and specimens stand far from their siblings.
     """
 
     ingested: Ingested
@@ -323,4 +325,7 @@ class Study:
     comparison: Comparison | None = None
     simulated: pd.DataFrame | None = None
     example_runs: tuple[Run, ...] = ()
+    budget: pd.DataFrame | None = None
+    power: tuple[str, ...] = ()
+    outlying: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

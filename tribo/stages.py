@@ -26,7 +26,7 @@ from tribo.records import (
 )
 
 Progress = Callable[[str, int, int], None]
-Weights = Literal["relative", "ratio", "force"]
+Weights = Literal["relative", "ratio", "force", "repeats"]
 Until = Literal["ingest", "fit", "compare", "report"]
 
 
@@ -185,7 +185,9 @@ def compare(
         prediction.calibration,
         flat,
     )
-    return Study(ingested, fits, (), comparison, prediction.table, prediction.example_runs, prediction.notes)
+    return Study(
+        ingested, fits, (), comparison, prediction.table, prediction.example_runs, notes=prediction.notes
+    )
 
 
 def study(
@@ -196,10 +198,35 @@ def study(
     if until == "ingest":
         return Study(ingested)
     fits = fit(ingested, weights=options.weights)
-    others = _other_fits(ingested, options)
-    if until == "fit":
-        return Study(ingested, fits, others)
-    return replace(compare(ingested, fits, options, progress=progress), other_fits=others)
+    walked = Study(ingested, fits) if until == "fit" else compare(ingested, fits, options, progress=progress)
+    return assess(walked, options)
+
+
+def assess(walked: Study, options: StudyOptions) -> Study:
+    """The fits of a study looked at from other sides: other weights and laws, budget, power, outlying pulls."""
+    import pandas as pd
+
+    from tribo.fitting import campaign_budgets, outlying_pulls, outlying_specimens, power_of_campaign
+
+    ingested = walked.ingested
+    table, area = ingested.table(), ingested.campaign.nominal_area_m2
+    budgets = campaign_budgets(ingested, walked.fits, weights=options.weights)
+    parts = [b.table().assign(sample=b.fit.sample, regime=b.fit.regime) for b in budgets]
+    power: list[str] = []
+    outlying: list[str] = []
+    for regime in REGIMES:
+        with suppress(FitError):
+            power += [p.text() for p in power_of_campaign(table, regime, area, weights=options.weights)]
+        for look in (outlying_pulls, outlying_specimens):
+            with suppress(FitError):
+                outlying += [found.text() for found in look(table, regime, area)]
+    return replace(
+        walked,
+        other_fits=_other_fits(ingested, options),
+        budget=pd.concat(parts, ignore_index=True) if parts else None,
+        power=tuple(power),
+        outlying=tuple(outlying),
+    )
 
 
 def _other_fits(ingested: Ingested, options: StudyOptions) -> tuple[LawFit, ...]:
@@ -212,7 +239,8 @@ def _other_fits(ingested: Ingested, options: StudyOptions) -> tuple[LawFit, ...]
     for regime in REGIMES:
         for weights in get_args(Weights):
             if weights != options.weights:
-                found += fit_samples(table, regime, area, weights=weights)
+                with suppress(FitError):  # "repeats" needs repeats, "ratio" loads above zero
+                    found += fit_samples(table, regime, area, weights=weights)
         mixed = (mixed_model(rows, regime, area) for _, rows in table.groupby("sample"))
         found += [fit for fit in mixed if fit is not None]
         with suppress(FitError):
