@@ -252,6 +252,7 @@ def test_without_one_usable_test_every_fault_is_listed(folder: Path) -> None:
             7,
             "no pitch_um",
         ),
+        (("true", 'true\n[columns]\ntiem = "T [s]"'), "wrong_value", "columns", 20, "did you mean time?"),
         (("true", "true\n[instrument]\nmas_u_g = 1.0"), "unknown_key", "instrument.mas_u_g", 21, "mass_u_g"),
     ],
 )

@@ -345,3 +345,17 @@ def match_quantity(name: str) -> tuple[str, int] | None:
     if len(name) > _LONGEST_NAME:
         return None
     return _RANKS.get(plain_name(name))
+
+
+_SHORT_NAMES = {"force": "friction force", "friction": "friction force", "load": "normal force"}
+
+
+def quantity_named(key: str) -> str | None:
+    """The quantity meant by a key such as "force", "normal_force", "time_s"; None where there is none."""
+    plain = key.strip().replace("_", " ").lower()
+    if plain in _SHORT_NAMES:
+        return _SHORT_NAMES[plain]
+    for q in QUANTITIES.values():
+        if plain == q.name or key.strip() == q.column:
+            return q.name
+    return None

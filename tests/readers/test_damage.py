@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -255,6 +257,42 @@ def test_a_file_above_the_limit_is_refused_without_reading_it(path: Path, monkey
     assert [p.kind for p in problems_of(path, written(ramp(), NAMES, UNITS))] == ["too_large"]
 
 
+def _first_export(practice: Callable[[str], Path], number: str) -> bytes:
+    return min((practice(number) / "raw").iterdir()).read_bytes()
+
+
+@pytest.mark.parametrize("number", ["01", "02", "03", "04"])
+@pytest.mark.parametrize(
+    ("kind", "spoil"),
+    [
+        ("empty", lambda lines: b""),
+        ("bom_only", lambda lines: b"\xef\xbb\xbf"),
+        ("header_only", lambda lines: b"".join(lines[: _header_rows(lines)])),
+        ("truncated_mid_row", lambda lines: b"".join(lines[:-40]) + lines[-40][:-9]),
+        ("text_in_numbers", lambda lines: b"".join([*lines[:90], lines[90].replace(b"0", b"O"), *lines[91:]])),
+        ("time_goes_back", lambda lines: b"".join([*lines[:300], *lines[240:]])),
+        ("two_decimal_marks", lambda lines: b"".join([*lines[:90], _doubled_mark(lines[90]), *lines[91:]])),
+    ],
+)
+def test_the_practice_exports_spoiled_are_named_in_every_dialect(
+    practice: Callable[[str], Path], path: Path, number: str, kind: str, spoil: Callable[[list[bytes]], bytes]
+) -> None:
+    lines = _first_export(practice, number).splitlines(keepends=True)
+    found = problems_of(path, spoil(lines))
+    assert {p.kind for p in found} == {kind}
+
+
+def _header_rows(lines: list[bytes]) -> int:
+    return next(k for k, line in enumerate(lines) if line.lstrip(b'"-')[:1].isdigit())
+
+
+def _doubled_mark(line: bytes) -> bytes:
+    """1.234 becomes 1.2.34 (or 1,2,34) in the last cell."""
+    cut = line.rstrip(b'"\r\n')
+    mark = b"," if b";" in line else b"."
+    return cut[:-2] + mark + cut[-2:] + line[len(cut) :]
+
+
 def test_the_spoiled_campaign_is_named_fault_by_fault_and_the_rest_reads_as_in_the_clean_one(
     shared: Path, practice: Callable[[str], Path]
 ) -> None:
@@ -274,6 +312,23 @@ def test_the_spoiled_campaign_is_named_fault_by_fault_and_the_rest_reads_as_in_t
             np.testing.assert_array_equal(trace.force_N, unspoiled.force_N)
             np.testing.assert_array_equal(trace.time_s, unspoiled.time_s)
     assert named == {where: {kind} for where, kind in truth.items() if kind not in of_traces}
+
+
+FUZZ = Path(__file__).parents[2] / "benchmarks" / "fuzz_readers.py"
+
+
+def test_a_sample_of_the_mutants_of_the_benchmark_fails_nowhere(
+    practice: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    spec = importlib.util.spec_from_file_location("fuzz_readers", FUZZ)
+    assert spec is not None
+    assert spec.loader is not None
+    fuzz = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "fuzz_readers", fuzz)
+    spec.loader.exec_module(fuzz)
+    files = [str(min((practice(number) / "raw").iterdir())) for number in ("01", "02", "03", "04")]
+    monkeypatch.setattr(sys, "argv", ["fuzz_readers", *files, "--mutants", "300", "--keep", str(tmp_path)])
+    assert fuzz.main() == 0, capsys.readouterr().out
 
 
 WHOLE = written(ramp(30), NAMES, UNITS, Dialect(quoted=True, above=("Specimen label,1",)))

@@ -51,7 +51,7 @@ def tables(draw: st.DrawFn) -> tuple[bytes, dict[str, np.ndarray]]:
     dialect = Dialect(
         delimiter=delimiter,
         decimal=draw(st.sampled_from(",.")) if delimiter != "," or quoted else ".",
-        encoding=draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "cp1252", "latin-1"])),
+        encoding=draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "cp1252", "latin-1"])),
         line_end=draw(st.sampled_from(["\n", "\r\n", "\r"])),
         quoted=quoted,
         units_row=draw(st.booleans()),

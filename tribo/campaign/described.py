@@ -9,9 +9,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from tribo.errors import Problem
+from tribo.quantities import QUANTITIES, quantity_named
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -92,12 +93,22 @@ class InstrumentTable(_Strict):
     sampling_rate_Hz: Positive | None = None
 
 
+def _only_quantities(columns: dict[str, str]) -> dict[str, str]:
+    names = [name.replace(" ", "_") for name in QUANTITIES]
+    for key in columns:
+        if quantity_named(key) is None:
+            near = difflib.get_close_matches(key, names, 1)
+            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
+            raise ValueError(f"{key} is no quantity; {hint}")
+    return columns
+
+
 class CampaignFile(_Strict):
     """The whole of campaign.toml."""
 
     campaign: CampaignTable
     patterns: Annotated[dict[str, PatternTable], Field(min_length=1)]
-    columns: dict[str, str] = {}
+    columns: Annotated[dict[str, str], AfterValidator(_only_quantities)] = {}
     instrument: InstrumentTable = InstrumentTable()
 
 

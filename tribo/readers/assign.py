@@ -9,13 +9,12 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from tribo.errors import Problem, ReadError
-from tribo.quantities import QUANTITIES, match_quantity, unit_factor
+from tribo.quantities import QUANTITIES, match_quantity, quantity_named, unit_factor
 
 NEEDED = ("time", "friction force")
 ASKED = "asked for"
 _BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^\[\]()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
 _AFTER_MARK = re.compile(r"^(.*\S)\s*(?:\s/|\sin\s|,\s|_)\s*([A-Za-zµμ°%][\w/µμ°%^·²-]*)$")
-_SHORT_NAMES = {"force": "friction force", "friction": "friction force", "load": "normal force"}
 _MEANS_NORMAL_BESIDE_FRICTION = {"load", "last", "applied load", "charge"}
 
 
@@ -46,17 +45,6 @@ class Assignment:
 
     columns: tuple[Column, ...]
     left_out: tuple[Problem, ...] = ()
-
-
-def quantity_named(key: str) -> str | None:
-    """The quantity meant by a key such as "force", "normal_force", "time_s"; None where there is none."""
-    plain = key.strip().replace("_", " ").lower()
-    if plain in _SHORT_NAMES:
-        return _SHORT_NAMES[plain]
-    for q in QUANTITIES.values():
-        if plain == q.name or key.strip() == q.column:
-            return q.name
-    return None
 
 
 def parse_columns(columns: Mapping[str, str] | None) -> tuple[Hint, ...]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tribo.errors import Problem, ReadError
-from tribo.readers.assign import NEEDED
+from tribo.readers.assign import NEEDED, match_column
 from tribo.readers.export import read_contents
 from tribo.readers.families import family_of, open_sources
 from tribo.readers.layout import sniff
@@ -234,7 +234,7 @@ def _missing(reading: Reading) -> tuple[str, ...]:
 def _doubts(reading: Reading, file: str) -> list[Problem]:
     label = {c.quantity: c.label for c in reading.assignment.columns}
     time, force = reading.arrays["time"], reading.arrays["friction force"]
-    doubts = []
+    doubts = _other_candidates(reading)
     step = np.diff(time)
     if step.size and np.percentile(step, 95) - np.percentile(step, 5) > _UNEVEN * max(np.median(step), 1e-12):
         found = f"{step.min():.4g} to {step.max():.4g} s"
@@ -252,6 +252,27 @@ def _doubts(reading: Reading, file: str) -> list[Problem]:
     for quantity, values in reading.arrays.items():
         if quantity not in NEEDED and values.size > 1 and not np.ptp(values) and not values[0]:
             doubts.append(Problem("all_zero", f"the {quantity} is zero throughout", file, None, label[quantity]))
+    return doubts
+
+
+def _other_candidates(reading: Reading) -> list[Problem]:
+    """Columns that could stand for a needed quantity as well as the one that was taken."""
+    layout = reading.block.layout
+    taken = {c.index for c in reading.assignment.columns}
+    doubts = []
+    for column in (c for c in reading.assignment.columns if c.quantity in NEEDED):
+        others = [
+            layout.names[k]
+            for k in range(layout.n_cells)
+            if k not in taken
+            and layout.filled[k]
+            and (hit := match_column(layout.names[k]))
+            and hit[0] == column.quantity
+        ]
+        if others:
+            what = f"the {column.quantity} could be {' or '.join(others)} as well"
+            place = (reading.source.file, layout.names_row, column.label)
+            doubts.append(Problem("other_candidate", what, *place))
     return doubts
 
 

@@ -111,12 +111,22 @@ def open_text(path: Path, file: str, raw: bytes | mmap.mmap) -> Source:
             raise _too_large(len(raw), MAPPED_BYTES, file)
         encoding = _WIDE_BOMS[bom]
         data: bytes | mmap.mmap = raw.decode(encoding, errors="replace").encode("utf-8")
+    elif isinstance(raw, bytes) and (wide := _wide_without_bom(raw[:HEAD_BYTES])):
+        encoding, data = wide, raw.decode(wide, errors="replace").encode("utf-8")
     elif b"\0" in raw[:HEAD_BYTES]:
         raise ReadError(Problem("binary", "not a text export", file=file, allowed="a text export"))
     else:
         encoding, data = ("utf-8-sig" if bom else _narrow_encoding(raw)), raw
     source = Source(path, file, data, encoding, start=len(bom) if bom == codecs.BOM_UTF8 else 0)
     return source if isinstance(data, mmap.mmap) else _with_one_line_ending(source, data)
+
+
+def _wide_without_bom(head: bytes) -> str:
+    """UTF-16 tells itself in a western text: every other byte is zero."""
+    for encoding, zeros, letters in (("utf-16-le", head[1::2], head[::2]), ("utf-16-be", head[::2], head[1::2])):
+        if len(zeros) > 8 and not any(zeros) and all(letters):
+            return encoding
+    return ""
 
 
 def _with_one_line_ending(source: Source, data: bytes) -> Source:
