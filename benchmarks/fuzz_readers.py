@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 import random
+import re
 import sys
 import tempfile
 import time
@@ -124,11 +125,10 @@ MUTATIONS: tuple[Mutation, ...] = (
 
 @dataclass(frozen=True)
 class Seed:
-    """A shortened export: its bytes, where its numbers begin, and the columns it is read from."""
+    """A shortened export: its bytes, and the columns it is read from."""
 
     name: str
     data: bytes
-    header_bytes: int
     columns: frozenset[tuple[str, str]]
     options: dict[str, str] | None = None  # columns by position, for an export that does not say enough
 
@@ -142,39 +142,43 @@ def shortened(path: Path) -> bytes:
     return head[: head.rfind(b"\n") + 1] + tail[tail.find(b"\n") + 1 :]
 
 
-def columns_of(path: Path, options: dict[str, str] | None = None) -> tuple[frozenset[tuple[str, str]], int]:
-    """(time and force columns with their units, header rows) a file is read with; nothing where it is refused."""
+def columns_of(path: Path, options: dict[str, str] | None = None) -> frozenset[tuple[str, str]]:
+    """Time and force columns with their units a file is read with; nothing where it is refused."""
     try:
         traces = read_blocks(path, columns=options)
     except ReadError as why:
         if not why.problems:
             raise AssertionError("refused without a reason") from why
-        return frozenset(), 0
+        return frozenset()
     found = set()
     for trace in traces:
         assert trace.source is not None
         assert trace.time_s.size == trace.force_N.size > 0
         found |= {(q, trace.source.columns[q]) for q in ("time", "friction force")}
-    return frozenset(found), traces[0].source.header_rows if traces[0].source else 0
+    return frozenset(found)
+
+
+def text_lines(data: bytes) -> list[bytes]:
+    """Lines with words in them: headers of all tables, and what mutations wrote into rows."""
+    return [line for line in data.split(b"\n") if re.search(rb"[A-Za-z]{2}|[a-z]_", line)]
 
 
 def load_seed(path: Path, scratch: Path) -> Seed:
     data = shortened(path)
     scratch.write_bytes(data)
     options = None
-    columns, header_rows = columns_of(scratch)
+    columns = columns_of(scratch)
     if not columns:
         options = BY_POSITION
-        columns, header_rows = columns_of(scratch, options)
-    header = b"\n".join(data.split(b"\n")[:header_rows])
-    return Seed(path.name, data, len(header), columns, options)
+        columns = columns_of(scratch, options)
+    return Seed(path.name, data, columns, options)
 
 
 def judge(seed: Seed, mutant: bytes, spliced: bool, scratch: Path) -> str:
     scratch.write_bytes(mutant)
     began = time.perf_counter()
     try:
-        columns, _ = columns_of(scratch, seed.options)
+        columns = columns_of(scratch, seed.options)
     except Exception:  # the point of the exercise is that nothing else is raised
         traceback.print_exc()
         return "broken"
@@ -186,7 +190,7 @@ def judge(seed: Seed, mutant: bytes, spliced: bool, scratch: Path) -> str:
         return "same"
     if spliced:
         return "another export spliced in"
-    header_touched = mutant[: seed.header_bytes] != seed.data[: seed.header_bytes]
+    header_touched = text_lines(mutant) != text_lines(seed.data)
     return "other columns, header changed" if header_touched or not seed.columns else "other columns"
 
 

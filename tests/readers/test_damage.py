@@ -327,7 +327,7 @@ def test_a_sample_of_the_mutants_of_the_benchmark_fails_nowhere(
     monkeypatch.setitem(sys.modules, "fuzz_readers", fuzz)
     spec.loader.exec_module(fuzz)
     files = [str(min((practice(number) / "raw").iterdir())) for number in ("01", "02", "03", "04")]
-    monkeypatch.setattr(sys, "argv", ["fuzz_readers", *files, "--mutants", "300", "--keep", str(tmp_path)])
+    monkeypatch.setattr(sys, "argv", ["fuzz_readers", *files, "--mutants", "124", "--keep", str(tmp_path)])
     assert fuzz.main() == 0, capsys.readouterr().out
 
 

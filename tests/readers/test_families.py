@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -364,6 +365,14 @@ def _as_cell(text: str) -> float | str | None:
         return float(text.replace(",", "."))
     except ValueError:
         return text or None
+
+
+def test_a_workbook_without_openpyxl_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    openpyxl.Workbook().save(tmp_path / "a.xlsx")
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    with pytest.raises(ReadError, match="pip install openpyxl"):
+        read_export(tmp_path / "a.xlsx")
 
 
 def test_every_sheet_of_a_workbook_is_looked_at(tmp_path: Path) -> None:

@@ -36,6 +36,9 @@ def open_workbook(path: Path, file: str) -> tuple[Source, ...]:
         sheets = _sheets(path)
     except ReadError:
         raise
+    except ImportError as why:
+        what, allowed = "reading .xlsx needs the package openpyxl", "pip install openpyxl, or save the sheet as text"
+        raise ReadError(Problem("needs_openpyxl", what, file=file, allowed=allowed)) from why
     except Exception as why:  # openpyxl raises many kinds on damaged files
         raise ReadError(Problem("bad_xlsx", f"not a readable .xlsx ({why})", file=file)) from why
     texts = {name: text for name, text in sheets.items() if text.strip()}
