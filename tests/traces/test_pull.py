@@ -126,8 +126,16 @@ def test_a_trace_that_starts_in_the_rise_has_no_zero_and_says_so() -> None:
     late = trace.time_s > 2.1
     pull = read_pull(Trace("late", trace.time_s[late], trace.force_N[late] - 0.3))
     assert "no_zero_phase" in pull.flags
-    assert math.isnan(pull.zero_u_N)
+    assert pull.zero_N == 0.0
+    assert pull.zero_u_N == pytest.approx((trace.force_N[late][0] - 0.3) / math.sqrt(3), abs=1e-9)
+    assert pull.static_u_N > pull.zero_u_N
     assert pull.static_N == pytest.approx(2.0, rel=0.01)
+
+
+def test_a_short_zero_before_a_long_rise_is_still_seen() -> None:
+    pull = read_pull(Shape(zero_s=0.5, rise_s=15, noise_N=0.01, offset_N=2.0).trace())
+    assert pull.zero_N == pytest.approx(2.0, abs=0.02)
+    assert pull.static_N == pytest.approx(2.0, rel=0.015)
 
 
 def test_pull_carries_rule_id_and_window_in_order() -> None:

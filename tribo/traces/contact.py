@@ -13,7 +13,7 @@ from tribo.traces.statistics import mean, median, running_mean, wander
 _LOW, _HIGH = 0.25, 0.75  # share of the first half-way level between which the slope of the rise is taken
 _DETECTABLE = 12.0  # a pull rises by at least this many times the sample noise
 _FEWEST_FOR_ZERO = 5
-_TOE = 0.1  # share of the rise left out before the loading line meets the zero
+_TOES = (0.1, 0.03, 0.01)  # share of the rise left out before the loading line meets the zero
 _CLIMBING = 0.3  # share of the loading line's pace above which a force before contact is no zero
 _SUBSTANTIAL = (
     0.3  # share of the range of a trace that a climb reaches at least to be the pull and not a touch before it
@@ -29,10 +29,7 @@ class Zero:
     u_N: float
     time_s: float
     wander_rate: float = 0.0
-
-    @property
-    def seen(self) -> bool:
-        return not math.isnan(self.u_N)
+    seen: bool = True
 
 
 @dataclass(frozen=True)
@@ -119,23 +116,22 @@ def departure(time_s: FloatArray, smooth: FloatArray, rise: Rise, margin: float)
 def zero_before(time_s: FloatArray, force: FloatArray, rise: Rise, noise: float) -> Zero:
     """Zero from the samples before contact: their mean without outliers and its uncertainty, correlation counted.
 
-    The zero phase ends a tenth of the rise before the loading line comes down to its level, so that a rounded
-    toe does not enter. With fewer than five samples, or if the force climbs all the way, no zero is seen.
+    The zero phase ends a tenth of the rise before the loading line comes down to its level, so that a rounded toe does
+    not enter; a thirtieth or a hundredth where less comes before. With fewer than five samples, or if the force climbs
+    all the way, no zero is seen: it is taken as 0, and may lie anywhere between 0 and the force the record starts at.
     """
-    level = median(force[: max(_FEWEST_FOR_ZERO, rise.first // 2)])
+    level = median(force[: max(_FEWEST_FOR_ZERO, rise.first // 4)])
     contact = rise.reaches(level)
-    last = int(np.searchsorted(time_s, contact - _TOE * (time_s[rise.last] - contact)))
-    if last < _FEWEST_FOR_ZERO:
-        return Zero(0.0, math.nan, float(time_s[0]))
-    before = force[:last]
-    slope, middle, level = line(time_s[:last], before)
-    if abs(slope) > _CLIMBING * rise.rate:
-        return Zero(0.0, math.nan, float(time_s[0]))
-    away = np.abs(before - level)
-    kept = before[away <= 4.0 * max(noise, math.sqrt(float(away @ away) / last))]
+    lasts = np.searchsorted(time_s, contact - np.array(_TOES) * (time_s[rise.last] - contact))
+    last = next((int(n) for n in lasts if n >= _FEWEST_FOR_ZERO), 0)
+    slope, middle, level = line(time_s[:last], force[:last]) if last else (math.inf, 0.0, 0.0)
+    by_noise = 3.0 * noise * math.sqrt(12.0 / last) / max(time_s[last - 1] - time_s[0], 1e-300) if last else 0.0
+    if abs(slope) > _CLIMBING * rise.rate + by_noise:
+        return Zero(0.0, abs(float(force[0])) / math.sqrt(3.0), float(time_s[0]), seen=False)
+    away = np.abs(force[:last] - level)
+    kept = force[:last][away <= 4.0 * max(noise, math.sqrt(float(away @ away) / last))]
     slow = wander(kept, float(time_s[last - 1] - time_s[0]))
-    u = max(slow.mean_u, noise / math.sqrt(last))
-    return Zero(mean(kept), u, middle, slow.rate)
+    return Zero(mean(kept), max(slow.mean_u, noise / math.sqrt(last)), middle, slow.rate)
 
 
 def smoothed(force: FloatArray) -> FloatArray:

@@ -57,7 +57,7 @@ def lay_out(trace: Trace, speed_m_s: float | None = None, zero: tuple[float, flo
     """
     if faults := quality.unreadable(trace):
         raise TraceError(faults)
-    time = np.asarray(trace.time_s, float)
+    time = quality.apart_in_time(np.asarray(trace.time_s, float))
     raw = np.asarray(trace.force_N, float)
     noise = noise_of(raw)
     spikes = quality.impulse_spikes(raw, noise)

@@ -73,7 +73,7 @@ def _reduce(motion: Motion, static: Apex, window: Window, rule: Rule, name: str,
     enough = end - start >= _FEWEST_SLIDING
     sliding = steady(time[start:end], force[start:end]) if enough else _NO_STEADY
     times = (float(time[start]), float(time[end - 1])) if enough else (math.nan, math.nan)
-    zero_u = motion.zero.u_N if motion.zero.seen else 0.0
+    zero_u = motion.zero.u_N
     static_wander, sliding_wander = _wander(motion, static, times)
     swing, period = _stick_slip(motion)
     return Pull(

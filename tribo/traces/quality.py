@@ -16,6 +16,7 @@ SPIKE_OVER_NOISE = 8.0
 SPIKE_OVER_NEIGHBOURS = 3.0
 SPIKE_WIDTHS = (1, 2)
 _NEIGHBOURS = 4
+_MOST_LISTED = 20
 _CHANCE_OF_FLAT_TOP = 1e-4
 _SHORTEST_FLAT_TOP = 4
 _COARSE = 0.5  # share of equal neighbours from which on a resolution is too coarse to tell clipping
@@ -44,7 +45,20 @@ def unreadable(trace: Trace) -> list[Problem]:
         at = int(np.argmax(back)) + 1
         found = f"{trace.time_s[at]:g} s after {trace.time_s[at - 1]:g} s"
         problems.append(Problem("time_goes_back", "the time runs back", trace.file, file_row(trace, at), "time", found))
+    if not problems and trace.time_s[0] == trace.time_s[-1]:
+        problems.append(Problem("time_stands_still", "all times are the same", trace.file or None, column="time"))
     return problems
+
+
+def apart_in_time(time_s: FloatArray) -> FloatArray:
+    """Times with samples that share a stamp spread evenly up to the next, the last ones at the pace of the record."""
+    new = np.concatenate(([True], np.diff(time_s) > 0))
+    if new.all():
+        return time_s
+    index = np.append(np.flatnonzero(new), time_s.size)
+    pace = (time_s[-1] - time_s[0]) / max(index[-2], 1)
+    stamps = np.append(time_s[new], time_s[-1] + pace * (index[-1] - index[-2]))
+    return np.asarray(np.interp(np.arange(time_s.size), index, stamps))
 
 
 def impulse_spikes(force: FloatArray, noise: float) -> NDArray[np.bool_]:
@@ -60,10 +74,14 @@ def impulse_spikes(force: FloatArray, noise: float) -> NDArray[np.bool_]:
     for width in SPIKE_WIDTHS:
         into, out = steps[:-width], steps[width:]
         height = np.where(into * out < 0, np.minimum(np.abs(into), np.abs(out)), 0.0)
-        for k in np.flatnonzero(height > SPIKE_OVER_NOISE * noise):
-            around = np.abs(np.concatenate((steps[max(0, k - _NEIGHBOURS) : k], steps[k + width + 1 :][:_NEIGHBOURS])))
-            if around.size and height[k] > SPIKE_OVER_NEIGHBOURS * around.max():
-                mask[k + 1 : k + 1 + width] = True
+        candidates = np.flatnonzero(height > SPIKE_OVER_NOISE * noise)
+        if candidates.size:
+            beside = np.concatenate((np.arange(-_NEIGHBOURS, 0), width + np.arange(1, _NEIGHBOURS + 1)))
+            near = np.abs(steps)[np.clip(candidates[:, None] + beside, 0, steps.size - 1)]
+            outside = (candidates[:, None] + beside < 0) | (candidates[:, None] + beside >= steps.size)
+            around = np.where(outside, 0.0, near).max(axis=1)
+            first = candidates[height[candidates] > SPIKE_OVER_NEIGHBOURS * around]
+            mask[(first[:, None] + 1 + np.arange(width)).ravel()] = True
     low, high = float(force[1:-1].min()), float(force[1:-1].max())
     for end in (0, -1):  # nothing shows whether the force came back: only what lies far beyond all else counts
         mask[end] = not low - (high - low) < force[end] < high + (high - low)
@@ -71,8 +89,9 @@ def impulse_spikes(force: FloatArray, noise: float) -> NDArray[np.bool_]:
 
 
 def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ...]:
-    """One Problem of kind ``spike`` a spiked sample, naming its row, time and value."""
-    return tuple(
+    """One Problem of kind ``spike`` a spiked sample, with its row, time and value; the last of many counts the rest."""
+    at = np.flatnonzero(spikes)
+    problems = [
         Problem(
             "spike",
             f"an impulse at {trace.time_s[k]:.6g} s; the sample is left out",
@@ -81,8 +100,12 @@ def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ..
             "force",
             f"{trace.force_N[k]:.6g} N",
         )
-        for k in np.flatnonzero(spikes)
-    )
+        for k in at[:_MOST_LISTED]
+    ]
+    if at.size > _MOST_LISTED:
+        what = f"{at.size - _MOST_LISTED} more impulses; the samples are left out"
+        problems.append(Problem("spike", what, trace.file or None, file_row(trace, int(at[_MOST_LISTED])), "force"))
+    return tuple(problems)
 
 
 def without_spikes(force: FloatArray, spikes: NDArray[np.bool_]) -> FloatArray:

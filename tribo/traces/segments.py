@@ -56,7 +56,7 @@ def split_pulls(trace: Trace) -> tuple[Trace, ...]:
         return (trace,)
     stretches = [(a, b) for a, b in between(cuts, trace.time_s.size) if b - a >= MINIMUM_SAMPLES]
     shortest = _FRAGMENT * float(np.median([b - a for a, b in stretches])) if stretches else 0.0
-    kept = [(a, b) for a, b in stretches if b - a >= shortest]
+    kept = [(a, b) for a, b in stretches if b - a >= shortest] or [(0, trace.time_s.size)]
     return tuple(_piece(trace, a, b, f"{trace.name}/{k}") for k, (a, b) in enumerate(kept, start=1))
 
 

@@ -66,7 +66,7 @@ def pieces_of(traces: Trace | Sequence[Trace]) -> Strokes:
 def _read_piece(
     piece: Trace, rule: str, test: Test | None, parameters: Mapping[str, float] | None, zero: tuple[float, float] | None
 ) -> Pull:
-    if zero is None and _slides_at_once(piece):
+    if zero is None and not quality.unreadable(piece) and _slides_at_once(piece):
         return read_sliding(piece, zero=zero, rule=rule)
     try:
         return read_pull(piece, rule=rule, test=test, parameters=parameters, zero=zero)
