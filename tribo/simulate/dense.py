@@ -47,9 +47,10 @@ def advance_dense(state: State, out: Samples, numerics: Numerics, until_step: in
     constant[lattice.contact] = 0.0
     planes[[OX, OY]] = constant.T.reshape(2, ny, nx)
     state.counts[CODE] = RUNNING
-    integrate(q[0], q[1], planes, lattice.contact.reshape(ny, nx), np.zeros(nx), state, out, numerics, until_step)
+    integrate(q[0], q[1], planes, lattice.contact.reshape(ny, nx), np.zeros((3, nx)), state, out, numerics, until_step)
     cells[:, k.QX : k.QY + 1] = q[:, 1:-1, 1:-1].reshape(2, -1).T
-    cells[:, k.GX : k.GY + 1] = numerics.stiffness * lattice.spring_forces(cells[:, k.QX : k.QY + 1]) + constant
+    with np.errstate(over="ignore", invalid="ignore"):  # the caller refuses a run that met such a number
+        cells[:, k.GX : k.GY + 1] = numerics.stiffness * lattice.spring_forces(cells[:, k.QX : k.QY + 1]) + constant
     for plane, column in ((VX, k.VX), (VY, k.VY), (SINCE, k.SINCE)):
         cells[:, column] = planes[plane].ravel()
     _rest_cavities(cells, lattice, numerics)
@@ -69,7 +70,7 @@ def integrate(
     qy: FloatArray,
     planes: FloatArray,
     contact: BoolArray,
-    along: FloatArray,
+    sums: FloatArray,
     s: State,
     out: Samples,
     c: Numerics,
@@ -81,9 +82,11 @@ def integrate(
             wrap(qx)
             wrap(qy)
         kick_all(qx, qy, planes, c.start + s.counts[STEP] * c.dt, c)
-        move_all(qx, qy, planes, along, c)
+        move_all(qx, qy, planes, sums, c)
         for x in range(c.nx):
-            s.totals[k.ALONG] += along[x]
+            s.totals[k.ALONG] += sums[0, x]
+            s.totals[k.FRICTION_WORK] += sums[1, x]
+            s.totals[k.VISCOUS_WORK] += sums[2, x] * c.mass * c.damping / c.dt
         s.counts[DENSE_STEPS] += 1
         moving = 0
         active = c.nx * c.ny
@@ -145,18 +148,23 @@ def kick_all(qx: FloatArray, qy: FloatArray, planes: FloatArray, t: float, c: Nu
 
 
 @compiled
-def move_all(qx: FloatArray, qy: FloatArray, planes: FloatArray, along: FloatArray, c: Numerics) -> None:
-    """Displace all blocks; ``along`` receives each column's displacement along the pull."""
-    along[:] = 0.0
+def move_all(qx: FloatArray, qy: FloatArray, planes: FloatArray, sums: FloatArray, c: Numerics) -> None:
+    """Displace all blocks; ``sums`` receives displacement along the pull, friction work and way squared by column."""
+    sums[:] = 0.0
+    along, work, ways2 = sums[0], sums[1], sums[2]
     for y in range(c.ny):
         x_row, y_row, v_x, v_y = qx[y + 1], qy[y + 1], planes[VX, y], planes[VY, y]
-        goes = planes[GOES, y]
+        goes, fd = planes[GOES, y], planes[FD, y]
         for x in range(c.nx):
             dx = c.dt * v_x[x]
             dy = c.dt * v_y[x]
             x_row[x + 1] += dx
             y_row[x + 1] += dy
             along[x] += dx * c.direction_x + dy * c.direction_y
+            way2 = dx * dx + dy * dy
+            way = math.sqrt(way2)
+            work[x] += way * sliding_threshold(fd[x], way / c.dt, c.law)
+            ways2[x] += way2
             v_x[x] *= goes[x]
             v_y[x] *= goes[x]
 

@@ -51,9 +51,15 @@ class Trajectory:
     first_peak_N: float
     first_peak_s: float
     first_failure_s: float
-    failed: NDArray[np.int64]  # blocks in the order of their first failures
-    dense_steps: int
-    active_block_steps: int
+    failed: NDArray[np.int64]  # blocks in the order of their failures, by number within one step
+    end_s: float  # may lie beyond the last sample
+    end_impulse_Ns: float
+    displacement_m: FloatArray  # (n, 2) at the end
+    velocity_m_s: FloatArray  # (n, 2) at the end
+    friction_work_J: float
+    viscous_work_J: float
+    dense_steps: int = 0
+    active_block_steps: int = 0
 
 
 def lattice_of(config: SimConfig) -> Lattice:
@@ -134,7 +140,7 @@ def run_fast(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Tra
                 advance_dense(state, samples, numerics, until, lattice)
         chunks.append(_first(samples, int(state.counts[k.N_SAMPLES])))
     _refuse_not_finite(state, numerics)
-    return _trajectory(chunks, state, numerics, failure)
+    return _trajectory(chunks, state, numerics, drive, failure)
 
 
 def _first(samples: k.Samples, n: int) -> k.Samples:
@@ -189,7 +195,7 @@ def _initial_state(
         neighbours=lattice.neighbours,
         lists=np.zeros((2, n + 1), np.int64),
         head=np.full(_RING, -1, np.int64),
-        failed=np.full(min(n, 64), -1, np.int64),
+        failed=np.full((2, min(n, 64)), -1, np.int64),
         counts=np.zeros(k.N_COUNTS, np.int64),
         totals=np.zeros(k.N_TOTALS),
     )
@@ -226,13 +232,15 @@ def _refuse_not_finite(state: k.State, numerics: k.Numerics) -> None:
 
 
 def _trajectory(
-    chunks: list[k.Samples], state: k.State, numerics: k.Numerics, failure: float
+    chunks: list[k.Samples], state: k.State, numerics: k.Numerics, drive: Drive, failure: float
 ) -> Trajectory:
     time, force, impulse, moving = (np.concatenate(part) for part in zip(*chunks, strict=True))
     totals = state.totals
     start = (0.0, numerics.start)
+    now = numerics.start + int(state.counts[k.STEP]) * numerics.dt
     at_start = numerics.force_rate * numerics.start
     found = totals[k.FIRST_FOUND] > 0
+    blocks, steps = state.failed[:, : state.counts[k.N_FAILED]]
     return Trajectory(
         time_s=np.concatenate([start, time]),
         force_N=np.concatenate([(0.0, at_start), force]),
@@ -243,7 +251,13 @@ def _trajectory(
         first_peak_N=float(totals[k.FIRST if found else k.PEAK]),
         first_peak_s=float(totals[k.FIRST_TIME if found else k.PEAK_TIME]),
         first_failure_s=failure,
-        failed=state.failed[: state.counts[k.N_FAILED]].copy(),
+        failed=blocks[np.lexsort((blocks, steps))],
+        end_s=now,
+        end_impulse_Ns=float(totals[k.INTEGRAL]),
+        displacement_m=state.cells[:-1, k.QX : k.QY + 1] + drive.follow * now,
+        velocity_m_s=state.cells[:-1, k.VX : k.VY + 1] + drive.follow,
+        friction_work_J=float(totals[k.FRICTION_WORK]),
+        viscous_work_J=float(totals[k.VISCOUS_WORK]),
         dense_steps=int(state.counts[k.DENSE_STEPS]),
         active_block_steps=int(state.counts[k.ACTIVE_STEPS]),
     )

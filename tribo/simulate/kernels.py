@@ -33,7 +33,8 @@ ASLEEP, ACTIVE, RIM, NOBODY = range(4)
 # State.counts
 N_ACTIVE, N_RIM, STEP, N_SAMPLES, N_FAILED, CODE, DENSE_STEPS, ACTIVE_STEPS, N_COUNTS = range(9)
 # State.totals
-ALONG, INTEGRAL, FORCE, PEAK, PEAK_TIME, FIRST, FIRST_TIME, FIRST_FOUND, N_TOTALS = range(9)
+ALONG, INTEGRAL, FORCE, PEAK, PEAK_TIME, FIRST, FIRST_TIME, FIRST_FOUND = range(8)
+FRICTION_WORK, VISCOUS_WORK, N_TOTALS = range(8, 11)
 RUNNING, FINISHED, NOT_FINITE, CROWDED = range(4)
 
 AGES = False  # whether the static threshold depends on the time at rest
@@ -47,7 +48,7 @@ class State(NamedTuple):
     neighbours: IntArray  # (n + 1, 8): E, W, N, S, NE, SW, NW, SE
     lists: IntArray  # (2, n + 1): active blocks, rim blocks
     head: IntArray  # failure queue: first block of each bucket, one bucket a step, used as a ring
-    failed: IntArray  # blocks in the order of their first failures, as far as the array reaches
+    failed: IntArray  # (2, m): the first m failures, block and step
     counts: NDArray[np.int64]
     totals: FloatArray
 
@@ -168,8 +169,9 @@ def activate(i: int, s: State) -> None:
     s.links[i, PLACE] = s.counts[N_ACTIVE]
     s.lists[0, s.counts[N_ACTIVE]] = i
     s.counts[N_ACTIVE] += 1
-    if s.links[i, CONTACT] and s.counts[N_FAILED] < len(s.failed):
-        s.failed[s.counts[N_FAILED]] = i
+    if s.links[i, CONTACT] and s.counts[N_FAILED] < s.failed.shape[1]:
+        s.failed[0, s.counts[N_FAILED]] = i
+        s.failed[1, s.counts[N_FAILED]] = s.counts[STEP]
         s.counts[N_FAILED] += 1
     for e in range(8):
         j = s.neighbours[i, e]
@@ -300,6 +302,8 @@ def move(s: State, c: Numerics) -> None:
     quarter = 0.25 * c.stiffness
     rest_speed = c.rest_force / math.sqrt(c.stiffness * c.mass)
     along = 0.0
+    friction = 0.0
+    viscous = 0.0
     k = s.counts[N_ACTIVE] - 1
     while k >= 0:  # from the end, so that the block that fills a gap has been seen
         i = s.lists[0, k]
@@ -309,6 +313,11 @@ def move(s: State, c: Numerics) -> None:
             continue
         dx = cells[i, VX] * c.dt
         dy = cells[i, VY] * c.dt
+        way2 = dx * dx + dy * dy
+        viscous += way2
+        if s.links[i, CONTACT] == 1:
+            way = math.sqrt(way2)
+            friction += way * sliding_threshold(cells[i, FD], way / c.dt, c.law)
         cells[i, QX] += dx
         cells[i, QY] += dy
         along += dx * c.direction_x + dy * c.direction_y
@@ -339,6 +348,8 @@ def move(s: State, c: Numerics) -> None:
             settle(i, s, c)
         k -= 1
     s.totals[ALONG] += along
+    s.totals[FRICTION_WORK] += friction
+    s.totals[VISCOUS_WORK] += viscous * c.mass * c.damping / c.dt
 
 
 @compiled
@@ -428,7 +439,7 @@ def start_lists(s: State, c: Numerics) -> None:
     s.links[:n, STATUS] = ASLEEP
     s.links[:, TOUCHED] = 0
     known = s.counts[N_FAILED]
-    s.counts[N_FAILED] = len(s.failed)
+    s.counts[N_FAILED] = s.failed.shape[1]
     for i in range(n):
         if s.cells[i, VX] != 0.0 or s.cells[i, VY] != 0.0:
             activate(i, s)

@@ -8,6 +8,7 @@ from tribo.errors import Problem, SimulationError
 from tribo.records import Run
 from tribo.simulate.config import SimConfig
 from tribo.simulate.engine import Trajectory, lattice_of, run_fast, thresholds_of
+from tribo.simulate.reference import run_reference
 
 
 def simulate(config: SimConfig) -> Run:
@@ -25,9 +26,8 @@ def simulate(config: SimConfig) -> Run:
     config.check()
     lattice = lattice_of(config)
     thresholds = thresholds_of(config, lattice)
-    if config.engine == "reference":
-        raise SimulationError(Problem("unsupported", "the reference engine is not part of this version yet"))
-    return run_of(config, run_fast(config, lattice, thresholds), float(lattice.area_fraction))
+    run = run_reference if config.engine == "reference" else run_fast
+    return run_of(config, run(config, lattice, thresholds), float(lattice.area_fraction))
 
 
 def run_of(config: SimConfig, trajectory: Trajectory, area_fraction: float) -> Run:
