@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tribo.errors import ReadError
-from tribo.readers import READERS, read_export
+from tribo.readers import READERS, columns_from_text, inspect_export, read_export
 
 from .tables import Dialect, ramp, written
 
@@ -174,3 +174,48 @@ def test_a_file_without_names_is_read_by_position(tmp_path: Path) -> None:
 def test_every_family_stands_in_the_table_with_a_sentence() -> None:
     assert list(READERS)[-1] == "delimited"
     assert all(name == family.name and family.text for name, family in READERS.items())
+
+
+def test_columns_of_a_command_line_are_split_at_the_right_commas() -> None:
+    text = "time=Clock, total [s], friction_force = #3 [N m / 2,5 mm],displacement=x=y [mm]"
+    assert columns_from_text(text) == {
+        "time": "Clock, total [s]",
+        "friction_force": "#3 [N m / 2,5 mm]",
+        "displacement": "x=y [mm]",
+    }
+    with pytest.raises(ReadError, match="QUANTITY=COLUMN"):
+        columns_from_text("time")
+
+
+def test_inspection_of_a_damaged_export_still_says_its_columns(tmp_path: Path) -> None:
+    rows = ramp()
+    rows[4][2] = "O.1"
+    path = tmp_path / "a.csv"
+    path.write_bytes(written(rows, NAMES, UNITS))
+    seen = inspect_export(path)
+    assert seen.refused
+    assert [c.quantity for c in seen.columns] == ["time", "displacement", "friction force"]
+    assert [p.kind for p in seen.problems] == ["text_in_numbers"]
+    assert not seen.advice
+    assert "row 7" in seen.in_words()
+
+
+def test_inspection_says_in_one_sentence_what_to_give(tmp_path: Path) -> None:
+    path = tmp_path / "bare.txt"
+    path.write_bytes(b"\n".join(b"\t".join(cell.encode() for cell in row) for row in ramp()))
+    assert inspect_export(path).advice == 'in columns: time = "#1 [unit]", friction_force = "#2 [unit]"'
+    assert not inspect_export(path, columns={"time": "#1 [s]", "force": "#3 [N]"}).refused
+
+
+def test_inspection_names_other_columns_that_would_do(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(written([[*row, row[2]] for row in ramp()], (*NAMES, "Force"), (*UNITS, "N")))
+    seen = inspect_export(path)
+    assert any(d.kind == "other_candidate" and "Force" in d.what for d in seen.doubts)
+    assert {c.quantity: c.name for c in seen.columns if c.quantity}["friction force"] == "Load"
+
+
+def test_inspection_never_raises_for_what_is_not_there(tmp_path: Path) -> None:
+    seen = inspect_export(tmp_path / "none.csv")
+    assert [p.kind for p in seen.problems] == ["missing"]
+    assert seen.record()["refused"] is True

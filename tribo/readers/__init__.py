@@ -5,18 +5,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from tribo.readers.assign import columns_from_text
     from tribo.readers.export import read_blocks, read_export
     from tribo.readers.families import READERS
     from tribo.readers.inspect import Inspection, inspect_export
 
 _HOME = {
     "READERS": "families",
+    "columns_from_text": "assign",
     "Inspection": "inspect",
     "inspect_export": "inspect",
     "read_blocks": "export",
     "read_export": "export",
 }
-__all__ = ["READERS", "Inspection", "inspect_export", "read_blocks", "read_export"]
+__all__ = ["READERS", "Inspection", "columns_from_text", "inspect_export", "read_blocks", "read_export"]
 
 
 def __getattr__(name: str) -> Any:

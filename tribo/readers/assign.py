@@ -70,6 +70,24 @@ def parse_columns(columns: Mapping[str, str] | None) -> tuple[Hint, ...]:
     return tuple(found)
 
 
+def columns_from_text(text: str) -> dict[str, str]:
+    """Columns as given on a command line: "time=Clock [s], friction_force=#3 [gf]".
+
+    Raises
+    ------
+    ReadError
+        bad_columns, for a part that is not QUANTITY=COLUMN.
+    """
+    found = {}
+    for part in re.split(r",(?=\s*\w[\w ]*=)", text):
+        key, equals, value = part.partition("=")
+        if not equals or not key.strip() or not value.strip():
+            allowed = "time=NAME [unit], friction_force=#3 [unit]"
+            raise ReadError(Problem("bad_columns", "not QUANTITY=COLUMN", found=part.strip(), allowed=allowed))
+        found[key.strip()] = value.strip()
+    return found
+
+
 def is_asked_for(name: str, hints: Sequence[Hint]) -> bool:
     """Whether a hint names this column."""
     return any(name in (hint.wanted, split_unit(hint.wanted)[0]) for hint in hints)

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tribo.errors import Problem, ReadError
-from tribo.readers.assign import NEEDED, match_column
+from tribo.quantities import quantity_named
+from tribo.readers.assign import NEEDED, Column, Hint, assign, match_column
 from tribo.readers.export import read_contents
 from tribo.readers.families import family_of, open_sources
-from tribo.readers.layout import sniff
-from tribo.readers.reading import Contents, Reading, split_at_restarts
+from tribo.readers.family import Family
+from tribo.readers.layout import Layout
+from tribo.readers.reading import Contents, Reading, layout_of, split_at_restarts
+from tribo.readers.source import Source
 from tribo.records import FloatArray
 
 _BASELINE_SHARE = 0.05  # of the largest force: a pull that starts above it has no zero phase
 _FLAT_TOP = 5  # equal samples at an extreme in a row
 _UNEVEN = 0.2  # spread of the time steps over their median
-_MARKS = {"\t": "tab", " ": "blanks", "": "none"}
+_MARKS = {"\t": "tab", " ": "blanks", "": "nothing", ",": "comma", ";": "semicolon", "|": "bar"}
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,11 @@ class TableSeen:
 
 @dataclass(frozen=True)
 class Inspection:
-    """What an export is. ``problems`` say why it cannot be read as it stands; ``doubts`` what to look at."""
+    """What an export is.
+
+    ``problems`` say why it cannot be read as it stands, ``advice`` in one sentence what to give so that it can;
+    ``doubts`` what to look at.
+    """
 
     file: str
     family: str = ""
@@ -70,6 +77,7 @@ class Inspection:
     missing: tuple[str, ...] = ()
     doubts: tuple[Problem, ...] = ()
     problems: tuple[Problem, ...] = ()
+    advice: str = ""
 
     @property
     def refused(self) -> bool:
@@ -97,6 +105,8 @@ class Inspection:
         lines += [f"  missing   {text}" for text in self.missing]
         lines += [f"  doubt     {problem}" for problem in self.doubts]
         lines += [f"  refused   {problem}" for problem in self.problems]
+        if self.advice:
+            lines.append(f"  give      {self.advice}")
         return "\n".join(lines)
 
 
@@ -111,37 +121,55 @@ def inspect_export(path: Path | str, *, columns: Mapping[str, str] | None = None
     try:
         contents = read_contents(path, columns, file)
     except ReadError as why:
-        return _refused(path, file, why.problems)
+        return _refused(path, file, why.problems, parse_hints(columns))
     return _read(file, contents)
 
 
-def _refused(path: Path, file: str, problems: tuple[Problem, ...]) -> Inspection:
+def parse_hints(columns: Mapping[str, str] | None) -> tuple[Hint, ...]:
+    """Columns asked for, without those that name no quantity."""
+    return tuple(Hint(q, wanted) for key, wanted in (columns or {}).items() if (q := quantity_named(key)))
+
+
+def _refused(path: Path, file: str, problems: tuple[Problem, ...], asked: tuple[Hint, ...]) -> Inspection:
     """As much as can be said about an export that cannot be read."""
     try:
         source = open_sources(path, file)[0]
     except ReadError:
         return Inspection(file, problems=problems)
     family = family_of(source)
-    known = Inspection(file, family.name, family.text, source.encoding, problems=problems)
-    if source.arrays:
-        seen = tuple(ColumnSeen(k + 1, name, "") for k, name in enumerate(source.names))
-        return Inspection(file, family.name, family.text, source.encoding, columns=seen, problems=problems)
+    seen = Inspection(file, family.name, family.text, source.encoding, problems=problems)
     try:
-        layout = sniff(source, lambda name: False, source.start)
+        layout = layout_of(source, asked)
     except ReadError:
-        return known
-    return Inspection(
-        file,
-        family.name,
-        family.text,
-        source.encoding,
-        layout.delimiter,
-        layout.decimal,
-        layout.header_rows,
-        tuple(ColumnSeen(k + 1, layout.names[k], layout.units[k]) for k in range(layout.n_cells)),
+        return seen
+    return replace(
+        seen,
+        delimiter=layout.delimiter,
+        decimal=layout.decimal,
+        header_rows=layout.header_rows,
+        columns=_columns(layout, _taken(source, family, layout, asked)),
         metadata=layout.metadata,
-        problems=problems,
+        advice=_advice(problems, family, layout),
     )
+
+
+def _taken(source: Source, family: Family, layout: Layout, asked: tuple[Hint, ...]) -> tuple[Column, ...]:
+    hints = asked + family.hints(source, layout)
+    try:
+        return assign(layout.names, layout.units, layout.filled, hints).columns
+    except ReadError:
+        return ()
+
+
+def _advice(problems: tuple[Problem, ...], family: Family, layout: Layout) -> str:
+    """What to give so that the export can be read, where that is a matter of names and units."""
+    if not all(p.kind in ("missing_column", "missing_unit", "unknown_unit") for p in problems):
+        return ""
+    if family.advice:
+        return family.advice
+    name = "NAME [unit]" if any(layout.names) else "#1 [unit]"
+    other = "NAME [unit]" if any(layout.names) else "#2 [unit]"
+    return f'in columns: time = "{name}", friction_force = "{other}"'
 
 
 def _read(file: str, contents: Contents) -> Inspection:
@@ -165,7 +193,7 @@ def _read(file: str, contents: Contents) -> Inspection:
         delimiter=layout.delimiter,
         decimal=layout.decimal,
         header_rows=layout.header_rows,
-        columns=_columns(first),
+        columns=_columns(layout, first.assignment.columns),
         tables=tuple(_table(part) for part in parts),
         other_tables=contents.others,
         metadata=layout.metadata,
@@ -176,9 +204,8 @@ def _read(file: str, contents: Contents) -> Inspection:
     )
 
 
-def _columns(reading: Reading) -> tuple[ColumnSeen, ...]:
-    layout = reading.block.layout
-    taken = {c.index: c for c in reading.assignment.columns}
+def _columns(layout: Layout, columns: tuple[Column, ...]) -> tuple[ColumnSeen, ...]:
+    taken = {c.index: c for c in columns}
     seen = []
     for k in range(layout.n_cells):
         column = taken.get(k)

@@ -59,11 +59,10 @@ def read_source(source: Source, asked: tuple[Hint, ...]) -> Contents:
         There is no table at all, or the one there is cannot be read.
     """
     family = family_of(source)
+    layout = layout_of(source, asked)
     if source.arrays:
-        layout = _layout_of_variables(source)
         return Contents((_read_block(source, family, Block(layout, 0, 0), asked),))
     named = partial(is_asked_for, hints=asked)
-    layout = _named_from_beside(source, sniff(source, named, source.start))
     beside = list(side_by_side(layout))
     if beside:
         parts = [_specimen(source, layout, columns, label) for label, columns in beside]
@@ -76,6 +75,20 @@ def read_source(source: Source, asked: tuple[Hint, ...]) -> Contents:
         if len(blocks) == 1 and blocks[0].end == whole.end:
             raise
     return replace(_gather([(source, block) for block in blocks], family, asked), footer=footer)
+
+
+def layout_of(source: Source, asked: tuple[Hint, ...]) -> Layout:
+    """The layout of the first table, names from a sidecar where the file has none.
+
+    Raises
+    ------
+    ReadError
+        There is no table.
+    """
+    if source.arrays:
+        n = len(source.names)
+        return Layout("", ".", 0, n, source.names, ("",) * n, (True,) * n)
+    return _named_from_beside(source, sniff(source, partial(is_asked_for, hints=asked), source.start))
 
 
 def _named_from_beside(source: Source, layout: Layout) -> Layout:
@@ -153,11 +166,6 @@ def _row_of(source: Source, block: Block, sample: int) -> int:
                 return row
         row -= 1  # a chunk ends with its last line's end
     return row
-
-
-def _layout_of_variables(source: Source) -> Layout:
-    n = len(source.names)
-    return Layout("", ".", 0, n, source.names, ("",) * n, (True,) * n)
 
 
 def _specimen(source: Source, layout: Layout, columns: tuple[int, ...], label: str) -> tuple[Source, Block]:
