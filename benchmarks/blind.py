@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 import numpy as np
 from blind.tribometer import EFFECTS, Design, hide, write
 
-SIZES = (0.25, 0.5, 1.0)
+SIZES = (0.4, 0.7, 1.0)
 LADDER = {"velocity_dependence": {"speeds_mm_s": (0.05, 0.2, 0.8)}, "contact_ageing": {"holds_s": (1.0, 10.0, 300.0)}}
 TIED = {"suction": {"suction", "normal_load_error"}, "normal_load_error": {"suction", "normal_load_error"}}
 PAIRS = (

@@ -23,7 +23,7 @@ LADDER = Design(samples=("F", "B", "C"), masses_g=(12.0, 50.0, 138.5), speeds_mm
 
 def verdict_on(folder: Path, seed: int, *effects: tuple[str, float], design: Design = QUICK) -> Verdict:
     campaign = load_campaign(write(hide(seed, list(effects), design), folder / "campaign", seed))
-    return examine(ingest(campaign), seed=seed, replicates=(60, 40)).verdict
+    return examine(ingest(campaign), seed=seed, replicates=(50, 30)).verdict
 
 
 @pytest.mark.parametrize("seed", [201, 202])

@@ -17,7 +17,7 @@ from tribo.records import SetAside
 from .synthetic import hidden
 
 KEYS = {"schema", "verdict", "misfits", "causes", "equivalent", "excluded", "gain", "set_aside", "next_test"}
-FEW = (60, 40)
+FEW = (40, 25)
 
 
 @pytest.fixture(scope="module")
@@ -94,3 +94,18 @@ def test_no_difference_tells_nothing_and_a_large_one_tells_all() -> None:
     assert bits(0.0) == pytest.approx(0.0, abs=1e-9)
     assert 0.05 < bits(1.0) < 0.2
     assert bits(400.0) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_batch_that_grips_more_is_named_by_its_column() -> None:
+    ingested = hidden(seed=21)
+    batches = {t.test_id: "abc"[k % 3] for k, t in enumerate(ingested.campaign.tests)}
+    tests = tuple(replace(t, covariates={"batch": batches[t.test_id]}) for t in ingested.campaign.tests)
+    gain = {"a": 1.0, "b": 1.0, "c": 1.2}
+    pulls = {
+        k: replace(p, static_N=p.static_N * gain[batches[k]], sliding_N=p.sliding_N * gain[batches[k]])
+        for k, p in ingested.pulls.items()
+    }
+    campaign = replace(ingested.campaign, tests=tests)
+    v = examine(replace(ingested, campaign=campaign, pulls=pulls), replicates=FEW).verdict
+    assert v.verdict == "named"
+    assert [c.mechanism for c in v.causes] == ["covariate:batch"]

@@ -84,3 +84,13 @@ def test_a_rigid_machine_leaves_the_rise_alone_and_equal_springs_halve_it() -> N
     stiffness = np.array([6000.0])
     assert np.array_equal(rise(np.array([0.0]), stiffness, conditions()), stiffness)
     assert rise(np.array([1 / 6000.0]), stiffness, conditions()) == pytest.approx(3000.0)
+
+
+def test_a_column_of_three_names_is_weighed_name_by_name() -> None:
+    from dataclasses import replace
+
+    c = replace(conditions(), columns={"batch": np.array(["a", "b", "c"] * 16), "oven_C": np.array(["70", "80"] * 24)})
+    m = MECHANISMS["covariate"]
+    assert m.choices(base(c), c) == ("batch is a", "batch is b", "batch is c", "oven_C")
+    after = m.law(np.array([0.2]), base(c), c, "batch is b").static_N / base(c).forces(c.normal_load_N).static_N
+    assert after[:3] == pytest.approx([1.0, np.exp(0.2), 1.0])

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tribo.diagnose.observations import Observations
 from tribo.diagnose.predictor import Predictor
+from tribo.mechanisms.covariate import column_of
 from tribo.mechanisms.record import Base, Forces, Mechanism
 from tribo.records import FloatArray
 
@@ -34,7 +35,7 @@ class Acting:
     def name(self) -> str:
         """The name a verdict uses: ``covariate:operator`` for a covariate."""
         if self.mechanism.name == "covariate":
-            return f"covariate:{self.choice}"
+            return f"covariate:{column_of(self.choice)}"
         return self.mechanism.name
 
 

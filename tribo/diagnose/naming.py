@@ -62,7 +62,26 @@ def name_causes(
         seen = _screen_left(model, replicates, rng, progress)
         if rivals:
             break
+    if len(causes) == MAX_CAUSES:
+        model, causes, rivals = _revisit(model, causes, rivals, excluded)
+        seen = _screen_left(model, replicates, rng, progress)
     return Named(model, tuple(causes), rivals, tuple(weighed), seen, seen.p_adjusted())
+
+
+def _revisit(
+    model: ModelFit,
+    causes: list[tuple[Candidate, ...]],
+    rivals: tuple[Candidate, ...],
+    excluded: Sequence[str],
+) -> tuple[ModelFit, list[tuple[Candidate, ...]], tuple[Candidate, ...]]:
+    """The first cause was picked before the second was known: pick it again beside the second."""
+    second = causes[-1][0].acting
+    alone = fit(model.setup, (second,), start=model)
+    ranked = weigh(alone, excluded)
+    if not ranked or rivals or ranked[0].fit.score <= model.score + CLOSE:
+        return model, causes, rivals
+    alike, others = _sort_rivals(alone, ranked)
+    return ranked[0].fit, [alike, causes[-1]], others
 
 
 def _is_real(candidate: Candidate, seen: Screen, level: float) -> bool:

@@ -7,43 +7,60 @@ import numpy as np
 from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, StringArray, Values, amplitude
 from tribo.records import FloatArray
 
+MOST_NAMES = 12
+IS = " is "
+
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str) -> Forces:
-    """T = T_b exp(g s), s the score of the column ``choice``; ``values`` = [g]."""
+    """T = T_b exp(g s), s the score of ``choice``: a column, or "batch is a" for one name of several."""
     before = base.forces(conditions.normal_load_N)
-    gain = np.exp(values[0] * score(conditions.columns[choice]))
+    gain = np.exp(values[0] * score(conditions, choice))
     return Forces(before.static_N * gain, before.sliding_N * gain)
 
 
-def score(column: StringArray) -> FloatArray:
-    """Numbers are standardised; of two names the first counts -1/2 and the second +1/2."""
+def score(conditions: Conditions, choice: str) -> FloatArray:
+    """Numbers are standardised; of two names the first counts -1/2 and the second +1/2; one of several counts 1."""
+    if choice in conditions.columns:
+        column = conditions.columns[choice]
+        numbers = _numbers(column)
+        if numbers is not None:
+            return np.asarray((numbers - numbers.mean()) / max(float(numbers.std()), 1e-300))
+        return np.where(column == np.unique(column)[0], -0.5, 0.5)
+    name, level = choice.split(IS, 1)
+    return np.asarray(conditions.columns[name] == level, float)
+
+
+def choices(base: Base, conditions: Conditions) -> tuple[str, ...]:
+    """Every column of numbers or of two names, and every name of a column of up to twelve."""
+    found: list[str] = []
+    for name, column in conditions.columns.items():
+        names = np.unique(column)
+        if len(names) < 2:
+            continue
+        if len(names) == 2 or _numbers(column) is not None:
+            found.append(name)
+        elif len(names) <= MOST_NAMES:
+            found += [f"{name}{IS}{level}" for level in names]
+    return tuple(found)
+
+
+def column_of(choice: str) -> str:
+    """The column a choice speaks of."""
+    return choice.split(IS, 1)[0]
+
+
+def _numbers(column: StringArray) -> FloatArray | None:
     try:
         numbers = np.asarray(column, float)
-        return np.asarray((numbers - numbers.mean()) / max(numbers.std(), 1e-300))
     except ValueError:
-        names = np.unique(column)
-        return np.where(column == names[0], -0.5, 0.5)
-
-
-def columns(base: Base, conditions: Conditions) -> tuple[str, ...]:
-    """Every recorded column of numbers, or of exactly two names."""
-    return tuple(name for name, column in conditions.columns.items() if _usable(column))
-
-
-def _usable(column: StringArray) -> bool:
-    names = np.unique(column)
-    if len(names) < 2:
-        return False
-    try:
-        return bool(np.all(np.isfinite(np.asarray(column, float))))
-    except ValueError:
-        return len(names) == 2
+        return None
+    return numbers if np.isfinite(numbers).all() else None
 
 
 MECHANISM = Mechanism(
     name="covariate",
     kind="any",
-    formula="T = T_b exp(g s), s the standardised column",
+    formula="T = T_b exp(g s), s the score of the column",
     parameters=(amplitude("g", "", -1.5, 1.5, 0.1, "ln T per standard deviation, or from name to name"),),
     law=law,
     sign=0,
@@ -53,5 +70,5 @@ MECHANISM = Mechanism(
     confused_with="whatever moved together with that column",
     separates="vary that column alone, in random order",
     silenced_by=("vary that column alone, in random order",),
-    choices=columns,
+    choices=choices,
 )
