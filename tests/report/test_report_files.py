@@ -129,3 +129,12 @@ def test_provenance_hashes_what_is_there(study: Study, tmp_path: Path) -> None:
     assert before.versions["numpy"] == np.__version__
     (tmp_path / "raw" / "T0001.csv").write_bytes(b"Export")
     assert gather_provenance(moved).inputs_digest != before.inputs_digest
+
+
+def test_naming_the_report_loads_none_of_the_heavy_libraries() -> None:
+    program = (
+        "import sys, tribo.report, tribo.figures\n"
+        "print([m for m in ('matplotlib', 'pandas', 'xarray', 'jinja2', 'scipy') if m in sys.modules])"
+    )
+    run = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+    assert run.stdout.strip() == "[]"

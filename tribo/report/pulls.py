@@ -83,7 +83,7 @@ def trace_picture(trace: Trace, pull: Pull, points: int = 120) -> Markup:
     time, force = time[np.isfinite(force)], force[np.isfinite(force)]
     if len(force) < 2 or time[-1] <= time[0]:
         return Markup("")
-    low, high = min(0.0, float(force.min())), max(float(force.max()), 1e-12)
+    low, high = min(0.0, float(force.min())), float(np.nanmax([*force, pull.static_N, 1e-12]))
 
     def x(t: float | np.ndarray) -> np.ndarray:
         return np.asarray((t - time[0]) / (time[-1] - time[0]) * WIDTH)
