@@ -100,6 +100,30 @@ def test_two_spiked_neighbours_and_several_impulses_are_listed() -> None:
     assert pull.sliding_N == pytest.approx(1.2, rel=0.01)
 
 
+def test_an_impulse_of_three_samples_on_the_peak_does_not_take_it() -> None:
+    trace = SHAPE.trace()
+    pull = read_pull(with_samples(trace, {k: trace.force_N[k] + 1.0 for k in (170, 171, 172)}))
+    assert [p.row for p in pull.problems] == [171, 172, 173]
+    assert pull.static_N == pytest.approx(2.0, rel=0.01)
+
+
+def test_a_peak_that_one_sample_saw_is_no_spike() -> None:
+    force = np.concatenate([np.zeros(50), [2.0], np.full(200, 1.2)]) + 0.01 * np.random.default_rng(0).standard_normal(
+        251
+    )
+    pull = read_pull(Trace("fast", np.arange(251) / 10, force))
+    assert pull.problems == ()
+    assert pull.static_N + 2 * pull.static_u_N > 1.95
+
+
+def test_a_gap_beside_the_peak_is_flagged_and_counted_in_its_uncertainty() -> None:
+    trace = SHAPE.trace()
+    kept = (trace.time_s < 3.3) | (trace.time_s > 3.55)
+    pull = read_pull(Trace("gap", trace.time_s[kept], trace.force_N[kept]))
+    assert "gap_at_peak" in pull.flags
+    assert abs(pull.static_N - 2.0) < 3 * pull.static_u_N
+
+
 def test_a_sharp_apex_and_stick_slip_are_no_spikes() -> None:
     for shape in (Shape(fall_s=0.005), Shape(rise_s=0.1, noise_N=0.01), Shape(swing_N=1.0, swing_s=0.2, noise_N=0.01)):
         for seed in range(10):

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from tribo.errors import Problem, TraceError
 from tribo.records import Pull, Test, Trace
 from tribo.traces.apex import Apex
@@ -16,6 +18,7 @@ from tribo.traces.sliding import Steady, steady, stick_slip
 from tribo.traces.statistics import wander
 
 _FEWEST_SLIDING = 10
+_GAP = 3.0
 _NO_STEADY = Steady(math.nan, math.nan, math.nan, math.nan)
 
 
@@ -131,6 +134,13 @@ def _rise_stiffness(motion: Motion) -> float:
     return motion.rise.rate / slope if slope > 0 else math.nan
 
 
+def _gap_at(motion: Motion, time_s: float) -> bool:
+    """Whether the samples on either side of a time lie further apart than ``_GAP`` mean steps of the record."""
+    time = motion.time_s
+    after = min(max(int(np.searchsorted(time, time_s)), 1), time.size - 1)
+    return float(time[after] - time[after - 1]) > _GAP * float(time[-1] - time[0]) / (time.size - 1)
+
+
 def _flags(motion: Motion, static: Apex, sliding: Steady, window: Window, rule: Rule, period: float) -> tuple[str, ...]:
     enough = not math.isnan(sliding.mean_N)
     asked = rule.parameters.get("length_m", 0.0)
@@ -139,6 +149,7 @@ def _flags(motion: Motion, static: Apex, sliding: Steady, window: Window, rule: 
     raised = {
         "no_zero_phase": not motion.zero.seen,
         "spike": bool(motion.problems),
+        "gap_at_peak": _gap_at(motion, static.time_s),
         "rounded_peak": static.shape == "rounded",
         "no_drop": enough and static.force_N - sliding.mean_N < 3.0 * math.hypot(static.u_N, sliding.u_N),
         "no_sliding": not enough,

@@ -14,7 +14,8 @@ from tribo.traces.statistics import sample_noise
 MINIMUM_SAMPLES = 20
 SPIKE_OVER_NOISE = 8.0
 SPIKE_OVER_NEIGHBOURS = 3.0
-SPIKE_WIDTHS = (1, 2)
+SPIKE_RETURN = 0.5
+SPIKE_WIDTHS = (1, 2, 3)
 _NEIGHBOURS = 4
 _MOST_LISTED = 20
 _CHANCE_OF_FLAT_TOP = 1e-4
@@ -62,18 +63,19 @@ def apart_in_time(time_s: FloatArray) -> FloatArray:
 
 
 def impulse_spikes(force: FloatArray, noise: float) -> NDArray[np.bool_]:
-    """Mask (n,) of one- or two-sample impulses: out and back by far more than noise and than the samples around.
+    """Mask (n,) of impulses of one to three samples: out and back by far more than noise and than the samples around.
 
-    A sample belongs to an impulse if the steps into and out of it have opposite signs and the smaller of the
-    two exceeds ``SPIKE_OVER_NOISE`` times the noise and ``SPIKE_OVER_NEIGHBOURS`` times the largest step
-    within ``_NEIGHBOURS`` samples on either side. The apex of a pull and stick-slip have like steps beside
-    them.
+    Samples belong to an impulse if the step out of them takes back the step into them to within half, and the smaller
+    of the two exceeds ``SPIKE_OVER_NOISE`` times the noise and ``SPIKE_OVER_NEIGHBOURS`` times the largest step within
+    ``_NEIGHBOURS`` samples on either side. The apex of a pull and stick-slip have like steps beside them, and a peak
+    seen by one sample does not fall back to where it came from.
     """
     steps = np.diff(force)
     mask = np.zeros(force.size, bool)
     for width in SPIKE_WIDTHS:
         into, out = steps[:-width], steps[width:]
-        height = np.where(into * out < 0, np.minimum(np.abs(into), np.abs(out)), 0.0)
+        height = np.minimum(np.abs(into), np.abs(out))
+        height = np.where(np.abs(into + out) < SPIKE_RETURN * height, height, 0.0)
         candidates = np.flatnonzero(height > SPIKE_OVER_NOISE * noise)
         if candidates.size:
             beside = np.concatenate((np.arange(-_NEIGHBOURS, 0), width + np.arange(1, _NEIGHBOURS + 1)))
