@@ -128,6 +128,27 @@ def test_a_row_of_another_length_is_named(path: Path, dialect: Dialect, change: 
     assert [(p.kind, p.row) for p in found] == [("wrong_number_of_cells", HEADER_ROWS + 10)]
 
 
+@pytest.mark.parametrize("n", [30, 20_000])
+def test_a_short_row_is_named_even_where_a_long_one_makes_up_for_it(path: Path, n: int) -> None:
+    """Columns that are not used count as well: a missing cell shifts those behind it."""
+    rows = [[f"{k}", "7", f"{0.04 * k:.3f}", f"{0.01 * k:.5f}"] for k in range(n)]
+    rows[9] = [rows[9][0], *rows[9][2:]]
+    rows[15] = ["0", *rows[15]]
+    found = problems_of(path, written(rows, ("No", "State", "Time", "Load"), ("", "", "s", "N")))
+    assert [(p.kind, p.row) for p in found] == [
+        ("wrong_number_of_cells", HEADER_ROWS + 10),
+        ("wrong_number_of_cells", HEADER_ROWS + 16),
+    ]
+
+
+def test_blank_lines_and_delimiters_in_quotes_are_no_damage(path: Path) -> None:
+    rows = [f'{0.04 * k:.3f},"held, then pulled",{0.01 * k:.3f}' for k in range(20)]
+    rows.insert(7, "")
+    rows += [",,", ",,"]
+    path.write_text("\n".join(["Time (s),Phase,Load (N)", *rows]) + "\n")
+    np.testing.assert_allclose(read_export(path).force_N, 0.01 * np.arange(20))
+
+
 def test_time_that_runs_back_is_named_at_the_first_earlier_row(path: Path, dialect: Dialect) -> None:
     rows = ramp()
     found = problems_of(path, written(rows[:12] + rows[6:], NAMES, UNITS, dialect))

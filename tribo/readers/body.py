@@ -11,7 +11,7 @@ import numpy as np
 from tribo.errors import Problem, ReadError
 from tribo.readers.blocks import Block
 from tribo.readers.damage import MOST_PROBLEMS, cut_short, find_damage
-from tribo.readers.layout import Layout
+from tribo.readers.layout import Layout, cut
 from tribo.readers.source import Source
 from tribo.records import FloatArray
 
@@ -35,8 +35,9 @@ def parse_block(source: Source, block: Block, used: Sequence[int]) -> FloatArray
     for chunk in source.chunks(block.start, block.end):
         values = parse_rows(chunk, block.layout, used)
         if values is None or not np.isfinite(values).all():
-            problems += find_damage(source.text(chunk).replace("\r\n", "\n"), block.layout, used, source.file, row)
-            values = parse_rows(_without_blank_lines(chunk), block.layout, used) if not problems else None
+            text = source.text(chunk).replace("\r\n", "\n")
+            problems += find_damage(text, block.layout, used, source.file, row)
+            values = None if problems else _parse_slowly(text, block.layout, used)
             if values is None and not problems:
                 what = "the table cannot be read as numbers"
                 problems.append(Problem("unreadable", what, file=source.file, row=row))
@@ -72,8 +73,13 @@ def _by_column(pieces: list[FloatArray]) -> FloatArray:
     return joined
 
 
-def _without_blank_lines(chunk: bytes) -> bytes:
-    return b"\n".join(line for line in chunk.split(b"\n") if line.strip(b' \t;,"|'))
+def _parse_slowly(text: str, layout: Layout, used: Sequence[int]) -> FloatArray | None:
+    """Row by row, for what the quick way cannot cut: blank lines inside, delimiters inside quotes."""
+    rows = [cut(line, layout.delimiter) for line in text.split("\n") if line.strip(' \t;,"|')]
+    try:
+        return np.array([[float(row[k].replace(layout.decimal, ".")) for k in used] for row in rows])
+    except (ValueError, IndexError):
+        return None
 
 
 def parse_rows(rows: bytes, layout: Layout, used: Sequence[int]) -> FloatArray | None:
@@ -97,18 +103,29 @@ def parse_rows(rows: bytes, layout: Layout, used: Sequence[int]) -> FloatArray |
 
 def _parse_few(rows: bytes, delimiter: str | None, n_cells: int, used: Sequence[int]) -> FloatArray | None:
     lines = rows.decode("latin-1").rstrip(" \n").split("\n")
-    everything = list(used) == list(range(n_cells))
-    if not everything and delimiter and rows.count(delimiter.encode()) != len(lines) * (n_cells - 1):
+    everything = sorted(used) == list(range(n_cells))
+    if not everything and delimiter and not _same_cells_in_all_rows(rows, delimiter, n_cells):
         return None
-    wanted = None if everything else list(used)
-    return np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2, usecols=wanted)
+    if everything:
+        return np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2)[:, list(used)]
+    return np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2, usecols=list(used))
+
+
+def _same_cells_in_all_rows(rows: bytes, delimiter: str, n_cells: int) -> bool:
+    """Whether each row has n_cells cells: a parser that takes some columns only would not tell."""
+    codes = np.frombuffer(rows, np.uint8)
+    ends = np.flatnonzero(codes == ord("\n"))
+    if not rows.endswith(b"\n"):
+        ends = np.append(ends, codes.size)
+    cuts = np.searchsorted(np.flatnonzero(codes == ord(delimiter)), ends)
+    return bool(np.all(np.diff(cuts, prepend=0) == n_cells - 1))
 
 
 def _parse_many(rows: bytes, delimiter: str, n_cells: int, used: Sequence[int]) -> FloatArray | None:
     import pandas as pd
 
     n_rows = rows.count(b"\n") + (not rows.endswith(b"\n"))
-    if rows.count(delimiter.encode()) != n_rows * (n_cells - 1):
+    if not _same_cells_in_all_rows(rows, delimiter, n_cells):
         return None
     version = tuple(int(part) for part in pd.__version__.split(".")[:2])
     exact: dict[str, Any] = {} if version >= _EXACT_BY_DEFAULT else {"float_precision": "round_trip"}

@@ -11,6 +11,7 @@ from tribo.errors import Problem
 from tribo.records import FloatArray
 
 GAP_STEPS = 5.0  # a time step this many median steps long is a gap
+_WORTH_A_LOOK = 1.5  # mean steps: where no step is this long, none is a gap
 _TEN_TIMES = (9.0, 11.0)  # a decimal mark slipped by one place, noise allowed for
 _LEAST_SHARE = 0.3  # of the range: smaller jumps are noise or stick-slip
 
@@ -31,7 +32,7 @@ def check_time(time: FloatArray, file: str, column: str, row_of: RowOf) -> list[
     if time.size < 2:
         return []
     step = np.diff(time)
-    least, median = float(step.min()), float(np.partition(step, step.size // 2)[step.size // 2])
+    least, largest = float(step.min()), float(step.max())
     found = []
     if least < 0:
         k = int(np.argmax(step < 0)) + 1
@@ -42,11 +43,13 @@ def check_time(time: FloatArray, file: str, column: str, row_of: RowOf) -> list[
         k = int(np.argmax(step == 0)) + 1
         what = f"{int((step == 0).sum())} times stand twice, the first here"
         found.append(Finding("time_repeats", Problem("time_repeats", what, file, row_of(k), column)))
-    if median > 0 and step.max() > GAP_STEPS * median:
-        k = int(np.argmax(step)) + 1
-        what = f"{int((step > GAP_STEPS * median).sum())} gaps in time, the longest ends here"
-        place = (file, row_of(k), column, f"{step[k - 1]:.4g} s", f"steps of about {median:.4g} s")
-        found.append(Finding("time_gap", Problem("time_gap", what, *place)))
+    if largest > _WORTH_A_LOOK * float(time[-1] - time[0]) / step.size:
+        median = float(np.median(step))
+        if median > 0 and largest > GAP_STEPS * median:
+            k = int(np.argmax(step)) + 1
+            what = f"{int((step > GAP_STEPS * median).sum())} gaps in time, the longest ends here"
+            place = (file, row_of(k), column, f"{largest:.4g} s", f"steps of about {median:.4g} s")
+            found.append(Finding("time_gap", Problem("time_gap", what, *place)))
     return found
 
 

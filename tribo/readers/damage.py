@@ -42,7 +42,7 @@ def find_damage(
     lines = text.split("\n")
     unfinished = bool(lines[-1].strip()) and layout.filled[-1] and not _ends_in_a_number(lines[-1], layout)
     breaks_off = breaks_off or unfinished
-    last = max((k for k, line in enumerate(lines) if line.strip()), default=-1)
+    last = max((k for k, line in enumerate(lines) if line.strip(' \t;,"|')), default=-1)
     gaps: dict[int, list[int]] = {}
     problems: list[Problem] = []
     for k in range(last + 1):

@@ -78,6 +78,8 @@ def sniff(source: Source, named: Named, start: int = 0, rows_above: int = 0) -> 
         at_start = start == source.start and size == HEAD_BYTES
         lines, more = source.beginning if at_start else source.lines(start, size)
         first = _first_row_of_numbers(lines)
+        if first is None and not (more and size <= LARGEST_HEAD_BYTES):
+            first = _first_row_with_words(lines)
         if first is not None and (first + 3 < len(lines) or not more):
             break
         if not more or size > LARGEST_HEAD_BYTES:
@@ -116,6 +118,22 @@ def _first_row_of_numbers(lines: Sequence[str]) -> int | None:
         if following is None or _ROW_OF_NUMBERS.fullmatch(following) or _mostly_numbers(line, following):
             return k
     return None
+
+
+def _first_row_with_words(lines: Sequence[str]) -> int | None:
+    """First of two neighbouring lines with numbers in the same cells, two at least, and words in others."""
+    for k, line in enumerate(lines[:-1]):
+        following = next((other for other in lines[k + 1 :] if other.strip(_BLANK)), "")
+        for delimiter in "\t;,|":
+            here, below = (_where_numbers_are(other, delimiter) for other in (line, following))
+            if here == below and len(here) > 2 and sum(here) > 1:
+                return k
+    return None
+
+
+def _where_numbers_are(line: str, delimiter: str) -> tuple[bool, ...]:
+    cells = cut(line, delimiter) if delimiter in line else []
+    return tuple(bool(_DOT_NUMBER.fullmatch(c) or _COMMA_NUMBER.fullmatch(c) or c.isdigit()) for c in cells)
 
 
 def _mostly_numbers(line: str, following: str) -> bool:

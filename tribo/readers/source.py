@@ -133,7 +133,8 @@ def _with_one_line_ending(source: Source, data: bytes) -> Source:
     if source.start:
         data = data[source.start :]
     if b"\r" in data:
-        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+        data = data.replace(b"\r\n", b"\n")
+        data = data.replace(b"\r", b"\n") if b"\r" in data else data
     return replace(source, data=data, start=0)
 
 
