@@ -134,9 +134,9 @@ def _fallen(smooth: FloatArray, first: int, end: int) -> int:
 def _before_unloading(smooth: FloatArray, peak: int) -> int:
     """End (exclusive) of the part after the peak in which the force holds its level, a tail of unloading left out."""
     level = median(smooth[peak:])
-    held = np.flatnonzero(smooth[peak:] >= _UNLOADED * level)
-    if level <= 0 or held.size == 0 or held[-1] >= smooth.size - peak - 3:
+    if level <= 0 or float(smooth[-3:].max()) >= _UNLOADED * level:
         return int(smooth.size)
+    held = np.flatnonzero(smooth[peak:] >= _UNLOADED * level)
     at_level = np.flatnonzero(smooth[peak : peak + held[-1] + 1] >= _BACK_AT_LEVEL * level)
     return peak + int(at_level[-1]) + 1
 

@@ -36,8 +36,8 @@ def unreadable(trace: Trace) -> list[Problem]:
         return [Problem("too_short", what, trace.file, found=str(n), allowed=f"{MINIMUM_SAMPLES} or more")]
     problems = []
     for name, values in (("time", trace.time_s), ("force", trace.force_N)):
-        finite = np.isfinite(values)
-        if not finite.all():
+        if not np.isfinite(values).all():
+            finite = np.isfinite(values)
             at = int(np.argmin(finite))
             what = f"{int(n - finite.sum())} values of the {name} are missing"
             problems.append(Problem("nan_gap", what, trace.file, file_row(trace, at), name))
@@ -71,23 +71,32 @@ def impulse_spikes(force: FloatArray, noise: float) -> NDArray[np.bool_]:
     seen by one sample does not fall back to where it came from.
     """
     steps = np.diff(force)
+    size = np.abs(steps)
     mask = np.zeros(force.size, bool)
-    for width in SPIKE_WIDTHS:
-        into, out = steps[:-width], steps[width:]
-        height = np.minimum(np.abs(into), np.abs(out))
-        height = np.where(np.abs(into + out) < SPIKE_RETURN * height, height, 0.0)
-        candidates = np.flatnonzero(height > SPIKE_OVER_NOISE * noise)
-        if candidates.size:
-            beside = np.concatenate((np.arange(-_NEIGHBOURS, 0), width + np.arange(1, _NEIGHBOURS + 1)))
-            near = np.abs(steps)[np.clip(candidates[:, None] + beside, 0, steps.size - 1)]
-            outside = (candidates[:, None] + beside < 0) | (candidates[:, None] + beside >= steps.size)
-            around = np.where(outside, 0.0, near).max(axis=1)
-            first = candidates[height[candidates] > SPIKE_OVER_NEIGHBOURS * around]
-            mask[(first[:, None] + 1 + np.arange(width)).ravel()] = True
-    low, high = float(force[1:-1].min()), float(force[1:-1].max())
+    large = np.flatnonzero(size > SPIKE_OVER_NOISE * noise)
+    both_ways = large.size > 0 and float(steps[large].min()) < 0 < float(steps[large].max())
+    for width in SPIKE_WIDTHS if both_ways else ():
+        first = large[: np.searchsorted(large, steps.size - width)]
+        lower = np.minimum(size[first], size[first + width])
+        back = np.abs(steps[first] + steps[first + width]) < SPIKE_RETURN * lower
+        back &= lower > SPIKE_OVER_NOISE * noise
+        first, lower = first[back], lower[back]
+        if first.size:
+            apart = first[lower > SPIKE_OVER_NEIGHBOURS * _largest_beside(size, first, width)]
+            mask[(apart[:, None] + 1 + np.arange(width)).ravel()] = True
+    inner = force[1:-1]
+    low, high = float(inner.min()), float(inner.max())
     for end in (0, -1):  # nothing shows whether the force came back: only what lies far beyond all else counts
         mask[end] = not low - (high - low) < force[end] < high + (high - low)
     return mask
+
+
+def _largest_beside(size: FloatArray, first: NDArray[np.int64], width: int) -> FloatArray:
+    """Largest of the steps within ``_NEIGHBOURS`` of a step ``first`` in and a step ``first + width`` out."""
+    beside = np.concatenate((np.arange(-_NEIGHBOURS, 0), width + np.arange(1, _NEIGHBOURS + 1)))
+    index = first[:, None] + beside
+    inside = (index >= 0) & (index < size.size)
+    return np.asarray(np.where(inside, size[np.clip(index, 0, size.size - 1)], 0.0).max(axis=1))
 
 
 def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ...]:
@@ -124,7 +133,10 @@ def flat_top(force: FloatArray) -> tuple[int, int] | None:
     Chance is the share of equal neighbours elsewhere in the trace: a coarse resolution repeats values
     everywhere, clipping only at the top.
     """
-    top = force >= force.max() - 1e-9 * float(np.ptp(force))
+    largest = float(force.max())
+    top = force >= largest - 1e-9 * (largest - float(force.min()))
+    if np.count_nonzero(top) < _SHORTEST_FLAT_TOP:
+        return None
     edges = np.flatnonzero(np.diff(np.concatenate(([False], top, [False]))))
     starts, lengths = edges[::2], edges[1::2] - edges[::2]
     longest = int(np.argmax(lengths))
