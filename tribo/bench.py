@@ -53,8 +53,8 @@ def _timed(work: Work) -> float:
     return time.perf_counter() - start
 
 
-def ingest_against_pandas(path: Path) -> Ratio:
-    """Reading a campaign into pulls, against pandas.read_csv merely loading the same files with options known."""
+def ingest_against_pandas(path: Path, jobs: int = 1) -> Ratio:
+    """Reading a campaign into pulls on ``jobs`` processes, against pandas.read_csv merely loading the same files."""
     import pandas as pd
 
     from tribo.campaign import open_campaign
@@ -76,7 +76,7 @@ def ingest_against_pandas(path: Path) -> Ratio:
 
         return compare_in_turns(
             f"ingest {len(known)} exports",
-            ("tribo ingest", lambda: ingest(campaign)),
+            (f"tribo ingest, {jobs} processes", lambda: ingest(campaign, jobs=jobs)),
             ("pandas.read_csv of the same files", load_all),
             "under 3",
         )

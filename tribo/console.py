@@ -74,14 +74,22 @@ def _bars() -> Iterator[Callable[[str, int, int], None]]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
     from rich.progress import TimeRemainingColumn as TimeLeft
 
-    columns = (TextColumn("{task.description:<28}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeLeft())
-    with Progress(*columns, console=RichConsole(stderr=True)) as bars:
+    text = TextColumn("{task.description:<28}")
+    columns = (text, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeLeft())
+    # drawn by hand: a refreshing thread would forbid the reading stage to fork
+    with Progress(*columns, console=RichConsole(stderr=True), auto_refresh=False) as bars:
         tasks: dict[str, Any] = {}
+        drawn = 0.0
 
         def report(stage: str, done: int, total: int) -> None:
+            nonlocal drawn
             if stage not in tasks:
                 tasks[stage] = bars.add_task(stage, total=total)
             bars.update(tasks[stage], completed=done, total=total)
+            now = time.monotonic()
+            if done >= total or now - drawn > 0.1:
+                drawn = now
+                bars.refresh()
 
         yield report
 

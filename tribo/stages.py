@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from tribo.errors import CampaignError, FitError, Problem, TriboError
+from tribo.errors import CampaignError, FitError, Problem
 from tribo.records import (
     REGIMES,
     Campaign,
@@ -21,7 +21,6 @@ from tribo.records import (
     Regime,
     SetAside,
     Study,
-    Test,
     Trace,
 )
 
@@ -50,37 +49,27 @@ class StudyOptions:
         return {"rule": self.rule, "weights": self.weights, "flat": self.flat, "runs": str(self.runs)}
 
 
-def _read_one(campaign: Campaign, test: Test, rule: str) -> tuple[Trace, Pull] | SetAside:
-    from tribo.readers import read_export
-    from tribo.traces import read_pull
+def ingest(campaign: Campaign, *, rule: str = "seed", jobs: int = 1, progress: Progress = _silent) -> Ingested:
+    """Read every usable test of a campaign into a trace and a pull, on ``jobs`` processes where that pays.
 
-    try:
-        trace = read_export(campaign.root / test.file, columns=campaign.columns or None, name=test.test_id)
-        return trace, read_pull(trace, rule=rule, test=test)
-    except TriboError as why:
-        problems = tuple(replace(p, file=test.file, test_id=test.test_id) for p in why.problems)
-        return SetAside(test.test_id, "; ".join(str(p) for p in problems), problems)
-
-
-def ingest(campaign: Campaign, *, rule: str = "seed", progress: Progress = _silent) -> Ingested:
-    """Read every usable test of a campaign into a trace and a pull.
-
-    A test that cannot be read is set aside with its problems; the rest goes on.
+    A test that cannot be read is set aside with its problems; the rest goes on. The result does not depend on
+    ``jobs``.
 
     Raises
     ------
     CampaignError
         Not one test could be read.
     """
+    from tribo.exports import read_all
+
     traces: dict[str, Trace] = {}
     pulls: dict[str, Pull] = {}
     set_aside = list(campaign.set_aside)
-    for done, test in enumerate(campaign.tests, start=1):
-        match _read_one(campaign, test, rule):
-            case SetAside() as fault:
-                set_aside.append(fault)
-            case (trace, pull):
-                traces[test.test_id], pulls[test.test_id] = trace, pull
+    for done, (test, outcome) in enumerate(read_all(campaign, rule, jobs), start=1):
+        if isinstance(outcome, SetAside):
+            set_aside.append(outcome)
+        else:
+            traces[test.test_id], pulls[test.test_id] = outcome
         progress("reading exports", done, len(campaign.tests))
     if not pulls:
         raise CampaignError(
@@ -194,7 +183,7 @@ def study(
     campaign: Campaign, options: StudyOptions, *, until: Until = "report", progress: Progress = _silent
 ) -> Study:
     """Walk the street with one campaign as far as ``until``."""
-    ingested = ingest(campaign, rule=options.rule, progress=progress)
+    ingested = ingest(campaign, rule=options.rule, jobs=options.jobs, progress=progress)
     if until == "ingest":
         return Study(ingested)
     fits = fit(ingested, weights=options.weights)

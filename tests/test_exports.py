@@ -1,0 +1,34 @@
+"""Exports read on several processes give the same as read one by one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from tribo import exports, stages
+from tribo.campaign import load_campaign
+
+EXAMPLE = Path(__file__).resolve().parents[1] / "data" / "example"
+
+
+def test_two_processes_read_the_same_bits_as_one(monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    monkeypatch.setattr(exports, "_may_fork", lambda: True)
+    campaign = load_campaign(EXAMPLE)
+    assert len(campaign.tests) >= exports.FEWEST_FOR_PROCESSES
+    one, two = stages.ingest(campaign), stages.ingest(campaign, jobs=2)
+    assert list(one.pulls) == list(two.pulls)
+    for test_id, trace in one.traces.items():
+        assert np.array_equal(trace.force_N, two.traces[test_id].force_N)
+        assert repr(one.pulls[test_id]) == repr(two.pulls[test_id])
+
+
+def test_faults_come_back_from_the_processes_too(monkeypatch, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    import shutil
+
+    monkeypatch.setattr(exports, "_may_fork", lambda: True)
+    shutil.copytree(EXAMPLE, tmp_path / "campaign")
+    (tmp_path / "campaign" / "raw" / "T005.csv").write_bytes(b"")
+    ingested = stages.ingest(load_campaign(tmp_path / "campaign"), jobs=2)
+    (fault,) = ingested.set_aside
+    assert (fault.test_id, fault.problems[0].kind, fault.problems[0].file) == ("T005", "empty", "raw/T005.csv")
