@@ -89,7 +89,7 @@ def sniff(source: Source, named: Named, start: int = 0, rows_above: int = 0) -> 
     delimiter = _delimiter(rows, source.file)
     cells = [cut(row, delimiter) for row in rows]
     n_cells = Counter(map(len, cells)).most_common(1)[0][0]
-    while len(cut(lines[first], delimiter)) == 1 < n_cells and first + 1 < len(lines):
+    if len(cells[0]) == 1 < n_cells:
         first += 1  # a line of settings in another delimiter belongs to the header
     first = _step_back_over_damage(lines, first, delimiter, n_cells)
     layout = Layout(delimiter, _decimal(cells), first, n_cells, filled=_filled(cells, n_cells))

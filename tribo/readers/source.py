@@ -103,7 +103,7 @@ def open_text(path: Path, file: str, raw: bytes | mmap.mmap) -> Source:
         empty, bom_only, binary or too_large.
     """
     bom = next((b for b in (*_WIDE_BOMS, codecs.BOM_UTF8) if raw[:4].startswith(b)), b"")
-    if not raw[len(bom) : LARGEST_HEAD_BYTES].strip():
+    if not raw[len(bom) : HEAD_BYTES].strip() and not raw[len(bom) : LARGEST_HEAD_BYTES].strip():
         kind, what = ("bom_only", "nothing but a byte order mark") if bom else ("empty", "the file is empty")
         raise ReadError(Problem(kind, what, file=file, allowed="an export with data rows"))
     if bom in _WIDE_BOMS:
@@ -111,10 +111,11 @@ def open_text(path: Path, file: str, raw: bytes | mmap.mmap) -> Source:
             raise _too_large(len(raw), MAPPED_BYTES, file)
         encoding = _WIDE_BOMS[bom]
         data: bytes | mmap.mmap = raw.decode(encoding, errors="replace").encode("utf-8")
-    elif isinstance(raw, bytes) and (wide := _wide_without_bom(raw[:HEAD_BYTES])):
-        encoding, data = wide, raw.decode(wide, errors="replace").encode("utf-8")
     elif b"\0" in raw[:HEAD_BYTES]:
-        raise ReadError(Problem("binary", "not a text export", file=file, allowed="a text export"))
+        encoding = _wide_without_bom(raw[:HEAD_BYTES])
+        if not encoding or isinstance(raw, mmap.mmap):
+            raise ReadError(Problem("binary", "not a text export", file=file, allowed="a text export"))
+        data = raw.decode(encoding, errors="replace").encode("utf-8")
     else:
         encoding, data = ("utf-8-sig" if bom else _narrow_encoding(raw)), raw
     source = Source(path, file, data, encoding, start=len(bom) if bom == codecs.BOM_UTF8 else 0)
