@@ -7,7 +7,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tribo.simulate.bench import Timing
 
 Work = Callable[[], Any]
 
@@ -53,30 +56,55 @@ def _timed(work: Work) -> float:
     return time.perf_counter() - start
 
 
-def ingest_against_pandas(path: Path, jobs: int = 1) -> Ratio:
-    """Reading a campaign into pulls on ``jobs`` processes, against pandas.read_csv merely loading the same files."""
+def against_pandas(path: Path, jobs: int = 1) -> list[Ratio]:
+    """Reading a campaign, and reading it into pulls, against pandas.read_csv told everything about the same files."""
     import pandas as pd
 
     from tribo.campaign import open_campaign
+    from tribo.readers import read_export
     from tribo.stages import ingest
 
     with open_campaign(path) as campaign:
-        ingested = ingest(campaign)
-        known = []
-        for test in campaign.tests:
-            trace = ingested.traces.get(test.test_id)
-            if trace is None or trace.source is None:
-                continue
-            form = trace.source
-            known.append((campaign.root / test.file, form.delimiter, form.decimal, form.encoding, form.header_rows))
+        known = [
+            (campaign.root / trace.file, trace.source)
+            for trace in ingest(campaign).traces.values()
+            if trace.source is not None
+        ]
 
         def load_all() -> None:
-            for file, sep, decimal, encoding, skip in known:
-                pd.read_csv(file, sep=sep, decimal=decimal, encoding=encoding, skiprows=skip, header=None)
+            for file, form in known:
+                pd.read_csv(
+                    file, sep=form.delimiter, decimal=form.decimal, encoding=form.encoding, skiprows=form.header_rows,
+                    header=None,
+                )  # fmt: skip
 
-        return compare_in_turns(
-            f"ingest {len(known)} exports",
-            (f"tribo ingest, {jobs} processes", lambda: ingest(campaign, jobs=jobs)),
-            ("pandas.read_csv of the same files", load_all),
-            "under 3",
-        )
+        def read_all() -> None:
+            for file, _ in known:
+                read_export(file)
+
+        pandas = ("pandas.read_csv of the same files", load_all)
+        return [
+            compare_in_turns(f"read {len(known)} exports", ("tribo reads", read_all), pandas, "at most 2"),
+            compare_in_turns(
+                f"ingest {len(known)} exports, {jobs} processes",
+                ("tribo reads and reduces to pulls", lambda: ingest(campaign, jobs=jobs)),
+                pandas,
+                "under 3",
+            ),
+        ]
+
+
+def in_words(ratio: Ratio) -> str:
+    """One ratio as a line."""
+    return (
+        f"{ratio.name}: {ratio.ours} {ratio.ours_s:.3g} s, {ratio.other} {ratio.other_s:.3g} s, "
+        f"ratio {ratio.ratio:.2f} ({ratio.lowest:.2f} to {ratio.highest:.2f} in {ratio.rounds} rounds; "
+        f"wanted {ratio.wanted})"
+    )
+
+
+def timing_in_words(timing: Timing) -> str:
+    """One figure of the simulator as a line."""
+    aim = "" if timing.aim is None else f", wanted {'at least' if timing.better == 'higher' else 'at most'} {timing.aim:g}"
+    note = f" ({timing.note})" if timing.note else ""
+    return f"{timing.name}: {timing.value:.4g} {timing.unit}{aim}{note}"

@@ -213,6 +213,23 @@ def simulate(
 
 
 @main.command()
+@click.option("--campaign", type=click.Path(exists=True, path_type=Path), help="Exports to read (the bundled example).")
+@click.option("--large", is_flag=True, help="Also the 1000 x 1000 lattice, some minutes.")
+@command_options
+def bench(console: Console, campaign: Path | None, large: bool, jobs: int, **_: Any) -> None:
+    """Speed, as ratios measured in one run."""
+    from tribo.bench import against_pandas, in_words, timing_in_words
+    from tribo.published import data_dir
+    from tribo.simulate.bench import simulator_benchmarks
+
+    with console.progress() as progress:
+        ratios = against_pandas(campaign or data_dir() / "example", jobs)
+        timings = simulator_benchmarks(lambda done, total: progress("timing the simulator", done, total), large=large)
+    record = {"reading": [vars(r) for r in ratios], "simulator": [t.record() for t in timings]}
+    console.result(record, "\n".join([*map(in_words, ratios), *map(timing_in_words, timings)]))
+
+
+@main.command()
 @command_options
 def doctor(console: Console, **_: Any) -> int:
     """Versions, cores, optional parts found or missing."""
