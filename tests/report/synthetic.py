@@ -211,4 +211,4 @@ def make_study(
     model = [make_fit(s, r, simulated[simulated["sample"] == s], "ensemble", 10.0) for s, r in pairs]
     runs = tuple(make_run(s, ingested.campaign.area_fraction(s)) for s in samples)
     comparison = compare(ingested.campaign, samples, fits, model)
-    return Study(ingested, tuple(fits), tuple(other), comparison, simulated, runs, ("a note of the study",))
+    return Study(ingested, tuple(fits), tuple(other), comparison, simulated, runs, notes=("a note of the study",))

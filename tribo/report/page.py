@@ -25,6 +25,7 @@ from tribo.report.provenance import Provenance
 from tribo.report.pulls import odd_rows, pull_groups
 from tribo.report.tables import all_set_aside
 from tribo.report.text import fit_cells
+from tribo.report.uncertainty import budget_origins, budget_tables
 
 LEAD_FIGURE = "agreement"
 VERDICT_MARKS = {"agrees": "=", "model too high": "▲", "model too low": "▼", "cannot tell": "?"}
@@ -63,6 +64,8 @@ def html(
             verdict=verdict_in_words(verdict) if verdict is not None else None,
             summary=_summary(study),
             table2=_table2(study),
+            budget=budget_tables(study),
+            budget_origins=budget_origins(study),
             agreement=_agreement_tables(study),
             lead=[f for f in shown if f.name == LEAD_FIGURE],
             figures=[f for f in shown if f.name != LEAD_FIGURE],

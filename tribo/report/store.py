@@ -56,6 +56,8 @@ def write_store(study: Study, out: Path) -> Path:
     if study.fits:
         groups["/fits"] = _table(tables.fits_table(study.fits), "fit")
         groups["/other_fits"] = _table(tables.other_fits_table(study), "parameter_row")
+    if study.budget is not None:
+        groups["/budget"] = _table(study.budget, "budget_row")
     if study.comparison is not None:
         groups["/comparison"] = _table(tables.comparison_table(study), "comparison_row")
         groups["/comparison"].attrs["flat"] = study.comparison.flat
