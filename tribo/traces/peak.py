@@ -71,7 +71,7 @@ def find_apex(
     length = fall_length(smooth, peak, level, 2 * FEWEST_SAMPLES, max(climb, 3 * FEWEST_SAMPLES))
     low, high = min(depart, peak + 1) - lag, min(depart, peak + 1) + 2
     candidates = [_resolved(time_s, force, Search(max(low - climb, 0), low, high, high + length), noise)]
-    if not (candidates[0] and candidates[0].fits):
+    if not (candidates[0] and candidates[0].fits) and not low <= peak < high:
         around = Search(max(peak - climb, 0), peak - 2, peak + 2, peak + length)
         candidates.append(_resolved(time_s, force, around, noise))
     sharp = min((a for a in candidates if a), key=lambda a: a.chi2_red, default=None)
@@ -123,7 +123,9 @@ def _condensed(time_s: FloatArray, force: FloatArray, search: Search, factor: in
     low = (search.low - search.start) // factor
     high = (search.high - search.start) // factor + 1
     noise = noise / math.sqrt(factor)
-    skipped = _smooth_from(t, f, low, noise)
+    apex = sharp_apex(t, f, low, high, noise)
+    if apex is None or apex.fits or not (skipped := _smooth_from(t, f, low, noise)):
+        return apex
     return sharp_apex(t[skipped:], f[skipped:], low - skipped, high - skipped, noise)
 
 
