@@ -47,7 +47,7 @@ def advance_dense(state: State, out: Samples, numerics: Numerics, until_step: in
     constant[lattice.contact] = 0.0
     planes[[OX, OY]] = constant.T.reshape(2, ny, nx)
     state.counts[CODE] = RUNNING
-    integrate(q[0], q[1], planes, lattice.contact.reshape(ny, nx), np.zeros((3, nx)), state, out, numerics, until_step)
+    integrate(q[0], q[1], planes, lattice.contact.reshape(ny, nx), np.zeros((4, nx)), state, out, numerics, until_step)
     cells[:, k.QX : k.QY + 1] = q[:, 1:-1, 1:-1].reshape(2, -1).T
     with np.errstate(over="ignore", invalid="ignore"):  # the caller refuses a run that met such a number
         cells[:, k.GX : k.GY + 1] = numerics.stiffness * lattice.spring_forces(cells[:, k.QX : k.QY + 1]) + constant
@@ -81,7 +81,7 @@ def integrate(
         if c.periodic:
             wrap(qx)
             wrap(qy)
-        kick_all(qx, qy, planes, c.start + s.counts[STEP] * c.dt, c)
+        kick_all(qx, qy, planes, sums, c.start + s.counts[STEP] * c.dt, c)
         move_all(qx, qy, planes, sums, c)
         for x in range(c.nx):
             s.totals[k.ALONG] += sums[0, x]
@@ -111,60 +111,98 @@ def wrap(a: FloatArray) -> None:
 
 
 @compiled
-def kick_all(qx: FloatArray, qy: FloatArray, planes: FloatArray, t: float, c: Numerics) -> None:
-    """As :func:`tribo.simulate.kernels.kick`, the forces gathered from the eight neighbours."""
+def kick_all(qx: FloatArray, qy: FloatArray, planes: FloatArray, sums: FloatArray, t: float, c: Numerics) -> None:
+    """As :func:`tribo.simulate.kernels.kick`, the forces gathered from the eight neighbours.
+
+    One root and one quotient a block, no branch: what a block needs to stop is rare and left to a second look.
+    """
     stiffness = c.stiffness
     quarter = 0.25 * stiffness
     gain = c.dt / c.mass
     keep = 1.0 - c.damping * c.dt
+    sums[:] = 0.0
+    work = sums[1]
+    before2 = sums[3]
     for y in range(c.ny):
         x_up, x_row, x_down = qx[y + 2], qx[y + 1], qx[y]
         y_up, y_row, y_down = qy[y + 2], qy[y + 1], qy[y]
-        row = planes[:, y]
+        v_x, v_y, r_x, r_y = planes[VX, y], planes[VY, y], planes[RX, y], planes[RY, y]
+        o_x, o_y = planes[OX, y], planes[OY, y]
+        fs, fd, since, goes = planes[FS, y], planes[FD, y], planes[SINCE, y], planes[GOES, y]
+        kxx, kyy, kxy = planes[KXX, y], planes[KYY, y], planes[KXY, y]
+        stops = 0
         for x in range(c.nx):
             rising = quarter * (x_up[x + 2] + y_up[x + 2] + x_down[x] + y_down[x])
             falling = quarter * (x_up[x] - y_up[x] + x_down[x + 2] - y_down[x + 2])
-            fx = stiffness * (x_row[x + 2] + x_row[x]) + rising + falling + row[OX, x] + row[RX, x] * t
-            fy = stiffness * (y_up[x + 1] + y_down[x + 1]) + rising - falling + row[OY, x] + row[RY, x] * t
-            fx -= row[KXX, x] * x_row[x + 1] + row[KXY, x] * y_row[x + 1]
-            fy -= row[KXY, x] * x_row[x + 1] + row[KYY, x] * y_row[x + 1]
-            speed = math.sqrt(row[VX, x] * row[VX, x] + row[VY, x] * row[VY, x])
-            vx = keep * row[VX, x] + gain * fx
-            vy = keep * row[VY, x] + gain * fy
+            fx = stiffness * (x_row[x + 2] + x_row[x]) + rising + falling + o_x[x] + r_x[x] * t
+            fy = stiffness * (y_up[x + 1] + y_down[x + 1]) + rising - falling + o_y[x] + r_y[x] * t
+            fx -= kxx[x] * x_row[x + 1] + kxy[x] * y_row[x + 1]
+            fy -= kxy[x] * x_row[x + 1] + kyy[x] * y_row[x + 1]
+            speed2 = v_x[x] * v_x[x] + v_y[x] * v_y[x]
+            vx = keep * v_x[x] + gain * fx
+            vy = keep * v_y[x] + gain * fy
             drive = math.sqrt(vx * vx + vy * vy)
-            sliding = gain * sliding_threshold(row[FD, x], speed, c.law)
-            holding = gain * static_threshold(row[FS, x], t - row[SINCE, x], c.law)
-            share = 1.0 - sliding / drive if drive > sliding else 0.0
+            sliding = gain * sliding_threshold(fd[x], math.sqrt(speed2), c.law)
+            holding = gain * static_threshold(fs[x], t - since[x], c.law)
+            slides = drive > sliding
+            resting = (speed2 == 0.0) & (fs[x] > 0.0)
+            stopping = (speed2 > 0.0) & (fs[x] > 0.0) & (drive <= sliding)
+            share = 1.0 - sliding / drive if slides else 0.0
             start = 0.5 * share if drive > holding else 0.0
-            contact = row[FS, x] > 0.0
-            stops = contact and speed > 0.0 and drive <= sliding
-            share = start if contact and speed == 0.0 else share
-            share = last_stretch(speed, drive, sliding) if stops else share
-            row[VX, x] = share * vx
-            row[VY, x] = share * vy
-            row[GOES, x] = 0.0 if stops else 1.0
-            if AGES and stops:
-                row[SINCE, x] = t
+            share = start if resting else share
+            work[x] += share * drive * fd[x]
+            share = 1.0 if stopping else share
+            v_x[x] = share * vx
+            v_y[x] = share * vy
+            before2[x] = speed2
+            goes[x] = 0.0 if stopping else 1.0
+            stops += 1 if stopping else 0
+        if stops > 0:
+            stop_row(v_x, v_y, fd, before2, goes, since, work, t, c)
+    for x in range(c.nx):
+        work[x] *= c.dt
+
+
+@compiled
+def stop_row(
+    v_x: FloatArray,
+    v_y: FloatArray,
+    fd: FloatArray,
+    before2: FloatArray,
+    goes: FloatArray,
+    since: FloatArray,
+    work: FloatArray,
+    t: float,
+    c: Numerics,
+) -> None:
+    """Give the blocks of a row that stop in this step the last stretch of their way."""
+    gain = c.dt / c.mass
+    for x in range(len(v_x)):
+        if goes[x] == 0.0:
+            speed = math.sqrt(before2[x])
+            drive = math.sqrt(v_x[x] * v_x[x] + v_y[x] * v_y[x])
+            share = last_stretch(speed, drive, gain * sliding_threshold(fd[x], speed, c.law))
+            work[x] += share * drive * fd[x]
+            v_x[x] *= share
+            v_y[x] *= share
+            if AGES:
+                since[x] = t
 
 
 @compiled
 def move_all(qx: FloatArray, qy: FloatArray, planes: FloatArray, sums: FloatArray, c: Numerics) -> None:
-    """Displace all blocks; ``sums`` receives displacement along the pull, friction work and way squared by column."""
-    sums[:] = 0.0
-    along, work, ways2 = sums[0], sums[1], sums[2]
+    """Displace all blocks; ``sums`` receives by column the displacement along the pull and the way squared."""
+    along, ways2 = sums[0], sums[2]
     for y in range(c.ny):
         x_row, y_row, v_x, v_y = qx[y + 1], qy[y + 1], planes[VX, y], planes[VY, y]
-        goes, fd = planes[GOES, y], planes[FD, y]
+        goes = planes[GOES, y]
         for x in range(c.nx):
             dx = c.dt * v_x[x]
             dy = c.dt * v_y[x]
             x_row[x + 1] += dx
             y_row[x + 1] += dy
             along[x] += dx * c.direction_x + dy * c.direction_y
-            way2 = dx * dx + dy * dy
-            way = math.sqrt(way2)
-            work[x] += way * sliding_threshold(fd[x], way / c.dt, c.law)
-            ways2[x] += way2
+            ways2[x] += dx * dx + dy * dy
             v_x[x] *= goes[x]
             v_y[x] *= goes[x]
 
