@@ -149,12 +149,17 @@ def main() -> None:
     parser.add_argument("--campaigns", type=int, default=6, help="per effect and size")
     parser.add_argument("--clean", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--first", type=int, default=None, help="only so many of the shuffled campaigns")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path, default=None, help="where the rows and the summary go, as JSON")
     options = parser.parse_args()
     rows = []
+    todo = list(cases(options.campaigns, options.clean, options.seed))
+    np.random.default_rng(options.seed).shuffle(todo)  # so that a part of the run is a fair sample of it
+    if options.first is not None:
+        todo = todo[: options.first]
     with ProcessPoolExecutor(options.jobs) as pool:
-        for row in pool.map(one, cases(options.campaigns, options.clean, options.seed)):
+        for row in pool.map(one, todo):
             rows.append(row)
             print(row["seed"], row["effects"], row["verdict"], row["causes"], flush=True)
     found = summary(rows)

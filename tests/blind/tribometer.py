@@ -169,6 +169,30 @@ def _tilt(b: Bench, size: float, rng: np.random.Generator) -> None:
         setattr(b, name, force)
 
 
+def _collapse(b: Bench, size: float, rng: np.random.Generator) -> None:
+    """Floors of the wide cavities touch down with growing load; what touches grips like the flat sample."""
+    kPa = b.column("N") / AREA_MM2 * 1e3
+    limit = b.of_sample({"F": 1e9, "A": 40.0, "B": 20.0, "C": 12.0, "Sx": 7.0, "Sy": 7.0})
+    down = min(0.8 * size, 1.0) / (1 + np.exp(-(kPa - limit) / (0.12 * limit)))
+    flat = np.array(b.law)
+    for name, k in (("static", 0), ("sliding", 2)):
+        grip = flat[k] * b.column("N") + flat[k + 1] * AREA_MM2 * 1e-3
+        setattr(b, name, getattr(b, name) + down * (grip - getattr(b, name)))
+
+
+def _shear(b: Bench, size: float, rng: np.random.Generator) -> None:
+    """Long cavities close when pulled along and open when pulled across."""
+    gain = b.of_sample({"F": 1, "A": 1, "B": 1, "C": 1, "Sx": 1 + 0.3 * size, "Sy": 1 / (1 + 0.3 * size)})
+    b.static, b.sliding = b.static * gain, b.sliding * gain
+
+
+def _moulding(b: Bench, size: float, rng: np.random.Generator) -> None:
+    """The cavities of B came out narrower, so that more of it adheres."""
+    rows = np.array([b.shares[s] for s in b.tests["true_sample"]]) * np.array(b.law)
+    more = b.of_sample({"F": 0, "A": 0, "B": 0.7 * size, "C": 0, "Sx": 0, "Sy": 0}) * AREA_MM2 * 1e-3
+    b.static, b.sliding = b.static + rows[:, 1] * more, b.sliding + rows[:, 3] * more
+
+
 def _day_wave(b: Bench, size: float, rng: np.random.Generator) -> None:
     """Outside the library: everything swings with the hour."""
     hours = pd.to_datetime(b.tests["started_at"]).dt.hour.to_numpy() + 0.0
@@ -188,7 +212,9 @@ EFFECTS: dict[str, Effect] = {
     "contact_area_loss": _area_loss, "velocity_dependence": _velocity, "contact_ageing": _ageing,
     "run_in": _run_in, "edge_adhesion": _edges, "temperature": _temperature, "humidity": _humidity,
     "mislabelled_specimen": _mislabelled, "covariate:operator": _operator, "load_cell_offset": _offset,
-    "load_cell_drift": _drift, "tilt": _tilt, "outside:day": _day_wave, "outside:temperature": _cold_and_hot,
+    "load_cell_drift": _drift, "tilt": _tilt, "cavity_collapse": _collapse,
+    "cavity_shear_deformation": _shear, "pattern_geometry": _moulding, "outside:day": _day_wave,
+    "outside:temperature": _cold_and_hot,
 }  # fmt: skip
 
 

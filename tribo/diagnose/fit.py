@@ -79,10 +79,10 @@ def _starts(acting: Sequence[Acting], start: ModelFit | None) -> list[list[Float
         if (a.mechanism.name, a.choice) in known:
             each.append([known[a.mechanism.name, a.choice]])
             continue
-        first = a.mechanism.start()
-        first[0] = a.mechanism.zero()[0] + 0.3 * (first[0] - a.mechanism.zero()[0])
-        tries = [(p.start, *p.tries) for p in a.mechanism.parameters[1:]]
-        each.append([np.array([first[0], *rest]) for rest in product(*tries)])
+        size = a.mechanism.amplitude
+        tries = [(size.zero + 0.3 * (size.start - size.zero), *size.tries)]
+        tries += [(p.start, *p.tries) for p in a.mechanism.parameters[1:]]
+        each.append([np.array(values) for values in product(*tries)])
     return [list(values) for values in product(*each)]
 
 

@@ -10,7 +10,7 @@ from tribo.diagnose.looks import candidates
 from tribo.diagnose.model import Acting, ModelFit, Noise, Setup, predict, setup
 from tribo.diagnose.observations import Observations, conditions_of, flat_sample
 from tribo.diagnose.predictor import Predictor, tabled_predictor
-from tribo.diagnose.screen import cleared
+from tribo.diagnose.screen import beyond_law, cleared
 from tribo.diagnose.weigh import ALIKE, unseen
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray
@@ -25,7 +25,7 @@ NINE_IN_TEN = FOUND + 1.28
 class Finding:
     """What a design would show of one mechanism.
 
-    ``amplitude`` (in ``unit``) and ``effect_percent`` (peak to peak of T) are found nine times in ten; both are
+    ``amplitude`` (in ``unit``) and ``effect_percent`` (peak to peak of T beyond what the flat law takes up) are found nine times in ten; both are
     NaN where the design cannot show it, and ``why`` says so. ``confused_with`` looks the same in this design.
     """
 
@@ -74,9 +74,9 @@ def plan_design(
     size = np.sqrt(np.sum(left**2, axis=0))
     cosine = (left.T @ left) / np.maximum(size[:, None] * size[None, :], 1e-12)
     hidden = unseen(f)
-    found = [
-        _finding(k, acting, columns, size, cosine, hidden) for k in np.argsort(-size / np.ptp(columns, axis=(0, 1)))
-    ]
+    shown = beyond_law(f, columns)
+    order = np.argsort(-size / np.ptp(shown, axis=(0, 1)))
+    found = [_finding(k, acting, shown, size, cosine, hidden) for k in order]
     return Plan(s.observations.n, (*found, *_not_applying(s)))
 
 

@@ -22,7 +22,7 @@ class Screen:
 
     ``chance`` (replicates,) is the strongest look in each simulated campaign of the fitted model,
     ``chance_library`` the strongest of the mechanisms alone. ``size`` (looks,) is the peak-to-peak effect
-    in ln T, ``coefficients`` those of each look's columns.
+    in ln T beyond what the law takes up, ``coefficients`` those of each look's columns.
     """
 
     looks: tuple[Look, ...]
@@ -73,7 +73,8 @@ def screen(
     spans = [slice(int(e - look.freedom), int(e)) for look, e in zip(looks, ends, strict=True)]
     library = np.array([look.kind == "mechanism" for look in looks])
     strength, coefficients = _strengths(f, stacked, spans)
-    size = np.array([_peak_to_peak(look, c) for look, c in zip(looks, coefficients, strict=True)])
+    shapes = [look.columns @ c for look, c in zip(looks, coefficients, strict=True)]
+    size = np.ptp(beyond_law(f, np.stack(shapes, axis=2)), axis=(0, 1))
     chance, chance_library = np.zeros(replicates), np.zeros(replicates)
     for k in range(replicates):
         found = _strengths(replicate(f, rng), stacked, spans)[0]
@@ -179,5 +180,9 @@ def deviate(chi2: FloatArray, freedom: FloatArray) -> FloatArray:
     return np.where(freedom == 1, np.sqrt(chi2), np.where(p > 1e-14, near, far))
 
 
-def _peak_to_peak(look: Look, coefficients: FloatArray) -> float:
-    return float(np.ptp(look.columns @ coefficients))
+def beyond_law(f: ModelFit, columns: FloatArray) -> FloatArray:
+    """Columns (n, 2, k) less what law and mechanisms of the fit can take up."""
+    flat = jacobian_at(f).reshape(-1, len(np.concatenate([f.law, *f.values])))
+    q = np.linalg.qr(flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300))[0]
+    rows = columns.reshape(-1, columns.shape[2])
+    return np.asarray((rows - q @ (q.T @ rows)).reshape(columns.shape))

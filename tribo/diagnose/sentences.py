@@ -9,7 +9,7 @@ import numpy as np
 from tribo.diagnose.instrument import Evidence
 from tribo.diagnose.looks import OBSERVABLES, Look, candidates
 from tribo.diagnose.model import ModelFit, predict
-from tribo.diagnose.screen import Screen, cleared
+from tribo.diagnose.screen import Screen, beyond_law, cleared
 from tribo.diagnose.verdict import Cause, Estimate, Excluded, Misfit, Outcome
 from tribo.diagnose.weigh import Candidate
 from tribo.mechanisms.table import MECHANISMS
@@ -171,9 +171,10 @@ def smallest_effects(
         [predict(s, baseline.law, (a,), (a.mechanism.start(),)) - before for a in acting], axis=2
     )
     left = np.sqrt(np.sum(cleared(baseline, columns)[0] ** 2, axis=0))
+    size = np.ptp(beyond_law(baseline, columns), axis=(0, 1))
     for k, a in enumerate(acting):
         if left[k] > 1e-6 and a.name not in unseen:
-            percent = 100.0 * float(np.ptp(columns[:, :, k])) * need / left[k]
+            percent = 100.0 * float(np.expm1(min(size[k] * need / left[k], 5.0)))
             found[a.name] = min(percent, found.get(a.name, np.inf))
     return {n: round(float(v), 2) for n, v in found.items() if v < 300.0}
 

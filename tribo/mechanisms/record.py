@@ -168,9 +168,11 @@ class Mechanism:
         return all(_varies(getattr(conditions, name)) for name in self.needs)
 
 
-def amplitude(name: str, unit: str, low: float, high: float, start: float, text: str) -> Parameter:
+def amplitude(
+    name: str, unit: str, low: float, high: float, start: float, text: str, tries: tuple[float, ...] = ()
+) -> Parameter:
     """The first parameter of a mechanism, absent at zero."""
-    return Parameter(name, unit, low, high, start, text, amplitude=True)
+    return Parameter(name, unit, low, high, start, text, amplitude=True, tries=tries)
 
 
 def _varies(values: FloatArray) -> bool:
