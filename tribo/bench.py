@@ -105,6 +105,7 @@ def in_words(ratio: Ratio) -> str:
 
 def timing_in_words(timing: Timing) -> str:
     """One figure of the simulator as a line."""
-    aim = "" if timing.aim is None else f", wanted {'at least' if timing.better == 'higher' else 'at most'} {timing.aim:g}"
+    bound = "at least" if timing.better == "higher" else "at most"
+    aim = "" if timing.aim is None else f", wanted {bound} {timing.aim:g}"
     note = f" ({timing.note})" if timing.note else ""
     return f"{timing.name}: {timing.value:.4g} {timing.unit}{aim}{note}"
