@@ -117,6 +117,7 @@ _ALIASES = {
         deplacement
         axial displacement
         traverse
+        course traverse
         traverse abs
         traverse absolue
         maschine
@@ -132,6 +133,9 @@ _ALIASES = {
         crosshead displacement
         crosshead travel
         axial extension
+        grip to grip separation
+        absolute crosshead travel
+        crosshead absolute
         actuator displacement
         sled displacement
         travel
@@ -308,6 +312,7 @@ def unit_factor(unit: str, quantity: str) -> tuple[float, float]:
     text = unit.strip()
     if not text and target != "dimensionless":
         raise ReadError(Problem("missing_unit", f"the {quantity} has no unit", allowed=f"such as {target}"))
+    _registry()  # an installation without a working pint is no fault of the unit
     try:
         zero, one = _in_unit(0.0, text, quantity, target), _in_unit(1.0, text, quantity, target)
     except Exception as why:  # pint raises many kinds, tokenizer errors among them

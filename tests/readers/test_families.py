@@ -251,6 +251,24 @@ def test_trapezium_specimens_side_by_side_are_a_trace_each(tmp_path: Path) -> No
     np.testing.assert_array_equal(alone.force_N, traces[0].force_N)
 
 
+def test_specimens_side_by_side_keep_their_names_and_the_format_of_the_file(tmp_path: Path) -> None:
+    path = saved(tmp_path, TRAPEZIUM_TWO)
+    seen = inspect_export(path)
+    assert [t.label for t in seen.tables] == ["1_1", "1_2"]
+    assert (seen.family, seen.delimiter, seen.encoding) == ("trapezium", ",", "ascii")
+    bare = saved(tmp_path, [line.replace('"', "") for line in TRAPEZIUM_TWO], name="bare.csv")
+    assert [t.time_s.size for t in read_blocks(bare)] == [8, 6]
+    assert inspect_export(bare).family == "trapezium"
+
+
+def test_a_counting_column_with_the_sampling_step_as_its_unit_is_a_time(tmp_path: Path) -> None:
+    lines = ["Index;Force [ N ]", *(f"{k};{0.02 * k:.3f}" for k in range(9))]
+    path = saved(tmp_path, lines)
+    with pytest.raises(ReadError, match=r"\[0.01 s\]"):
+        read_export(path)
+    np.testing.assert_allclose(read_export(path, columns={"time": "Index [0.01 s]"}).time_s, 0.01 * np.arange(9))
+
+
 def test_several_traces_are_refused_until_one_is_chosen(tmp_path: Path) -> None:
     path = saved(tmp_path, UMT)
     with pytest.raises(ReadError, match="2 tables") as caught:

@@ -224,6 +224,8 @@ def _is_unit(text: str, quantity: str) -> bool:
 
 def _missing(quantity: str, names: Sequence[str]) -> Problem:
     here = f"columns here: {_listed(names)}" if any(names) else f"{len(names)} columns without names"
+    if quantity == "time":
+        here = f"a counting column takes the sampling step as its unit, [0.01 s]; {here}"
     example = '"NAME [unit]"' if any(names) else '"#2 [unit]"'
     return Problem(
         "missing_column", f"no column for the {quantity}", allowed=f"{_key(quantity)} = {example} in columns; {here}"

@@ -75,13 +75,13 @@ def _labelled(block: Block, k: int) -> Block:
     return replace(block, label=f"table {k + 1}")
 
 
-def side_by_side(layout: Layout) -> Iterator[tuple[str, tuple[int, ...]]]:
-    """(label, columns) of each specimen where the same names stand several times in a row; nothing otherwise."""
+def side_by_side(layout: Layout) -> Iterator[tuple[int, tuple[int, ...]]]:
+    """(number, columns) of each specimen where the same names stand several times in a row; nothing otherwise."""
     names = [name for name in layout.names if name]
     for width in range(2, len(names) // 2 + 1):
         repeats, rest = divmod(len(names), width)
         if not rest and names == names[:width] * repeats and len(set(names[:width])) == width:
             at = [k for k, name in enumerate(layout.names) if name]
             for k in range(repeats):
-                yield f"specimen {k + 1}", tuple(at[k * width : (k + 1) * width])
+                yield k + 1, tuple(at[k * width : (k + 1) * width])
             return

@@ -65,7 +65,7 @@ def read_source(source: Source, asked: tuple[Hint, ...]) -> Contents:
     named = partial(is_asked_for, hints=asked)
     beside = list(side_by_side(layout))
     if beside:
-        parts = [_specimen(source, layout, columns, label) for label, columns in beside]
+        parts = [_specimen(source, layout, columns, number) for number, columns in beside]
         return _gather([(part, block) for part, block in parts], family, asked)
     whole = whole_block(source, layout)
     try:
@@ -168,22 +168,25 @@ def _row_of(source: Source, block: Block, sample: int) -> int:
     return row
 
 
-def _specimen(source: Source, layout: Layout, columns: tuple[int, ...], label: str) -> tuple[Source, Block]:
+def _specimen(source: Source, layout: Layout, columns: tuple[int, ...], number: int) -> tuple[Source, Block]:
     """One of several specimens side by side, as a table of its own that keeps the rows of the file."""
     text = source.text(bytes(source.data[source.offset(source.start, layout.header_rows) :]))
     rows = [cut(line, layout.delimiter) for line in text.split("\n") if line.strip()]
     rows = [row for row in rows if any(k < len(row) and row[k] for k in columns)]
-    lines = ["\t".join(row[k] if k < len(row) else "" for k in columns) for row in rows]
-    data = ("\n" * layout.header_rows + "\n".join(lines) + "\n").encode()
+    delimiter = layout.delimiter if layout.delimiter != layout.decimal else "\t"
+    lines = [delimiter.join(row[k] if k < len(row) else "" for k in columns) for row in rows]
+    data = ("\n" * layout.header_rows + "\n".join(lines) + "\n").encode(source.codec, errors="replace")
     alone = replace(
         layout,
-        delimiter="\t",
+        delimiter=delimiter,
         n_cells=len(columns),
         names=tuple(layout.names[k] for k in columns),
         units=tuple(layout.units[k] for k in columns),
         filled=tuple(layout.filled[k] for k in columns),
     )
-    part = replace(source, data=data, encoding="utf-8", start=0, part=label)
+    above = [cut(line, layout.delimiter) for line in source.head[: (layout.names_row or 1) - 1]]
+    label = next((row[columns[0]] for row in reversed(above) if columns[0] < len(row)), "") or f"specimen {number}"
+    part = replace(source, data=data, start=0, part=label)
     return part, replace(whole_block(part, alone), label=label)
 
 

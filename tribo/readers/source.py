@@ -71,9 +71,14 @@ class Source:
         """The first lines as one text, a line end before each."""
         return "\n" + "\n".join(self.head)
 
+    @property
+    def codec(self) -> str:
+        """The encoding of ``data``."""
+        return "utf-8" if self.encoding.startswith("utf") else self.encoding
+
     def text(self, piece: bytes) -> str:
         """Bytes of this file as text; bytes that the encoding does not know become U+FFFD."""
-        return piece.decode("utf-8" if self.encoding.startswith("utf") else self.encoding, errors="replace")
+        return piece.decode(self.codec, errors="replace")
 
     def offset(self, start: int, lines: int) -> int:
         """Where the line stands that is ``lines`` lines below the one at ``start``."""

@@ -13,11 +13,14 @@ _NAMES = re.compile(
     r'^"(?:prüfzeit|zeit|temps|test time)"[;,\t]"(?:standardweg|traverse absolue|course standard|standard travel)"',
     re.I | re.M,
 )
+_SHEET_NAMES = re.compile(r"^(?:.*\t)?(?:standard force|standardkraft|force standard)(?:\t|$)", re.I | re.M)
 _UNITS = re.compile(r'^"(?:m?s|min|mm|m?N)"[;,\t]"', re.M)
 
 
 def recognises(source: Source) -> bool:
     head = source.head_text
+    if source.part:  # a sheet of a workbook has no quotes
+        return bool(_SHEET_NAMES.search(head))
     return '"' in head and bool(_NAMES.search(head)) and bool(_UNITS.search(head))
 
 
