@@ -109,3 +109,18 @@ def test_a_batch_that_grips_more_is_named_by_its_column() -> None:
     v = examine(replace(ingested, campaign=campaign, pulls=pulls), replicates=FEW).verdict
     assert v.verdict == "named"
     assert [c.mechanism for c in v.causes] == ["covariate:batch"]
+
+
+def test_an_offset_gains_on_the_zeros_of_specimens_it_has_not_seen() -> None:
+    v = examine(hidden(("load_cell_offset", 1.0)), replicates=(20, 10)).verdict
+    assert v.verdict == "named"
+    assert [c.mechanism for c in v.causes] == ["load_cell_offset"]
+    assert v.misfits[0].observable == "zero"
+    assert v.gain is not None
+    assert v.gain.difference > 10 * v.gain.se
+
+
+def test_a_campaign_without_misfit_is_told_what_it_never_varied() -> None:
+    v = examine(hidden(seed=8), replicates=(20, 10)).verdict
+    assert v.next_test is not None
+    assert v.next_test.separates == ("velocity_dependence", "contact_ageing")

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tribo.diagnose.fit import fit
-from tribo.diagnose.gain import gain
+from tribo.diagnose.gain import gain, gain_of_zero
 from tribo.diagnose.instrument import Evidence, rise_stiffening, zero_drift, zero_offset
 from tribo.diagnose.looks import all_looks
 from tribo.diagnose.model import ModelFit, setup
 from tribo.diagnose.naming import Named, name_causes, weights_of
-from tribo.diagnose.next_test import next_test
+from tribo.diagnose.next_test import first_test_of, next_test, widening_test
 from tribo.diagnose.observations import Observations, observe
 from tribo.diagnose.predictor import Predictor, tabled_predictor
 from tribo.diagnose.screen import Progress, Screen, screen
@@ -24,7 +25,7 @@ from tribo.diagnose.sentences import (
     smallest_effects,
     summary,
 )
-from tribo.diagnose.verdict import Cause, Excluded, Misfit, Outcome, Verdict
+from tribo.diagnose.verdict import Cause, Excluded, Gain, Misfit, NextTest, Outcome, Verdict
 from tribo.diagnose.weigh import Candidate, unseen
 from tribo.records import Ingested
 
@@ -144,17 +145,15 @@ def _verdict(
     causes = [c for c, _ in direct] + (_causes(named, baseline) if outcome in ("named", "undetermined") else [])
     left = misfits_of(named.left, level) if named is not None and outcome == "unknown" and named.causes else []
     smallest = smallest_effects(baseline, screened, level, {e.mechanism for e in barred})
-    extended = named.model if named is not None and named.causes else None
-    tied = _tied(named) if outcome in ("named", "undetermined") else []
     return Verdict(
         verdict=outcome,
         misfits=(*left, *misfits),
         causes=tuple(causes),
         equivalent=_equivalent(named) if outcome == "named" else (),
         excluded=tuple(_excluded(named, barred, causes)),
-        gain=gain(baseline, extended, rng) if extended is not None and outcome != "unknown" else None,
+        gain=_gain(baseline, named, outcome, evidence, rng),
         set_aside=baseline.setup.observations.set_aside,
-        next_test=next_test(tied),
+        next_test=_next_test(baseline, named, outcome, [*left, *misfits]),
         text=summary(outcome, causes, misfits, left, smallest),
         smallest_effects=smallest,
     )
@@ -194,13 +193,32 @@ def _equivalent(named: Named | None) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(c.name for c in alike) for alike in named.causes if len(alike) > 1)
 
 
-def _tied(named: Named | None) -> list[Candidate]:
+def _gain(
+    baseline: ModelFit, named: Named | None, outcome: Outcome, evidence: dict[str, Evidence], rng: np.random.Generator
+) -> Gain | None:
+    """Of the extended model where a mechanism was weighed, else of what direct evidence shows."""
+    if named is not None and named.causes and outcome != "unknown":
+        return gain(baseline, named.model, rng)
+    zeros = [n for n in _certain(evidence) if n.startswith("load_cell")]
+    if outcome == "named" and zeros:
+        return gain_of_zero(baseline.setup.observations, zeros[0] == "load_cell_drift", rng)
+    return None
+
+
+def _next_test(
+    baseline: ModelFit, named: Named | None, outcome: Outcome, misfits: Sequence[Misfit]
+) -> NextTest | None:
+    """What parts the tied; what confirms a name against its runner-up; what narrows or widens the search."""
+    if outcome == "unknown":
+        return first_test_of(misfits[0].covariate) if misfits else None
     if named is None or not named.causes:
-        return []
+        return widening_test(baseline.setup.observations.conditions) if outcome == "no_misfit" else None
     for alike in named.causes:
         if len(alike) > 1:
-            return list(alike)
-    return [named.causes[-1][0], *named.rivals]
+            return next_test(alike)
+    best = named.causes[-1][0]
+    others = [*named.rivals, *(c for c in named.weighed if c.name != best.name and len(named.causes) == 1)]
+    return next_test([best, *others])
 
 
 def _excluded(named: Named | None, barred: list[Excluded], causes: list[Cause]) -> list[Excluded]:

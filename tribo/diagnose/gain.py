@@ -10,6 +10,7 @@ from scipy.special import gammaln
 
 from tribo.diagnose.fit import fit, jacobian_at
 from tribo.diagnose.model import Acting, ModelFit, Setup, predict
+from tribo.diagnose.observations import Observations
 from tribo.diagnose.verdict import Gain
 from tribo.records import FloatArray
 
@@ -81,6 +82,32 @@ def _fit_without(model: ModelFit, out: np.ndarray) -> ModelFit:
     )  # fmt: skip
     start = replace(model, setup=fewer, residual=model.residual[keep], weight=model.weight[keep])
     return fit(fewer, model.acting, start=start, iterations=12)
+
+
+def gain_of_zero(o: Observations, drifting: bool, rng: np.random.Generator) -> Gain | None:
+    """The same for the force before contact: a zero load cell against one that is off, or that wanders in time.
+
+    Whole specimens are left out; RMSE is in percent of the median sliding force.
+    """
+    hours = o.conditions.elapsed_s / 3600.0
+    usable = np.isfinite(o.zero_N) & (np.isfinite(hours) if drifting else True)
+    zero, hours, specimen = o.zero_N[usable], hours[usable], o.conditions.specimen[usable]
+    if len(np.unique(specimen)) < 2:
+        return None
+    scores, errors = np.zeros((len(zero), 2)), np.zeros((len(zero), 2))
+    for name in np.unique(specimen):
+        out = specimen == name
+        line = np.polyfit(hours[~out], zero[~out], 1) if drifting else np.array([np.median(zero[~out])])
+        for k, polynomial in enumerate((np.zeros(1), line)):
+            spread = max(float(np.sqrt(np.mean((zero - np.polyval(polynomial, hours))[~out] ** 2))), 1e-9)
+            errors[out, k] = zero[out] - np.polyval(polynomial, hours[out])
+            scores[out, k] = -np.log(spread * np.sqrt(2 * np.pi)) - 0.5 * (errors[out, k] / spread) ** 2
+    difference = scores[:, 1] - scores[:, 0]
+    rmse = 100 * np.sqrt(np.mean(errors**2, axis=0)) / float(np.exp(np.median(o.log_force[:, 1])))
+    return Gain(
+        "specimens", float(scores[:, 0].mean()), float(scores[:, 1].mean()), float(difference.mean()),
+        _specimen_bootstrap(difference, specimen, rng), float(rmse[0]), float(rmse[1]),
+    )  # fmt: skip
 
 
 def _specimen_bootstrap(difference: FloatArray, specimen: np.ndarray, rng: np.random.Generator) -> float:

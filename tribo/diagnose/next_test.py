@@ -11,6 +11,8 @@ import numpy as np
 from tribo.diagnose.model import ModelFit, log_forces
 from tribo.diagnose.verdict import NextTest
 from tribo.diagnose.weigh import Candidate, effect
+from tribo.mechanisms.record import Conditions
+from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray
 
 HOURS_PER_PULL = 7.0 / 60.0
@@ -47,6 +49,27 @@ def next_test(tied: Sequence[Candidate]) -> NextTest | None:
     options = [*_direct(first, second), *_without(first, second), *_loads(first, second)]
     best = max(options, key=lambda option: option.expected_bits / float(option.design["hours"]))
     return best
+
+
+def first_test_of(covariate: str) -> NextTest:
+    """What to do about a misfit that follows a column but no law: vary that column alone."""
+    text = f"Vary {covariate} alone, in random order, on one sample at one load: {PULLS} pulls."
+    design = {"covariate": covariate, "pulls": PULLS, "hours": PULLS * HOURS_PER_PULL}
+    return NextTest(text, (covariate,), design, float("nan"))
+
+
+def widening_test(conditions: Conditions) -> NextTest | None:
+    """For a campaign without misfit: vary what it held fixed, so that more mechanisms could show."""
+    fixed = {
+        "velocity_dependence": ("the pull speed over 0.05, 0.2 and 0.8 mm/s", "speed_mm_s", [0.05, 0.2, 0.8]),
+        "contact_ageing": ("the hold over 1, 10 and 300 s", "hold_s", [1.0, 10.0, 300.0]),
+    }
+    open_ = {name: how for name, how in fixed.items() if not MECHANISMS[name].applies(conditions)}
+    if not open_:
+        return None
+    text = f"Vary {' and '.join(how[0] for how in open_.values())} in random order: {PULLS} pulls of the flat sample."
+    design: dict[str, Any] = {how[1]: how[2] for how in open_.values()}
+    return NextTest(text, tuple(open_), design | {"pulls": PULLS, "hours": 3 * PULLS * HOURS_PER_PULL}, float("nan"))
 
 
 def bits(distance2: float) -> float:

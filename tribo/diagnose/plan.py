@@ -25,8 +25,9 @@ NINE_IN_TEN = FOUND + 1.28
 class Finding:
     """What a design would show of one mechanism.
 
-    ``amplitude`` (in ``unit``) and ``effect_percent`` (peak to peak of T beyond what the flat law takes up) are found nine times in ten; both are
-    NaN where the design cannot show it, and ``why`` says so. ``confused_with`` looks the same in this design.
+    ``amplitude`` (in ``unit``) and ``effect_percent`` (peak to peak of T beyond what the flat law takes up) are
+    found nine times in ten; both are NaN where the design cannot show it, and ``why`` says so.
+    ``confused_with`` looks the same in this design.
     """
 
     mechanism: str
