@@ -123,6 +123,7 @@ _ALIASES = {
         maschine
         maschinenweg
         machine displacement
+        linear position
         sliding distance
         distance
         x position

@@ -197,6 +197,21 @@ NEWPORT = [
 ]
 SPACES = ["Time(s)  Extension(mm)  Load(N)", *(row.replace(",", "   ") for row in rows())]
 
+RTEC_LOG = [
+    "Rtec instruments",
+    "sled",
+    "Step, Timestamp, RecipeStep, DAQ.Fz (N),DAQ.Fx (N),DAQ.COF (),XYZ.X Position (mm),",
+    *(f"1,{0.1 * k:.3f},1,1.0,{0.02 * k + 0.001:.5f},0.02,{0.01 * k + 0.001:.5f}," for k in range(8)),
+    *(f"2,{0.1 * k:.3f},2,2.0,{0.02 * k:.5f},0.02,{0.01 * k:.5f}," for k in range(6)),
+    "End of log",
+]
+TRB = [
+    "TRB3",
+    "Linear mode",
+    "Time [s]\tDistance [m]\tLaps\tNominal Load [N]\tµ\tLinear Position [mm]\tFriction Force [N]\tHumidity [%]",
+    *(f"{0.1 * k:.3f}\t{k}\t1\t2.0\t0.1\t{0.01 * k + 0.001:.5f}\t{0.02 * k + 0.001:.5f}\t45" for k in range(8)),
+]
+
 # text, family, number of traces, factor of the force column, encoding
 SAMPLES: dict[str, tuple[list[str], str, int, float]] = {
     "bluehill": (BLUEHILL, "bluehill", 1, 1.0),
@@ -213,6 +228,8 @@ SAMPLES: dict[str, tuple[list[str], str, int, float]] = {
     "labview, two segments": (LVM, "labview", 2, 1.0),
     "rheocompass, two intervals": (RHEOCOMPASS, "rheocompass", 2, 1.0),
     "rtec, two steps": (RTEC, "rtec", 2, 1.0),
+    "rtec, one log of two steps": (RTEC_LOG, "rtec", 2, 1.0),
+    "anton paar, units in the names": (TRB, "csm", 1, 1.0),
     "blanks between cells": (SPACES, "delimited", 1, 1.0),
 }
 
@@ -278,6 +295,13 @@ def test_several_traces_are_refused_until_one_is_chosen(tmp_path: Path) -> None:
     np.testing.assert_allclose(second.force_N, -2.0 * np.arange(6) * GRAM_FORCE)
     with pytest.raises(ReadError, match=r"#1 to .*#2"):
         read_export(f"{path}#3")
+
+
+def test_anton_paar_columns_with_units_need_no_help(tmp_path: Path) -> None:
+    trace = read_export(saved(tmp_path, TRB, encoding="utf-8"))
+    np.testing.assert_allclose(trace.columns["normal_force_N"], 2.0)
+    np.testing.assert_allclose(trace.columns["friction_coefficient"], 0.1)
+    np.testing.assert_allclose(trace.columns["humidity_pct"], 45)
 
 
 def test_gram_force_and_signs_of_the_umt_are_kept(tmp_path: Path) -> None:

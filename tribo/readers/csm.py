@@ -1,15 +1,17 @@
-"""CSM and Anton Paar tribometer tables as often passed on: names without units, which must then be given."""
+"""CSM and Anton Paar tribometers (TRB, NTR): names with units, or as passed on without, to be given then."""
 
 from __future__ import annotations
 
+import re
+
 from tribo.readers.family import Family
-from tribo.readers.layout import cut
 from tribo.readers.source import Source
+
+_NAMES = re.compile(r"\nTime *(?:\[s\])?[\t;] *Distance[^\t;]*[\t;] *laps\b", re.I)
 
 
 def recognises(source: Source) -> bool:
-    names = {name.lower() for name in cut(source.head[0], "\t")}
-    return "laps" in names and "time" in names
+    return bool(_NAMES.search(source.head_text))
 
 
 ADVICE = 'this table carries no units; give them: time = "Time [s]", friction_force = "FrictionForce [N]" in columns'
