@@ -13,12 +13,15 @@ if TYPE_CHECKING:
     from tribo.simulate.config import PAPER, LocalFriction, SimConfig
     from tribo.simulate.ensemble import angle_range_deg, run_ensemble, stratified_design
     from tribo.simulate.masks import PAPER_PATTERNS, contact_mask
+    from tribo.simulate.resume import read_stored, run_stored
     from tribo.simulate.run import simulate
     from tribo.simulate.store import write_ensemble, write_run
+    from tribo.simulate.tables import table2
 
 _MODULES = {
     "PAPER": "config", "PAPER_PATTERNS": "masks", "LocalFriction": "config", "SimConfig": "config",
-    "angle_range_deg": "ensemble", "calibrate": "calibration", "contact_mask": "masks", "run_ensemble": "ensemble",
+    "angle_range_deg": "ensemble", "calibrate": "calibration", "contact_mask": "masks", "read_stored": "resume",
+    "run_ensemble": "ensemble", "run_stored": "resume", "table2": "tables",
     "simulate": "run", "stratified_design": "ensemble", "write_ensemble": "store", "write_run": "store",
 }  # fmt: skip
 
@@ -30,9 +33,12 @@ __all__ = [
     "angle_range_deg",
     "calibrate",
     "contact_mask",
+    "read_stored",
     "run_ensemble",
+    "run_stored",
     "simulate",
     "stratified_design",
+    "table2",
     "write_ensemble",
     "write_run",
 ]

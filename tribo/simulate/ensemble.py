@@ -19,6 +19,7 @@ from tribo.simulate.run import simulate
 if TYPE_CHECKING:
     import pandas as pd
 
+AngleRule = Literal["midpoints", "random"]
 Progress = Callable[[int, int], None]
 ANGLE_SPREAD_DEG = 10.0  # around the nominal direction of an anisotropic sample (Berardo 2019)
 
@@ -49,7 +50,7 @@ def stratified_design(
     repeats: int = 4,
     seed: int = 0,
     base: SimConfig | None = None,
-    angles: Literal["midpoints", "random"] = "midpoints",
+    angles: AngleRule = "midpoints",
 ) -> list[SimConfig]:
     """Configurations of an ensemble: every sample at every pressure, ``repeats`` times.
 

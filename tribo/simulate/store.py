@@ -89,7 +89,7 @@ def write_run(run: Run, path: str | Path) -> Path:
             **versions(),
         },
     )
-    return _written(path, lambda target: dataset.to_netcdf(target, engine="h5netcdf"))
+    return written(path, lambda target: dataset.to_netcdf(target, engine="h5netcdf"))
 
 
 def write_ensemble(table: pd.DataFrame, path: str | Path, parameters: Mapping[str, Any] | None = None) -> Path:
@@ -103,14 +103,14 @@ def write_ensemble(table: pd.DataFrame, path: str | Path, parameters: Mapping[st
         },
         attrs={"title": "an ensemble of the spring-block model", **attributes(parameters or {}), **versions()},
     )
-    return _written(path, lambda target: dataset.to_netcdf(target, engine="h5netcdf"))
+    return written(path, lambda target: dataset.to_netcdf(target, engine="h5netcdf"))
 
 
 def _column(values: Any) -> Any:
     return values.astype(str).astype(object) if values.dtype.kind in "OUT" else values
 
 
-def _written(path: str | Path, write: Callable[[Path], Any]) -> Path:
+def written(path: str | Path, write: Callable[[Path], Any]) -> Path:
     """Write beside ``path`` under another name, then rename: no half-written file bears the final name."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
