@@ -263,7 +263,7 @@ def run_reference(
     resting = lattice.contact.copy()
     end = config.duration_s or 2.0 * config.duration_peaks * float(thresholds.static_N.sum()) / drive.force_rate
     steps = max(1, int(np.ceil((end - start) / config.dt_s)))
-    stride = max(1, round(config.sample_interval_s / config.dt_s))
+    stride = min(max(1, round(config.sample_interval_s / config.dt_s)), steps)
     room = steps // stride
     sums = np.zeros(N_SUMS)
     sums[FORCE] = drive.force_rate * start
