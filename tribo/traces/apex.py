@@ -126,7 +126,7 @@ def _fall_side(t: FloatArray, f: FloatArray, after: FloatArray, at: FloatArray, 
     fall_s = np.maximum(shares * float(t[-1]), 0.3 * float(t[-1] - t[-2]))[:, None]
     u = np.exp((t[-1] - t) / fall_s)  # (K, n), 1 at the last sample
     n, sf, sff = np.array((np.ones_like(f), f, f * f)) @ after.T  # (J,) each
-    su, suu, suf = np.array((u, u * u, u * f)) @ after.T  # (K, J) each
+    su, suu, suf = (np.concatenate((u, u * u, u * f)) @ after.T).reshape(3, len(shares), -1)  # (K, J) each
     spread, joint = suu - su * su / n, suf - su * sf / n
     spread[-1], joint[-1] = 1.0, 0.0
     slope = joint / spread

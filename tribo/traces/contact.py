@@ -70,13 +70,12 @@ def starting_level(smooth: FloatArray) -> float:
     return min(first, median(smooth[: smooth.size // 50])) if smooth.size >= 50 * _FEWEST_FOR_ZERO else first
 
 
-def first_rise(time_s: FloatArray, smooth: FloatArray, noise: float) -> Rise | None:
+def first_rise(time_s: FloatArray, smooth: FloatArray, start: float, noise: float) -> Rise | None:
     """The first climb through a quarter to three quarters of the first maximum-like level, or None without one.
 
     That level is the highest force before the first clear fall; where the force climbs on without one, what it reaches
-    when it leaves the pace of the first climb.
+    when it leaves the pace of the first climb. ``start`` is the force the trace begins at.
     """
-    start = starting_level(smooth)
     full = float(smooth.max()) - start
     if full < _DETECTABLE * noise:
         return None
@@ -122,8 +121,9 @@ def zero_before(time_s: FloatArray, force: FloatArray, rise: Rise, noise: float)
     """
     level = median(force[: max(_FEWEST_FOR_ZERO, rise.first // 4)])
     contact = rise.reaches(level)
-    lasts = np.searchsorted(time_s, contact - np.array(_TOES) * (time_s[rise.last] - contact))
-    last = next((int(n) for n in lasts if n >= _FEWEST_FOR_ZERO), 0)
+    climb = float(time_s[rise.last]) - contact
+    lasts = (int(np.searchsorted(time_s, contact - toe * climb)) for toe in _TOES)
+    last = next((n for n in lasts if n >= _FEWEST_FOR_ZERO), 0)
     slope, middle, level = line(time_s[:last], force[:last]) if last else (math.inf, 0.0, 0.0)
     by_noise = 3.0 * noise * math.sqrt(12.0 / last) / max(time_s[last - 1] - time_s[0], 1e-300) if last else 0.0
     if abs(slope) > _CLIMBING * rise.rate + by_noise:

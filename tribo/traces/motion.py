@@ -66,8 +66,8 @@ def lay_out(trace: Trace, speed_m_s: float | None = None, zero: tuple[float, flo
     noise = min(noise, noise_of(force)) if problems else noise
     calm = median_of_three(force)
     smooth = smoothed(calm)
-    rise = first_rise(time, smooth, noise)
     start = starting_level(smooth)
+    rise = first_rise(time, smooth, start, noise)
     if faults := _no_pull(trace, smooth, start, rise, noise):
         raise TraceError([*faults, *problems])
     assert rise is not None
