@@ -193,6 +193,30 @@ def test_a_missing_unit_is_an_error_and_all_faults_come_at_once(path: Path) -> N
     assert {(p.kind, p.column) for p in found} == {("missing_unit", "Time"), ("unknown_unit", "Extension")}
 
 
+@pytest.mark.parametrize(
+    ("names", "row"),
+    [
+        ("Time (s),Load (N)", "{k},{t},{f}"),  # a row number without a name, as R writes it
+        ("Time (s),Load, filtered (N),Extension (mm)", "{t},{f},{x}"),
+        ("Time  Axial Force  Axial Displacement", "{t} {f} {x} 1"),
+    ],
+)
+def test_names_that_do_not_stand_over_their_columns_are_refused(path: Path, names: str, row: str) -> None:
+    rows = [row.format(k=k + 1, t=f"{0.1 * k:.2f}", f=f"{0.01 * k:.3f}", x=f"{0.02 * k:.3f}") for k in range(9)]
+    found = problems_of(path, "\n".join([names, *rows, ""]).encode())
+    assert (found[0].kind, found[0].row) == ("names_do_not_fit", 1)
+    assert read_export(path, columns={"time": "#1 [s]", "force": "#2 [N]"}).force_N.size == 9
+
+
+def test_names_of_several_words_may_stand_between_blanks(path: Path) -> None:
+    rows = [f"{0.1 * k:.2f}   {0.01 * k:.3f}   {0.02 * k:.3f}" for k in range(9)]
+    path.write_text("\n".join(["Time      Axial Force   Axial Displacement", "s   N   mm", *rows]))
+    trace = read_export(path)
+    np.testing.assert_allclose(trace.force_N, 0.01 * np.arange(9))
+    assert trace.displacement_m is not None
+    np.testing.assert_allclose(trace.displacement_m, 0.02e-3 * np.arange(9))
+
+
 def test_a_missing_column_says_how_to_name_it(path: Path) -> None:
     found = problems_of(path, written(ramp(), ("Time", "Extension", "Voltage"), ("s", "mm", "V")))
     assert [p.kind for p in found] == ["missing_column"]

@@ -20,6 +20,7 @@ _COMMA_NUMBER = re.compile(r"[-+]?(?:\d+,\d*|,\d+)(?:[eE][-+]?\d+)?")
 _DOT_NUMBER = re.compile(r"[-+]?(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _ROWS_LOOKED_AT = 6
 _HEADER_LINES_LOOKED_AT = 200
+_COMMENTS = {"comment", "comments", "kommentar", "commentaire"}
 _BLANK = ' \t;,"|'
 
 
@@ -28,7 +29,8 @@ class Layout:
     """How a table stands in a file. ``names``, ``units`` and ``filled`` have ``n_cells`` entries.
 
     ``header_rows`` counts the lines of the file above the first data row; ``names_row`` and ``units_row`` count
-    from 1. ``filled`` is False for a column that is empty in the first rows.
+    from 1. ``filled`` is False for a column that is empty in the first rows; ``misfit`` says that the
+    names of the file cannot be told apart, and are left out.
     """
 
     delimiter: str
@@ -41,6 +43,7 @@ class Layout:
     names_row: int | None = None
     units_row: int | None = None
     metadata: dict[str, str] = field(default_factory=dict)
+    misfit: str = ""
 
     def name(self, index: int) -> str:
         """What a column is called, or its position where it has no name."""
@@ -194,29 +197,44 @@ def _step_back_over_damage(lines: Sequence[str], first: int, delimiter: str, n_c
 def _with_header(lines: Sequence[str], layout: Layout, named: Named) -> Layout:
     """Names and units are the two lines nearest above the data; the rest of the header is metadata."""
     above = [k for k in range(layout.header_rows) if lines[k].strip(_BLANK)]
-    if above and len(cut(lines[above[-1]], layout.delimiter)) == 1 < layout.n_cells:
+    cells = {k: _header_cells(lines[k], layout) for k in above[-2:]}
+    if not above or len(cells[above[-1]]) == 1 < layout.n_cells:
         return replace(layout, **_nameless(lines, above, layout))
-    cells = {k: _fit(cut(lines[k], layout.delimiter), layout.n_cells) for k in above[-2:]}
     hits = {k: sum(_known(cell, named) for cell in row) for k, row in cells.items()}
-    names_row = units_row = None
-    if above:
-        names_row = above[-1]
-        if len(above) > 1 and hits[above[-2]] > hits[above[-1]]:
-            names_row, units_row = above[-2], above[-1]
-    nothing = ("",) * layout.n_cells
-    before = [k for k in above if names_row is None or k < names_row]
-    return replace(
-        layout,
-        names=nothing if names_row is None else cells[names_row],
-        units=nothing if units_row is None else cells[units_row],
-        names_row=None if names_row is None else names_row + 1,
-        units_row=None if units_row is None else units_row + 1,
-        metadata=metadata(lines, before, layout.delimiter),
-    )
+    names_row, units_row = above[-1], None
+    if len(above) > 1 and hits[above[-2]] > hits[above[-1]]:
+        names_row, units_row = above[-2], above[-1]
+    header = _nameless(lines, [k for k in above if k < names_row], layout)
+    if units_row is not None:
+        header["units"] = _fit(cells[units_row], layout.n_cells)
+        header["units_row"] = units_row + 1
+    if _stands_over(cells[names_row], layout):
+        header["names"] = _fit(cells[names_row], layout.n_cells)
+        header["names_row"] = names_row + 1
+    else:
+        given = sum(bool(cell) for cell in cells[names_row])
+        header["misfit"] = f"{given} names over {layout.n_cells} cells: which is whose cannot be told"
+        header["names_row"] = names_row + 1
+    return replace(layout, **header)
+
+
+def _header_cells(line: str, layout: Layout) -> list[str]:
+    """Cells of a line of names or units; between blanks, names may hold single ones."""
+    cells = cut(line, layout.delimiter)
+    if layout.delimiter != " " or len(cells) == layout.n_cells:
+        return cells
+    wider = re.split(r"\s{2,}", line.replace('"', "").strip())
+    return wider if len(wider) == layout.n_cells else cells
+
+
+def _stands_over(names: Sequence[str], layout: Layout) -> bool:
+    """Whether each name has its column: none without a name but empty ones, none too many but a comment."""
+    extra = [name for name in names[layout.n_cells :] if name and name.lower() not in _COMMENTS]
+    return not extra and not any(layout.filled[len(names) :])
 
 
 def _nameless(lines: Sequence[str], above: Sequence[int], layout: Layout) -> dict[str, Any]:
-    """A title or settings right above the numbers: the columns have no names."""
+    """Columns without names or units, and the lines above as metadata."""
     nothing = ("",) * layout.n_cells
     return {"names": nothing, "units": nothing, "metadata": metadata(lines, above, layout.delimiter)}
 

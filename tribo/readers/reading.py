@@ -126,6 +126,8 @@ def _read_block(source: Source, family: Family, block: Block, asked: tuple[Hint,
     except ReadError as why:
         row = layout.units_row or layout.names_row
         problems = [replace(p, file=source.file, row=row) for p in why.problems]
+        if layout.misfit:
+            problems.insert(0, Problem("names_do_not_fit", layout.misfit, source.file, layout.names_row))
         if family.advice:
             problems = [replace(p, allowed=family.advice) for p in problems]
         raise ReadError(problems) from None
