@@ -36,7 +36,7 @@ PAIRS = (
 TRUTH = {
     "suction": ("dp", 5000.0), "pressure_dependent_friction": ("n", 0.2), "velocity_dependence": ("a", 0.06),
     "contact_ageing": ("b", 0.035), "run_in": ("c", 0.25), "temperature": ("c", 0.06),
-    "normal_load_error": ("dN", 0.12), "contact_area_loss": ("c", 1.6e-11),
+    "normal_load_error": ("dN", 0.12),
 }  # fmt: skip
 
 

@@ -147,7 +147,7 @@ def _verdict(
     smallest = smallest_effects(baseline, screened, level, {e.mechanism for e in barred})
     return Verdict(
         verdict=outcome,
-        misfits=(*left, *misfits),
+        misfits=_once([*left, *misfits]),
         causes=tuple(causes),
         equivalent=_equivalent(named) if outcome == "named" else (),
         excluded=tuple(_excluded(named, barred, causes)),
@@ -157,6 +157,12 @@ def _verdict(
         text=summary(outcome, causes, misfits, left, smallest),
         smallest_effects=smallest,
     )
+
+
+def _once(misfits: Sequence[Misfit]) -> tuple[Misfit, ...]:
+    """Each column of each observable and sample once, as it was said first."""
+    first = {(m.observable, m.sample, m.covariate): m for m in reversed(misfits)}
+    return tuple(m for m in misfits if first[m.observable, m.sample, m.covariate] is m)
 
 
 def _certain(evidence: dict[str, Evidence]) -> dict[str, Evidence]:
