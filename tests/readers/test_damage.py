@@ -248,6 +248,16 @@ def test_one_sample_ten_times_off_is_a_spike_and_not_for_the_reader(path: Path) 
     assert read_export(path).flags == ()
 
 
+def test_a_tenfold_load_for_a_while_is_no_slipped_decimal_mark(path: Path) -> None:
+    load = [10.0 if 10 <= k < 20 else 1.0 for k in range(30)]
+    rows = [[f"{0.1 * k:.2f}", f"{0.3 * n:.3f}", f"{n:.2f}"] for k, n in enumerate(load)]
+    path.write_bytes(written(rows, ("Time", "Fx", "Fz"), ("s", "N", "N")))
+    assert read_export(path).flags == ()
+    without_load = [row[:2] for row in rows]
+    found = problems_of(path, written(without_load, ("Time", "Fx"), ("s", "N")))
+    assert [p.kind for p in found] == ["scale_jump"]
+
+
 def test_a_gap_in_time_is_read_and_flagged_with_its_row(path: Path) -> None:
     rows = ramp(40)
     path.write_bytes(written(rows[:20] + rows[30:], NAMES, UNITS))

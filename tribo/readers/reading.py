@@ -147,12 +147,19 @@ def _findings(
     row_of = partial(_row_of, source, block)
     label = {c.quantity: c.label for c in assignment.columns}
     found = check_time(arrays["time"], source.file, label["time"], row_of)
-    for quantity in ("friction force", "displacement", "normal force"):
+    checked = ["displacement"] if _load_varies(arrays) else ["friction force", "displacement"]
+    for quantity in checked:
         if quantity in arrays:
             found += check_scale(arrays[quantity], source.file, label[quantity], row_of)
     row = block.layout.units_row or block.layout.names_row
     left_out = [replace(p, file=source.file, row=row) for p in assignment.left_out]
     return (*found, *(Finding("column_without_unit", p) for p in left_out))
+
+
+def _load_varies(arrays: dict[str, FloatArray]) -> bool:
+    """Whether the normal force changes by half or more: a tenfold load gives a tenfold friction."""
+    load = arrays.get("normal force")
+    return load is not None and bool(np.ptp(load) > 0.5 * np.abs(load).max())
 
 
 def _row_of(source: Source, block: Block, sample: int) -> int:
