@@ -201,3 +201,41 @@ def test_an_impossible_simulation_is_refused_with_everything_that_is_wrong(tmp_p
     assert result.exit_code == 1
     assert "pressure" in result.stderr
     assert not (tmp_path / "run.nc").exists()
+
+
+def test_report_carries_a_verdict_in_the_binding_schema(report: tuple[Result, Path]) -> None:
+    verdict = json.loads((report[1] / "verdict.json").read_text(encoding="utf-8"))
+    assert verdict["schema"] == "tribo.verdict/1"
+    assert verdict["verdict"] in {"no_misfit", "named", "undetermined", "unknown"}
+    assert {"misfits", "causes", "equivalent", "excluded", "gain", "set_aside", "next_test"} <= set(verdict)
+
+
+def test_fit_says_what_the_campaign_could_have_shown(report: tuple[Result, Path]) -> None:
+    power = json.loads(report[0].stdout)["power"]
+    assert any("static T at 10 kPa" in line for line in power)
+
+
+def test_a_plan_needs_no_export(small_campaign: Path, tmp_path: Path) -> None:
+    shutil.copytree(small_campaign, tmp_path / "plan", ignore=shutil.ignore_patterns("raw"))
+    result = run("plan", tmp_path / "plan", "--json")
+    assert result.exit_code == 0
+    found = {f["mechanism"]: f for f in json.loads(result.stdout)["findings"]}
+    assert found["velocity_dependence"]["why"]
+    assert found["pull_angle"]["why"]
+
+
+def test_suction_raises_the_simulated_friction_of_a_patterned_sample(tmp_path: Path) -> None:
+    friction = []
+    for extra in ([], ["--with", "suction:dp=3000"]):
+        result = run(
+            "simulate", "--sample", "B", "--pressure", 5, "--blocks", 24, "-o", tmp_path / "run.nc", "--json", *extra
+        )
+        friction.append(json.loads(result.stdout)["static_friction"])
+    assert friction[1] > 1.05 * friction[0]
+
+
+def test_an_unknown_mechanism_is_refused_with_the_known_ones(tmp_path: Path) -> None:
+    out = tmp_path / "run.nc"
+    result = run("simulate", "--sample", "B", "--pressure", 5, "--with", "sucktion:dp=1", "-o", out)
+    assert result.exit_code == 1
+    assert "suction" in result.stderr

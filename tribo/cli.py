@@ -13,7 +13,7 @@ from tribo.console import Console, command_options, set_aside_record, set_aside_
 
 if TYPE_CHECKING:
     from tribo.records import Study
-    from tribo.stages import Until
+    from tribo.stages import Progress, Until
 
 CAMPAIGN = click.argument("campaign", type=click.Path(exists=True, path_type=Path))
 FOLDER = click.Path(file_okay=False, path_type=Path)
@@ -140,6 +140,23 @@ def report(console: Console, campaign: Path, out: Path, dry_run: bool, **options
 
 
 @main.command()
+@CAMPAIGN
+@command_options
+def plan(console: Console, campaign: Path, **_: Any) -> None:
+    """What a design can and cannot tell apart, before measuring; the exports need not exist."""
+    from dataclasses import asdict
+
+    from tribo.campaign import open_campaign
+    from tribo.diagnose import plan_design
+    from tribo.report.verdict import plan_text
+
+    with open_campaign(campaign, measured=False) as opened:
+        planned = plan_design(opened)
+    record = {"tests": planned.n_tests, "findings": [asdict(f) for f in planned.findings], "tied": planned.tied}
+    console.result(record, plan_text(planned))
+
+
+@main.command()
 @click.option("-o", "--out", type=FOLDER, default="out/demo", show_default=True, help="Output folder.")
 @_fit_options
 @_model_options
@@ -173,30 +190,30 @@ def inspect(console: Console, files: tuple[Path, ...], **_: Any) -> int:
 @click.option("--dt", "dt_s", type=float, default=5e-8, show_default=True, help="Time step in s.")
 @click.option("--duration", "duration_ms", type=float, help="Length of the run in ms (three times the peak time).")
 @click.option("--engine", default="fast", show_default=True, help="fast, dense or reference.")
+@click.option("--with", "mechanisms", default="", help="MECHANISM:PARAM=VALUE,... put into the model.")
 @click.option("-o", "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="FILE.nc to write.")
 @command_options
 def simulate(
     console: Console, sample: str, pressure_kPa: float, angle_deg: float | None, blocks: int, dt_s: float,
-    duration_ms: float | None, engine: Any, out: Path, seed: int, **_: Any,
+    duration_ms: float | None, engine: Any, mechanisms: str, out: Path, seed: int, **_: Any,
 ) -> None:  # fmt: skip
     """One run of the spring-block model with the paper's parameters."""
+    from tribo.diagnose import parse_with, simulate_with
     from tribo.simulate import SimConfig, angle_range_deg, write_run
-    from tribo.simulate import simulate as run_model
 
     low, high = angle_range_deg(sample)
     nominal = (low + high) / 2 if (low, high) != (0.0, 90.0) else 0.0
-    run = run_model(
-        SimConfig(
-            sample=sample,
-            pressure_Pa=pressure_kPa * 1e3,
-            angle_deg=nominal if angle_deg is None else angle_deg,
-            seed=seed,
-            blocks=(blocks, blocks),
-            dt_s=dt_s,
-            duration_s=None if duration_ms is None else duration_ms * 1e-3,
-            engine=engine,
-        )
+    config = SimConfig(
+        sample=sample,
+        pressure_Pa=pressure_kPa * 1e3,
+        angle_deg=nominal if angle_deg is None else angle_deg,
+        seed=seed,
+        blocks=(blocks, blocks),
+        dt_s=dt_s,
+        duration_s=None if duration_ms is None else duration_ms * 1e-3,
+        engine=engine,
     )
+    run = simulate_with(config.check(), parse_with(mechanisms))
     write_run(run, out)
     record = {
         "out": str(out),
@@ -254,25 +271,44 @@ def _walk(console: Console, path: Path, out: Path, until: Until, dry_run: bool, 
             return status_of(campaign.set_aside)
         with console.progress() as progress:
             study = stages.study(campaign, chosen, until=until, progress=progress)
+            study, verdict = _diagnosed(study, chosen.seed, progress) if until == "report" else (study, None)
             provenance = gather_provenance(
                 study, command=_command_line(), seed=chosen.seed, started_at=_now(), options=chosen.as_words()
             )
-            write_until(study, out, until, progress=progress, provenance=provenance)
+            write_until(study, out, until, progress=progress, provenance=provenance, verdict=verdict)
     return _conclude(console, study, out)
+
+
+def _diagnosed(study: Study, seed: int, progress: Progress) -> tuple[Study, dict[str, Any] | None]:
+    """The verdict in the form of verdict.json; a note instead where there is too little to diagnose."""
+    from dataclasses import replace
+
+    from tribo.diagnose import diagnose
+    from tribo.errors import FitError
+
+    try:
+        return study, diagnose(study.ingested, seed=seed, progress=progress).as_dict()
+    except FitError as why:
+        return replace(study, notes=(*study.notes, f"no diagnosis: {why}")), None
 
 
 def _conclude(console: Console, study: Study, out: Path) -> int:
     """Say what came out, what was set aside, and with what status it ends."""
+    from dataclasses import asdict
+
     from tribo.report import summary_text, table2_text
     from tribo.report.tables import fits_table
 
     set_aside = study.ingested.set_aside
+    doubts = study.ingested.doubts()
     fits = fits_table(study.fits).astype(object)
     record = {
         "out": str(out),
         "tests": len(study.ingested.pulls),
         "set_aside": set_aside_record(set_aside),
-        "notes": [str(p) for p in study.ingested.campaign.problems] + list(study.notes),
+        "used_with_doubts": set_aside_record(doubts),
+        "problems": [asdict(p) for p in study.ingested.campaign.problems],
+        "notes": list(study.notes),
         "fits": fits.where(fits.notna(), None).to_dict("records"),
         "power": list(study.power),
         "outlying": list(study.outlying),
@@ -282,6 +318,8 @@ def _conclude(console: Console, study: Study, out: Path) -> int:
     console.result(record, "\n\n".join([*words, summary_text(study), *looks]))
     if set_aside:
         console.say(f"{len(set_aside)} tests set aside:\n{set_aside_text(set_aside)}", level=-1)
+    if doubts:
+        console.say(f"{len(doubts)} tests used with doubts:\n{set_aside_text(doubts)}")
     return status_of(set_aside)
 
 

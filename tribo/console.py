@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import logging
+import math
 import os
 import sys
 import time
@@ -35,7 +36,7 @@ class Console:
 
     def result(self, record: dict[str, Any], text: str) -> None:
         """The result itself: JSON where asked for, else ``text``."""
-        click.echo(json.dumps(record, indent=1, default=str, allow_nan=False) if self.as_json else text)
+        click.echo(json.dumps(without_nan(record), indent=1, default=str) if self.as_json else text)
 
     @contextmanager
     def progress(self) -> Iterator[Callable[[str, int, int], None]]:
@@ -92,6 +93,15 @@ def _bars() -> Iterator[Callable[[str, int, int], None]]:
                 bars.refresh()
 
         yield report
+
+
+def without_nan(value: Any) -> Any:
+    """The same record with null for every number that does not exist, as JSON wants it."""
+    if isinstance(value, dict):
+        return {key: without_nan(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [without_nan(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def faults_text(problems: Sequence[Problem]) -> str:

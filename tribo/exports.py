@@ -26,7 +26,7 @@ def read_one(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> O
     from tribo.traces import read_pull
 
     try:
-        trace = read_export(root / test.file, columns=columns or None, name=test.test_id)
+        trace = read_export(root / test.file, columns=columns or None, name=test.test_id, file=test.file)
         return trace, read_pull(trace, rule=rule, test=test)
     except TriboError as why:
         problems = tuple(replace(p, file=test.file, test_id=test.test_id) for p in why.problems)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -285,6 +285,18 @@ class Ingested:
     traces: Mapping[str, Trace]
     pulls: Mapping[str, Pull]
     set_aside: tuple[SetAside, ...]
+
+    def doubts(self) -> tuple[SetAside, ...]:
+        """Tests that were used although their export or pull shows something odd, such as an impulse spike."""
+        found = []
+        for test_id, pull in self.pulls.items():
+            problems = tuple(
+                replace(p, file=self.traces[test_id].file or p.file, test_id=test_id)
+                for p in dict.fromkeys((*self.traces[test_id].problems, *pull.problems))
+            )
+            if problems:
+                found.append(SetAside(test_id, "; ".join(map(str, problems)), problems))
+        return tuple(found)
 
     def table(self) -> pd.DataFrame:
         """One row a usable test: test_id, sample, specimen, normal_load_N and what the pull says."""

@@ -24,8 +24,10 @@ _NOT_A_ZIP = (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, Runtim
 
 
 @contextmanager
-def open_campaign(path: Path | str) -> Iterator[Campaign]:
+def open_campaign(path: Path | str, *, measured: bool = True) -> Iterator[Campaign]:
     """Open a campaign folder, or a .zip that holds one (unpacked into a temporary folder for the duration).
+
+    ``measured`` is that of :func:`tribo.campaign.load_campaign`.
 
     Raises
     ------
@@ -35,11 +37,11 @@ def open_campaign(path: Path | str) -> Iterator[Campaign]:
     """
     path = Path(path)
     if path.is_dir():
-        yield load_campaign(_campaign_folder(path, path.name))
+        yield load_campaign(_campaign_folder(path, path.name), measured=measured)
     elif path.is_file():
         with tempfile.TemporaryDirectory(prefix="tribo-", ignore_cleanup_errors=True) as folder:
             _unpack(path, Path(folder))
-            yield load_campaign(_campaign_folder(Path(folder), path.name))
+            yield load_campaign(_campaign_folder(Path(folder), path.name), measured=measured)
     else:
         raise CampaignError(Problem("missing", "no such folder or .zip", file=str(path)))
 

@@ -21,8 +21,10 @@ _MM2, _GRAM, _MM, _UM = 1e-6, 1e-3, 1e-3, 1e-6
 _NUMBER_ROW = re.compile(rb'^\s*"?[-+]?[.,]?\d+[.,\d]*"?\s*[,;\t|]', re.M)
 
 
-def load_campaign(folder: Path | str) -> Campaign:
+def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     """Read campaign.toml and tests.csv of a folder; of raw/ only which files there are.
+
+    With ``measured=False`` the exports need not exist yet: the campaign is a plan.
 
     Returns
     -------
@@ -43,7 +45,7 @@ def load_campaign(folder: Path | str) -> Campaign:
     if described is None or rows is None:
         raise CampaignError(problems)
     patterns = {name: _pattern(name, table) for name, table in described.patterns.items()}
-    usable, set_aside = _sort_rows(root, rows, patterns)
+    usable, set_aside = _sort_rows(root, rows, patterns, measured)
     problems += [p for s in set_aside for p in s.problems]
     if not usable:
         nothing = Problem("no_usable_test", "no test of this campaign can be used", file=TESTS)
@@ -103,7 +105,7 @@ def _pattern_of(sample: str, patterns: Mapping[str, Pattern]) -> str:
 
 
 def _sort_rows(
-    root: Path, rows: Sequence[TestRow], patterns: Mapping[str, Pattern]
+    root: Path, rows: Sequence[TestRow], patterns: Mapping[str, Pattern], measured: bool
 ) -> tuple[list[TestRow], tuple[SetAside, ...]]:
     """Usable rows, and the others with all their faults; rows that share a test_id are one set-aside test."""
     places: dict[str, list[int]] = {}
@@ -116,7 +118,7 @@ def _sort_rows(
         test_id = row.test_id
         if row.row != places[test_id][0]:
             continue
-        problems = _row_faults(root, row, patterns)
+        problems = [p for p in _row_faults(root, row, patterns) if measured or p.kind != "missing"]
         if len(places[test_id]) > 1:
             problems.append(_duplicate(test_id, places[test_id]))
         others = [other for other in users[row.cells.get("file", "")] if other != test_id]

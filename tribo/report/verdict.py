@@ -1,7 +1,8 @@
-"""The verdict in words for a terminal."""
+"""A verdict, and what a planned design can tell, in words for a terminal."""
 
 from __future__ import annotations
 
+from tribo.diagnose.plan import Plan
 from tribo.diagnose.verdict import Cause, Verdict
 from tribo.report.numerals import significant
 
@@ -29,3 +30,15 @@ def _cause_line(cause: Cause) -> str:
         for name, e in cause.parameters.items()
     )
     return f"{cause.text} [{cause.mechanism}, weight {cause.weight:.2f}; 90 %: {values}]"
+
+
+def plan_text(plan: Plan) -> str:
+    """What a design finds nine times in ten, mechanism by mechanism, and what it cannot part or show."""
+    shown = [f for f in plan.findings if not f.why]
+    lines = [f"{plan.n_tests} planned tests. Found nine times in ten, the easiest first:"]
+    for f in shown:
+        size = f"{f.amplitude:.3g} {f.unit}".rstrip()
+        tie = f"; looks like {', '.join(f.confused_with)} here: {f.separates}" if f.confused_with else ""
+        lines.append(f"  {f.mechanism}: from {size}, {f.effect_percent:.0f} % of T from end to end{tie}")
+    lines += [f"  {f.mechanism}: cannot be told from this design ({f.why})" for f in plan.findings if f.why]
+    return "\n".join(lines)
