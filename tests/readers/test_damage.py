@@ -307,6 +307,12 @@ def test_damage_in_a_large_file_is_named_with_its_row(path: Path, dialect: Diale
     ]
 
 
+@pytest.mark.usefixtures("small_pieces")
+def test_a_large_file_without_line_ends_is_refused(path: Path) -> None:
+    header = written(ramp(6), NAMES, UNITS)
+    assert problems_of(path, header + b"1.0,2.0," * 3000)[0].kind == "wrong_number_of_cells"
+
+
 def test_a_file_above_the_limit_is_refused_without_reading_it(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tribo.readers.source.LARGEST_FILE_BYTES", 100)
     assert [p.kind for p in problems_of(path, written(ramp(), NAMES, UNITS))] == ["too_large"]

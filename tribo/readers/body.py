@@ -30,32 +30,26 @@ def parse_block(source: Source, block: Block, used: Sequence[int]) -> FloatArray
     """
     if source.arrays:
         return np.array([source.arrays[index] for index in used], dtype=float)
-    pieces, problems = [], []
-    row = block.layout.header_rows + 1
+    pieces: list[FloatArray] = []
+    problems: list[Problem] = []
+    row, start = block.layout.header_rows + 1, block.start
     for chunk in source.chunks(block.start, block.end):
+        start += len(chunk)
+        ends_file = start >= len(source.data)
         values = parse_rows(chunk, block.layout, used)
-        if values is None or not np.isfinite(values).all():
+        breaks_off = ends_file and cut_short(source, block)
+        if values is None or breaks_off or not np.isfinite(values).all():
             text = source.text(chunk).replace("\r\n", "\n")
-            problems += find_damage(text, block.layout, used, source.file, row)
-            values = None if problems else _parse_slowly(text, block.layout, used)
-            if values is None and not problems:
-                what = "the table cannot be read as numbers"
-                problems.append(Problem("unreadable", what, file=source.file, row=row))
+            found = find_damage(text, block.layout, used, source.file, row, ends_file, breaks_off)
+            values = None if found else _parse_slowly(text, block.layout, used)
+            if values is None and not found:
+                found = [Problem("unreadable", "the table cannot be read as numbers", source.file, row)]
+            problems += found
         if len(problems) > MOST_PROBLEMS:
             break
         row += chunk.count(b"\n")
         if values is not None:
             pieces.append(values)
-    if not problems and cut_short(source, block):
-        chunk = bytes(source.data[block.start : block.end])
-        problems = find_damage(
-            source.text(chunk).replace("\r\n", "\n"),
-            block.layout,
-            used,
-            source.file,
-            block.layout.header_rows + 1,
-            True,
-        )
     if problems:
         raise ReadError(problems)
     return _by_column(pieces)

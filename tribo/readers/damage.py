@@ -32,15 +32,18 @@ def cut_short(source: Source, block: Block) -> bool:
 
 
 def find_damage(
-    text: str, layout: Layout, used: Sequence[int], file: str, first_row: int, breaks_off: bool = False
+    text: str, layout: Layout, used: Sequence[int], file: str, first_row: int, ends_file: bool, breaks_off: bool
 ) -> list[Problem]:
     """Cells without a number and rows with too many or too few cells; runs of empty cells are one problem.
 
-    ``first_row`` is the line of the file, from 1, that ``text`` begins with; ``breaks_off`` says that the last
-    row is known to be cut. A last row without a line end that lacks its last number is cut as well.
+    ``first_row`` is the line of the file, from 1, that ``text`` begins with; ``ends_file`` says that the file ends with
+    it, so that its last row may be cut, ``breaks_off`` that this row is known to be cut. A last row without a
+    line end that lacks its last number is cut as well.
     """
     lines = text.split("\n")
-    unfinished = bool(lines[-1].strip()) and layout.filled[-1] and not _ends_in_a_number(lines[-1], layout)
+    unfinished = (
+        ends_file and bool(lines[-1].strip()) and layout.filled[-1] and not _ends_in_a_number(lines[-1], layout)
+    )
     breaks_off = breaks_off or unfinished
     last = max((k for k, line in enumerate(lines) if line.strip(' \t;,"|')), default=-1)
     gaps: dict[int, list[int]] = {}
@@ -51,7 +54,7 @@ def find_damage(
         if len(problems) >= MOST_PROBLEMS:
             problems.append(Problem("more", "further faults in the rows below", file=file, row=first_row + k))
             break
-        row_fault = _row_fault(lines[k], layout, file, first_row + k, k == last, breaks_off)
+        row_fault = _row_fault(lines[k], layout, file, first_row + k, ends_file and k == last, breaks_off)
         if row_fault:
             problems.append(row_fault)
         else:

@@ -38,7 +38,7 @@ def open_matlab(path: Path, file: str) -> Source:
 
 def _vectors(path: Path, file: str) -> dict[str, FloatArray]:
     try:
-        found = _from_hdf5(path) if path.read_bytes()[:520].find(_HDF5) >= 0 else _from_mat5(path)
+        found = _from_hdf5(path) if _is_hdf5(path) else _from_mat5(path)
     except ReadError:
         raise
     except Exception as why:  # scipy and h5py raise many kinds on damaged files
@@ -48,6 +48,11 @@ def _vectors(path: Path, file: str) -> dict[str, FloatArray]:
         for name, value in found.items()
         if isinstance(value, np.ndarray) and value.dtype.kind in "fiu" and value.size == max(value.shape, default=0)
     }
+
+
+def _is_hdf5(path: Path) -> bool:
+    with path.open("rb") as stream:
+        return _HDF5 in stream.read(520)
 
 
 def _from_mat5(path: Path) -> dict[str, Any]:

@@ -94,7 +94,7 @@ class Source:
             stop = end
             if end - start > CHUNK_BYTES:
                 stop = self.data.rfind(b"\n", start, start + CHUNK_BYTES) + 1
-                stop = stop if stop > start else end
+                stop = stop if stop > start else start + CHUNK_BYTES
             yield bytes(self.data[start:stop])
             start = stop
 

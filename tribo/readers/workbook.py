@@ -9,7 +9,7 @@ from tribo.errors import Problem, ReadError
 from tribo.readers.source import Source
 
 _OLD_EXCEL = b"\xd0\xcf\x11\xe0"
-_MOST_UNPACKED_BYTES = 500_000_000
+_MOST_UNPACKED_BYTES = 200_000_000
 
 
 def is_workbook(head: bytes) -> bool:
