@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tribo.simulate.calibration import calibrate
-    from tribo.simulate.config import PAPER, LocalFriction, SimConfig
+    from tribo.simulate.config import PAPER, FrictionTerms, LocalFriction, SimConfig
     from tribo.simulate.ensemble import angle_range_deg, run_ensemble, stratified_design
     from tribo.simulate.masks import PAPER_PATTERNS, contact_mask
     from tribo.simulate.resume import read_stored, run_stored
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from tribo.simulate.tables import table2
 
 _MODULES = {
-    "PAPER": "config", "PAPER_PATTERNS": "masks", "LocalFriction": "config", "SimConfig": "config",
+    "FrictionTerms": "config", "PAPER": "config",
+    "PAPER_PATTERNS": "masks", "LocalFriction": "config", "SimConfig": "config",
     "angle_range_deg": "ensemble", "calibrate": "calibration", "contact_mask": "masks", "read_stored": "resume",
     "run_ensemble": "ensemble", "run_stored": "resume", "table2": "tables",
     "simulate": "run", "stratified_design": "ensemble", "write_ensemble": "store", "write_run": "store",
@@ -28,6 +29,7 @@ _MODULES = {
 __all__ = [
     "PAPER",
     "PAPER_PATTERNS",
+    "FrictionTerms",
     "LocalFriction",
     "SimConfig",
     "angle_range_deg",

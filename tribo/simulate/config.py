@@ -38,6 +38,36 @@ PAPER = LocalFriction()
 
 
 @dataclass(frozen=True)
+class FrictionTerms:
+    """Local friction that changes during a run; amplitudes of zero, the default, leave the baseline as it is.
+
+    The laws stand in :mod:`tribo.simulate.friction`.
+
+    Parameters
+    ----------
+    ageing_b, ageing_t0_s
+        Static friction grows by ``b ln(1 + t / t0)`` with the time t at rest (Dieterich-Ruina), b >= 0.
+    hold_s
+        Time at rest before the pull starts.
+    speed_a, speed_v0_m_s
+        Sliding friction changes by ``a ln(1 + v / v0)`` with the slip speed v of a block.
+    """
+
+    ageing_b: float = 0.0
+    ageing_t0_s: float = 1e-3
+    hold_s: float = 0.0
+    speed_a: float = 0.0
+    speed_v0_m_s: float = 2e-4
+
+    @property
+    def active(self) -> bool:
+        return self.ageing_b != 0.0 or self.speed_a != 0.0
+
+
+NO_TERMS = FrictionTerms()
+
+
+@dataclass(frozen=True)
 class SimConfig:
     """One run. Lengths, times and pressures in SI units; the defaults are the baseline of Berardo 2019.
 
@@ -49,6 +79,8 @@ class SimConfig:
         Nominal pressure, and pull direction against x.
     seed
         Draws the local friction. Equal seeds give equal numbers on every sample.
+    terms
+        What changes the local friction during the run; nothing by default.
     blocks, spacing_m, thickness_m
         Blocks along x and y, their distance l, and the layer thickness l_z (l by default).
     shear_factor
@@ -79,6 +111,7 @@ class SimConfig:
     seed: int = 0
     pattern: Pattern | None = None
     friction: LocalFriction = PAPER
+    terms: FrictionTerms = NO_TERMS
     blocks: tuple[int, int] = (85, 85)
     spacing_m: float = 5e-6
     thickness_m: float | None = None
@@ -197,7 +230,12 @@ _ABOVE = {"duration_peaks": 1.0, "window_start_peaks": 1.0, "window_end_peaks": 
 
 def _problems(config: SimConfig) -> Iterator[Problem]:
     """Every fault of a configuration; later checks only run on numbers the earlier ones let through."""
-    faults = [*_number_problems(config), *_choice_problems(config), *_friction_problems(config.friction)]
+    faults = [
+        *_number_problems(config),
+        *_choice_problems(config),
+        *_friction_problems(config.friction),
+        *_term_problems(config),
+    ]
     yield from faults
     if faults:
         return
@@ -217,6 +255,23 @@ def _problems(config: SimConfig) -> Iterator[Problem]:
         yield Problem(
             "unsupported", "only the reference engine has springs of finite rotation", column="rotation",
             found="finite", allowed="small, or engine reference",
+        )  # fmt: skip
+
+
+def _term_problems(config: SimConfig) -> Iterator[Problem]:
+    terms = config.terms
+    for field in fields(terms):
+        value = getattr(terms, field.name)
+        if not math.isfinite(value):
+            yield Problem("not_finite", "not a finite number", column=field.name, found=str(value), allowed="a number")
+        elif field.name in ("ageing_b", "hold_s") and value < 0:
+            yield Problem("negative", "must not be negative", column=field.name, found=f"{value:g}", allowed=">= 0")
+        elif field.name in ("ageing_t0_s", "speed_v0_m_s") and value <= 0:
+            yield Problem("not_positive", "must be positive", column=field.name, found=f"{value:g}", allowed="> 0")
+    if terms.active and config.engine == "reference":
+        yield Problem(
+            "unsupported", "the reference engine knows the paper's friction only", column="engine",
+            found="reference", allowed="fast or dense",
         )  # fmt: skip
 
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from tribo.records import FloatArray
 from tribo.simulate import kernels as k
+from tribo.simulate.friction import sliding_threshold, static_threshold
 from tribo.simulate.jit import compiled
 from tribo.simulate.kernels import (
-    AGES,
     CODE,
     DENSE_STEPS,
     RUNNING,
@@ -20,9 +20,7 @@ from tribo.simulate.kernels import (
     State,
     last_stretch,
     observe,
-    sliding_threshold,
-    static_threshold,
-)  # fmt: skip
+)
 from tribo.simulate.lattice import Lattice
 from tribo.simulate.masks import BoolArray
 
@@ -185,8 +183,7 @@ def stop_row(
             work[x] += share * drive * fd[x]
             v_x[x] *= share
             v_y[x] *= share
-            if AGES:
-                since[x] = t
+            since[x] = t
 
 
 @compiled

@@ -12,6 +12,7 @@ from tribo.records import FloatArray
 from tribo.simulate import kernels as k
 from tribo.simulate.config import SimConfig, mask_of
 from tribo.simulate.dense import advance_dense
+from tribo.simulate.friction import packed
 from tribo.simulate.lattice import Lattice, make_lattice
 
 _RING = 1 << 15  # steps the failure queue looks ahead
@@ -170,7 +171,7 @@ def _numerics(
         stop_at_peaks=np.inf if config.duration_s is not None else config.duration_peaks,
         peak_drop=config.peak_drop,
         dense_above=-1 if config.engine == "dense" else int(_DENSE_SHARE * n),
-        law=np.zeros(0),
+        law=packed(config.terms),
     )
 
 
@@ -186,6 +187,7 @@ def _initial_state(
     cells[:n, k.QX : k.QY + 1] = drive.lag
     cells[:n, k.FS], cells[:n, k.FD] = thresholds.static_N, thresholds.sliding_N
     cells[:, k.KXX : k.KXY + 1] = config.stiffness_N_m * lattice.own
+    cells[:, k.SINCE] = -config.terms.hold_s
     links = np.zeros((n + 1, k.LINKS), np.int64)
     links[:n, k.CONTACT] = lattice.contact
     links[n, k.STATUS] = k.NOBODY

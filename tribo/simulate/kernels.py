@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tribo.simulate.friction import sliding_threshold, static_threshold
 from tribo.simulate.jit import compiled
 
 FloatArray = NDArray[np.float64]
@@ -36,8 +37,6 @@ N_ACTIVE, N_RIM, STEP, N_SAMPLES, N_FAILED, CODE, DENSE_STEPS, ACTIVE_STEPS, N_C
 ALONG, INTEGRAL, FORCE, PEAK, PEAK_TIME, FIRST, FIRST_TIME, FIRST_FOUND = range(8)
 FRICTION_WORK, VISCOUS_WORK, N_TOTALS = range(8, 11)
 RUNNING, FINISHED, NOT_FINITE, CROWDED = range(4)
-
-AGES = False  # whether the static threshold depends on the time at rest
 
 
 class State(NamedTuple):
@@ -82,19 +81,7 @@ class Numerics(NamedTuple):
     stop_at_peaks: float  # stop once the time exceeds this multiple of the peak time
     peak_drop: float  # the first peak is found once the force has fallen by this share
     dense_above: int  # active blocks above which all blocks are integrated
-    law: FloatArray  # parameters of the friction law
-
-
-@compiled
-def static_threshold(base: float, held_s: float, law: FloatArray) -> float:
-    """Largest friction force (N) of a block at rest: Amontons-Coulomb with adhesion, mu_s F_n + F_as."""
-    return base
-
-
-@compiled
-def sliding_threshold(base: float, speed_m_s: float, law: FloatArray) -> float:
-    """Friction force (N) of a sliding block: mu_d F_n + F_ad."""
-    return base
+    law: FloatArray  # parameters of the friction terms
 
 
 @compiled
@@ -192,8 +179,7 @@ def settle(i: int, s: State, c: Numerics) -> None:
     s.links[last, PLACE] = s.links[i, PLACE]
     s.cells[i, VX] = 0.0
     s.cells[i, VY] = 0.0
-    if AGES:
-        s.cells[i, SINCE] = c.start + s.counts[STEP] * c.dt
+    s.cells[i, SINCE] = c.start + s.counts[STEP] * c.dt
     for e in range(8):
         j = s.neighbours[i, e]
         if s.links[j, STATUS] == NOBODY:

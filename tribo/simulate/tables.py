@@ -25,10 +25,8 @@ STUDY: dict[str, dict[str, Any]] = {
     "K_s halved": {"shear_factor": 0.5},
     "cavities touch the edge": {"pattern_first": (0, 0)},
     "K_s halved, cavities touch the edge": {"shear_factor": 0.5, "pattern_first": (0, 0)},
+    "first local peak, window from 2 peak times": {"peak_rule": "first", "window_start_peaks": 2.0},
     "p l2 on every block": {"normal_force": "uniform"},
-    "first local peak": {"peak_rule": "first"},
-    "window from 1.5 peak times": {"window_start_peaks": 1.5},
-    "window from 2 peak times": {"window_start_peaks": 2.0},
 }
 """Choices the text leaves open, as changes of the baseline; periodic edges, angles and weights are asked apart."""
 
