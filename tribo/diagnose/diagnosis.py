@@ -154,7 +154,7 @@ def _verdict(
         gain=_gain(baseline, named, outcome, evidence, rng),
         set_aside=baseline.setup.observations.set_aside,
         next_test=_next_test(baseline, named, outcome, [*left, *misfits]),
-        text=summary(outcome, causes, misfits, left, smallest),
+        text=summary(outcome, causes, _equivalent(named), [*left, *misfits], smallest),
         smallest_effects=smallest,
     )
 
@@ -176,11 +176,9 @@ def _certain(evidence: dict[str, Evidence]) -> dict[str, Evidence]:
 def _outcome(named: Named | None, direct: bool, level: float) -> Outcome:
     if named is None:
         return "named" if direct else "no_misfit"
-    if named.rivals:
-        return "undetermined"
     if not named.causes or named.p_left < level:
         return "unknown"
-    return "named"
+    return "undetermined" if named.rivals else "named"
 
 
 def _causes(named: Named | None, baseline: ModelFit) -> list[Cause]:

@@ -61,8 +61,6 @@ def name_causes(
         causes.append(alike)
         model = alike[0].fit
         seen = _screen_left(model, replicates, rng, progress)
-        if rivals:
-            break
     if len(causes) == MAX_CAUSES:
         model, causes, rivals = _revisit(model, causes, rivals, excluded)
         seen = _screen_left(model, replicates, rng, progress)
@@ -76,13 +74,12 @@ def _revisit(
     excluded: Sequence[str],
 ) -> tuple[ModelFit, list[tuple[Candidate, ...]], tuple[Candidate, ...]]:
     """The first cause was picked before the second was known: pick it again beside the second."""
-    second = causes[-1][0].acting
-    alone = fit(model.setup, (second,), start=model)
+    alone = fit(model.setup, (causes[-1][0].acting,), start=model)
     ranked = weigh(alone, excluded)
-    if not ranked or rivals or ranked[0].fit.score <= model.score + CLOSE:
+    if not ranked:
         return model, causes, rivals
     alike, others = _sort_rivals(alone, ranked)
-    return ranked[0].fit, [alike, causes[-1]], others
+    return ranked[0].fit, [alike, causes[-1]], (*rivals, *others)
 
 
 def _is_real(candidate: Candidate, seen: Screen, level: float) -> bool:

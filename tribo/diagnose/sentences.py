@@ -182,8 +182,8 @@ def smallest_effects(
 def summary(
     outcome: Outcome,
     causes: Sequence[Cause],
+    equivalent: Sequence[Sequence[str]],
     misfits: Sequence[Misfit],
-    left: Sequence[Misfit],
     smallest: dict[str, float],
 ) -> str:
     """The verdict in two or three sentences."""
@@ -195,13 +195,15 @@ def summary(
             f"own error. Effects this campaign would have shown half the time (peak to peak): {shown}."
         )
     if outcome == "named":
-        names = " and ".join(dict.fromkeys(c.mechanism for c in causes))
-        return f"The model fails beyond chance, and {names} explains it; what is left is within chance."
+        tied = [" or ".join(names) for names in equivalent]
+        alone = [c.mechanism for c in causes if not any(c.mechanism in names for names in equivalent)]
+        told = " Which of those joined by or, this design cannot tell." if tied else ""
+        reason = " and ".join(dict.fromkeys([*tied, *alone]))
+        return f"Beyond chance something is at work: {reason}. What is left is within chance.{told}"
     if outcome == "undetermined":
-        names = ", ".join(c.mechanism for c in causes)
+        names = ", ".join(dict.fromkeys(c.mechanism for c in causes))
         return f"The model fails beyond chance, but several mechanisms explain it about equally: {names}."
-    worst = [*left, *misfits][:1]
-    where = worst[0].text if worst else "no single column stands out."
+    where = misfits[0].text if misfits else "No single column stands out."
     return f"The model fails beyond chance and nothing in the library explains it. {where}"
 
 
