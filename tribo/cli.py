@@ -12,6 +12,7 @@ from tribo import __version__
 from tribo.console import Console, command_options, set_aside_record, set_aside_text, status_of
 
 if TYPE_CHECKING:
+    from tribo.diagnose.verdict import Verdict
     from tribo.records import Study
     from tribo.stages import Progress, Until
 
@@ -275,29 +276,31 @@ def _walk(console: Console, path: Path, out: Path, until: Until, dry_run: bool, 
             provenance = gather_provenance(
                 study, command=_command_line(), seed=chosen.seed, started_at=_now(), options=chosen.as_words()
             )
-            write_until(study, out, until, progress=progress, provenance=provenance, verdict=verdict)
-    return _conclude(console, study, out)
+            as_dict = verdict.as_dict() if verdict else None
+            write_until(study, out, until, progress=progress, provenance=provenance, verdict=as_dict)
+    return _conclude(console, study, out, verdict)
 
 
-def _diagnosed(study: Study, seed: int, progress: Progress) -> tuple[Study, dict[str, Any] | None]:
-    """The verdict in the form of verdict.json; a note instead where there is too little to diagnose."""
+def _diagnosed(study: Study, seed: int, progress: Progress) -> tuple[Study, Verdict | None]:
+    """The verdict on a study; a note instead where there is too little to diagnose."""
     from dataclasses import replace
 
     from tribo.diagnose import diagnose
     from tribo.errors import FitError
 
     try:
-        return study, diagnose(study.ingested, seed=seed, progress=progress).as_dict()
+        return study, diagnose(study.ingested, seed=seed, progress=progress)
     except FitError as why:
         return replace(study, notes=(*study.notes, f"no diagnosis: {why}")), None
 
 
-def _conclude(console: Console, study: Study, out: Path) -> int:
+def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None = None) -> int:
     """Say what came out, what was set aside, and with what status it ends."""
     from dataclasses import asdict
 
     from tribo.report import summary_text, table2_text
     from tribo.report.tables import fits_table
+    from tribo.report.verdict import verdict_text
 
     set_aside = study.ingested.set_aside
     doubts = study.ingested.doubts()
@@ -312,10 +315,12 @@ def _conclude(console: Console, study: Study, out: Path) -> int:
         "fits": fits.where(fits.notna(), None).to_dict("records"),
         "power": list(study.power),
         "outlying": list(study.outlying),
+        "verdict": verdict.verdict if verdict else None,
     }
     words = [table2_text(study)] if study.fits else []
     looks = ["\n".join(lines) for lines in (study.power, study.outlying) if lines]
-    console.result(record, "\n\n".join([*words, summary_text(study), *looks]))
+    said = [verdict_text(verdict)] if verdict else []
+    console.result(record, "\n\n".join([*words, summary_text(study), *said, *looks]))
     if set_aside:
         console.say(f"{len(set_aside)} tests set aside:\n{set_aside_text(set_aside)}", level=-1)
     if doubts:
