@@ -1,6 +1,6 @@
 """The numerical column of Table 2, and the study of what the text leaves open.
 
-    python -P benchmarks/simulator_table2.py all STORE.h5 docs/data/table2.csv
+    python -P benchmarks/simulator_table2.py all STORE.h5 docs/data/table2.csv [jobs [dt_s]]
     python -P benchmarks/simulator_table2.py study FOLDER docs/data/table2-study.csv
 
 ``all`` makes the 960 runs of the paper at dt = 5e-8 s; STORE.h5 keeps every run, and a second start goes on where
@@ -27,9 +27,10 @@ def said(done: int, total: int) -> None:
         print(f"{time.strftime('%H:%M:%S')} {done} of {total}", flush=True)
 
 
-def main(what: str, place: str, out: str, jobs: int = 2) -> None:
+def main(what: str, place: str, out: str, jobs: int = 2, dt_s: float = 5e-8) -> None:
     if what == "all":
-        table = table2(path=place, published=load_table2(), jobs=jobs, progress=said)
+        base = SimConfig(dt_s=dt_s, rest_tolerance=5e-3 if dt_s <= 5e-8 else 1e-2)
+        table = table2(base, path=place, published=load_table2(), jobs=jobs, progress=said)
         print(table.to_string(), distance(table))
     else:
         Path(place).mkdir(parents=True, exist_ok=True)
@@ -41,4 +42,5 @@ def main(what: str, place: str, out: str, jobs: int = 2) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:4], jobs=int(sys.argv[4]) if len(sys.argv) > 4 else 2)
+    jobs, dt_s = [*sys.argv[4:6], *("2", "5e-8")[len(sys.argv[4:6]) :]]
+    main(*sys.argv[1:4], jobs=int(jobs), dt_s=float(dt_s))
