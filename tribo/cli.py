@@ -264,7 +264,7 @@ def _walk(console: Console, path: Path, out: Path, until: Until, dry_run: bool, 
     from tribo.campaign import open_campaign
     from tribo.report import gather_provenance, write_until
 
-    chosen = stages.StudyOptions(**options)
+    chosen = stages.StudyOptions(ensemble=out / "ensemble.nc", **options)
     with open_campaign(path) as campaign:
         if dry_run:
             planned = stages.plan(campaign, chosen, until)

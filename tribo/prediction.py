@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribo.errors import FitError, Problem
+from tribo.errors import FitError, Problem, SimulationError
 from tribo.records import REGIMES, Campaign, FloatArray, LawFit, Regime, Run
 
 if TYPE_CHECKING:
@@ -69,6 +70,7 @@ def predict(
     runs: int = 4,
     seed: int = 0,
     jobs: int = 2,
+    ensemble: Path | None = None,
     progress: Progress = lambda stage, done, total: None,
 ) -> Prediction:
     """Calibrate the model on the measured flat sample and simulate every measured sample at the campaign's loads.
@@ -78,6 +80,7 @@ def predict(
     fits : laws measured on the samples, the flat one among them
     runs : simulated runs a sample and load, at stratified pull angles with fresh local friction
     weights : of the fits to the simulated forces
+    ensemble : HDF5 file that keeps finished runs; one that holds another design is replaced
 
     Raises
     ------
@@ -86,7 +89,7 @@ def predict(
     SimulationError
         A pattern that the lattice cannot hold.
     """
-    from tribo.simulate import SimConfig, calibrate, run_ensemble, stratified_design
+    from tribo.simulate import SimConfig, calibrate, stratified_design
 
     laws = _flat_laws(fits, flat)
     loads = loads_to_simulate(campaign)
@@ -98,7 +101,7 @@ def predict(
     base = SimConfig(friction=friction)
     samples = {s: campaign.samples[s] for s in _measured_samples(campaign)}
     design = stratified_design(samples, pressures, runs, seed, base)
-    table = run_ensemble(design, jobs, lambda done, total: progress("simulating the samples", done, total))
+    table = _run(design, ensemble, jobs, lambda done, total: progress("simulating the samples", done, total))
     table = _as_forces(table, campaign)
     return Prediction(
         table,
@@ -107,6 +110,25 @@ def predict(
         _calibration(friction, base),
         _example_runs(design),
     )
+
+
+def _run(
+    design: list[SimConfig], ensemble: Path | None, jobs: int, progress: Callable[[int, int], None]
+) -> pd.DataFrame:
+    """All runs of a design, those that ``ensemble`` already holds taken from there."""
+    from tribo.simulate import run_ensemble
+    from tribo.simulate.resume import run_stored
+
+    if ensemble is None:
+        return run_ensemble(design, jobs, progress)
+    ensemble.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        return run_stored(design, ensemble, jobs, progress=progress)
+    except SimulationError as why:
+        if not {p.kind for p in why.problems} <= {"other_design", "not_a_store"}:
+            raise
+    ensemble.unlink()
+    return run_stored(design, ensemble, jobs, progress=progress)
 
 
 def _flat_laws(fits: tuple[LawFit, ...], flat: str) -> dict[Regime, LawFit]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -43,6 +44,7 @@ class StudyOptions:
     runs: int = 4
     seed: int = 0
     jobs: int = 2
+    ensemble: Path | None = None  # where finished simulations are kept, so that the next start goes on from there
 
     def as_words(self) -> dict[str, str]:
         """What was chosen, for the provenance."""
@@ -156,7 +158,7 @@ def compare(
     flat = flat_sample(campaign, options.flat)
     prediction = predict(
         campaign, fits, flat, weights=options.weights, runs=options.runs, seed=options.seed, jobs=options.jobs,
-        progress=progress,
+        ensemble=options.ensemble, progress=progress,
     )  # fmt: skip
     rows = [
         ComparisonRow(sample, regime, load, mean, u, *prediction.force_N(sample, regime, load))
