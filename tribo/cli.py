@@ -13,7 +13,7 @@ from tribo.console import Console, command_options, set_aside_record, set_aside_
 
 if TYPE_CHECKING:
     from tribo.diagnose.verdict import Verdict
-    from tribo.records import Study
+    from tribo.records import Campaign, Study
     from tribo.stages import Progress, Until
 
 CAMPAIGN = click.argument("campaign", type=click.Path(exists=True, path_type=Path))
@@ -22,8 +22,14 @@ OUT = click.option("-o", "--out", type=FOLDER, required=True, help="Output folde
 DRY_RUN = click.option("--dry-run", is_flag=True, help="Say what would be done, and do nothing.")
 
 
+COLUMNS = click.option(
+    "--columns", default="", help="QUANTITY=NAME [UNIT],... as in [columns] of campaign.toml; #3 is the third column."
+)
+
+
 def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
+        COLUMNS,
         click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off."),
         click.option(
             "--weights",
@@ -77,9 +83,9 @@ def init(console: Console, folder: Path, **_: Any) -> None:
 @DRY_RUN
 @_fit_options
 @command_options
-def ingest(console: Console, campaign: Path, out: Path, dry_run: bool, rule: str, **options: Any) -> int:
+def ingest(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
     """Traces and per-test features of CAMPAIGN: tests.csv and campaign.nc."""
-    return _walk(console, campaign, out, "ingest", dry_run, rule=rule, **options)
+    return _walk(console, campaign, out, "ingest", dry_run, **options)
 
 
 @main.command()
@@ -173,12 +179,14 @@ def demo(console: Console, out: Path, **options: Any) -> int:
 
 @main.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@COLUMNS
 @command_options
-def inspect(console: Console, files: tuple[Path, ...], **_: Any) -> int:
+def inspect(console: Console, files: tuple[Path, ...], columns: str, **_: Any) -> int:
     """What an export is: format, encoding, columns, units, time base, doubts."""
-    from tribo.readers import inspect_export
+    from tribo.readers import columns_from_text, inspect_export
 
-    found = [inspect_export(file) for file in files]
+    given = columns_from_text(columns) if columns else None
+    found = [inspect_export(file, columns=given) for file in files]
     console.result({"files": [f.record() for f in found]}, "\n\n".join(f.in_words() for f in found))
     return 1 if all(f.refused for f in found) else 0
 
@@ -258,14 +266,17 @@ def doctor(console: Console, **_: Any) -> int:
     return 0 if found["healthy"] else 1
 
 
-def _walk(console: Console, path: Path, out: Path, until: Until, dry_run: bool, **options: Any) -> int:
+def _walk(
+    console: Console, path: Path, out: Path, until: Until, dry_run: bool, columns: str, **options: Any
+) -> int:
     """Walk the street with one campaign as far as ``until`` and write what that yields."""
     from tribo import stages
     from tribo.campaign import open_campaign
     from tribo.report import gather_provenance, write_until
 
     chosen = stages.StudyOptions(ensemble=out / "ensemble.nc", **options)
-    with open_campaign(path) as campaign:
+    with open_campaign(path) as described:
+        campaign = _with_columns(described, columns)
         if dry_run:
             planned = stages.plan(campaign, chosen, until)
             console.result(planned, _plan_text(planned, out))
@@ -279,6 +290,15 @@ def _walk(console: Console, path: Path, out: Path, until: Until, dry_run: bool, 
             as_dict = verdict.as_dict() if verdict else None
             write_until(study, out, until, progress=progress, provenance=provenance, verdict=as_dict)
     return _conclude(console, study, out, verdict)
+
+
+def _with_columns(campaign: Campaign, columns: str) -> Campaign:
+    """The campaign with the columns given on the command line on top of its own."""
+    from dataclasses import replace
+
+    from tribo.readers import columns_from_text
+
+    return replace(campaign, columns={**campaign.columns, **columns_from_text(columns)}) if columns else campaign
 
 
 def _diagnosed(study: Study, seed: int, progress: Progress) -> tuple[Study, Verdict | None]:

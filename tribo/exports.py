@@ -27,7 +27,8 @@ def read_one(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> O
 
     try:
         trace = read_export(root / test.file, columns=columns or None, name=test.test_id, file=test.file)
-        return trace, read_pull(trace, rule=rule, test=test)
+        pull = read_pull(trace, rule=rule, test=test)
+        return trace, replace(pull, flags=tuple(dict.fromkeys((*trace.flags, *pull.flags))))
     except TriboError as why:
         problems = tuple(replace(p, file=test.file, test_id=test.test_id) for p in why.problems)
         return SetAside(test.test_id, "; ".join(str(p) for p in problems), problems)
