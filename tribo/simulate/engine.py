@@ -52,7 +52,7 @@ class Trajectory:
     first_peak_N: float
     first_peak_s: float
     first_failure_s: float
-    failed: NDArray[np.int64]  # blocks in the order of their failures, by number within one step
+    failed: NDArray[np.int64]  # blocks in the order of their first failures, by number within one step
     end_s: float  # may lie beyond the last sample
     end_impulse_Ns: float
     displacement_m: FloatArray  # (n, 2) at the end
@@ -142,6 +142,11 @@ def run_fast(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Tra
         chunks.append(_first(samples, int(state.counts[k.N_SAMPLES])))
     _refuse_not_finite(state, numerics)
     return _trajectory(chunks, state, numerics, drive, failure)
+
+
+def once(blocks: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The blocks in their order, each where it appears first."""
+    return blocks[np.sort(np.unique(blocks, return_index=True)[1])]
 
 
 def _first(samples: k.Samples, n: int) -> k.Samples:
@@ -253,7 +258,7 @@ def _trajectory(
         first_peak_N=float(totals[k.FIRST if found else k.PEAK]),
         first_peak_s=float(totals[k.FIRST_TIME if found else k.PEAK_TIME]),
         first_failure_s=failure,
-        failed=blocks[np.lexsort((blocks, steps))],
+        failed=once(blocks[np.lexsort((blocks, steps))]),
         end_s=now,
         end_impulse_Ns=float(totals[k.INTEGRAL]),
         displacement_m=state.cells[:-1, k.QX : k.QY + 1] + drive.follow * now,

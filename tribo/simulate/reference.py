@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from tribo.errors import Problem, SimulationError
 from tribo.records import FloatArray
 from tribo.simulate.config import SimConfig
-from tribo.simulate.engine import Thresholds, Trajectory, drive_of, first_failure_s
+from tribo.simulate.engine import Thresholds, Trajectory, drive_of, first_failure_s, once
 from tribo.simulate.jit import compiled
 from tribo.simulate.lattice import OFFSETS, Lattice
 
@@ -287,7 +287,7 @@ def run_reference(
         first_peak_N=float(sums[PEAK]),
         first_peak_s=float(sums[PEAK_TIME]),
         first_failure_s=failure,
-        failed=record.failed[: int(sums[N_FAILED])].copy(),
+        failed=once(record.failed[: int(sums[N_FAILED])]),
         end_s=float(record.time[kept - 1]),
         end_impulse_Ns=float(sums[IMPULSE]),
         displacement_m=u,
