@@ -1,7 +1,7 @@
 """Fast engine against the reference engine on the same random thresholds.
 
-    python -P benchmarks/simulator_agreement.py peaks docs/data/simulator-peaks.csv
-    python -P benchmarks/simulator_agreement.py sliding docs/data/simulator-sliding.csv
+    python benchmarks/simulator_agreement.py peaks docs/data/simulator-peaks.csv
+    python benchmarks/simulator_agreement.py sliding docs/data/simulator-sliding.csv
 
 ``peaks`` compares the static peak and the order of the first failures in 42 cases, cavities resting below 1e-4 and
 below the default tolerance (about half an hour on one core); ``sliding`` the mean over the same window, ten seeds

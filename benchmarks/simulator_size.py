@@ -1,7 +1,7 @@
 """How static friction depends on the number of blocks and on the mesh, which the paper asserts in a sentence each.
 
-    python -P benchmarks/simulator_size.py blocks docs/data/simulator-blocks.csv
-    python -P benchmarks/simulator_size.py mesh docs/data/simulator-mesh.csv
+    python benchmarks/simulator_size.py blocks docs/data/simulator-blocks.csv
+    python benchmarks/simulator_size.py mesh docs/data/simulator-mesh.csv
 
 ``blocks``: flat samples of growing size against the expected minimum of n Gaussian numbers. ``mesh``: the same domain
 at l = 5 um with square cavities, and at 2.5 um with square and with round ones.

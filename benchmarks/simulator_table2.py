@@ -1,7 +1,7 @@
 """The numerical column of Table 2, and the study of what the text leaves open.
 
-    python -P benchmarks/simulator_table2.py all STORE.h5 docs/data/table2.csv [jobs [dt_s]]
-    python -P benchmarks/simulator_table2.py study FOLDER docs/data/table2-study.csv
+    python benchmarks/simulator_table2.py all STORE.h5 docs/data/table2.csv [jobs [dt_s]]
+    python benchmarks/simulator_table2.py study FOLDER docs/data/table2-study.csv
 
 ``all`` makes the 960 runs of the paper at dt = 5e-8 s; STORE.h5 keeps every run, and a second start goes on where
 the first was stopped. ``study`` makes fewer runs a variant at dt = 1e-7 s.

@@ -1,4 +1,4 @@
-"""The intervals hold the law as often as they say, in a small run of benchmarks/coverage.py."""
+"""The intervals hold the law as often as they say, in a small run of benchmarks/interval_coverage.py."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-COVERAGE = Path(__file__).resolve().parents[2] / "benchmarks" / "coverage.py"
+COVERAGE = Path(__file__).resolve().parents[2] / "benchmarks" / "interval_coverage.py"
 DEFAULT, POOLED = "specimens first, relative", "pooled least squares"
 
 

@@ -1,6 +1,6 @@
 """How often do 95 % intervals hold the law? Simulated campaigns of known law, several designs and methods.
 
-    python benchmarks/coverage.py [--campaigns 200] [--seed 1] [--design NAME] [--method NAME] [--csv FILE]
+    python benchmarks/interval_coverage.py [--campaigns 200] [--seed 1] [--design NAME] [--method NAME] [--csv FILE]
 
 Every campaign has six samples whose population laws T = mu N + tau0 A stand in Table 2 of Berardo et al.
 (2019). A specimen has its own mu and tau0, scattered about the population's; a pull scatters by a share of T
