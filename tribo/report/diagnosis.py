@@ -12,7 +12,7 @@ from tribo.report.files import write_text
 from tribo.report.numerals import joined, significant
 
 OUTCOMES = {
-    "no_misfit": "The model holds.",
+    "no_misfit": "No misfit found.",
     "named": "The cause is named.",
     "undetermined": "Something is wrong, and several causes explain it about equally.",
     "unknown": "Something is wrong, and no known mechanism explains it.",
