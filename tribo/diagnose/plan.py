@@ -137,6 +137,8 @@ def _not_applying(s: Setup) -> list[Finding]:
     for m in MECHANISMS.values():
         if m.name == "covariate" or (m.applies(s.observations.conditions) and m.regimes != ("rise",)):
             continue
-        why = f"{', '.join(m.needs)} does not vary" if m.needs else "it shows in the shape of the trace only"
+        varied = m.applies(s.observations.conditions)
+        in_shape = "it shows in the shape of the trace, not in its forces"
+        why = in_shape if varied or not m.needs else f"{', '.join(m.needs)} does not vary"
         found.append(Finding(m.name, float("nan"), m.amplitude.unit, float("nan"), (), why, m.separates))
     return found
