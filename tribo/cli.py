@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tribo import __version__
-from tribo.console import Console, command_options, set_aside_record, set_aside_text, status_of
+from tribo.console import Console, command_options, set_aside_record, status_of
 
 if TYPE_CHECKING:
     from tribo.diagnose.verdict import Verdict
@@ -129,8 +129,7 @@ def diagnose(console: Console, campaign: Path, out: Path, rule: str, seed: int, 
         verdict = name_the_cause(ingested, seed=seed, progress=progress)
         write_until(stages.Study(ingested), out, "ingest", verdict=verdict.as_dict())
     console.result(verdict.as_dict(), verdict_text(verdict))
-    if ingested.set_aside:
-        console.say(f"{len(ingested.set_aside)} tests set aside:\n{set_aside_text(ingested.set_aside)}", level=-1)
+    console.list_tests("set aside", ingested.set_aside, level=-1)
     return status_of(ingested.set_aside)
 
 
@@ -341,10 +340,8 @@ def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None
     looks = ["\n".join(lines) for lines in (study.power, study.outlying) if lines]
     said = [verdict_text(verdict)] if verdict else []
     console.result(record, "\n\n".join([*words, summary_text(study), *said, *looks]))
-    if set_aside:
-        console.say(f"{len(set_aside)} tests set aside:\n{set_aside_text(set_aside)}", level=-1)
-    if doubts:
-        console.say(f"{len(doubts)} tests used with doubts:\n{set_aside_text(doubts)}")
+    console.list_tests("set aside", set_aside, level=-1)
+    console.list_tests("used with doubts", doubts)
     return status_of(set_aside)
 
 

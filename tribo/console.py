@@ -34,6 +34,12 @@ class Console:
         if self.verbosity >= level:
             click.echo(text, err=True)
 
+    def list_tests(self, what: str, tests: Sequence[SetAside], *, level: int = 0) -> None:
+        """The tests of one kind with their reasons, one line each; nothing where there are none."""
+        if tests:
+            lines = "\n".join(f"  {test.test_id}: {test.reason}" for test in tests)
+            self.say(f"{len(tests)} tests {what}:\n{lines}", level=level)
+
     def result(self, record: dict[str, Any], text: str) -> None:
         """The result itself: JSON where asked for, else ``text``."""
         click.echo(json.dumps(without_nan(record), indent=1, default=str) if self.as_json else text)
@@ -107,11 +113,6 @@ def without_nan(value: Any) -> Any:
 def faults_text(problems: Sequence[Problem]) -> str:
     """All problems, one line each."""
     return "\n".join(f"  {p.test_id + ': ' if p.test_id else ''}{p}" for p in problems)
-
-
-def set_aside_text(set_aside: Sequence[SetAside]) -> str:
-    """The tests that take no part, one line each."""
-    return "\n".join(f"  {fault.test_id}: {fault.reason}" for fault in set_aside)
 
 
 def set_aside_record(set_aside: Sequence[SetAside]) -> list[dict[str, Any]]:
