@@ -239,3 +239,11 @@ def test_an_unknown_mechanism_is_refused_with_the_known_ones(tmp_path: Path) -> 
     result = run("simulate", "--sample", "B", "--pressure", 5, "--with", "sucktion:dp=1", "-o", out)
     assert result.exit_code == 1
     assert "suction" in result.stderr
+
+
+@pytest.mark.parametrize("command", ["ingest", "fit", "compare", "diagnose", "report"])
+def test_every_command_on_a_campaign_takes_columns(small_campaign: Path, tmp_path: Path, command: str) -> None:
+    """Columns that name no quantity make every export unreadable, so that each command shows it obeys them."""
+    result = run(command, small_campaign, "-o", tmp_path / "out", "--columns", "fricton_force=Load [N]", "-q")
+    assert result.exit_code == 1
+    assert "did you mean friction_force?" in result.stderr

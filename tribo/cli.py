@@ -115,8 +115,9 @@ def compare(console: Console, campaign: Path, out: Path, dry_run: bool, **option
 @CAMPAIGN
 @OUT
 @click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off.")
+@COLUMNS
 @command_options
-def diagnose(console: Console, campaign: Path, out: Path, rule: str, seed: int, **_: Any) -> int:
+def diagnose(console: Console, campaign: Path, out: Path, rule: str, columns: str, seed: int, **_: Any) -> int:
     """What the calibrated model gets wrong, and why, or that it cannot be told: verdict.json."""
     from tribo import stages
     from tribo.campaign import open_campaign
@@ -125,7 +126,7 @@ def diagnose(console: Console, campaign: Path, out: Path, rule: str, seed: int, 
     from tribo.report.verdict import verdict_text
 
     with open_campaign(campaign) as opened, console.progress() as progress:
-        ingested = stages.ingest(opened, rule=rule, progress=progress)
+        ingested = stages.ingest(_with_columns(opened, columns), rule=rule, progress=progress)
         verdict = name_the_cause(ingested, seed=seed, progress=progress)
         write_until(stages.Study(ingested), out, "ingest", verdict=verdict.as_dict())
     console.result(verdict.as_dict(), verdict_text(verdict))
