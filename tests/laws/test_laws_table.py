@@ -8,8 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pint
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tribo.laws.records import Law
 from tribo.laws.table import LAWS

@@ -1,0 +1,11 @@
+from .diagnosis import Diagnosis as Diagnosis, diagnose as diagnose, examine as examine
+from .extend import extended as extended, parse_with as parse_with, simulate_with as simulate_with
+from .plan import Plan as Plan, plan_design as plan_design
+from .predictor import simulated_predictor as simulated_predictor, tabled_predictor as tabled_predictor
+from .tables import (
+    look_table as look_table,
+    misfit_map as misfit_map,
+    residual_table as residual_table,
+    weighing_table as weighing_table,
+)
+from .verdict import Verdict as Verdict

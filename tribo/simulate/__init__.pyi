@@ -1,0 +1,17 @@
+from .calibration import calibrate as calibrate
+from .config import (
+    PAPER as PAPER,
+    FrictionTerms as FrictionTerms,
+    LocalFriction as LocalFriction,
+    SimConfig as SimConfig,
+)
+from .ensemble import (
+    angle_range_deg as angle_range_deg,
+    run_ensemble as run_ensemble,
+    stratified_design as stratified_design,
+)
+from .masks import PAPER_PATTERNS as PAPER_PATTERNS, contact_mask as contact_mask
+from .resume import read_stored as read_stored, run_stored as run_stored
+from .run import simulate as simulate
+from .store import write_ensemble as write_ensemble, write_run as write_run
+from .tables import table2 as table2
