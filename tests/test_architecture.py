@@ -29,7 +29,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "report": {"laws", "diagnose", "figures", "published"},
 }
 EVERYONE = {"errors", "quantities", "records"}
-TOP = {"stages", "exports", "prediction", "cli", "console", "bench", "doctor", "__init__"}
+TOP = {"stages", "exports", "prediction", "kept", "pipeline", "cli", "console", "bench", "doctor", "__init__"}
 ROOMS = sorted(p for p in PACKAGE.rglob("*.py"))
 
 
