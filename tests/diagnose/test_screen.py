@@ -11,7 +11,7 @@ from tribo.diagnose.looks import all_looks
 from tribo.diagnose.model import ModelFit, setup
 from tribo.diagnose.observations import observe
 from tribo.diagnose.predictor import tabled_predictor
-from tribo.diagnose.screen import cleared, deviate, replicate, screen
+from tribo.diagnose.screen import cleared, deviate, screen
 
 from .synthetic import hidden
 
@@ -55,13 +55,16 @@ def test_an_effect_is_the_strongest_look_at_its_own_column() -> None:
     assert strongest.acting.name == "run_in"
 
 
-def test_the_null_is_simulated_from_the_fitted_model() -> None:
-    """Scores of a trend in simulated campaigns are standard normal, specimens and sample errors included."""
-    f = baseline()
-    rng = np.random.default_rng(1)
-    trend = [look for look in all_looks(f) if look.covariate == "run_order" and look.kind == "trend"][:1]
-    strengths = [screen(replicate(f, rng), trend, replicates=0, rng=rng).strength[0] for _ in range(40)]
-    assert 0.6 < np.sqrt(np.mean(np.square(strengths))) < 1.4
+def test_no_more_replicates_are_made_than_the_decision_needs() -> None:
+    plain = baseline()
+    looks = [look for look in all_looks(plain) if look.kind == "trend"]
+    within = screen(plain, looks[:1], replicates=200, rng=np.random.default_rng(2))
+    f = baseline(("run_in", 1.0))
+    beyond = screen(f, all_looks(f), replicates=200, rng=np.random.default_rng(2))
+    assert len(within.chance) < 200
+    assert np.sum(within.chance >= within.strength.max()) >= 10
+    assert len(beyond.chance) < 200
+    assert beyond.p_adjusted() < 1e-6
 
 
 def test_a_p_value_beyond_all_replicates_is_small_and_finite() -> None:

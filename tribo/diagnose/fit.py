@@ -14,6 +14,8 @@ from tribo.records import FloatArray
 
 SPECIMEN_PRIOR = (0.05, 4.0)  # expected gain of a specimen, and how many specimens that is worth
 REPEAT_PRIOR = (0.08, 4.0)
+TRIAL_STEPS = 5
+SMALLEST_SD = 0.003  # of ln T: no reading repeats better
 _SCALE = np.array([1.0, 5.0, 1.0, 5.0])
 
 
@@ -55,20 +57,19 @@ def fit(
     start: ModelFit | None = None,
     noise: Noise | None = None,
     iterations: int = 30,
-    to_the_end: bool = True,
 ) -> ModelFit:
-    """The best of the fits from every start of the mechanisms' further parameters.
+    """The fit from the best start of the mechanisms' further parameters; a few steps from each find out which.
 
-    ``noise`` given is kept; otherwise it is estimated along with everything else. Without ``to_the_end`` just
-    ``iterations`` steps are made, whatever they still change.
+    ``noise`` given is kept; otherwise it is estimated along with everything else.
     """
     law = start.law if start is not None else first_law(s)
     begin = noise or (start.noise if start is not None else first_noise(s))
-    fits = [
-        _fit_from(s, tuple(acting), law, values, begin, noise is None, iterations, to_the_end)
-        for values in _starts(acting, start)
-    ]
-    return max(fits, key=lambda f: f.score)
+    starts = _starts(acting, start)
+    if len(starts) > 1:
+        short = [_fit_from(s, tuple(acting), law, values, begin, noise is None, TRIAL_STEPS) for values in starts]
+        best = max(short, key=lambda f: f.score)
+        law, starts, begin = best.law, [list(best.values)], best.noise
+    return _fit_from(s, tuple(acting), law, starts[0], begin, noise is None, iterations)
 
 
 def _starts(acting: Sequence[Acting], start: ModelFit | None) -> list[list[FloatArray]]:
@@ -94,7 +95,6 @@ def _fit_from(
     noise: Noise,
     estimate: bool,
     iterations: int,
-    to_the_end: bool,
 ) -> ModelFit:
     sizes = [len(v) for v in values]
     x = np.concatenate([law, *values])
@@ -109,12 +109,9 @@ def _fit_from(
         x, effects, residual = _step(s, acting, sizes, noise, x, effects, residual, system, low, high)
         if estimate:
             noise = _update(s, noise, weight, residual - s.random @ effects, effects, system)
-        if not to_the_end:
-            continue
         last, score = score, _score(s, noise, residual, effects)
         if abs(score - last) < 2e-3:
             break
-    score = score if to_the_end else _score(s, noise, residual, effects)
     return ModelFit(
         s, acting, x[:N_LAW], tuple(np.split(x[N_LAW:], np.cumsum(sizes)[:-1])) if acting else (),
         noise, effects, residual, weights(s, noise, residual - s.random @ effects), score,
@@ -301,4 +298,4 @@ def _update(
 def _positive(cov: FloatArray) -> NDArray[np.float64]:
     """The nearest covariance with no standard deviation below 0.3 %."""
     values, vectors = np.linalg.eigh(0.5 * (cov + cov.T))
-    return np.asarray((vectors * np.maximum(values, 0.003**2)) @ vectors.T)
+    return np.asarray((vectors * np.maximum(values, SMALLEST_SD**2)) @ vectors.T)

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtrc, ndtri
 
-from tribo.diagnose.fit import fit, jacobian_at, prior_precision, weights, whitened, whitener
+from tribo.diagnose.chance import as_measured, columns_of, drawn_residuals, refit, scores
+from tribo.diagnose.fit import jacobian_at, prior_precision, weights, whitened
 from tribo.diagnose.looks import Look
 from tribo.diagnose.model import ModelFit
 from tribo.records import FloatArray
 
 Progress = Callable[[str, int, int], None]
+AT_ONCE = 20  # replicates, between two looks at whether they suffice
+FEWEST = 40
 
 
 @dataclass(frozen=True)
@@ -44,15 +48,14 @@ class Screen:
 
 def _tail(chance: FloatArray, value: float) -> float:
     """Share of replicates at or above, beyond the last one by a fitted Gumbel tail."""
-    from scipy.stats import gumbel_r
-
     if not len(chance):
         return float("nan")
     counted = (1 + np.sum(chance >= value)) / (1 + len(chance))
     if counted > 5.0 / len(chance):
         return float(counted)
     scale = max(float(np.std(chance)) * np.sqrt(6) / np.pi, 1e-3)
-    fitted = float(gumbel_r.sf(value, float(np.mean(chance)) - 0.5772 * scale, scale))
+    above_mode = (value - float(np.mean(chance))) / scale + np.euler_gamma
+    fitted = float(-np.expm1(-np.exp(-above_mode)))
     return min(float(counted), max(fitted, 1e-12))
 
 
@@ -64,89 +67,44 @@ def screen(
     rng: np.random.Generator,
     progress: Progress | None = None,
 ) -> Screen:
-    """Look at a fitted model in every way, then do the same with ``replicates`` campaigns it makes itself.
+    """Look at a fitted model in every way, then do the same with up to ``replicates`` campaigns it makes itself.
 
-    Each replicate keeps the design, draws specimens, sample errors and repeats anew and is fitted again.
+    No more replicates are made once the strongest look is plainly within chance, or plainly beyond it.
     """
     stacked = np.concatenate([look.columns for look in looks], axis=2)
     ends = np.cumsum([look.freedom for look in looks])
-    spans = [slice(int(e - look.freedom), int(e)) for look, e in zip(looks, ends, strict=True)]
-    library = np.array([look.kind == "mechanism" for look in looks])
-    strength, coefficients = _strengths(f, stacked, spans)
+    spans = [slice(int(e - look.freedom), int(e)) for e, look in zip(ends, looks, strict=True)]
+    ready, freedom = columns_of(stacked, spans), np.array([look.freedom for look in looks])
+    chi2, found = scores(as_measured(f), ready)
+    strength, coefficients = deviate(chi2[0], freedom), [c[0] for c in found]
     shapes = [look.columns @ c for look, c in zip(looks, coefficients, strict=True)]
     size = np.ptp(beyond_law(f, np.stack(shapes, axis=2)), axis=(0, 1))
-    chance, chance_library = np.zeros(replicates), np.zeros(replicates)
-    for k in range(replicates):
-        found = _strengths(replicate(f, rng), stacked, spans)[0]
-        chance[k] = found.max()
-        chance_library[k] = found[library].max() if library.any() else -np.inf
-        if progress is not None and k % 20 == 0:
-            progress("diagnose", k, replicates)
-    return Screen(tuple(looks), strength, size, tuple(coefficients), chance, chance_library)
+    library = np.array([look.kind == "mechanism" for look in looks])
+    chance = np.zeros((0, 2))
+    while len(chance) < replicates and not _decided(chance[:, 0], float(strength.max())):
+        made = refit(f, drawn_residuals(f, rng, min(AT_ONCE, replicates - len(chance))))
+        chance = np.concatenate([chance, _strongest(deviate(scores(made, ready)[0], freedom), library)])
+        if progress is not None:
+            progress("diagnose", len(chance), replicates)
+    return Screen(tuple(looks), strength, size, tuple(coefficients), chance[:, 0], chance[:, 1])
 
 
-def replicate(f: ModelFit, rng: np.random.Generator) -> ModelFit:
-    """A campaign made by the fitted model itself, fitted again from there."""
-    log_force = simulate_log_force(f, rng)
-    observations = replace(f.setup.observations, log_force=log_force)
-    again = replace(f.setup, observations=observations)
-    return fit(again, f.acting, start=replace(f, setup=again), iterations=4, to_the_end=False)
+def _strongest(strengths: FloatArray, library: NDArray[np.bool_]) -> FloatArray:
+    """The strongest look of every replicate, and the strongest of the library's alone, (r, 2)."""
+    alone = strengths[:, library].max(axis=1) if library.any() else np.full(len(strengths), -np.inf)
+    return np.column_stack([strengths.max(axis=1), alone])
 
 
-def simulate_log_force(f: ModelFit, rng: np.random.Generator) -> FloatArray:
-    """ln T of the same tests with new specimens, sample errors and repeats; repeats resampled from the fit."""
-    s = f.setup
-    effects = rng.normal(size=s.random.shape[2]) / np.sqrt(prior_precision(s, f.noise))
-    factor = whitener(s, f.noise)
-    left = np.einsum("nij,nj->ni", factor, f.residual - s.random @ f.effects)
-    left = (left - left.mean(axis=0)) * np.sqrt(s.observations.n / (s.observations.n - 4.0))
-    drawn = left[rng.integers(0, s.observations.n, s.observations.n)]
-    noise = np.linalg.solve(factor, drawn[:, :, None])[:, :, 0]
-    return f.predicted + s.random @ effects + noise
+def _decided(chance: FloatArray, strongest: float) -> bool:
+    """Whether further replicates could not change the decision at one percent: a sequential Monte Carlo test.
 
-
-def _strengths(
-    f: ModelFit, stacked: FloatArray, spans: Sequence[slice]
-) -> tuple[FloatArray, list[FloatArray]]:
-    """Score test of each group of columns given the fitted model, as normal deviates, and its coefficients."""
-    extra, crossed, target = _whitened_system(f, stacked)
-    pull = extra.T @ target - crossed[:, :-1].T @ crossed[:, -1]
-    squares = np.sum(extra**2, axis=0) - np.sum(crossed[:, :-1] ** 2, axis=0)
-    squares = np.maximum(squares, 1e-9 * np.sum(extra**2, axis=0) + 1e-12)
-    freedom = np.array([span.stop - span.start for span in spans])
-    chi2, coefficients = np.zeros(len(spans)), []
-    for k, span in enumerate(spans):
-        if freedom[k] == 1:
-            solution = pull[span] / squares[span]
-        else:
-            inner = crossed[:, span]
-            own = extra[:, span].T @ extra[:, span] - inner.T @ inner
-            solution = np.linalg.solve(own + np.diag(1e-9 * squares[span]), pull[span])
-        coefficients.append(solution)
-        chi2[k] = pull[span] @ solution
-    return deviate(chi2, freedom), coefficients
-
-
-def _whitened_system(f: ModelFit, stacked: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Whitened columns (2n, k), their part (q, k + 1) along the model, and the whitened residual (2n,).
-
-    The model's columns are law, mechanisms and random effects, these with their penalty; the last column of the
-    part is that of the residual. Inner products of whitened columns less those of their parts are scores and
-    informations of the marginal model.
+    Ten replicates as strong say "within chance" (Besag and Clifford 1991); ten standard deviations beyond
+    their mean say the opposite.
     """
-    from scipy.linalg import solve_triangular
-
-    s = f.setup
-    weight = weights(s, f.noise, f.residual - s.random @ f.effects)
-    model = np.concatenate([jacobian_at(f), s.random, f.residual[:, :, None]], axis=2)
-    white, extra = whitened(s, f.noise, weight, model), whitened(s, f.noise, weight, stacked)
-    columns, target = white[:, :-1], white[:, -1]
-    n_law = columns.shape[1] - s.random.shape[2]
-    normal = columns.T @ columns + np.diag(np.concatenate([np.zeros(n_law), prior_precision(s, f.noise)]))
-    scale = 1.0 / np.sqrt(np.diag(normal) + 1e-300)
-    root = np.linalg.cholesky(normal * scale[:, None] * scale[None, :] + 1e-9 * np.eye(len(scale)))
-    along = np.column_stack([columns.T @ extra, columns.T @ target]) * scale[:, None]
-    return extra, solve_triangular(root, along, lower=True, check_finite=False), target
+    if len(chance) < FEWEST:
+        return False
+    beyond = strongest > float(np.mean(chance) + 10.0 * np.std(chance))
+    return bool(np.sum(chance >= strongest) >= 10 or beyond)
 
 
 def cleared(f: ModelFit, stacked: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,51 @@
+"""Replicates of a fitted model: fitted in a batch as one by one, and as strong as chance says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tribo.diagnose.chance import as_measured, columns_of, drawn_residuals, refit, scores
+from tribo.diagnose.fit import fit
+from tribo.diagnose.looks import all_looks
+from tribo.diagnose.screen import screen
+
+from .test_screen import baseline
+
+
+def test_a_batch_of_replicates_looks_like_each_fitted_by_itself() -> None:
+    """The strongest look of a replicate is within 5 % of that of the full fit of the same campaign."""
+    f = baseline()
+    looks = all_looks(f)
+    ends = np.cumsum([look.freedom for look in looks])
+    spans = [slice(int(e - look.freedom), int(e)) for e, look in zip(ends, looks, strict=True)]
+    ready = columns_of(np.concatenate([look.columns for look in looks], axis=2), spans)
+    drawn = drawn_residuals(f, np.random.default_rng(5), 6)
+    alone = np.array([look.freedom == 1 for look in looks])
+    batch = np.sqrt(scores(refit(f, drawn), ready)[0][:, alone].max(axis=1))
+    for k, log_force in enumerate(f.predicted + drawn.transpose(0, 2, 1)):
+        again = replace(f.setup, observations=replace(f.setup.observations, log_force=log_force))
+        single = screen(fit(again, start=replace(f, setup=again)), looks, replicates=0, rng=np.random.default_rng(0))
+        assert batch[k] == pytest.approx(single.strength[alone].max(), rel=0.05)
+
+
+def test_the_null_is_simulated_from_the_fitted_model() -> None:
+    """Scores of a trend are close to standard normal (robust weights make them a little smaller), specimens included."""
+    f = baseline()
+    trend = next(look for look in all_looks(f) if look.covariate == "run_order" and look.kind == "trend")
+    ready = columns_of(trend.columns, [slice(0, 1)])
+    chi2 = scores(refit(f, drawn_residuals(f, np.random.default_rng(1), 300)), ready)[0][:, 0]
+    assert 0.8 < np.sqrt(np.mean(chi2)) < 1.2
+    assert 0.005 < np.mean(chi2 > 3.84) < 0.09
+
+
+def test_a_column_that_the_law_takes_up_counts_for_nothing() -> None:
+    from tribo.diagnose.fit import jacobian_at
+
+    f = baseline()
+    law = columns_of(jacobian_at(f), [slice(k, k + 1) for k in range(4)])
+    chi2, coefficients = scores(as_measured(f), law)
+    assert chi2.max() == 0.0
+    assert all((c == 0.0).all() for c in coefficients)
