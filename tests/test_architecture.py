@@ -29,7 +29,10 @@ MAY_IMPORT: dict[str, set[str]] = {
     "report": {"laws", "diagnose", "figures", "published"},
 }
 EVERYONE = {"errors", "quantities", "records"}
-TOP = {"stages", "exports", "prediction", "kept", "pipeline", "cli", "console", "bench", "doctor", "__init__"}
+TOP = {
+    "stages", "exports", "overrides", "prediction", "simulations", "kept", "pipeline", "cli", "console", "bench", "doctor",
+    "__init__",
+}  # fmt: skip
 ROOMS = sorted(p for p in PACKAGE.rglob("*.py"))
 
 

@@ -132,7 +132,8 @@ class Trace:
     """Force against time of one export, in SI units, samples as recorded (never resampled).
 
     Arrays share one length n >= 1. ``columns`` holds further quantities by SI name ("normal_force_N"),
-    ``metadata`` the file's own header untouched, ``flags`` what a reader doubted.
+    ``metadata`` the file's own header untouched, ``flags`` what a reader doubted. ``first_row`` is the line of the
+    file, from 1, that the first sample stands on.
     """
 
     name: str
@@ -145,6 +146,7 @@ class Trace:
     file: str = ""
     flags: tuple[str, ...] = ()
     problems: tuple[Problem, ...] = ()
+    first_row: int = 1
 
 
 @dataclass(frozen=True)
@@ -278,13 +280,42 @@ class Comparison:
 
 
 @dataclass(frozen=True)
+class Override:
+    """What a person decided about one test: to leave it out, or to move its static peak or its sliding window.
+
+    Times on the clock of the trace; None where the automatic reading stands. ``row`` is its line in overrides.csv.
+    """
+
+    test_id: str
+    action: Literal["exclude", "move"]
+    reason: str = ""
+    window_s: tuple[float, float] | None = None
+    peak_s: float | None = None
+    row: int | None = None
+
+
+@dataclass(frozen=True)
+class ByHand:
+    """A test that a person decided about, with its trace and the pull as the rule reads it by itself."""
+
+    override: Override
+    trace: Trace
+    automatic: Pull
+
+
+@dataclass(frozen=True)
 class Ingested:
-    """A campaign with its exports read: one trace and one pull per usable test, the rest set aside."""
+    """A campaign with its exports read: one trace and one pull per usable test, the rest set aside.
+
+    ``by_hand`` holds every test that a person decided about: one excluded is among ``set_aside``, one moved has the
+    moved reading among ``pulls``.
+    """
 
     campaign: Campaign
     traces: Mapping[str, Trace]
     pulls: Mapping[str, Pull]
     set_aside: tuple[SetAside, ...]
+    by_hand: Mapping[str, ByHand] = field(default_factory=dict)
 
     def doubts(self) -> tuple[SetAside, ...]:
         """Tests that were used although their export or pull shows something odd, such as an impulse spike."""

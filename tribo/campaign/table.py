@@ -35,33 +35,53 @@ class TestRow:
         return self.cells.get("test_id") or f"row {self.row}"
 
 
+@dataclass(frozen=True)
+class Table:
+    """A table as it stands in a file: column names, the line they stand in, and the lines below."""
+
+    names: tuple[str, ...]
+    header_row: int
+    rows: tuple[TestRow, ...]
+
+
 def read_tests_table(path: Path, file: str, problems: list[Problem]) -> list[TestRow] | None:
     """The rows of tests.csv; None where the table cannot be used, with every fault added to ``problems``."""
     try:
-        text = _decoded(path.read_bytes())
+        table = read_table(path, file)
     except FileNotFoundError:
         problems.append(Problem("missing_file", f"a campaign needs a {file}", file=file))
         return None
+    if table is None:
+        problems.append(Problem("empty", "no header and no test", file=file))
+        return None
+    found = _header_faults(list(table.names), file, table.header_row)
+    problems.extend(found)
+    return None if any(p.kind != "resembles_a_column" for p in found) else list(table.rows)
+
+
+def read_table(path: Path, file: str) -> Table | None:
+    """A delimited table of any encoding and delimiter; None where there is not even a header.
+
+    Raises FileNotFoundError.
+    """
+    text = _decoded(path.read_bytes())
     lines = text.splitlines()
     first = next((k for k, line in enumerate(lines) if line.strip()), None)
     if first is None:
-        problems.append(Problem("empty", "no header and no test", file=file))
         return None
     delimiter = max(",;\t|", key=lines[first].count)
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
-    names: list[str] | None = None
-    rows = []
+    names: list[str] = []
+    header_row, rows = 0, []
     for cells in reader:
         stripped = [cell.strip() for cell in cells]
         if not any(stripped):
             continue
-        if names is None:
+        if not names:
             names, header_row = stripped, reader.line_num
             continue
         rows.append(_row(stripped, names, reader.line_num, delimiter, file))
-    found = _header_faults(names or [], file, header_row)
-    problems.extend(found)
-    return None if any(p.kind != "resembles_a_column" for p in found) else rows
+    return Table(tuple(names), header_row, tuple(rows))
 
 
 def _decoded(raw: bytes) -> str:

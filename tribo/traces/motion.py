@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tribo.errors import Problem, TraceError
 from tribo.records import FloatArray, Trace
 from tribo.traces import quality
-from tribo.traces.apex import Apex
+from tribo.traces.apex import FEWEST_SAMPLES, Apex
 from tribo.traces.contact import Rise, Zero, departure, first_rise, smoothed, starting_level, zero_before
 from tribo.traces.peak import find_apex, first_maximum
 from tribo.traces.quality import noise_of
@@ -122,6 +122,18 @@ def _with_peak(
     travel = _travel(trace, time, onset, speed_m_s)
     fallen = _fallen(smooth, first, end)
     return Motion(time, force, smooth, travel, zero, rise, onset, apex, (first, end), fallen, noise, problems)
+
+
+def with_peak_at(motion: Motion, peak_s: float) -> Motion:
+    """The same pull with its static peak looked for within two samples of a given time, and sliding after it."""
+    last = motion.time_s.size - FEWEST_SAMPLES - 1
+    peak = min(max(int(np.searchsorted(motion.time_s, peak_s)), FEWEST_SAMPLES), last)
+    end = max(motion.sliding[1], peak + FEWEST_SAMPLES)
+    time, force, smooth = motion.time_s[:end], motion.force_N[:end], motion.smooth_N[:end]
+    level = median(smooth[(peak + end) // 2 :])
+    apex = find_apex(time, force, smooth, motion.rise.first, peak, 2, peak, level, motion.noise_N)
+    first = int(np.searchsorted(time, apex.time_s, side="right"))
+    return replace(motion, apex=apex, sliding=(first, end), fallen=_fallen(smooth, first, end))
 
 
 def _fallen(smooth: FloatArray, first: int, end: int) -> int:

@@ -12,7 +12,7 @@ from tribo.errors import Problem, TraceError
 from tribo.records import Pull, Test, Trace
 from tribo.traces.apex import Apex
 from tribo.traces.contact import line
-from tribo.traces.motion import Motion, lay_out
+from tribo.traces.motion import Motion, lay_out, with_peak_at
 from tribo.traces.rules import RULES, Rule, Window
 from tribo.traces.sliding import Steady, steady, stick_slip
 from tribo.traces.statistics import wander
@@ -29,13 +29,17 @@ def read_pull(
     test: Test | None = None,
     parameters: Mapping[str, float] | None = None,
     zero: tuple[float, float] | None = None,
+    peak_s: float | None = None,
+    window_s: tuple[float, float] | None = None,
 ) -> Pull:
     """Read static and sliding friction off one trace.
 
     ``rule`` names an entry of ``RULES``; ``parameters`` replace its own (``length_m``, ``skip_m``,
     ``share``, ``start_s``). ``test`` gives the pull its id and, where the trace has no displacement, its speed.
     ``zero`` is the zero of the force with its standard uncertainty (N) where it is known otherwise than from the
-    force before contact, such as from the asymmetry of strokes.
+    force before contact, such as from the asymmetry of strokes. ``peak_s`` and ``window_s``, on the clock of the
+    trace, are a static peak and a sliding window that a person chose: the peak is then looked for within two samples
+    of ``peak_s``, and the flags say what was chosen by hand.
 
     The standard uncertainties hold the scatter of the reading (correlation counted), that of the zero, and
     how far a slow wander of the size seen while sliding may have carried the signal since the zero was last
@@ -50,12 +54,21 @@ def read_pull(
     test_id, file = (test.test_id if test else None), trace.file or None
     try:
         motion = lay_out(trace, test.speed_m_s if test else None, zero)
-        static = chosen.static(motion, chosen.parameters)
-        window = chosen.sliding(motion, chosen.parameters)
+        motion = motion if peak_s is None else with_peak_at(motion, peak_s)
+        static = chosen.static(motion, chosen.parameters) if peak_s is None else motion.apex
+        window = chosen.sliding(motion, chosen.parameters) if window_s is None else _samples(motion, window_s)
     except TraceError as fault:
         raise TraceError([p.at(file=file, test_id=test_id) for p in fault.problems]) from None
     problems = tuple(p.at(file=file, test_id=test_id) for p in motion.problems)
-    return _reduce(motion, static, window, chosen, test_id or trace.name, problems)
+    pull = _reduce(motion, static, window, chosen, test_id or trace.name, problems)
+    by_hand = {"peak_by_hand": peak_s is not None, "window_by_hand": window_s is not None}
+    return replace(pull, flags=(*pull.flags, *(flag for flag, raised in by_hand.items() if raised)))
+
+
+def _samples(motion: Motion, window_s: tuple[float, float]) -> Window:
+    """The range of samples within a window of time."""
+    first, end = np.searchsorted(motion.time_s, window_s)
+    return int(first), int(end) + int(end < motion.time_s.size and motion.time_s[end] == window_s[1])
 
 
 def _rule(name: str, parameters: Mapping[str, float] | None) -> Rule:

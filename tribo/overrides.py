@@ -1,0 +1,214 @@
+"""overrides.csv: what a person decided about single pulls, checked against the campaign and applied to its readings."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from tribo.campaign.table import Table, TestRow, read_table
+from tribo.errors import CampaignError, Problem, TraceError
+from tribo.records import ByHand, Ingested, Override, Pull, SetAside, Trace
+
+TIMES = ("window_start_s", "window_end_s", "peak_s")
+COLUMNS = ("test_id", "action", "reason", *TIMES)
+ACTIONS = ("exclude", "move")
+FEWEST_IN_WINDOW = 10
+
+
+def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
+    """The campaign with what stands in overrides.csv applied: pulls left out, static peaks and windows moved.
+
+    Columns: test_id, action (``exclude`` or ``move``), reason, window_start_s, window_end_s, peak_s; times on the
+    clock of the trace. A pull excluded is set aside with its reason; one moved is read anew by the same rule with
+    the given peak or window. Both keep their automatic reading in ``by_hand``.
+
+    Raises
+    ------
+    CampaignError
+        Every fault of the table at once, with its row and column; or nothing is left.
+    """
+    overrides = read_overrides(path, ingested)
+    known = [o for o in overrides if o.test_id in ingested.pulls]  # what is set aside already stays so
+    by_hand = {o.test_id: ByHand(o, ingested.traces[o.test_id], ingested.pulls[o.test_id]) for o in known}
+    left_out = tuple(_left_out(o, path.name) for o in known if o.action == "exclude")
+    gone = {s.test_id for s in left_out}
+    pulls = {i: p for i, p in ingested.pulls.items() if i not in gone}
+    if not pulls:
+        raise CampaignError(Problem("no_usable_test", "every test is excluded", file=path.name))
+    pulls |= _moved(ingested, [o for o in known if o.action == "move"], rule)
+    traces = {i: t for i, t in ingested.traces.items() if i not in gone}
+    return replace(
+        ingested, traces=traces, pulls=pulls, set_aside=(*ingested.set_aside, *left_out), by_hand=by_hand
+    )
+
+
+def _left_out(override: Override, file: str) -> SetAside:
+    return SetAside(override.test_id, f"excluded by hand in {file}: {override.reason}")
+
+
+def _moved(ingested: Ingested, overrides: list[Override], rule: str) -> dict[str, Pull]:
+    from tribo.traces import read_pull
+
+    tests = {t.test_id: t for t in ingested.campaign.tests}
+    found: dict[str, Pull] = {}
+    problems: list[Problem] = []
+    for o in overrides:
+        trace = ingested.traces[o.test_id]
+        try:
+            pull = read_pull(trace, rule=rule, test=tests[o.test_id], peak_s=o.peak_s, window_s=o.window_s)
+        except TraceError as why:
+            problems += why.problems
+            continue
+        found[o.test_id] = replace(pull, flags=tuple(dict.fromkeys((*trace.flags, *pull.flags))))
+    if problems:
+        raise CampaignError(problems)
+    return found
+
+
+def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
+    """The rows of overrides.csv, checked against the tests and traces of a campaign.
+
+    Raises
+    ------
+    CampaignError
+        With every fault at once: an unknown test, action or column, a number that is none, a time outside the trace.
+    """
+    file = path.name
+    try:
+        table = read_table(path, file)
+    except OSError:
+        raise CampaignError(Problem("missing_file", "no such file", file=str(path))) from None
+    if table is None:
+        raise CampaignError(Problem("empty", "no header", file=file, allowed=",".join(COLUMNS)))
+    if faults := list(_header_faults(table, file)):
+        raise CampaignError(faults)
+    known = _known_tests(ingested)
+    problems = list(_repeated(table, file))
+    overrides = []
+    for row in table.rows:
+        faults = [row.fault] if row.fault else list(_row_faults(row, file, known))
+        problems += faults
+        if not faults:
+            overrides.append(_override(row))
+    if problems:
+        raise CampaignError(problems)
+    return tuple(overrides)
+
+
+def _known_tests(ingested: Ingested) -> dict[str, Trace | None]:
+    """Every test of the campaign with its trace, None where it has none."""
+    found: dict[str, Trace | None] = {s.test_id: None for s in ingested.set_aside}
+    found |= {t.test_id: None for t in ingested.campaign.tests}
+    return found | dict(ingested.traces)
+
+
+def _header_faults(table: Table, file: str) -> Iterator[Problem]:
+    for name in COLUMNS[:2]:
+        if name not in table.names:
+            yield Problem("missing_column", "this column is required", file, table.header_row, name,
+                          ", ".join(table.names))  # fmt: skip
+    for name in dict.fromkeys(table.names):
+        if name not in COLUMNS:
+            yield Problem("unknown_column", "no such column", file, table.header_row, name, name, ", ".join(COLUMNS))
+        elif table.names.count(name) > 1:
+            yield Problem("duplicate_column", "this column stands twice", file, table.header_row, name)
+
+
+def _repeated(table: Table, file: str) -> Iterator[Problem]:
+    first: dict[str, int] = {}
+    for row in table.rows:
+        if row.test_id in first:
+            what = f"this test stands in row {first[row.test_id]} already"
+            yield Problem("duplicate_row", what, file, row.row, "test_id", row.test_id, "one row a test")
+        first.setdefault(row.test_id, row.row)
+
+
+def _row_faults(row: TestRow, file: str, known: Mapping[str, Trace | None]) -> Iterator[Problem]:
+    test_id, action = row.cells.get("test_id", ""), row.cells.get("action", "")
+    if test_id not in known:
+        near = difflib.get_close_matches(test_id, known, 1, 0.5)
+        hint = f"a test of this campaign{f'; did you mean {near[0]}?' if near else ''}"
+        yield Problem("unknown_test", "no such test", file, row.row, "test_id", test_id, hint)
+    if action not in ACTIONS:
+        yield Problem("unknown_action", "no such action", file, row.row, "action", action, " or ".join(ACTIONS))
+    times, faults = _times(row, file)
+    yield from faults
+    if action == "exclude":
+        yield from _exclude_faults(row, file)
+    elif action == "move" and not faults:
+        yield from _move_faults(row, file, times, known.get(test_id))
+
+
+def _exclude_faults(row: TestRow, file: str) -> Iterator[Problem]:
+    if not row.cells.get("reason"):
+        yield Problem("no_reason", "a test is left out for a reason", file, row.row, "reason", "", "a few words")
+    for column in TIMES:
+        if cell := row.cells.get(column):
+            what = "a test that is left out has nothing to move"
+            yield Problem("unused_cell", what, file, row.row, column, cell, "an empty cell")
+
+
+def _times(row: TestRow, file: str) -> tuple[dict[str, float], list[Problem]]:
+    """The times given, in seconds, and the cells that hold none."""
+    found, problems = {}, []
+    for column in TIMES:
+        cell = row.cells.get(column, "")
+        try:
+            value = float(cell.replace(",", ".") if row.decimal_comma else cell) if cell else math.nan
+            if cell and ("_" in cell or not math.isfinite(value)):
+                raise ValueError(cell)
+        except ValueError:
+            problems.append(Problem("not_a_number", "not a time", file, row.row, column, cell, "seconds"))
+            continue
+        if cell:
+            found[column] = value
+    return found, problems
+
+
+def _move_faults(row: TestRow, file: str, times: Mapping[str, float], trace: Trace | None) -> Iterator[Problem]:
+    start, end = times.get("window_start_s"), times.get("window_end_s")
+    if not times:
+        what = "nothing is moved"
+        yield Problem("nothing_moved", what, file, row.row, None, None, "window_start_s and window_end_s, or peak_s")
+    if (start is None) != (end is None):
+        column = "window_start_s" if start is None else "window_end_s"
+        yield Problem("half_a_window", "a window has a start and an end", file, row.row, column, "", "seconds")
+    if start is not None and end is not None and not start < end:
+        found = row.cells["window_end_s"]
+        yield Problem("window_reversed", "a window ends after its start", file, row.row, "window_end_s", found,
+                      f"more than {start:g}")  # fmt: skip
+        return
+    if trace is not None:
+        yield from _outside(row, file, times, trace)
+
+
+def _outside(row: TestRow, file: str, times: Mapping[str, float], trace: Trace) -> Iterator[Problem]:
+    first, last = float(trace.time_s[0]), float(trace.time_s[-1])
+    for column, value in times.items():
+        if not first <= value <= last:
+            what = "outside the record of this test"
+            yield Problem("outside_trace", what, file, row.row, column, row.cells[column], f"{first:g} to {last:g}")
+    if len(times) > 1 and "window_start_s" in times:
+        inside = (trace.time_s >= times["window_start_s"]) & (trace.time_s <= times["window_end_s"])
+        if np.count_nonzero(inside) < FEWEST_IN_WINDOW:
+            yield Problem("window_short", "too few samples in this window", file, row.row, "window_end_s",
+                          f"{np.count_nonzero(inside)} samples", f"at least {FEWEST_IN_WINDOW}")  # fmt: skip
+
+
+def _override(row: TestRow) -> Override:
+    times, _ = _times(row, "")
+    window = (times["window_start_s"], times["window_end_s"]) if "window_start_s" in times else None
+    action = row.cells["action"]
+    return Override(
+        row.cells["test_id"],
+        "exclude" if action == "exclude" else "move",
+        row.cells.get("reason", ""),
+        window,
+        times.get("peak_s"),
+        row.row,
+    )
