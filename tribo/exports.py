@@ -1,44 +1,165 @@
-"""The exports of a campaign, read one by one or on several processes, each into a trace and its pull."""
+"""The exports of a campaign, read one by one or on several processes, each into traces and their pulls."""
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import threading
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from tribo.errors import TriboError
+import numpy as np
+
+from tribo.campaign.choice import is_chosen, names_pulls, split_choice
+from tribo.errors import Problem, TraceError, TriboError
 from tribo.records import Campaign, Pull, SetAside, Test, Trace
 
 FEWEST_FOR_PROCESSES = 100  # below, starting processes costs more than it gains
 CHUNK = 16
+_UNLOADED = 0.05  # share of the largest load of an export below which a piece of it carries none
 
 Outcome = tuple[Trace, Pull] | SetAside
 
 
-def read_one(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> Outcome:
-    """One export into its trace and pull, or what is wrong with it."""
+def read_row(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> tuple[tuple[Test, Outcome], ...]:
+    """What a row of tests.csv gives: one test as a rule, one a pull where it names pulls within its export.
+
+    ``PATH#2/3`` is the third pull of the second table, ``PATH#2/*`` every pull of it, ``PATH#*`` every pull of every
+    table; where a row means many, each is a test of its own called ``ID#2/3``. A row without a load takes that
+    recorded in the export.
+    """
+    try:
+        if names_pulls(split_choice(test.file)[1]):
+            return _chosen_pulls(root, columns, rule, test)
+        return (_whole(root, columns, rule, test),)
+    except TriboError as why:
+        return ((test, _set_aside(test, why)),)
+
+
+def _set_aside(test: Test, why: TriboError) -> SetAside:
+    problems = tuple(replace(p, file=test.file, test_id=test.test_id) for p in why.problems)
+    return SetAside(test.test_id, "; ".join(str(p) for p in problems), problems)
+
+
+def _whole(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> tuple[Test, Outcome]:
+    """An export, or one table of it, as one pull."""
     from tribo.readers import read_export
     from tribo.traces import read_pull
 
+    trace = read_export(root / test.file, columns=columns or None, name=test.test_id, file=test.file)
+    test = _with_load(test, trace)
+    pull = read_pull(trace, rule=rule, test=test)
+    if doubt := _several_pulls(trace):
+        flags, problems = (*trace.flags, doubt.kind), (*trace.problems, doubt)
+        trace = replace(trace, flags=flags, problems=problems)
+    return test, (trace, replace(pull, flags=tuple(dict.fromkeys((*trace.flags, *pull.flags)))))
+
+
+def _several_pulls(trace: Trace) -> Problem | None:
+    """A doubt where a trace that was read as one pull holds several, told by steps of load or speed or reversals."""
+    from tribo.traces import split_pulls
+
+    pieces = split_pulls(trace)
+    loaded = [] if len(pieces) == 1 else [k for k, there in enumerate(_carry_load(pieces)) if there]
+    if len(loaded) < 2:
+        return None
+    export, choice = split_choice(trace.file)
+    table = choice or "1"
+    what = f"{len(loaded)} pulls in this trace, read as one"
+    allowed = f"{export}#{table}/{loaded[0] + 1} and so on for one of them, {export}#{table}/* for all"
+    return Problem("several_pulls", what, trace.file, allowed=allowed)
+
+
+def _carry_load(pieces: Sequence[Trace]) -> list[bool]:
+    """Which pieces carry a load; all of them where none was recorded."""
+    from tribo.traces import load_of
+
+    loads = np.nan_to_num(np.abs([load_of(piece)[0] for piece in pieces]))
+    return [bool(load >= _UNLOADED * loads.max()) for load in loads]
+
+
+def _with_load(test: Test, trace: Trace) -> Test:
+    """The test with the load of its trace where tests.csv gives none.
+
+    Raises
+    ------
+    TraceError
+        ``no_load``: neither gives it.
+    """
+    from tribo.traces import load_of
+
+    if not math.isnan(test.normal_load_N):
+        return test
+    load = load_of(trace)[0]
+    if not load > 0:
+        found = None if math.isnan(load) else f"{load:.4g} N"
+        what, allowed = "no load: neither tests.csv nor the export gives it", "normal_load_N in tests.csv"
+        raise TraceError(Problem("no_load", what, found=found, allowed=allowed))
+    return replace(test, normal_load_N=load)
+
+
+def _chosen_pulls(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> tuple[tuple[Test, Outcome], ...]:
+    """Every pull that the choice of a test means, as a test of its own; all strokes of an export share one zero."""
+    from tribo.readers import read_blocks
+    from tribo.traces import orient_strokes, split_pulls
+    from tribo.traces.strokes import read_pieces
+
+    export, choice = split_choice(test.file)
+    tables = read_blocks(root / export, columns=columns or None, name=test.test_id, file=test.file)
+    pieces = {f"{t}/{p}": piece for t, table in enumerate(tables, 1) for p, piece in enumerate(split_pulls(table), 1)}
+    strokes = orient_strokes(list(pieces.values()))
+    loaded = dict(zip(pieces, _carry_load(strokes.traces), strict=True))
+    chosen = [address for address in pieces if is_chosen(address, choice) and (loaded[address] or "*" not in choice)]
+    if not chosen:
+        what, allowed = f"{len(pieces)} pulls in this export", f"{export}#*, or {', '.join(pieces)} after the #"
+        raise TraceError(Problem("no_such_pull", what, found=choice, allowed=allowed))
+    zero = 0.0 if math.isnan(strokes.zero_N) else strokes.zero_N
+    found = []
+    read = read_pieces(strokes, rule=rule, test=test)
+    for address, piece, sign, pull in zip(pieces, strokes.traces, strokes.directions, read, strict=True):
+        if address in chosen:
+            name = f"{test.test_id}#{address}" if "*" in choice else test.test_id
+            one = replace(test, test_id=name, file=f"{export}#{address}")
+            found.append(_one_of_several(one, piece, sign * zero, pull))
+    left_out = [address for address in pieces if is_chosen(address, choice) and not loaded[address]]
+    return _with_note(tuple(found), left_out if "*" in choice else [])
+
+
+def _one_of_several(test: Test, piece: Trace, zero_N: float, pull: Pull | TraceError) -> tuple[Test, Outcome]:
+    """One pull of an export; the trace keeps its zero, as one that was read alone does."""
+    if isinstance(pull, TraceError):
+        return test, _set_aside(test, pull)
     try:
-        trace = read_export(root / test.file, columns=columns or None, name=test.test_id, file=test.file)
-        pull = read_pull(trace, rule=rule, test=test)
-        return trace, replace(pull, flags=tuple(dict.fromkeys((*trace.flags, *pull.flags))))
-    except TriboError as why:
-        problems = tuple(replace(p, file=test.file, test_id=test.test_id) for p in why.problems)
-        return SetAside(test.test_id, "; ".join(str(p) for p in problems), problems)
+        test = _with_load(test, piece)
+    except TraceError as why:
+        return test, _set_aside(test, why)
+    trace = replace(piece, name=test.test_id, file=test.file, force_N=piece.force_N + zero_N)
+    flags = tuple(dict.fromkeys((*trace.flags, *pull.flags)))
+    return test, (trace, replace(pull, test_id=test.test_id, zero_N=zero_N or pull.zero_N, flags=flags))
 
 
-def read_all(campaign: Campaign, rule: str, jobs: int = 1) -> Iterator[tuple[Test, Outcome]]:
-    """Every test with its outcome, in the order of the campaign."""
-    read = partial(read_one, campaign.root, dict(campaign.columns), rule)
+def _with_note(found: tuple[tuple[Test, Outcome], ...], left_out: Sequence[str]) -> tuple[tuple[Test, Outcome], ...]:
+    """The pulls of an export, the first with a doubt that names the pieces left out because they carry no load."""
+    first = next((k for k, (_, outcome) in enumerate(found) if not isinstance(outcome, SetAside)), None)
+    if not left_out or first is None:
+        return found
+    test, outcome = found[first]
+    assert not isinstance(outcome, SetAside)
+    trace, pull = outcome
+    doubt = Problem("unloaded", f"pieces without a load left out of this export: {', '.join(left_out)}", test.file)
+    trace = replace(trace, problems=(*trace.problems, doubt))
+    return *found[:first], (test, (trace, pull)), *found[first + 1 :]
+
+
+def read_all(campaign: Campaign, rule: str, jobs: int = 1) -> Iterator[tuple[tuple[Test, Outcome], ...]]:
+    """The tests of every row with their outcomes, in the order of the campaign."""
+    read = partial(read_row, campaign.root, dict(campaign.columns), rule)
     if jobs == 1 or len(campaign.tests) < FEWEST_FOR_PROCESSES or not _may_fork():
-        yield from zip(campaign.tests, map(read, campaign.tests), strict=True)
+        yield from map(read, campaign.tests)
         return
     read(campaign.tests[0])  # what it imports is then in every process
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("fork")) as pool:
@@ -47,7 +168,7 @@ def read_all(campaign: Campaign, rule: str, jobs: int = 1) -> Iterator[tuple[Tes
                 # Python 3.12 and later warn of threads at a fork; the ones here are those of BLAS, which survives it
                 warnings.simplefilter("ignore", DeprecationWarning)
                 outcomes = pool.map(read, campaign.tests, chunksize=CHUNK)
-            yield from zip(campaign.tests, outcomes, strict=True)
+            yield from outcomes
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise

@@ -24,7 +24,7 @@ MOST_LOADS = 8  # T(N) of the model is close to a straight line: more loads are 
 
 def loads_to_simulate(campaign: Campaign) -> FloatArray:
     """The campaign's own loads in N, ascending; where there are more than MOST_LOADS, a spread over their range."""
-    loads = np.unique([test.normal_load_N for test in campaign.tests])
+    loads = np.unique([test.normal_load_N for test in campaign.tests if np.isfinite(test.normal_load_N)])
     if loads.size <= MOST_LOADS:
         return loads
     return np.geomspace(loads[0], loads[-1], MOST_LOADS)

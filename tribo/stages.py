@@ -23,6 +23,7 @@ from tribo.records import (
     SetAside,
     Study,
     Trace,
+    Test,
 )
 
 Progress = Callable[[str, int, int], None]
@@ -54,8 +55,8 @@ class StudyOptions:
 def ingest(campaign: Campaign, *, rule: str = "seed", jobs: int = 1, progress: Progress = _silent) -> Ingested:
     """Read every usable test of a campaign into a trace and a pull, on ``jobs`` processes where that pays.
 
-    A test that cannot be read is set aside with its problems; the rest goes on. The result does not depend on
-    ``jobs``.
+    A test that cannot be read is set aside with its problems; the rest goes on. A row that names many pulls within
+    its export is a test for each of them. The result does not depend on ``jobs``.
 
     Raises
     ------
@@ -67,18 +68,21 @@ def ingest(campaign: Campaign, *, rule: str = "seed", jobs: int = 1, progress: P
     traces: dict[str, Trace] = {}
     pulls: dict[str, Pull] = {}
     set_aside = list(campaign.set_aside)
-    for done, (test, outcome) in enumerate(read_all(campaign, rule, jobs), start=1):
-        if isinstance(outcome, SetAside):
-            set_aside.append(outcome)
-        else:
-            traces[test.test_id], pulls[test.test_id] = outcome
+    tests: list[Test] = []
+    for done, outcomes in enumerate(read_all(campaign, rule, jobs), start=1):
+        for test, outcome in outcomes:
+            tests.append(test)
+            if isinstance(outcome, SetAside):
+                set_aside.append(outcome)
+            else:
+                traces[test.test_id], pulls[test.test_id] = outcome
         progress("reading exports", done, len(campaign.tests))
     if not pulls:
         raise CampaignError(
             [p for fault in set_aside for p in fault.problems]
             or [Problem("no_usable_test", "no test of this campaign can be used", file=str(campaign.root))]
         )
-    return Ingested(campaign, traces, pulls, tuple(set_aside))
+    return Ingested(replace(campaign, tests=tuple(tests)), traces, pulls, tuple(set_aside))
 
 
 def fit(ingested: Ingested, *, weights: Weights = "relative") -> tuple[LawFit, ...]:
@@ -87,13 +91,26 @@ def fit(ingested: Ingested, *, weights: Weights = "relative") -> tuple[LawFit, .
     Raises
     ------
     FitError
+    A regime that no pull shows has no fits.
+
         No sample has enough loads for the law.
     """
     from tribo.fitting import fit_samples
 
     table = ingested.table()
     area = ingested.campaign.nominal_area_m2
-    return tuple(f for regime in REGIMES for f in fit_samples(table, regime, area, weights=weights))
+    found: list[LawFit] = []
+    problems: list[Problem] = []
+    for regime in REGIMES:
+        try:
+            found += fit_samples(table, regime, area, weights=weights)
+        except FitError as why:
+            if np.isfinite(table[f"{regime}_N"]).any():
+                raise
+            problems += why.problems  # a log of steps while sliding has no static peaks, and a law all the same
+    if not found:
+        raise FitError(problems)
+    return tuple(found)
 
 
 def flat_sample(campaign: Campaign, wanted: str = "F") -> str:
@@ -254,6 +271,8 @@ def plan(campaign: Campaign, options: StudyOptions, until: Until) -> dict[str, A
         steps.append(f"calibrate the model on sample {flat} and run it {runs} times at {len(loads)} loads")
     return {
         "steps": steps,
+    if unknown := sum(np.isnan(t.normal_load_N) for t in campaign.tests):
+        steps.append(f"take the load of {unknown} tests from their exports")
         "set_aside": [f"{s.test_id}: {s.reason}" for s in campaign.set_aside],
         "problems": [asdict(p) for p in campaign.problems],
     }

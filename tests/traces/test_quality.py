@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from tribo.errors import TraceError
-from tribo.records import ExportFormat, Trace
+from tribo.records import Trace
 from tribo.traces import RULES, read_pull, read_pulls, split_pulls
 
 from .synthetic import Shape, with_samples
@@ -84,8 +84,7 @@ def test_a_force_that_never_rises_holds_no_pull(force: np.ndarray) -> None:
 @pytest.mark.parametrize("height", [0.5, 3.0, -3.0, 60.0])
 def test_an_impulse_is_listed_with_its_row_and_does_not_take_the_peak(index: int, height: float) -> None:
     trace = SHAPE.trace()
-    layout = ExportFormat("plain", "utf-8", ",", ".", 7, {})
-    spiked = replace(with_samples(trace, {index: trace.force_N[index] + height}), source=layout)
+    spiked = replace(with_samples(trace, {index: trace.force_N[index] + height}), first_row=8)
     pull = read_pull(spiked)
     assert [(p.kind, p.row) for p in pull.problems] == [("spike", index + 8)]
     assert "spike" in pull.flags

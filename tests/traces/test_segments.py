@@ -115,6 +115,16 @@ def test_a_step_of_load_while_sliding_gives_sliding_friction_without_a_static_pe
     assert all(math.isnan(p.static_N) and "no_static" in p.flags for p in pulls)
 
 
+def test_an_impulse_in_a_later_pull_is_listed_with_its_row_of_the_file() -> None:
+    record = loaded_pulls((1.0, 2.0), mu=0.8, tau0_A=0.4)
+    at = record.time_s.size - 200
+    force = record.force_N.copy()
+    force[at] += 5.0
+    first, second = read_pulls(replace(record, force_N=force, first_row=30), rule="seed")
+    assert first.problems == ()
+    assert [(p.kind, p.row) for p in second.problems] == [("spike", 30 + at)]
+
+
 def test_a_step_of_speed_cuts_and_a_start_from_rest_does_not() -> None:
     time = np.arange(3000) / RATE
     speed = np.where(time < 5, 0.0, np.where(time < 15, 1e-3, 3e-3))

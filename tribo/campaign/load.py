@@ -8,6 +8,7 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
+from tribo.campaign.choice import overlap, split_choice
 from tribo.campaign.described import CampaignFile, PatternTable, read_description
 from tribo.campaign.table import COUNTS, KNOWN, LOADS, NUMBERS, TestRow, read_tests_table
 from tribo.errors import CampaignError, Problem
@@ -109,20 +110,22 @@ def _sort_rows(
 ) -> tuple[list[TestRow], tuple[SetAside, ...]]:
     """Usable rows, and the others with all their faults; rows that share a test_id are one set-aside test."""
     places: dict[str, list[int]] = {}
-    users: dict[str, list[str]] = {}
+    users: dict[str, list[tuple[str, str]]] = {}
     for row in rows:
         places.setdefault(row.test_id, []).append(row.row)
-        users.setdefault(row.cells.get("file", ""), []).append(row.test_id)
+        path, choice = _export_of(row)
+        users.setdefault(path, []).append((row.test_id, choice))
     usable, set_aside = [], []
     for row in rows:
         test_id = row.test_id
         if row.row != places[test_id][0]:
             continue
-        problems = [p for p in _row_faults(root, row, patterns) if measured or p.kind != "missing"]
+        problems = _row_faults(root, row, patterns, measured)
         if len(places[test_id]) > 1:
             problems.append(_duplicate(test_id, places[test_id]))
-        others = [other for other in users[row.cells.get("file", "")] if other != test_id]
-        if others and row.cells["file"]:
+        path, choice = _export_of(row)
+        others = [other for other, theirs in users[path] if other != test_id and overlap(choice, theirs)]
+        if others and path:
             what = f"this export is given for {', '.join(others)} too; none of them is used"
             place = (TESTS, row.row, "file", row.cells["file"])
             problems.append(Problem("duplicate_file", what, *place, "one export a test"))
@@ -141,15 +144,21 @@ def _duplicate(test_id: str, rows: Sequence[int]) -> Problem:
     return Problem("duplicate_row", what, TESTS, rows[1], "test_id", test_id, "one row a test")
 
 
-def _row_faults(root: Path, row: TestRow, patterns: Mapping[str, Pattern]) -> list[Problem]:
+def _export_of(row: TestRow) -> tuple[str, str]:
+    """(path, choice within it) of the export a row names; the path as it stands where it leaves the campaign."""
+    path, choice = split_choice(row.cells.get("file", ""))
+    return str(_relative(path) or path) if path else "", choice
+
+
+def _row_faults(root: Path, row: TestRow, patterns: Mapping[str, Pattern], measured: bool) -> list[Problem]:
     if row.fault is not None:
         return [row.fault]
     problems = []
     if not row.cells["test_id"]:
         problems.append(Problem("no_test_id", "a test needs a test_id", TESTS, row.row, "test_id"))
     problems += _sample_faults(row, patterns)
-    problems += _number_faults(row)
-    problems += _file_faults(root, row)
+    problems += _number_faults(row, load_in_export=measured and bool(_export_of(row)[1]))
+    problems += [p for p in _file_faults(root, row) if measured or p.kind != "missing"]
     return problems
 
 
@@ -176,7 +185,7 @@ def _number(row: TestRow, column: str) -> float | None:
     return value
 
 
-def _number_faults(row: TestRow) -> list[Problem]:
+def _number_faults(row: TestRow, load_in_export: bool) -> list[Problem]:
     problems, loads, at = [], [], (TESTS, row.row)
     for column in (*NUMBERS, *COUNTS):
         cell = row.cells.get(column, "")
@@ -192,13 +201,18 @@ def _number_faults(row: TestRow) -> list[Problem]:
             problems.append(Problem("not_a_number", "not a count", *at, column, cell, "1, 2, ..."))
         if column in ("speed_mm_s", "hold_s") and value is not None and value < 0:
             problems.append(Problem("negative", "cannot be negative", *at, column, cell, "0 or more"))
-    return problems + _load_faults(row, dict(loads))
+    return problems + _load_faults(row, dict(loads), load_in_export)
 
 
-def _load_faults(row: TestRow, loads: Mapping[str, float]) -> list[Problem]:
-    """normal_load_N must be positive; a sled may carry no mass of its own, but none may be negative."""
+def _load_faults(row: TestRow, loads: Mapping[str, float], load_in_export: bool) -> list[Problem]:
+    """normal_load_N must be positive; a sled may carry no mass of its own, but none may be negative.
+
+    A row that names a table or pulls within its export may leave the load to the normal force recorded there.
+    """
     at = (TESTS, row.row)
     if not loads and not any(row.cells.get(column) for column in LOADS):
+        if load_in_export:
+            return []
         return [Problem("no_load", "no load", *at, " or ".join(LOADS), None, "mass_g or normal_load_N")]
     if loads.get("normal_load_N", 1.0) <= 0:
         found, what = row.cells["normal_load_N"], "a load must be positive"
@@ -227,33 +241,29 @@ def _file_faults(root: Path, row: TestRow) -> list[Problem]:
 
 
 def _relative(name: str) -> PurePosixPath | None:
-    """A path inside the campaign, "/" between its parts, a "#2" (second table) dropped; None if it leaves it."""
-    path = PurePosixPath(re.sub(r"#\d+$", "", name.replace("\\", "/")))
+    """A path inside the campaign, "/" between its parts, a choice such as "#2" dropped; None if it leaves it."""
+    path = PurePosixPath(split_choice(name)[0].replace("\\", "/"))
     if path.is_absolute() or ".." in path.parts or "\0" in name or re.match(r"[A-Za-z]:", name):
         return None
     return path
 
 
-def _table_choice(name: str) -> str:
-    """The "#2" of "raw/all.csv#2", the second table of an export that holds several."""
-    found = re.search(r"#\d+$", name)
-    return found.group() if found else ""
-
-
 def _test(row: TestRow, described: CampaignFile) -> Test:
-    """A row without faults as a Test. N = normal_load_N, or (mass + slider mass) g."""
+    """A row without faults as a Test. N = normal_load_N, or (mass + slider mass) g; NaN where the export tells it."""
     cells = row.cells
     numbers = {column: _number(row, column) for column in NUMBERS}
     counts = {c: None if (v := _number(row, c)) is None else int(v) for c in COUNTS}
     speed = numbers["speed_mm_s"] if numbers["speed_mm_s"] is not None else described.campaign.pull_speed_mm_s
     load = numbers["normal_load_N"]
+    if load is None and numbers["mass_g"] is None:
+        load = math.nan
     if load is None:
         load = ((numbers["mass_g"] or 0.0) + described.campaign.slider_mass_g) * _GRAM * STANDARD_GRAVITY
     sample = cells["sample"]
     directed = sample[-1:] if sample not in described.patterns else ""
     return Test(
         test_id=cells["test_id"],
-        file=f"{_relative(cells['file'])}{_table_choice(cells['file'])}",
+        file="#".join(part for part in _export_of(row) if part),
         sample=sample,
         normal_load_N=load,
         specimen=cells.get("specimen") or sample,

@@ -8,7 +8,7 @@ from tribo.campaign.load import RAW, TESTS, TOML
 from tribo.errors import CampaignError, Problem
 
 _TOML_TEXT = """\
-# A campaign: what was pulled over what, and the patterns. Every pull is a row of tests.csv.
+# A campaign: what was pulled over what, and the patterns.
 
 [campaign]
 title = "Sled friction of patterned PDMS on polycarbonate"
@@ -36,6 +36,11 @@ cavity = "rectangle"
 size_um = [200.0, 40.0]
 pitch_um = [220.0, 120.0]
 staggered = true
+
+# Every pull is a row of tests.csv, and its file an export in raw/. Where one export holds several pulls, file says
+# which: raw/log.csv#2 is its second table (step, segment, specimen), raw/log.csv#2/3 the third pull within that
+# table (a stroke, or one of several loads or speeds), raw/log.csv#2/* every pull of it, raw/log.csv#* every pull of the
+# export, each a test of its own. Such a row may leave the load empty: it is then the normal force in the export.
 
 # Where the exports name their columns in a way that is not understood (tribo inspect FILE tells), say it
 # here: the quantity, then the column's own name with its unit, or its position.

@@ -59,7 +59,7 @@ def read_export(
         return traces[choice - 1]
     shown = path.name
     what = f"{len(traces)} tables that each are a trace"
-    allowed = f"one of them: {shown}#1 to {shown}#{len(traces)}"
+    allowed = f"one of them: {shown}#1 to {shown}#{len(traces)}; in a campaign also {shown}#*, every pull of all"
     raise ReadError(Problem("several_tables", what, file=file or str(path), allowed=allowed))
 
 
@@ -142,6 +142,7 @@ def _trace(reading: Reading, name: str, file: str) -> Trace:
         file=file,
         flags=tuple(dict.fromkeys(f.flag for f in reading.findings)),
         problems=tuple(f.problem for f in reading.findings),
+        first_row=reading.block.layout.header_rows + 1 + reading.skipped,
     )
 
 

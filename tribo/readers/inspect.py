@@ -223,7 +223,7 @@ def _table(reading: Reading) -> TableSeen:
     normal = reading.arrays.get("normal force")
     return TableSeen(
         label=reading.block.label,
-        first_row=reading.block.layout.header_rows + 1,
+        first_row=reading.block.layout.header_rows + 1 + reading.skipped,
         rows=int(time.size),
         start_s=float(time[0]),
         end_s=float(time[-1]),

@@ -31,10 +31,11 @@ class Reading:
     assignment: Assignment
     arrays: dict[str, FloatArray]
     findings: tuple[Finding, ...]
+    skipped: int = 0  # rows of the block that belong to a trace before this one
 
     def row_of(self, sample: int) -> int:
         """Line of the file, from 1, of a sample, from 0."""
-        return _row_of(self.source, self.block, sample)
+        return _row_of(self.source, self.block, self.skipped + sample)
 
 
 @dataclass(frozen=True)
@@ -212,5 +213,5 @@ def split_at_restarts(reading: Reading) -> tuple[Reading, ...]:
         arrays = {q: values[first:stop] for q, values in reading.arrays.items()}
         block = replace(reading.block, label=f"{reading.block.label or 'part'}, start {k + 1} of time")
         others = tuple(f for f in reading.findings if f.flag != "time_goes_back")
-        parts.append(replace(reading, block=block, arrays=arrays, findings=others))
+        parts.append(replace(reading, block=block, arrays=arrays, findings=others, skipped=int(first)))
     return tuple(parts)

@@ -25,7 +25,7 @@ _COARSE = 0.5  # share of equal neighbours from which on a resolution is too coa
 
 def file_row(trace: Trace, index: int) -> int:
     """Line of the export (from 1) that sample ``index`` stands on, as far as the reader said."""
-    return index + 1 + (trace.source.header_rows if trace.source else 0)
+    return trace.first_row + index
 
 
 def unreadable(trace: Trace) -> list[Problem]:

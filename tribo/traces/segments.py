@@ -69,6 +69,7 @@ def _piece(trace: Trace, start: int, end: int, name: str) -> Trace:
         force_N=trace.force_N[part],
         displacement_m=None if trace.displacement_m is None else trace.displacement_m[part],
         columns={quantity: values[part] for quantity, values in trace.columns.items()},
+        first_row=trace.first_row + start,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -39,22 +39,36 @@ def read_pulls(
     TraceError
         A piece cannot be read; every problem of every piece is listed.
     """
-    strokes = pieces_of(traces)
-    zero = None if math.isnan(strokes.zero_N) else (0.0, strokes.zero_u_N)
     pulls: list[Pull] = []
     problems: list[Problem] = []
+    for pull in read_pieces(pieces_of(traces), rule=rule, test=test, parameters=parameters):
+        if isinstance(pull, TraceError):
+            problems += pull.problems
+        else:
+            pulls.append(pull)
+    if problems:
+        raise TraceError(problems)
+    return tuple(pulls)
+
+
+def read_pieces(
+    strokes: Strokes,
+    *,
+    rule: str = "middle_share",
+    test: Test | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> Iterator[Pull | TraceError]:
+    """What each piece gives, in order: its pull (see :func:`read_pulls`), or why it cannot be read."""
+    zero = None if math.isnan(strokes.zero_N) else (0.0, strokes.zero_u_N)
     for piece, direction in zip(strokes.traces, strokes.directions, strict=True):
         try:
             pull = _read_piece(piece, rule, test, parameters, zero)
         except TraceError as fault:
-            problems += fault.problems
+            yield fault
             continue
         offset = pull.zero_N if zero is None else strokes.zero_N
-        flags = (*pull.flags, "forward" if direction > 0 else "backward") if zero else pull.flags
-        pulls.append(replace(pull, test_id=piece.name, zero_N=offset, flags=flags))
-    if problems:
-        raise TraceError(problems)
-    return tuple(pulls)
+        flags = (*pull.flags, "forward" if direction > 0 else "backward") if zero or direction < 0 else pull.flags
+        yield replace(pull, test_id=piece.name, zero_N=offset, flags=flags)
 
 
 def pieces_of(traces: Trace | Sequence[Trace]) -> Strokes:

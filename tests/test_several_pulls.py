@@ -1,0 +1,203 @@
+"""An export of many pulls gives a campaign mu and tau0 across them, by rows of tests.csv alone."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from tribo import stages
+from tribo.campaign import load_campaign
+from tribo.campaign.choice import is_chosen, overlap, split_choice
+from tribo.cli import main
+from tribo.readers import read_blocks
+from tribo.records import Campaign, Ingested
+
+RATE_HZ = 100
+AREA_M2 = 55e-6
+MU, TAU0_PA = 0.6, 2000.0  # of sliding; static friction is STATIC times as much
+STATIC = 1.25
+GRAM_FORCE_N = 9.80665e-3
+TOML = """\
+[campaign]
+title = "Strokes under steps of load"
+nominal_area_mm2 = 55.0
+
+[patterns.F]
+cavity = "none"
+"""
+HEADER = "test_id,file,sample,specimen,normal_load_N"
+
+
+def strokes(loads_N: tuple[float, ...], strokes_a_load: int, scale: float, zero_N: float, seed: int) -> np.ndarray:
+    """Time, friction and normal force (n, 3) of strokes of 4 s in turn forward and backward, two or more at a load."""
+    one = np.arange(4 * RATE_HZ) / RATE_HZ
+    parts = []
+    for k, load in enumerate(np.repeat(loads_N, strokes_a_load)):
+        friction = scale * (MU * load + TAU0_PA * AREA_M2)
+        rise = np.minimum(friction * (-1 + (1 + STATIC) * one / 0.5), STATIC * friction)
+        fall = friction * (1 + (STATIC - 1) * np.exp(-np.maximum(one - 0.5, 0) / 0.1))
+        parts.append(np.column_stack([(-1) ** k * np.where(one < 0.5, rise, fall), np.full(one.size, -load)]))
+    both = np.concatenate(parts)
+    rng = np.random.default_rng(seed)
+    both += [zero_N, 0.0] + rng.standard_normal(both.shape) * 0.005
+    return np.column_stack([np.arange(len(both)) / RATE_HZ, both])
+
+
+def umt_text(table: np.ndarray) -> str:
+    """A log as the data viewer of a CETR UMT writes it: gram-force called g, the load negative."""
+    rows = [f"{f / GRAM_FORCE_N:.3f},{n / GRAM_FORCE_N:.3f},{t:.3f}," for t, f, n in table]
+    return "\n".join(["Created by CETR Data Viewer 2.19", "Step No. 1", "Fx,Fz,T,", "g,g,sec,", *rows, ""])
+
+
+def write_campaign(root: Path, rows: list[str], header: str = HEADER) -> Campaign:
+    (root / "raw").mkdir(exist_ok=True)
+    for k, scale in enumerate((0.98, 1.0, 1.02)):
+        table = strokes((1.0, 2.0, 4.0), 4, scale, 0.15, seed=k)
+        (root / "raw" / f"F{k + 1}.csv").write_text(umt_text(table))
+    (root / "campaign.toml").write_text(TOML)
+    (root / "tests.csv").write_text("\n".join([header, *rows]) + "\n")
+    return load_campaign(root)
+
+
+@pytest.fixture(scope="module")
+def ingested(tmp_path_factory: pytest.TempPathFactory) -> Ingested:
+    """Three specimens, one log of twelve strokes each, every stroke of it named by one row."""
+    root = tmp_path_factory.mktemp("strokes")
+    campaign = write_campaign(root, [f"R{k},raw/F{k}.csv#*,F,F{k}," for k in (1, 2, 3)])
+    return stages.ingest(campaign, rule="middle_share")
+
+
+def test_one_row_gives_every_stroke_of_its_log_with_the_load_recorded_there(ingested: Ingested) -> None:
+    assert not ingested.set_aside
+    assert list(ingested.pulls)[:12] == [f"R1#1/{k}" for k in range(1, 13)]
+    loads = [t.normal_load_N for t in ingested.campaign.tests[:12]]
+    assert loads == pytest.approx(np.repeat((1.0, 2.0, 4.0), 4), rel=2e-3)
+    assert {t.specimen for t in ingested.campaign.tests} == {"F1", "F2", "F3"}
+    assert [p.zero_N for p in ingested.pulls.values()] == pytest.approx([0.15, -0.15] * 18, abs=0.01)
+
+
+@pytest.mark.parametrize(("regime", "times"), [("static", STATIC), ("sliding", 1.0)])
+def test_mu_and_tau0_come_out_across_the_strokes_of_a_log(ingested: Ingested, regime: str, times: float) -> None:
+    (fit,) = (f for f in stages.fit(ingested) if f.regime == regime)
+    assert fit.n_specimens == 3
+    assert fit.value("mu") == pytest.approx(times * MU, rel=0.02)
+    assert fit.value("tau0_Pa") == pytest.approx(times * TAU0_PA, rel=0.04)
+    for parameter, truth in (("mu", times * MU), ("tau0_Pa", times * TAU0_PA)):
+        low, high = fit.interval(parameter)
+        assert low < truth < high
+
+
+def test_the_trace_of_a_stroke_keeps_its_zero_and_the_rows_it_stands_on(ingested: Ingested) -> None:
+    pull, trace = ingested.pulls["R1#1/2"], ingested.traces["R1#1/2"]
+    rows = (ingested.campaign.root / "raw" / "F1.csv").read_text().splitlines()
+    friction, load = (float(cell) * GRAM_FORCE_N for cell in rows[trace.first_row - 1].split(",")[:2])
+    assert trace.force_N[0] == pytest.approx(-friction)  # turned, as a stroke backward is
+    assert trace.columns["normal_force_N"][0] == pytest.approx(load)
+    within = (trace.time_s >= pull.window_s[0]) & (trace.time_s <= pull.window_s[1])
+    assert trace.force_N[within].mean() - pull.zero_N == pytest.approx(pull.sliding_N)
+
+
+def test_one_pull_of_a_log_is_the_same_named_alone(ingested: Ingested, tmp_path: Path) -> None:
+    campaign = write_campaign(tmp_path, ["one,raw/F1.csv#1/7,F,F1,", "other,raw/F1.csv#1/8,F,F1,2.5"])
+    alone = stages.ingest(campaign, rule="middle_share")
+    assert alone.pulls["one"].sliding_N == ingested.pulls["R1#1/7"].sliding_N
+    assert [t.normal_load_N for t in alone.campaign.tests] == pytest.approx([2.0, 2.5], rel=2e-3)
+
+
+def test_a_log_read_as_one_pull_is_doubted_with_what_to_write(tmp_path: Path) -> None:
+    campaign = write_campaign(tmp_path, ["R1,raw/F1.csv,F,F1,1"])
+    time = np.arange(6000) / RATE_HZ
+    table = np.column_stack([time, np.where(time < 2, 0, np.where(time < 30, 1.0, 2.0)), np.where(time < 30, -2.0, -4)])
+    (tmp_path / "raw" / "F1.csv").write_text(umt_text(table + 0.003 * np.sin(40 * time)[:, None] * [0, 1, 1]))
+    (doubt,) = stages.ingest(campaign).doubts()
+    (problem,) = (p for p in doubt.problems if p.kind == "several_pulls")
+    assert problem.what.startswith("2 pulls")
+    assert "raw/F1.csv#1/* for all" in (problem.allowed or "")
+
+
+def test_a_pull_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) -> None:
+    campaign = write_campaign(tmp_path, ["R1,raw/F1.csv#2/1,F,F1,", "R2,raw/F2.csv#*,F,F2,"])
+    (aside,) = stages.ingest(campaign, rule="middle_share").set_aside
+    assert [(p.kind, p.found) for p in aside.problems] == [("no_such_pull", "2/1")]
+    assert "1/12" in (aside.problems[0].allowed or "")
+
+
+def test_a_load_that_nobody_gives_sets_each_pull_aside(tmp_path: Path) -> None:
+    campaign = write_campaign(tmp_path, ["R1,raw/F1.csv#*,F,F1,", "R2,raw/F2.csv#*,F,F2,"])
+    log = (tmp_path / "raw" / "F1.csv").read_text().replace("Fx,Fz,T", "Fx,Aux,T")
+    (tmp_path / "raw" / "F1.csv").write_text(log)
+    found = stages.ingest(campaign, rule="middle_share")
+    assert {p.kind for s in found.set_aside for p in s.problems} == {"no_load"}
+    assert {s.test_id.partition("#")[0] for s in found.set_aside} == {"R1"}
+
+
+def test_pieces_without_a_load_are_left_out_and_named(tmp_path: Path) -> None:
+    """The head is off the disc for a while between two loads."""
+    campaign = write_campaign(tmp_path, ["R1,raw/F1.csv#*,F,F1,"])
+    time = np.arange(6000) / RATE_HZ
+    load = np.where(time < 20, 1.0, np.where(time < 40, 0.0, 3.0))
+    noise = 0.003 * np.random.default_rng(0).standard_normal((time.size, 2))
+    table = np.column_stack([time, MU * load + noise[:, 0], -load + noise[:, 1]])
+    (tmp_path / "raw" / "F1.csv").write_text(umt_text(table))
+    found = stages.ingest(campaign, rule="middle_share")
+    assert [t.normal_load_N for t in found.campaign.tests] == pytest.approx([1.0, 3.0], rel=1e-2)
+    assert {p.kind for d in found.doubts() for p in d.problems} == {"unloaded"}
+
+
+def test_steps_of_load_while_sliding_give_a_sliding_law_and_no_static_one(tmp_path: Path) -> None:
+    campaign = write_campaign(tmp_path, ["R1,raw/F1.csv#*,F,F1,"])
+    time = np.arange(9000) / RATE_HZ
+    load = np.where(time < 30, 1.0, np.where(time < 60, 2.0, 4.0))
+    noise = 0.003 * np.random.default_rng(0).standard_normal((time.size, 2))
+    friction = MU * load + TAU0_PA * AREA_M2
+    table = np.column_stack([time, friction + noise[:, 0], -load + noise[:, 1]])
+    (tmp_path / "raw" / "F1.csv").write_text(umt_text(table))
+    (fit,) = stages.fit(stages.ingest(campaign))
+    assert (fit.regime, fit.n_tests) == ("sliding", 3)
+    assert fit.value("mu") == pytest.approx(MU, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "meet"),
+    [("", "1", True), ("*", "2/3", True), ("1", "2", False), ("1", "1/2", True), ("1/2", "1/3", False),
+     ("1/*", "1/3", True), ("1/*", "2/3", False), ("1/2", "1/2", True)],
+)  # fmt: skip
+def test_rows_may_share_an_export_but_no_sample_of_it(tmp_path: Path, one: str, other: str, meet: bool) -> None:
+    assert overlap(one, other) is overlap(other, one) is meet
+    rows = [f"A,raw/F1.csv{'#' + one if one else ''},F,F1,1", f"B,raw/F1.csv{'#' + other if other else ''},F,F1,1"]
+    campaign = write_campaign(tmp_path, [*rows, "C,raw/F2.csv,F,F2,1"])
+    assert len(campaign.set_aside) == (2 if meet else 0)
+
+
+def test_a_choice_stands_behind_the_last_number_sign() -> None:
+    assert split_choice("raw/a.csv#2/3") == ("raw/a.csv", "2/3")
+    assert split_choice("raw/run #4.csv") == ("raw/run #4.csv", "")
+    assert split_choice("raw/a#1.csv#*") == ("raw/a#1.csv", "*")
+    assert [c for c in ("*", "2/*", "2/3", "1/*", "2/4") if is_chosen("2/3", c)] == ["*", "2/*", "2/3"]
+
+
+def test_a_plan_needs_the_loads_in_its_table(tmp_path: Path) -> None:
+    write_campaign(tmp_path, ["R1,raw/F1.csv#*,F,F1,", "R2,raw/F2.csv#*,F,F2,2"])
+    (aside,) = load_campaign(tmp_path, measured=False).set_aside
+    assert [p.kind for p in aside.problems] == ["no_load"]
+
+
+def test_the_command_fits_a_log_of_strokes(tmp_path: Path) -> None:
+    write_campaign(tmp_path, [f"R{k},raw/F{k}.csv#*,F,F{k}," for k in (1, 2, 3)])
+    out = tmp_path / "out"
+    result = CliRunner().invoke(main, ["fit", str(tmp_path), "-o", str(out), "--rule", "middle_share", "--json"])
+    assert result.exit_code == 0, result.stderr
+    (sliding,) = (f for f in json.loads(result.stdout)["fits"] if f["regime"] == "sliding")
+    assert sliding["mu"] == pytest.approx(MU, rel=0.02)
+    assert (out / "tests.csv").read_text().count("\nR1#1/") == 12
+
+
+def test_tables_and_pulls_are_counted_as_the_reader_gives_them(tmp_path: Path) -> None:
+    """A log whose time starts again has a table for each start, and first rows that tell them apart."""
+    (tmp_path / "log.csv").write_text(umt_text(np.concatenate([strokes((1.0,), 2, 1.0, 0.0, seed=k) for k in (0, 1)])))
+    tables = read_blocks(tmp_path / "log.csv")
+    assert [t.first_row for t in tables] == [5, 5 + 8 * RATE_HZ]
