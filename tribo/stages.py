@@ -88,11 +88,11 @@ def ingest(campaign: Campaign, *, rule: str = "seed", jobs: int = 1, progress: P
 def fit(ingested: Ingested, *, weights: Weights = "relative") -> tuple[LawFit, ...]:
     """mu and tau0 of every sample, static and sliding: specimens first, then combined.
 
+    A regime that no pull shows has no fits.
+
     Raises
     ------
     FitError
-    A regime that no pull shows has no fits.
-
         No sample has enough loads for the law.
     """
     from tribo.fitting import fit_samples
