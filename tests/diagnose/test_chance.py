@@ -32,7 +32,7 @@ def test_a_batch_of_replicates_looks_like_each_fitted_by_itself() -> None:
 
 
 def test_the_null_is_simulated_from_the_fitted_model() -> None:
-    """Scores of a trend are close to standard normal (robust weights make them a little smaller), specimens included."""
+    """Scores of a trend are close to standard normal, robust weights making them a little smaller."""
     f = baseline()
     trend = next(look for look in all_looks(f) if look.covariate == "run_order" and look.kind == "trend")
     ready = columns_of(trend.columns, [slice(0, 1)])
