@@ -262,6 +262,8 @@ def plan(campaign: Campaign, options: StudyOptions, until: Until) -> dict[str, A
 
     steps = [f"read {len(campaign.tests)} exports of {campaign.root} by rule {options.rule}"]
     samples = sorted({t.sample for t in campaign.tests})
+    if unknown := sum(np.isnan(t.normal_load_N) for t in campaign.tests):
+        steps.append(f"take the load of {unknown} tests from their exports")
     if until != "ingest":
         steps.append(f"fit mu and tau0 of {len(samples)} samples ({', '.join(samples)}), weights {options.weights}")
     if until in ("compare", "report"):
@@ -271,8 +273,6 @@ def plan(campaign: Campaign, options: StudyOptions, until: Until) -> dict[str, A
         steps.append(f"calibrate the model on sample {flat} and run it {runs} times at {len(loads)} loads")
     return {
         "steps": steps,
-    if unknown := sum(np.isnan(t.normal_load_N) for t in campaign.tests):
-        steps.append(f"take the load of {unknown} tests from their exports")
         "set_aside": [f"{s.test_id}: {s.reason}" for s in campaign.set_aside],
         "problems": [asdict(p) for p in campaign.problems],
     }
