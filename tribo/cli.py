@@ -26,10 +26,17 @@ COLUMNS = click.option(
     "--columns", default="", help="QUANTITY=NAME [UNIT],... as in [columns] of campaign.toml; #3 is the third column."
 )
 
+OVERRIDES = click.option(
+    "--overrides",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Pulls left out or read elsewhere by hand, as the report page hands them back.",
+)
+
 
 def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         COLUMNS,
+        OVERRIDES,
         click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off."),
         click.option(
             "--weights",
@@ -116,8 +123,11 @@ def compare(console: Console, campaign: Path, out: Path, dry_run: bool, **option
 @OUT
 @click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off.")
 @COLUMNS
+@OVERRIDES
 @command_options
-def diagnose(console: Console, campaign: Path, out: Path, rule: str, columns: str, seed: int, **_: Any) -> int:
+def diagnose(
+    console: Console, campaign: Path, out: Path, rule: str, columns: str, overrides: Path | None, seed: int, **_: Any
+) -> int:
     """What the calibrated model gets wrong, and why, or that it cannot be told: verdict.json."""
     from tribo import stages
     from tribo.campaign import open_campaign
@@ -126,7 +136,8 @@ def diagnose(console: Console, campaign: Path, out: Path, rule: str, columns: st
     from tribo.report.verdict import verdict_text
 
     with open_campaign(campaign) as opened, console.progress() as progress:
-        ingested = stages.ingest(_with_columns(opened, columns), rule=rule, progress=progress)
+        described = _with_columns(opened, columns)
+        ingested = stages.ingest(described, rule=rule, overrides=overrides, progress=progress)
         verdict = name_the_cause(ingested, seed=seed, progress=progress)
         write_until(stages.Study(ingested), out, "ingest", verdict=verdict.as_dict())
     console.result(verdict.as_dict(), verdict_text(verdict))

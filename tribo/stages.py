@@ -45,6 +45,7 @@ class StudyOptions:
     runs: int = 4
     seed: int = 0
     jobs: int = 2
+    overrides: Path | None = None  # table of what a person decided about single pulls
     ensemble: Path | None = None  # where finished simulations are kept, so that the next start goes on from there
 
     def as_words(self) -> dict[str, str]:
@@ -52,16 +53,24 @@ class StudyOptions:
         return {"rule": self.rule, "weights": self.weights, "flat": self.flat, "runs": str(self.runs)}
 
 
-def ingest(campaign: Campaign, *, rule: str = "seed", jobs: int = 1, progress: Progress = _silent) -> Ingested:
+def ingest(
+    campaign: Campaign,
+    *,
+    rule: str = "seed",
+    jobs: int = 1,
+    overrides: Path | None = None,
+    progress: Progress = _silent,
+) -> Ingested:
     """Read every usable test of a campaign into a trace and a pull, on ``jobs`` processes where that pays.
 
     A test that cannot be read is set aside with its problems; the rest goes on. A row that names many pulls within
-    its export is a test for each of them. The result does not depend on ``jobs``.
+    its export is a test for each of them. ``overrides`` is a table of what a person decided about single pulls
+    (:mod:`tribo.overrides`). The result does not depend on ``jobs``.
 
     Raises
     ------
     CampaignError
-        Not one test could be read.
+        Not one test could be read, or the overrides have faults.
     """
     from tribo.exports import read_all
 
@@ -82,7 +91,12 @@ def ingest(campaign: Campaign, *, rule: str = "seed", jobs: int = 1, progress: P
             [p for fault in set_aside for p in fault.problems]
             or [Problem("no_usable_test", "no test of this campaign can be used", file=str(campaign.root))]
         )
-    return Ingested(replace(campaign, tests=tuple(tests)), traces, pulls, tuple(set_aside))
+    ingested = Ingested(replace(campaign, tests=tuple(tests)), traces, pulls, tuple(set_aside))
+    if overrides is None:
+        return ingested
+    from tribo.overrides import apply_overrides
+
+    return apply_overrides(ingested, overrides, rule)
 
 
 def fit(ingested: Ingested, *, weights: Weights = "relative") -> tuple[LawFit, ...]:
@@ -202,7 +216,9 @@ def study(
     campaign: Campaign, options: StudyOptions, *, until: Until = "report", progress: Progress = _silent
 ) -> Study:
     """Walk the street with one campaign as far as ``until``."""
-    ingested = ingest(campaign, rule=options.rule, jobs=options.jobs, progress=progress)
+    ingested = ingest(
+        campaign, rule=options.rule, jobs=options.jobs, overrides=options.overrides, progress=progress
+    )
     if until == "ingest":
         return Study(ingested)
     fits = fit(ingested, weights=options.weights)
