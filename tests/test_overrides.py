@@ -119,3 +119,35 @@ def test_excluding_everything_is_refused(ingested: Ingested, tmp_path: Path) -> 
 def test_a_missing_file_is_named(ingested: Ingested, tmp_path: Path) -> None:
     (problem,) = faults(ingested, tmp_path / "nowhere.csv")
     assert "nowhere.csv" in str(problem)
+
+
+def test_every_command_that_reads_a_campaign_takes_overrides_and_says_what_is_wrong_with_them(
+    small_campaign: Path, tmp_path: Path
+) -> None:
+    from click.testing import CliRunner
+
+    from tribo.cli import main
+
+    faulty = str(written(tmp_path, "T999,exclude,gone,,,"))
+    for command in ("ingest", "fit", "compare", "diagnose", "report"):
+        arguments = [command, str(small_campaign), "-o", str(tmp_path / "out"), "--overrides", faulty]
+        result = CliRunner().invoke(main, arguments)
+        assert result.exit_code == 1, command
+        assert "overrides.csv, row 2, column test_id" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_fit_leaves_out_what_overrides_exclude(small_campaign: Path, tmp_path: Path) -> None:
+    import pandas as pd
+    from click.testing import CliRunner
+
+    from tribo.cli import main
+
+    path = str(written(tmp_path, "T003,exclude,sled tipped,,,", "T005,move,drift,10,12,"))
+    result = CliRunner().invoke(main, ["fit", str(small_campaign), "-o", str(tmp_path / "out"), "--overrides", path])
+    assert result.exit_code == 0
+    table = pd.read_csv(tmp_path / "out" / "tests.csv").set_index("test_id")
+    assert "sled tipped" in table.loc["T003", "set_aside"]
+    assert np.isnan(table.loc["T003", "static_N"])
+    assert "window_by_hand" in table.loc["T005", "flags"]
+    assert table.loc["T005", "window_start_s"] == pytest.approx(10, abs=0.1)
