@@ -2,8 +2,25 @@
 
 from __future__ import annotations
 
-from tribo.figures import agreement, area, force, pulls, ratio, runs
-from tribo.figures.record import StudyFigure
+from typing import TYPE_CHECKING
+
+from tribo.figures import (
+    agreement,
+    area,
+    evidence,
+    extended,
+    force,
+    misfit,
+    power,
+    pulls,
+    ratio,
+    residuals,
+    runs,
+)
+from tribo.figures.record import FigureOf, StudyFigure
+
+if TYPE_CHECKING:
+    from tribo.figures.record import DiagnosisFigure
 
 FIGURES: dict[str, StudyFigure] = {
     figure.name: figure
@@ -70,6 +87,61 @@ FIGURES: dict[str, StudyFigure] = {
             "by one.",
             area.numbers,
             area.draw,
+        ),
+    )
+}
+
+DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
+    figure.name: figure
+    for figure in (
+        FigureOf(
+            "misfit",
+            "Where the calibrated model fails",
+            "Change of measured over modelled friction from the low to the high end of each recorded column, in "
+            "percent, sample by sample; in the first column the mean of a sample, under bend how far the ends of the "
+            "load range lie above its middle. Strong colours and stars (** p < 0.01, * p < 0.05) mark what chance does "
+            "not explain: the p value counts every look, by setting it against the strongest look in simulated "
+            "campaigns of the calibrated model. Faint cells are within chance. The last rows are rank correlations "
+            "within samples and loads, adjusted for their number.",
+            misfit.numbers,
+            misfit.draw,
+        ),
+        FigureOf(
+            "residuals",
+            "The strongest looks",
+            "Measured over modelled friction (100 ln of the ratio) against the column it follows most strongly, or, "
+            "where nothing is beyond chance, against the three that come closest. Grey: where 95 % of single tests lie "
+            "by repeats, specimens and the model's own error. The line is what the named mechanism adds.",
+            residuals.numbers,
+            residuals.draw,
+        ),
+        FigureOf(
+            "extended",
+            "Before and after the extension of the model",
+            "Mean of measured over modelled friction (100 ln of the ratio) at each load under the model calibrated on "
+            "the flat sample and under the model with the named mechanism, fitted with equal effort; and, where it was "
+            "run, under the spring-block model itself with the mechanism in it. Above each panel the root mean square "
+            "over all its tests. The gain on tests that no fit has seen is in the verdict.",
+            extended.numbers,
+            extended.draw,
+        ),
+        FigureOf(
+            "evidence",
+            "What speaks for each mechanism",
+            "Log likelihood gained over the calibrated model, less what the freedom of each mechanism is worth, with "
+            "its fitted size. Those that the design cannot tell from the best are named with it. In italics why a "
+            "mechanism was not weighed. With two causes the gains are those of the first step.",
+            evidence.numbers,
+            evidence.draw,
+        ),
+        FigureOf(
+            "power",
+            "What this campaign could have shown",
+            "Left: the strongest of all looks at this campaign, and at simulated campaigns of the calibrated model "
+            "with the same design and noise. Right: the effect on T, from end to end and beyond what the flat law "
+            "takes up, that would be found one, five and nine times in ten.",
+            power.numbers,
+            power.draw,
         ),
     )
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from tribo.records import Study
 
@@ -12,18 +12,27 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from tribo.diagnose import Diagnosis
+
+Of = TypeVar("Of")
+
 
 @dataclass(frozen=True)
-class StudyFigure:
-    """One figure of a study.
+class FigureOf(Generic[Of]):
+    """One figure of a record of type ``Of``.
 
-    ``numbers(study)`` gives exactly what is plotted, one row a point, units in the column names; an empty
-    frame where the study lacks what the figure needs. ``draw(numbers)`` knows nothing else, so a table
+    ``numbers(record)`` gives exactly what is plotted, one row a point, units in the column names; an empty
+    frame where the record lacks what the figure needs. ``draw(numbers)`` knows nothing else, so a table
     written from the numbers is by construction what the figure shows.
     """
 
     name: str
     title: str
     caption: str
-    numbers: Callable[[Study], pd.DataFrame]
+    numbers: Callable[[Of], pd.DataFrame]
     draw: Callable[[pd.DataFrame], Figure]
+
+
+StudyFigure = FigureOf[Study]
+if TYPE_CHECKING:
+    DiagnosisFigure = FigureOf[Diagnosis]

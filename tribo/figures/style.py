@@ -13,7 +13,9 @@ import numpy as np
 import pandas as pd
 from matplotlib import style
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 from matplotlib.transforms import ScaledTranslation, Transform
 
 COLUMN_WIDTH_MM = 190.0
@@ -114,6 +116,15 @@ def cover(ax: Axes, x: Any, low: Any, high: Any) -> None:
     if points:
         ax.update_datalim(points)
         ax.autoscale_view()
+
+
+def plain_log_axis(axis: Axis, values: Any) -> None:
+    """Plain numbers on a logarithmic axis: 1, 2 and 5 of each decade, or the values themselves where few."""
+    distinct = np.unique([float(f"{v:.2g}") for v in values])
+    few = len(distinct) <= 6 and (len(distinct) < 2 or np.diff(np.log10(distinct)).min() > 0.12)
+    axis.set_major_locator(FixedLocator(distinct.tolist()) if few else LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def legend_below(figure: Figure, handles: list[Any], columns: int = 6) -> None:

@@ -1,0 +1,135 @@
+"""The figures of a diagnosis show what it found, and mark no more than chance allows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from diagnose.synthetic import hidden
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from tribo.diagnose import examine
+from tribo.diagnose.diagnosis import Diagnosis
+from tribo.figures import extended, misfit, power, residuals
+from tribo.figures.catalogue import DIAGNOSIS_FIGURES
+from tribo.figures.style import house_style
+
+FEW = (40, 25)
+NAMES = list(DIAGNOSIS_FIGURES)
+
+
+@pytest.fixture(scope="module")
+def temperature() -> Diagnosis:
+    return examine(hidden(("temperature", 1.5)), replicates=FEW)
+
+
+@pytest.fixture(scope="module")
+def nothing() -> Diagnosis:
+    return examine(hidden(), replicates=FEW)
+
+
+def shown_points(figure: Figure) -> set[tuple[float, float]]:
+    lines = [np.asarray(line.get_xydata(), float) for ax in figure.axes for line in ax.lines]
+    xy = np.concatenate([line for line in lines if len(line)])
+    return {(float(f"{x:.6g}"), float(f"{y:.6g}")) for x, y in xy[np.isfinite(xy).all(axis=1)]}
+
+
+def test_the_heat_map_marks_the_column_that_was_hidden_and_its_sign(temperature: Diagnosis) -> None:
+    cells = misfit.numbers(temperature)
+    hit = cells.query("row == @misfit.ALL and observable == 'both' and covariate == 'temperature_C'")
+    assert hit["mark"].item() == "**"
+    assert hit["effect_percent"].item() < -10
+    assert cells[cells["mark"] != ""]["covariate"].value_counts().idxmax() == "temperature_C"
+
+
+def test_the_heat_map_of_a_campaign_without_effect_marks_nothing(nothing: Diagnosis) -> None:
+    cells = misfit.numbers(nothing)
+    assert (cells["mark"] == "").all()
+    assert set(cells["observable"]) >= {"both", "static", "sliding", "drop"}
+
+
+def test_a_mean_cell_is_the_mean_residual_of_its_sample(nothing: Diagnosis) -> None:
+    cells = misfit.numbers(nothing)
+    cell = cells[(cells["row"] == "C") & (cells["covariate"] == "mean") & (cells["observable"] == "static")]
+    here = nothing.baseline.setup.observations.conditions.sample == "C"
+    assert cell["effect_percent"].item() == pytest.approx(100 * np.expm1(nothing.baseline.residual[here, 0].mean()))
+
+
+def test_the_strongest_look_comes_first_with_the_curve_of_the_named_mechanism(temperature: Diagnosis) -> None:
+    rows = residuals.numbers(temperature)
+    first = rows[rows["panel"] == 0]
+    assert first["axis"].iloc[0].startswith("Temperature")
+    curve = first[first["mark"] == "curve"].sort_values("x")
+    assert curve["y"].is_monotonic_decreasing
+    tests, band = first[first["mark"] == "test"], first[first["mark"] == "band"]
+    assert len(tests) == temperature.baseline.setup.observations.n
+    inside = np.mean(np.abs(tests["y"]) < band["y_high"].max())
+    assert 0.75 < inside < 1.0
+
+
+def test_the_extended_model_has_the_smaller_residuals(temperature: Diagnosis, nothing: Diagnosis) -> None:
+    rows = extended.numbers(temperature)
+    rms = rows.groupby("model")["rms_percent"].mean()
+    assert rms["after"] < rms["before"]
+    assert extended.numbers(nothing).empty
+
+
+def test_power_grows_with_the_effect_around_half(nothing: Diagnosis) -> None:
+    rows = power.numbers(nothing)
+    sizes = rows[rows["mark"] == "mechanism"]
+    assert (sizes["found_10_percent"] < sizes["found_50_percent"]).all()
+    assert (sizes["found_50_percent"] < sizes["found_90_percent"]).all()
+    halves = dict(zip(sizes["name"], sizes["found_50_percent"], strict=True))
+    assert halves.items() <= nothing.verdict.smallest_effects.items()
+
+
+@pytest.mark.parametrize("name", ["residuals", "extended", "power"])
+def test_what_is_drawn_is_what_the_table_says(name: str, temperature: Diagnosis) -> None:
+    rows = DIAGNOSIS_FIGURES[name].numbers(temperature)
+    mark, x, y = {
+        "residuals": ("mean", "x", "y"), "extended": ("", "normal_load_N", "residual_percent"),
+        "power": ("mechanism", "found_50_percent", ""),
+    }[name]  # fmt: skip
+    part = rows[rows["mark"] == mark] if mark else rows
+    drawn = shown_points(DIAGNOSIS_FIGURES[name].draw(rows))
+    if not y:
+        assert {across for across, _ in drawn} >= {float(f"{v:.6g}") for v in part[x]}
+        return
+    assert {(float(f"{a:.6g}"), float(f"{b:.6g}")) for a, b in part[[x, y]].to_numpy(float)} <= drawn
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_label_lies_outside_the_figure_or_on_another(name: str, temperature: Diagnosis) -> None:
+    rows = DIAGNOSIS_FIGURES[name].numbers(temperature)
+    assert isinstance(rows, pd.DataFrame)
+    assert not rows.empty
+    figure = DIAGNOSIS_FIGURES[name].draw(rows)
+    with house_style():
+        figure.draw_without_rendering()
+    page = figure.bbox
+    texts = [
+        t
+        for ax in figure.axes
+        for t in (
+            *(t for t in (*ax.get_xticklabels(), *ax.get_yticklabels())), ax.xaxis.label, ax.yaxis.label,
+            *(c for c in ax.get_children() if isinstance(c, Text)),
+        )
+        if t.get_text() and t.get_visible() and _inside(ax, t)
+    ]  # fmt: skip
+    texts += [t for legend in figure.legends for t in legend.get_texts()]
+    boxes = [(t.get_text(), t.get_window_extent()) for t in texts]
+    outside = [s for s, b in boxes if b.x0 < page.x0 or b.x1 > page.x1 or b.y0 < page.y0 or b.y1 > page.y1]
+    assert not outside
+    upright = [(t.get_text(), t.get_window_extent()) for t in texts if t.get_rotation() in (0, 90)]
+    assert not [(s, u) for k, (s, a) in enumerate(upright) for u, b in upright[k + 1 :] if a.overlaps(b)]
+
+
+def _inside(ax: object, text: Text) -> bool:
+    """Tick labels beyond the limits are not drawn."""
+    (x0, x1), (y0, y1) = sorted(ax.get_xlim()), sorted(ax.get_ylim())  # type: ignore[attr-defined]
+    if text in ax.get_xticklabels():  # type: ignore[attr-defined]
+        return bool(x0 <= text.get_position()[0] <= x1) and bool(text.get_window_extent().height > 0)
+    if text in ax.get_yticklabels():  # type: ignore[attr-defined]
+        return bool(y0 <= text.get_position()[1] <= y1)
+    return True

@@ -1,0 +1,103 @@
+"""What speaks for each mechanism: log likelihood gained over the calibrated model, and why the others are out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from tribo.figures import style
+
+if TYPE_CHECKING:
+    from tribo.diagnose import Diagnosis
+
+COLUMNS = ["mechanism", "choice", "status", "gain", "weight", "estimate", "reason"]
+STATUS = {
+    "cause": ("named", style.VERMILLION),
+    "tied": ("cannot be told from it by this design", style.ORANGE),
+    "rival": ("explains about as much", style.SKY),
+    "lost": ("explains less", "0.7"),
+    "out": ("not weighed", "0.5"),
+}
+ROW_MM, FRAME_MM = 4.4, 24.0
+LEAST_SHOWN = -2.0
+
+
+def numbers(d: Diagnosis) -> pd.DataFrame:
+    """Every mechanism: log likelihood gained net of its freedom, share of the evidence, amplitude, or why it is out.
+
+    With two causes the gains are those of the first step. Empty where nothing had to be explained.
+    """
+    from tribo.diagnose import weighing_table
+
+    if d.named is None or not d.named.weighed:
+        return pd.DataFrame(columns=COLUMNS)
+    status = _status(d)
+    rows = []
+    for row in weighing_table(d).to_dict("records"):
+        known = status.get(row["mechanism"], "lost")
+        amplitude = f"{row['parameter']} = {row['value']:.3g} {row['unit']}".rstrip()
+        rows.append((row["mechanism"], row["choice"], known, row["gain"], row["weight"], amplitude, ""))
+    weighed = {row[0] for row in rows}
+    out = [e for e in d.verdict.excluded if e.mechanism not in weighed]
+    rows += [(e.mechanism, "", "out", float("nan"), float("nan"), "", e.reason) for e in out]
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _status(d: Diagnosis) -> dict[str, str]:
+    assert d.named is not None
+    if d.verdict.verdict == "unknown":  # the best of them did not pass its check
+        return {}
+    found = {c.name: "rival" for c in d.named.rivals}
+    for alike in d.named.causes:
+        found |= {c.name: "tied" for c in alike[1:]} | {alike[0].name: "cause"}
+    return found
+
+
+@style.in_house_style
+def draw(numbers: pd.DataFrame) -> Figure:
+    """Bars for what was weighed, the best first; below, in words, what could not be."""
+    height_mm = ROW_MM * len(numbers) + FRAME_MM
+    figure = Figure(figsize=(style.COLUMN_WIDTH_MM / style.MM_PER_INCH, height_mm / style.MM_PER_INCH),
+                    layout="constrained")  # fmt: skip
+    ax = figure.subplots()
+    rows = numbers.reset_index(drop=True)
+    weighed = rows[rows["status"] != "out"]
+    reach = max(float(weighed["gain"].max()), 5.0)
+    for status, part in weighed.groupby("status"):
+        ax.barh(part.index, part["gain"].clip(lower=LEAST_SHOWN), color=STATUS[str(status)][1], height=0.72)
+    for k, row in weighed.iterrows():
+        name = f"{row['estimate']}" + (f"  ({row['choice']})" if row["choice"] else "")
+        weight = f"weight {row['weight']:.2f},  " if row["weight"] >= 0.005 else ""
+        words = f"{row['gain'] + 0.0:.1f}   {weight}{name}".replace("-0.0 ", "0.0 ").replace("-", "−")
+        ax.text(max(row["gain"], 0.0) + 0.012 * reach, int(str(k)), words, va="center", fontsize=6.5)
+    for k, row in rows[rows["status"] == "out"].iterrows():
+        reason = _short(row["reason"])
+        ax.text(0.012 * reach, int(str(k)), reason, va="center", fontsize=6.5, color="0.35", style="italic")
+    _frame(ax, rows, reach)
+    shown = [s for s in STATUS if (weighed["status"] == s).any()]
+    style.legend_below(figure, [Patch(color=STATUS[s][1], label=STATUS[s][0]) for s in shown])
+    return figure
+
+
+def _frame(ax: Axes, rows: pd.DataFrame, reach: float) -> None:
+    ax.axvline(0, color="0.4", lw=0.8)
+    ax.set_yticks(np.arange(len(rows)), [m.replace("_", " ") for m in rows["mechanism"]])
+    for label, status in zip(ax.get_yticklabels(), rows["status"], strict=True):
+        label.set_fontweight("bold" if status in ("cause", "tied") else "normal")
+        label.set_color("0.45" if status == "out" else "black")
+    ax.set_ylim(len(rows) - 0.4, -0.6)
+    ax.set_xlim(LEAST_SHOWN - 0.02 * reach, 1.55 * reach)
+    ax.grid(visible=False, axis="y")
+    ax.tick_params(axis="y", length=0)
+    ax.set_xlabel("Log likelihood gained over the calibrated model, net of its freedom")
+
+
+def _short(reason: str, most: int = 96) -> str:
+    """The reason up to its first semicolon, in one line."""
+    text = reason.split(";")[0].split(", and each")[0].replace(" +- ", " ± ")
+    return text if len(text) <= most else f"{text[: most - 1]}…"

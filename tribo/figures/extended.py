@@ -1,0 +1,116 @@
+"""Before and after: the residuals of every sample under the calibrated model and under the extended one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from tribo.figures import select, style
+from tribo.records import REGIMES
+
+if TYPE_CHECKING:
+    from tribo.diagnose import Diagnosis
+
+COLUMNS = [
+    "sample_number", "sample", "regime", "normal_load_N", "model", "residual_percent", "low_percent", "high_percent",
+    "rms_percent", "n_tests",
+]  # fmt: skip
+MODELS = {"before": "calibrated model", "after": "extended model", "simulated": "extended model, simulated"}
+LOOKS: dict[str, dict[str, Any]] = {
+    "before": {"marker": "o", "mfc": "white", "color": "0.45", "ls": ":"},
+    "after": {"marker": "s", "color": style.BLUE, "ls": "-"},
+    "simulated": {"marker": "D", "color": style.VERMILLION, "ls": ""},
+}
+SHIFT_POINTS = {"before": -2.0, "after": 0.0, "simulated": 2.0}
+
+
+def numbers(d: Diagnosis) -> pd.DataFrame:
+    """Mean residual (percent, 100 ln of measured over modelled) of each sample, regime and load, before and after.
+
+    ``low`` to ``high`` are two standard errors of the mean over tests; ``rms_percent`` is the root mean square over
+    all tests of the panel. "simulated" is the spring-block model itself with the mechanism in it, where it was run.
+    Empty where no mechanism extends the model.
+    """
+    if d.named is None or not d.named.causes or d.verdict.verdict == "unknown":
+        return pd.DataFrame(columns=COLUMNS)
+    f = d.baseline
+    o = f.setup.observations
+    residuals = {"before": f.residual, "after": d.named.model.residual}
+    simulated = getattr(d, "simulated", None)
+    if simulated is not None:
+        residuals["simulated"] = o.log_force - simulated.log_force
+    levels = select.load_levels(o.conditions.normal_load_N)
+    samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
+    rows = [
+        _row(number, sample, regime, load, model, residual[:, k], here & (levels == load), here)
+        for k, regime in enumerate(REGIMES)
+        for number, sample in enumerate(samples)
+        for here in [o.conditions.sample == sample]
+        for load in np.unique(levels[here])
+        for model, residual in residuals.items()
+    ]
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def _row(
+    number: int, sample: str, regime: str, load: float, model: str, residual: np.ndarray, cell: np.ndarray,
+    panel: np.ndarray,
+) -> dict[str, Any]:  # fmt: skip
+    values = 100.0 * residual[cell]
+    values = values[np.isfinite(values)]
+    mean = float(values.mean()) if len(values) else float("nan")
+    error = float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
+    whole = 100.0 * residual[panel]
+    return {
+        "sample_number": number, "sample": sample, "regime": regime, "normal_load_N": float(load), "model": model,
+        "residual_percent": mean, "low_percent": mean - 2 * error, "high_percent": mean + 2 * error,
+        "rms_percent": float(np.sqrt(np.nanmean(whole**2))), "n_tests": len(values),
+    }  # fmt: skip
+
+
+@style.in_house_style
+def draw(numbers: pd.DataFrame) -> Figure:
+    """A column a sample, static above sliding; on the line at zero the model is right."""
+    samples = style.by_sample(numbers)
+    figure, axes = style.panel_grid(2 * len(samples), 44, columns=len(samples), sharex=True, sharey=True)
+    for k, (_, part) in enumerate(samples):
+        for row, regime in enumerate(REGIMES):
+            ax = axes[row * len(samples) + k]
+            cell = part[part["regime"] == regime]
+            _draw_panel(ax, cell)
+            if row == 0:
+                ax.set_title(str(part["sample"].iloc[0]), loc="left")
+            ax.set_title(_rms(cell), loc="right", fontweight="normal", fontsize=6.5)
+            if style.is_leftmost(ax):
+                ax.set_ylabel(f"{regime} friction:\nmeasured over model (%)")
+    for ax in axes[len(samples) :]:
+        style.plain_log_axis(ax.xaxis, numbers["normal_load_N"])
+        ax.tick_params(axis="x", labelsize=6, rotation=90)
+        ax.set_xlabel("Load N (N)")
+    shown = [m for m in MODELS if (numbers["model"] == m).any()]
+    handles: list[Any] = [Line2D([], [], ms=3.2, lw=0.9, label=f"{MODELS[m]}, ± 2 s.e.", **LOOKS[m]) for m in shown]
+    style.legend_below(figure, handles)
+    return figure
+
+
+def _draw_panel(ax: Axes, cell: pd.DataFrame) -> None:
+    ax.set_xscale("log")
+    ax.axhline(0, color="0.4", lw=0.8)
+    for model, part in cell.groupby("model"):
+        bars = np.abs(part[["low_percent", "high_percent"]].to_numpy() - part[["residual_percent"]].to_numpy()).T
+        style.cover(ax, part["normal_load_N"], part["low_percent"], part["high_percent"])
+        ax.errorbar(
+            part["normal_load_N"], part["residual_percent"], bars, ms=3.0, lw=0.9, elinewidth=0.7, capsize=1.2,
+            transform=style.moved_aside(ax, SHIFT_POINTS[str(model)]), **LOOKS[str(model)],
+        )  # fmt: skip
+
+
+def _rms(cell: pd.DataFrame) -> str:
+    """Root mean square before and after."""
+    rms = cell.groupby("model")["rms_percent"].first()
+    return "rms " + " → ".join(f"{rms[m]:.0f}" for m in MODELS if m in rms.index) + " %"

@@ -1,0 +1,202 @@
+"""Where the calibrated model fails: sample by covariate, signed percent, with what chance does not explain marked."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm
+from matplotlib.figure import Figure
+
+from tribo.figures import style
+from tribo.figures.covariates import BEND, Covariate, covariates
+from tribo.records import FloatArray
+
+if TYPE_CHECKING:
+    from tribo.diagnose import Diagnosis
+    from tribo.diagnose.model import ModelFit
+
+COLUMNS = ["observable", "row", "covariate", "label", "effect_percent", "strength", "p_adjusted", "mark"]
+ALL = "all samples"
+REGIMES = {"both": (0.5, 0.5), "static": (1.0, 0.0), "sliding": (0.0, 1.0), "drop": (1.0, -1.0)}
+PATTERNS = {**REGIMES, "both": (1.0, 1.0)}  # what a look would follow in the two regimes
+TITLES = {
+    "both": "Static and sliding friction alike", "static": "Static friction", "sliding": "Sliding friction",
+    "drop": "Drop from static to sliding", "trace": "What else the traces show",
+}  # fmt: skip
+MARKS = ((0.01, "**"), (0.05, "*"))  # adjusted p below which a cell is marked
+LEAST_PERCENT, MOST_PERCENT = 10.0, 60.0  # ends of the colour scale
+DIVERGING = LinearSegmentedColormap.from_list("misfit", [style.BLUE, "#FFFFFF", style.VERMILLION])
+CELL_MM, HEAD_MM, FOOT_MM = 4.3, 7.0, 20.0
+FAINT = 0.35  # how strongly a cell is coloured that chance explains
+
+
+def numbers(d: Diagnosis) -> pd.DataFrame:
+    """Change of the residual from end to end of each covariate (percent), for each sample and observable.
+
+    ``strength`` is the signed score in standard deviations once the flat law, the model's own error of a sample and
+    the specimens are taken out; ``p_adjusted`` sets it against the strongest of all looks at simulated campaigns. The
+    column "mean" is the mean residual of a sample. The observable "trace" has the rank correlation of the zero, the
+    slope of the rise and the stick-slip amplitude with the covariate, adjusted for the number of cells.
+    """
+    columns = covariates(d.baseline.setup)
+    rows = [_cells(d, columns, observable) for observable in REGIMES]
+    return pd.DataFrame([*(cell for part in rows for cell in part), *_trace_cells(d, columns)], columns=COLUMNS)
+
+
+def _cells(d: Diagnosis, columns: list[Covariate], observable: str) -> list[dict[str, Any]]:
+    f = d.baseline
+    sample = f.setup.observations.conditions.sample
+    samples = sorted(set(sample.tolist()), key=lambda s: (s != f.setup.observations.flat, s))
+    residual = f.residual @ np.array(REGIMES[observable])
+    cells, shapes = [], []
+    for row in (*samples, ALL):
+        here = np.ones(len(sample), bool) if row == ALL else sample == row
+        for column in columns:
+            if row == ALL and column.name == "mean":
+                continue  # the free flat law and the sample error leave nothing to see here
+            shape = _shape(column, here)
+            if np.ptp(shape) <= 1e-9:
+                continue
+            cells.append((row, column, _end_to_end(column, residual[here], here)))
+            shapes.append(shape)
+    strength = _strengths(f, np.column_stack(shapes), observable)
+    return [
+        _cell(observable, row, column, effect, float(z), d.screened.p_adjusted(abs(float(z))))
+        for (row, column, effect), z in zip(cells, strength, strict=True)
+    ]
+
+
+def _shape(column: Covariate, here: np.ndarray) -> FloatArray:
+    """What the residuals of the tests ``here`` would follow, without their mean, and zero elsewhere."""
+    score = column.score
+    if column.name == "mean":
+        return here.astype(float)
+    ground = [np.ones(here.sum())]
+    if column.name == BEND:
+        ground.append(np.log(column.values[here]))
+    span = np.column_stack(ground)
+    shape = np.zeros(len(score))
+    shape[here] = score[here] - span @ np.linalg.lstsq(span, score[here], rcond=None)[0]
+    return shape
+
+
+def _end_to_end(column: Covariate, residual: FloatArray, here: np.ndarray) -> float:
+    """The mean of a sample; or by how much a straight line rises from the 5 % to the 95 % quantile; in percent."""
+    if column.name == "mean":
+        return 100.0 * float(np.expm1(residual.mean()))
+    x = column.score[here]
+    if column.name == BEND:  # beside a straight line in ln N: how far the ends lie above the middle
+        line = np.log(column.values[here])
+        slope = np.linalg.lstsq(np.column_stack([x, line, np.ones_like(x)]), residual, rcond=None)[0][0]
+        return 100.0 * float(np.expm1(slope * np.ptp(x)))
+    slope = np.polyfit(x, residual, 1)[0]
+    return 100.0 * float(np.expm1(slope * (np.quantile(x, 0.95) - np.quantile(x, 0.05))))
+
+
+def _strengths(f: ModelFit, shapes: FloatArray, observable: str) -> FloatArray:
+    """Signed score of every shape (n, k) in one observable, as the diagnosis itself judges its looks."""
+    from tribo.diagnose.screen import cleared
+
+    stacked = shapes[:, None, :] * np.array(PATTERNS[observable])[None, :, None]
+    left, target = cleared(f, stacked)
+    length = np.sqrt(np.sum(left**2, axis=0))
+    return np.asarray(left.T @ target / np.maximum(length, 1e-9))
+
+
+def _cell(
+    observable: str, row: str, column: Covariate, effect: float, strength: float, p: float
+) -> dict[str, Any]:
+    mark = next((mark for level, mark in MARKS if p < level), "")
+    return {
+        "observable": observable, "row": row, "covariate": column.name, "label": column.label,
+        "effect_percent": effect, "strength": strength, "p_adjusted": p, "mark": mark,
+    }  # fmt: skip
+
+
+def _trace_cells(d: Diagnosis, columns: list[Covariate]) -> list[dict[str, Any]]:
+    """Rank correlations of what the traces show besides the forces; nothing is modelled there."""
+    from scipy.stats import spearmanr
+
+    found = []
+    for name, values in _trace_observables(d).items():
+        good = np.isfinite(values)
+        for column in columns:
+            x = column.score[good]
+            if column.name in ("mean", "normal_load_N", BEND) or good.sum() < 12 or np.ptp(x) <= 1e-9:
+                continue
+            rho, p = spearmanr(x, values[good])
+            slope = np.polyfit(x, values[good], 1)[0]
+            effect = 100.0 * float(slope * (np.quantile(x, 0.95) - np.quantile(x, 0.05)))
+            found.append((name, column, effect, float(rho) * np.sqrt(good.sum() - 1), float(p)))
+    return [_cell("trace", name, c, effect, z, min(1.0, p * len(found))) for name, c, effect, z, p in found]
+
+
+def _trace_observables(d: Diagnosis) -> dict[str, FloatArray]:
+    """Per test, as a share: zero of the median sliding force; rise and stick-slip of their median at that load."""
+    o = d.baseline.setup.observations
+    groups = [f"{s} {n:.4g}" for s, n in zip(o.conditions.sample, o.conditions.normal_load_N, strict=True)]
+
+    def centred(values: FloatArray) -> FloatArray:
+        logs = pd.Series(np.log(np.where(values > 0, values, np.nan)))
+        return np.asarray(logs - logs.groupby(groups).transform("median"))
+
+    sliding = float(np.exp(np.median(o.log_force[:, 1])))
+    return {"zero": o.zero_N / sliding, "rise": centred(o.rise_N_per_m), "stick-slip": centred(o.stick_slip_N)}
+
+
+@style.in_house_style
+def draw(numbers: pd.DataFrame) -> Figure:
+    """One panel an observable, rows the samples, columns the covariates, one colour scale."""
+    panels = [(name, part) for name in TITLES if len(part := numbers[numbers["observable"] == name])]
+    labels = numbers.drop_duplicates("covariate").set_index("covariate")["label"]
+    heights = [part["row"].nunique() for _, part in panels]
+    size_mm = (style.COLUMN_WIDTH_MM, CELL_MM * sum(heights) + HEAD_MM * len(panels) + FOOT_MM)
+    figure = Figure(figsize=(size_mm[0] / style.MM_PER_INCH, size_mm[1] / style.MM_PER_INCH), layout="constrained")
+    axes = np.atleast_1d(figure.subplots(len(panels), 1, height_ratios=heights, squeeze=True))
+    reach = float(np.clip(numbers["effect_percent"].abs().quantile(0.98), LEAST_PERCENT, MOST_PERCENT))
+    norm = TwoSlopeNorm(0.0, -reach, reach)
+    for ax, (name, part) in zip(axes, panels, strict=True):
+        mesh = _draw_panel(ax, part, list(labels.index), norm)
+        style.panel_title(ax, TITLES[name])
+    for ax in axes[:-1]:
+        ax.tick_params(labelbottom=False)
+    axes[-1].set_xticks(np.arange(len(labels)) + 0.5, list(labels), rotation=25, ha="right", rotation_mode="anchor")
+    bar = figure.colorbar(mesh, ax=list(axes), shrink=0.6, pad=0.015, aspect=35, extend="both")
+    bar.set_label("measured over model, from end to end (%)")
+    bar.outline.set_visible(False)
+    return figure
+
+
+def _draw_panel(ax: Axes, part: pd.DataFrame, covariates: list[str], norm: TwoSlopeNorm) -> Any:
+    """Cells that chance explains are faint, so that the eye goes to the others."""
+    rows = list(dict.fromkeys(part["row"]))
+    values = np.full((len(rows), len(covariates)), np.nan)
+    strong = np.zeros(values.shape, bool)
+    for cell in part.to_dict("records"):
+        i, j, percent = rows.index(cell["row"]), covariates.index(cell["covariate"]), float(cell["effect_percent"])
+        values[i, j], strong[i, j] = percent, bool(cell["mark"])
+        dark = strong[i, j] and abs(norm(percent) - 0.5) > 0.32
+        ax.text(
+            j + 0.5, i + 0.5, f"{_signed(percent)}{cell['mark']}", ha="center", va="center", fontsize=6.5,
+            fontweight="bold" if strong[i, j] else "normal",
+            color="white" if dark else ("black" if strong[i, j] else "0.35"),
+        )  # fmt: skip
+    drawing: dict[str, Any] = {"cmap": DIVERGING, "norm": norm, "edgecolors": "white", "linewidth": 0.8}
+    ax.pcolormesh(np.ma.masked_where(np.isnan(values) | strong, values), alpha=FAINT, **drawing)
+    mesh = ax.pcolormesh(np.ma.masked_where(np.isnan(values) | ~strong, values), **drawing)
+    ax.set_facecolor("0.93")
+    ax.set_yticks(np.arange(len(rows)) + 0.5, rows)
+    ax.set_xticks([])
+    ax.set_xlim(0, len(covariates))
+    ax.set_ylim(len(rows), 0)
+    ax.grid(visible=False)
+    ax.tick_params(length=0)
+    ax.spines[:].set_visible(False)
+    return mesh
+
+
+def _signed(percent: float) -> str:
+    return f"{percent:+.0f}".replace("-", "−") if abs(percent) >= 0.5 else "0"

@@ -1,0 +1,255 @@
+"""The strongest looks: residual against covariate, the band that chance fills, and the curve of the named mechanism."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from tribo.figures import style
+from tribo.figures.covariates import LOGARITHMIC, Covariate, covariate
+from tribo.records import FloatArray
+
+if TYPE_CHECKING:
+    from tribo.diagnose import Diagnosis
+    from tribo.diagnose.looks import Look
+
+COLUMNS = [
+    "panel", "title", "detail", "axis", "y_axis", "mark", "sample_number", "sample", "test_id", "x", "x_name", "y",
+    "y_low", "y_high",
+]  # fmt: skip
+MOST_PANELS = 6
+MOST_POINTS_OF_CURVE = 12
+BAND = 2.0  # standard deviations
+WEIGHTS = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (0.5, 0.5), "drop": (1.0, -1.0)}
+NAMES = {"static": "static friction", "sliding": "sliding friction", "both": "static and sliding", "drop": "drop"}
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One look as a panel: the tests it is about, their covariate and their residual in percent of T."""
+
+    look: Look
+    covariate: Covariate
+    here: np.ndarray
+    p: float
+
+
+def numbers(d: Diagnosis) -> pd.DataFrame:
+    """Residuals (percent: 100 ln of measured over modelled) of the strongest looks, one panel each.
+
+    ``mark`` is test; mean and band, the mean of a bin and two standard deviations of single tests by the fitted
+    noise (repeats, specimens, the model's own error of a sample); curve, what the named model adds there.
+    """
+    frames = [_rows(d, k, panel) for k, panel in enumerate(panels(d))]
+    return pd.DataFrame([row for rows in frames for row in rows], columns=COLUMNS)
+
+
+def panels(d: Diagnosis) -> list[Panel]:
+    """The strongest look at each covariate and sample, the strongest first."""
+    s = d.screened
+    found: dict[tuple[str, str], Panel] = {}
+    for k in np.argsort(-s.strength):
+        look = s.looks[k]
+        panel = _panel(d, look, s.p_adjusted(float(s.strength[k])))
+        if panel is not None:
+            found.setdefault((panel.covariate.name, look.sample if look.kind == "sample" else ""), panel)
+        if len(found) == MOST_PANELS:
+            break
+    certain = [p for p in found.values() if p.p < 0.05]
+    return certain or list(found.values())[:3]
+
+
+def _panel(d: Diagnosis, look: Look, p: float) -> Panel | None:
+    c = d.baseline.setup.observations.conditions
+    here = np.ones(len(c.sample), bool)
+    name = look.covariate
+    if look.acting is not None:
+        needs = look.acting.mechanism.needs
+        name = _column_of(look.acting.choice) or {"speed_m_s": "speed_mm_s", "elapsed_s": "started_at"}.get(
+            needs[0] if needs else "", needs[0] if needs else "normal_load_N"
+        )
+    if look.kind in ("sample", "specimen") or name in ("area_fraction", "rim_per_m", "elongation", "tau0", "clip_N"):
+        name = "normal_load_N"
+    if look.kind == "sample":
+        here = c.sample == look.sample
+    if look.kind == "specimen":
+        here = c.specimen == look.covariate.split()[1]
+    if look.kind == "period":
+        name = look.covariate.split(",")[0]
+    try:
+        return Panel(look, covariate(d.baseline.setup, name), here, p)
+    except KeyError:
+        return None
+
+
+def _column_of(choice: str) -> str:
+    """The column that a choice of a mechanism speaks of; a wrong label or pattern is read by load."""
+    if " behaves as " in choice or " swapped with " in choice:
+        return "specimen"
+    return choice.split(" is ")[0] if choice else ""
+
+
+def _rows(d: Diagnosis, k: int, panel: Panel) -> list[dict[str, Any]]:
+    f, look, here = d.baseline, panel.look, panel.here
+    o = f.setup.observations
+    observable = _observable(look)
+    weight = np.array(WEIGHTS[observable])
+    samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
+    places = {s: i for i, s in enumerate(samples)}
+    x, y = panel.covariate.values, 100.0 * f.residual @ weight
+    common = {
+        "panel": k, "title": _title(look), "detail": f"p {_p(panel.p)}", "axis": panel.covariate.axis,
+        "y_axis": f"{NAMES[observable]} (%)",
+    }  # fmt: skip
+    tests = [
+        {
+            "mark": "test", "sample_number": places[o.conditions.sample[i]], "sample": o.conditions.sample[i],
+            "test_id": o.test_ids[i], "x": x[i], "x_name": _name(panel.covariate, x[i]), "y": y[i],
+        }
+        for i in np.flatnonzero(here)
+    ]  # fmt: skip
+    return [common | row for row in (*tests, *_summaries(d, panel, x, y, weight))]
+
+
+def _summaries(
+    d: Diagnosis, panel: Panel, x: FloatArray, y: FloatArray, weight: FloatArray
+) -> list[dict[str, Any]]:
+    """Mean with its standard error, noise band and curve of the named mechanism, bin by bin."""
+    noise = 100.0 * np.sqrt(_variance(d, weight))
+    passes = d.named is not None and d.named.causes and d.verdict.verdict != "unknown"
+    named = d.named.model if d.named is not None and passes else None
+    added = None if named is None else 100.0 * (named.predicted - d.baseline.predicted) @ weight
+    found: list[dict[str, Any]] = []
+    for rows in _bins(x, panel.here, panel.covariate):
+        centre = float(np.exp(np.log(x[rows]).mean())) if _logarithmic(panel.covariate) else float(x[rows].mean())
+        at = {"x": centre, "x_name": _name(panel.covariate, centre)}
+        error = float(y[rows].std(ddof=1) / np.sqrt(len(rows))) if len(rows) > 1 else float("nan")
+        mean, band = float(y[rows].mean()), BAND * float(np.sqrt(np.mean(noise[rows] ** 2)))
+        found.append(at | {"mark": "mean", "y": mean, "y_low": mean - BAND * error, "y_high": mean + BAND * error})
+        found.append(at | {"mark": "band", "y": 0.0, "y_low": -band, "y_high": band})
+        if added is not None:
+            found.append(at | {"mark": "curve", "y": float(added[rows].mean())})
+    return found
+
+
+def _variance(d: Diagnosis, weight: FloatArray) -> FloatArray:
+    """Variance of one test's residual by the fitted noise: repeats, reading, specimens, error of the sample."""
+    from tribo.diagnose.fit import prior_precision
+
+    f = d.baseline
+    repeats = float(weight @ f.noise.repeat @ weight) + (f.setup.observations.reading**2) @ weight**2
+    effects = np.einsum("nrq,r->nq", f.setup.random, weight) ** 2 @ (1.0 / prior_precision(f.setup, f.noise))
+    return np.asarray(repeats + effects)
+
+
+def _bins(x: FloatArray, here: np.ndarray, column: Covariate) -> list[np.ndarray]:
+    """Rows by value where there are few, else by quantile."""
+    rows = np.flatnonzero(here & np.isfinite(x))
+    rounded = np.array([float(f"{v:.3g}") for v in x[rows]])
+    distinct = np.unique(rounded)
+    if len(distinct) <= MOST_POINTS_OF_CURVE or column.names:
+        return [rows[rounded == value] for value in distinct]
+    edges = np.quantile(x[rows], np.linspace(0, 1, MOST_POINTS_OF_CURVE + 1)[1:-1])
+    codes = np.searchsorted(edges, x[rows], side="right")
+    return [rows[codes == code] for code in np.unique(codes)]
+
+
+def _logarithmic(column: Covariate) -> bool:
+    return column.name in LOGARITHMIC and bool((column.values > 0).all())
+
+
+def _name(column: Covariate, value: float) -> str:
+    return column.names[round(value)] if column.names else ""
+
+
+def _observable(look: Look) -> str:
+    """What a look is about; a mechanism that acts in one regime is shown there."""
+    if look.acting is not None and len(look.acting.mechanism.regimes) == 1:
+        return look.acting.mechanism.regimes[0]
+    return look.observable
+
+
+def _title(look: Look) -> str:
+    if look.kind == "specimen":
+        return f"{look.covariate} ({look.sample})"
+    return f"Sample {look.sample}" if look.sample else "All samples"
+
+
+def _p(p: float) -> str:
+    return "< 0.001" if p < 1e-3 else f"= {p:.2g}"
+
+
+@style.in_house_style
+def draw(numbers: pd.DataFrame) -> Figure:
+    """Grey band: 95 % of single tests if nothing were hidden. Bars: mean of a bin with twice its standard error."""
+    groups = [part for _, part in numbers.groupby("panel")]
+    figure, axes = style.panel_grid(len(groups), 56, columns=min(len(groups), 3))
+    for ax, part in zip(axes, groups, strict=True):
+        _draw_panel(ax, part)
+    style.legend_below(figure, _legend(numbers), columns=12)
+    return figure
+
+
+def _draw_panel(ax: Axes, part: pd.DataFrame) -> None:
+    tests = part[part["mark"] == "test"]
+    band = part[part["mark"] == "band"].sort_values("x")
+    names = tests.drop_duplicates("x")[["x", "x_name"]].sort_values("x") if tests["x_name"].any() else None
+    shifted = tests["x"] + (0.22 * _jitter(len(tests)) if names is not None else 0.0)
+    for number, points in tests.groupby("sample_number"):
+        mark = style.sample_mark(int(float(str(number))))
+        ax.plot(shifted[points.index], points["y"], mark.marker, color=mark.colour, ms=2.0, alpha=0.45, mew=0)
+    mean = part[part["mark"] == "mean"]
+    bars = np.abs(mean[["y_low", "y_high"]].to_numpy(float) - mean[["y"]].to_numpy(float)).T
+    ax.errorbar(mean["x"], mean["y"], bars, fmt="o", ms=3.4, color="black", elinewidth=0.9, zorder=5)
+    if len(band) > 1:
+        ax.fill_between(band["x"].astype(float), band["y_low"], band["y_high"], color="0.75", alpha=0.35, lw=0)
+    curve = part[part["mark"] == "curve"].sort_values("x")
+    step: dict[str, Any] = {"drawstyle": "steps-mid"} if names is not None else {}
+    ax.plot(curve["x"], curve["y"], "-", color=style.VERMILLION, lw=1.6, zorder=6, **step)
+    ax.axhline(0, color="0.4", lw=0.8)
+    _axis(ax, part, names)
+
+
+def _axis(ax: Axes, part: pd.DataFrame, names: pd.DataFrame | None) -> None:
+    first = part.iloc[0]
+    tests = part[part["mark"] == "test"]
+    style.panel_title(ax, str(first["title"]), str(first["detail"]))
+    ax.set_xlabel(str(first["axis"]))
+    ax.set_ylabel(str(first["y_axis"]))
+    reach = 1.15 * float(np.quantile(np.abs(tests["y"]), 0.99))
+    ax.set_ylim(-reach, reach)
+    if names is not None:
+        ax.set_xticks(names["x"], names["x_name"])
+        if names["x_name"].str.len().sum() > 24:
+            for label in ax.get_xticklabels():
+                label.set(rotation=40, ha="right", rotation_mode="anchor", fontsize=6.5)
+        ax.set_xlim(-0.6, float(names["x"].max()) + 0.6)
+    elif str(first["axis"]).split(" (")[0] in ("Normal load N", "Speed", "Hold"):
+        ax.set_xscale("log")
+        style.plain_log_axis(ax.xaxis, tests["x"])
+
+
+def _jitter(n: int) -> FloatArray:
+    """Evenly spread numbers in -1..1 that do not follow the order: the golden ratio."""
+    return np.asarray(2.0 * np.mod(np.arange(n) * 0.618034, 1.0) - 1.0)
+
+
+def _legend(numbers: pd.DataFrame) -> list[Any]:
+    tests = numbers[numbers["mark"] == "test"]
+    shown = tests.drop_duplicates("sample_number").sort_values("sample_number")
+    marks = [(str(row["sample"]), style.sample_mark(int(row["sample_number"]))) for row in shown.to_dict("records")]
+    handles: list[Any] = [
+        Line2D([], [], color=m.colour, marker=m.marker, lw=0, ms=3.5, label=name) for name, m in marks
+    ]
+    handles.append(Line2D([], [], color="black", marker="o", lw=0.9, ms=3.4, label="mean ± 2 s.e."))
+    handles.append(Patch(color="0.75", alpha=0.5, lw=0, label="± 2 s.d. by chance"))
+    if (numbers["mark"] == "curve").any():
+        handles.append(Line2D([], [], color=style.VERMILLION, lw=1.6, label="what the named model adds"))
+    return handles
