@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tribo import stages
 from tribo.campaign import load_campaign
 from tribo.errors import CampaignError, FitError
-from tribo.prediction import MOST_LOADS, loads_to_simulate, predict
+from tribo.prediction import MOST_LOADS, Prediction, loads_to_simulate, predict
 from tribo.records import LawFit, Regime
 
 
@@ -19,50 +20,80 @@ def fitted(small_campaign: Path) -> tuple[stages.Ingested, tuple[LawFit, ...]]:
     return ingested, stages.fit(ingested)
 
 
-def run(fitted: tuple[stages.Ingested, tuple[LawFit, ...]], ensemble: Path, seed: int = 0) -> tuple[object, list[int]]:
-    """A prediction, and how many runs each report of its progress counted as done."""
+Fitted = tuple[stages.Ingested, tuple[LawFit, ...]]
+
+
+def run(fitted: Fitted, kept: Path, **options: Any) -> tuple[Prediction, set[str]]:
+    """A prediction of two runs a load, and the stages that had to be computed for it."""
     ingested, fits = fitted
-    seen: list[int] = []
+    computed: set[str] = set()
+    before = contents(kept)
 
     def progress(stage: str, done: int, total: int) -> None:
-        if stage == "simulating the samples":
-            seen.append(done)
+        if stage.startswith("calibrating"):
+            computed.add("calibration")
 
-    return predict(ingested.campaign, fits, "F", runs=2, seed=seed, ensemble=ensemble, progress=progress), seen
-
-
-def test_a_second_start_takes_every_finished_run_from_the_store(
-    fitted: tuple[stages.Ingested, tuple[LawFit, ...]], tmp_path: Path
-) -> None:
-    first, counted = run(fitted, tmp_path / "ensemble.nc")
-    again, recounted = run(fitted, tmp_path / "ensemble.nc")
-    assert counted[0] == 0
-    assert recounted == [counted[-1]]
-    assert again.table.equals(first.table)  # type: ignore[attr-defined]
+    found = predict(ingested.campaign, fits, "F", runs=2, kept=kept, progress=progress, **options)
+    computed |= {name for name, content in contents(kept).items() if before.get(name) != content}
+    return found, computed
 
 
-def test_a_store_of_another_design_or_no_store_at_all_is_replaced(
-    fitted: tuple[stages.Ingested, tuple[LawFit, ...]], tmp_path: Path
-) -> None:
-    store = tmp_path / "ensemble.nc"
-    store.write_bytes(b"not HDF5")
-    _, counted = run(fitted, store)
-    _, other = run(fitted, store, seed=1)
-    assert counted[0] == other[0] == 0
-    assert counted[-1] == other[-1] > 0
+def contents(folder: Path) -> dict[str, bytes]:
+    """Every file of a folder."""
+    return {p.name: p.read_bytes() for p in folder.glob("*")}
 
 
-def test_the_flat_law_is_all_the_model_sees_of_the_measurement(
-    fitted: tuple[stages.Ingested, tuple[LawFit, ...]], tmp_path: Path
-) -> None:
+def test_a_second_start_computes_nothing_and_says_the_same(fitted: Fitted, tmp_path: Path) -> None:
+    first, computed = run(fitted, tmp_path)
+    again, recomputed = run(fitted, tmp_path)
+    assert "calibration" in computed
+    assert len([name for name in computed if name.endswith(".nc")]) == 4
+    assert recomputed == set()
+    assert again.table.equals(first.table)
+    assert [r.force_N.tolist() for r in again.example_runs] == [r.force_N.tolist() for r in first.example_runs]
+
+
+def test_a_damaged_cell_is_run_again_and_no_other(fitted: Fitted, tmp_path: Path) -> None:
+    first, _ = run(fitted, tmp_path)
+    damaged = sorted(tmp_path.glob("B@*.nc"))[0]
+    damaged.write_bytes(b"not HDF5")
+    again, recomputed = run(fitted, tmp_path)
+    assert recomputed == {damaged.name}
+    assert again.table.equals(first.table)
+
+
+def test_runs_of_another_seed_replace_those_there_are(fitted: Fitted, tmp_path: Path) -> None:
+    run(fitted, tmp_path)
+    before = set(contents(tmp_path))
+    run(fitted, tmp_path, seed=1)
+    cells = {name for name in contents(tmp_path) if name.endswith(".nc")}
+    assert len(cells) == 4
+    assert not cells & before
+
+
+def test_cells_run_one_by_one_are_what_a_prediction_takes(fitted: Fitted, tmp_path: Path) -> None:
+    ingested, fits = fitted
+    options = stages.StudyOptions(runs=2, kept=tmp_path)
+    (only_b,) = {c.sample for c in stages.simulate_cells(ingested, fits, options, "B")}
+    assert only_b == "B"
+    cells = {p.name for p in tmp_path.glob("*.nc")}
+    stages.simulate_cells(ingested, fits, options, "F")
+    assert len(cells) == 2
+    _, computed = run(fitted, tmp_path)
+    assert computed == set()
+    with pytest.raises(CampaignError, match="nothing of this name"):
+        stages.simulate_cells(ingested, fits, options, "B@1Pa")
+
+
+def test_the_flat_law_is_all_the_model_sees_of_the_measurement(fitted: Fitted, tmp_path: Path) -> None:
     ingested, fits = fitted
     alone = tuple(f for f in fits if f.sample == "F")
-    with_all, _ = run((ingested, fits), tmp_path / "a.nc")
-    flat_only, _ = run((ingested, alone), tmp_path / "b.nc")
-    assert flat_only.table.equals(with_all.table)  # type: ignore[attr-defined]
+    with_all, _ = run((ingested, fits), tmp_path / "a")
+    flat_only, _ = run((ingested, alone), tmp_path / "b")
+    assert flat_only.table.equals(with_all.table)
 
 
-def test_a_campaign_without_a_flat_law_is_refused(fitted: tuple[stages.Ingested, tuple[LawFit, ...]]) -> None:
+def test_a_campaign_without_a_flat_law_is_refused(fitted: Fitted) -> None:
     ingested, fits = fitted
     with pytest.raises(FitError, match="flat sample F"):
         predict(ingested.campaign, tuple(f for f in fits if f.sample != "F"), "F")

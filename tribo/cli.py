@@ -14,11 +14,13 @@ from tribo.console import Console, command_options, set_aside_record, status_of
 if TYPE_CHECKING:
     from tribo.diagnose.verdict import Verdict
     from tribo.records import Campaign, Study
-    from tribo.stages import Progress, Until
+    from tribo.stages import Progress, StudyOptions, Until
 
 CAMPAIGN = click.argument("campaign", type=click.Path(exists=True, path_type=Path))
 FOLDER = click.Path(file_okay=False, path_type=Path)
 OUT = click.option("-o", "--out", type=FOLDER, required=True, help="Output folder.")
+KEPT = "kept"  # folder of OUT with finished simulations and the like, for the next start
+SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler whose workers run the simulations.")
 DRY_RUN = click.option("--dry-run", is_flag=True, help="Say what would be done, and do nothing.")
 
 
@@ -56,6 +58,7 @@ def _model_options(function: Callable[..., Any]) -> Callable[..., Any]:
         click.option(
             "--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulated runs a load."
         ),
+        SCHEDULER,
     ):
         function = option(function)
     return function
@@ -109,6 +112,27 @@ def fit(console: Console, campaign: Path, out: Path, dry_run: bool, **options: A
 @main.command()
 @CAMPAIGN
 @OUT
+@click.option("--only", default="", help="calibration, a sample, or SAMPLE@PRESSUREPa as in kept/; all by default.")
+@_fit_options
+@_model_options
+@command_options
+def predict(console: Console, campaign: Path, out: Path, only: str, columns: str, **options: Any) -> int:
+    """Calibrate the model on the flat sample and run it for CAMPAIGN, into OUT/kept; compare and report go on there."""
+    from tribo import stages
+    from tribo.campaign import open_campaign
+
+    chosen = stages.StudyOptions(kept=out / KEPT, **options)
+    with open_campaign(campaign) as described, console.progress() as progress:
+        ingested = stages.study(_with_columns(described, columns), chosen, until="ingest", progress=progress).ingested
+        cells = stages.simulate_cells(ingested, stages.fit(ingested, weights=chosen.weights), chosen, only, progress)
+    names = [cell.name for cell in cells]
+    console.result({"out": str(out), "cells": names}, f"calibrated; simulated {', '.join(names) or 'nothing more'}")
+    return status_of(ingested.set_aside)
+
+
+@main.command()
+@CAMPAIGN
+@OUT
 @DRY_RUN
 @_fit_options
 @_model_options
@@ -131,14 +155,13 @@ def diagnose(
     """What the calibrated model gets wrong, and why, or that it cannot be told: verdict.json."""
     from tribo import stages
     from tribo.campaign import open_campaign
-    from tribo.diagnose import diagnose as name_the_cause
     from tribo.report import write_until
     from tribo.report.verdict import verdict_text
 
     with open_campaign(campaign) as opened, console.progress() as progress:
         described = _with_columns(opened, columns)
         ingested = stages.ingest(described, rule=rule, overrides=overrides, progress=progress)
-        verdict = name_the_cause(ingested, seed=seed, progress=progress)
+        verdict = stages.diagnosis(ingested, seed=seed, kept=out / KEPT, progress=progress).verdict
         write_until(stages.Study(ingested), out, "ingest", verdict=verdict.as_dict())
     console.result(verdict.as_dict(), verdict_text(verdict))
     console.list_tests("set aside", ingested.set_aside, level=-1)
@@ -285,7 +308,7 @@ def _walk(
     from tribo.campaign import open_campaign
     from tribo.report import gather_provenance, write_until
 
-    chosen = stages.StudyOptions(ensemble=out / "ensemble.nc", **options)
+    chosen = stages.StudyOptions(kept=out / KEPT, **options)
     with open_campaign(path) as described:
         campaign = _with_columns(described, columns)
         if dry_run:
@@ -294,7 +317,7 @@ def _walk(
             return status_of(campaign.set_aside)
         with console.progress() as progress:
             study = stages.study(campaign, chosen, until=until, progress=progress)
-            study, verdict = _diagnosed(study, chosen.seed, progress) if until == "report" else (study, None)
+            study, verdict = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
             provenance = gather_provenance(
                 study, command=_command_line(), seed=chosen.seed, started_at=_now(), options=chosen.as_words()
             )
@@ -312,15 +335,15 @@ def _with_columns(campaign: Campaign, columns: str) -> Campaign:
     return replace(campaign, columns={**campaign.columns, **columns_from_text(columns)}) if columns else campaign
 
 
-def _diagnosed(study: Study, seed: int, progress: Progress) -> tuple[Study, Verdict | None]:
+def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[Study, Verdict | None]:
     """The verdict on a study; a note instead where there is too little to diagnose."""
     from dataclasses import replace
 
-    from tribo.diagnose import diagnose
     from tribo.errors import FitError
+    from tribo.stages import diagnosis
 
     try:
-        return study, diagnose(study.ingested, seed=seed, progress=progress)
+        return study, diagnosis(study.ingested, seed=chosen.seed, kept=chosen.kept, progress=progress).verdict
     except FitError as why:
         return replace(study, notes=(*study.notes, f"no diagnosis: {why}")), None
 

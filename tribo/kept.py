@@ -16,6 +16,7 @@ from dataclasses import dataclass, fields, is_dataclass
 from functools import lru_cache
 from importlib import import_module, metadata
 from pathlib import Path
+from types import FunctionType
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -87,7 +88,9 @@ def fingerprint(*values: object) -> str:
 
 def _feed(update: Callable[[bytes], object], value: object) -> None:
     update(f"<{type(value).__name__}".encode())
-    if isinstance(value, np.ndarray) and value.dtype.kind != "O":
+    if isinstance(value, FunctionType):
+        update(f"{value.__module__}:{value.__qualname__}".encode())
+    elif isinstance(value, np.ndarray) and value.dtype.kind != "O":
         update(f"{value.dtype}{value.shape}".encode())
         update(np.ascontiguousarray(value).tobytes())
     elif isinstance(value, Path):
@@ -122,7 +125,7 @@ def encoded(value: Any) -> Any:
     Raises
     ------
     TypeError
-        It holds something that is no record of tribo, array, table or plain value.
+        It holds something that is no record or function of tribo, array, table or plain value.
     """
     if value is None or isinstance(value, str | bool):
         return value
@@ -142,11 +145,13 @@ def encoded(value: Any) -> Any:
     if is_dataclass(value) and type(value).__module__.startswith("tribo."):
         values = [[field.name, encoded(getattr(value, field.name))] for field in fields(value) if field.init]
         return {"record": f"{type(value).__module__}:{type(value).__qualname__}", "fields": values}
+    if isinstance(value, FunctionType) and _named(place := f"{value.__module__}:{value.__qualname__}") is value:
+        return {"function": place}
     raise TypeError(f"a {type(value).__qualname__} cannot be kept")
 
 
 def decoded(value: Any) -> Any:
-    """The value that :func:`encoded` was given. Only records of tribo are ever constructed."""
+    """The value that :func:`encoded` was given. Only records of tribo are ever constructed, and nothing is called."""
     if isinstance(value, list):
         return [decoded(part) for part in value]
     if not isinstance(value, dict):
@@ -162,12 +167,19 @@ def decoded(value: Any) -> Any:
         import pandas as pd
 
         return pd.DataFrame({name: decoded(column) for name, column in value["table"]})
-    return _record_class(value["record"])(**{name: decoded(part) for name, part in value["fields"]})
+    if "function" in value:
+        function = _named(value["function"])
+        if not isinstance(function, FunctionType):
+            raise TypeError(f"{value['function']} is no function of tribo")
+        return function
+    record = _named(value["record"])
+    if not (isinstance(record, type) and is_dataclass(record)):
+        raise TypeError(f"{value['record']} is no record of tribo")
+    return record(**{name: decoded(part) for name, part in value["fields"]})
 
 
-def _record_class(place: str) -> type:
+def _named(place: str) -> object:
+    """What tribo itself defines at "module:name"; None where it defines nothing of that name there."""
     module, _, name = place.partition(":")
     found = getattr(import_module(module), name, None) if module.startswith("tribo.") else None
-    if not (isinstance(found, type) and is_dataclass(found)):
-        raise TypeError(f"{place} is no record of tribo")
-    return found
+    return found if getattr(found, "__module__", None) == module else None

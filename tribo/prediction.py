@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribo.errors import FitError, Problem, SimulationError
+from tribo.errors import FitError, Problem
+from tribo.kept import Shelf
 from tribo.records import REGIMES, Campaign, FloatArray, LawFit, Regime, Run
+from tribo.simulations import SOURCES, Cell, cells_of, example_run, remove_strangers, run_cells
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from tribo.simulate import LocalFriction, SimConfig
-
 
 Progress = Callable[[str, int, int], None]
 MOST_LOADS = 8  # T(N) of the model is close to a straight line: more loads are interpolated
@@ -70,7 +71,8 @@ def predict(
     runs: int = 4,
     seed: int = 0,
     jobs: int = 2,
-    ensemble: Path | None = None,
+    kept: Path | None = None,
+    scheduler: str | None = None,
     progress: Progress = lambda stage, done, total: None,
 ) -> Prediction:
     """Calibrate the model on the measured flat sample and simulate every measured sample at the campaign's loads.
@@ -80,7 +82,8 @@ def predict(
     fits : laws measured on the samples, the flat one among them
     runs : simulated runs a sample and load, at stratified pull angles with fresh local friction
     weights : of the fits to the simulated forces
-    ensemble : HDF5 file that keeps finished runs; one that holds another design is replaced
+    kept : folder that keeps the calibration and every finished run; what was made otherwise is not taken from it
+    scheduler : address of a dask.distributed scheduler whose workers run the simulations
 
     Raises
     ------
@@ -89,46 +92,64 @@ def predict(
     SimulationError
         A pattern that the lattice cannot hold.
     """
+    from tribo.simulate import SimConfig
+
+    friction, cells = calibrated_cells(
+        campaign, fits, flat, runs=runs, seed=seed, jobs=jobs, kept=kept, progress=progress
+    )
+    if kept is not None:
+        remove_strangers(cells, kept)
+    table = run_cells(
+        cells, kept, jobs, scheduler, lambda done, total: progress("simulating the samples", done, total)
+    )
+    table = _as_forces(table, campaign)
+    return Prediction(
+        table,
+        _simulated_fits(table, campaign.nominal_area_m2, weights),
+        _flat_laws(fits, flat),
+        _calibration(friction, SimConfig()),
+        tuple(example_run(own, kept) for own in _by_sample(cells).values()),
+    )
+
+
+def calibrated_cells(
+    campaign: Campaign,
+    fits: tuple[LawFit, ...],
+    flat: str,
+    *,
+    runs: int = 4,
+    seed: int = 0,
+    jobs: int = 2,
+    kept: Path | None = None,
+    progress: Progress = lambda stage, done, total: None,
+) -> tuple[LocalFriction, tuple[Cell, ...]]:
+    """Local friction from the flat sample alone, and the runs that predict every sample, by sample and load.
+
+    Parameters and exceptions are those of :func:`predict`.
+    """
     from tribo.simulate import SimConfig, calibrate, stratified_design
 
     laws = _flat_laws(fits, flat)
     loads = loads_to_simulate(campaign)
     pressures = [campaign.nominal_pressure_Pa(load) for load in loads]
-    friction = calibrate(
-        _law(laws["static"]), _law(laws["sliding"]), pressures_Pa=pressures, seed=seed, jobs=jobs,
-        progress=lambda done, total: progress("calibrating on the flat sample", done, total),
-    )  # fmt: skip
-    base = SimConfig(friction=friction)
+    wanted = (_law(laws["static"]), _law(laws["sliding"]))
+
+    def calibration() -> LocalFriction:
+        return calibrate(
+            *wanted, pressures_Pa=pressures, seed=seed, jobs=jobs,
+            progress=lambda done, total: progress("calibrating on the flat sample", done, total),
+        )  # fmt: skip
+
+    friction = Shelf(kept).take("calibration", (wanted, pressures, seed), calibration, SOURCES)
     samples = {s: campaign.samples[s] for s in _measured_samples(campaign)}
-    design = stratified_design(samples, pressures, runs, seed, base)
-    table = _run(design, ensemble, jobs, lambda done, total: progress("simulating the samples", done, total))
-    table = _as_forces(table, campaign)
-    return Prediction(
-        table,
-        _simulated_fits(table, campaign.nominal_area_m2, weights),
-        laws,
-        _calibration(friction, base),
-        _example_runs(design),
-    )
+    return friction, cells_of(stratified_design(samples, pressures, runs, seed, SimConfig(friction=friction)))
 
 
-def _run(
-    design: list[SimConfig], ensemble: Path | None, jobs: int, progress: Callable[[int, int], None]
-) -> pd.DataFrame:
-    """All runs of a design, those that ``ensemble`` already holds taken from there."""
-    from tribo.simulate import run_ensemble
-    from tribo.simulate.resume import run_stored
-
-    if ensemble is None:
-        return run_ensemble(design, jobs, progress)
-    ensemble.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        return run_stored(design, ensemble, jobs, progress=progress)
-    except SimulationError as why:
-        if not {p.kind for p in why.problems} <= {"other_design", "not_a_store"}:
-            raise
-    ensemble.unlink()
-    return run_stored(design, ensemble, jobs, progress=progress)
+def _by_sample(cells: tuple[Cell, ...]) -> dict[str, list[Cell]]:
+    found: dict[str, list[Cell]] = {}
+    for cell in cells:
+        found.setdefault(cell.sample, []).append(cell)
+    return found
 
 
 def _flat_laws(fits: tuple[LawFit, ...], flat: str) -> dict[Regime, LawFit]:
@@ -173,13 +194,3 @@ def _simulated_fits(table: pd.DataFrame, nominal_area_m2: float, weights: str) -
 
 def _calibration(friction: LocalFriction, base: SimConfig) -> dict[str, float]:
     return {**asdict(friction), "blocks_x": base.blocks[0], "blocks_y": base.blocks[1], "dt_s": base.dt_s}
-
-
-def _example_runs(design: list[SimConfig]) -> tuple[Run, ...]:
-    """One run with its whole force trace per sample, at a middle load and a middle angle."""
-    from tribo.simulate import simulate
-
-    chosen: dict[str, list[SimConfig]] = {}
-    for config in design:
-        chosen.setdefault(config.sample, []).append(config)
-    return tuple(simulate(configs[len(configs) // 2]) for configs in chosen.values())

@@ -6,11 +6,12 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
 from tribo.errors import CampaignError, FitError, Problem
+from tribo.kept import Shelf
 from tribo.records import (
     REGIMES,
     Campaign,
@@ -22,13 +23,19 @@ from tribo.records import (
     Regime,
     SetAside,
     Study,
-    Trace,
     Test,
+    Trace,
 )
+
+if TYPE_CHECKING:
+    from tribo.diagnose import Diagnosis
+    from tribo.simulations import Cell
 
 Progress = Callable[[str, int, int], None]
 Weights = Literal["relative", "ratio", "force", "repeats"]
 Until = Literal["ingest", "fit", "compare", "report"]
+DIAGNOSED_BY = ("diagnose", "mechanisms", "fitting", "laws", "simulate", "records")
+ASSESSED_BY = ("stages", "fitting", "laws", "records")
 
 
 def _silent(stage: str, done: int, total: int) -> None:
@@ -46,7 +53,8 @@ class StudyOptions:
     seed: int = 0
     jobs: int = 2
     overrides: Path | None = None  # table of what a person decided about single pulls
-    ensemble: Path | None = None  # where finished simulations are kept, so that the next start goes on from there
+    kept: Path | None = None  # folder of finished simulations and diagnosis: the next start goes on from there
+    scheduler: str | None = None  # address of a dask scheduler that runs the simulations
 
     def as_words(self) -> dict[str, str]:
         """What was chosen, for the provenance."""
@@ -176,6 +184,43 @@ def compare(
 ) -> Study:
     """Calibrate the model on the flat sample, predict every sample at its loads, and put both side by side.
 
+def simulate_cells(
+    ingested: Ingested, fits: tuple[LawFit, ...], options: StudyOptions, only: str = "", progress: Progress = _silent
+) -> tuple[Cell, ...]:
+    """Calibrate the model and run what :func:`compare` will need, into ``options.kept``; returns the cells that ran.
+
+    ``only`` is the name of a cell ("Sx@18180Pa"), a sample, "calibration", or empty for all.
+
+    Raises
+    ------
+    CampaignError
+        No flat sample to calibrate on, or ``only`` names nothing this campaign measured.
+    """
+    from tribo.prediction import calibrated_cells
+    from tribo.simulations import example_config, example_run, run_cells
+
+    campaign = ingested.campaign
+    flat = flat_sample(campaign, options.flat)
+    _, cells = calibrated_cells(
+        campaign, fits, flat, runs=options.runs, seed=options.seed, jobs=options.jobs, kept=options.kept,
+        progress=progress,
+    )  # fmt: skip
+    chosen = tuple(c for c in cells if only in ("", c.sample, c.name))
+    if not chosen and only != "calibration":
+        allowed = ", ".join(["calibration", *dict.fromkeys(c.sample for c in cells), *(c.name for c in cells)])
+        raise CampaignError(Problem("no_such_cell", "nothing of this name to simulate", found=only, allowed=allowed))
+    if chosen:
+        run_cells(
+            chosen, options.kept, options.jobs, options.scheduler,
+            lambda done, total: progress("simulating the samples", done, total),
+        )  # fmt: skip
+    for sample in dict.fromkeys(c.sample for c in chosen):
+        own = [c for c in cells if c.sample == sample]
+        if any(example_config(own) in c.configs for c in chosen):
+            example_run(own, options.kept)
+    return chosen
+
+
     Raises
     ------
     CampaignError
@@ -189,7 +234,7 @@ def compare(
     flat = flat_sample(campaign, options.flat)
     prediction = predict(
         campaign, fits, flat, weights=options.weights, runs=options.runs, seed=options.seed, jobs=options.jobs,
-        ensemble=options.ensemble, progress=progress,
+        kept=options.kept, scheduler=options.scheduler, progress=progress,
     )  # fmt: skip
     rows = [
         ComparisonRow(sample, regime, load, mean, u, *prediction.force_N(sample, regime, load))
@@ -233,6 +278,13 @@ def assess(walked: Study, options: StudyOptions) -> Study:
     from tribo.fitting import campaign_budgets, outlying_pulls, outlying_specimens, power_of_campaign
 
     ingested = walked.ingested
+    made_from = (walked.ingested, walked.fits, options.weights)
+    looks = Shelf(options.kept).take("assessment", made_from, lambda: _looks(walked, options), ASSESSED_BY)
+    return replace(walked, **looks)
+
+
+def _looks(walked: Study, options: StudyOptions) -> dict[str, Any]:
+    """What :func:`assess` adds to a study, by the name of its field."""
     table, area = ingested.table(), ingested.campaign.nominal_area_m2
     budgets = campaign_budgets(ingested, walked.fits, weights=options.weights)
     parts = [b.table().assign(sample=b.fit.sample, regime=b.fit.regime) for b in budgets]
@@ -244,12 +296,28 @@ def assess(walked: Study, options: StudyOptions) -> Study:
         for look in (outlying_pulls, outlying_specimens):
             with suppress(FitError):
                 outlying += [found.text() for found in look(table, regime, area)]
-    return replace(
-        walked,
-        other_fits=_other_fits(ingested, options),
-        budget=pd.concat(parts, ignore_index=True) if parts else None,
-        power=tuple(power),
-        outlying=tuple(outlying),
+    return {
+        "other_fits": _other_fits(ingested, options),
+        "budget": pd.concat(parts, ignore_index=True) if parts else None,
+        "power": tuple(power),
+        "outlying": tuple(outlying),
+    }
+
+
+def diagnosis(
+    ingested: Ingested, *, seed: int = 0, kept: Path | None = None, progress: Progress = _silent
+) -> Diagnosis:
+    """What the calibrated model gets wrong and why, with all it rests on; taken from ``kept`` where it is there.
+
+    Raises
+    ------
+    FitError
+        Fewer than twelve usable tests.
+    """
+    from tribo.diagnose import examine
+
+    return Shelf(kept).take(
+        "diagnosis", (ingested, seed), lambda: examine(ingested, seed=seed, progress=progress), DIAGNOSED_BY
     )
 
 

@@ -121,6 +121,11 @@ class Parameter:
     tries: tuple[float, ...] = ()  # further values a fit starts from
 
 
+def no_choice(base: Base, conditions: Conditions) -> tuple[str, ...]:
+    """A mechanism without variants."""
+    return ("",)
+
+
 @dataclass(frozen=True)
 class Mechanism:
     """One thing that can part a measured campaign from the baseline.
@@ -146,7 +151,7 @@ class Mechanism:
     silenced_by: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
     rise: Rise | None = None  # what becomes of the slope of the rise, N/m, where the mechanism shows there
-    choices: Callable[[Base, Conditions], tuple[str, ...]] = lambda base, conditions: ("",)
+    choices: Callable[[Base, Conditions], tuple[str, ...]] = no_choice
 
     @property
     def amplitude(self) -> Parameter:
