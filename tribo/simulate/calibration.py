@@ -15,6 +15,9 @@ from tribo.simulate.ensemble import Progress, run_ensemble, stratified_design
 Law = tuple[float, float]
 """mu and tau0 (Pa) of T = mu N + tau0 A."""
 
+WEIGHTS = ("ratio", "force", "relative")
+"""What scatters alike at all loads: T/N, T, or T over its own size."""
+
 
 @lru_cache(maxsize=32)
 def expected_minimum(n: int) -> float:
@@ -88,8 +91,9 @@ def calibrate(
 def simulated_law(pressure_Pa: FloatArray, friction: FloatArray, weights: str = "ratio") -> FloatArray:
     """(mu, tau0 in Pa) of T/N over p by least squares.
 
-    ``weights="ratio"`` fits T/N = mu + tau0/p, ``"force"`` fits T = mu N + tau0 A.
+    ``weights="ratio"`` fits T/N = mu + tau0/p, ``"force"`` fits T = mu N + tau0 A, and ``"relative"`` either of them
+    with deviations relative to each force.
     """
-    scale = np.ones_like(pressure_Pa) if weights == "ratio" else pressure_Pa
+    scale = {"ratio": np.ones_like(pressure_Pa), "force": pressure_Pa, "relative": 1.0 / friction}[weights]
     columns = np.stack([scale, scale / pressure_Pa], axis=1)
     return np.asarray(np.linalg.lstsq(columns, friction * scale, rcond=None)[0])

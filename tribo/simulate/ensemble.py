@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 AngleRule = Literal["midpoints", "random"]
+Angles = AngleRule | Sequence[float]
 Progress = Callable[[int, int], None]
 ANGLE_SPREAD_DEG = 10.0  # around the nominal direction of an anisotropic sample (Berardo 2019)
 
@@ -50,12 +51,13 @@ def stratified_design(
     repeats: int = 4,
     seed: int = 0,
     base: SimConfig | None = None,
-    angles: AngleRule = "midpoints",
+    angles: Angles = "midpoints",
 ) -> list[SimConfig]:
     """Configurations of an ensemble: every sample at every pressure, ``repeats`` times.
 
     The angle range of a sample is cut into as many strata as there are repeats. One angle stands in each: its
-    middle, which averages the uniform law of the paper best, or a random one.
+    middle, which averages the uniform law of the paper best, or a random one. Angles given in degrees are each
+    pulled ``repeats`` times instead.
 
     Parameters
     ----------
@@ -67,19 +69,26 @@ def stratified_design(
     patterns = dict(samples) if isinstance(samples, Mapping) else dict.fromkeys(samples)
     design = []
     for sample, pattern in patterns.items():
-        low, high = angle_range_deg(sample, pattern)
-        pressures = pressures_Pa[sample] if isinstance(pressures_Pa, Mapping) else pressures_Pa
-        for pressure in pressures:
-            for repeat in range(repeats):
-                own = run_seed(seed, sample, pressure, repeat)
-                within = 0.5 if angles == "midpoints" else np.random.default_rng([own, 1]).random()
-                angle = float(low + (high - low) * (repeat + within) / repeats)
-                design.append(
-                    base.with_(
-                        sample=sample, pattern=pattern, pressure_Pa=float(pressure), angle_deg=angle, seed=own
-                    )
-                )
+        for pressure in pressures_Pa[sample] if isinstance(pressures_Pa, Mapping) else pressures_Pa:
+            runs = range(repeats if isinstance(angles, str) else repeats * len(angles))
+            seeds = [run_seed(seed, sample, pressure, k) for k in runs]
+            pulls = _angles_deg(angles, angle_range_deg(sample, pattern), repeats, seeds)
+            design += [
+                base.with_(sample=sample, pattern=pattern, pressure_Pa=float(pressure), angle_deg=angle, seed=own)
+                for own, angle in zip(seeds, pulls, strict=True)
+            ]
     return design
+
+
+def _angles_deg(
+    angles: Angles, limits_deg: tuple[float, float], repeats: int, seeds: Sequence[int]
+) -> list[float]:
+    """The pull angle of every run at one pressure."""
+    if not isinstance(angles, str):
+        return [float(angle) for angle in angles for _ in range(repeats)]
+    low, high = limits_deg
+    within = [0.5 if angles == "midpoints" else np.random.default_rng([own, 1]).random() for own in seeds]
+    return [float(low + (high - low) * (k + share) / repeats) for k, share in enumerate(within)]
 
 
 def run_row(run: Run) -> dict[str, Any]:

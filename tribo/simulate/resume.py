@@ -8,9 +8,11 @@ opens the file for writing again, so that a process killed at any moment leaves 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,10 +20,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tribo.errors import Problem, SimulationError
+from tribo.records import Run
 from tribo.simulate.config import SimConfig
 from tribo.simulate.ensemble import Progress, check_all, run_row
 from tribo.simulate.run import simulate
-from tribo.simulate.store import attributes, versions, written
+from tribo.simulate.store import attributes, unit_of, versions, written
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,6 +33,20 @@ RESULTS = {
     "static_friction": "1", "sliding_friction": "1", "peak_s": "s", "first_failure_s": "s", "window_start_s": "s",
     "window_end_s": "s", "area_fraction": "1", "normal_load_N": "N",
 }  # fmt: skip
+INPUTS = {"sample": "1", "pressure_Pa": "Pa", "angle_deg": "degree", "seed": "1"}
+OF_THE_SAMPLE = {"pattern", "cavity", "cavity_size_m", "cavity_pitch_m", "cavity_staggered"}
+SCHEDULER_TIMEOUT_S = 10.0
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a store keeps of a run: a function to numbers by name (sent to workers), and their units."""
+
+    read: Callable[[Run], Mapping[str, Any]] = run_row
+    units: Mapping[str, str] = field(default_factory=lambda: RESULTS)
+
+
+FRICTION = Reading()
 
 
 def run_stored(
@@ -38,6 +55,7 @@ def run_stored(
     jobs: int = 2,
     scheduler: str | None = None,
     progress: Progress | None = None,
+    reading: Reading = FRICTION,
 ) -> pd.DataFrame:
     """Run what ``path`` does not hold yet of a design, and return all of it.
 
@@ -48,24 +66,25 @@ def run_stored(
     jobs : threads on this machine
     scheduler : address of a dask.distributed scheduler; its workers then run the cells (optional dependency)
     progress : called with the runs done, earlier starts included, and their total
+    reading : what is kept of a run, static and sliding friction with their times by default
 
     Raises
     ------
     SimulationError
-        An impossible configuration, a file of another design, or no dask where a scheduler is given.
+        An impossible configuration, a file of another design, or no dask or no scheduler where one is given.
     """
     path = Path(path)
     check_all(design)
     if not path.exists():
-        _create(design, path)
-    _refuse_other_design(design, path)
+        _create(design, path, reading)
+    _refuse_other_design(design, path, reading)
     missing = [k for k, done in enumerate(read_stored(path)["done"]) if not done]
     finished = len(design) - len(missing)
     if progress is not None:
         progress(finished, len(design))
-    with _columns(path) as columns:
-        for k, row in _rows(design, missing, jobs, scheduler):
-            for name in RESULTS:
+    with _columns(path, reading) as columns:
+        for k, row in _rows(design, missing, jobs, scheduler, partial(cell, read=reading.read)):
+            for name in reading.units:
                 columns[name][k] = row[name]
             columns["done"][k] = 1
             finished += 1
@@ -80,43 +99,61 @@ def read_stored(path: str | Path) -> pd.DataFrame:
     import pandas as pd
 
     with h5py.File(path) as file:
-        columns = {name: file[name][:] for name in ("sample", "pressure_Pa", "angle_deg", "seed", *RESULTS, "done")}
-    columns["sample"] = [text.decode() for text in columns["sample"]]
-    return pd.DataFrame(columns | {"done": columns["done"].astype(bool)})
+        columns = {name: file[name][:] for name in file.attrs["columns"]}
+    texts = {name: [t.decode() for t in column] for name, column in columns.items() if column.dtype == object}
+    return pd.DataFrame(columns | texts | {"done": columns["done"].astype(bool)})
 
 
-def fingerprint(design: Iterable[SimConfig]) -> str:
-    """Hash of every field of every configuration, in order."""
-    digest = hashlib.sha256()
+def fingerprint(design: Iterable[SimConfig], reading: Reading = FRICTION) -> str:
+    """Hash of every field of every configuration, in order, and of the names that are kept of a run."""
+    digest = hashlib.sha256(repr(list(reading.units)).encode())
     for config in design:
         digest.update(repr(config).encode())
     return digest.hexdigest()
 
 
-def _create(design: Sequence[SimConfig], path: Path) -> None:
+def _create(design: Sequence[SimConfig], path: Path, reading: Reading) -> None:
     import h5py
+
+    given: dict[str, Any] = {name: [getattr(c, name) for c in design] for name in INPUTS} | _varied_parameters(design)
+    empty = dict.fromkeys(reading.units, np.full(len(design), np.nan))
+    columns = given | empty | {"done": np.zeros(len(design), np.uint8)}
 
     def write(target: Path) -> None:
         with h5py.File(target, "w") as file:
             file.attrs["title"] = "an ensemble of the spring-block model, one entry a run"
-            file.attrs["design"] = fingerprint(design)
-            shared = _shared_parameters(design)
-            for name, value in (attributes(shared) | versions()).items():
+            file.attrs["design"] = fingerprint(design, reading)
+            file.attrs["columns"] = list(columns)
+            for name, value in (attributes(_shared_parameters(design)) | versions()).items():
                 file.attrs[name] = value
             run = file.create_dataset("run", data=np.arange(len(design)))
             run.make_scale("run")
-            text = np.array([c.sample for c in design], dtype=h5py.string_dtype())
-            inputs: dict[str, Any] = {"sample": text}
-            inputs |= {
-                name: np.array([getattr(c, name) for c in design]) for name in ("pressure_Pa", "angle_deg", "seed")
-            }
-            empty = {name: np.full(len(design), np.nan) for name in RESULTS}
-            for name, values in (inputs | empty | {"done": np.zeros(len(design), np.uint8)}).items():
-                column = file.create_dataset(name, data=values)
+            for name, values in columns.items():
+                column = file.create_dataset(name, data=_as_stored(values))
                 column.dims[0].attach_scale(run)
-                column.attrs["units"] = {"pressure_Pa": "Pa", "angle_deg": "degree"}.get(name, RESULTS.get(name, "1"))
+                column.attrs["units"] = {**INPUTS, **reading.units}.get(name) or unit_of(name)
 
     written(path, write)
+
+
+def _as_stored(values: Any) -> Any:
+    """Numbers as they are; everything else as text."""
+    import h5py
+
+    array = np.array(values) if all(np.isscalar(v) for v in values) else np.array([str(v) for v in values])
+    return array.astype(h5py.string_dtype()) if array.dtype.kind == "U" else array
+
+
+def _varied_parameters(design: Sequence[SimConfig]) -> dict[str, Any]:
+    """The parameters, beside the inputs, that differ between runs; those that follow from the sample are left out."""
+    all_parameters = [config.parameters() for config in design]
+    names = {name: None for parameters in all_parameters for name in parameters}
+    shared = _shared_parameters(design)
+    return {
+        name: [p.get(name, "") for p in all_parameters]
+        for name in names
+        if name not in shared and name not in INPUTS and name not in OF_THE_SAMPLE
+    }
 
 
 def _shared_parameters(design: Sequence[SimConfig]) -> dict[str, Any]:
@@ -126,7 +163,7 @@ def _shared_parameters(design: Sequence[SimConfig]) -> dict[str, Any]:
     return {name: value for name, value in first.items() if all(p.get(name) == value for p in all_parameters)}
 
 
-def _refuse_other_design(design: Sequence[SimConfig], path: Path) -> None:
+def _refuse_other_design(design: Sequence[SimConfig], path: Path, reading: Reading) -> None:
     import h5py
 
     try:
@@ -134,7 +171,7 @@ def _refuse_other_design(design: Sequence[SimConfig], path: Path) -> None:
             known = file.attrs.get("design")
     except OSError as why:
         raise SimulationError(Problem("not_a_store", f"cannot be read as HDF5: {why}", file=str(path))) from why
-    if known != fingerprint(design):
+    if known != fingerprint(design, reading):
         raise SimulationError(
             Problem(
                 "other_design", "holds an ensemble of another design", file=str(path), allowed="a new file, or the same"
@@ -143,12 +180,13 @@ def _refuse_other_design(design: Sequence[SimConfig], path: Path) -> None:
 
 
 @contextmanager
-def _columns(path: Path) -> Iterator[dict[str, Any]]:
+def _columns(path: Path, reading: Reading) -> Iterator[dict[str, Any]]:
     """The result columns of a store as arrays mapped into memory, writable in place."""
     import h5py
 
+    names = (*reading.units, "done")
     with h5py.File(path) as file:
-        places = {name: (file[name].id.get_offset(), file[name].shape, file[name].dtype) for name in (*RESULTS, "done")}
+        places = {name: (file[name].id.get_offset(), file[name].shape, file[name].dtype) for name in names}
     columns = {
         name: np.memmap(path, dtype, "r+", offset, shape) for name, (offset, shape, dtype) in places.items()
     }
@@ -159,20 +197,24 @@ def _columns(path: Path) -> Iterator[dict[str, Any]]:
             column.flush()
 
 
-def cell(config: SimConfig) -> dict[str, Any]:
+def cell(config: SimConfig, read: Callable[[Run], Mapping[str, Any]]) -> Mapping[str, Any]:
     """One run as the row of the table, for workers in other processes."""
-    return run_row(simulate(config))
+    return read(simulate(config))
 
 
 def _rows(
-    design: Sequence[SimConfig], missing: Sequence[int], jobs: int, scheduler: str | None
-) -> Iterator[tuple[int, dict[str, Any]]]:
+    design: Sequence[SimConfig],
+    missing: Sequence[int],
+    jobs: int,
+    scheduler: str | None,
+    work: Callable[[SimConfig], Mapping[str, Any]],
+) -> Iterator[tuple[int, Mapping[str, Any]]]:
     """Results in the order they come in, each with its place in the design."""
     if scheduler is not None:
-        yield from _distributed_rows(design, missing, scheduler)
+        yield from _distributed_rows(design, missing, scheduler, work)
         return
     with ThreadPoolExecutor(max(1, jobs)) as pool:
-        pending = {pool.submit(cell, design[k]): k for k in missing}
+        pending = {pool.submit(work, design[k]): k for k in missing}
         try:
             for future in as_completed(pending):
                 yield pending[future], future.result()
@@ -182,8 +224,21 @@ def _rows(
 
 
 def _distributed_rows(
-    design: Sequence[SimConfig], missing: Sequence[int], scheduler: str
-) -> Iterator[tuple[int, dict[str, Any]]]:
+    design: Sequence[SimConfig],
+    missing: Sequence[int],
+    scheduler: str,
+    work: Callable[[SimConfig], Mapping[str, Any]],
+) -> Iterator[tuple[int, Mapping[str, Any]]]:
+    with _client(scheduler) as (client, as_done):
+        futures = client.map(work, [design[k] for k in missing], pure=False)
+        place = {future.key: k for future, k in zip(futures, missing, strict=True)}
+        for future, row in as_done(futures, with_results=True):
+            yield place[future.key], row
+
+
+@contextmanager
+def _client(scheduler: str) -> Iterator[tuple[Any, Any]]:
+    """A client of the scheduler at this address, and the function that yields its futures as they are done."""
     try:
         distributed = import_module("distributed")
     except ImportError as why:
@@ -193,8 +248,14 @@ def _distributed_rows(
                 allowed="pip install distributed, or no scheduler",
             )
         ) from why
-    with distributed.Client(scheduler) as client:
-        futures = client.map(cell, [design[k] for k in missing], pure=False)
-        place = {future.key: k for future, k in zip(futures, missing, strict=True)}
-        for future, row in distributed.as_completed(futures, with_results=True):
-            yield place[future.key], row
+    try:
+        client = distributed.Client(scheduler, timeout=SCHEDULER_TIMEOUT_S)
+    except (OSError, ValueError) as why:
+        raise SimulationError(
+            Problem(
+                "no_scheduler", f"no dask scheduler answers: {why}", column="scheduler", found=scheduler,
+                allowed="the address a running dask scheduler prints, such as tcp://HOST:8786",
+            )
+        ) from why
+    with client:
+        yield client, distributed.as_completed

@@ -1,16 +1,17 @@
-"""The numerical column of the paper's Table 2, computed anew, and what its silent choices do to it."""
+"""The numerical column of the paper's Table 2, computed anew and set beside the printed one."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tribo.records import FloatArray
 from tribo.simulate.calibration import simulated_law
 from tribo.simulate.config import SimConfig
-from tribo.simulate.ensemble import AngleRule, Progress, run_ensemble, stratified_design
+from tribo.simulate.ensemble import Angles, Progress, run_ensemble, stratified_design
 from tribo.simulate.resume import run_stored
 
 if TYPE_CHECKING:
@@ -20,15 +21,18 @@ SAMPLES = ("F", "A", "B", "C", "Sx", "Sy")
 PRESSURES_PA = (3e3, 5e3, 8e3, 11e3, 14e3, 17.5e3, 21e3, 25e3)
 """Eight pressures over the range of the paper, which does not list its own."""
 
-STUDY: dict[str, dict[str, Any]] = {
-    "baseline": {},
-    "K_s halved": {"shear_factor": 0.5},
-    "cavities touch the edge": {"pattern_first": (0, 0)},
-    "K_s halved, cavities touch the edge": {"shear_factor": 0.5, "pattern_first": (0, 0)},
-    "first local peak, window from 2 peak times": {"peak_rule": "first", "window_start_peaks": 2.0},
-    "p l2 on every block": {"normal_force": "uniform"},
-}
-"""Choices the text leaves open, as changes of the baseline; periodic edges, angles and weights are asked apart."""
+
+
+def table2_design(
+    base: SimConfig | None = None,
+    repeats: int = 20,
+    pressures_Pa: Sequence[float] = PRESSURES_PA,
+    samples: Sequence[str] = SAMPLES,
+    seed: int = 0,
+    angles: Angles = "midpoints",
+) -> list[SimConfig]:
+    """The runs behind the numerical column: 20 at each of 8 pressures for 6 samples, 960 in all, by default."""
+    return stratified_design(samples, pressures_Pa, repeats, seed, base, angles)
 
 
 def table2(
@@ -43,7 +47,7 @@ def table2(
     scheduler: str | None = None,
     published: pd.DataFrame | None = None,
     progress: Progress | None = None,
-    angles: AngleRule = "midpoints",
+    angles: Angles = "midpoints",
 ) -> pd.DataFrame:
     """mu and tau0 of the simulated samples, static and sliding, as in Berardo 2019, Table 2.
 
@@ -51,7 +55,7 @@ def table2(
     ----------
     base : everything the design does not vary; the paper's parameters by default
     repeats, pressures_Pa, samples : 20 runs at each of 8 pressures for 6 samples, 960 in all, by default
-    weights : "ratio" fits T/N = mu + tau0/p, "force" fits T = mu N + tau0 A
+    weights : as for :func:`tribo.simulate.calibration.simulated_law`
     path, scheduler : as for :func:`tribo.simulate.resume.run_stored`; without a path nothing is kept
     published : the published table (columns sample, regime, source, mu, tau0_kPa); adds the deviations
 
@@ -60,7 +64,7 @@ def table2(
     DataFrame with sample, regime, mu, mu_se, tau0_kPa, tau0_kPa_se and, with ``published``, mu_paper,
     tau0_kPa_paper, mu_deviation_percent, tau0_deviation_percent.
     """
-    design = stratified_design(samples, pressures_Pa, repeats, seed, base, angles)
+    design = table2_design(base, repeats, pressures_Pa, samples, seed, angles)
     runs = run_stored(design, path, jobs, scheduler, progress) if path else run_ensemble(design, jobs, progress)
     table = fitted(runs, weights)
     return table if published is None else beside(table, published)
@@ -74,12 +78,9 @@ def fitted(runs: pd.DataFrame, weights: str = "ratio", resamples: int = 200) -> 
     rows = []
     for sample, group in runs.groupby("sample", sort=False):
         pressure = group["pressure_Pa"].to_numpy(float)
-        strata = [np.flatnonzero(pressure == p) for p in np.unique(pressure)]
         for regime in ("static", "sliding"):
-            friction = group[f"{regime}_friction"].to_numpy(float)
-            mu, tau0 = simulated_law(pressure, friction, weights)
-            drawn = [np.concatenate([rng.choice(s, s.size) for s in strata]) for _ in range(resamples)]
-            se = np.std([simulated_law(pressure[k], friction[k], weights) for k in drawn], axis=0, ddof=1)
+            laws = resampled_laws(pressure, group[f"{regime}_friction"].to_numpy(float), weights, rng, resamples)
+            (mu, tau0), se = laws[0], laws[1:].std(axis=0, ddof=1)
             rows.append(
                 {
                     "sample": sample, "regime": regime, "mu": mu, "mu_se": se[0], "tau0_kPa": tau0 / 1e3,
@@ -87,6 +88,15 @@ def fitted(runs: pd.DataFrame, weights: str = "ratio", resamples: int = 200) -> 
                 }
             )  # fmt: skip
     return pd.DataFrame(rows)
+
+
+def resampled_laws(
+    pressure_Pa: FloatArray, friction: FloatArray, weights: str, rng: np.random.Generator, resamples: int
+) -> FloatArray:
+    """(mu, tau0 in Pa) of the runs, then of ``resamples`` drawings of them with replacement at each pressure."""
+    strata = [np.flatnonzero(pressure_Pa == p) for p in np.unique(pressure_Pa)]
+    drawn = [np.concatenate([rng.choice(s, s.size) for s in strata]) for _ in range(resamples)]
+    return np.array([simulated_law(pressure_Pa[k], friction[k], weights) for k in (np.arange(len(friction)), *drawn)])
 
 
 def beside(table: pd.DataFrame, published: pd.DataFrame) -> pd.DataFrame:
@@ -104,26 +114,24 @@ def beside(table: pd.DataFrame, published: pd.DataFrame) -> pd.DataFrame:
     return both
 
 
-def study(
-    published: pd.DataFrame,
-    variants: Mapping[str, Mapping[str, Any]] = STUDY,
-    base: SimConfig | None = None,
-    folder: str | Path | None = None,
-    **design: Any,
-) -> pd.DataFrame:
-    """:func:`table2` under each variant of the baseline, one block of rows a variant (column ``variant``)."""
-    import pandas as pd
-
-    base = base or SimConfig()
-    tables = []
-    for k, (name, changes) in enumerate(variants.items()):
-        path = None if folder is None else Path(folder) / f"variant-{k:02d}.h5"
-        table = table2(base.with_(**changes), published=published, path=path, **design)
-        tables.append(table.assign(variant=name))
-    return pd.concat(tables, ignore_index=True)
-
-
 def distance(table: pd.DataFrame) -> dict[str, float]:
     """How far a table lies from the published one: root mean square of the deviations in percent."""
     columns = ("mu_deviation_percent", "tau0_deviation_percent", "friction_deviation_percent")
     return {name: float(np.sqrt((table[name] ** 2).mean())) for name in columns}
+
+
+def table2_text(table: pd.DataFrame) -> str:
+    """The computed column beside the printed one, a line a sample and regime, each number with its deviation."""
+    head = f"{'':<12}{'mu':>17}{'paper':>8}{'dev. %':>8}{'tau0 / kPa':>17}{'paper':>8}{'dev. %':>8}{'at 10 kPa %':>13}"
+    lines = [
+        f"{r.sample:<3}{r.regime:<9}{r.mu:>8.3f} +- {r.mu_se:.3f}{r.mu_paper:>8.3f}{r.mu_deviation_percent:>+8.1f}"
+        f"{r.tau0_kPa:>10.2f} +- {r.tau0_kPa_se:.2f}{r.tau0_kPa_paper:>8.2f}{r.tau0_deviation_percent:>+8.1f}"
+        f"{r.friction_deviation_percent:>+13.1f}"
+        for r in table.itertuples(index=False)
+    ]
+    rms = distance(table)
+    foot = (
+        f"root mean square of the deviations: mu {rms['mu_deviation_percent']:.1f} %, "
+        f"tau0 {rms['tau0_deviation_percent']:.1f} %, T/N at 10 kPa {rms['friction_deviation_percent']:.1f} %"
+    )
+    return "\n".join([head, *lines, foot])
