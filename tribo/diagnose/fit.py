@@ -15,6 +15,7 @@ from tribo.records import FloatArray
 SPECIMEN_PRIOR = (0.05, 4.0)  # expected gain of a specimen, and how many specimens that is worth
 REPEAT_PRIOR = (0.08, 4.0)
 TRIAL_STEPS = 5
+STILL = 0.02  # standard errors of a step below which derivatives are not taken anew
 SMALLEST_SD = 0.003  # of ln T: no reading repeats better
 _SCALE = np.array([1.0, 5.0, 1.0, 5.0])
 
@@ -68,6 +69,8 @@ def fit(
     if len(starts) > 1:
         short = [_fit_from(s, tuple(acting), law, values, begin, noise is None, TRIAL_STEPS) for values in starts]
         best = max(short, key=lambda f: f.score)
+        if iterations <= TRIAL_STEPS:
+            return best
         law, starts, begin = best.law, [list(best.values)], best.noise
     return _fit_from(s, tuple(acting), law, starts[0], begin, noise is None, iterations)
 
@@ -99,23 +102,28 @@ def _fit_from(
     sizes = [len(v) for v in values]
     x = np.concatenate([law, *values])
     low, high = _bounds(acting)
-    effects = np.zeros(s.random.shape[2])
+    effects, fitted = np.zeros(s.random.shape[2]), np.zeros((s.observations.n, 2))
     residual = s.observations.log_force - _predict(s, x, acting, sizes)
-    score = -np.inf
+    score, jacobian, moved = -np.inf, np.zeros((0, 2, 0)), np.inf
+    moments = np.einsum("nrp,nsq->rspq", s.random, s.random, optimize=True)
     for _ in range(iterations):
-        jacobian = _jacobian(s, x, acting, sizes, s.observations.log_force - residual)
-        weight = weights(s, noise, residual - s.random @ effects)
-        system = _solve(s, noise, weight, jacobian, residual, x, low, high)
-        x, effects, residual = _step(s, acting, sizes, noise, x, effects, residual, system, low, high)
+        if moved > STILL:
+            jacobian = _jacobian(s, x, acting, sizes, s.observations.log_force - residual)
+        factor = whitener(s, noise)
+        weight = weights(s, noise, residual - fitted, factor)
+        system = _solve(s, noise, factor, weight, jacobian, residual, x, low, high)
+        before = x
+        x, effects, residual = _step(s, acting, sizes, noise, factor, x, effects, residual, system, low, high)
+        fitted = s.random @ effects
+        moved = float(np.max(np.abs(x - before) / np.sqrt(np.diag(system.inverse)[: len(x)] + 1e-300)))
         if estimate:
-            noise = _update(s, noise, weight, residual - s.random @ effects, effects, system)
-        last, score = score, _score(s, noise, residual, effects)
+            noise = _update(s, noise, weight, residual - fitted, effects, system, moments)
+        last, score = score, _score(s, noise, residual, fitted, effects)
         if abs(score - last) < 2e-3:
             break
     return ModelFit(
         s, acting, x[:N_LAW], tuple(np.split(x[N_LAW:], np.cumsum(sizes)[:-1])) if acting else (),
-        noise, effects, residual, weights(s, noise, residual - s.random @ effects), score,
-        system.inverse,
+        noise, effects, residual, weights(s, noise, residual - fitted), score, system.inverse,
     )  # fmt: skip
 
 
@@ -163,10 +171,15 @@ def whitener(s: Setup, noise: Noise) -> FloatArray:
     return factor
 
 
-def weights(s: Setup, noise: Noise, left: FloatArray) -> FloatArray:
+def weights(s: Setup, noise: Noise, left: FloatArray, factor: FloatArray | None = None) -> FloatArray:
     """Weight of every test under the bivariate t, one on average for normal noise, shape (n,)."""
-    distance = np.sum(np.einsum("nij,nj->ni", whitener(s, noise), left) ** 2, axis=1)
-    return (noise.tail + 2.0) / (noise.tail + distance)
+    return (noise.tail + 2.0) / (noise.tail + _distance(whitener(s, noise) if factor is None else factor, left))
+
+
+def _distance(factor: FloatArray, left: FloatArray) -> FloatArray:
+    """Squared length of what is left of every test, whitened, shape (n,)."""
+    static = factor[:, 0, 0] * left[:, 0]
+    return static**2 + (factor[:, 1, 0] * left[:, 0] + factor[:, 1, 1] * left[:, 1]) ** 2
 
 
 def prior_precision(s: Setup, noise: Noise) -> FloatArray:
@@ -175,9 +188,11 @@ def prior_precision(s: Setup, noise: Noise) -> FloatArray:
     return 1.0 / sd**2
 
 
-def whitened(s: Setup, noise: Noise, weight: FloatArray, columns: FloatArray) -> FloatArray:
+def whitened(
+    s: Setup, noise: Noise, weight: FloatArray, columns: FloatArray, factor: FloatArray | None = None
+) -> FloatArray:
     """Columns (n, 2, k) in units of the weighted noise, shape (2n, k), static rows first."""
-    factor = whitener(s, noise) * np.sqrt(weight)[:, None, None]
+    factor = (whitener(s, noise) if factor is None else factor) * np.sqrt(weight)[:, None, None]
     n = len(columns)
     white = np.empty((2 * n, columns.shape[2]))
     np.multiply(columns[:, 0], factor[:, 0, :1], out=white[:n])
@@ -189,6 +204,7 @@ def whitened(s: Setup, noise: Noise, weight: FloatArray, columns: FloatArray) ->
 def _solve(
     s: Setup,
     noise: Noise,
+    factor: FloatArray,
     weight: FloatArray,
     jacobian: FloatArray,
     residual: FloatArray,
@@ -199,7 +215,7 @@ def _solve(
     """One step; a parameter at a bound that would leave it is held there."""
     p = len(x)
     both = np.concatenate([jacobian, s.random, residual[:, :, None]], axis=2)
-    white = whitened(s, noise, weight, both)
+    white = whitened(s, noise, weight, both, factor)
     columns, target = white[:, :-1], white[:, -1]
     precision = np.concatenate([np.full(p, 1e-12), prior_precision(s, noise)])
     normal = columns.T @ columns + np.diag(precision)
@@ -207,8 +223,11 @@ def _solve(
     held = np.zeros(len(right), bool)
     for _ in range(3):
         free = ~held
-        inverse = np.zeros_like(normal)
-        inverse[np.ix_(free, free)] = _inverse(normal[np.ix_(free, free)])
+        if held.any():
+            inverse = np.zeros_like(normal)
+            inverse[np.ix_(free, free)] = _inverse(normal[np.ix_(free, free)])
+        else:
+            inverse = _inverse(normal)
         solution = inverse @ right
         outward = ((x <= low) & (solution[:p] < 0)) | ((x >= high) & (solution[:p] > 0))
         if not (outward & ~held[:p]).any():
@@ -229,6 +248,7 @@ def _step(
     acting: Sequence[Acting],
     sizes: Sequence[int],
     noise: Noise,
+    factor: FloatArray,
     x: FloatArray,
     effects: FloatArray,
     residual: FloatArray,
@@ -238,45 +258,50 @@ def _step(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The longest of a halved sequence of steps that does not worsen the penalised likelihood."""
     p = len(x)
-    factor, precision = whitener(s, noise), prior_precision(s, noise)
-    before = _penalised(s, noise, residual, effects, factor, precision)
+    precision = prior_precision(s, noise)
+    before = _penalised(noise, residual - s.random @ effects, effects, factor, precision)
     for length in (1.0, 0.5, 0.25, 0.1, 0.02):
         trial = np.clip(x + length * system.solution[:p], low, high)
         moved = effects + length * (system.solution[p:] - effects)
         left = s.observations.log_force - _predict(s, trial, acting, sizes)
-        if _penalised(s, noise, left, moved, factor, precision) >= before - 1e-9:
+        if _penalised(noise, left - s.random @ moved, moved, factor, precision) >= before - 1e-9:
             return trial, moved, left
     return x, effects, residual
 
 
 def _penalised(
-    s: Setup, noise: Noise, residual: FloatArray, effects: FloatArray, factor: FloatArray, precision: FloatArray
+    noise: Noise, left: FloatArray, effects: FloatArray, factor: FloatArray, precision: FloatArray
 ) -> float:
     """Log density of the tests given the effects, plus that of the effects, without constants of the noise."""
-    left = np.einsum("nij,nj->ni", factor, residual - s.random @ effects)
-    distance = np.sum(left**2, axis=1)
-    tests = -0.5 * (noise.tail + 2.0) * np.sum(np.log1p(distance / noise.tail))
+    tests = -0.5 * (noise.tail + 2.0) * np.sum(np.log1p(_distance(factor, left) / noise.tail))
     return float(tests - 0.5 * np.sum(effects**2 * precision))
 
 
-def _score(s: Setup, noise: Noise, residual: FloatArray, effects: FloatArray) -> float:
+def _score(s: Setup, noise: Noise, residual: FloatArray, fitted: FloatArray, effects: FloatArray) -> float:
     """Log marginal likelihood by Laplace's method, with the priors of the noise sizes."""
-    weight = weights(s, noise, residual - s.random @ effects)
-    white = whitened(s, noise, weight, s.random)
-    precision = prior_precision(s, noise)
-    curvature = np.linalg.slogdet(white.T @ white + np.diag(precision))[1]
-    factor = whitener(s, noise)
+    factor, precision = whitener(s, noise), prior_precision(s, noise)
+    weight = weights(s, noise, residual - fitted, factor)
+    white = whitened(s, noise, weight, s.random, factor)
+    root = np.linalg.cholesky(white.T @ white + np.diag(precision))
+    curvature = 2.0 * np.sum(np.log(np.diag(root)))
     scale = float(np.sum(np.log(factor[:, 0, 0] * factor[:, 1, 1])))
     size, worth = SPECIMEN_PRIOR
     prior = -0.5 * worth * np.sum(2 * np.log(noise.specimen) + (size / noise.specimen) ** 2)
-    penalised = _penalised(s, noise, residual, effects, factor, precision)
+    penalised = _penalised(noise, residual - fitted, effects, factor, precision)
     return float(penalised + scale + 0.5 * np.sum(np.log(precision)) - 0.5 * curvature + prior)
 
 
 def _update(
-    s: Setup, noise: Noise, weight: FloatArray, left: FloatArray, effects: FloatArray, system: System
+    s: Setup,
+    noise: Noise,
+    weight: FloatArray,
+    left: FloatArray,
+    effects: FloatArray,
+    system: System,
+    moments: FloatArray,
 ) -> Noise:
-    """One step of expectation-maximisation of the noise sizes, with weak priors."""
+    """One step of expectation-maximisation of the noise sizes, with weak priors; ``moments`` (2, 2, q, q) are the
+    sums over the tests of products of the random columns."""
     q = s.random.shape[2]
     spread = system.inverse[-q:, -q:]
     variance = effects**2 + np.diag(spread)
@@ -286,9 +311,7 @@ def _update(
     ]
     n = s.observations.n
     p = system.inverse.shape[0] - q
-    total = np.einsum("n,nr,ns->rs", weight, left, left)
-    blurred = s.random @ spread
-    total += np.einsum("n,nrq,nsq->rs", weight, blurred, s.random)
+    total = (left * weight[:, None]).T @ left + np.sum(moments * spread, axis=(2, 3))
     size, worth = REPEAT_PRIOR
     reading = np.diag(np.mean(s.observations.reading**2, axis=0))
     repeat = (total + worth * size**2 * np.eye(2)) / (n - p / 2 + worth) - reading

@@ -7,6 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from tribo.diagnose.instrument import Evidence
+from tribo.diagnose.interval import intervals
 from tribo.diagnose.looks import OBSERVABLES, Look, candidates
 from tribo.diagnose.model import ModelFit, predict
 from tribo.diagnose.screen import Screen, beyond_law, cleared
@@ -100,14 +101,12 @@ def cause_of(candidate: Candidate, weight: float, baseline: ModelFit) -> Cause:
 
 
 def estimates(f: ModelFit, index: int) -> dict[str, Estimate]:
-    """Parameters of one mechanism of a fit with 90 % intervals, kept inside their bounds."""
-    offset = 4 + sum(len(v) for v in f.values[:index])
-    found = {}
-    for k, p in enumerate(f.acting[index].mechanism.parameters):
-        value = float(f.values[index][k])
-        half = 1.645 * float(np.sqrt(max(f.covariance[offset + k, offset + k], 0.0)))
-        found[p.name] = Estimate(value, max(value - half, p.low), min(value + half, p.high), p.unit)
-    return found
+    """Parameters of one mechanism of a fit with their 90 % intervals."""
+    parameters = f.acting[index].mechanism.parameters
+    return {
+        p.name: Estimate(float(value), low, high, p.unit)
+        for p, value, (low, high) in zip(parameters, f.values[index], intervals(f, index), strict=True)
+    }
 
 
 def cause_from_evidence(name: str, e: Evidence, others: dict[str, Evidence]) -> tuple[Cause, Misfit]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tribo.diagnose.fit import fit
+from tribo.diagnose.fit import TRIAL_STEPS, fit
 from tribo.diagnose.looks import candidates
 from tribo.diagnose.model import Acting, ModelFit, log_forces, predict
 from tribo.diagnose.screen import cleared
@@ -15,6 +15,7 @@ from tribo.records import FloatArray
 
 PER_PARAMETER = 1.0  # log likelihood that a further parameter has to earn
 CHOICES_FITTED = 4  # of a mechanism with many choices, how many are fitted in full
+IN_REACH, CLOSE_BY = 0.5, 3.0  # share of the best first gain, less so much, from which a mechanism is fitted to the end
 LABEL_SD = 0.15  # a wrong label is all or nothing
 ALIKE = 0.95  # cosine from which two mechanisms cannot be told apart
 SEEN = 1e-3  # share of a mechanism's effect that must be left once the flat law is free
@@ -40,17 +41,21 @@ class Candidate:
 
 
 def weigh(start: ModelFit, excluded: Sequence[str] = ()) -> list[Candidate]:
-    """Every mechanism that is not excluded, added to ``start``; the best choice of each, best first."""
+    """Every mechanism that is not excluded, added to ``start``; the best choice of each, best first.
+
+    All are tried in a few steps, and those within reach of the best are fitted to the end.
+    """
     groups: dict[str, list[Acting]] = {}
     for acting in candidates(start.setup, start.law):
         if acting.name not in excluded and acting not in start.acting:
             groups.setdefault(acting.mechanism.name, []).append(acting)
-    found = []
+    tried: dict[str, Candidate] = {}
     for group in groups.values():
-        chosen = _most_promising(start, group)
-        fitted = [_candidate(start, acting, len(group)) for acting in chosen]
-        best = {c.name: c for c in sorted(fitted, key=lambda c: c.gain)}
-        found += list(best.values())
+        short = [_candidate(start, acting, len(group), TRIAL_STEPS) for acting in _most_promising(start, group)]
+        tried |= {c.name: c for c in sorted(short, key=lambda c: c.gain)}
+    best = max((c.gain for c in tried.values()), default=0.0)
+    hopeful = IN_REACH * best - CLOSE_BY
+    found = [_to_the_end(start, c) if c.gain > hopeful else c for c in tried.values()]
     return sorted(found, key=lambda c: -c.gain)
 
 
@@ -69,12 +74,23 @@ def _most_promising(start: ModelFit, group: list[Acting]) -> list[Acting]:
     return [group[i] for i in np.argsort(-rank)[:CHOICES_FITTED]]
 
 
-def _candidate(start: ModelFit, acting: Acting, choices: int) -> Candidate:
-    fitted = fit(start.setup, (*start.acting, acting), start=start)
+def _candidate(start: ModelFit, acting: Acting, choices: int, iterations: int) -> Candidate:
+    fitted = fit(start.setup, (*start.acting, acting), start=start, iterations=iterations)
+    return _judged(start, fitted, float(np.log(choices)))
+
+
+def _to_the_end(start: ModelFit, c: Candidate) -> Candidate:
+    """A candidate that was only tried, fitted until nothing changes any more."""
+    return _judged(start, fit(start.setup, c.fit.acting, start=c.fit), c.raw - c.gain)
+
+
+def _judged(start: ModelFit, fitted: ModelFit, choosing: float) -> Candidate:
+    """What a fit earns beyond ``start``: its parameters and the choosing, in log likelihood, are paid for."""
+    acting = fitted.acting[-1]
     raw = fitted.score - start.score - PER_PARAMETER * (len(acting.mechanism.parameters) - 1)
     if acting.mechanism.name == "mislabelled_specimen":
         raw -= 0.5 * ((fitted.values[-1][0] - 1.0) / LABEL_SD) ** 2
-    return Candidate(acting, fitted, float(raw - np.log(choices)), float(raw))
+    return Candidate(acting, fitted, float(raw - choosing), float(raw))
 
 
 def effect(f: ModelFit, index: int = -1) -> FloatArray:

@@ -1,0 +1,77 @@
+"""Intervals of a mechanism's parameters: from the curvature, or by profile likelihood near a bound."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tribo.diagnose.fit import fit
+from tribo.diagnose.model import N_LAW, ModelFit
+from tribo.mechanisms.record import Mechanism
+
+NORMAL_90 = 1.645
+DROP_90 = 0.5 * NORMAL_90**2  # of the log likelihood at the ends of a 90 % interval
+NEAR = 2.0 * NORMAL_90  # standard errors from a bound within which the curvature is not trusted
+HALVINGS = 7
+
+
+def intervals(f: ModelFit, index: int) -> list[tuple[float, float]]:
+    """90 % interval of every parameter of the mechanism ``index`` of a fit, kept inside the bounds.
+
+    Where one of them lies at a bound or near it, the intervals of all are profile likelihoods, the others and the
+    flat law fitted anew at each value; the noise stays that of the fit.
+    """
+    errors = standard_errors(f, index)
+    parameters = f.acting[index].mechanism.parameters
+    values = f.values[index]
+    clear = all(
+        e > 0 and v - NEAR * e > p.low and v + NEAR * e < p.high
+        for v, e, p in zip(values, errors, parameters, strict=True)
+    )
+    if clear:
+        return [(float(v - NORMAL_90 * e), float(v + NORMAL_90 * e)) for v, e in zip(values, errors, strict=True)]
+    return [_profile(f, index, k, errors[k]) for k in range(len(parameters))]
+
+
+def standard_errors(f: ModelFit, index: int) -> list[float]:
+    """Of every parameter of one mechanism, from the curvature; zero for one held at a bound."""
+    first = N_LAW + sum(len(v) for v in f.values[:index])
+    diagonal = np.diag(f.covariance)[first : first + len(f.values[index])]
+    return [float(np.sqrt(max(d, 0.0))) for d in diagonal]
+
+
+def _profile(f: ModelFit, index: int, k: int, error: float) -> tuple[float, float]:
+    p = f.acting[index].mechanism.parameters[k]
+    return _end(f, index, k, p.low, error), _end(f, index, k, p.high, error)
+
+
+def _end(f: ModelFit, index: int, k: int, bound: float, error: float) -> float:
+    """Where the profile falls by DROP_90 between the estimate and a bound; the bound where it does not."""
+    best = float(f.values[index][k])
+    if best == bound or f.score - _score_at(f, index, k, bound) < DROP_90:
+        return bound
+    inside, outside = 0.0, 1.0  # shares of the way to the bound
+    first_try = min(2.0 * error / abs(bound - best), 0.5) or 0.5
+    for step in range(HALVINGS):
+        share = first_try if step == 0 else 0.5 * (inside + outside)
+        if f.score - _score_at(f, index, k, best + share * (bound - best)) < DROP_90:
+            inside = share
+        else:
+            outside = share
+    return best + 0.5 * (inside + outside) * (bound - best)
+
+
+def _score_at(f: ModelFit, index: int, k: int, value: float) -> float:
+    """Log likelihood with one parameter held at a value and everything but the noise fitted anew."""
+    acting, values = list(f.acting), [v.copy() for v in f.values]
+    acting[index] = replace(acting[index], mechanism=_held(acting[index].mechanism, k, value))
+    values[index][k] = value
+    begin = replace(f, acting=tuple(acting), values=tuple(values))
+    return fit(f.setup, acting, start=begin, noise=f.noise, iterations=12).score
+
+
+def _held(mechanism: Mechanism, k: int, value: float) -> Mechanism:
+    parameters = list(mechanism.parameters)
+    parameters[k] = replace(parameters[k], low=value, high=value)
+    return replace(mechanism, parameters=tuple(parameters))
