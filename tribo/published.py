@@ -46,6 +46,14 @@ def load_table2() -> pd.DataFrame:
     return _read("table2.csv")
 
 
+def load_table2_simulated_anew() -> pd.DataFrame:
+    """The simulated part of Table 2 as tribo's own engine gives it (960 runs at stratified angles, docs/table2.md).
+
+    Columns: sample, regime, mu, mu_se, tau0_kPa, tau0_kPa_se.
+    """
+    return _read("table2_tribo.csv")
+
+
 def load_model_parameters() -> pd.DataFrame:
     """Parameters of the paper's spring-block model: name, symbol, value, unit, place (section)."""
     return _read("model_parameters.csv")

@@ -12,6 +12,7 @@ from tribo.figures import (
     force,
     misfit,
     power,
+    published,
     pulls,
     ratio,
     residuals,
@@ -20,6 +21,7 @@ from tribo.figures import (
 from tribo.figures.record import FigureOf, StudyFigure
 
 if TYPE_CHECKING:
+    from tribo.diagnose.published import PublishedDiagnosis
     from tribo.figures.record import DiagnosisFigure
 
 FIGURES: dict[str, StudyFigure] = {
@@ -142,6 +144,31 @@ DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
             "takes up, that would be found one, five and nine times in ten.",
             power.numbers,
             power.draw,
+        ),
+    )
+}
+
+PUBLISHED_FIGURES: dict[str, FigureOf[PublishedDiagnosis]] = {
+    figure.name: figure
+    for figure in (
+        FigureOf(
+            "published",
+            "The published table against the model of the paper",
+            "Measured over simulated friction force at a load, from mu and tau0 of Table 2 of Berardo et al. (2019). "
+            "The band is the 90 % interval of the measurement with the correlation of mu and tau0 that loads spread "
+            "evenly over 3 to 25 kPa would give; dotted, if the two were independent. Dashed, the same model with its "
+            "flat law fitted to the whole table; red, with the best mechanism of the library on top.",
+            published.ratio_numbers,
+            published.draw_ratio,
+        ),
+        FigureOf(
+            "published-readings",
+            "What each reading of the table says of each mechanism",
+            "Log likelihood that each mechanism earns over the calibrated model. The three guesses of the authors "
+            "stand left of the line. Rows: whose simulation is the model, the correlation of mu and tau0, whether the "
+            "printed standard deviations are those of a mean or of three specimens, and the outcome.",
+            published.reading_numbers,
+            published.draw_readings,
         ),
     )
 }
