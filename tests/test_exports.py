@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from tribo import exports, stages
 from tribo.campaign import load_campaign
+from tribo.records import SetAside
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "data" / "example"
 
@@ -32,3 +34,15 @@ def test_faults_come_back_from_the_processes_too(monkeypatch, tmp_path: Path) ->
     ingested = stages.ingest(load_campaign(tmp_path / "campaign"), jobs=2)
     (fault,) = ingested.set_aside
     assert (fault.test_id, fault.problems[0].kind, fault.problems[0].file) == ("T005", "empty", "raw/T005.csv")
+
+
+def test_a_displacement_that_does_not_run_at_the_speed_of_the_test_is_doubted() -> None:
+    campaign = load_campaign(EXAMPLE)
+    test = campaign.tests[0]
+    assert test.speed_m_s is not None
+    for factor, doubted in ((1.0, False), (1.1, False), (2.0, True), (0.1, True)):
+        told = replace(test, speed_m_s=factor * test.speed_m_s)
+        ((_, outcome),) = exports.read_row(campaign.root, campaign.columns, "seed", told)
+        assert not isinstance(outcome, SetAside)
+        trace, pull = outcome
+        assert ("off_speed" in pull.flags) is ("off_speed" in {p.kind for p in trace.problems}) is doubted

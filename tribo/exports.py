@@ -20,6 +20,7 @@ from tribo.records import Campaign, Pull, SetAside, Test, Trace
 
 FEWEST_FOR_PROCESSES = 100  # below, starting processes costs more than it gains
 CHUNK = 16
+_OFF_SPEED = 0.2  # share by which the travel while sliding may differ from the speed of the test times the time
 _UNLOADED = 0.05  # share of the largest load of an export below which a piece of it carries none
 
 Outcome = tuple[Trace, Pull] | SetAside
@@ -53,8 +54,9 @@ def _whole(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> tup
     trace = read_export(root / test.file, columns=columns or None, name=test.test_id, file=test.file)
     test = _with_load(test, trace)
     pull = read_pull(trace, rule=rule, test=test)
-    if doubt := _several_pulls(trace):
-        flags, problems = (*trace.flags, doubt.kind), (*trace.problems, doubt)
+    doubts = [doubt for doubt in (_several_pulls(trace), _off_speed(trace, pull, test)) if doubt]
+    if doubts:
+        flags, problems = (*trace.flags, *(d.kind for d in doubts)), (*trace.problems, *doubts)
         trace = replace(trace, flags=flags, problems=problems)
     return test, (trace, replace(pull, flags=tuple(dict.fromkeys((*trace.flags, *pull.flags)))))
 
@@ -72,6 +74,19 @@ def _several_pulls(trace: Trace) -> Problem | None:
     what = f"{len(loaded)} pulls in this trace, read as one"
     allowed = f"{export}#{table}/{loaded[0] + 1} and so on for one of them, {export}#{table}/* for all"
     return Problem("several_pulls", what, trace.file, allowed=allowed)
+
+
+def _off_speed(trace: Trace, pull: Pull, test: Test) -> Problem | None:
+    """A doubt where the displacement recorded while sliding does not run at the speed that the campaign gives."""
+    if trace.displacement_m is None or not test.speed_m_s or math.isnan(pull.window_s[0]):
+        return None
+    start, end = np.searchsorted(trace.time_s, pull.window_s)
+    time_s = float(trace.time_s[end] - trace.time_s[start])
+    travel_m = abs(float(trace.displacement_m[end] - trace.displacement_m[start]))
+    if time_s <= 0 or abs(travel_m / time_s / test.speed_m_s - 1.0) < _OFF_SPEED:
+        return None
+    what, found = "the displacement does not run at the speed of the test", f"{travel_m / time_s * 1e3:.4g} mm/s"
+    return Problem("off_speed", what, trace.file, None, "displacement", found, f"{test.speed_m_s * 1e3:.4g} mm/s")
 
 
 def _carry_load(pieces: Sequence[Trace]) -> list[bool]:

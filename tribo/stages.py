@@ -81,6 +81,7 @@ def ingest(
         Not one test could be read, or the overrides have faults.
     """
     from tribo.exports import read_all
+    from tribo.traces.copies import under_the_wrong_test
 
     traces: dict[str, Trace] = {}
     pulls: dict[str, Pull] = {}
@@ -94,6 +95,10 @@ def ingest(
             else:
                 traces[test.test_id], pulls[test.test_id] = outcome
         progress("reading exports", done, len(campaign.tests))
+    ids = {test.test_id for test in tests} | {fault.test_id for fault in set_aside}
+    for test_id, problem in under_the_wrong_test(traces, ids).items():
+        del traces[test_id], pulls[test_id]
+        set_aside.append(SetAside(test_id, str(problem), (problem,)))
     if not pulls:
         raise CampaignError(
             [p for fault in set_aside for p in fault.problems]

@@ -240,6 +240,39 @@ def test_a_stretch_ten_times_off_its_neighbours_is_named(path: Path, dialect: Di
     assert [(p.kind, p.row, p.column) for p in found] == [("scale_jump", HEADER_ROWS + 21, "Load [N]")]
 
 
+def pulled(rng: np.random.Generator) -> np.ndarray:
+    """Force of 300 samples: zero, a rise, a peak, sliding, with noise."""
+    k = np.arange(300)
+    return np.interp(k, [0, 60, 100, 110, 299], [0.02, 0.02, 1.0, 0.7, 0.7]) + 0.01 * rng.standard_normal(300)
+
+
+@pytest.mark.parametrize("times", [10.0, 0.1, 100.0, 0.01, 1000.0, 0.001])
+@pytest.mark.parametrize("start", [85, 150, 280])
+def test_a_decimal_mark_that_slips_for_good_is_named_with_its_row(path: Path, times: float, start: int) -> None:
+    force = pulled(np.random.default_rng(start))
+    force[start:] *= times
+    found = problems_of(
+        path, written([[f"{0.04 * k:.3f}", "0", f"{f:.5f}"] for k, f in enumerate(force)], NAMES, UNITS)
+    )
+    assert [(p.kind, p.row, p.column) for p in found] == [("scale_jump", HEADER_ROWS + start + 1, "Load [N]")]
+
+
+@pytest.mark.parametrize("left", [0.0, 0.07, 0.1, -0.1])
+def test_a_force_that_falls_to_a_tenth_keeps_its_noise_and_is_no_slipped_mark(path: Path, left: float) -> None:
+    rng = np.random.default_rng(7)
+    force = pulled(rng)
+    force[200:] = left * 0.7 + 0.01 * rng.standard_normal(100)
+    path.write_bytes(written([[f"{0.04 * k:.3f}", "0", f"{f:.5f}"] for k, f in enumerate(force)], NAMES, UNITS))
+    assert read_export(path).flags == ()
+
+
+def test_two_impulses_are_no_stretch_between_them(path: Path) -> None:
+    force = pulled(np.random.default_rng(3))
+    force[[180, 200]] *= 10
+    path.write_bytes(written([[f"{0.04 * k:.3f}", "0", f"{f:.5f}"] for k, f in enumerate(force)], NAMES, UNITS))
+    assert read_export(path).flags == ()
+
+
 def test_one_sample_ten_times_off_is_a_spike_and_not_for_the_reader(path: Path) -> None:
     rows = ramp(40)
     rows[20][2] = f"{float(rows[20][2]) * 10:.5f}"

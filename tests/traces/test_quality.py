@@ -48,6 +48,25 @@ def test_a_clipped_peak_is_named_with_its_row(share: float) -> None:
     assert first < problem.row <= first + 4  # noise may part the first samples at the limit from the rest
 
 
+@pytest.mark.parametrize(("first", "run"), [(250, 40), (400, 375), (150, 25)])
+def test_a_sensor_that_repeats_one_value_is_named_with_its_row(first: int, run: int) -> None:
+    trace = SHAPE.trace()
+    force = trace.force_N.copy()
+    force[first : first + run] = force[first]
+    with pytest.raises(TraceError) as fault:
+        read_pull(replace(trace, force_N=force, first_row=4))
+    assert [(p.kind, p.row) for p in fault.value.problems] == [("stuck", 4 + first)]
+
+
+def test_a_zero_band_and_a_trace_without_noise_are_not_stuck() -> None:
+    trace = SHAPE.trace()
+    band = replace(trace, force_N=np.where(trace.time_s < 2.0, 0.0, trace.force_N))
+    assert np.isfinite(read_pull(band).static_N)
+    made = Shape().trace()
+    assert (np.diff(made.force_N[-200:]) == 0).all()
+    assert np.isfinite(read_pull(made).static_N)
+
+
 def test_a_coarse_resolution_is_not_taken_for_clipping() -> None:
     for step in (0.01, 0.05, 0.1):
         for shape in (SHAPE, Shape(sliding_N=2.0, noise_N=0.01)):

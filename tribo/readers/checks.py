@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tribo.errors import Problem
 from tribo.records import FloatArray
@@ -14,6 +16,11 @@ GAP_STEPS = 5.0  # a time step this many median steps long is a gap
 _WORTH_A_LOOK = 1.5  # mean steps: where no step is this long, none is a gap
 _TEN_TIMES = (9.0, 11.0)  # a decimal mark slipped by one place, noise allowed for
 _LEAST_SHARE = 0.3  # of the range: smaller jumps are noise or stick-slip
+_MOST_STEPS = 40  # large steps, above which they are what the signal does
+_MOST_TRIED = 10  # large steps that may begin a scaled rest of the record
+_FEWEST_ROWS, _ROWS_BESIDE = 10, 100  # looked at on either side of a jump
+_LEVEL_ROWS = (1, 10, 100)  # rows beside a jump by which the levels are compared; all are tried, as the force may swing
+_TIMES_IN_WORDS = {1: "ten", 2: "a hundred", 3: "a thousand"}
 
 RowOf = Callable[[int], int]
 
@@ -54,27 +61,82 @@ def check_time(time: FloatArray, file: str, column: str, row_of: RowOf) -> list[
 
 
 def check_scale(values: FloatArray, file: str, column: str, row_of: RowOf) -> list[Finding]:
-    """A stretch of two or more samples ten times larger or smaller than both neighbours: a slipped decimal mark."""
+    """Rows ten times larger or smaller than what is beside them: a slipped decimal mark, or another unit.
+
+    Two rows or more between neighbours that agree; or all rows from one to the end (ten, a hundred or a thousand
+    times), if what changes from row to row is off by as much as the values are: a force that falls does not do that.
+    """
     if values.size < 4:
         return []
     step = np.diff(values)
     least = _LEAST_SHARE * float(values.max() - values.min())
-    if step.max() <= least or step.min() >= -least:
+    if step.max() <= least and step.min() >= -least:
         return []
     large = np.flatnonzero(np.abs(step) > least)
-    if large.size < 2 or large.size > 40:
+    found = _there_and_back(values, large) if large.size <= _MOST_STEPS else None
+    found = found or _to_the_end(values, step, large[:_MOST_TRIED])
+    if found is None:
         return []
+    first, n, times = found
+    beside = "the rows before" if first + n == values.size else "their neighbours"
+    way = "above" if times > 1 else "below"
+    what = f"{n} rows {_TIMES_IN_WORDS[round(abs(math.log10(times)))]} times {way} {beside}, the first here"
+    place = (file, row_of(first), column, f"{values[first]:.6g}", f"about {values[first - 1]:.6g}")
+    return [Finding("scale_jump", Problem("scale_jump", what, *place), fatal=True)]
+
+
+def _there_and_back(values: FloatArray, large: NDArray[np.int64]) -> tuple[int, int, float] | None:
+    """(first row, rows, factor) of a stretch ten times off, between two of the large steps, or None."""
+    if large.size < 2:
+        return None
     before, after = values[large], values[large + 1]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = after / before
     up = (ratio > _TEN_TIMES[0]) & (ratio < _TEN_TIMES[1])
     down = (ratio > 1 / _TEN_TIMES[1]) & (ratio < 1 / _TEN_TIMES[0])
-    for (i, first), (j, second) in zip(enumerate(large), list(enumerate(large))[1:], strict=False):
-        if (up[i] and down[j]) or (down[i] and up[j]):
-            n = int(second - first)
-            if n < 2:
-                continue
-            what = f"{n} rows ten times {'above' if up[i] else 'below'} their neighbours, the first here"
-            place = (file, row_of(int(first) + 1), column, f"{values[first + 1]:.6g}", f"about {values[first]:.6g}")
-            return [Finding("scale_jump", Problem("scale_jump", what, *place), fatal=True)]
-    return []
+    for i in range(large.size - 1):
+        n = int(large[i + 1] - large[i])
+        there_and_back = (up[i] and down[i + 1]) or (down[i] and up[i + 1])
+        if n > 1 and there_and_back and not (_is_impulse(values, large[i]) or _is_impulse(values, large[i + 1] + 1)):
+            return int(large[i]) + 1, n, 10.0 if up[i] else 0.1
+    return None
+
+
+def _is_impulse(values: FloatArray, k: int) -> bool:
+    """Whether the values on both sides of one are alike, and it is not: then it is no level to compare with."""
+    beside = values[[max(k - 1, 0), min(k + 1, values.size - 1)]]
+    return bool(np.ptp(beside) < 0.5 * np.abs(values[k] - beside).min())
+
+
+def _to_the_end(values: FloatArray, step: FloatArray, large: NDArray[np.int64]) -> tuple[int, int, float] | None:
+    """(first row, rows, factor) of rows off by a power of ten from one on, or None."""
+    for k in (int(at) for at in large):
+        if min(k, step.size - k - 1) < _FEWEST_ROWS:
+            continue
+        change = _typical(np.abs(step[max(k - _ROWS_BESIDE, 0) : k])), _typical(np.abs(step[k + 1 :][:_ROWS_BESIDE]))
+        for rows in _LEVEL_ROWS:
+            before, after = _typical(values[max(k + 1 - rows, 0) : k + 1]), _typical(values[k + 1 :][:rows])
+            times = _power_of_ten(after / before) if before else None
+            if times and _scaled_as(times, *change):
+                return k + 1, values.size - k - 1, times
+    return None
+
+
+def _typical(values: FloatArray) -> float:
+    return float(np.median(values))
+
+
+def _power_of_ten(ratio: float) -> float | None:
+    """10, 100, 1000 or one part in so many where a ratio is about that, else None."""
+    power = round(math.log10(ratio)) if ratio > 0 else 0
+    near = 1 <= abs(power) <= 3 and _TEN_TIMES[0] / 10 < ratio / 10.0**power < _TEN_TIMES[1] / 10
+    return 10.0**power if near else None
+
+
+def _scaled_as(times: float, before: float, after: float) -> bool:
+    """Whether changes from row to row scaled rather as the values did than not at all; shrinking may leave nothing."""
+    if not before:
+        return False
+    if not after:
+        return times < 1
+    return abs(math.log10(after / before / times)) < abs(math.log10(times)) / 2

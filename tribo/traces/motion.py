@@ -53,7 +53,7 @@ def lay_out(trace: Trace, speed_m_s: float | None = None, zero: tuple[float, flo
     ------
     TraceError
         Kinds ``too_short``, ``nan_gap``, ``time_goes_back``, ``sign_flipped``, ``stopped_before_peak``,
-        ``saturated``.
+        ``saturated``, ``stuck``.
     """
     if faults := quality.unreadable(trace):
         raise TraceError(faults)
@@ -73,6 +73,8 @@ def lay_out(trace: Trace, speed_m_s: float | None = None, zero: tuple[float, flo
     assert rise is not None
     if clipped := quality.flat_top(force):
         raise TraceError([_saturated(trace, clipped), *problems])
+    if still := quality.standstill(raw):
+        raise TraceError([_stuck(trace, still), *problems])
     known = Zero(*zero, time_s=float(time[0])) if zero else zero_before(time, force, rise, noise)
     return _with_peak(trace, time, force - known.force_N, calm - known.force_N, rise, known, noise, speed_m_s, problems)
 
@@ -95,6 +97,13 @@ def _saturated(trace: Trace, clipped: tuple[int, int]) -> Problem:
     what = f"the force stands at its largest value for {run} samples: the load cell or the recorder was saturated"
     row = quality.file_row(trace, first)
     return Problem("saturated", what, trace.file or None, row, "force", f"{trace.force_N[first]:.6g} N")
+
+
+def _stuck(trace: Trace, still: tuple[int, int]) -> Problem:
+    first, run = still
+    what = f"the force repeats one value for {run} samples: the sensor or the recorder was stuck"
+    row = quality.file_row(trace, first)
+    return Problem("stuck", what, trace.file or None, row, "force", f"{trace.force_N[first]:.6g} N")
 
 
 def _with_peak(

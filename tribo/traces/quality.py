@@ -20,6 +20,9 @@ _NEIGHBOURS = 4
 _MOST_LISTED = 20
 _CHANCE_OF_FLAT_TOP = 1e-4
 _SHORTEST_FLAT_TOP = 4
+_SHORTEST_STANDSTILL = 20
+_NO_NOISE = 1e-4  # noise over range below which a trace was never measured, and may stand still
+_AT_ZERO = 0.2  # share of the range below which a force may stand still: nothing pulls
 _COARSE = 0.5  # share of equal neighbours from which on a resolution is too coarse to tell clipping
 
 
@@ -145,13 +148,37 @@ def flat_top(force: FloatArray) -> tuple[int, int] | None:
         return None
     pairs = force[1:] == force[:-1]
     inside = top[1:] & top[:-1]
-    elsewhere = max(int((~inside).sum()), 1)
-    share = (int((pairs & ~inside).sum()) + 1.0) / (elsewhere + 2.0)
-    if share > _COARSE:
+    return (int(starts[longest]), run) if _beyond_chance(run, pairs[~inside], force.size) else None
+
+
+def _beyond_chance(run: int, pairs_elsewhere: NDArray[np.bool_], samples: int) -> bool:
+    """Whether chance hardly gives a run of equal samples, by the share of equal neighbours elsewhere."""
+    share = (int(pairs_elsewhere.sum()) + 1.0) / (max(pairs_elsewhere.size, 1) + 2.0)
+    return share <= _COARSE and (run - 1) * math.log(share) + math.log(samples) <= math.log(_CHANCE_OF_FLAT_TOP)
+
+
+def standstill(force: FloatArray) -> tuple[int, int] | None:
+    """(first index, length) of the longest run of equal samples while something pulls, if chance does not give it.
+
+    A signal that is noisy elsewhere and then repeats one value to the last digit was not measured there. Runs near the
+    lowest force of a trace are left alone (a zero band), and so are traces without noise.
+    """
+    equal = force[1:] == force[:-1]
+    if np.count_nonzero(equal) < _SHORTEST_STANDSTILL:
         return None
-    if (run - 1) * math.log(share) + math.log(force.size) > math.log(_CHANCE_OF_FLAT_TOP):
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], equal, [False]))))
+    starts, lengths = edges[::2], edges[1::2] - edges[::2]
+    low, span = float(force.min()), float(np.ptp(force))
+    lengths = np.where(force[starts] - low > _AT_ZERO * span, lengths, 0)
+    longest = int(np.argmax(lengths))
+    start, run = int(starts[longest]), int(lengths[longest]) + 1
+    if run < _SHORTEST_STANDSTILL:
         return None
-    return int(starts[longest]), run
+    elsewhere = np.concatenate((force[:start], force[start + run :]))
+    pairs = np.concatenate((equal[:start], equal[start + run - 1 :]))
+    if elsewhere.size < MINIMUM_SAMPLES or sample_noise(elsewhere) < _NO_NOISE * span:
+        return None
+    return (start, run) if _beyond_chance(run, pairs, force.size) else None
 
 
 def noise_of(force: FloatArray) -> float:
