@@ -184,11 +184,6 @@ def load_means(ingested: Ingested, sample: str, regime: Regime) -> list[tuple[fl
     return means
 
 
-def compare(
-    ingested: Ingested, fits: tuple[LawFit, ...], options: StudyOptions, *, progress: Progress = _silent
-) -> Study:
-    """Calibrate the model on the flat sample, predict every sample at its loads, and put both side by side.
-
 def simulate_cells(
     ingested: Ingested, fits: tuple[LawFit, ...], options: StudyOptions, only: str = "", progress: Progress = _silent
 ) -> tuple[Cell, ...]:
@@ -225,6 +220,11 @@ def simulate_cells(
             example_run(own, options.kept)
     return chosen
 
+
+def compare(
+    ingested: Ingested, fits: tuple[LawFit, ...], options: StudyOptions, *, progress: Progress = _silent
+) -> Study:
+    """Calibrate the model on the flat sample, predict every sample at its loads, and put both side by side.
 
     Raises
     ------
@@ -278,11 +278,6 @@ def study(
 
 def assess(walked: Study, options: StudyOptions) -> Study:
     """The fits of a study looked at from other sides: other weights and laws, budget, power, outlying pulls."""
-    import pandas as pd
-
-    from tribo.fitting import campaign_budgets, outlying_pulls, outlying_specimens, power_of_campaign
-
-    ingested = walked.ingested
     made_from = (walked.ingested, walked.fits, options.weights)
     looks = Shelf(options.kept).take("assessment", made_from, lambda: _looks(walked, options), ASSESSED_BY)
     return replace(walked, **looks)
@@ -290,6 +285,11 @@ def assess(walked: Study, options: StudyOptions) -> Study:
 
 def _looks(walked: Study, options: StudyOptions) -> dict[str, Any]:
     """What :func:`assess` adds to a study, by the name of its field."""
+    import pandas as pd
+
+    from tribo.fitting import campaign_budgets, outlying_pulls, outlying_specimens, power_of_campaign
+
+    ingested = walked.ingested
     table, area = ingested.table(), ingested.campaign.nominal_area_m2
     budgets = campaign_budgets(ingested, walked.fits, weights=options.weights)
     parts = [b.table().assign(sample=b.fit.sample, regime=b.fit.regime) for b in budgets]
