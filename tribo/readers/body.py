@@ -12,7 +12,7 @@ from tribo.errors import Problem, ReadError
 from tribo.readers.blocks import Block
 from tribo.readers.damage import MOST_PROBLEMS, cut_short, find_damage
 from tribo.readers.layout import Layout, cut
-from tribo.readers.source import Source
+from tribo.readers.source import LARGEST_TABLE_ROWS, Source
 from tribo.records import FloatArray
 
 _FOR_PANDAS_BYTES = 200_000  # numpy starts faster, pandas runs faster; both round to the nearest double
@@ -26,11 +26,13 @@ def parse_block(source: Source, block: Block, used: Sequence[int]) -> FloatArray
     Raises
     ------
     ReadError
-        truncated_mid_row, wrong_number_of_cells, text_in_numbers, two_decimal_marks or nan_gap, all at once.
+        too_many_rows; or truncated_mid_row, wrong_number_of_cells, text_in_numbers, two_decimal_marks and nan_gap,
+        all at once.
     """
     if source.arrays:
         return np.array([source.arrays[index] for index in used], dtype=float)
-    pieces: list[FloatArray] = []
+    table = _room_for(source, block, len(used))
+    filled = 0
     problems: list[Problem] = []
     row, start = block.layout.header_rows + 1, block.start
     for chunk in source.chunks(block.start, block.end):
@@ -49,22 +51,23 @@ def parse_block(source: Source, block: Block, used: Sequence[int]) -> FloatArray
             break
         row += chunk.count(b"\n")
         if values is not None:
-            pieces.append(values)
+            table[:, filled : filled + len(values)] = values.T
+            filled += len(values)
     if problems:
         raise ReadError(problems)
-    return _by_column(pieces)
+    return table[:, :filled]
 
 
-def _by_column(pieces: list[FloatArray]) -> FloatArray:
-    """Pieces of rows by columns as one array of columns by rows; each piece is let go once it is copied."""
-    joined = np.empty((pieces[0].shape[1], sum(len(piece) for piece in pieces)))
-    start = 0
-    pieces.reverse()
-    while pieces:
-        piece = pieces.pop()
-        joined[:, start : start + len(piece)] = piece.T
-        start += len(piece)
-    return joined
+def _room_for(source: Source, block: Block, columns: int) -> FloatArray:
+    """An empty array (columns, lines) for all rows of a table, so that no number is held twice."""
+    rows = source.line_ends(block.start, block.end) + 1
+    if rows > LARGEST_TABLE_ROWS:
+        what, allowed = (
+            "too many rows for one table",
+            f"at most {LARGEST_TABLE_ROWS}: cut the export, or record at a lower rate",
+        )
+        raise ReadError(Problem("too_many_rows", what, source.file, found=f"{rows} rows", allowed=allowed))
+    return np.empty((columns, rows))
 
 
 def _parse_slowly(text: str, layout: Layout, used: Sequence[int]) -> FloatArray | None:

@@ -104,8 +104,12 @@ def _read(
     return tuple(_trace(reading, f"{name}#{k}", file) for k, reading in enumerate(readings, start=1))
 
 
-def read_contents(path: Path, columns: Mapping[str, str] | None, file: str) -> Contents:
+def read_contents(
+    path: Path, columns: Mapping[str, str] | None, file: str, *, beginning_only: bool = False
+) -> Contents:
     """All tables of an export that are traces, of all sheets; a sheet without any counts only if none has.
+
+    With ``beginning_only`` no more is read of a large file than tells what it is.
 
     Raises
     ------
@@ -116,7 +120,7 @@ def read_contents(path: Path, columns: Mapping[str, str] | None, file: str) -> C
     found, refused = [], []
     for source in open_sources(path, file):
         try:
-            found.append(read_source(source, asked))
+            found.append(read_source(source.beginning_only() if beginning_only else source, asked))
         except ReadError as why:
             refused.append(why)
     problems = [p for contents in found for p in contents.problems]

@@ -17,7 +17,7 @@ from tribo.readers.families import family_of, open_sources
 from tribo.readers.family import Family
 from tribo.readers.layout import Layout
 from tribo.readers.reading import Contents, Reading, layout_of, split_at_restarts
-from tribo.readers.source import Source
+from tribo.readers.source import MAPPED_BYTES, Source
 from tribo.records import FloatArray
 
 _BASELINE_SHARE = 0.05  # of the largest force: a pull that starts above it has no zero phase
@@ -114,15 +114,27 @@ def inspect_export(path: Path | str, *, columns: Mapping[str, str] | None = None
     """What an export is: family, encoding, columns and why, units, tables, time base, doubts.
 
     Never raises for what is in the file: an export that cannot be read has its ``problems`` here.
-    ``columns`` as in :func:`tribo.readers.read_export`.
+    Of a large file only the beginning is looked at, and a doubt says so. ``columns`` as in
+    :func:`tribo.readers.read_export`.
     """
     path = Path(path)
     file = str(path)
     try:
-        contents = read_contents(path, columns, file)
+        contents = read_contents(path, columns, file, beginning_only=True)
     except ReadError as why:
         return _refused(path, file, why.problems, parse_hints(columns))
-    return _read(file, contents)
+    seen = _read(file, contents)
+    return replace(seen, doubts=(*_unseen(path, file), *seen.doubts))
+
+
+def _unseen(path: Path, file: str) -> tuple[Problem, ...]:
+    """The doubt about a large file, of which only the beginning was looked at; with its last line."""
+    source = open_sources(path, file)[0] if path.stat().st_size > MAPPED_BYTES else None
+    if source is None or not source.is_large:
+        return ()
+    seen, everything = len(source.beginning_only().data), len(source.data)
+    what = f"the first {seen / 1e6:.0f} of {everything / 1e6:.0f} MB were looked at; the last line stands beside this"
+    return (Problem("only_beginning", what, file, found=source.last_line()[:60]),)
 
 
 def parse_hints(columns: Mapping[str, str] | None) -> tuple[Hint, ...]:

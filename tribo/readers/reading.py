@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from tribo.errors import Problem, ReadError
-from tribo.readers.assign import Assignment, Hint, assign, is_asked_for
+from tribo.readers.assign import Assignment, Column, Hint, assign, is_asked_for
 from tribo.readers.blocks import Block, side_by_side, split_blocks, whole_block
 from tribo.readers.body import parse_block
 from tribo.readers.checks import Finding, check_scale, check_time
@@ -134,12 +134,17 @@ def _read_block(source: Source, family: Family, block: Block, asked: tuple[Hint,
         raise ReadError(problems) from None
     columns = assignment.columns
     written = parse_block(source, block, [c.index for c in columns])
-    arrays = {
-        c.quantity: row if (c.factor, c.offset) == (1.0, 0.0) else c.factor * row + c.offset
-        for c, row in zip(columns, written, strict=True)
-    }
+    arrays = {c.quantity: _in_si(row, c) for c, row in zip(columns, written, strict=True)}
     findings = _findings(source, block, assignment, arrays)
     return Reading(source, family, block, assignment, arrays, findings)
+
+
+def _in_si(numbers: FloatArray, column: Column) -> FloatArray:
+    """Numbers as written in SI units, in their own memory: a long record is not held twice."""
+    if (column.factor, column.offset) != (1.0, 0.0):
+        numbers *= column.factor
+        numbers += column.offset
+    return numbers
 
 
 def _findings(

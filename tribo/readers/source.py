@@ -17,6 +17,7 @@ LARGEST_HEAD_BYTES = 400_000
 LARGEST_FILE_BYTES = 2 << 30
 MAPPED_BYTES = 64 << 20  # larger files are mapped and read in pieces, so that memory holds the numbers only
 CHUNK_BYTES = 16 << 20
+LARGEST_TABLE_ROWS = 40_000_000  # reading takes 8 bytes a number, and a pull about 110 bytes a row: 4.4 GB
 _WIDE_BOMS = {
     codecs.BOM_UTF32_LE: "utf-32",
     codecs.BOM_UTF32_BE: "utf-32",
@@ -87,6 +88,27 @@ class Source:
             if start == 0:
                 return len(self.data)
         return start
+
+    @property
+    def is_large(self) -> bool:
+        """Whether the file is mapped and read in pieces."""
+        return isinstance(self.data, mmap.mmap)
+
+    def beginning_only(self) -> Source:
+        """The first lines of a large file as a source of their own, enough to tell what it is; any other as it is."""
+        if not self.is_large:
+            return self
+        piece = bytes(self.data[: max(LARGEST_HEAD_BYTES, CHUNK_BYTES // 4)])
+        return _with_one_line_ending(self, piece[: piece.rfind(b"\n") + 1] or piece)
+
+    def last_line(self) -> str:
+        """The last line of the file that is not blank."""
+        lines = self.text(bytes(self.data[-HEAD_BYTES:])).split("\n")
+        return next((line.strip() for line in reversed(lines) if line.strip()), "")
+
+    def line_ends(self, start: int, end: int) -> int:
+        """Line ends from ``start`` to ``end``, counted piece by piece."""
+        return sum(chunk.count(b"\n") for chunk in self.chunks(start, end))
 
     def chunks(self, start: int, end: int) -> Iterator[bytes]:
         """Whole lines from ``start`` to ``end`` in pieces of bounded size."""
