@@ -1,5 +1,5 @@
 from .diagnosis import Diagnosis as Diagnosis, diagnose as diagnose, examine as examine
-from .extend import extended as extended, parse_with as parse_with, simulate_with as simulate_with
+from .extend import parse_given as parse_given, parse_with as parse_with, simulate_with as simulate_with
 from .plan import Plan as Plan, plan_design as plan_design
 from .predictor import simulated_predictor as simulated_predictor, tabled_predictor as tabled_predictor
 from .tables import (

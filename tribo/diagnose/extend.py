@@ -1,33 +1,39 @@
 """Putting a mechanism into the spring-block model itself: ``tribo simulate --with suction:dp=3000``.
 
-A mechanism acts on the blocks in contact. Its law, applied to the law of one contact block, says by how much
-the block's coefficients, its adhesion and what rests on it change; the simulation then makes of that what the
-pattern makes of it, which the quick predictor can only scale.
+Every mechanism of the library can be simulated: those of interface, pattern, bulk and room act on the blocks
+(:mod:`tribo.diagnose.blocks`), those of the instrument in the measuring chain (:mod:`tribo.simulate.chain`), a wrong
+label swaps the sample. At zero amplitude a run is that of the baseline to the bit.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from tribo.diagnose.blocks import RECORDED, Pulled, conditions_of_run, run_with
 from tribo.errors import Problem, SimulationError
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values
+from tribo.mechanisms.record import Base, Mechanism, Values
 from tribo.mechanisms.table import MECHANISMS
-from tribo.records import FloatArray, Run
-from tribo.simulate.config import LocalFriction, SimConfig
-from tribo.simulate.run import simulate
+from tribo.records import Run
+from tribo.simulate.chain import MeasuringChain, measured
+from tribo.simulate.config import SimConfig
+from tribo.simulate.masks import pattern_of
 
-SIMULATED = (
-    "contact_area_loss", "pressure_dependent_friction", "velocity_dependence", "contact_ageing", "run_in", "suction",
-    "edge_adhesion", "normal_load_error", "temperature", "humidity",
-)  # fmt: skip
-RECORDED = {"hold_s": 10.0, "specimen_run": 1.0, "temperature_C": 23.0, "humidity_pct": 50.0, "speed_m_s": 2e-4}
+SIMULATED = tuple(MECHANISMS)
+ON_ITSELF = ("contact_area_loss", "pull_angle", "tilt")  # they depend on the friction they change
+SETTLED = 2e-3  # relative change of T/N at which such a run has found itself
+MOST_ROUNDS = 12
+NEEDS_CHOICE = ("mislabelled_specimen",)
 
 
 def parse_with(text: str) -> dict[str, Values]:
     """"suction:dp=3000,run_in:c=0.2,n0=5" -> values by mechanism; parameters not given keep their start.
+
+    A wrong label names the sample that the specimen really is: "mislabelled_specimen(C):share=1"; the key of the
+    result is then "mislabelled_specimen(C)".
 
     Raises
     ------
@@ -38,15 +44,40 @@ def parse_with(text: str) -> dict[str, Values]:
     found: dict[str, Values] = {}
     name = ""
     for item in filter(None, (part.strip() for part in text.split(","))):
-        if ":" in item:
-            name, item = (part.strip() for part in item.split(":", 1))
-        if name not in SIMULATED:
+        head, colon, rest = item.rpartition(":")
+        name, item = (head.strip(), rest.strip()) if colon else (name, item)
+        mechanism = MECHANISMS.get(name_of(name))
+        if mechanism is None:
             problems.append(_unknown(name or item))
             continue
-        _set(found.setdefault(name, MECHANISMS[name].start()), MECHANISMS[name], item, problems)
+        problems += _choice_problems(name)
+        _set(found.setdefault(name, mechanism.start()), mechanism, item, problems)
     if problems:
-        raise SimulationError(problems)
+        raise SimulationError(list(dict.fromkeys(problems)))
     return found
+
+
+def name_of(key: str) -> str:
+    """The mechanism of "mislabelled_specimen(C)", or of a covariate "covariate:operator"."""
+    return key.split("(")[0].split(":")[0]
+
+
+def choice_of(key: str) -> str:
+    """What stands in brackets behind a mechanism."""
+    found = re.fullmatch(r"[^(]+\((.*)\)", key)
+    return found[1] if found else ""
+
+
+def _choice_problems(key: str) -> list[Problem]:
+    name, choice = name_of(key), choice_of(key)
+    if name in NEEDS_CHOICE and pattern_of(choice) is None:
+        return [
+            Problem("unknown_sample", f"{name} needs the sample that the specimen is, in brackets", found=key,
+                    allowed=f"{name}(F), and so for A, B, C, Sx, Sy")
+        ]  # fmt: skip
+    if name not in NEEDS_CHOICE and choice:
+        return [Problem("unknown_choice", f"{name} takes nothing in brackets", found=key, allowed=name)]
+    return []
 
 
 def _unknown(name: str) -> Problem:
@@ -74,80 +105,144 @@ def _set(values: Values, mechanism: Mechanism, item: str, problems: list[Problem
     values[names.index(key)] = value
 
 
+def parse_given(text: str) -> dict[str, float]:
+    """"hold_s=100,temperature_C=25" -> conditions of a pull that mechanisms depend on.
+
+    Raises
+    ------
+    SimulationError
+        An unknown condition or no number: every fault with what is allowed.
+    """
+    problems: list[Problem] = []
+    found: dict[str, float] = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        key, _, number = item.partition("=")
+        if key not in RECORDED:
+            allowed = ", ".join(f"{name} ({value:g})" for name, value in RECORDED.items())
+            problems.append(Problem("unknown_condition", "no condition of a pull", found=key, allowed=allowed))
+            continue
+        try:
+            found[key] = float(number)
+        except ValueError:
+            problems.append(Problem("bad_value", f"{key} is a number", found=number, allowed="a number"))
+    if problems:
+        raise SimulationError(problems)
+    return found
+
+
 def simulate_with(config: SimConfig, mechanisms: Mapping[str, Values], **recorded: float) -> Run:
     """One run with mechanisms at work; with none, or all at zero, the run of ``config`` to the bit.
 
-    ``recorded`` are the conditions of the pull that the model itself does not have: hold_s, specimen_run,
-    temperature_C, humidity_pct, and speed_m_s of the bench (the model's own clock is scaled).
+    Parameters
+    ----------
+    mechanisms : values by name, as :func:`parse_with` gives them
+    recorded : conditions of the pull that the model itself does not have: hold_s, specimen_run, temperature_C,
+        humidity_pct, speed_m_s of the bench (the model's own clock is scaled), elapsed_s since the zero was taken,
+        samples_in_rise of the recorder, nominal_area_m2 of the sled
+
+    Raises
+    ------
+    SimulationError
+        A mechanism that does not exist, or an impossible configuration.
     """
-    return simulate(extended(config, mechanisms, **recorded))
+    acting = _acting(mechanisms)
+    label = next((key for key in acting if name_of(key) in NEEDS_CHOICE), None)
+    if label is None:
+        return _simulate(config, acting, recorded)
+    share = float(acting.pop(label)[0])
+    other = config.with_(sample=choice_of(label), pattern=None)
+    as_labelled, as_other = (_simulate(c, acting, recorded) for c in (config, other))
+    return mixed(as_labelled, as_other, share)
 
 
-def extended(config: SimConfig, mechanisms: Mapping[str, Values], **recorded: float) -> SimConfig:
-    """The configuration whose blocks obey the mechanisms; raises SimulationError for one that cannot be simulated."""
-    friction = config.friction
-    for name, values in mechanisms.items():
-        if name not in SIMULATED:
-            raise SimulationError(_unknown(name))
-        if values[0] != MECHANISMS[name].amplitude.zero:
-            friction = _blocks(config, friction, MECHANISMS[name], values, recorded)
-    return config if friction == config.friction else replace(config, friction=friction)
+def _acting(mechanisms: Mapping[str, Values]) -> dict[str, Values]:
+    """Those whose amplitude is not zero."""
+    unknown = [key for key in mechanisms if name_of(key) not in MECHANISMS]
+    if unknown:
+        raise SimulationError([_unknown(key) for key in unknown])
+    problems = [problem for key in mechanisms for problem in _choice_problems(key)]
+    if problems:
+        raise SimulationError(problems)
+    by_key = {key if choice_of(key) else name_of(key): np.asarray(v, float) for key, v in mechanisms.items()}
+    return {key: v for key, v in by_key.items() if v[0] != MECHANISMS[name_of(key)].amplitude.zero}
 
 
-def _blocks(
-    config: SimConfig, friction: LocalFriction, mechanism: Mechanism, values: Values, recorded: Mapping[str, float]
-) -> LocalFriction:
-    """Local friction changed by one mechanism. The load of the contact blocks is p / AF, their area AF A."""
-    conditions = conditions_of_run(config, recorded)
-    load = conditions.contact_pressure_Pa[0]
-    mu = _base(friction.mu_s, 0.0, friction.mu_d, 0.0)
-    adhesion = _base(0.0, friction.static_adhesion_Pa, 0.0, friction.sliding_adhesion_Pa)
-    whole = _base(friction.mu_s, friction.static_adhesion_Pa, friction.mu_d, friction.sliding_adhesion_Pa)
-    nothing = _tractions(mechanism, values, _base(0.0, 0.0, 0.0, 0.0), conditions)
-    changed = _tractions(mechanism, values, mu, conditions) - nothing
-    stuck = _tractions(mechanism, values, adhesion, conditions) - nothing
-    together = _tractions(mechanism, values, whole, conditions) - nothing
-    plain = np.array([friction.mu_s * load, friction.mu_d * load])
-    pull = np.array([friction.static_adhesion_Pa, friction.sliding_adhesion_Pa])
-    if not np.allclose(changed + stuck, together, rtol=1e-9):  # not linear: one gain on the whole threshold
-        changed, stuck = plain * together / (plain + pull), pull * together / (plain + pull)
-    gain = changed / plain
-    return replace(
-        friction,
-        mu_s=friction.mu_s * gain[0], mu_s_sd=friction.mu_s_sd * gain[0],
-        mu_d=friction.mu_d * gain[1], mu_d_sd=friction.mu_d_sd * gain[1],
-        static_adhesion_Pa=float(stuck[0] + nothing[0]), sliding_adhesion_Pa=float(stuck[1] + nothing[1]),
-    )  # fmt: skip
+def _simulate(config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[str, float]) -> Run:
+    run = settled(config, acting, recorded)
+    chain = chain_of(acting, recorded)
+    return measured(run, chain, config.speed_m_s)
 
 
-def conditions_of_run(config: SimConfig, recorded: Mapping[str, float]) -> Conditions:
-    """The contact blocks of a run as one test, shape (1,): nominal load p A on the area fraction AF."""
-    from tribo.diagnose.observations import rim_per_m
+def settled(config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[str, float]) -> Run:
+    """The run whose own friction is the one that tilt, wire and contact area were given.
 
-    pattern, known = config.cavities, {**RECORDED, **recorded}
-
-    def one(value: float) -> FloatArray:
-        return np.array([value], float)
-
-    return Conditions(
-        normal_load_N=one(config.pressure_Pa), nominal_area_m2=1.0, area_fraction=one(pattern.area_fraction),
-        rim_per_m=one(rim_per_m(pattern)), cavity_width_m=one(min(pattern.size_m) if pattern.size_m else 0.0),
-        elongation=one(0.0), sample=np.array([config.sample]), specimen=np.array([""]),
-        speed_m_s=one(known["speed_m_s"]), hold_s=one(known["hold_s"]), specimen_run=one(known["specimen_run"]),
-        run_order=one(1.0), elapsed_s=one(0.0), temperature_C=one(known["temperature_C"]),
-        humidity_pct=one(known["humidity_pct"]), clip_N=one(0.0),
-    )  # fmt: skip
-
-
-def _base(mu_s: float, static_Pa: float, mu_d: float, sliding_Pa: float) -> Base:
-    return Base(np.array([mu_s]), np.array([static_Pa]), np.array([mu_d]), np.array([sliding_Pa]))
+    The first guess is the quick law on the run without them; then as many rounds as it takes.
+    """
+    on_itself = [name for name in ON_ITSELF if name in acting]
+    if not on_itself:
+        return run_with(config, acting, recorded, Pulled())
+    others = {name: values for name, values in acting.items() if name not in on_itself}
+    pulled = guessed(config, {n: acting[n] for n in on_itself}, recorded, run_with(config, others, recorded, Pulled()))
+    for _ in range(MOST_ROUNDS):
+        run = run_with(config, acting, recorded, pulled)
+        off = max(abs(run.static_friction / pulled.static - 1), abs(run.sliding_friction / pulled.sliding - 1))
+        if off < SETTLED:
+            break
+        pulled = Pulled(
+            0.5 * (pulled.static + run.static_friction), 0.5 * (pulled.sliding + run.sliding_friction)
+        )
+    return run
 
 
-def _tractions(mechanism: Mechanism, values: Values, base: Base, conditions: Conditions) -> FloatArray:
-    """Static and sliding traction of the contact, Pa, (2,), of a sample whose whole force is carried by AF."""
-    share = conditions.area_fraction
-    spread = replace(
-        base, static_adhesion_N=base.static_adhesion_N * share, sliding_adhesion_N=base.sliding_adhesion_N * share
+def guessed(config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[str, float], before: Run) -> Pulled:
+    """T/N that the quick laws expect, from a run without them whose mu and tau0 part as those of its blocks do."""
+    f, conditions = config.friction, conditions_of_run(config, recorded)
+    load = conditions.normal_load_N[0]
+    contact = conditions.contact_pressure_Pa[0]
+    parts = [
+        (ratio, mu * contact / (mu * contact + adhesion))
+        for ratio, mu, adhesion in (
+            (before.static_friction, f.mu_s, f.static_adhesion_Pa),
+            (before.sliding_friction, f.mu_d, f.sliding_adhesion_Pa),
+        )
+    ]  # fmt: skip
+    (static_mu, static_N), (sliding_mu, sliding_N) = (
+        (np.array([ratio * part]), np.array([ratio * (1 - part) * load])) for ratio, part in parts
     )
-    forces: Forces = mechanism.law(values, spread, conditions, "")
-    return np.array([forces.static_N[0], forces.sliding_N[0]]) / share[0]
+    base = Base(static_mu, static_N, sliding_mu, sliding_N)
+    static, sliding = before.static_friction, before.sliding_friction
+    for name, values in acting.items():
+        after = MECHANISMS[name].law(values, base, conditions, "")
+        static *= float(after.static_N[0] / load) / before.static_friction
+        sliding *= float(after.sliding_N[0] / load) / before.sliding_friction
+    return Pulled(static, sliding)
+
+
+def chain_of(acting: Mapping[str, Values], recorded: Mapping[str, float]) -> MeasuringChain:
+    """The measuring chain with the instrument mechanisms in it; a drift counts from when the zero was taken."""
+    known = {**RECORDED, **recorded}
+
+    def size(name: str) -> float:
+        return float(acting[name][0]) if name in acting else 0.0
+
+    return MeasuringChain(
+        wire_angle_rad=size("pull_angle"),
+        roller_friction=size("pulley_friction"),
+        compliance_m_per_N=size("machine_compliance"),
+        offset_N=size("load_cell_offset") + size("load_cell_drift") * known["elapsed_s"] / 3600.0,
+        interval_peaks=size("sampling_clip") / known["samples_in_rise"],
+        nominal_area_m2=known["nominal_area_m2"],
+    )
+
+
+def mixed(own: Run, other: Run, share: float) -> Run:
+    """ln T between two runs, on the clock of the first in units of its peak time; at one the other's, to the bit."""
+    if share == 1.0:
+        return replace(other, sample=own.sample)
+    force = np.interp(own.time_s / own.peak_s, other.time_s / other.peak_s, other.force_N)
+    both = np.exp((1 - share) * np.log(np.maximum(own.force_N, 1e-30)) + share * np.log(np.maximum(force, 1e-30)))
+    return replace(
+        own, force_N=both,
+        static_friction=own.static_friction ** (1 - share) * other.static_friction**share,
+        sliding_friction=own.sliding_friction ** (1 - share) * other.sliding_friction**share,
+    )  # fmt: skip

@@ -23,6 +23,7 @@ MECHANISM = Mechanism(
     sign=1,
     regimes=("static",),
     enters="block static thresholds, by the time of rest",
+    quick_error=0.05,  # a higher peak widens the swing that follows it
     shows="static only, against ln of the hold",
     confused_with="humidity",
     separates="holds of 0.1 to 1000 s in random order",

@@ -24,6 +24,7 @@ MECHANISM = Mechanism(
     sign=1,
     regimes=("static", "sliding"),
     enters="static adhesion of the contact blocks beside a cavity",
+    quick_error=0.08,  # it strengthens the blocks that are stressed most
     shows="rank B > C >> A > S, mostly static",
     confused_with="suction",
     separates="equal area fraction at another pitch",

@@ -134,7 +134,8 @@ class Mechanism:
     the sign of the change of T for a positive amplitude: +1, -1, or 0 where both occur. ``needs`` names the
     arrays of :class:`Conditions` that must vary for it to show. ``choices`` lists what a bookkeeping or
     geometry cause has to be told besides numbers (which specimen, which pattern); one empty choice otherwise.
-    ``silenced_by`` names the extra measurement that would remove or settle it.
+    ``silenced_by`` names the extra measurement that would remove or settle it. ``quick_error`` is the relative error
+    of T by which the law may part from the spring-block model with the mechanism in it, at the start amplitude.
     """
 
     name: str
@@ -150,6 +151,7 @@ class Mechanism:
     separates: str
     silenced_by: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
+    quick_error: float = 0.03
     rise: Rise | None = None  # what becomes of the slope of the rise, N/m, where the mechanism shows there
     choices: Callable[[Base, Conditions], tuple[str, ...]] = no_choice
 

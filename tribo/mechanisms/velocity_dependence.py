@@ -23,6 +23,7 @@ MECHANISM = Mechanism(
     sign=0,
     regimes=("sliding",),
     enters="block sliding thresholds, by the pull speed",
+    quick_error=0.05,  # blocks that slid already carry their share of the peak
     shows="sliding force against ln v, all samples alike",
     confused_with="temperature",
     separates="a speed ladder at one temperature",

@@ -1,0 +1,107 @@
+"""The measuring chain of the virtual tribometer: a run of the model as a machine would show it.
+
+A run pulls a square of a fraction of a millimetre; offsets, drifts and compliances belong to the whole sled. They are
+scaled by the nominal area, so that T/N of the run is that of the sled. With nothing wrong in the chain a run passes to
+the bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tribo.records import FloatArray, Run
+
+SLED_AREA_M2 = 55e-6
+
+
+@dataclass(frozen=True)
+class MeasuringChain:
+    """What stands between the slider and the numbers, in the order of the signal.
+
+    Parameters
+    ----------
+    wire_angle_rad
+        Upward angle of the wire: its tension is the pull over the cosine (what it lifts is the normal load's affair).
+    roller_friction
+        Coefficient of the roller under the wire, wrapped over a right angle: gain exp(mu pi / 2).
+    compliance_m_per_N
+        Machine and wire as a spring in series with the sled: the crosshead moves on by the force times this.
+    offset_N
+        What the load cell shows at zero force on the sled.
+    interval_peaks
+        Time between two samples of the recorder in units of the peak time; the peak falls midway between two. Zero
+        keeps the samples of the run.
+    nominal_area_m2
+        Nominal area of the sled.
+    """
+
+    wire_angle_rad: float = 0.0
+    roller_friction: float = 0.0
+    compliance_m_per_N: float = 0.0
+    offset_N: float = 0.0
+    interval_peaks: float = 0.0
+    nominal_area_m2: float = SLED_AREA_M2
+
+
+def measured(run: Run, chain: MeasuringChain, speed_m_s: float) -> Run:
+    """The run as the chain shows it; ``speed_m_s`` is that of the crosshead on the model's own clock."""
+    if chain.wire_angle_rad or chain.roller_friction:
+        run = amplified(run, float(np.exp(chain.roller_friction * np.pi / 2) / np.cos(chain.wire_angle_rad)))
+    if chain.compliance_m_per_N:
+        run = with_compliance(run, chain.compliance_m_per_N * _sleds(run, chain), speed_m_s)
+    if chain.offset_N:
+        run = shifted(run, chain.offset_N / _sleds(run, chain))
+    if chain.interval_peaks:
+        run = sampled(run, chain.interval_peaks * run.peak_s)
+    return run
+
+
+def _sleds(run: Run, chain: MeasuringChain) -> float:
+    """How many of the model's squares make the sled."""
+    return chain.nominal_area_m2 * run.pressure_Pa / run.normal_load_N
+
+
+def amplified(run: Run, gain: float) -> Run:
+    """Every force times ``gain``."""
+    return replace(
+        run, force_N=run.force_N * gain, static_friction=run.static_friction * gain,
+        sliding_friction=run.sliding_friction * gain,
+    )  # fmt: skip
+
+
+def shifted(run: Run, force_N: float) -> Run:
+    """Every force plus ``force_N``."""
+    return replace(
+        run, force_N=run.force_N + force_N, static_friction=run.static_friction + force_N / run.normal_load_N,
+        sliding_friction=run.sliding_friction + force_N / run.normal_load_N,
+    )  # fmt: skip
+
+
+def with_compliance(run: Run, compliance_m_per_N: float, speed_m_s: float) -> Run:
+    """The same forces on the clock of a crosshead that has to stretch the machine as well.
+
+    The force that falls in a slip lets the machine spring back faster than the crosshead moves: such a drop is
+    upright. Static and sliding friction are those of the slider.
+    """
+    clock = np.maximum.accumulate(run.time_s + run.force_N * compliance_m_per_N / speed_m_s)
+
+    def moved(time_s: float) -> float:
+        return float(np.interp(time_s, run.time_s, clock))
+
+    return replace(
+        run, time_s=clock, peak_s=moved(run.peak_s), window_s=(moved(run.window_s[0]), moved(run.window_s[1]))
+    )
+
+
+def sampled(run: Run, interval_s: float) -> Run:
+    """What a recorder of this interval keeps; its samples lie half an interval to either side of the peak."""
+    first = np.mod(run.peak_s - interval_s / 2, interval_s)
+    time: FloatArray = np.arange(first, run.time_s[-1], interval_s)
+    force = np.interp(time, run.time_s, run.force_N)
+    moving = np.interp(time, run.time_s, run.moving).round().astype(np.int64)
+    before = np.interp(run.peak_s - interval_s / 2, run.time_s, run.force_N)
+    after = np.interp(run.peak_s + interval_s / 2, run.time_s, run.force_N)
+    static = max(float(before), float(after)) / run.normal_load_N
+    return replace(run, time_s=time, force_N=force, moving=moving, static_friction=min(static, run.static_friction))
