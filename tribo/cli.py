@@ -12,8 +12,10 @@ from tribo import __version__
 from tribo.console import Console, command_options, set_aside_record, status_of
 
 if TYPE_CHECKING:
+    from tribo.diagnose import Diagnosis
     from tribo.diagnose.verdict import Verdict
     from tribo.records import Campaign, Study
+    from tribo.report import Provenance
     from tribo.stages import Progress, StudyOptions, Until
 
 CAMPAIGN = click.argument("campaign", type=click.Path(exists=True, path_type=Path))
@@ -161,8 +163,11 @@ def diagnose(
     with open_campaign(campaign) as opened, console.progress() as progress:
         described = _with_columns(opened, columns)
         ingested = stages.ingest(described, rule=rule, overrides=overrides, progress=progress)
-        verdict = stages.diagnosis(ingested, seed=seed, kept=out / KEPT, progress=progress).verdict
-        write_until(stages.Study(ingested), out, "ingest", verdict=verdict.as_dict())
+        found = stages.diagnosis(ingested, seed=seed, kept=out / KEPT, progress=progress)
+        study = stages.Study(ingested)
+        provenance = _provenance(study, campaign, stages.StudyOptions(rule=rule, seed=seed, overrides=overrides))
+        write_until(study, out, "ingest", progress, provenance, diagnosis=found)
+    verdict = found.verdict
     console.result(verdict.as_dict(), verdict_text(verdict))
     console.list_tests("set aside", ingested.set_aside, level=-1)
     return status_of(ingested.set_aside)
@@ -176,8 +181,21 @@ def diagnose(
 @_model_options
 @command_options
 def report(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
-    """All of the above, and report.html."""
+    """All of the above, report.html and report.pdf."""
     return _walk(console, campaign, out, "report", dry_run, **options)
+
+
+@main.command()
+@click.argument("out", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("--campaign", type=click.Path(exists=True, path_type=Path), help="The campaign, if it was moved.")
+@command_options
+def verify(console: Console, out: Path, campaign: Path | None, **_: Any) -> int:
+    """Whether the inputs and outputs of OUT are what they were: says what changed, is missing or was added."""
+    from tribo.report import verify as compared
+
+    found = compared(out, campaign)
+    console.result(found.as_record(), found.in_words())
+    return 0 if found.unchanged else 1
 
 
 @main.command()
@@ -306,7 +324,7 @@ def _walk(
     """Walk the street with one campaign as far as ``until`` and write what that yields."""
     from tribo import stages
     from tribo.campaign import open_campaign
-    from tribo.report import gather_provenance, write_until
+    from tribo.report import write_until
 
     chosen = stages.StudyOptions(kept=out / KEPT, **options)
     with open_campaign(path) as described:
@@ -317,13 +335,25 @@ def _walk(
             return status_of(campaign.set_aside)
         with console.progress() as progress:
             study = stages.study(campaign, chosen, until=until, progress=progress)
-            study, verdict = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
-            provenance = gather_provenance(
-                study, command=_command_line(), seed=chosen.seed, started_at=_now(), options=chosen.as_words()
-            )
-            as_dict = verdict.as_dict() if verdict else None
-            write_until(study, out, until, progress=progress, provenance=provenance, verdict=as_dict)
-    return _conclude(console, study, out, verdict)
+            study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
+            provenance = _provenance(study, path, chosen)
+            write_until(study, out, until, progress, provenance, diagnosis=found, jobs=chosen.jobs)
+    return _conclude(console, study, out, found.verdict if found else None)
+
+
+def _provenance(study: Study, campaign: Path, chosen: StudyOptions) -> Provenance:
+    """Where a study comes from, as this command was given it."""
+    from tribo.report import gather_provenance
+
+    return gather_provenance(
+        study,
+        command=_command_line(),
+        seed=chosen.seed,
+        started_at=_now(),
+        options=chosen.as_words(),
+        campaign=campaign,
+        overrides=chosen.overrides,
+    )
 
 
 def _with_columns(campaign: Campaign, columns: str) -> Campaign:
@@ -335,15 +365,15 @@ def _with_columns(campaign: Campaign, columns: str) -> Campaign:
     return replace(campaign, columns={**campaign.columns, **columns_from_text(columns)}) if columns else campaign
 
 
-def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[Study, Verdict | None]:
-    """The verdict on a study; a note instead where there is too little to diagnose."""
+def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[Study, Diagnosis | None]:
+    """The diagnosis of a study; a note instead where there is too little to diagnose."""
     from dataclasses import replace
 
     from tribo.errors import FitError
     from tribo.stages import diagnosis
 
     try:
-        return study, diagnosis(study.ingested, seed=chosen.seed, kept=chosen.kept, progress=progress).verdict
+        return study, diagnosis(study.ingested, seed=chosen.seed, kept=chosen.kept, progress=progress)
     except FitError as why:
         return replace(study, notes=(*study.notes, f"no diagnosis: {why}")), None
 
@@ -393,6 +423,10 @@ def _command_line() -> str:
 
 
 def _now() -> str:
+    """The time of this run, or that of SOURCE_DATE_EPOCH (reproducible-builds.org) where it is set."""
+    import os
     from datetime import UTC, datetime
 
-    return datetime.now(UTC).isoformat(timespec="seconds")
+    fixed = os.environ.get("SOURCE_DATE_EPOCH")
+    now = datetime.fromtimestamp(int(fixed), UTC) if fixed else datetime.now(UTC)
+    return now.isoformat(timespec="seconds")
