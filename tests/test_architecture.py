@@ -31,7 +31,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 EVERYONE = {"errors", "quantities", "records"}
 TOP = {
     "stages", "exports", "overrides", "prediction", "simulations", "kept", "pipeline", "cli", "console",
-    "bench", "doctor", "__init__",
+    "bench", "doctor", "__init__", "__main__",
 }  # fmt: skip
 ROOMS = sorted(p for p in PACKAGE.rglob("*.py"))
 

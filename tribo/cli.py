@@ -10,6 +10,7 @@ import click
 
 from tribo import __version__
 from tribo.console import Console, command_options, set_aside_record, status_of
+from tribo.pipeline.commands import build, schedule
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
@@ -76,6 +77,10 @@ def main() -> None:
                  tribo init my-campaign
                  tribo report my-campaign -o out
     """
+
+
+main.add_command(build)
+main.add_command(schedule)
 
 
 @main.command()

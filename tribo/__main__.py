@@ -1,0 +1,6 @@
+"""``python -m tribo`` is the command tribo."""
+
+from tribo.cli import main
+
+if __name__ == "__main__":
+    main(prog_name="tribo")

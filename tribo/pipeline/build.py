@@ -1,0 +1,268 @@
+"""`tribo build`: a drop folder of campaigns into a site of reports, by the Snakemake workflow in pipelines/.
+
+A site holds ``current`` (the outputs of each campaign and the index page), ``builds`` (dated copies), ``latest`` (a
+link to the newest) and ``.tribo`` (records of steps, logs, the lock).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from tribo import __version__
+from tribo.errors import CampaignError, Problem, TriboError
+from tribo.pipeline.builds import date_build
+from tribo.pipeline.lock import only_build
+from tribo.pipeline.scan import Dropped, difference, scan
+from tribo.pipeline.step import read_record
+from tribo.report.files import write_text
+
+STATE = ".tribo"
+CURRENT = "current"
+PROFILES = ("local", "slurm")
+_BLOCKS = re.compile(r"(?m)^(?=\[|\s*$)")  # Snakemake says one thing after a blank line or a date in brackets
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+class BuildError(TriboError):
+    """The workflow itself could not run, or a step failed in a way that is no fault of the input."""
+
+
+@dataclass(frozen=True)
+class BuildOptions:
+    """What a build may choose: ``settle_s`` is how long a file must rest, ``keep`` how many dated copies stay."""
+
+    rule: str = "seed"
+    weights: str = "relative"
+    flat: str = "F"
+    runs: int = 4
+    seed: int = 0
+    scheduler: str | None = None
+    jobs: int = 2
+    profile: str = "local"
+    settle_s: float = 60.0
+    keep: int = 10
+    wait_s: float = 0.0
+
+    def of_commands(self) -> dict[str, str]:
+        """Options of the commands of the workflow, and all of them in words for what a step is made from."""
+        fit = ["--rule", self.rule, "--weights", self.weights, "--seed", str(self.seed)]
+        model = [*fit, "--flat", self.flat, "--runs", str(self.runs)]
+        where = ["--scheduler", self.scheduler] if self.scheduler else []
+        diagnosis = ["--rule", self.rule, "--seed", str(self.seed)]
+        parts = {"fit": fit, "model": [*model, *where], "diagnose": diagnosis, "words": model}
+        return {name: shlex.join(words) for name, words in parts.items()}
+
+
+@dataclass(frozen=True)
+class Built:
+    """How a build ended: campaigns by name with what was due and why, those left waiting, and the dated copy."""
+
+    site: Path
+    due: Mapping[str, str]
+    waiting: Mapping[str, tuple[str, ...]]
+    status: Mapping[str, str] = field(default_factory=dict)
+    steps: tuple[str, ...] = ()
+    dated: Path | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same as plain types."""
+        return {
+            "site": str(self.site), "due": dict(self.due), "waiting": {k: list(v) for k, v in self.waiting.items()},
+            "status": dict(self.status), "steps": list(self.steps), "dated": str(self.dated) if self.dated else None,
+        }  # fmt: skip
+
+
+def workflow_dir() -> Path:
+    """Folder of the Snakefile: ``tribo/_pipelines`` of an installed wheel, ``pipelines`` of a source checkout."""
+    for folder in (_PACKAGE / "_pipelines", _PACKAGE.parent / "pipelines"):
+        if (folder / "Snakefile").is_file():
+            return folder
+    raise BuildError(Problem("missing_workflow", "this installation has no pipelines/Snakefile"))
+
+
+def build_site(drop: Path, site: Path, options: BuildOptions, *, dry_run: bool = False) -> Built:
+    """Bring the site up to the campaigns of a drop folder; with ``dry_run`` only say what would run and why.
+
+    Raises
+    ------
+    SiteBusyError
+        Another build of this site is running.
+    CampaignError
+        The drop folder cannot be used.
+    BuildError
+        Snakemake is missing, or a step failed other than by unusable input; everything else is built.
+    """
+    if find_spec("snakemake") is None:
+        what, allowed = "the pipelines need snakemake", "pip install 'tribo[pipelines]'"
+        raise BuildError(Problem("missing_package", what, allowed=allowed))
+    state = site.resolve() / STATE
+    if dry_run:
+        return _built(drop, state, options, dry_run=True, descriptor=None)
+    with only_build(state, options.wait_s) as descriptor:
+        return _built(drop, state, options, dry_run=False, descriptor=descriptor)
+
+
+def _built(drop: Path, state: Path, options: BuildOptions, *, dry_run: bool, descriptor: int | None) -> Built:
+    found = scan(drop.resolve(), options.settle_s)
+    due = {c.name: why for c in found if not c.waiting and (why := _why_due(c, state, options))}
+    waiting = {c.name: c.waiting for c in found if c.waiting}
+    target = state / ("dry-run" if dry_run else "inputs")
+    config = _configuration(found, target, state, options)
+    if dry_run:
+        said = _snakemake(state, config, options, ("--dry-run",), None)
+        return Built(state.parent, due, waiting, steps=tuple(planned_steps(said.stdout)))
+    said = _snakemake(state, config, options, (), descriptor)
+    write_text(state / "log" / "snakemake.log", said.stdout)
+    dated = date_build(state.parent, options.keep)
+    if said.returncode:
+        raise BuildError(_failures(state, said.stdout))
+    status = {c.name: _status(c.name, state) for c in found}
+    return Built(state.parent, due, waiting, status, tuple(planned_steps(said.stdout)), dated)
+
+
+def _why_due(campaign: Dropped, state: Path, options: BuildOptions) -> str:
+    """Why a campaign is to be built, in words; empty where its report is of exactly these files and options."""
+    record = read_record(state / "steps" / campaign.name / "report.json")
+    if record is None:
+        started = (state / "steps" / campaign.name).is_dir()
+        return "not finished in an earlier build" if started else "new"
+    changed = difference(record["files"], campaign.files)
+    if changed:
+        return changed
+    same = record["digest"] == step_digest(campaign.digest, options)
+    return "" if same else "other options or another version of tribo"
+
+
+def step_digest(digest: str, options: BuildOptions) -> str:
+    """What every step of a campaign is made from, as one text: contents, version, options."""
+    return f"{digest} {__version__} {options.of_commands()['words']}"
+
+
+def _configuration(found: Sequence[Dropped], inputs: Path, state: Path, options: BuildOptions) -> Path:
+    """Write what the workflow needs to know; returns the file."""
+    ready: dict[str, Any] = {}
+    for campaign in found:
+        if not campaign.waiting:
+            ready[campaign.name] = _inputs(campaign, inputs)
+    campaigns = {c.name: {"path": str(c.path), "waiting": list(c.waiting)} for c in found}
+    listing = json.dumps([campaigns, {n: r["digest"] for n, r in ready.items()}, step_digest("", options)])
+    config = {
+        "ready": ready,
+        "campaigns": campaigns,
+        "digest": hashlib.sha256(listing.encode()).hexdigest(),
+        "options": options.of_commands(),
+        "version": __version__,
+        "python": sys.executable,
+        "threads": options.jobs,
+    }
+    file = inputs.parent / ("build.json" if inputs.name == "inputs" else "dry-run.json")
+    return write_text(file, json.dumps(config, indent=1) + "\n")
+
+
+def _inputs(campaign: Dropped, folder: Path) -> dict[str, Any]:
+    """Path, digest, samples and cells of a campaign, and the file that lists its exports by content."""
+    file = folder / f"{campaign.name}.json"
+    known = read_record(file)
+    if known is None or known["digest"] != campaign.digest:
+        samples, cells = _to_simulate(campaign)
+        known = {"digest": campaign.digest, "samples": samples, "cells": cells, "files": dict(campaign.files)}
+        write_text(file, json.dumps(known, indent=1) + "\n")
+    return {
+        "path": str(campaign.path), "digest": campaign.digest, "samples": known["samples"], "cells": known["cells"],
+        "files": str(file.relative_to(folder.parent)),
+        "overrides": shlex.join(["--overrides", str(campaign.overrides)]) if campaign.overrides else "",
+    }  # fmt: skip
+
+
+def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
+    """Samples and cells as the description of a campaign has them; none where it cannot be read (ingest says why)."""
+    from tribo.campaign import open_campaign
+    from tribo.prediction import loads_to_simulate
+    from tribo.simulations import cell_name
+
+    try:
+        with open_campaign(campaign.path) as opened:
+            measured = {test.sample for test in opened.tests}
+            samples = [s for s in opened.samples if s in measured]
+            pressures = [opened.nominal_pressure_Pa(load) for load in loads_to_simulate(opened)]
+    except CampaignError:
+        return [], []
+    return samples, [cell_name(s, p) for s in samples for p in pressures]
+
+
+def _snakemake(
+    state: Path, config: Path, options: BuildOptions, more: Sequence[str], descriptor: int | None
+) -> subprocess.CompletedProcess[str]:
+    """Run the workflow; the lock of the site is what keeps two apart, so that Snakemake needs none of its own."""
+    folder = workflow_dir()
+    profile = folder / "profiles" / options.profile if options.profile in PROFILES else Path(options.profile)
+    command = [
+        sys.executable, "-m", "snakemake", "--snakefile", str(folder / "Snakefile"), "--directory", str(state),
+        "--configfile", str(config), "--profile", str(profile.resolve()), "--cores", str(options.jobs), "--nolock",
+        "--nocolor", *more,
+    ]  # fmt: skip
+    (state / "log").mkdir(parents=True, exist_ok=True)
+    return subprocess.run(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"}, pass_fds=() if descriptor is None else (descriptor,),
+    )  # fmt: skip
+
+
+def planned_steps(said: str) -> list[str]:
+    """Each job that Snakemake names in what it says, with its reason: "fit (a): Params have changed ..."."""
+    jobs = []
+    for block in _BLOCKS.split(said):
+        named = re.search(r"^\s*(?:local)?rule (\w+):", block, re.M)
+        if not named or named.group(1) == "all":
+            continue
+        of = re.search(r"^\s*wildcards: (.+)$", block, re.M)
+        why = re.search(r"^\s*reason: (.+)$", block, re.M)
+        words = re.sub(r"\w+=", "", of.group(1)) if of else ""
+        reason = _plain_reason(why.group(1)) if why else ""
+        jobs.append(f"{named.group(1)}{f' ({words})' if words else ''}: {reason}")
+    return list(dict.fromkeys(jobs))
+
+
+def _plain_reason(reason: str) -> str:
+    """Snakemake's reason in fewer words."""
+    if reason.startswith("Params have changed"):
+        return "its inputs, by content, or its options changed"
+    if reason.startswith("Missing output files"):
+        return "never finished before"
+    if reason.startswith("Input files updated by another job"):
+        return "a step before it runs"
+    return reason
+
+
+def _status(name: str, state: Path) -> str:
+    record = read_record(state / "steps" / name / "report.json")
+    return str(record["status"]) if record else "not built yet"
+
+
+def _failures(state: Path, said: str) -> list[Problem]:
+    """The steps that failed, each with the end of its log; what Snakemake said last where it was no step."""
+    errors = "\n".join(block for block in _BLOCKS.split(said) if "Error in rule" in block)
+    logs = sorted({state / "log" / log for log in re.findall(r"log: log/(.+?\.log)", errors)})
+    what = "a step failed; the next build tries it again, everything else is built"
+    if not logs:
+        return [Problem("workflow_failed", "the workflow could not run", found=_last_lines(said))]
+    return [Problem("step_failed", what, file=str(log), found=_tail(log)) for log in logs]
+
+
+def _tail(path: Path) -> str:
+    return _last_lines(path.read_text(encoding="utf-8", errors="replace")) if path.is_file() else "no log"
+
+
+def _last_lines(text: str, most: int = 8) -> str:
+    return "\n".join(text.strip().splitlines()[-most:])

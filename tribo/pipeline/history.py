@@ -1,0 +1,135 @@
+"""What the outputs of all campaigns of a site say together: a row a campaign, and the laws of each sample over time."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tribo.pipeline.step import read_record
+
+PARAMETERS = {"mu": ("mu", "mu_low", "mu_high"), "tau0": ("tau0_kPa", "tau0_low_kPa", "tau0_high_kPa")}
+
+
+@dataclass(frozen=True)
+class Law:
+    """One fitted parameter of one sample in one regime, with its 95 % interval; tau0 in kPa."""
+
+    sample: str
+    regime: str
+    parameter: str
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class CampaignRow:
+    """One campaign as the index page shows it.
+
+    ``state`` is done, some set aside, unusable, failed, waiting or gone (no longer in the drop folder); ``why`` what
+    stands behind it. ``measured`` is when the first pull started, ``built`` when the report was made.
+    """
+
+    name: str
+    title: str
+    state: str
+    why: tuple[str, ...] = ()
+    measured: str = ""
+    built: str = ""
+    tests: int = 0
+    set_aside: int = 0
+    verdict: str = ""
+    verdict_text: str = ""
+    has_report: bool = False
+    laws: tuple[Law, ...] = ()
+
+
+def history(site: Path) -> tuple[CampaignRow, ...]:
+    """Every campaign of a site, those in the drop folder and those that once were, in the order of measurement."""
+    state = site / ".tribo"
+    config = json.loads((state / "build.json").read_text(encoding="utf-8"))
+    steps = state / "steps"
+    names = set(config["campaigns"]) | ({p.parent.name for p in steps.glob("*/report.json")})
+    rows = [_row(name, site, config) for name in names]
+    return tuple(sorted(rows, key=lambda row: (row.measured or "9999", row.name)))
+
+
+def _row(name: str, site: Path, config: Mapping[str, Any]) -> CampaignRow:
+    out = site / "current" / name
+    record = read_record(site / ".tribo" / "steps" / name / "report.json")
+    state, why = _state(name, record, config)
+    verdict = read_record(out / "verdict.json") or {}
+    tests = _table(out / "tests.csv")
+    started = sorted(t["started_at"] for t in tests if t.get("started_at"))
+    return CampaignRow(
+        name=name,
+        title=_title(out) or name,
+        state=state,
+        why=why,
+        measured=started[0][:10] if started else "",
+        built=record["finished"][:16].replace("T", " ") if record else "",
+        tests=sum(not t["set_aside"] for t in tests),
+        set_aside=sum(bool(t["set_aside"]) for t in tests),
+        verdict=str(verdict.get("verdict", "")),
+        verdict_text=str(verdict.get("text") or ""),
+        has_report=(out / "report.html").is_file(),
+        laws=tuple(_laws(_table(out / "fits.csv"))),
+    )
+
+
+def _state(name: str, record: Mapping[str, Any] | None, config: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
+    """How a campaign stands after a build, and why."""
+    if name not in config["campaigns"]:
+        return "gone", ("no longer in the drop folder; its last report stands",)
+    waiting = config["campaigns"][name]["waiting"]
+    if waiting:
+        return "waiting", tuple(waiting)
+    expected = f"{config['ready'][name]['digest']} {config['version']} {config['options']['words']}"
+    if record is None or record["digest"] != expected:
+        return "failed", ("a step failed; its log is in .tribo/log, and the next build tries it again",)
+    if record["status"] == "unusable":
+        return "unusable", tuple(_problem(p) for p in record["problems"])
+    return record["status"].replace("_", " "), ()
+
+
+def _problem(problem: Mapping[str, Any]) -> str:
+    from tribo.errors import Problem
+
+    return str(Problem(**problem))
+
+
+def _title(out: Path) -> str:
+    import h5py
+
+    try:
+        with h5py.File(out / "campaign.nc") as file:
+            return str(file.attrs.get("title", ""))
+    except OSError:
+        return ""
+
+
+def _table(path: Path) -> list[dict[str, str]]:
+    try:
+        with path.open(encoding="utf-8", newline="") as stream:
+            return list(csv.DictReader(stream))
+    except OSError:
+        return []
+
+
+def _laws(fits: Sequence[Mapping[str, str]]) -> list[Law]:
+    found = []
+    for fit in fits:
+        for parameter, columns in PARAMETERS.items():
+            value, low, high = (_number(fit[column]) for column in columns)
+            if math.isfinite(value):
+                found.append(Law(fit["sample"], fit["regime"], parameter, value, low, high))
+    return found
+
+
+def _number(cell: str) -> float:
+    return float(cell) if cell else math.nan

@@ -1,0 +1,153 @@
+"""What lies in a drop folder: campaigns by the content of their files, and those still on their way."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from tribo.errors import CampaignError, Problem
+
+# how copying programs and browsers name a file that is not whole yet
+UPLOAD_SUFFIXES = (".part", ".partial", ".tmp", ".temp", ".crdownload", ".download", ".filepart", ".upload", ".!ut")
+OVERRIDES = ".overrides.csv"
+IGNORED = ("Thumbs.db", "desktop.ini", ".DS_Store")
+_CHUNK = 1 << 20
+
+
+@dataclass(frozen=True)
+class Dropped:
+    """A campaign folder or .zip of a drop folder.
+
+    ``files`` maps each file (relative to the campaign) to its SHA-256, ``waiting`` says which files are not whole
+    yet and why; a campaign with such files is left for the next round. ``overrides`` is NAME.overrides.csv beside the
+    campaign: what a person decided about single pulls.
+    """
+
+    name: str
+    path: Path
+    files: Mapping[str, str] = field(default_factory=dict)
+    waiting: tuple[str, ...] = ()
+    overrides: Path | None = None
+
+    @property
+    def digest(self) -> str:
+        """One SHA-256 over the names and contents of all files."""
+        listing = "".join(f"{digest}  {name}\n" for name, digest in sorted(self.files.items()))
+        return hashlib.sha256(listing.encode()).hexdigest()
+
+
+def scan(drop: Path, settle_s: float = 60.0) -> tuple[Dropped, ...]:
+    """Every campaign of a drop folder, by name.
+
+    A folder is one campaign, and so is a .zip. A file changed less than ``settle_s`` seconds ago, one that changes
+    while it is read, and one whose name says that it is being uploaded is not whole yet.
+
+    Raises
+    ------
+    CampaignError
+        Two campaigns of one name ("a" and "a.zip"), or no such folder.
+    """
+    if not drop.is_dir():
+        raise CampaignError(Problem("missing", "no such folder", file=str(drop)))
+    found = [
+        _with_overrides(_look(path, settle_s), settle_s) for path in sorted(drop.iterdir()) if _is_campaign(path)
+    ]
+    names = [campaign.name for campaign in found]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        what = "a folder and a .zip of one name; rename one of them"
+        raise CampaignError(Problem("duplicate_campaign", what, file=str(drop), found=name) for name in twice)
+    return tuple(found)
+
+
+def _is_campaign(path: Path) -> bool:
+    if path.name.startswith("."):
+        return False
+    return path.is_dir() or path.suffix.lower() == ".zip" or _uploading(path.name)
+
+
+def _uploading(name: str) -> bool:
+    return name.lower().endswith(UPLOAD_SUFFIXES) or name.startswith(("~$", ".~", ".syncthing."))
+
+
+def _look(path: Path, settle_s: float) -> Dropped:
+    if path.is_file():
+        name = path.stem if not _uploading(path.name) else path.name
+        why = _not_whole(path, settle_s)
+        if why:
+            return Dropped(name, path, waiting=(f"{path.name} {why}",))
+        digest, changed = _hashed(path)
+        return Dropped(name, path, {path.name: digest}, (f"{path.name} is still growing",) if changed else ())
+    files, waiting = {}, []
+    for file in _files(path):
+        shown = file.relative_to(path).as_posix()
+        why = _not_whole(file, settle_s)
+        if not why:
+            files[shown], changed = _hashed(file)
+            why = "is still growing" if changed else ""
+        if why:
+            waiting.append(f"{shown} {why}")
+    if not any(name.rsplit("/", 1)[-1] == "campaign.toml" for name in files) and not waiting:
+        waiting.append("campaign.toml is not there yet")
+    return Dropped(path.name, path, files, tuple(waiting))
+
+
+def _with_overrides(campaign: Dropped, settle_s: float) -> Dropped:
+    """The campaign with the overrides that lie beside it."""
+    beside = campaign.path.with_name(f"{campaign.name}{OVERRIDES}")
+    if not beside.is_file():
+        return campaign
+    why = _not_whole(beside, settle_s)
+    waiting = (*campaign.waiting, f"{beside.name} {why}") if why else campaign.waiting
+    return replace(
+        campaign, files={**campaign.files, beside.name: _hashed(beside)[0]}, waiting=waiting, overrides=beside
+    )
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for path in sorted(folder.rglob("*")):
+        hidden = path.name.startswith(".") and not _uploading(path.name)
+        if path.is_file() and path.name not in IGNORED and not hidden:
+            yield path
+
+
+def _not_whole(file: Path, settle_s: float) -> str:
+    """Why a file may not be whole yet, as the end of a sentence; empty where it is."""
+    if _uploading(file.name):
+        return "is being uploaded"
+    status = file.stat()
+    # a copy that keeps the old modification time still changed its inode now
+    age = time.time() - max(status.st_mtime, status.st_ctime)
+    return f"changed {max(age, 0.0):.0f} s ago" if age < settle_s else ""
+
+
+def _hashed(file: Path) -> tuple[str, bool]:
+    """SHA-256 of a file, and whether the file changed meanwhile."""
+    digest = hashlib.sha256()
+    with file.open("rb") as stream:
+        before = os.fstat(stream.fileno())
+        while chunk := stream.read(_CHUNK):
+            digest.update(chunk)
+    after = file.stat()
+    return digest.hexdigest(), (before.st_size, before.st_mtime_ns) != (after.st_size, after.st_mtime_ns)
+
+
+def difference(old: Mapping[str, str] | None, new: Mapping[str, str]) -> str:
+    """What changed between two sets of files, in words; empty where nothing did."""
+    if old is None:
+        return "new"
+    kinds = {
+        "changed": [name for name in new if name in old and old[name] != new[name]],
+        "added": [name for name in new if name not in old],
+        "removed": [name for name in old if name not in new],
+    }
+    return "; ".join(f"{kind} {_listed(names)}" for kind, names in kinds.items() if names)
+
+
+def _listed(names: list[str], most: int = 5) -> str:
+    shown = ", ".join(sorted(names)[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
