@@ -23,9 +23,11 @@ FIGURES = ["agreement", *(f"fig{k}" for k in range(3, 9))]
 
 def test_out_holds_the_agreed_files(written: Written) -> None:
     found = {str(p.relative_to(written.out)) for p in written.out.rglob("*") if p.is_file()}
-    figures = {f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "png", "csv")}
+    figures = {f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "pdf", "png", "csv")}
     tables = {"tests.csv", "fits.csv", "other_fits.csv", "comparison.csv"}
-    assert found == figures | tables | {"campaign.nc", "report.html", "provenance.json"}
+    assert found == figures | tables | {
+        "campaign.nc", "report.html", "report.pdf", "provenance.json", "ro-crate-metadata.json",
+    }  # fmt: skip
 
 
 def test_the_same_study_gives_the_same_bytes(written: Written, study: Study, tmp_path: Path) -> None:
@@ -69,7 +71,7 @@ def test_a_walk_that_stops_early_writes_less(until: str, expected: set[str], stu
 
     short = replace(study, comparison=None, fits=study.fits if until == "fit" else ())
     write_until(short, tmp_path, until)
-    assert {p.name for p in tmp_path.iterdir()} == expected | {"campaign.nc"}
+    assert {p.name for p in tmp_path.iterdir()} == expected | {"campaign.nc", "provenance.json"}
 
 
 def test_progress_is_told_of_every_figure(written: Written) -> None:

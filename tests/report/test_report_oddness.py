@@ -28,8 +28,9 @@ def test_a_pull_at_half_the_force_is_the_oddest(study: Study) -> None:
 
 def test_an_odd_pull_is_shown_and_still_used(study: Study) -> None:
     page = html(with_static(study, "T0010", 0.5), drawn={})
-    assert "<h4>T0010</h4>" in page
-    assert '<th scope="row">T0010</th>' in page
+    first = page.index('<li class="card')
+    assert 'data-id="T0010"' in page[first : page.index(">", first)]  # the oddest comes first
+    assert "below the median of the 2 other pulls" in page
 
 
 def test_ordinary_scatter_is_not_odd(study: Study) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import re
 from collections import Counter
 from dataclasses import replace
@@ -68,10 +70,17 @@ def test_no_id_stands_twice_and_no_link_leads_nowhere(outline: Outline) -> None:
     assert {t[1:] for t in outline.targets} <= set(outline.ids)
 
 
-def test_the_page_fetches_nothing_and_runs_nothing(page: str, outline: Outline) -> None:
+def test_the_page_fetches_nothing_and_runs_only_the_script_its_policy_names(page: str, outline: Outline) -> None:
     assert all(target.startswith("#") for target in outline.targets)
     assert outline.sources == []
-    assert outline.tags["script"] == 0
+    (script,) = re.findall(r"<script>(.*?)</script>", page, flags=re.DOTALL)
+    policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
+    assert policy is not None
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in policy[1]
+    assert "default-src 'none'" in policy[1]
+    assert outline.tags["script"] == 3  # the other two hold data
+    assert page.count('type="application/json"') == 2
     assert "@import" not in page
     assert not re.search(r"url\((?!#)", page)
 
@@ -83,8 +92,10 @@ def test_names_from_the_campaign_are_escaped(page: str) -> None:
 
 
 def test_every_pull_and_every_test_set_aside_is_on_the_page(page: str, study: Study) -> None:
-    for test in study.ingested.campaign.tests:
-        assert f'<th scope="row">{test.test_id}</th>' in page
+    for test_id in study.ingested.pulls:
+        assert page.count(f'data-id="{test_id}"') == 1
+    for test_id in ("T9001", study.ingested.campaign.tests[-1].test_id):
+        assert f'<th scope="row">{test_id}</th>' in page
     assert page.count('class="trace"') == len(study.ingested.traces)
 
 
@@ -108,7 +119,7 @@ def test_provenance_is_told(page: str) -> None:
 
 
 def test_the_page_holds_no_undefined_numbers(page: str) -> None:
-    words = re.sub(r"<svg.*?</svg>|<style>.*?</style>", "", page, flags=re.DOTALL)
+    words = re.sub(r"<(svg|style|script)\b.*?</\1>", "", page, flags=re.DOTALL)
     assert not re.search(r"\b(nan|inf|None)\b", words)
 
 
@@ -137,8 +148,7 @@ def test_a_sample_that_could_not_be_fitted_leaves_dashes(study: Study) -> None:
         replace(f, values=np.full(2, np.nan), covariance=np.full((2, 2), np.nan), dof=0.0) if f.sample == "B" else f
         for f in study.fits
     )
-    words = re.sub(
-        r"<svg.*?</svg>|<style>.*?</style>", "", html(replace(study, fits=broken), drawn={}), flags=re.DOTALL
-    )
+    broken_page = html(replace(study, fits=broken), drawn={})
+    words = re.sub(r"<(svg|style|script)\b.*?</\1>", "", broken_page, flags=re.DOTALL)
     assert not re.search(r"\b(nan|inf)\b", words)
     assert "<td>–</td>" in words

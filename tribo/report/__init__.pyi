@@ -1,12 +1,10 @@
 from .diagnosis import write_verdict as write_verdict
 from .drawings import write_figures as write_figures
 from .page import write_html as write_html
+from .pdf import write_pdf as write_pdf
 from .provenance import Provenance as Provenance, gather_provenance as gather_provenance
 from .store import write_store as write_store
 from .tables import write_tables as write_tables
-from .text import (
-    set_aside_text as set_aside_text,
-    summary_text as summary_text,
-    table2_text as table2_text,
-)
+from .text import summary_text as summary_text, table2_text as table2_text
+from .verify import Verification as Verification, verify as verify
 from .write import write_report as write_report, write_until as write_until

@@ -1,100 +1,121 @@
-"""Figures to files: SVG, PNG and the plotted numbers as CSV, the same bytes for the same study."""
+"""Figures to files: SVG, PDF, PNG and the plotted numbers as CSV, the same bytes for the same study."""
 
 from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+import pandas as pd
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from tribo.figures.catalogue import FIGURES
-from tribo.figures.record import StudyFigure
+from tribo.figures.catalogue import DIAGNOSIS_FIGURES, FIGURES
+from tribo.figures.record import FigureOf
 from tribo.figures.style import house_style
 from tribo.records import Study
-from tribo.report.files import write_bytes, write_text
+from tribo.report.files import write_bytes
+from tribo.report.hover import Series, series_of
+from tribo.report.parallel import each
 from tribo.report.tables import to_csv
+from tribo.report.typeset import figure_files
+
+if TYPE_CHECKING:
+    from tribo.diagnose import Diagnosis
 
 Progress = Callable[[str, int, int], None]
 STAGE = "drawing figures"
-PNG_DPI = 300
 
 
-def write_figures(study: Study, out: Path, progress: Progress | None = None) -> dict[str, str]:
-    """Write out/figures/NAME.svg, .png and .csv of every figure the study has the numbers for.
+@dataclass(frozen=True)
+class Drawn:
+    """A figure as drawn: its words, its files by ending, and where its points lie for who hovers over them."""
 
-    Returns the SVG text of each figure drawn, by name, so that a page can show it without drawing it again.
+    name: str
+    title: str
+    caption: str
+    files: dict[str, bytes]
+    series: list[Series] = field(default_factory=list)
+
+    @property
+    def svg(self) -> str:
+        return self.files["svg"].decode("utf-8")
+
+
+def write_figures(
+    study: Study | None,
+    out: Path,
+    progress: Progress | None = None,
+    diagnosis: Diagnosis | None = None,
+    origin: str = "",
+    jobs: int = 1,
+) -> dict[str, Drawn]:
+    """Write out/figures/NAME.svg, .pdf, .png and .csv of every figure there are numbers for, and return them.
+
+    ``origin`` says in the metadata of every file what it was made from; ``jobs`` processes share the drawing.
     """
-    drawn = {}
-    for done, figure in enumerate(FIGURES.values(), start=1):
-        svg = _write_one(study, figure, out / "figures")
-        if svg:
-            drawn[figure.name] = svg
+    drawn = draw_all(study, diagnosis, origin, progress, jobs)
+    for figure in drawn.values():
+        for ending, content in figure.files.items():
+            write_bytes(out / "figures" / f"{figure.name}.{ending}", content)
+    return drawn
+
+
+def draw_all(
+    study: Study | None,
+    diagnosis: Diagnosis | None = None,
+    origin: str = "",
+    progress: Progress | None = None,
+    jobs: int = 1,
+) -> dict[str, Drawn]:
+    """Every figure there are numbers for, by name, those of the study before those of the diagnosis; no files."""
+    todo = list(_with_numbers(study, diagnosis))
+    found = {}
+    for done, figure in enumerate(each(partial(_draw, origin), todo, jobs), start=1):
+        # not in the other processes: typst keeps threads of its own, which do not survive a fork
+        rest = figure_files(figure.files["svg"], figure.title, origin)
+        found[figure.name] = replace(figure, files={**figure.files, **rest})
         if progress is not None:
-            progress(STAGE, done, len(FIGURES))
-    return drawn
+            progress(STAGE, done, len(todo))
+    return found
 
 
-def _write_one(study: Study, record: StudyFigure, folder: Path) -> str:
-    numbers = record.numbers(study)
-    if numbers.empty:
-        return ""
+def _with_numbers(study: Study | None, diagnosis: Diagnosis | None) -> Iterator[tuple[str, pd.DataFrame]]:
+    of_study = ((name, figure.numbers(study)) for name, figure in FIGURES.items() if study is not None)
+    of_diagnosis = ((n, figure.numbers(diagnosis)) for n, figure in DIAGNOSIS_FIGURES.items() if diagnosis is not None)
+    yield from ((name, numbers) for name, numbers in (*of_study, *of_diagnosis) if not numbers.empty)
+
+
+def _draw(origin: str, todo: tuple[str, pd.DataFrame]) -> Drawn:
+    name, numbers = todo
+    record: FigureOf[Any] = FIGURES[name] if name in FIGURES else DIAGNOSIS_FIGURES[name]
     figure = record.draw(numbers)
-    _settle(figure)
-    svg = svg_text(figure)
-    write_text(folder / f"{record.name}.csv", to_csv(numbers))
-    write_text(folder / f"{record.name}.svg", svg)
-    write_bytes(folder / f"{record.name}.png", png_bytes(figure))
-    return svg
+    svg = svg_text(figure, record.title, origin).encode("utf-8")
+    csv = to_csv(numbers).encode("utf-8")
+    return Drawn(name, record.title, record.caption, {"csv": csv, "svg": svg}, series_of(figure))
 
 
-def draw_all(study: Study) -> dict[str, str]:
-    """SVG text of every figure the study has the numbers for, by name; nothing is written."""
-    drawn = {}
-    for record in FIGURES.values():
-        numbers = record.numbers(study)
-        if not numbers.empty:
-            figure = record.draw(numbers)
-            _settle(figure)
-            drawn[record.name] = svg_text(figure)
-    return drawn
-
-
-def _settle(figure: Figure) -> None:
-    """Lay the figure out once, so that each rendering need not do it again."""
-    with house_style():
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")
-
-
-# The canvases are called directly: Figure.savefig draws every figure once more than it needs to.
-def svg_text(figure: Figure) -> str:
-    """A settled figure as SVG without a date and without random names."""
+def svg_text(figure: Figure, title: str = "", origin: str = "") -> str:
+    """A figure as SVG without a date and without random names; its layout is settled on the way."""
     buffer = io.StringIO()
-    with house_style():
-        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": "tribo"})
-    return buffer.getvalue()
-
-
-def png_bytes(figure: Figure) -> bytes:
-    """A settled figure as PNG at print resolution, without the version of the program that drew it."""
-    buffer = io.BytesIO()
-    with house_style():
-        figure.set_dpi(PNG_DPI)
-        FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None})
+    about = {"Date": None, "Creator": "tribo", "Title": title or None, "Description": origin or None}
+    with house_style():  # the canvas is called directly: Figure.savefig draws every figure once more than it needs to
+        FigureCanvasSVG(figure).print_svg(buffer, metadata={k: v for k, v in about.items() if v or k == "Date"})
     return buffer.getvalue()
 
 
 def inline_svg(svg: str, name: str, label: str) -> str:
     """An SVG to stand inside an HTML page: names unique to it, a label for screen readers, theme colours.
 
-    White paper becomes transparent and black ink the colour of the text, so that it reads on light and dark.
+    White paper becomes transparent and black ink the colour of the text, so that it reads on light and dark; a
+    style sheet of its own would hold for the whole page, so it is taken out.
     """
     body = svg[svg.index("<svg") :]
-    body = re.sub(r"<metadata>.*?</metadata>\s*", "", body, flags=re.DOTALL)
+    body = re.sub(r"<(metadata|style)\b.*?</\1>\s*|<title>.*?</title>\s*", "", body, flags=re.DOTALL)
     body = re.sub(r'\bid="', f'id="{name}-', body)
     body = re.sub(r'(href="#|url\(#)', rf"\g<1>{name}-", body)
     body = re.sub(r"(fill|stroke): #ffffff", r"\1: var(--paper)", body)

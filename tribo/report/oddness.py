@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -17,7 +18,7 @@ FEWEST_SIBLINGS = 2
 
 @dataclass(frozen=True)
 class OddPull:
-    """A pull, how far its force lies from the median of its siblings, and how many robust SDs that is."""
+    """Where a pull stands: how far its force lies from the median of its siblings, and how many robust SDs that is."""
 
     test_id: str
     regime: Regime
@@ -26,24 +27,36 @@ class OddPull:
     siblings: int
 
 
-def odd_pulls(study: Study) -> list[OddPull]:
-    """Pulls with a modified z-score beyond 3.5, the oddest first; a pull odd in both regimes stands once.
+def standings(study: Study) -> dict[str, OddPull]:
+    """Where every pull stands among its siblings, in the regime in which it stands farther out.
 
     Deviations are taken in ln T from the median of the other pulls of the sample at the load, and scaled by the
-    median absolute deviation over the whole campaign: one cell has too few pulls for a scale of its own.
+    median absolute deviation over the whole campaign: one cell has too few pulls for a scale of its own. A pull
+    that was excluded by hand is judged like any other; one with fewer than two siblings is not judged.
     """
-    table = study.ingested.table()
-    if table.empty:
-        return []
+    ingested = study.ingested
+    left_out = {i: b.automatic for i, b in ingested.by_hand.items() if b.override.action == "exclude"}
+    table = replace(ingested, pulls={**ingested.pulls, **left_out}).table()
     found: dict[str, OddPull] = {}
-    for regime in REGIMES:
-        for pull in _odd_in(table, regime):
+    for regime in REGIMES if not table.empty else ():
+        for pull in _judged_in(table, regime):
             if pull.test_id not in found or abs(pull.score) > abs(found[pull.test_id].score):
                 found[pull.test_id] = pull
-    return sorted(found.values(), key=lambda pull: (-abs(pull.score), pull.test_id))
+    return found
 
 
-def _odd_in(table: pd.DataFrame, regime: Regime) -> list[OddPull]:
+def odd_pulls(study: Study) -> list[OddPull]:
+    """Used pulls with a modified z-score beyond 3.5, the oddest first; a pull odd in both regimes stands once."""
+    odd = [p for i, p in standings(study).items() if i in study.ingested.pulls and abs(p.score) > ODD_SCORE]
+    return sorted(odd, key=lambda pull: (-abs(pull.score), pull.test_id))
+
+
+def oddness(standing: OddPull | None, flags: Collection[str]) -> float:
+    """By what pulls are sorted: robust standard deviations from the siblings, and one for every flag."""
+    return (abs(standing.score) if standing is not None else 0.0) + len(flags)
+
+
+def _judged_in(table: pd.DataFrame, regime: Regime) -> list[OddPull]:
     table = table[table[f"{regime}_N"] > 0]
     level_N = select.load_levels(table["normal_load_N"].to_numpy(float))
     log_force = np.log(table[f"{regime}_N"])
@@ -54,8 +67,7 @@ def _odd_in(table: pd.DataFrame, regime: Regime) -> list[OddPull]:
     scale = MAD_TO_SD * float(deviation[judged].abs().median())
     if not scale > 0:
         return []
-    odd = judged & (deviation.abs() > ODD_SCORE * scale)
-    rows = zip(table["test_id"][odd], deviation[odd], siblings[odd], strict=True)
+    rows = zip(table["test_id"][judged], deviation[judged], siblings[judged], strict=True)
     return [OddPull(str(i), regime, float(np.expm1(d)), float(d) / scale, int(n)) for i, d, n in rows]
 
 

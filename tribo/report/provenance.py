@@ -1,10 +1,11 @@
-"""Where a result comes from: command, versions, seed, options, and the hash of every input."""
+"""Where a result comes from: command, time, versions, seed, options, and the hash of every input and output."""
 
 from __future__ import annotations
 
 import json
+import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
@@ -14,23 +15,22 @@ from typing import Any
 from tribo.records import Study
 from tribo.report.files import write_text
 
+FILE = "provenance.json"
 PACKAGES = (
-    "tribo",
-    "numpy",
-    "scipy",
-    "pandas",
-    "matplotlib",
-    "xarray",
-    "h5netcdf",
-    "h5py",
-    "numba",
-    "statsmodels",
-)
+    "tribo", "numpy", "scipy", "pandas", "matplotlib", "xarray", "h5netcdf", "h5py", "numba", "statsmodels", "typst",
+    "rocrate",
+)  # fmt: skip
+DESCRIBED_IN = ("campaign.toml", "tests.csv")
+RAW = "raw"
 
 
 @dataclass(frozen=True)
 class Provenance:
-    """How a report was made. ``inputs`` maps each input file (relative to the campaign) to its SHA-256."""
+    """How a report was made. ``inputs`` maps each file of the campaign, by its path in it, to its SHA-256.
+
+    ``campaign`` is where the campaign was, ``overrides`` the path and SHA-256 of the table of decisions by hand, if
+    one was given.
+    """
 
     command: str = ""
     started_at: str = ""
@@ -38,12 +38,46 @@ class Provenance:
     options: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
     inputs: Mapping[str, str] = field(default_factory=dict)
+    campaign: str = ""
+    overrides: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def inputs_digest(self) -> str:
-        """One SHA-256 over the names and hashes of all inputs."""
-        listing = "".join(f"{digest}  {name}\n" for name, digest in sorted(self.inputs.items()))
+        """One SHA-256 over the names and hashes of all inputs, the overrides among them."""
+        hashes = {**self.inputs, **({"--overrides": self.overrides["sha256"]} if self.overrides else {})}
+        listing = "".join(f"{digest}  {name}\n" for name, digest in sorted(hashes.items()))
         return sha256(listing.encode()).hexdigest()
+
+    @property
+    def origin(self) -> str:
+        """What decides the numbers, in one line: the same for the same inputs, whenever and wherever they are read."""
+        chosen = {"seed": self.seed, **self.options}
+        return "; ".join(
+            [
+                f"tribo {self.versions.get('tribo', '')}".rstrip(),
+                f"inputs SHA-256 {self.inputs_digest}",
+                *(f"{name} {value}" for name, value in chosen.items() if value is not None),
+            ]
+        )
+
+    def in_words(self) -> list[tuple[str, str]]:
+        """Names and values as a report shows them."""
+        chosen = {name.replace("_", " "): str(value) for name, value in self.options.items()}
+        overrides = f"{self.overrides['file']}, SHA-256 {self.overrides['sha256']}" if self.overrides else ""
+        known = {
+            "Command": self.command,
+            "Started": self.started_at,
+            "Seed": "" if self.seed is None else str(self.seed),
+            **chosen,
+            "Versions": ", ".join(f"{name} {number}" for name, number in self.versions.items()),
+            "Inputs": f"{len(self.inputs)} files, SHA-256 of their names and hashes together {self.inputs_digest}",
+            "Overrides": overrides,
+        }
+        return [(name, value) for name, value in known.items() if value]
+
+    def as_record(self) -> dict[str, Any]:
+        """Plain types, as provenance.json and campaign.nc hold them."""
+        return {**asdict(self), "inputs_sha256": self.inputs_digest}
 
 
 def gather_provenance(
@@ -52,12 +86,27 @@ def gather_provenance(
     seed: int | None = None,
     started_at: str = "",
     options: Mapping[str, Any] | None = None,
+    campaign: Path | None = None,
+    overrides: Path | None = None,
 ) -> Provenance:
-    """Versions of what computes, and hashes of campaign.toml, tests.csv and every export that exists."""
-    campaign = study.ingested.campaign
-    names = dict.fromkeys(["campaign.toml", "tests.csv", *(test.file for test in campaign.tests)])
-    inputs = {name: _hash(campaign.root / name) for name in names if (campaign.root / name).is_file()}
-    return Provenance(command, started_at, seed, dict(options or {}), _versions(), inputs)
+    """Versions of what computes, and hashes of everything in the campaign.
+
+    ``campaign`` is the folder or .zip as the user gave it, ``overrides`` the table of decisions by hand.
+    """
+    root = study.ingested.campaign.root
+    named = {test.file.partition("#")[0] for test in study.ingested.campaign.tests}
+    inputs = {name: file_hash(root / name) for name in dict.fromkeys((*input_names(root), *sorted(named)))
+              if (root / name).is_file()}  # fmt: skip
+    decided = {} if overrides is None else {"file": str(overrides), "sha256": file_hash(overrides)}
+    where = str(campaign or root)
+    return Provenance(command, started_at, seed, dict(options or {}), _versions(), inputs, where, decided)
+
+
+def input_names(root: Path) -> Iterator[str]:
+    """What a campaign folder holds: its two tables and every file of raw/, in order."""
+    yield from (name for name in DESCRIBED_IN if (root / name).is_file())
+    if (root / RAW).is_dir():
+        yield from (p.relative_to(root).as_posix() for p in sorted((root / RAW).rglob("*")) if p.is_file())
 
 
 def _versions() -> dict[str, str]:
@@ -70,11 +119,70 @@ def _versions() -> dict[str, str]:
     return found
 
 
-def _hash(path: Path) -> str:
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file."""
     return sha256(path.read_bytes()).hexdigest()
 
 
-def write_provenance(provenance: Provenance, out: Path) -> Path:
-    """Write out/provenance.json."""
-    record = {**asdict(provenance), "inputs_sha256": provenance.inputs_digest}
-    return write_text(out / "provenance.json", json.dumps(record, indent=1, ensure_ascii=False, default=str) + "\n")
+def write_provenance(provenance: Provenance, out: Path, outputs: Mapping[str, str] | None = None) -> Path:
+    """Write out/provenance.json; ``outputs`` maps each file of OUT to its SHA-256.
+
+    Places are written relative to OUT, so that a study that is moved as a whole can still be verified.
+    """
+    record = provenance.as_record()
+    record["campaign"] = _from(out, provenance.campaign)
+    if provenance.overrides:
+        record["overrides"] = {**provenance.overrides, "file": _from(out, provenance.overrides["file"])}
+    record["origin"] = provenance.origin
+    record["outputs"] = dict(sorted((outputs or {}).items()))
+    return write_text(out / FILE, json.dumps(record, indent=1, ensure_ascii=False, default=str) + "\n")
+
+
+def _from(out: Path, place: str) -> str:
+    if not place:
+        return ""
+    try:
+        return Path(os.path.relpath(place, out)).as_posix()
+    except ValueError:  # another drive
+        return str(Path(place).absolute())
+
+
+def read_record(out: Path) -> dict[str, Any] | None:
+    """What provenance.json of a folder says; None where there is none, or none of this kind."""
+    try:
+        record = json.loads((out / FILE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return record if isinstance(record, dict) and isinstance(record.get("outputs"), dict) else None
+
+
+def settle_outputs(
+    out: Path, before: Mapping[str, Any] | None, provenance: Provenance, written: Iterable[Path], complete: bool
+) -> dict[str, str]:
+    """The files that stand for this record, with their hashes; those of an earlier record that do not are removed.
+
+    An earlier file stays where its run had the same inputs and choices and this run did not write everything itself
+    (``complete``). A file that someone changed since is never removed.
+    """
+    stands = before is not None and not complete and _same_origin(before, provenance)
+    outputs = {path.relative_to(out).as_posix(): file_hash(path) for path in written}
+    for name, digest in (before or {}).get("outputs", {}).items():
+        path = out / name
+        if name in outputs or not path.resolve().is_relative_to(out.resolve()) or not path.is_file():
+            continue
+        if stands:
+            outputs[name] = digest
+        elif file_hash(path) == digest:
+            path.unlink()
+    return outputs
+
+
+def _same_origin(before: Mapping[str, Any], provenance: Provenance) -> bool:
+    """Whether an earlier run had the same inputs and version, and made the same choices where it had to choose."""
+    earlier, now = before["options"], provenance.options
+    return (
+        before["inputs_sha256"] == provenance.inputs_digest
+        and before["versions"].get("tribo") == provenance.versions.get("tribo")
+        and (None in (before["seed"], provenance.seed) or before["seed"] == provenance.seed)
+        and all(str(earlier[name]) == str(now[name]) for name in earlier.keys() & now.keys())
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +14,7 @@ import xarray as xr
 from tribo.records import Study, Trace
 from tribo.report import tables
 from tribo.report.files import whole_file
+from tribo.report.provenance import Provenance
 
 # How the end of a column name says its unit; the longest ending wins.
 UNIT_ENDINGS = {
@@ -36,8 +38,10 @@ def _units(column: str) -> dict[str, str]:
     return {"units": unit} if unit else {}
 
 
-def write_store(study: Study, out: Path) -> Path:
+def write_store(study: Study, out: Path, provenance: Provenance | None = None) -> Path:
     """Write out/campaign.nc, a DataTree with the groups tests, fits, comparison, simulated and traces.
+
+    ``provenance`` stands in the attributes of the file, as JSON.
 
     ``traces`` is a contiguous ragged array (CF conventions 9.3.3): the samples of all traces end to end, with
     ``row_size`` samples and the first at ``row_start`` for each test. Times in s, forces in N as recorded
@@ -51,6 +55,9 @@ def write_store(study: Study, out: Path) -> Path:
         "nominal_area_m2": campaign.nominal_area_m2,
         "Conventions": "CF-1.11",
     }
+    if provenance is not None:
+        about |= {"source": provenance.origin, "history": f"{provenance.started_at} {provenance.command}".strip()}
+        about["provenance"] = json.dumps(provenance.as_record(), ensure_ascii=False, default=str)
     groups = {"/": xr.Dataset(attrs=about), "/tests": _table(tables.tests_table(study), "test")}
     groups["/traces"] = _ragged(study)
     if study.fits:

@@ -6,7 +6,7 @@ from tribo.figures import select
 from tribo.records import REGIMES, LawFit, Regime, Study
 from tribo.report import findings, wording
 from tribo.report.numerals import with_uncertainty
-from tribo.report.tables import PA_PER_KPA, all_set_aside
+from tribo.report.tables import PA_PER_KPA
 
 HEAD = ("sample", "mu", "tau0 (kPa)", "T (N)", "mu", "tau0 (kPa)", "T (N)", "specimens", "tests")
 
@@ -61,11 +61,6 @@ def fit_cells(fit: LawFit | None, load_N: float) -> tuple[str, str, str]:
         with_uncertainty(fit.value("tau0_Pa") / PA_PER_KPA, fit.standard_uncertainty("tau0_Pa") / PA_PER_KPA),
         with_uncertainty(float(fit.force_N(load_N)), float(fit.force_u_N(load_N))),
     )
-
-
-def set_aside_text(study: Study) -> str:
-    """The tests that take no part, one line each; empty where there are none."""
-    return "\n".join(f"{fault.test_id}: {fault.reason}" for fault in all_set_aside(study).values())
 
 
 def summary_text(study: Study) -> str:

@@ -3,33 +3,20 @@
 from __future__ import annotations
 
 from tribo.diagnose.plan import Plan
-from tribo.diagnose.verdict import Cause, Verdict
-from tribo.report.numerals import significant
+from tribo.diagnose.verdict import Verdict
+from tribo.report.diagnosis import verdict_in_words
 
 
 def verdict_text(verdict: Verdict) -> str:
-    """The verdict, its causes with intervals, what else was excluded or tied, the gain and the next test."""
-    lines = [f"{verdict.verdict.upper()}: {verdict.text}"]
-    lines += [f"  misfit: {m.text}" for m in verdict.misfits]
-    lines += [f"  cause: {_cause_line(c)}" for c in verdict.causes]
-    lines += [f"  cannot be parted by this design: {', '.join(names)}" for names in verdict.equivalent]
-    if verdict.gain is not None:
-        gain = verdict.gain
-        lines.append(
-            f"  gain on {gain.held_out} not seen: {gain.difference:.2f} +- {gain.se:.2f} in log score a test, "
-            f"RMSE {gain.rmse_percent_before:.1f} % before, {gain.rmse_percent_after:.1f} % after"
-        )
-    if verdict.next_test is not None:
-        lines.append(f"  next test: {verdict.next_test.text}")
+    """The verdict as the report words it: outcome, misfits, causes with intervals, ties, gain and next test."""
+    words = verdict_in_words(verdict.as_dict())
+    lines = [f"{words['outcome']} {words['text']}"]
+    lines += [f"  misfit: {misfit['text']}" for misfit in words["misfits"]]
+    lines += [f"  cause, weight {c['weight']}: {c['text']}" for c in words["causes"]]
+    lines += [f"  {tie}" for tie in words["equivalent"]]
+    lines += [f"  {words['gain']}"] if words["gain"] else []
+    lines += [f"  next test: {words['next_test']}"] if words["next_test"] else []
     return "\n".join(lines)
-
-
-def _cause_line(cause: Cause) -> str:
-    values = ", ".join(
-        f"{name} = {significant(e.value)} ({significant(e.low)} to {significant(e.high)}) {e.unit}".rstrip()
-        for name, e in cause.parameters.items()
-    )
-    return f"{cause.text} [{cause.mechanism}, weight {cause.weight:.2f}; 90 %: {values}]"
 
 
 def plan_text(plan: Plan) -> str:

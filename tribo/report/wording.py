@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from tribo.figures import select
-from tribo.records import REGIMES, LawFit, Regime, Study
+from tribo.records import REGIMES, ByHand, LawFit, Pull, Regime, Study
 from tribo.report import findings
 from tribo.report.findings import Agreement, DirectionRatio, Ranking, Verdict
 from tribo.report.numerals import counted, joined, percent, significant, span, with_uncertainty
@@ -201,6 +201,29 @@ def odd_sentence(pull: OddPull) -> str:
         f"{pull.regime.capitalize()} force {percent(abs(pull.deviation))} {side} the median of the {pull.siblings} "
         f"other pulls of this sample at this load, {abs(pull.score):.1f} robust standard deviations."
     )
+
+
+def by_hand_sentence(decided: ByHand, pull: Pull | None) -> str:
+    """What a person decided about a pull, and what it changed against the automatic reading."""
+    reason = f" ({decided.override.reason})" if decided.override.reason else ""
+    if pull is None:
+        return f"Left out by hand{reason}."
+    automatic = decided.automatic
+    moved = []
+    if decided.override.peak_s is not None:
+        moved.append(f"static peak from {significant(automatic.peak_s)} to {significant(pull.peak_s)} s")
+    if decided.override.window_s is not None:
+        before, after = (" to ".join(map(significant, p.window_s)) for p in (automatic, pull))
+        moved.append(f"sliding window from {before} s to {after} s")
+    return (
+        f"Read elsewhere by hand{reason}: {joined(moved)}. Static force {_changed(automatic.static_N, pull.static_N)}, "
+        f"sliding force {_changed(automatic.sliding_N, pull.sliding_N)}."
+    )
+
+
+def _changed(before: float, after: float) -> str:
+    change = percent(after / before - 1) if before else "–"
+    return f"{significant(after)} N where the rule reads {significant(before)} N ({change})"
 
 
 def flags_in_words(flags: Iterable[str]) -> str:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from tribo.records import Study
 from tribo.report.diagnosis import write_verdict
 from tribo.report.drawings import write_figures
-from tribo.report.provenance import Provenance, write_provenance
+from tribo.report.provenance import Provenance, gather_provenance, read_record, settle_outputs, write_provenance
 from tribo.report.store import write_store
 from tribo.report.tables import write_tables
+
+if TYPE_CHECKING:
+    from tribo.diagnose import Diagnosis
 
 Progress = Callable[[str, int, int], None]
 Until = Literal["ingest", "fit", "compare", "report"]
@@ -24,25 +27,35 @@ def write_until(
     progress: Progress | None = None,
     provenance: Provenance | None = None,
     verdict: Mapping[str, Any] | None = None,
+    diagnosis: Diagnosis | None = None,
+    jobs: int = 1,
 ) -> None:
     """Write what a walk as far as ``until`` (ingest, fit, compare or report) yields.
 
-    Tables and campaign.nc always, as far as the study went; figures from ``compare`` on; then the page.
-    Every file is whole or absent: it is written under a temporary name and renamed.
+    Tables and campaign.nc always, as far as the study went; verdict.json and its figures where there is a
+    ``verdict`` or the whole ``diagnosis`` of it; the figures of the study from ``compare`` on; then page, PDF and
+    crate. Every file is whole or absent: it is written under a temporary name and renamed. Last comes
+    provenance.json with the hash of each; files of an earlier run that no longer hold are removed.
     """
-    write_tables(study, out)
-    write_store(study, out)
-    if provenance is not None:
-        write_provenance(provenance, out)
+    before = read_record(out)
+    made_by = provenance if provenance is not None else gather_provenance(study)
+    verdict = diagnosis.verdict.as_dict() if diagnosis is not None else verdict
+    written = [*write_tables(study, out), write_store(study, out, made_by)]
     if verdict is not None:
-        write_verdict(verdict, out)
-    if until not in ("compare", "report"):
-        return
-    drawn = write_figures(study, out, progress)
+        written.append(write_verdict(verdict, out))
+    if until in ("compare", "report") or diagnosis is not None:
+        shown = study if until in ("compare", "report") else None
+        drawn = write_figures(shown, out, progress, diagnosis, made_by.origin, jobs)
+        written += [out / "figures" / f"{f.name}.{ending}" for f in drawn.values() for ending in f.files]
     if until == "report":
+        from tribo.report.crate import write_crate
         from tribo.report.page import write_html
+        from tribo.report.pdf import write_pdf
 
-        write_html(study, out, provenance=provenance, drawn=drawn, verdict=verdict)
+        written.append(write_html(study, out, made_by, drawn, verdict))
+        written.append(write_pdf(study, out, made_by, drawn, verdict))
+        written.append(write_crate(study, out, made_by, written))
+    write_provenance(made_by, out, settle_outputs(out, before, made_by, written, complete=until == "report"))
 
 
 def write_report(
@@ -51,6 +64,8 @@ def write_report(
     progress: Progress | None = None,
     provenance: Provenance | None = None,
     verdict: Mapping[str, Any] | None = None,
+    diagnosis: Diagnosis | None = None,
+    jobs: int = 1,
 ) -> None:
-    """All of OUT: tables, campaign.nc, figures, verdict.json where there is a verdict, report.html."""
-    write_until(study, out, "report", progress, provenance, verdict)
+    """All of OUT: tables, campaign.nc, figures, verdict.json where there is a verdict, page, PDF and crate."""
+    write_until(study, out, "report", progress, provenance, verdict, diagnosis, jobs)

@@ -1,0 +1,49 @@
+"""What the script of the page reads is what was measured, as finely as a screen can show, and cannot break the page."""
+
+from __future__ import annotations
+
+import base64
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tribo.records import Study
+from tribo.report.embedded import figure_data, trace_data
+from tribo.report.hover import Series
+
+
+def unpacked(record: dict[str, object]) -> np.ndarray:
+    share = np.frombuffer(base64.b64decode(str(record["data"])), "<u2") / 65535
+    low, high = float(str(record["low"])), float(str(record["high"]))
+    return low + (high - low) * share
+
+
+def test_a_trace_comes_out_as_it_went_in(study: Study) -> None:
+    record = json.loads(trace_data(study, ["T0001"]))["T0001"]
+    trace, pull = study.ingested.traces["T0001"], study.ingested.pulls["T0001"]
+    assert record["whole"] is True
+    assert unpacked(record["t"]) == pytest.approx(trace.time_s, abs=1e-3)
+    assert unpacked(record["f"]) == pytest.approx(trace.force_N - pull.zero_N, abs=1e-4)
+    assert record["peak"] == pytest.approx([pull.peak_s, pull.static_N], rel=1e-5)
+
+
+def test_a_long_trace_is_thinned_without_losing_its_extremes(study: Study) -> None:
+    time = np.linspace(0, 20, 200_000)
+    force = np.sin(time)
+    force[77_777] = 9.0
+    trace = replace(study.ingested.traces["T0001"], time_s=time, force_N=force, displacement_m=None)
+    ingested = replace(study.ingested, traces={**study.ingested.traces, "T0001": trace})
+    record = json.loads(trace_data(replace(study, ingested=ingested), ["T0001"]))["T0001"]
+    values = unpacked(record["f"])
+    assert len(values) <= 1002
+    assert record["whole"] is False
+    assert values.max() == pytest.approx(9.0 - study.ingested.pulls["T0001"].zero_N, abs=1e-3)
+
+
+def test_no_name_can_end_the_script_element() -> None:
+    series = Series("</script><script>alert(1)", "x", "y", np.zeros((1, 2)), np.zeros((1, 2)))
+    text = figure_data({"fig": [series]})
+    assert "<" not in text
+    assert json.loads(text)["fig"][0]["name"] == series.name

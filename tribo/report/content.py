@@ -1,0 +1,142 @@
+"""What a report says, in the order it says it: made once, set as a page (page.py) and as a PDF (pdf.py)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tribo import __version__
+from tribo.figures import select
+from tribo.figures.catalogue import DIAGNOSIS_FIGURES
+from tribo.records import REGIMES, Regime, Study
+from tribo.report import findings, wording
+from tribo.report.diagnosis import verdict_in_words
+from tribo.report.provenance import Provenance
+from tribo.report.pulls import pull_cards
+from tribo.report.tables import all_set_aside
+from tribo.report.text import fit_cells
+from tribo.report.tribosystem import conditions
+from tribo.report.uncertainty import budget_origins, budget_tables
+
+LEAD_FIGURE = "agreement"
+MISFIT_FIGURES = ("misfit", "residuals")
+CAUSE_FIGURES = ("extended", "evidence")
+VERDICT_MARKS = {"agrees": "=", "model too high": "▲", "model too low": "▼", "cannot tell": "?"}
+
+
+def content(study: Study, provenance: Provenance | None, verdict: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Everything but the figures, by the names the templates use."""
+    return {
+        "study": study,
+        "campaign": study.ingested.campaign,
+        "verdict": verdict_in_words(verdict) if verdict is not None else None,
+        "summary": _summary(study),
+        "table2": _table2(study),
+        "budget": budget_tables(study),
+        "budget_origins": budget_origins(study),
+        "agreement": _agreement_tables(study),
+        "calibration": _calibration(study),
+        "set_aside": list(all_set_aside(study).values()),
+        "by_hand": by_hand(study),
+        "flags": _flag_counts(study),
+        "tribosystem": conditions(study),
+        "cards": pull_cards(study),
+        "provenance": provenance.in_words() if provenance is not None else None,
+        "version": __version__,
+    }
+
+
+def figure_places(names: list[str]) -> dict[str, list[str]]:
+    """Where each figure stands: beside the verdict, among Figs. 3 to 8, at the misfits, at the cause, at the end."""
+    places: dict[str, list[str]] = {"lead": [], "figures": [], "misfit": [], "cause": [], "rest": []}
+    for name in names:
+        if name == LEAD_FIGURE:
+            places["lead"].append(name)
+        elif name in MISFIT_FIGURES:
+            places["misfit"].append(name)
+        elif name in CAUSE_FIGURES:
+            places["cause"].append(name)
+        else:
+            places["rest" if name in DIAGNOSIS_FIGURES else "figures"].append(name)
+    return places
+
+
+def by_hand(study: Study) -> list[tuple[str, str]]:
+    """Every pull that was read elsewhere by hand, with what that changed; those left out are among the set aside."""
+    ingested = study.ingested
+    return [
+        (test_id, wording.by_hand_sentence(decided, ingested.pulls[test_id]))
+        for test_id, decided in ingested.by_hand.items()
+        if test_id in ingested.pulls
+    ]
+
+
+def _summary(study: Study) -> dict[str, Any]:
+    agreements = findings.agreements(study)
+    return {
+        "measured": wording.what_was_measured(study),
+        "flat": wording.flat_law(study),
+        "model": wording.in_short(agreements, select.flat_sample(study)),
+        "order": [wording.ranking_sentence(r) for r in findings.rankings(study)],
+        "directions": wording.direction_sentences(findings.direction_ratios(study)),
+        "correlation": wording.correlation_note(study),
+        "how_to_read": wording.HOW_TO_READ,
+    }
+
+
+def _table2(study: Study) -> dict[str, Any]:
+    simulated = study.comparison.simulated if study.comparison is not None else ()
+    load = findings.common_loads(study)[1]
+    regimes = []
+    for regime in REGIMES:
+        rows = []
+        for sample in select.sample_numbers(study):
+            fit = select.fit_of(study.fits, sample, regime)
+            if fit is not None:
+                model = fit_cells(select.fit_of(simulated, sample, regime), load)
+                area_fraction = study.ingested.campaign.area_fraction(sample)
+                rows.append((sample, area_fraction, fit_cells(fit, load), model, fit))
+        regimes.append((regime, rows))
+    return {
+        "load_N": load,
+        "regimes": [(r, rows) for r, rows in regimes if rows],
+        "simulated": bool(simulated),
+    }
+
+
+def _agreement_tables(study: Study) -> list[dict[str, Any]]:
+    agreements = findings.agreements(study)
+    return [table for regime in REGIMES if (table := _agreement_table(agreements, regime))]
+
+
+def _agreement_table(agreements: list[findings.Agreement], regime: Regime) -> dict[str, Any]:
+    """Ratios of one regime: a row a sample, a column a load level, and the sentence of each sample."""
+    part = [a for a in agreements if a.regime == regime]
+    if not part:
+        return {}
+    every_load = np.array([load.normal_load_N for a in part for load in a.loads])
+    levels = select.load_levels(every_load)
+    level_of = dict(zip(every_load.tolist(), levels.tolist(), strict=True))
+    columns = sorted(set(levels.tolist()))
+    rows = [
+        (a, [next((x for x in a.loads if level_of[x.normal_load_N] == level), None) for level in columns]) for a in part
+    ]
+    sentences = [(a.sample, wording.agreement_sentence(a)) for a in part]
+    return {"regime": regime, "loads": columns, "rows": rows, "sentences": sentences, "marks": VERDICT_MARKS}
+
+
+def _calibration(study: Study) -> list[tuple[str, str]]:
+    if study.comparison is None:
+        return []
+    return [(name, f"{float(value):.5g}".replace("-", "−")) for name, value in study.comparison.calibration.items()]
+
+
+def _flag_counts(study: Study) -> list[tuple[str, int, list[str]]]:
+    """Each quality flag, how many pulls carry it, and the tests."""
+    found: dict[str, list[str]] = {}
+    for test_id, pull in study.ingested.pulls.items():
+        for flag in pull.flags:
+            found.setdefault(flag, []).append(test_id)
+    return sorted(((f.replace("_", " "), len(tests), tests) for f, tests in found.items()), key=lambda x: (-x[1], x[0]))

@@ -1,0 +1,374 @@
+"use strict";
+(() => {
+  const byId = (id) => document.getElementById(id);
+  const make = (name, attributes = {}, ...children) => {
+    const svg = ["svg", "g", "path", "line", "circle", "rect", "text", "title"].includes(name);
+    const node = svg ? document.createElementNS("http://www.w3.org/2000/svg", name) : document.createElement(name);
+    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+    node.append(...children);
+    return node;
+  };
+  const number = (value, digits = 4) =>
+    value === null || !Number.isFinite(value) ? "–" : String(Number(value.toPrecision(digits))).replace("-", "−");
+  const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+
+  document.querySelectorAll("[data-with-script]").forEach((node) => node.removeAttribute("hidden"));
+
+  // Numbers under the pointer in the figures.
+  const tip = make("div", { class: "tip", hidden: "", "aria-hidden": "true" });
+  document.body.append(tip);
+  const figures = JSON.parse(byId("figure-data").textContent);
+  for (const [name, series] of Object.entries(figures)) {
+    const svg = document.querySelector(`#figure-${name} svg`);
+    if (!svg || !series.length) continue;
+    const reach = 9;
+    svg.addEventListener("pointermove", (event) => {
+      const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+      let best = null, least = reach * reach;
+      for (const s of series) {
+        for (let k = 0; k < s.place.length; k += 2) {
+          const away = (s.place[k] - at.x) ** 2 + (s.place[k + 1] - at.y) ** 2;
+          if (away < least) [best, least] = [[s, k], away];
+        }
+      }
+      tip.hidden = !best;
+      if (!best) return;
+      const [s, k] = best;
+      const lines = [`${s.x}: ${number(s.value[k])}`, `${s.y}: ${number(s.value[k + 1])}`];
+      tip.replaceChildren(...[s.name, ...lines].filter(Boolean).map((line) => make("div", {}, line)));
+      const width = tip.offsetWidth, left = event.clientX + 14;
+      tip.style.left = `${left + width > innerWidth ? Math.max(event.clientX - width - 14, 4) : left}px`;
+      tip.style.top = `${event.clientY + 14}px`;
+    });
+    svg.addEventListener("pointerleave", () => { tip.hidden = true; });
+  }
+
+  // The pulls: filters, order, decisions.
+  const traces = JSON.parse(byId("trace-data").textContent);
+  const list = byId("pull-list"), dialog = byId("pull");
+  const cards = [...list.children];
+  const decisions = new Map();
+  let saved = true;
+  for (const [id, record] of Object.entries(traces)) if (record.decided) decisions.set(id, { ...record.decided });
+
+  const filters = [...document.querySelectorAll("[id^=filter-]")].map((node) => [node.id.slice(7), node]);
+  const passes = (card) => filters.every(([name, node]) =>
+    !node.value || (name === "flags" ? card.dataset.flags.split(" ").includes(node.value) : card.dataset[name] === node.value));
+  const shown = () => [...list.children].filter((card) => !card.hidden);
+  const order = {
+    odd: (a, b) => b.dataset.odd - a.dataset.odd,
+    load: (a, b) => a.dataset.load - b.dataset.load,
+    order: (a, b) => a.dataset.order - b.dataset.order,
+    id: () => 0,
+  };
+  const byName = (a, b) => a.dataset.id.localeCompare(b.dataset.id, undefined, { numeric: true });
+  function show() {
+    for (const card of cards) card.hidden = !passes(card);
+    const rule = order[byId("sort").value];
+    list.append(...[...cards].sort((a, b) => rule(a, b) || byName(a, b)));
+    const count = shown().length;
+    byId("pull-count").textContent = `${count} of ${cards.length} pulls`;
+  }
+  for (const [, node] of filters) node.addEventListener("change", show);
+  byId("sort").addEventListener("change", show);
+  byId("clear-filters").addEventListener("click", () => {
+    for (const [, node] of filters) node.value = "";
+    show();
+  });
+
+  for (const card of cards) {
+    const name = card.querySelector(".name");
+    const button = make("button", { type: "button", class: "name", "aria-haspopup": "dialog" }, name.textContent);
+    name.replaceWith(button);
+    card.addEventListener("click", () => open(card.dataset.id));
+  }
+
+  function state(id) {
+    const decision = decisions.get(id);
+    return !decision ? "used" : decision.action === "exclude" ? "excluded" : "moved";
+  }
+  function mark(id) {
+    const card = cards.find((c) => c.dataset.id === id), now = state(id);
+    card.classList.remove("used", "moved", "excluded");
+    card.classList.add(now);
+    card.dataset.state = now;
+    let note = card.querySelector(".decision");
+    if (!note) card.append(note = make("span", { class: "small decision" }));
+    const decision = decisions.get(id), before = traces[id].decided;
+    const same = JSON.stringify(decision || null) === JSON.stringify(before || null);
+    const words = { used: "used as the rule reads it", moved: "moved by hand", excluded: "left out" };
+    note.textContent = same ? "" : `Decided: ${words[now]}${decision && decision.reason ? ` (${decision.reason})` : ""}`;
+    count();
+  }
+  function count() {
+    const out = [...decisions.values()].filter((d) => d.action === "exclude").length, moved = decisions.size - out;
+    byId("decision-count").textContent = decisions.size ? `Left out: ${out}. Moved: ${moved}.` : "No decision.";
+  }
+  count();
+
+  // One pull at full size.
+  let current = null, view = null, from = null;
+  const unpack = ({ low, high, data }) => {
+    const bytes = atob(data), values = new Float64Array(bytes.length / 2);
+    for (let k = 0; k < values.length; k++) {
+      values[k] = low + (high - low) * (bytes.charCodeAt(2 * k) + 256 * bytes.charCodeAt(2 * k + 1)) / 65535;
+    }
+    return values;
+  };
+  const automatic = (record) => record.automatic || record;
+
+  function open(id) {
+    const record = traces[id], card = cards.find((c) => c.dataset.id === id);
+    if (!dialog.open) from = card.querySelector("button.name");
+    current = { id, record, t: unpack(record.t), f: unpack(record.f) };
+    view = [current.t[0], current.t[current.t.length - 1]];
+    byId("pull-h").textContent = id;
+    byId("pull-about").textContent =
+      `${card.dataset.sample}, specimen ${card.dataset.specimen}, ${card.dataset.load} N. ` +
+      `Read by the rule: static ${number(automatic(record).peak[1])} N at ${number(automatic(record).peak[0])} s, ` +
+      `sliding ${number(automatic(record).sliding)} N from ${number(automatic(record).window[0])} to ` +
+      `${number(automatic(record).window[1])} s; zero ${number(automatic(record).zero, 3)} N.` +
+      (card.dataset.flags ? ` Flags: ${card.dataset.flags.replaceAll("_", " ").split(" ").join(" ")}.` : "");
+    if (!dialog.open) dialog.showModal();
+    fill();
+    draw();
+  }
+  const step = (by) => {
+    const order = shown(), at = order.findIndex((c) => c.dataset.id === current.id);
+    if (order.length) open(order[(at + by + order.length) % order.length].dataset.id);
+  };
+  byId("pull-previous").addEventListener("click", () => step(-1));
+  byId("pull-next").addEventListener("click", () => step(1));
+  byId("pull-close").addEventListener("click", () => dialog.close());
+  dialog.addEventListener("close", () => from && from.focus());
+
+  function marks() {
+    const decision = decisions.get(current.id), rule = automatic(current.record);
+    const moved = decision && decision.action === "move" ? decision : {};
+    return { peak: moved.peak ?? rule.peak[0], start: (moved.window || rule.window)[0], end: (moved.window || rule.window)[1] };
+  }
+  function fill() {
+    const decision = decisions.get(current.id), now = marks();
+    for (const [key, value] of Object.entries(now)) byId(`hand-${key}`).value = value === null ? "" : Number(value.toPrecision(6));
+    byId("hand-exclude").checked = Boolean(decision && decision.action === "exclude");
+    byId("hand-reason").value = decision ? decision.reason : "";
+    says();
+  }
+  function nearest(time) {
+    let low = 0, high = current.t.length - 1;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (current.t[middle] < time) low = middle; else high = middle;
+    }
+    return time - current.t[low] < current.t[high] - time ? low : high;
+  }
+  function meanOver(start, end) {
+    let sum = 0, n = 0;
+    current.t.forEach((t, k) => { if (t >= start && t <= end) { sum += current.f[k]; n += 1; } });
+    return n ? sum / n : null;
+  }
+  function says() {
+    const decision = decisions.get(current.id), now = marks();
+    const lacking = decision && decision.action === "exclude" && !decision.reason.trim();
+    byId("hand-reason").setAttribute("aria-invalid", lacking ? "true" : "false");
+    const parts = { used: "Used as the rule reads it.", excluded: lacking ? "Left out: give a reason." : "Left out.", moved: "" };
+    let text = parts[state(current.id)];
+    if (!text) {
+      text = `Moved by hand: about ${number(meanOver(now.start, now.end), 3)} N over this window, ` +
+        `about ${number(current.f[nearest(now.peak)], 3)} N at this peak. tribo reads both anew from the whole trace.`;
+    }
+    byId("pull-says").textContent = text;
+  }
+  function decide(change) {
+    const old = decisions.get(current.id) || { action: "move", reason: "", peak: null, window: null };
+    const next = { ...old, ...change };
+    if (next.action === "move" && next.peak === null && !next.window) decisions.delete(current.id);
+    else decisions.set(current.id, next);
+    saved = false;
+    mark(current.id);
+    says();
+  }
+  function moveTo(which, time) {
+    const now = marks(), rule = automatic(current.record), first = current.t[0], last = current.t[current.t.length - 1];
+    const at = Number(clamp(time, first, last).toPrecision(6));
+    const same = (a, b) => Math.abs(a - b) < 1e-9;
+    if (which === "peak") decide({ action: "move", peak: rule.peak[0] !== null && same(at, rule.peak[0]) ? null : at });
+    else {
+      const window = which === "start" ? [Math.min(at, now.end), now.end] : [now.start, Math.max(at, now.start)];
+      decide({ action: "move", window: same(window[0], rule.window[0]) && same(window[1], rule.window[1]) ? null : window });
+    }
+  }
+  for (const which of ["peak", "start", "end"]) {
+    byId(`hand-${which}`).addEventListener("change", (event) => {
+      if (event.target.value !== "") moveTo(which, Number(event.target.value));
+      fill();
+      draw();
+    });
+  }
+  byId("hand-exclude").addEventListener("change", (event) => {
+    const reason = byId("hand-reason").value;
+    if (event.target.checked) decide({ action: "exclude", reason });
+    else decide({ action: "move" });
+    fill();
+    draw();
+    if (event.target.checked && !reason) byId("hand-reason").focus();
+  });
+  byId("hand-reason").addEventListener("input", (event) => {
+    if (decisions.has(current.id)) decide({ reason: event.target.value });
+  });
+  byId("hand-reset").addEventListener("click", () => {
+    decisions.delete(current.id);
+    saved = false;
+    mark(current.id);
+    fill();
+    draw();
+  });
+
+  // The chart.
+  const ticks = (low, high, wanted) => {
+    const raw = (high - low) / wanted, power = 10 ** Math.floor(Math.log10(raw));
+    const size = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= raw), found = [];
+    for (let v = Math.ceil(low / size) * size; v <= high + 1e-9 * size; v += size) found.push(Math.abs(v) < 1e-9 * size ? 0 : v);
+    return found;
+  };
+  function scales() {
+    const box = byId("pull-chart"), width = Math.max(box.clientWidth, 240), height = clamp(width * 0.45, 220, 420);
+    const inside = { left: 52, right: width - 12, top: 12, bottom: height - 40 };
+    let low = 0, high = 1e-12;
+    current.t.forEach((t, k) => {
+      if (t >= view[0] && t <= view[1]) { low = Math.min(low, current.f[k]); high = Math.max(high, current.f[k]); }
+    });
+    high += 0.06 * (high - low);
+    const x = (t) => inside.left + (t - view[0]) / (view[1] - view[0]) * (inside.right - inside.left);
+    const y = (f) => inside.bottom - (f - low) / (high - low) * (inside.bottom - inside.top);
+    const time = (px) => view[0] + (px - inside.left) / (inside.right - inside.left) * (view[1] - view[0]);
+    return { width, height, ...inside, low, high, x, y, time };
+  }
+  let chart = null;
+  function draw() {
+    const s = scales(), now = marks(), out = state(current.id) === "excluded";
+    const svg = make("svg", { width: s.width, height: s.height, viewBox: `0 0 ${s.width} ${s.height}`, role: "group",
+      "aria-label": `Trace of ${current.id}: force in newton against time in seconds` });
+    for (const v of ticks(view[0], view[1], s.width / 90)) {
+      svg.append(make("line", { class: "grid", x1: s.x(v), x2: s.x(v), y1: s.top, y2: s.bottom }),
+        make("text", { x: s.x(v), y: s.bottom + 16, "text-anchor": "middle" }, number(v)));
+    }
+    for (const v of ticks(s.low, s.high, s.height / 55)) {
+      svg.append(make("line", { class: "grid", x1: s.left, x2: s.right, y1: s.y(v), y2: s.y(v) }),
+        make("text", { x: s.left - 6, y: s.y(v) + 4, "text-anchor": "end" }, number(v)));
+    }
+    svg.append(make("text", { x: (s.left + s.right) / 2, y: s.height - 6, "text-anchor": "middle" }, "Time (s)"),
+      make("text", { transform: `translate(13 ${(s.top + s.bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, "Force (N)"),
+      make("line", { class: "zero", x1: s.left, x2: s.right, y1: s.y(0), y2: s.y(0) }));
+    const inView = (t) => clamp(s.x(t), s.left, s.right);
+    if (now.start !== null) {
+      svg.append(make("rect", { class: "window", x: inView(now.start), width: Math.max(inView(now.end) - inView(now.start), 0),
+        y: s.top, height: s.bottom - s.top }));
+    }
+    let path = "";
+    current.t.forEach((t, k) => {
+      const near = t >= view[0] - (view[1] - view[0]) * 0.02 && t <= view[1] + (view[1] - view[0]) * 0.02;
+      if (near) path += `${path ? "L" : "M"}${clamp(s.x(t), s.left, s.right).toFixed(1)} ${s.y(current.f[k]).toFixed(1)}`;
+    });
+    svg.append(make("path", { class: out ? "trace out" : "trace", d: path }));
+    const cross = make("line", { class: "cross", y1: s.top, y2: s.bottom, visibility: "hidden" });
+    svg.append(cross);
+    handle(svg, s, "start", "Start of the sliding window", now.start);
+    handle(svg, s, "end", "End of the sliding window", now.end);
+    handle(svg, s, "peak", "Static peak", now.peak);
+    svg.addEventListener("pointermove", (event) => {
+      const px = event.clientX - svg.getBoundingClientRect().left;
+      if (px < s.left || px > s.right) return;
+      const k = nearest(s.time(px));
+      cross.setAttribute("x1", s.x(current.t[k]));
+      cross.setAttribute("x2", s.x(current.t[k]));
+      cross.setAttribute("visibility", "visible");
+      byId("pull-reading").textContent = `${number(current.t[k])} s, ${number(current.f[k])} N`;
+    });
+    svg.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      zoom(event.deltaY < 0 ? 0.8 : 1.25, s.time(clamp(event.clientX - svg.getBoundingClientRect().left, s.left, s.right)));
+    }, { passive: false });
+    svg.addEventListener("pointerdown", (event) => pan(event, svg, s));
+    const focused = chart && chart.contains(document.activeElement) ? document.activeElement.dataset.which : null;
+    byId("pull-chart").replaceChildren(svg);
+    chart = svg;
+    if (focused) svg.querySelector(`[data-which=${focused}]`)?.focus();
+  }
+  function handle(svg, s, which, label, time) {
+    if (time === null || time < view[0] || time > view[1]) return;
+    const first = current.t[0], last = current.t[current.t.length - 1], px = s.x(time);
+    const node = make("g", { class: `handle ${which}`, tabindex: "0", role: "slider", "aria-label": label, "data-which": which,
+      "aria-valuemin": number(first), "aria-valuemax": number(last), "aria-valuenow": String(Number(time.toPrecision(6))),
+      "aria-valuetext": `${number(time)} s` },
+    make("line", { class: "grip", x1: px, x2: px, y1: s.top, y2: s.bottom }),
+    make("line", { class: "edge", x1: px, x2: px, y1: s.top, y2: s.bottom }));
+    if (which === "peak") node.append(make("circle", { cx: px, cy: s.y(current.f[nearest(time)]), r: 5 }));
+    node.addEventListener("keydown", (event) => {
+      const sign = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
+      if (!sign) return;
+      event.preventDefault();
+      moveTo(which, time + sign * (event.shiftKey ? 10 : 1) * (view[1] - view[0]) / 400);
+      fill();
+      draw();
+    });
+    node.addEventListener("pointerdown", (event) => {
+      event.stopPropagation();
+      event.preventDefault();
+      const left = svg.getBoundingClientRect().left;
+      const move = (e) => { moveTo(which, s.time(clamp(e.clientX - left, s.left, s.right))); fill(); draw(); };
+      follow(move);
+    });
+    svg.append(node);
+  }
+  function follow(move) {
+    const stop = () => {
+      removeEventListener("pointermove", move);
+      removeEventListener("pointerup", stop);
+      removeEventListener("pointercancel", stop);
+    };
+    addEventListener("pointermove", move);
+    addEventListener("pointerup", stop);
+    addEventListener("pointercancel", stop);
+  }
+  function look(start, end) {
+    const first = current.t[0], last = current.t[current.t.length - 1];
+    const span = clamp(end - start, (last - first) / 500, last - first);
+    const low = clamp(start, first, last - span);
+    view = [low, low + span];
+    draw();
+  }
+  function zoom(by, about = (view[0] + view[1]) / 2) {
+    look(about - (about - view[0]) * by, about + (view[1] - about) * by);
+  }
+  function pan(event, svg, s) {
+    const began = event.clientX, [low, high] = view;
+    follow((e) => { const by = (began - e.clientX) / (s.right - s.left) * (high - low); look(low + by, high + by); });
+  }
+  byId("zoom-in").addEventListener("click", () => zoom(0.5));
+  byId("zoom-out").addEventListener("click", () => zoom(2));
+  byId("zoom-all").addEventListener("click", () => look(current.t[0], current.t[current.t.length - 1]));
+  addEventListener("resize", () => { if (dialog.open) draw(); });
+
+  // What is handed back.
+  const cell = (value) => /[",;\n\r]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value;
+  byId("save-overrides").addEventListener("click", () => {
+    const lacking = [...decisions].find(([, d]) => d.action === "exclude" && !d.reason.trim());
+    if (lacking) {
+      open(lacking[0]);
+      byId("hand-reason").focus();
+      return;
+    }
+    const rows = [...decisions].sort(([a], [b]) => a.localeCompare(b, undefined, { numeric: true })).map(([id, d]) => {
+      const moved = d.action === "move", window = moved && d.window ? d.window : ["", ""];
+      return [id, d.action, d.reason.trim().replace(/\s+/g, " "), ...window, moved && d.peak !== null ? d.peak : ""];
+    });
+    const head = ["test_id", "action", "reason", "window_start_s", "window_end_s", "peak_s"];
+    const text = [head, ...rows].map((row) => row.map((v) => cell(String(v))).join(",")).join("\n") + "\n";
+    const url = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
+    make("a", { href: url, download: "overrides.csv" }).click();
+    setTimeout(() => URL.revokeObjectURL(url), 1000);
+    saved = true;
+  });
+  addEventListener("beforeunload", (event) => { if (!saved) event.preventDefault(); });
+})();

@@ -1,0 +1,125 @@
+"""The tribosystem of a campaign: what ASTM G115 asks to be said beside a friction coefficient.
+
+Where the TriboDataFAIR ontology (Garabedian et al. 2022, Scientific Data 9, 315) has a term, it stands beside the
+condition. What a campaign does not record is said to be not recorded, never guessed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tribo.figures import select
+from tribo.records import Campaign, Pattern, Study, Test
+from tribo.report.numerals import counted, joined, significant
+
+ONTOLOGY = "https://raw.githubusercontent.com/nick-garabedian/TriboDataFAIR-Ontology/v0.1.1/TriboDataFAIR_Ontology.owl#"
+NOT_RECORDED = "not recorded"
+PA_PER_KPA = 1e3
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One condition of the tribosystem in words; ``unit`` where the value is numbers, ``term`` where one exists."""
+
+    name: str
+    value: str
+    unit: str = ""
+    term: str = ""
+
+    @property
+    def iri(self) -> str:
+        return ONTOLOGY + self.term if self.term else ""
+
+    @property
+    def in_words(self) -> str:
+        return self.value if self.value == NOT_RECORDED else f"{self.value} {self.unit}".rstrip()
+
+
+def conditions(study: Study) -> list[Condition]:
+    """The conditions of the tests that were used, in the order of ASTM G115: bodies, contact, motion, surroundings."""
+    campaign = study.ingested.campaign
+    tests = [t for t in campaign.tests if t.test_id in study.ingested.pulls]
+    return [*_bodies(study, tests), *_contact(campaign, tests), *_motion(campaign, tests), *_surroundings(tests)]
+
+
+def _bodies(study: Study, tests: list[Test]) -> Iterator[Condition]:
+    campaign = study.ingested.campaign
+    samples = [s for s in select.sample_numbers(study) if any(t.sample == s for t in tests)]
+    yield Condition("Moving body, material", campaign.material or NOT_RECORDED, term="MaterialName")
+    yield Condition("Counterface, material", campaign.counterface or NOT_RECORDED, term="MaterialName")
+    yield Condition("Surface geometry", "; ".join(f"{s}: {_geometry(campaign.samples[s])}" for s in samples))
+    yield Condition("Roughness and preparation of the surfaces", NOT_RECORDED)
+    specimens = len({(t.sample, t.specimen) for t in tests})
+    yield Condition("Specimens", counted(specimens, "specimen"), term="BlockSpecimen")
+
+
+def _geometry(pattern: Pattern) -> str:
+    if pattern.cavity == "none" or pattern.size_m is None or pattern.pitch_m is None:
+        return "flat"
+    size, pitch = ([v * 1e6 for v in pair] for pair in (pattern.size_m, pattern.pitch_m))
+    sides = size[:1] if pattern.cavity in ("circle", "square") else size
+    steps = pitch[:1] if pitch[0] == pitch[1] else pitch
+    shape = f"{pattern.cavity} {' × '.join(f'{v:g}' for v in sides)} µm"
+    staggered = ", staggered" if pattern.staggered else ""
+    return f"{shape}, pitch {' × '.join(f'{v:g}' for v in steps)} µm{staggered}, AF = {pattern.area_fraction:.3f}"
+
+
+def _contact(campaign: Campaign, tests: list[Test]) -> Iterator[Condition]:
+    loads = np.array([t.normal_load_N for t in tests])
+    area = campaign.nominal_area_m2
+    yield Condition("Test geometry", "flat on flat, a sled pulled over the counterface")
+    yield Condition("Nominal contact area", f"{area * 1e6:g}", "mm²")
+    yield Condition("Normal load", _range(loads), "N", "NormalLoadSetpoint")
+    yield Condition("Nominal pressure", _range(loads / area / PA_PER_KPA), "kPa")
+    if campaign.slider_mass_kg:
+        yield Condition("Load applied by", "dead weight", term="DeadWeightLoadApplication")
+    yield Condition("Lubrication", "none", term="InterfacialMediumCategory")
+
+
+def _motion(campaign: Campaign, tests: list[Test]) -> Iterator[Condition]:
+    speeds = [t.speed_m_s if t.speed_m_s is not None else campaign.pull_speed_m_s for t in tests]
+    directions = sorted({t.direction for t in tests if t.direction})
+    yield Condition("Motion", "linear, one way", term="UnidirectionalLinearMotion")
+    yield Condition("Speed", _range(_known(speeds) * 1e3), "mm/s", "SlidingSpeedSetpoint")
+    yield Condition("Hold before the pull", _range(_known(t.hold_s for t in tests)), "s", "LoadRelaxationSetpoint")
+    yield Condition("Direction of pull", joined(directions) or NOT_RECORDED)
+    yield Condition("Number of tests", str(len(tests)))
+    yield Condition("Tests of each sample at each load", _repeats(tests))
+
+
+def _surroundings(tests: list[Test]) -> Iterator[Condition]:
+    temperature = _range(_known(t.temperature_C for t in tests))
+    humidity = _range(_known(t.humidity_pct for t in tests))
+    days = sorted(t.started_at for t in tests if t.started_at)
+    yield Condition("Temperature", temperature, "°C", "UncontrolledEnvironmentTemperature")
+    yield Condition("Relative humidity", humidity, "%", "UncontrolledEnvironmentRelativeHumidity")
+    yield Condition("Measured", f"{days[0]} to {days[-1]}" if days else NOT_RECORDED, term="ProcessStartTime")
+    operators = sorted({t.operator for t in tests if t.operator})
+    yield Condition("Operators", joined(operators) or NOT_RECORDED)
+
+
+def _known(values: Iterable[float | None]) -> np.ndarray:
+    return np.array([v for v in values if v is not None], float)
+
+
+def _range(values: np.ndarray) -> str:
+    """ "0.0638 to 1.37", one number where all are alike, "not recorded" where there are none."""
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return NOT_RECORDED
+    low, high = significant(float(finite.min())), significant(float(finite.max()))
+    return low if low == high else f"{low} to {high}"
+
+
+def _repeats(tests: list[Test]) -> str:
+    if not tests:
+        return "0"
+    levels = select.load_levels(np.array([t.normal_load_N for t in tests]))
+    cells: dict[tuple[str, float], int] = {}
+    for test, level in zip(tests, levels.tolist(), strict=True):
+        cells[test.sample, level] = cells.get((test.sample, level), 0) + 1
+    fewest, most = min(cells.values()), max(cells.values())
+    return str(most) if fewest == most else f"{fewest} to {most}"

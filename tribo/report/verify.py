@@ -1,0 +1,132 @@
+"""Whether a study is still what it was: every input and output against the hash recorded when it was made."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Literal
+
+from tribo.errors import CampaignError, Problem
+from tribo.report.provenance import DESCRIBED_IN, FILE, RAW, file_hash, input_names, read_record
+
+KEPT = "kept"  # intermediate results, each checked against its own hash whenever it is used
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One file that is not as it was recorded."""
+
+    kind: Literal["input", "output"]
+    status: Literal["changed", "missing", "added"]
+    file: str
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What was compared, and every difference found."""
+
+    campaign: str
+    n_inputs: int
+    n_outputs: int
+    differences: tuple[Difference, ...]
+
+    @property
+    def unchanged(self) -> bool:
+        return not self.differences
+
+    def as_record(self) -> dict[str, Any]:
+        return {**asdict(self), "unchanged": self.unchanged}
+
+    def in_words(self) -> str:
+        compared = f"{self.n_inputs} inputs and {self.n_outputs} outputs compared with {FILE}"
+        if self.unchanged:
+            return f"{compared}: nothing changed"
+        lines = [f"{d.status} {d.kind}: {d.file}" for d in self.differences]
+        return "\n".join([f"{compared}: {len(lines)} differ", *lines])
+
+
+def verify(out: Path, campaign: Path | None = None) -> Verification:
+    """Compare the files of a study with the hashes in its provenance.json.
+
+    Parameters
+    ----------
+    out : folder that a command wrote
+    campaign : folder or .zip of the campaign, where it is not where it was
+
+    Raises
+    ------
+    CampaignError
+        There is no provenance.json in ``out``, or it lists no outputs.
+    """
+    record = read_record(out)
+    if record is None:
+        what = "no record of inputs and outputs"
+        raise CampaignError(Problem("no_provenance", what, file=str(out / FILE), allowed="a folder that tribo wrote"))
+    place = campaign or out / record["campaign"]
+    recorded = dict(record["inputs"])
+    found = dict(_input_hashes(place, recorded))
+    overrides = record.get("overrides") or {}
+    if overrides:
+        recorded[overrides["file"]] = overrides["sha256"]
+        path = out / overrides["file"]
+        found |= {overrides["file"]: file_hash(path)} if path.is_file() else {}
+    outputs = dict(_output_hashes(out))
+    differences = (
+        *_differences("input", recorded, found),
+        *_differences("output", record["outputs"], outputs),
+    )
+    return Verification(str(place), len(recorded), len(record["outputs"]), differences)
+
+
+def _differences(
+    kind: Literal["input", "output"], recorded: Mapping[str, str], found: Mapping[str, str]
+) -> Iterator[Difference]:
+    for name in sorted({*recorded, *found}):
+        if name not in found:
+            yield Difference(kind, "missing", name)
+        elif name not in recorded:
+            yield Difference(kind, "added", name)
+        elif found[name] != recorded[name]:
+            yield Difference(kind, "changed", name)
+
+
+def _input_hashes(campaign: Path, recorded: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """Everything that counts as an input of a campaign folder or .zip, and whatever else was recorded as one."""
+    if campaign.is_file():
+        yield from _zipped_hashes(campaign, recorded)
+        return
+    root = campaign if (campaign / DESCRIBED_IN[0]).is_file() else _only_campaign_below(campaign)
+    for name in dict.fromkeys((*input_names(root), *recorded)):
+        if (root / name).is_file():
+            yield name, file_hash(root / name)
+
+
+def _only_campaign_below(folder: Path) -> Path:
+    found = sorted(p.parent for p in folder.rglob(DESCRIBED_IN[0])) if folder.is_dir() else []
+    return found[0] if len(found) == 1 else folder
+
+
+def _zipped_hashes(archive: Path, recorded: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    try:
+        with zipfile.ZipFile(archive) as opened:
+            names = [i.filename for i in opened.infolist() if not i.is_dir() and not i.filename.startswith("__MACOSX/")]
+            tomls = [n for n in names if n.rpartition("/")[2] == DESCRIBED_IN[0]]
+            base = tomls[0].removesuffix(DESCRIBED_IN[0]) if len(tomls) == 1 else ""
+            for name in names:
+                inside = name.removeprefix(base)
+                if inside in DESCRIBED_IN or inside.startswith(f"{RAW}/") or inside in recorded:
+                    yield inside, sha256(opened.read(name)).hexdigest()
+    except (zipfile.BadZipFile, OSError):
+        return
+
+
+def _output_hashes(out: Path) -> Iterator[tuple[str, str]]:
+    """Every file of OUT but the record itself, what is hidden, and what is kept for the next start."""
+    for path in sorted(out.rglob("*")):
+        inside = path.relative_to(out)
+        hidden = any(part.startswith(".") for part in inside.parts)
+        if path.is_file() and not hidden and inside.parts[0] != KEPT and inside.as_posix() != FILE:
+            yield inside.as_posix(), file_hash(path)
