@@ -1,12 +1,24 @@
 """From the raw exports of a sled friction test to mu and tau0, beside a calibrated spring-block model.
 
 The street a measurement walks: export file -> Trace -> Pull -> LawFit -> Comparison -> report, and beside it
-SimConfig -> Run -> LawFit. Each stage takes and returns the frozen records of :mod:`tribo.records`.
+SimConfig -> Run -> LawFit. Each stage takes and returns the frozen records of :mod:`tribo.records`::
+
+    import tribo
+
+    campaign = tribo.load_campaign("my-campaign")
+    study = tribo.study(campaign)              # ingest, fit, compare
+    found = tribo.diagnosis(study.ingested)    # what the model gets wrong, and why
+    tribo.write_report(study, "out", diagnosis=found)
+
+The stub beside this file lists the public names; each is imported on first use.
 """
 
 import os
+
+import lazy_loader
 
 # thousands of small matrix products: on them the threads of OpenBLAS cost more than they give
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 __version__ = "0.1.0"
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -61,6 +61,9 @@ class StudyOptions:
         return {"rule": self.rule, "weights": self.weights, "flat": self.flat, "runs": str(self.runs)}
 
 
+DEFAULTS = StudyOptions()
+
+
 def ingest(
     campaign: Campaign,
     *,
@@ -222,7 +225,7 @@ def simulate_cells(
 
 
 def compare(
-    ingested: Ingested, fits: tuple[LawFit, ...], options: StudyOptions, *, progress: Progress = _silent
+    ingested: Ingested, fits: tuple[LawFit, ...], options: StudyOptions = DEFAULTS, *, progress: Progress = _silent
 ) -> Study:
     """Calibrate the model on the flat sample, predict every sample at its loads, and put both side by side.
 
@@ -263,7 +266,7 @@ def compare(
 
 
 def study(
-    campaign: Campaign, options: StudyOptions, *, until: Until = "report", progress: Progress = _silent
+    campaign: Campaign, options: StudyOptions = DEFAULTS, *, until: Until = "report", progress: Progress = _silent
 ) -> Study:
     """Walk the street with one campaign as far as ``until``."""
     ingested = ingest(
@@ -276,7 +279,7 @@ def study(
     return assess(walked, options)
 
 
-def assess(walked: Study, options: StudyOptions) -> Study:
+def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
     """The fits of a study looked at from other sides: other weights and laws, budget, power, outlying pulls."""
     made_from = (walked.ingested, walked.fits, options.weights)
     looks = Shelf(options.kept).take("assessment", made_from, lambda: _looks(walked, options), ASSESSED_BY)

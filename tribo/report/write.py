@@ -60,7 +60,7 @@ def write_until(
 
 def write_report(
     study: Study,
-    out: Path,
+    out: Path | str,
     progress: Progress | None = None,
     provenance: Provenance | None = None,
     verdict: Mapping[str, Any] | None = None,
@@ -68,4 +68,4 @@ def write_report(
     jobs: int = 1,
 ) -> None:
     """All of OUT: tables, campaign.nc, figures, verdict.json where there is a verdict, page, PDF and crate."""
-    write_until(study, out, "report", progress, provenance, verdict, diagnosis, jobs)
+    write_until(study, Path(out), "report", progress, provenance, verdict, diagnosis, jobs)

@@ -1,0 +1,45 @@
+"""What the commands do, in a few lines of Python, with nothing heavy imported before it is used."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import tribo
+from tribo.cli import main
+
+
+@pytest.mark.parametrize("name", tribo.__all__)
+def test_every_public_name_is_there_documented_and_no_package(name: str) -> None:
+    found = getattr(tribo, name)
+    assert not isinstance(found, ModuleType)
+    assert (found.__doc__ or "").strip()
+
+
+def test_a_public_name_stays_what_it_is_after_its_package_was_imported() -> None:
+    code = "import tribo, tribo.cli, tribo.diagnose, tribo.report, tribo.simulate, tribo.fitting, types\n"
+    code += "print([n for n in tribo.__all__ if isinstance(getattr(tribo, n), types.ModuleType)])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+
+
+def test_importing_tribo_imports_none_of_the_heavy_libraries() -> None:
+    code = "import sys, tribo; print([m for m in sys.modules if m.split('.')[0] in sys.argv[1:]])"
+    heavy = ["numba", "xarray", "statsmodels", "matplotlib", "scipy", "pandas", "numpy", "pydantic"]
+    seen = subprocess.run([sys.executable, "-c", code, *heavy], capture_output=True, text=True, check=True)
+    assert seen.stdout.strip() == "[]"
+
+
+def test_three_lines_of_python_give_the_numbers_of_tribo_fit(small_campaign: Path, tmp_path: Path) -> None:
+    from click.testing import CliRunner
+
+    ingested = tribo.ingest(tribo.load_campaign(small_campaign))
+    fits = {(f.sample, f.regime): f.value("mu") for f in tribo.fit(ingested)}
+    CliRunner().invoke(main, ["fit", str(small_campaign), "-o", str(tmp_path), "-q"])
+    import pandas as pd
+
+    table = pd.read_csv(tmp_path / "fits.csv").set_index(["sample", "regime"])["mu"]
+    assert {key: pytest.approx(mu, rel=1e-7) for key, mu in table.items()} == fits

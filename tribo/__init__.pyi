@@ -1,0 +1,39 @@
+from .campaign import load_campaign as load_campaign, open_campaign as open_campaign, write_template as write_template
+from .diagnose import plan_design as plan_design, simulate_with as simulate_with
+from .errors import Problem as Problem, TriboError as TriboError
+from .published import (
+    contradictions as contradictions,
+    data_dir as data_dir,
+    load_table1 as load_table1,
+    load_table2 as load_table2,
+)
+from .readers import inspect_export as inspect_export, read_export as read_export
+from .records import (
+    Campaign as Campaign,
+    Ingested as Ingested,
+    LawFit as LawFit,
+    Pattern as Pattern,
+    Pull as Pull,
+    Run as Run,
+    Study as Study,
+    Trace as Trace,
+)
+from .report import verify as verify, write_report as write_report
+from .simulate import (
+    SimConfig as SimConfig,
+    calibrate as calibrate,
+    run_ensemble as run_ensemble,
+    stratified_design as stratified_design,
+)
+from .stages import (
+    StudyOptions as StudyOptions,
+    assess as assess,
+    compare as compare,
+    diagnosis as diagnosis,
+    fit as fit,
+    ingest as ingest,
+    study as study,
+)
+from .traces import read_pull as read_pull
+
+__version__: str
