@@ -91,28 +91,28 @@ def clean_design(seed: int) -> Design:
 
 
 def cases(half: dict[str, float], campaigns: int, clean: int, seed: int) -> Iterator[Case]:
-    """Every campaign of a run: clean ones, each effect at its sizes, pairs, and what cannot be seen."""
-    number = seed * 1_000_000
+    """Every campaign of a run: clean ones, each effect at its sizes, pairs, and what cannot be seen.
+
+    A campaign's seed follows from its place among all cells, known or not, so that a run can be widened.
+    """
     for k in range(clean):
-        yield Case("clean", number + k, (), clean_design(number + k))
-    number += 100_000
-    for cell, effects in _cells(half):
-        names = [name for name, _ in effects]
-        for k in range(campaigns):
-            number += 1
-            engine = k % 5 == 0 and all(name in ON_ENGINE for name in names)
-            yield Case(cell, number, effects, design_for(*names, engine=engine))
+        yield Case("clean", seed * 1_000_000 + k, (), clean_design(seed * 1_000_000 + k))
+    for place, names in enumerate([*((name,) for name in EFFECTS), *PAIRS], start=1):
+        for step, (cell, effects) in enumerate(_cells(names, half)):
+            for k in range(campaigns):
+                number = seed * 1_000_000 + 10_000 * place + 1000 * step + k
+                engine = k % 5 == 0 and all(name in ON_ENGINE for name in names)
+                yield Case(cell, number, effects, design_for(*names, engine=engine))
 
 
-def _cells(half: dict[str, float]) -> Iterator[tuple[str, Effects]]:
-    for name in EFFECTS:
-        if name in HIDDEN_FROM_ALL or name in ALL_OR_NOTHING:
-            yield f"{name} x 1", ((name, 1.0),)
-        elif name in half:
-            yield from ((f"{name} x {t}", ((name, _times(name, half, t)),)) for t in (3, 6))
-    for pair in PAIRS:
-        if all(name in half for name in pair):
-            yield " + ".join(pair), tuple((name, _times(name, half, 3)) for name in pair)
+def _cells(names: tuple[str, ...], half: dict[str, float]) -> Iterator[tuple[str, Effects]]:
+    """One effect at three and six times its half-found size, a pair at three times; all or nothing at size 1."""
+    if names[0] in HIDDEN_FROM_ALL or names[0] in ALL_OR_NOTHING:
+        yield f"{names[0]} x 1", ((names[0], 1.0),)
+    elif all(name in half for name in names):
+        for times in (3, 6)[: 3 - len(names)]:
+            cell = f"{names[0]} x {times}" if len(names) == 1 else " + ".join(names)
+            yield cell, tuple((name, _times(name, half, times)) for name in names)
 
 
 def _times(name: str, half: dict[str, float], times: float) -> float:

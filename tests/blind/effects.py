@@ -1,7 +1,7 @@
 """Effects that the virtual tribometer can hide, coded apart from ``tribo.mechanisms``; size 1 is a clear one.
 
 An effect changes a bench in place. ``LARGEST`` is the size beyond which its law leaves what physics or the bench
-allows: cavities of more than the whole area, an air pressure below zero, contact lost by more than half.
+allows: cavities of more than the whole area, an air pressure below zero, contact lost by more than a third.
 """
 
 from __future__ import annotations
@@ -200,7 +200,7 @@ EFFECTS: dict[str, Effect] = {
 # These change what the law is given, so they come before those that change what it gives.
 FIRST = ("mislabelled_specimen", "suction", "normal_load_error", "pressure_dependent_friction")
 LARGEST = {
-    "suction": 20.0, "normal_load_error": 12.0, "pressure_dependent_friction": 4.0, "contact_area_loss": 2.0,
+    "suction": 20.0, "normal_load_error": 12.0, "pressure_dependent_friction": 4.0, "contact_area_loss": 1.0,
     "velocity_dependence": 6.5, "contact_ageing": 10.0, "run_in": 12.0, "edge_adhesion": 12.0, "temperature": 6.0,
     "humidity": 2.0, "mislabelled_specimen": 1.0, "tilt": 15.0, "cavity_collapse": 1.25,
     "cavity_shear_deformation": 4.0, "pattern_geometry": 1.9, "bulk_viscoelasticity": 5.0, "sampling_clip": 4.0,

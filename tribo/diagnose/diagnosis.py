@@ -22,6 +22,7 @@ from tribo.diagnose.sentences import (
     cause_of,
     exclusions,
     misfits_of,
+    patterns_apart,
     smallest_effects,
     summary,
 )
@@ -143,7 +144,8 @@ def _verdict(
     misfits = [m for _, m in direct] + misfits_of(screened, level)
     outcome = _outcome(named, bool(direct), level)
     causes = [c for c, _ in direct] + (_causes(named, baseline) if outcome in ("named", "undetermined") else [])
-    left = misfits_of(named.left, level) if named is not None and outcome == "unknown" and named.causes else []
+    rest = named is not None and named.causes and outcome == "unknown" and not patterns_apart(misfits)
+    left = misfits_of(named.left, level) if named is not None and rest else []
     smallest = smallest_effects(baseline, screened, level, {e.mechanism for e in barred})
     return Verdict(
         verdict=outcome,

@@ -13,7 +13,7 @@ from tribo.mechanisms.record import Mechanism
 NORMAL_90 = 1.645
 DROP_90 = 0.5 * NORMAL_90**2  # of the log likelihood at the ends of a 90 % interval
 NEAR = 2.0 * NORMAL_90  # standard errors from a bound within which the curvature is not trusted
-HALVINGS = 7
+SMALLEST_SHARE = 1e-6  # of the way to a bound
 
 
 def intervals(f: ModelFit, index: int) -> list[tuple[float, float]]:
@@ -48,18 +48,21 @@ def _profile(f: ModelFit, index: int, k: int, error: float) -> tuple[float, floa
 
 def _end(f: ModelFit, index: int, k: int, bound: float, error: float) -> float:
     """Where the profile falls by DROP_90 between the estimate and a bound; the bound where it does not."""
+    from scipy.optimize import brentq
+
     best = float(f.values[index][k])
     if best == bound or f.score - _score_at(f, index, k, bound) < DROP_90:
         return bound
-    inside, outside = 0.0, 1.0  # shares of the way to the bound
-    first_try = min(2.0 * error / abs(bound - best), 0.5) or 0.5
-    for step in range(HALVINGS):
-        share = first_try if step == 0 else 0.5 * (inside + outside)
-        if f.score - _score_at(f, index, k, best + share * (bound - best)) < DROP_90:
-            inside = share
-        else:
-            outside = share
-    return best + 0.5 * (inside + outside) * (bound - best)
+
+    def excess(share: float) -> float:
+        return f.score - _score_at(f, index, k, best + share * (bound - best)) - DROP_90
+
+    outside = 1.0
+    inside = min(2.0 * error / abs(bound - best), 0.5) or 0.1
+    while excess(inside) > 0.0 and inside > SMALLEST_SHARE:
+        inside, outside = 0.2 * inside, inside
+    share = brentq(excess, inside, outside, rtol=0.05) if inside > SMALLEST_SHARE else inside
+    return best + float(share) * (bound - best)
 
 
 def _score_at(f: ModelFit, index: int, k: int, value: float) -> float:

@@ -203,7 +203,20 @@ def summary(
         names = ", ".join(dict.fromkeys(c.mechanism for c in causes))
         return f"The model fails beyond chance, but several mechanisms explain it about equally: {names}."
     where = misfits[0].text if misfits else "No single column stands out."
+    own = patterns_apart(misfits)
+    if own:
+        return (
+            "The model fails beyond chance and no one mechanism of the library explains it: "
+            f"{', '.join(own)} part from it each in its own way, and no recorded column accounts for that. {where}"
+        )
     return f"The model fails beyond chance and nothing in the library explains it. {where}"
+
+
+def patterns_apart(misfits: Sequence[Misfit]) -> tuple[str, ...]:
+    """The samples that misfit each by itself, where there are three or more and no further column takes part."""
+    samples = tuple(dict.fromkeys(m.sample for m in misfits if m.sample))
+    alone = all(m.covariate in ("sample", "normal_load_N") for m in misfits)
+    return samples if alone and len(samples) >= 3 else ()
 
 
 __all__ = ["OBSERVABLES", "cause_of", "exclusions", "misfits_of", "summary"]

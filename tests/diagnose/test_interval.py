@@ -1,0 +1,39 @@
+"""Intervals of recovered parameters, away from their bounds and at them."""
+
+from __future__ import annotations
+
+import pytest
+
+from tribo.diagnose.fit import fit
+from tribo.diagnose.interval import DROP_90, _score_at, intervals, standard_errors
+from tribo.diagnose.looks import candidates
+from tribo.diagnose.model import ModelFit
+
+from .test_screen import baseline
+
+
+def fitted(name: str, *effects: tuple[str, float]) -> ModelFit:
+    b = baseline(*effects)
+    acting = next(a for a in candidates(b.setup, b.law) if a.name == name)
+    return fit(b.setup, (acting,), start=b)
+
+
+def test_away_from_the_bounds_the_curvature_gives_the_interval() -> None:
+    f = fitted("temperature", ("temperature", 1.0))
+    (low, high), error = intervals(f, 0)[0], standard_errors(f, 0)[0]
+    assert high - low == pytest.approx(2 * 1.645 * error)
+    assert low < 0.06 < high
+
+
+def test_at_a_bound_the_interval_opens_to_the_inside() -> None:
+    """A load that is lifted leaves no room for suction: the best value is zero, but some suction is possible."""
+    f = fitted("suction", ("normal_load_error", -0.4))
+    low, high = intervals(f, 0)[0]
+    assert f.values[0][0] == low == 0.0
+    assert 10.0 < high < 3000.0
+
+
+def test_the_ends_of_a_profile_interval_lose_what_they_should() -> None:
+    f = fitted("suction", ("normal_load_error", -0.4))
+    high = intervals(f, 0)[0][1]
+    assert f.score - _score_at(f, 0, 0, high) == pytest.approx(DROP_90, rel=0.2)
