@@ -1,12 +1,13 @@
 # From a fresh clone with nothing but python3 and make:
 #   make demo    the main job on the bundled example, into out/demo
 #   make test    lint, types and tests
+#   make blind   campaigns with hidden effects, about an hour on two cores; goes on where it was stopped
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint types pytest bench clean
+.PHONY: demo test lint types pytest bench blind clean
 
 $(VENV)/.run: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -33,6 +34,9 @@ test: lint types pytest
 
 bench: $(VENV)/.dev
 	$(BIN)/tribo bench
+
+blind: $(VENV)/.dev
+	$(BIN)/python benchmarks/blind.py run out/blind.jsonl
 
 clean:
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache
