@@ -30,8 +30,8 @@ MAY_IMPORT: dict[str, set[str]] = {
 }
 EVERYONE = {"errors", "quantities", "records"}
 TOP = {
-    "stages", "exports", "overrides", "prediction", "simulations", "kept", "pipeline", "cli", "console",
-    "bench", "doctor", "__init__", "__main__",
+    "stages", "exports", "overrides", "prediction", "simulations", "designs", "simulating", "kept", "pipeline",
+    "cli", "console", "bench", "doctor", "__init__", "__main__",
 }  # fmt: skip
 ROOMS = sorted(p for p in PACKAGE.rglob("*.py"))
 

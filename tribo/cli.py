@@ -11,6 +11,7 @@ import click
 from tribo import __version__
 from tribo.console import Console, command_options, set_aside_record, status_of
 from tribo.pipeline.commands import build, schedule
+from tribo.simulating import simulate
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
@@ -81,6 +82,7 @@ def main() -> None:
 
 main.add_command(build)
 main.add_command(schedule)
+main.add_command(simulate)
 
 
 @main.command()
@@ -246,53 +248,6 @@ def inspect(console: Console, files: tuple[Path, ...], columns: str, **_: Any) -
     found = [inspect_export(file, columns=given) for file in files]
     console.result({"files": [f.record() for f in found]}, "\n\n".join(f.in_words() for f in found))
     return 1 if all(f.refused for f in found) else 0
-
-
-@main.command()
-@click.option("--sample", required=True, help="F, A, B, C, Sx or Sy, the samples of the paper.")
-@click.option("--pressure", "pressure_kPa", type=float, required=True, help="Nominal pressure in kPa.")
-@click.option("--angle", "angle_deg", type=float, help="Pull direction against x in degrees (the sample's own).")
-@click.option("--blocks", type=int, default=85, show_default=True, help="Blocks a side.")
-@click.option("--dt", "dt_s", type=float, default=5e-8, show_default=True, help="Time step in s.")
-@click.option("--duration", "duration_ms", type=float, help="Length of the run in ms (three times the peak time).")
-@click.option("--engine", default="fast", show_default=True, help="fast, dense or reference.")
-@click.option("--with", "mechanisms", default="", help="MECHANISM:PARAM=VALUE,... put into the model.")
-@click.option("-o", "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="FILE.nc to write.")
-@command_options
-def simulate(
-    console: Console, sample: str, pressure_kPa: float, angle_deg: float | None, blocks: int, dt_s: float,
-    duration_ms: float | None, engine: Any, mechanisms: str, out: Path, seed: int, **_: Any,
-) -> None:  # fmt: skip
-    """One run of the spring-block model with the paper's parameters."""
-    from tribo.diagnose import parse_with, simulate_with
-    from tribo.simulate import SimConfig, angle_range_deg, write_run
-
-    low, high = angle_range_deg(sample)
-    nominal = (low + high) / 2 if (low, high) != (0.0, 90.0) else 0.0
-    config = SimConfig(
-        sample=sample,
-        pressure_Pa=pressure_kPa * 1e3,
-        angle_deg=nominal if angle_deg is None else angle_deg,
-        seed=seed,
-        blocks=(blocks, blocks),
-        dt_s=dt_s,
-        duration_s=None if duration_ms is None else duration_ms * 1e-3,
-        engine=engine,
-    )
-    run = simulate_with(config.check(), parse_with(mechanisms))
-    write_run(run, out)
-    record = {
-        "out": str(out),
-        "static_friction": run.static_friction,
-        "sliding_friction": run.sliding_friction,
-        "window_s": run.window_s,
-    }
-    start, end = (1e3 * t for t in run.window_s)
-    console.result(
-        record,
-        f"{sample} at {pressure_kPa:g} kPa: static T/N {run.static_friction:.4f}, "
-        f"sliding T/N {run.sliding_friction:.4f} (mean from {start:.2f} to {end:.2f} ms), written to {out}",
-    )
 
 
 @main.command()

@@ -61,17 +61,17 @@ class _PlainLines:
 
     def __init__(self, console: Console):
         self._console = console
-        self._started: dict[str, float] = {}
+        self._started: dict[str, tuple[float, int]] = {}  # when, and how much was done before
         self._last: dict[str, float] = {}
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         now = time.monotonic()
-        start = self._started.setdefault(stage, now)
+        start, before = self._started.setdefault(stage, (now, done if done < total else 0))
         if done < total and now - self._last.setdefault(stage, now) < 10.0:
             return
         self._last[stage] = now
         spent = now - start
-        left = f", {spent / done * (total - done):.0f} s left" if 0 < done < total else ""
+        left = f", {spent / (done - before) * (total - done):.0f} s left" if before < done < total else ""
         self._console.say(f"{stage}: {done} of {total} ({spent:.0f} s{left})")
 
 
@@ -97,7 +97,7 @@ def _bars() -> Iterator[Callable[[str, int, int], None]]:
         def report(stage: str, done: int, total: int) -> None:
             nonlocal drawn
             if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=total)
+                tasks[stage] = bars.add_task(stage, total=total, completed=done)
             bars.update(tasks[stage], completed=done, total=total)
             now = time.monotonic()
             if done >= total or now - drawn > 0.1:

@@ -29,13 +29,19 @@ def test_defaults_are_those_of_the_paper():
 
 
 def test_all_faults_are_listed_at_once():
-    """A negative pressure, a NaN and an unknown choice come back together."""
-    config = SimConfig(pressure_Pa=-1.0, angle_deg=math.nan, edges="open", friction=LocalFriction(mu_s=math.inf))
+    """A negative pressure, a NaN, an unknown choice, an unknown sample and an unstable step come back together."""
+    config = SimConfig(
+        sample="Q", pressure_Pa=-1.0, angle_deg=math.nan, normal_force="none", dt_s=1e-3,
+        friction=LocalFriction(mu_s=math.inf), window_end_peaks=1.01,
+    )  # fmt: skip
     assert kinds(config) == {
         ("not_positive", "pressure_Pa"),
         ("not_finite", "angle_deg"),
-        ("unknown_choice", "edges"),
+        ("unknown_choice", "normal_force"),
         ("not_finite", "mu_s"),
+        ("unknown_sample", "sample"),
+        ("unstable_step", "dt_s"),
+        ("empty_window", "window_end_peaks"),
     }  # fmt: skip
 
 

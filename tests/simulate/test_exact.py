@@ -92,26 +92,32 @@ def test_jump_stops_at_the_first_failure():
 
 def transformed(values: FloatArray, n: int, how: str) -> FloatArray:
     grid = values.reshape(n, n)
-    return {"mirror": grid[:, ::-1], "turn": grid.T, "shift": np.roll(grid, (5, 9), (0, 1))}[how].ravel().copy()
+    return {"mirror": grid[:, ::-1], "turn": grid.T, "shift": np.roll(grid, (8, 12), (0, 1))}[how].ravel().copy()
 
 
 @pytest.mark.parametrize(
     ("how", "angle_deg", "edges"), [("mirror", 150.0, "free"), ("turn", 60.0, "free"), ("shift", 30.0, "periodic")]
 )
-def test_symmetries(how: str, angle_deg: float, edges: str):
-    """Reflection, exchange of the axes and (periodic) translation of the thresholds leave the force as it was."""
-    n = 32
-    config = SimConfig(blocks=(n, n), angle_deg=30.0, edges=edges, duration_peaks=1.02, seed=6)
+@pytest.mark.parametrize(("sample", "close"), [("F", 1e-9), ("C", 1e-5)])
+def test_symmetries(sample: str, close: float, how: str, angle_deg: float, edges: str):
+    """Reflection, exchange of the axes and (periodic) translation of the thresholds leave the force as it was.
+
+    The pattern of C lies symmetrically on 31 blocks and repeats on 32; the translation is one of whole pitches.
+    Its cavities go to sleep and wake in another order, which is why it holds less closely.
+    """
+    n = 32 if edges == "periodic" else 31
+    config = SimConfig(sample=sample, blocks=(n, n), angle_deg=30.0, edges=edges, duration_peaks=1.02, seed=6)
     lattice = lattice_of(config)
     drawn = thresholds_of(config, lattice)
+    assert np.array_equal(transformed(lattice.contact, n, how), lattice.contact)
     image = Thresholds(transformed(drawn.static_N, n, how), transformed(drawn.sliding_N, n, how))
     here = run_fast(config, lattice, drawn)
     there = run_fast(config.with_(angle_deg=angle_deg), lattice, image)
-    assert there.peak_N == pytest.approx(here.peak_N, rel=1e-9)
+    assert there.peak_N == pytest.approx(here.peak_N, rel=close)
     upto = here.peak_s + 15e-6
     grid = np.linspace(0, upto, 300)
     forces = [np.interp(grid, run.time_s, run.force_N) for run in (here, there)]
-    assert np.allclose(*forces, rtol=1e-6, atol=1e-9 * here.peak_N)
+    assert np.allclose(*forces, rtol=max(1e2 * close, 1e-6), atol=1e-9 * here.peak_N)
 
 
 def test_equal_seeds_give_equal_bits():

@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
 import pandas as pd
 import pytest
 import xarray as xr
+from click.testing import CliRunner
 
+from tribo.cli import main
 from tribo.errors import SimulationError
+from tribo.records import Run
 from tribo.simulate import SimConfig, run_ensemble, stratified_design
-from tribo.simulate.resume import read_stored, run_stored
+from tribo.simulate.resume import Work, read_stored, run_stored, varied_columns
 
 SMALL = SimConfig(blocks=(40, 40), dt_s=1e-7, rest_tolerance=1e-2)
 RESULTS = ["static_friction", "sliding_friction", "peak_s", "window_end_s"]
+
+
+@pytest.fixture(scope="module")
+def two_workers() -> Iterator[str]:
+    """The address of a dask scheduler with two worker processes."""
+    distributed = pytest.importorskip("distributed")
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
+    with distributed.LocalCluster(**options) as cluster:
+        yield cluster.scheduler_address
 
 
 def design(repeats: int = 3) -> list[SimConfig]:
@@ -101,13 +115,59 @@ def test_a_scheduler_without_dask_is_an_error_that_says_so(tmp_path: Path, monke
         run_stored(design(1), tmp_path / "e.h5", scheduler="tcp://nowhere:1")
 
 
-@pytest.mark.filterwarnings("ignore")
-def test_dask_gives_the_same_bits(tmp_path: Path):
-    """A LocalCluster of two processes against threads."""
-    distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
-    ) as cluster:
-        far = run_stored(design(2), tmp_path / "far.h5", scheduler=cluster.scheduler_address)
-    near = run_stored(design(2), tmp_path / "near.h5", jobs=1)
+def test_a_scheduler_that_does_not_answer_is_an_error_that_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Naming the address; what was asked for can be started again."""
+    monkeypatch.setattr("tribo.simulate.resume.SCHEDULER_TIMEOUT_S", 0.5)
+    with pytest.raises(SimulationError, match="no dask scheduler answers"):
+        run_stored(design(1), tmp_path / "e.h5", scheduler="tcp://127.0.0.1:9")
+
+
+def test_processes_threads_and_one_job_give_the_same_bits(tmp_path: Path, two_workers: str):
+    """A LocalCluster of two worker processes, two threads here, and one after the other."""
+    far = run_stored(design(2), tmp_path / "far.h5", scheduler=two_workers)
+    near = run_stored(design(2), tmp_path / "near.h5", jobs=2)
+    alone = run_stored(design(2), tmp_path / "alone.h5", jobs=1)
+    pd.testing.assert_frame_equal(far, alone, check_exact=True)
+    pd.testing.assert_frame_equal(near, alone, check_exact=True)
+
+
+def test_a_fault_in_a_worker_comes_back_whole(tmp_path: Path, two_workers: str):
+    """A run too short for its window is refused on the worker; the error here names what is allowed."""
+    short = [config.with_(duration_s=1e-6) for config in design(1)]
+    with pytest.raises(SimulationError) as refused:
+        run_stored(short, tmp_path / "e.h5", scheduler=two_workers)
+    assert [(p.kind, p.column) for p in refused.value.problems] == [("too_short", "duration_s")]
+
+
+def test_the_command_line_takes_the_scheduler(tmp_path: Path, two_workers: str):
+    """tribo simulate --scheduler gives the bits of tribo simulate on this machine."""
+    options = ["--sample", "F", "--sample", "C", "--pressure", "5", "--repeats", "2", "--dt", "1e-7", "--blocks", "40"]
+    for name, where in (("far", ["--scheduler", two_workers]), ("near", ["--jobs", "1"])):
+        said = CliRunner().invoke(main, ["simulate", *options, *where, "-o", str(tmp_path / f"{name}.nc"), "--json"])
+        assert json.loads(said.stdout)["runs"] == 4
+    far, near = (read_stored(tmp_path / f"{name}.nc") for name in ("far", "near"))
     pd.testing.assert_frame_equal(far, near, check_exact=True)
+
+
+def test_parameters_that_differ_stand_beside_the_runs(tmp_path: Path):
+    """A varied number and a varied word are columns; what all runs share is an attribute."""
+    runs = [c.with_(shear_factor=f, edges=e) for c in design(1) for f, e in ((0.5, "free"), (1.0, "periodic"))]
+    table = run_stored(runs, tmp_path / "e.h5")
+    assert varied_columns(table) == ["shear_factor", "edges"]
+    assert table["edges"].tolist()[:2] == ["free", "periodic"]
+    with xr.open_dataset(tmp_path / "e.h5", engine="h5netcdf") as dataset:
+        assert dataset["shear_factor"].values.tolist()[:2] == [0.5, 1.0]
+        assert dataset.attrs["dt_s"] == 1e-7
+
+
+def test_a_store_keeps_what_it_is_asked_to_read_off_a_run(tmp_path: Path):
+    """Other work has its own columns, and is not mixed with the usual one."""
+    table = run_stored(design(1), tmp_path / "e.h5", work=Work(read=samples_of, units={"samples": "1"}))
+    assert (table["samples"] > 100).all()
+    assert "static_friction" not in table
+    with pytest.raises(SimulationError, match="another design"):
+        run_stored(design(1), tmp_path / "e.h5")
+
+
+def samples_of(run: Run) -> dict[str, float]:
+    return {"samples": float(len(run.time_s))}

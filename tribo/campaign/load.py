@@ -45,7 +45,7 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     rows = read_tests_table(root / TESTS, TESTS, problems)
     if described is None or rows is None:
         raise CampaignError(problems)
-    patterns = {name: _pattern(name, table) for name, table in described.patterns.items()}
+    patterns = {name: pattern_of_table(name, table) for name, table in described.patterns.items()}
     usable, set_aside = _sort_rows(root, rows, patterns, measured)
     problems += [p for s in set_aside for p in s.problems]
     if not usable:
@@ -84,7 +84,7 @@ def _campaign(
     )
 
 
-def _pattern(name: str, table: PatternTable) -> Pattern:
+def pattern_of_table(name: str, table: PatternTable) -> Pattern:
     def metres(pair: tuple[float, float] | None) -> tuple[float, float] | None:
         return None if pair is None else (pair[0] * _UM, pair[1] * _UM)
 

@@ -229,8 +229,13 @@ _CHOICES: dict[str, tuple[str, ...]] = {
 _ABOVE = {"duration_peaks": 1.0, "window_start_peaks": 1.0, "window_end_peaks": 1.0}
 
 
+_OF_THE_STEP = {"dt_s", "spacing_m", "thickness_m", "modulus_Pa", "density_kg_m3", "damping_per_s", "shear_factor"}
+_OF_THE_GEOMETRY = {"spacing_m", "edges", "cavity_shape"}
+_OF_THE_WINDOW = {"window_start_peaks", "window_end_peaks"}
+
+
 def _problems(config: SimConfig) -> Iterator[Problem]:
-    """Every fault of a configuration; later checks only run on numbers the earlier ones let through."""
+    """Every fault of a configuration; what follows from several numbers is checked where each of them is possible."""
     faults = [
         *_number_problems(config),
         *_choice_problems(config),
@@ -238,16 +243,16 @@ def _problems(config: SimConfig) -> Iterator[Problem]:
         *_term_problems(config),
     ]
     yield from faults
-    if faults:
-        return
-    yield from _geometry_problems(config)
-    if config.dt_s > config.largest_dt_s:
+    faulty = {problem.column for problem in faults}
+    if not faulty & _OF_THE_GEOMETRY:
+        yield from _geometry_problems(config)
+    if not faulty & _OF_THE_STEP and config.dt_s > config.largest_dt_s:
         yield Problem(
             "unstable_step", "the time step is beyond the stability limit", column="dt_s",
             found=f"{config.dt_s:g}", allowed=f"at most {config.largest_dt_s:.3g} s for these springs and masses",
         )  # fmt: skip
     end = config.window_end_peaks
-    if end is not None and end <= config.window_start_peaks:
+    if not faulty & _OF_THE_WINDOW and end is not None and end <= config.window_start_peaks:
         yield Problem(
             "empty_window", "the sliding window ends before it starts", column="window_end_peaks",
             found=f"{end:g}", allowed=f"more than {config.window_start_peaks:g}",

@@ -39,14 +39,24 @@ SCHEDULER_TIMEOUT_S = 10.0
 
 
 @dataclass(frozen=True)
-class Reading:
-    """What a store keeps of a run: a function to numbers by name (sent to workers), and their units."""
+class Work:
+    """What is done for every configuration of a store. The functions are sent to workers in other processes.
 
+    Parameters
+    ----------
+    run : makes the run; :func:`tribo.simulate.simulate` by default
+    read : numbers by name, read off the run
+    units : names of the numbers that are kept, with their units
+    label : tells this work from another that keeps the same names
+    """
+
+    run: Callable[[SimConfig], Run] | None = None
     read: Callable[[Run], Mapping[str, Any]] = run_row
     units: Mapping[str, str] = field(default_factory=lambda: RESULTS)
+    label: str = ""
 
 
-FRICTION = Reading()
+FRICTION = Work()
 
 
 def run_stored(
@@ -55,7 +65,7 @@ def run_stored(
     jobs: int = 2,
     scheduler: str | None = None,
     progress: Progress | None = None,
-    reading: Reading = FRICTION,
+    work: Work = FRICTION,
 ) -> pd.DataFrame:
     """Run what ``path`` does not hold yet of a design, and return all of it.
 
@@ -66,7 +76,7 @@ def run_stored(
     jobs : threads on this machine
     scheduler : address of a dask.distributed scheduler; its workers then run the cells (optional dependency)
     progress : called with the runs done, earlier starts included, and their total
-    reading : what is kept of a run, static and sliding friction with their times by default
+    work : how a run is made and what is kept of it, static and sliding friction with their times by default
 
     Raises
     ------
@@ -76,15 +86,15 @@ def run_stored(
     path = Path(path)
     check_all(design)
     if not path.exists():
-        _create(design, path, reading)
-    _refuse_other_design(design, path, reading)
+        _create(design, path, work)
+    _refuse_other_design(design, path, work)
     missing = [k for k, done in enumerate(read_stored(path)["done"]) if not done]
     finished = len(design) - len(missing)
     if progress is not None:
         progress(finished, len(design))
-    with _columns(path, reading) as columns:
-        for k, row in _rows(design, missing, jobs, scheduler, partial(cell, read=reading.read)):
-            for name in reading.units:
+    with _columns(path, work) as columns:
+        for k, row in _rows(design, missing, jobs, scheduler, partial(cell, work=work)):
+            for name in work.units:
                 columns[name][k] = row[name]
             columns["done"][k] = 1
             finished += 1
@@ -104,25 +114,30 @@ def read_stored(path: str | Path) -> pd.DataFrame:
     return pd.DataFrame(columns | texts | {"done": columns["done"].astype(bool)})
 
 
-def fingerprint(design: Iterable[SimConfig], reading: Reading = FRICTION) -> str:
-    """Hash of every field of every configuration, in order, and of the names that are kept of a run."""
-    digest = hashlib.sha256(repr(list(reading.units)).encode())
+def varied_columns(table: pd.DataFrame) -> list[str]:
+    """The columns of a stored ensemble that hold parameters the design varies beside its inputs."""
+    return [str(name) for name in table.columns if name not in {*INPUTS, *RESULTS, "done"}]
+
+
+def fingerprint(design: Iterable[SimConfig], work: Work = FRICTION) -> str:
+    """Hash of every field of every configuration, in order, and of what is done with them."""
+    digest = hashlib.sha256(repr((list(work.units), work.label)).encode())
     for config in design:
         digest.update(repr(config).encode())
     return digest.hexdigest()
 
 
-def _create(design: Sequence[SimConfig], path: Path, reading: Reading) -> None:
+def _create(design: Sequence[SimConfig], path: Path, work: Work) -> None:
     import h5py
 
     given: dict[str, Any] = {name: [getattr(c, name) for c in design] for name in INPUTS} | _varied_parameters(design)
-    empty = dict.fromkeys(reading.units, np.full(len(design), np.nan))
+    empty = dict.fromkeys(work.units, np.full(len(design), np.nan))
     columns = given | empty | {"done": np.zeros(len(design), np.uint8)}
 
     def write(target: Path) -> None:
         with h5py.File(target, "w") as file:
             file.attrs["title"] = "an ensemble of the spring-block model, one entry a run"
-            file.attrs["design"] = fingerprint(design, reading)
+            file.attrs["design"] = fingerprint(design, work)
             file.attrs["columns"] = list(columns)
             for name, value in (attributes(_shared_parameters(design)) | versions()).items():
                 file.attrs[name] = value
@@ -131,7 +146,7 @@ def _create(design: Sequence[SimConfig], path: Path, reading: Reading) -> None:
             for name, values in columns.items():
                 column = file.create_dataset(name, data=_as_stored(values))
                 column.dims[0].attach_scale(run)
-                column.attrs["units"] = {**INPUTS, **reading.units}.get(name) or unit_of(name)
+                column.attrs["units"] = {**INPUTS, **work.units}.get(name) or unit_of(name)
 
     written(path, write)
 
@@ -163,7 +178,7 @@ def _shared_parameters(design: Sequence[SimConfig]) -> dict[str, Any]:
     return {name: value for name, value in first.items() if all(p.get(name) == value for p in all_parameters)}
 
 
-def _refuse_other_design(design: Sequence[SimConfig], path: Path, reading: Reading) -> None:
+def _refuse_other_design(design: Sequence[SimConfig], path: Path, work: Work) -> None:
     import h5py
 
     try:
@@ -171,7 +186,7 @@ def _refuse_other_design(design: Sequence[SimConfig], path: Path, reading: Readi
             known = file.attrs.get("design")
     except OSError as why:
         raise SimulationError(Problem("not_a_store", f"cannot be read as HDF5: {why}", file=str(path))) from why
-    if known != fingerprint(design, reading):
+    if known != fingerprint(design, work):
         raise SimulationError(
             Problem(
                 "other_design", "holds an ensemble of another design", file=str(path), allowed="a new file, or the same"
@@ -180,11 +195,11 @@ def _refuse_other_design(design: Sequence[SimConfig], path: Path, reading: Readi
 
 
 @contextmanager
-def _columns(path: Path, reading: Reading) -> Iterator[dict[str, Any]]:
+def _columns(path: Path, work: Work) -> Iterator[dict[str, Any]]:
     """The result columns of a store as arrays mapped into memory, writable in place."""
     import h5py
 
-    names = (*reading.units, "done")
+    names = (*work.units, "done")
     with h5py.File(path) as file:
         places = {name: (file[name].id.get_offset(), file[name].shape, file[name].dtype) for name in names}
     columns = {
@@ -197,9 +212,9 @@ def _columns(path: Path, reading: Reading) -> Iterator[dict[str, Any]]:
             column.flush()
 
 
-def cell(config: SimConfig, read: Callable[[Run], Mapping[str, Any]]) -> Mapping[str, Any]:
+def cell(config: SimConfig, work: Work) -> Mapping[str, Any]:
     """One run as the row of the table, for workers in other processes."""
-    return read(simulate(config))
+    return work.read((work.run or simulate)(config))
 
 
 def _rows(
@@ -207,14 +222,14 @@ def _rows(
     missing: Sequence[int],
     jobs: int,
     scheduler: str | None,
-    work: Callable[[SimConfig], Mapping[str, Any]],
+    one: Callable[[SimConfig], Mapping[str, Any]],
 ) -> Iterator[tuple[int, Mapping[str, Any]]]:
     """Results in the order they come in, each with its place in the design."""
     if scheduler is not None:
-        yield from _distributed_rows(design, missing, scheduler, work)
+        yield from _distributed_rows(design, missing, scheduler, one)
         return
     with ThreadPoolExecutor(max(1, jobs)) as pool:
-        pending = {pool.submit(work, design[k]): k for k in missing}
+        pending = {pool.submit(one, design[k]): k for k in missing}
         try:
             for future in as_completed(pending):
                 yield pending[future], future.result()
@@ -227,10 +242,10 @@ def _distributed_rows(
     design: Sequence[SimConfig],
     missing: Sequence[int],
     scheduler: str,
-    work: Callable[[SimConfig], Mapping[str, Any]],
+    one: Callable[[SimConfig], Mapping[str, Any]],
 ) -> Iterator[tuple[int, Mapping[str, Any]]]:
     with _client(scheduler) as (client, as_done):
-        futures = client.map(work, [design[k] for k in missing], pure=False)
+        futures = client.map(one, [design[k] for k in missing], pure=False)
         place = {future.key: k for future, k in zip(futures, missing, strict=True)}
         for future, row in as_done(futures, with_results=True):
             yield place[future.key], row

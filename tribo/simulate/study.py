@@ -19,7 +19,7 @@ from tribo.records import FloatArray, Run
 from tribo.simulate.calibration import WEIGHTS
 from tribo.simulate.config import SimConfig
 from tribo.simulate.ensemble import Angles, Progress, stratified_design
-from tribo.simulate.resume import Reading, run_stored
+from tribo.simulate.resume import Work, run_stored
 from tribo.simulate.tables import SAMPLES, resampled_laws
 
 if TYPE_CHECKING:
@@ -103,7 +103,8 @@ def studied(run: Run) -> dict[str, float]:
     return {"area_fraction": run.parameters["area_fraction"], "peak_s": run.peak_s, **readings(run)}
 
 
-READINGS = Reading(studied, {"area_fraction": "1", "peak_s": "s", **dict.fromkeys((*PEAK_DROPS, *WINDOWS), "1")})
+UNITS = {"area_fraction": "1", "peak_s": "s", **dict.fromkeys((*PEAK_DROPS, *WINDOWS), "1")}
+READINGS = Work(read=studied, units=UNITS)
 
 
 def run_study(

@@ -12,7 +12,7 @@ from tribo.records import FloatArray
 from tribo.simulate.calibration import simulated_law
 from tribo.simulate.config import SimConfig
 from tribo.simulate.ensemble import Angles, Progress, run_ensemble, stratified_design
-from tribo.simulate.resume import run_stored
+from tribo.simulate.resume import run_stored, varied_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,24 +70,38 @@ def table2(
     return table if published is None else beside(table, published)
 
 
-def fitted(runs: pd.DataFrame, weights: str = "ratio", resamples: int = 200) -> pd.DataFrame:
-    """mu and tau0 of every sample of an ensemble; standard errors by resampling the runs at each pressure."""
+def fitted(
+    runs: pd.DataFrame, weights: str = "ratio", resamples: int = 200, by: Sequence[str] = ("sample",)
+) -> pd.DataFrame:
+    """mu and tau0 of every sample of an ensemble; standard errors by resampling the runs at each pressure.
+
+    ``by`` names the columns that part the laws, the sample and whatever parameters the design varies.
+    """
     import pandas as pd
 
     rng = np.random.default_rng(0)
     rows = []
-    for sample, group in runs.groupby("sample", sort=False):
+    for key, group in runs.groupby(list(by), sort=False):
         pressure = group["pressure_Pa"].to_numpy(float)
         for regime in ("static", "sliding"):
             laws = resampled_laws(pressure, group[f"{regime}_friction"].to_numpy(float), weights, rng, resamples)
             (mu, tau0), se = laws[0], laws[1:].std(axis=0, ddof=1)
             rows.append(
-                {
-                    "sample": sample, "regime": regime, "mu": mu, "mu_se": se[0], "tau0_kPa": tau0 / 1e3,
-                    "tau0_kPa_se": se[1] / 1e3, "runs": len(group),
-                }
-            )  # fmt: skip
+                dict(zip(by, key, strict=True))
+                | {"regime": regime, "mu": mu, "mu_se": se[0], "tau0_kPa": tau0 / 1e3, "tau0_kPa_se": se[1] / 1e3}
+                | {"runs": len(group)}
+            )
     return pd.DataFrame(rows)
+
+
+def means(runs: pd.DataFrame, by: Sequence[str] = ("sample",)) -> pd.DataFrame:
+    """Mean T/N at every pressure, static and sliding, with its standard error over the runs (NaN for one run)."""
+    grouped = runs.groupby([*by, "pressure_Pa"], sort=False)
+    table = grouped.size().rename("runs").to_frame()
+    for regime in ("static", "sliding"):
+        table[regime] = grouped[f"{regime}_friction"].mean()
+        table[f"{regime}_se"] = grouped[f"{regime}_friction"].sem()
+    return table.reset_index()
 
 
 def resampled_laws(
@@ -135,3 +149,15 @@ def table2_text(table: pd.DataFrame) -> str:
         f"tau0 {rms['tau0_deviation_percent']:.1f} %, T/N at 10 kPa {rms['friction_deviation_percent']:.1f} %"
     )
     return "\n".join([head, *lines, foot])
+
+
+def described(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame, str]:
+    """Means at every pressure, laws where a sample has several pressures, and both in words."""
+    import pandas as pd
+
+    by = ["sample", *varied_columns(runs)]
+    table = means(runs, by)
+    several = runs.groupby(by, sort=False)["pressure_Pa"].transform("nunique") > 1
+    laws = fitted(runs[several], by=by) if several.any() else pd.DataFrame()
+    shown = [table.assign(pressure_kPa=table["pressure_Pa"] / 1e3).drop(columns="pressure_Pa"), laws]
+    return table, laws, "\n\n".join(t.to_string(index=False, float_format="%.4g") for t in shown if len(t))
