@@ -24,13 +24,16 @@ from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import numpy as np
 from blind.tribometer import EFFECTS, LARGEST, Design, hide, write
 from blind_tables import tables
+
+if TYPE_CHECKING:
+    from tribo.diagnose.diagnosis import Diagnosis
 
 HALF_SEED = 500_000_000
 TRIALS = 16  # of each search for the size found half the time
@@ -129,7 +132,8 @@ def one(case: Case) -> dict[str, Any]:
     begin = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
         path = write(hide(case.seed, list(case.effects), case.design), Path(folder) / "campaign", case.seed)
-        v = examine(ingest(load_campaign(path)), seed=case.seed).verdict
+        d = examine(ingest(load_campaign(path)), seed=case.seed)
+    v = d.verdict
     tied = [sorted(names) for names in v.equivalent]
     alone = [[c.mechanism] for c in v.causes if not any(c.mechanism in names for names in tied)]
     row = {
@@ -145,7 +149,18 @@ def one(case: Case) -> dict[str, Any]:
         if cause.mechanism == name and key in cause.parameters:
             e = cause.parameters[key]
             row["interval"] = [float(f"{x:.5g}") for x in (unit * size, e.low, e.value, e.high)]
+    if not case.effects and v.verdict == "no_misfit":
+        row["gain"] = gain_of_the_best(d, case.seed)
     return row
+
+
+def gain_of_the_best(d: Diagnosis, seed: int) -> list[float]:
+    """What the mechanism that fits best by chance gains on samples left out: mean log score, standard error."""
+    from tribo.diagnose.gain import gain
+    from tribo.diagnose.weigh import weigh
+
+    found = gain(d.baseline, weigh(d.baseline)[0].fit, np.random.default_rng(seed))
+    return [round(found.difference, 5), round(found.se, 5)] if found is not None else []
 
 
 def is_seen(case: Case) -> bool:

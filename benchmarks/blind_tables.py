@@ -54,6 +54,11 @@ def held(row: Row) -> bool:
     return bool(low <= truth <= high)
 
 
+def no_gain(row: Row) -> bool:
+    difference, error = row["gain"]
+    return bool(difference - 1.645 * error <= 0.0)
+
+
 def share(rows: list[Row], test: Callable[[Row], bool]) -> str:
     """Count and share, with the 90 % interval of Wilson's score."""
     n, k = len(rows), sum(map(test, rows))
@@ -83,9 +88,11 @@ def _summary(rows: list[Row]) -> str:
     outside = [r for r in rows if any(n.startswith("outside") for n in hidden(r))]
     pairs = [r for r in rows if len(r["effects"]) == 2]
     unseen = [r for r in inside if hidden(r) <= UNSEEN]
+    gained = [r for r in clean if r.get("gain")]
     lines = [
         ("nothing hidden: a cause named", share(clean, lambda r: bool(r["causes"]))),
         ("nothing hidden: a misfit seen", share(clean, lambda r: r["verdict"] != "no_misfit")),
+        ("nothing hidden: 90 % interval of the best mechanism's gain holds zero or less", share(gained, no_gain)),
         ("three times the size found half the time: right", share(at3, right)),
         ("the same: wrong", share(at3, wrong)),
         ("six times: right", share(at6, right)),
