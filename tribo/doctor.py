@@ -10,12 +10,11 @@ from typing import Any
 
 NEEDED = (
     "numpy", "scipy", "pandas", "statsmodels", "xarray", "h5py", "h5netcdf", "matplotlib", "numba", "pydantic",
-    "click", "rich", "pint", "jinja2", "odrpack", "charset-normalizer",
+    "click", "rich", "pint", "jinja2", "odrpack", "charset-normalizer", "typst", "rocrate",
 )  # fmt: skip
 OPTIONAL = {
     "distributed": "simulations on a dask cluster (--scheduler)",
     "openpyxl": "exports saved as .xlsx",
-    "typst": "report.pdf",
     "snakemake": "the pipelines",
 }
 
