@@ -247,3 +247,10 @@ def test_every_command_on_a_campaign_takes_columns(small_campaign: Path, tmp_pat
     result = run(command, small_campaign, "-o", tmp_path / "out", "--columns", "fricton_force=Load [N]", "-q")
     assert result.exit_code == 1
     assert "did you mean friction_force?" in result.stderr
+
+
+def test_diagnose_takes_a_campaign_or_a_published_table_and_not_both(tmp_path: Path) -> None:
+    neither = run("diagnose", "-o", tmp_path)
+    both = run("diagnose", tmp_path, "--published", "berardo2019", "-o", tmp_path)
+    assert (neither.exit_code, both.exit_code) == (2, 2)
+    assert "CAMPAIGN" in neither.output

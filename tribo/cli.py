@@ -152,16 +152,22 @@ def compare(console: Console, campaign: Path, out: Path, dry_run: bool, **option
 
 
 @main.command()
-@CAMPAIGN
+@click.argument("campaign", required=False, type=click.Path(exists=True, path_type=Path))
 @OUT
+@click.option("--published", type=click.Choice(["berardo2019"]), help="The table of a paper in place of CAMPAIGN.")
 @click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off.")
 @COLUMNS
 @OVERRIDES
 @command_options
 def diagnose(
-    console: Console, campaign: Path, out: Path, rule: str, columns: str, overrides: Path | None, seed: int, **_: Any
-) -> int:
-    """What the calibrated model gets wrong, and why, or that it cannot be told: verdict.json."""
+    console: Console, campaign: Path | None, out: Path, published: str | None, rule: str, columns: str,
+    overrides: Path | None, seed: int, **_: Any,
+) -> int:  # fmt: skip
+    """What the calibrated model gets wrong, and why, or that it cannot be told: verdict.json and its figures."""
+    if (campaign is None) == (published is None):
+        raise click.UsageError("give a CAMPAIGN, or --published and the name of a table")
+    if campaign is None:
+        return _diagnose_published(console, out, seed)
     from tribo import stages
     from tribo.campaign import open_campaign
     from tribo.report import write_until
@@ -178,6 +184,20 @@ def diagnose(
     console.result(verdict.as_dict(), verdict_text(verdict))
     console.list_tests("set aside", ingested.set_aside, level=-1)
     return status_of(ingested.set_aside)
+
+
+def _diagnose_published(console: Console, out: Path, seed: int) -> int:
+    """The verdict on Table 2 of Berardo et al. (2019), in every way to read what it leaves open."""
+    from tribo.diagnose.published import diagnose_published
+    from tribo.published import load_table2, load_table2_simulated_anew
+    from tribo.report.published import write_published
+    from tribo.report.verdict import verdict_text
+
+    with console.progress() as progress:
+        found = diagnose_published(load_table2(), load_table2_simulated_anew(), seed=seed, progress=progress)
+        write_published(found, out)
+    console.result(found.verdict.as_dict(), verdict_text(found.verdict))
+    return 0
 
 
 @main.command()

@@ -42,7 +42,7 @@ def verdict_of(outlooks: Sequence[Outlook], gain: Gain) -> Verdict:
 
 def misfits(outlook: Outlook) -> list[Misfit]:
     """Samples whose friction is off beyond chance, the surest first; the strongest look where none is alone."""
-    found = []
+    found: list[Misfit] = []
     table = outlook.table
     for look, p in sorted(outlook.looks.items(), key=lambda item: item[1]):
         if p >= LEVEL or look in MECHANISMS or " of " not in look:
@@ -72,7 +72,11 @@ def _ratio_percent(outlook: Outlook, sample: str, what: str) -> tuple[float, flo
 
 
 def _off(low: float, high: float) -> str:
-    return f"{low:+.0f} to {high:+.0f} % off that".replace("-", "−")
+    if high < 0:
+        return f"{-high:.0f} to {-low:.0f} % below that"
+    if low > 0:
+        return f"{low:.0f} to {high:.0f} % above that"
+    return f"from {-low:.0f} % below to {high:.0f} % above that"
 
 
 def _p(p: float) -> str:
