@@ -51,9 +51,16 @@ def next_test(tied: Sequence[Candidate]) -> NextTest | None:
     return best
 
 
+ALONE = {
+    "normal_load_N": "Pull one specimen at nine loads over the range, up and down again",
+    "sample": "Pull one fresh specimen of every sample in turn, at one load and within one day",
+}
+
+
 def first_test_of(covariate: str) -> NextTest:
     """What to do about a misfit that follows a column but no law: vary that column alone."""
-    text = f"Vary {covariate} alone, in random order, on one sample at one load: {PULLS} pulls."
+    how = ALONE.get(covariate, f"Vary {covariate} alone, in random order, on one sample at one load")
+    text = f"{how}: {PULLS} pulls."
     design = {"covariate": covariate, "pulls": PULLS, "hours": PULLS * HOURS_PER_PULL}
     return NextTest(text, (covariate,), design, float("nan"))
 
