@@ -48,7 +48,8 @@ def mesh(known: pd.DataFrame) -> Iterator[dict[str, object]]:
             n = round(425 / spacing_um)
             base = SimConfig(
                 blocks=(n, n), spacing_m=spacing_um * 1e-6, thickness_m=5e-6, cavity_shape=shape,
-                dt_s=1e-8 * spacing_um, duration_peaks=WINDOW_END, pattern_first=same_place(sample, n),
+                dt_s=2e-8 * spacing_um, rest_tolerance=1e-2, duration_peaks=WINDOW_END,
+                pattern_first=same_place(sample, n),
             )  # fmt: skip
             for config in stratified_design([sample], MESH_PRESSURES_PA, MESH_RUNS, base=base):
                 key = {"sample": sample, "spacing_um": spacing_um, "cavities": shape,
