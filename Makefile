@@ -1,13 +1,14 @@
 # From a fresh clone with nothing but python3 and make:
 #   make demo    the main job on the bundled example, into out/demo
 #   make test    lint, types and tests
+#   make docs    the documentation, into out/docs; warnings are errors, internal links are checked
 #   make blind   campaigns with hidden effects, about an hour on two cores; goes on where it was stopped
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint types pytest bench blind clean
+.PHONY: demo test lint types pytest docs links bench blind clean
 
 $(VENV)/.run: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -31,6 +32,16 @@ pytest: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
 test: lint types pytest
+
+$(VENV)/.docs: $(VENV)/.run
+	$(PIP) -e '.[docs]'
+	touch $@
+
+docs: $(VENV)/.docs
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
+
+links: $(VENV)/.docs
+	$(BIN)/python -m sphinx -q -b linkcheck docs out/links  # external ones are listed in out/links/output.txt
 
 bench: $(VENV)/.dev
 	$(BIN)/tribo bench
