@@ -1,8 +1,9 @@
 """Campaigns with hidden effects in full: power against size, confusion, false alarms, coverage.
 
     python benchmarks/blind.py half   docs/data/blind-half.jsonl             the size of each effect found half the time
-    python benchmarks/blind.py run    docs/data/blind.jsonl --seed 71        three and six times that size, and the rest
-    python benchmarks/blind.py tables docs/data/blind.jsonl                  what came of it
+    python benchmarks/blind.py run    out/blind.jsonl --seed 71              three and six times that size, and the rest
+    python benchmarks/blind.py tables out/blind.jsonl                        what came of it
+    python benchmarks/blind.py page   out/blind.jsonl                        the same into docs/blind.md, rows beside it
 
 Every campaign is written to disk as raw exports by the virtual tribometer of tests/blind and read back through
 the whole chain; the diagnosis sees only the files. ``half`` has seeds of its own. A run appends one line a campaign
@@ -35,6 +36,8 @@ from blind_tables import tables
 if TYPE_CHECKING:
     from tribo.diagnose.diagnosis import Diagnosis
 
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+MARK = "<!-- below: python benchmarks/blind.py page -->"
 HALF_SEED = 500_000_000
 TRIALS = 16  # of each search for the size found half the time
 SPEEDS, HOLDS = (0.05, 0.2, 0.8), (1.0, 10.0, 300.0)
@@ -245,9 +248,18 @@ def run(path: Path, half: Path, campaigns: int, clean: int, seed: int, jobs: int
     work_off([c for c in todo if (c.cell, c.seed) not in known], one, path, jobs)
 
 
+def put_on_page(rows: list[dict[str, Any]], planned: int, seed: int) -> None:
+    """The tables into docs/blind.md below its mark, and the rows into docs/data."""
+    page, data = DOCS / "blind.md", DOCS / "data" / "blind.jsonl"
+    above = page.read_text().split(MARK)[0]
+    made = f"Seed {seed}: {len(rows)} of {planned} campaigns, in random order.\n\n"
+    page.write_text(above + MARK + "\n\n" + made + tables(rows))
+    data.write_text("".join(json.dumps(row) + "\n" for row in sorted(rows, key=lambda r: int(r["seed"]))))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("half", "run", "tables"))
+    parser.add_argument("what", choices=("half", "run", "tables", "page"))
     parser.add_argument("path", type=Path, help="JSON lines, one a campaign")
     parser.add_argument("--half", type=Path, default=Path("docs/data/blind-half.jsonl"))
     parser.add_argument("--campaigns", type=int, default=50, help="per cell")
@@ -259,6 +271,9 @@ def main() -> None:
         find_half(o.path, o.jobs)
     elif o.what == "run":
         run(o.path, o.half, o.campaigns, o.clean, o.seed, o.jobs)
+    elif o.what == "page":
+        sizes = {row["effect"]: row["half"] for row in read_rows(o.half)}
+        put_on_page(read_rows(o.path), len(list(cases(sizes, o.campaigns, o.clean, o.seed))), o.seed)
     if o.what != "half":
         print(tables(read_rows(o.path)))
 
