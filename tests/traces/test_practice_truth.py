@@ -38,8 +38,10 @@ def test_pulls_agree_with_what_the_traces_were_made_with(
         assert np.median(error) < 0.006
         assert np.mean(error < 0.03) >= 0.99
         z = (read - true) / u
-        assert 0.6 < np.sqrt(np.mean(z**2)) < 1.4
+        # tops are sharp here, and the static uncertainty allows for rounded ones
+        assert (0.3 if regime == "static" else 0.6) < np.sqrt(np.mean(z**2)) < 1.4
         assert np.mean(np.abs(z) < 1.96) > 0.9
+        assert np.median(u / true) < 0.015
 
 
 def test_every_kind_of_spoiled_trace_is_named_and_its_clean_twin_is_not(

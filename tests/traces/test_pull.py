@@ -239,3 +239,21 @@ def test_a_rule_that_counts_travel_needs_travel() -> None:
         read_pull(replace(NOISY.trace(), displacement_m=None), rule="iso_8295", test=replace(SOME_TEST, speed_m_s=None))
     assert kinds(fault.value) == ["no_displacement"]
     assert fault.value.problems[0].test_id == "T1"
+
+
+@pytest.mark.parametrize(("rate_Hz", "width_s"), [(10, 0.3), (20, 0.2), (50, 0.1), (100, 0.1)])
+def test_a_top_rounded_over_a_few_samples_lies_within_the_static_uncertainty(rate_Hz: float, width_s: float) -> None:
+    """The line bends into its top over ``width_s``; noise hides the bend, and a sharp apex would lie above it."""
+    rise_N_per_s, rng = 1.0, np.random.default_rng(int(rate_Hz))
+    held = []
+    for _ in range(40):
+        time = np.arange(rng.uniform(0, 1 / rate_Hz), 14.0, 1 / rate_Hz)
+        start = 4.0 - width_s / 2
+        bend = np.clip((time - start) / width_s, 0, 1)
+        peak = rise_N_per_s * (start - 2.0 + width_s / 2)
+        force = rise_N_per_s * (np.clip(time - 2.0, 0, start - 2.0) + width_s * (bend - bend**2 / 2))
+        after = np.maximum(time - start - width_s, 0)
+        force = np.where(after > 0, 1.3 + (peak - 1.3) * np.exp(-after / 0.3), force)
+        pull = read_pull(Trace("arched", time, force + 0.01 * rng.standard_normal(time.size)))
+        held.append(abs(pull.static_N - peak) < 1.96 * pull.static_u_N)
+    assert np.mean(held) >= 0.85

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,12 +16,17 @@ _POSITIONS = np.linspace(0.0, 1.0, 9)  # of the apex between two samples
 _FALL_TIMES = np.append(np.geomspace(0.1, 2.0, 8), math.inf)  # as shares of the time looked at
 _MORE_FALL_TIMES = np.append(np.geomspace(0.1, 2.0, 24), math.inf)
 _MANY = 200  # samples from which on a fit tells the finer series apart
+_CLOSEST = 2  # samples on either side of a top that tell a parabola
 _FITS = 1.5  # misfit per degree of freedom up to which a parabola fits
 
 
 @dataclass(frozen=True)
 class Apex:
-    """A peak: time and force with standard uncertainties, misfit per degree of freedom and the shape fitted."""
+    """A peak: time and force with standard uncertainties, misfit per degree of freedom and the shape fitted.
+
+    ``shape_u_N`` is what the choice of the shape leaves open: a sharp apex may be the end of a line that no sample
+    followed to its end.
+    """
 
     time_s: float
     time_u_s: float
@@ -29,6 +34,7 @@ class Apex:
     u_N: float
     chi2_red: float
     shape: str
+    shape_u_N: float = 0.0
 
     @property
     def fits(self) -> bool:
@@ -136,13 +142,34 @@ def _fall_side(t: FloatArray, f: FloatArray, after: FloatArray, at: FloatArray, 
     return _Side(value, (1.0 / n)[:, None] + away * away / spread[:, :, None], misfit[:, :, None])
 
 
-def rounded_apex(time_s: FloatArray, force: FloatArray, peak: int, half: int, noise: float) -> Apex:
-    """Top of a parabola through the samples within ``half`` of ``peak``, or closer until a parabola fits."""
+def rounded_apex(
+    time_s: FloatArray, force: FloatArray, peak: int, half: int, noise: float, closest: int = FEWEST_SAMPLES
+) -> Apex:
+    """Top of a parabola through the samples within ``half`` of ``peak``, or closer until a parabola fits.
+
+    Once ``half`` is ``closest`` or less it is not made smaller.
+    """
     apex = _parabola_top(time_s, force, peak, half, noise)
-    while not apex.fits and half > FEWEST_SAMPLES:
+    while not apex.fits and half > closest:
         half //= 2
         apex = _parabola_top(time_s, force, peak, half, noise)
     return apex
+
+
+def with_shape_left_open(
+    sharp: Apex, time_s: FloatArray, force: FloatArray, peak: int, half: int, noise: float
+) -> Apex:
+    """A sharp apex with the uncertainty that its sharpness adds (GUM type B).
+
+    The top may be rounded over a few samples, or over as many as noise hides it in: then the highest force lies
+    anywhere between the top of the widest parabola that fits and the apex of the sharp shape, a rectangular
+    distribution with one end at the value given. Where a parabola fits over many samples its own uncertainty is added.
+    """
+    rounded = rounded_apex(time_s, force, peak, half, noise, _CLOSEST)
+    step_s = float(time_s[min(peak + 1, time_s.size - 1)] - time_s[max(peak - 1, 0)]) / 2.0
+    over_many = 2.0 * rounded.time_u_s > FEWEST_SAMPLES * step_s
+    lower = sharp.force_N - rounded.force_N + (rounded.u_N if over_many else 0.0)
+    return replace(sharp, shape_u_N=max(lower, 0.0) / math.sqrt(3.0))
 
 
 def _parabola_top(time_s: FloatArray, force: FloatArray, peak: int, half: int, noise: float) -> Apex:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribo.records import FloatArray
-from tribo.traces.apex import FEWEST_SAMPLES, Apex, rounded_apex, sharp_apex
+from tribo.traces.apex import FEWEST_SAMPLES, Apex, rounded_apex, sharp_apex, with_shape_left_open
 from tribo.traces.statistics import condense
 
 _DROP = 5.0  # a fall by this many times the noise ends the search for the first maximum
@@ -75,10 +75,13 @@ def find_apex(
         around = Search(max(peak - climb, 0), peak - 2, peak + 2, peak + length)
         candidates.append(_resolved(time_s, force, around, noise))
     sharp = min((a for a in candidates if a), key=lambda a: a.chi2_red, default=None)
+    half = max(length // 2, 2)
     if sharp and sharp.fits:
-        return sharp
-    rounded = rounded_apex(time_s, force, peak, max(length // 2, 2), noise)
-    return sharp if sharp and rounded.chi2_red > _CLEARLY_ROUNDED * sharp.chi2_red else rounded
+        return with_shape_left_open(sharp, time_s, force, peak, half, noise)
+    rounded = rounded_apex(time_s, force, peak, half, noise)
+    if sharp and rounded.chi2_red > _CLEARLY_ROUNDED * sharp.chi2_red:
+        return with_shape_left_open(sharp, time_s, force, peak, half, noise)
+    return rounded
 
 
 def _resolved(time_s: FloatArray, force: FloatArray, search: Search, noise: float) -> Apex | None:

@@ -41,9 +41,9 @@ def read_pull(
     trace, are a static peak and a sliding window that a person chose: the peak is then looked for within two samples
     of ``peak_s``, and the flags say what was chosen by hand.
 
-    The standard uncertainties hold the scatter of the reading (correlation counted), that of the zero, and
-    how far a slow wander of the size seen while sliding may have carried the signal since the zero was last
-    seen.
+    The standard uncertainties hold the scatter of the reading (correlation counted), that of the zero, how far
+    a slow wander of the size seen while sliding may have carried the signal since the zero was last seen, and
+    for the static peak how much lower a rounded top would lie that the samples cannot tell from a sharp one.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def _reduce(motion: Motion, static: Apex, window: Window, rule: Rule, name: str,
         test_id=name,
         rule=rule.name,
         static_N=static.force_N,
-        static_u_N=math.sqrt(static.u_N**2 + zero_u**2 + static_wander),
+        static_u_N=math.sqrt(static.u_N**2 + static.shape_u_N**2 + zero_u**2 + static_wander),
         sliding_N=sliding.mean_N,
         sliding_u_N=math.sqrt(sliding.u_N**2 + zero_u**2 + sliding_wander),
         zero_N=motion.zero.force_N,
