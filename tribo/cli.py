@@ -379,6 +379,7 @@ def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None
         "fits": fits.where(fits.notna(), None).to_dict("records"),
         "power": list(study.power),
         "outlying": list(study.outlying),
+        "differences": [] if study.differences is None else study.differences.to_dict("records"),
         "verdict": verdict.verdict if verdict else None,
     }
     words = [table2_text(study)] if study.fits else []

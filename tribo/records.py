@@ -359,7 +359,8 @@ class Study:
     pressure_Pa, normal_load_N (p times the nominal area of the campaign), angle_deg, seed, static_N,
     sliding_N. ``example_runs`` keeps a full force trace of the model per sample. ``budget`` is the uncertainty
     budget of every fitted number, one row a component; ``power`` says what this campaign could have shown and
-    ``outlying`` which pulls and specimens stand far from their siblings.
+    ``outlying`` which pulls and specimens stand far from their siblings; ``differences`` how far samples are apart that
+    were measured on the same specimens, one row a pair of samples, regime and number.
     """
 
     ingested: Ingested
@@ -371,4 +372,5 @@ class Study:
     budget: pd.DataFrame | None = None
     power: tuple[str, ...] = ()
     outlying: tuple[str, ...] = ()
+    differences: pd.DataFrame | None = None
     notes: tuple[str, ...] = ()

@@ -291,6 +291,7 @@ def _looks(walked: Study, options: StudyOptions) -> dict[str, Any]:
     import pandas as pd
 
     from tribo.fitting import campaign_budgets, outlying_pulls, outlying_specimens, power_of_campaign
+    from tribo.fitting.paired import differences_table, paired_differences
 
     ingested = walked.ingested
     table, area = ingested.table(), ingested.campaign.nominal_area_m2
@@ -309,6 +310,7 @@ def _looks(walked: Study, options: StudyOptions) -> dict[str, Any]:
         "budget": pd.concat(parts, ignore_index=True) if parts else None,
         "power": tuple(power),
         "outlying": tuple(outlying),
+        "differences": differences_table(paired) if (paired := paired_differences(walked.fits)) else None,
     }
 
 

@@ -3,6 +3,7 @@ from .budget import campaign_budgets as campaign_budgets, uncertainty_budget as 
 from .curves import fit_power_law as fit_power_law
 from .mixed import mixed_model as mixed_model
 from .outlying import outlying_pulls as outlying_pulls, outlying_specimens as outlying_specimens
+from .paired import PairedDifference as PairedDifference, paired_differences as paired_differences
 from .pooled_scatter import pool_specimen_scatter as pool_specimen_scatter
 from .power import power_of_campaign as power_of_campaign
 from .repeats import repeat_scatter as repeat_scatter

@@ -155,13 +155,15 @@ def to_csv(table: pd.DataFrame) -> str:
 
 
 def write_tables(study: Study, out: Path) -> list[Path]:
-    """tests.csv, and fits.csv, other_fits.csv, budget.csv and comparison.csv as far as the study went."""
+    """tests.csv, and fits.csv, other_fits.csv, budget.csv, differences.csv and comparison.csv as far as the study went."""
     tables = {"tests.csv": tests_table(study)}
     if study.fits:
         tables["fits.csv"] = fits_table(study.fits)
         tables["other_fits.csv"] = other_fits_table(study)
     if study.budget is not None:
         tables["budget.csv"] = study.budget
+    if study.differences is not None:
+        tables["differences.csv"] = study.differences
     if study.comparison is not None:
         tables["comparison.csv"] = comparison_table(study)
     return [write_text(out / name, to_csv(table)) for name, table in tables.items()]
