@@ -108,7 +108,7 @@ def _summary(rows: list[Row]) -> str:
     return "| what | campaigns |\n|---|---|\n" + "\n".join(f"| {a} | {b} |" for a, b in lines)
 
 
-UNSEEN = {"pull_angle", "pulley_friction", "machine_compliance"}
+UNSEEN = {"pull_angle", "pulley_friction", "machine_compliance", "sampling_clip"}
 
 
 def _cells(rows: list[Row]) -> str:
