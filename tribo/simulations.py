@@ -7,16 +7,16 @@ one finished run is never computed twice. Cells can be run by different processe
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from tribo.errors import SimulationError
 from tribo.kept import Shelf, sources
-from tribo.records import Run
+from tribo.records import Pattern, Run
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -115,6 +115,48 @@ def _run_stored(
             raise
     path.unlink()
     return run_stored(cell.configs, path, threads, scheduler, progress)
+
+
+def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | None:
+    """Finished runs of the baseline in ``kept`` that today's sources would make again, a row a run; None without any.
+
+    A file counts where its name is the one that its own runs would be given.
+    """
+    import pandas as pd
+
+    from tribo.simulate import read_stored
+
+    found = []
+    for path in sorted(kept.glob(f"*@*{SUFFIX}")):
+        try:
+            table = read_stored(path)
+            cell = _cell_of(path, table, patterns)
+        except (OSError, KeyError, ValueError):  # another program's file, or a damaged one
+            continue
+        if cell is not None and cell.path(kept) == path and table["done"].all():
+            found.append(table)
+    return pd.concat(found, ignore_index=True) if found else None
+
+
+def _cell_of(path: Path, table: pd.DataFrame, patterns: Mapping[str, Pattern]) -> Cell | None:
+    """The cell that a kept file says it holds, its runs those of the baseline with the file's local friction."""
+    import h5py
+
+    from tribo.simulate import LocalFriction, SimConfig
+
+    sample = str(table["sample"].iloc[0])
+    if sample not in patterns:
+        return None
+    with h5py.File(path) as file:
+        friction = LocalFriction(**{f.name: float(file.attrs[f"friction_{f.name}"]) for f in fields(LocalFriction)})
+    configs = tuple(
+        SimConfig(
+            sample=sample, pattern=patterns[sample], pressure_Pa=float(row["pressure_Pa"]),
+            angle_deg=float(row["angle_deg"]), seed=int(row["seed"]), friction=friction,
+        )
+        for row in table.to_dict("records")
+    )  # fmt: skip
+    return Cell(sample, configs[0].pressure_Pa, configs)
 
 
 def example_run(cells: Sequence[Cell], kept: Path | None = None) -> Run:

@@ -29,6 +29,7 @@ from tribo.records import (
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
+    from tribo.diagnose.predictor import Predictor
     from tribo.simulations import Cell
 
 Progress = Callable[[str, int, int], None]
@@ -315,20 +316,43 @@ def _looks(walked: Study, options: StudyOptions) -> dict[str, Any]:
 
 
 def diagnosis(
-    ingested: Ingested, *, seed: int = 0, kept: Path | None = None, progress: Progress = _silent
+    ingested: Ingested, *, seed: int = 0, jobs: int = 2, kept: Path | None = None, progress: Progress = _silent
 ) -> Diagnosis:
     """What the calibrated model gets wrong and why, with all it rests on; taken from ``kept`` where it is there.
+
+    What the model makes of each pattern comes from the campaign's own simulations where ``kept`` holds them, else
+    from the tabulated ones; a named mechanism is then put into the simulator itself.
 
     Raises
     ------
     FitError
         Fewer than twelve usable tests.
     """
-    from tribo.diagnose import examine
+    from tribo.diagnose import examine, with_simulation
 
-    return Shelf(kept).take(
-        "diagnosis", (ingested, seed), lambda: examine(ingested, seed=seed, progress=progress), DIAGNOSED_BY
+    predictor = own_predictor(ingested.campaign, kept)
+
+    def found() -> Diagnosis:
+        examined = examine(ingested, seed=seed, predictor=predictor, progress=progress)
+        return with_simulation(examined, seed=seed, jobs=jobs, progress=progress)
+
+    return Shelf(kept).take("diagnosis", (ingested, seed, predictor), found, DIAGNOSED_BY)
+
+
+def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:
+    """The predictor from simulations of this campaign, where ``kept`` holds them for the flat sample at least."""
+    from tribo.diagnose import simulated_predictor
+    from tribo.simulations import kept_runs
+
+    runs = kept_runs(kept, campaign.samples) if kept is not None else None
+    if runs is None:
+        return None
+    load = runs["pressure_Pa"] * campaign.nominal_area_m2
+    forces = runs.assign(
+        normal_load_N=load, static_N=runs["static_friction"] * load, sliding_N=runs["sliding_friction"] * load
     )
+    flat = [s for s in dict.fromkeys(forces["sample"]) if campaign.samples[s].cavity == "none"]
+    return simulated_predictor(campaign.samples, forces, flat[0], campaign.nominal_area_m2) if flat else None
 
 
 def _other_fits(ingested: Ingested, options: StudyOptions) -> tuple[LawFit, ...]:

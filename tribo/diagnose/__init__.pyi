@@ -2,6 +2,7 @@ from .diagnosis import Diagnosis as Diagnosis, diagnose as diagnose, examine as 
 from .extend import parse_given as parse_given, parse_with as parse_with, simulate_with as simulate_with
 from .plan import Plan as Plan, plan_design as plan_design
 from .predictor import simulated_predictor as simulated_predictor, tabled_predictor as tabled_predictor
+from .simulated import with_simulation as with_simulation
 from .tables import (
     look_table as look_table,
     misfit_map as misfit_map,

@@ -26,6 +26,7 @@ from tribo.diagnose.sentences import (
     smallest_effects,
     summary,
 )
+from tribo.diagnose.simulated import SimulatedExtension
 from tribo.diagnose.verdict import Cause, Excluded, Gain, Misfit, NextTest, Outcome, Verdict
 from tribo.diagnose.weigh import Candidate, unseen
 from tribo.records import Ingested
@@ -37,12 +38,16 @@ FEWEST_TESTS = 12
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """A verdict with what it rests on, for figures and tables."""
+    """A verdict with what it rests on, for figures and tables.
+
+    ``simulated`` is the extended model run in the simulator itself, where that was asked for.
+    """
 
     verdict: Verdict
     baseline: ModelFit
     screened: Screen
     named: Named | None
+    simulated: SimulatedExtension | None = None
 
 
 def diagnose(

@@ -155,6 +155,19 @@ def simulate_with(config: SimConfig, mechanisms: Mapping[str, Values], **recorde
     return mixed(as_labelled, as_other, share)
 
 
+def simulate_pair(
+    config: SimConfig, mechanisms: Mapping[str, Values], recorded: Mapping[str, float]
+) -> tuple[Run, Run]:
+    """The run without mechanisms and the one with them, each computed once; parameters as :func:`simulate_with`."""
+    before = run_with(config, {}, recorded, Pulled())
+    acting = _acting(mechanisms)
+    if not acting:
+        return before, before
+    if set(acting) <= set(ON_ITSELF):
+        return before, _simulate(config, acting, recorded, before)
+    return before, simulate_with(config, acting, **recorded)
+
+
 def _acting(mechanisms: Mapping[str, Values]) -> dict[str, Values]:
     """Those whose amplitude is not zero."""
     unknown = [key for key in mechanisms if name_of(key) not in MECHANISMS]
@@ -167,22 +180,27 @@ def _acting(mechanisms: Mapping[str, Values]) -> dict[str, Values]:
     return {key: v for key, v in by_key.items() if v[0] != MECHANISMS[name_of(key)].amplitude.zero}
 
 
-def _simulate(config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[str, float]) -> Run:
-    run = settled(config, acting, recorded)
+def _simulate(
+    config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[str, float], before: Run | None = None
+) -> Run:
+    run = settled(config, acting, recorded, before)
     chain = chain_of(acting, recorded)
     return measured(run, chain, config.speed_m_s)
 
 
-def settled(config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[str, float]) -> Run:
+def settled(
+    config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[str, float], before: Run | None = None
+) -> Run:
     """The run whose own friction is the one that tilt, wire and contact area were given.
 
-    The first guess is the quick law on the run without them; then as many rounds as it takes.
+    The first guess is the quick law on the run without them (``before``); then as many rounds as it takes.
     """
     on_itself = [name for name in ON_ITSELF if name in acting]
     if not on_itself:
         return run_with(config, acting, recorded, Pulled())
     others = {name: values for name, values in acting.items() if name not in on_itself}
-    pulled = guessed(config, {n: acting[n] for n in on_itself}, recorded, run_with(config, others, recorded, Pulled()))
+    without = before if before is not None else run_with(config, others, recorded, Pulled())
+    pulled = guessed(config, {n: acting[n] for n in on_itself}, recorded, without)
     for _ in range(MOST_ROUNDS):
         run = run_with(config, acting, recorded, pulled)
         off = max(abs(run.static_friction / pulled.static - 1), abs(run.sliding_friction / pulled.sliding - 1))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Shares = tuple[float, float, float, float]  # static mu, static tau0, sliding mu, sliding tau0
 
 # (cavity size x, y, pitch x, y in um, pulled along) -> mu, tau0 in kPa, static and sliding
-_FLAT = (4.79, 23.44, 2.93, 11.2)
+FLAT_LAW = (4.79, 23.44, 2.93, 11.2)
 _SIMULATED: dict[tuple[float, float, float, float, str], Shares] = {
     (5, 5, 20, 20, ""): (4.40, 18.8, 2.97, 11.0),
     (10, 10, 15, 15, ""): (4.18, 10.7, 3.09, 7.0),
@@ -33,6 +33,7 @@ _SIMULATED: dict[tuple[float, float, float, float, str], Shares] = {
 # edge, window and angle law move a pattern's static force by 3 to 13 % and its sliding force by 2 to 8 %.
 OFFSET = (0.055, 0.045)
 SLOPE = (0.02, 0.02)  # per e-fold of pressure
+LEAST_SPREAD = 2.0  # largest over smallest load from which mu and tau0 part
 UNTABLED = 1.6  # a pattern that was never simulated is predicted that much worse
 
 
@@ -64,19 +65,24 @@ def simulated_predictor(
 ) -> Predictor:
     """The predictor of a campaign's samples from an ensemble of its own.
 
-    ``simulated`` has one row a run: sample, normal_load_N, static_N, sliding_N. Samples it lacks are taken
-    from the table.
+    ``simulated`` has one row a run: sample, normal_load_N, static_N, sliding_N. Samples it lacks, or has at
+    loads too close together for a line, are taken from the table, and so is all where that is the flat sample.
     """
-    laws = {str(s): _law_of_runs(rows, nominal_area_m2) for s, rows in simulated.groupby("sample")}
+    spread = simulated.groupby("sample")["normal_load_N"].agg(lambda loads: loads.max() / loads.min())
+    enough = simulated[simulated["sample"].isin(spread.index[spread >= LEAST_SPREAD])]
+    laws = {str(s): _law_of_runs(rows, nominal_area_m2) for s, rows in enough.groupby("sample")}
     reference = laws.get(flat)
+    if reference is None:
+        return tabled_predictor(patterns)
     shares = {name: _shares(name, pattern) for name, pattern in patterns.items()}
-    if reference is not None:
-        shares |= {
-            s: (float(v[0]), float(v[1]), float(v[2]), float(v[3]))
-            for s, law in laws.items()
-            if s in patterns and np.all(np.isfinite(v := law / reference))
-        }
-    return _with_error(patterns, shares, "an ensemble simulated for this campaign")
+    own = {
+        s: (float(v[0]), float(v[1]), float(v[2]), float(v[3]))
+        for s, law in laws.items()
+        if s in patterns and np.all(np.isfinite(v := law / reference))
+    }
+    lacking = sorted(s for s, p in patterns.items() if p.area_fraction < 1.0 and s not in own)
+    source = "an ensemble simulated for this campaign"
+    return _with_error(patterns, shares | own, f"{source} (without {', '.join(lacking)})" if lacking else source)
 
 
 def _law_of_runs(rows: pd.DataFrame, area_m2: float) -> FloatArray:
@@ -112,7 +118,7 @@ def _shares(name: str, pattern: Pattern) -> Shares:
         return (1.0, 1.0, 1.0, 1.0)
     key = _key(name, pattern)
     if key is not None:
-        row = np.array(_SIMULATED[key]) / np.array(_FLAT)
+        row = np.array(_SIMULATED[key]) / np.array(FLAT_LAW)
         return (float(row[0]), float(row[1]), float(row[2]), float(row[3]))
     return _interpolated(pattern.area_fraction)
 
@@ -121,7 +127,7 @@ def _interpolated(area_fraction: float) -> Shares:
     """Between the tabulated patterns by area fraction: the efficiency of a pattern falls with its cavities."""
     keys = sorted(_SIMULATED, key=_area_fraction)
     known = np.array([*(_area_fraction(key) for key in keys), 1.0])
-    rows = [np.array(_SIMULATED[key]) / _FLAT / [1.0, a, 1.0, a] for key, a in zip(keys, known[:-1], strict=True)]
+    rows = [np.array(_SIMULATED[key]) / FLAT_LAW / [1.0, a, 1.0, a] for key, a in zip(keys, known[:-1], strict=True)]
     at = [float(np.interp(area_fraction, known, column)) for column in np.array([*rows, np.ones(4)]).T]
     return (at[0], at[1] * area_fraction, at[2], at[3] * area_fraction)
 

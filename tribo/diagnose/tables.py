@@ -20,7 +20,7 @@ def residual_table(d: Diagnosis) -> pd.DataFrame:
     Columns: test_id, sample, specimen, regime, normal_load_N, run_order, specimen_run, temperature_C,
     humidity_pct, speed_m_s, hold_s, measured_N, baseline_N, extended_N, residual_percent and
     residual_extended_percent (100 ln of measured over modelled). Without a named mechanism the extended
-    columns repeat the baseline.
+    columns repeat the baseline. Where the extended model was run in the simulator itself, simulated_N is what it says.
     """
     import pandas as pd
 
@@ -30,6 +30,7 @@ def residual_table(d: Diagnosis) -> pd.DataFrame:
     parts = []
     for k, regime in enumerate(REGIMES):
         measured, before, after = o.log_force[:, k], d.baseline.predicted[:, k], extended.predicted[:, k]
+        simulated = {} if d.simulated is None else {"simulated_N": np.exp(d.simulated.log_force[:, k])}
         parts.append(
             pd.DataFrame(
                 {
@@ -40,6 +41,7 @@ def residual_table(d: Diagnosis) -> pd.DataFrame:
                     "extended_N": np.exp(after), "residual_percent": 100 * (measured - before),
                     "residual_extended_percent": 100 * (measured - after),
                 }
+                | simulated
             )
         )  # fmt: skip
     return pd.concat(parts, ignore_index=True)

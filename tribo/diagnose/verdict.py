@@ -91,6 +91,7 @@ class Verdict:
     next_test: NextTest | None = None
     text: str = ""
     smallest_effects: Mapping[str, float] = field(default_factory=dict)
+    model: Mapping[str, Any] = field(default_factory=dict)  # where the shares come from, what the simulation says
 
     def as_dict(self) -> dict[str, Any]:
         """The verdict as plain types, in the order of the schema; numbers that do not exist are null."""
@@ -106,6 +107,7 @@ class Verdict:
             "set_aside": [{"test_id": s.test_id, "reason": s.reason} for s in self.set_aside],
             "next_test": asdict(self.next_test) if self.next_test else None,
             "smallest_effects_percent": dict(self.smallest_effects),
+            "model": dict(self.model),
         }
         clean: dict[str, Any] = _finite(plain)
         return clean

@@ -41,9 +41,8 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     f = d.baseline
     o = f.setup.observations
     residuals = {"before": f.residual, "after": d.named.model.residual}
-    simulated = getattr(d, "simulated", None)
-    if simulated is not None:
-        residuals["simulated"] = o.log_force - simulated.log_force
+    if d.simulated is not None:
+        residuals["simulated"] = o.log_force - d.simulated.log_force
     levels = select.load_levels(o.conditions.normal_load_N)
     samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
     rows = [

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -16,11 +17,15 @@ from tribo.report import tables
 from tribo.report.files import whole_file
 from tribo.report.provenance import Provenance
 
+if TYPE_CHECKING:
+    from tribo.diagnose import Diagnosis
+
 # How the end of a column name says its unit; the longest ending wins.
 UNIT_ENDINGS = {
     "_N_per_s": "N/s", "_N_per_m": "N/m", "_m_s": "m/s", "_u_kPa": "kPa", "_kPa": "kPa", "_Pa": "Pa",
     "_N": "N",
     "_u_N": "N", "_s": "s", "_m": "m", "_kg": "kg", "_deg": "degree", "_C": "degC", "_pct": "percent",
+    "_percent": "percent",
 }  # fmt: skip
 UNITLESS = {"mu": "1", "mu_u": "1", "ratio": "1", "ratio_low": "1", "ratio_high": "1", "cov": "kPa"}
 
@@ -38,8 +43,13 @@ def _units(column: str) -> dict[str, str]:
     return {"units": unit} if unit else {}
 
 
-def write_store(study: Study, out: Path, provenance: Provenance | None = None) -> Path:
+def write_store(
+    study: Study, out: Path, provenance: Provenance | None = None, diagnosis: Diagnosis | None = None
+) -> Path:
     """Write out/campaign.nc, a DataTree with the groups tests, fits, comparison, simulated and traces.
+
+    With a ``diagnosis`` also residuals, a row a test and regime under the calibrated and the extended model, and
+    extended_runs, the pairs of runs of the simulator without and with the named mechanisms.
 
     ``provenance`` stands in the attributes of the file, as JSON.
 
@@ -70,10 +80,22 @@ def write_store(study: Study, out: Path, provenance: Provenance | None = None) -
         groups["/comparison"].attrs["flat"] = study.comparison.flat
     if study.simulated is not None:
         groups["/simulated"] = _table(study.simulated, "run")
+    if diagnosis is not None:
+        groups |= _diagnosed(diagnosis)
     path = out / "campaign.nc"
     with whole_file(path) as part:
         xr.DataTree.from_dict(groups).to_netcdf(part, engine="h5netcdf")
     return path
+
+
+def _diagnosed(diagnosis: Diagnosis) -> dict[str, xr.Dataset]:
+    from tribo.diagnose import residual_table
+
+    groups = {"/residuals": _table(residual_table(diagnosis), "residual_row")}
+    if diagnosis.simulated is not None:
+        groups["/extended_runs"] = _table(diagnosis.simulated.table, "pair")
+        groups["/extended_runs"].attrs["mechanisms"] = ", ".join(diagnosis.simulated.mechanisms)
+    return groups
 
 
 def _table(frame: pd.DataFrame, dimension: str) -> xr.Dataset:

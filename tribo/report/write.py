@@ -40,7 +40,7 @@ def write_until(
     before = read_record(out)
     made_by = provenance if provenance is not None else gather_provenance(study)
     verdict = diagnosis.verdict.as_dict() if diagnosis is not None else verdict
-    written = [*write_tables(study, out), write_store(study, out, made_by)]
+    written = [*write_tables(study, out), write_store(study, out, made_by, diagnosis)]
     if verdict is not None:
         written.append(write_verdict(verdict, out))
     if until in ("compare", "report") or diagnosis is not None:
