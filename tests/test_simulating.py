@@ -11,6 +11,7 @@ from click.testing import CliRunner, Result
 
 from tribo.cli import main
 from tribo.published import load_table2
+from tribo.simulate import SimConfig, simulate as library_run
 
 QUICK = ("--blocks", 45, "--dt", 1e-7, "--set", "rest_tolerance=0.01", "--set", "duration_peaks=1.5")
 
@@ -100,3 +101,14 @@ def test_a_design_file_says_all_of_it(tmp_path: Path):
     assert run("--design", tmp_path / "d.toml", "--sample", "F", "-o", tmp_path / "e.nc").exit_code == 2
     assert run("--design", tmp_path / "d.toml", "--table2", "-o", tmp_path / "e.nc").exit_code == 2
     assert run("--sample", "F", "-o", tmp_path / "e.nc").exit_code == 2
+
+
+def test_one_run_has_the_seed_it_is_given(tmp_path: Path):
+    """FILE.nc holds the run that the library makes of the same seed, to the bit."""
+    asked = ("--sample", "Sy", "--pressure", 5, *QUICK, "--seed", 11, "-o", tmp_path / "run.nc", "--json")
+    said = json.loads(run(*asked).stdout)
+    same = SimConfig(sample="Sy", pressure_Pa=5e3, angle_deg=90.0, seed=11, blocks=(45, 45), dt_s=1e-7,
+                     rest_tolerance=0.01, duration_peaks=1.5)  # fmt: skip
+    assert said["static_friction"] == library_run(same).static_friction
+    with xr.open_dataset(tmp_path / "run.nc", engine="h5netcdf") as data:
+        assert data.attrs["seed"] == 11
