@@ -27,7 +27,7 @@ VERDICTS = {
     "unknown": "misfit of unknown cause", "": "–",
 }  # fmt: skip
 SYMBOLS = {"mu": ("μ", ""), "tau0": ("τ₀", "kPa")}
-WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 300.0, 130.0, 44.0, 8.0, 8.0, 16.0
+WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 300.0, 136.0, 44.0, 8.0, 16.0, 18.0
 
 Key = tuple[str, str, str]  # sample, regime, parameter
 
@@ -46,12 +46,13 @@ class Point:
 
 @dataclass(frozen=True)
 class Panel:
-    """One parameter of one sample over the campaigns: points, tick labels (y, text) and changes (x, text)."""
+    """One parameter of one sample over the campaigns: tick labels are (y, text), changes (x, text)."""
 
     title: str
     label: str
     points: tuple[Point, ...]
     ticks: tuple[tuple[float, str], ...]
+    dates: tuple[str, str]
     changes: tuple[tuple[float, str], ...]
 
 
@@ -116,12 +117,14 @@ def panel(key: Key, rows: Sequence[CampaignRow], changes: Sequence[Change]) -> P
     """One parameter of one sample, laid out in WIDTH by HEIGHT."""
     sample, regime, parameter = key
     symbol, unit = SYMBOLS[parameter]
+    fitted = [k for k, row in enumerate(rows) if row.laws]
+    place = {k: at for at, k in enumerate(fitted)}  # campaigns without a fit take no room
     placed = [(k, row, law) for k, row in enumerate(rows) for law in row.laws if _key(law) == key]
     low, high = _range([law for _, _, law in placed])
-    step = (WIDTH - LEFT - RIGHT) / max(len(rows), 1)
+    step = (WIDTH - LEFT - RIGHT) / len(fitted)
 
-    def x(k: float) -> float:
-        return round(LEFT + step * (k + 0.5), 1)
+    def x(k: int, aside: float = 0.0) -> float:
+        return round(LEFT + step * (place[k] + 0.5 + aside), 1)
 
     def y(value: float) -> float:
         share = min(max((value - low) / (high - low), 0.0), 1.0)
@@ -140,7 +143,8 @@ def panel(key: Key, rows: Sequence[CampaignRow], changes: Sequence[Change]) -> P
         label=f"{regime} {symbol} of {sample} in {len(points)} campaigns: " + "; ".join(p.text for p in points),
         points=points,
         ticks=tuple((y(v), _short(v)) for v in (low, (low + high) / 2, high)),
-        changes=tuple((x(c.at - 0.5), f"{_short(c.before)} to {_short(c.after)}") for c in changes),
+        dates=(rows[fitted[0]].measured, rows[fitted[-1]].measured) if len(fitted) > 1 else ("", ""),
+        changes=tuple((x(c.at, -0.5), f"{_short(c.before)} to {_short(c.after)}") for c in changes),
     )
 
 

@@ -122,7 +122,7 @@ def _not_whole(file: Path, settle_s: float) -> str:
     status = file.stat()
     # a copy that keeps the old modification time still changed its inode now
     age = time.time() - max(status.st_mtime, status.st_ctime)
-    return f"changed {max(age, 0.0):.0f} s ago" if age < settle_s else ""
+    return f"changed less than {settle_s:g} s ago" if age < settle_s else ""
 
 
 def _hashed(file: Path) -> tuple[str, bool]:
