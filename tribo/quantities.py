@@ -206,7 +206,9 @@ _ALIASES = {
         speed
         velocity
         geschwindigkeit
+        gleitgeschwindigkeit
         vitesse
+        vitesse de glissement
     """,
 }
 
@@ -246,6 +248,10 @@ _SPELLINGS = {
     "μs": "microsecond",
     "us": "microsecond",
     "n": "newton",
+    "newtons": "newton",
+    "millinewtons": "millinewton",
+    "micron": "micrometer",
+    "microns": "micrometer",
     "kn": "kilonewton",
     "mn": "millinewton",
     "cn": "centinewton",

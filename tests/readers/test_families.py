@@ -212,6 +212,53 @@ TRB = [
     *(f"{0.1 * k:.3f}\t{k}\t1\t2.0\t0.1\t{0.01 * k + 0.001:.5f}\t{0.02 * k + 0.001:.5f}\t45" for k in range(8)),
 ]
 
+LVM_NO_X_SEGMENT = [
+    "Channels\t2\t\t",
+    "Y_Unit_Label\tNewtons\tmicrometer\t",
+    "X_Dimension\tTime\tTime\t",
+    "X0\t0,0\t0,0\t",
+    "Delta_X\t0,100000\t0,100000\t",
+    "***End_of_Header***\t\t\t",
+    "X_Value\tForce\tDisplacement\tComment",
+]
+LVM_NO_X = [
+    "LabVIEW Measurement\t",
+    "Separator\tTab",
+    "Decimal_Separator\t,",
+    "Multi_Headings\tYes",
+    "X_Columns\tNo",
+    "***End_of_Header***\t",
+    "\t",
+    *LVM_NO_X_SEGMENT,
+    *(f"\t{0.02 * k + 0.001:.6f}\t{10.0 * k + 1:.6f}".replace(".", ",") for k in range(8)),
+    "",
+    *LVM_NO_X_SEGMENT,
+    *(f"\t{0.02 * k:.6f}\t{10.0 * k:.6f}".replace(".", ",") for k in range(6)),
+]
+RHEOCOMPASS_DE_INTERVAL = [
+    "Intervalldaten:\tMesspkt.\tZeit\tGleitgeschwindigkeit\tNormalkraft\tReibkraft",
+    "\t\t\t\t\t",
+    "\t\t[s]\t[m/s]\t[N]\t[mN]",
+]
+RHEOCOMPASS_DE = [
+    "Projekt:\tSchlitten",
+    "Intervall und Messpunkte:\t1\t8",
+    *RHEOCOMPASS_DE_INTERVAL,
+    *(f"\t{k + 1}\t{0.1 * k:.3f}\t0.001\t1.0\t{0.02 * k + 0.001:.5f}".replace(".", ",") for k in range(8)),
+    "",
+    "Intervall und Messpunkte:\t2\t6",
+    *RHEOCOMPASS_DE_INTERVAL,
+    *(f"\t{k + 1}\t{0.1 * k:.3f}\t0.002\t1.0\t{0.02 * k:.5f}".replace(".", ",") for k in range(6)),
+]
+BLUEHILL_SIDE_BY_SIDE = [
+    "Specimen 1,,,Specimen 2,,",
+    "Time,Displacement,Force,Time,Displacement,Force",
+    "(s),(mm),(N),(s),(mm),(N)",
+    *(f"{a},{b}" for a, b in zip(rows(), [*rows(6), ",,", ",,"], strict=True)),
+]
+BLUEHILL_EMPTY_FIRST = ["", ",Time,Extension,Load", ",(s),(mm),(N)", *(f",{row}" for row in rows())]
+TEXT_OF_NUMPY = ["# sled of 50 g", "# time/s disp/mm force/N", *(row.replace(",", " ") for row in rows())]
+
 # text, family, number of traces, factor of the force column, encoding
 SAMPLES: dict[str, tuple[list[str], str, int, float]] = {
     "bluehill": (BLUEHILL, "bluehill", 1, 1.0),
@@ -229,6 +276,11 @@ SAMPLES: dict[str, tuple[list[str], str, int, float]] = {
     "rheocompass, two intervals": (RHEOCOMPASS, "rheocompass", 2, 1.0),
     "rtec, two steps": (RTEC, "rtec", 2, 1.0),
     "rtec, one log of two steps": (RTEC_LOG, "rtec", 2, 1.0),
+    "labview, times left out, two segments": (LVM_NO_X, "labview", 2, 1.0),
+    "rheocompass german, two intervals": (RHEOCOMPASS_DE, "rheocompass", 2, 1e-3),
+    "bluehill, specimens side by side": (BLUEHILL_SIDE_BY_SIDE, "bluehill", 2, 1.0),
+    "bluehill, empty first column": (BLUEHILL_EMPTY_FIRST, "delimited", 1, 1.0),
+    "numbers under a comment of names": (TEXT_OF_NUMPY, "delimited", 1, 1.0),
     "anton paar, units in the names": (TRB, "csm", 1, 1.0),
     "blanks between cells": (SPACES, "delimited", 1, 1.0),
 }
@@ -327,6 +379,28 @@ def test_the_te67_is_refused_where_its_columns_prove_nothing(tmp_path: Path) -> 
     with pytest.raises(ReadError) as caught:
         read_export(saved(tmp_path, lines))
     assert {(p.kind, p.column) for p in caught.value.problems} == {("missing_unit", "Friction Force")}
+
+
+@pytest.mark.parametrize("stamp", ["09:00:{:04.1f}", "2026-03-02 09:00:{:04.1f}", "2026-03-02T09:00:{:04.1f}"])
+def test_times_of_day_are_refused_with_what_to_give(tmp_path: Path, stamp: str) -> None:
+    lines = ["No,Timestamp,Force (N)", *(f"{k},{stamp.format(0.1 * k)},{0.02 * k:.3f}" for k in range(12))]
+    path = saved(tmp_path, lines)
+    with pytest.raises(ReadError) as caught:
+        read_export(path)
+    (problem,) = caught.value.problems
+    assert (problem.kind, problem.column, problem.row) == ("time_of_day", "Timestamp", 1)
+    assert "[0.01 s]" in (problem.allowed or "")
+    trace = read_export(path, columns={"time": "No [0.1 s]"})
+    np.testing.assert_allclose(np.diff(trace.time_s), 0.1)
+
+
+def test_old_excel_files_are_refused_with_what_to_save_them_as(tmp_path: Path) -> None:
+    path = tmp_path / "export.xls"
+    path.write_bytes(bytes.fromhex("d0cf11e0a1b11ae1") + bytes(2000))
+    with pytest.raises(ReadError) as caught:
+        read_export(path)
+    (problem,) = caught.value.problems
+    assert (problem.kind, problem.allowed) == ("old_excel", "the sheet saved as .xlsx or as CSV")
 
 
 def test_a_table_without_units_is_refused_with_what_to_give(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from tribo.quantities import QUANTITIES, match_quantity, quantity_named, unit_fa
 NEEDED = ("time", "friction force")
 ASKED = "asked for"
 _BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^\[\]()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
-_AFTER_MARK = re.compile(r"^(.*\S)\s*(?:\s/|\sin\s|,\s|_)\s*([A-Za-zµμ°%][\w/µμ°%^·²-]*)$")
+_AFTER_MARK = re.compile(r"^(.*\S)\s*(?:\s?/|\sin\s|,\s|_)\s*([A-Za-zµμ°%][\w/µμ°%^·²-]*)$")
 _MEANS_NORMAL_BESIDE_FRICTION = {"load", "last", "applied load", "charge"}
 
 
@@ -203,7 +203,7 @@ def _bare(unit: str) -> str:
 
 @lru_cache(maxsize=1024)
 def split_unit(name: str) -> tuple[str, str | None]:
-    """("Kraft", "kN") of "Kraft [kN]", "Kraft (kN)", "Kraft / kN", "Kraft in kN", "Kraft_kN"."""
+    """("Kraft", "kN") of "Kraft [kN]", "Kraft (kN)", "Kraft / kN", "Kraft/kN", "Kraft in kN", "Kraft_kN"."""
     found = _BRACKETS.search(name)
     if found:
         return name[: found.start()].strip(), found.group(1).strip()

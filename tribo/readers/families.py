@@ -9,7 +9,7 @@ from tribo.readers.bluehill import BLUEHILL
 from tribo.readers.csm import CSM
 from tribo.readers.delimited import DELIMITED
 from tribo.readers.family import Family
-from tribo.readers.labview import LABVIEW
+from tribo.readers.labview import LABVIEW, with_times_written
 from tribo.readers.matlab import MATLAB, is_matlab, open_matlab
 from tribo.readers.mts import MTS793, TESTSUITE
 from tribo.readers.newport import NEWPORT
@@ -68,4 +68,4 @@ def open_sources(path: Path, file: str) -> tuple[Source, ...]:
         return open_workbook(path, file)
     if is_matlab(head):
         return (open_matlab(path, file),)
-    return (open_text(path, file, raw),)
+    return (with_times_written(open_text(path, file, raw)),)

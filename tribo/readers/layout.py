@@ -15,12 +15,13 @@ from tribo.readers.source import HEAD_BYTES, LARGEST_HEAD_BYTES, Source
 
 Named = Callable[[str], bool]
 _NUMBER_START = re.compile(r"[-+]?[.,]?\d")
-_ROW_OF_NUMBERS = re.compile(r'[\s";,|]*[-+]?[.,]?\d[-+\d\s.,;|"/:eEnaNA]*')
+_ROW_OF_NUMBERS = re.compile(r'[\s";,|]*[-+]?[.,]?\d[-+\d\s.,;|"/:eEnaNATZ]*')
 _COMMA_NUMBER = re.compile(r"[-+]?(?:\d+,\d*|,\d+)(?:[eE][-+]?\d+)?")
 _DOT_NUMBER = re.compile(r"[-+]?(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _ROWS_LOOKED_AT = 5
 _HEADER_LINES_LOOKED_AT = 200
 _COMMENTS = {"comment", "comments", "kommentar", "commentaire"}
+_COMMENT_MARKS = ("#", "%", "//", ";")
 _BLANK = ' \t;,"|'
 
 
@@ -221,6 +222,8 @@ def _with_header(lines: Sequence[str], layout: Layout, named: Named) -> Layout:
 def _header_cells(line: str, layout: Layout) -> list[str]:
     """Cells of a line of names or units; between blanks, names may hold single ones."""
     cells = cut(line, layout.delimiter)
+    if layout.delimiter == " " and len(cells) == layout.n_cells + 1 and cells[0] in _COMMENT_MARKS:
+        return cells[1:]
     if layout.delimiter != " " or len(cells) == layout.n_cells:
         return cells
     wider = re.split(r"\s{2,}", line.replace('"', "").strip())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,8 +18,10 @@ from tribo.readers.families import family_of
 from tribo.readers.family import Family
 from tribo.readers.layout import Layout, cut, sniff
 from tribo.readers.sidecar import names_beside
-from tribo.readers.source import Source
+from tribo.readers.source import HEAD_BYTES, Source
 from tribo.records import FloatArray
+
+_CLOCK = re.compile(r"(?<!\d)\d{1,2}:\d\d:\d\d(?!\d)")
 
 
 @dataclass(frozen=True)
@@ -129,6 +132,7 @@ def _read_block(source: Source, family: Family, block: Block, asked: tuple[Hint,
         problems = [replace(p, file=source.file, row=row) for p in why.problems]
         if layout.misfit:
             problems.insert(0, Problem("names_do_not_fit", layout.misfit, source.file, layout.names_row))
+        problems = [_of_a_clock(p, source, block) for p in problems]
         if family.advice:
             problems = [replace(p, allowed=family.advice) for p in problems]
         raise ReadError(problems) from None
@@ -137,6 +141,19 @@ def _read_block(source: Source, family: Family, block: Block, asked: tuple[Hint,
     arrays = {c.quantity: _in_si(row, c) for c, row in zip(columns, written, strict=True)}
     findings = _findings(source, block, assignment, arrays)
     return Reading(source, family, block, assignment, arrays, findings)
+
+
+def _of_a_clock(problem: Problem, source: Source, block: Block) -> Problem:
+    """A time without a unit said better where it is a time of day."""
+    if problem.kind != "missing_unit" or source.arrays or problem.column not in block.layout.names:
+        return problem
+    cells = cut(source.lines(block.start, HEAD_BYTES)[0][0], block.layout.delimiter)
+    index = block.layout.names.index(problem.column)
+    if index >= len(cells) or not _CLOCK.search(cells[index]):
+        return problem
+    what = "a time of day, not a time in seconds"
+    allowed = 'a column of seconds, or one that counts rows with the sampling step as its unit: time = "NAME [0.01 s]"'
+    return replace(problem, kind="time_of_day", what=what, found=cells[index], allowed=f"{allowed} in columns")
 
 
 def _in_si(numbers: FloatArray, column: Column) -> FloatArray:

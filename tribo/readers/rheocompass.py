@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
+
 from tribo.readers.family import Family
 from tribo.readers.source import Source
 
+_NAMES_FOLLOW = re.compile(r"\n(?:Interval data|Intervall-?\s?daten|Données de l.intervalle):", re.I)
+
 
 def recognises(source: Source) -> bool:
-    return "\nInterval data:" in source.head_text
+    return bool(_NAMES_FOLLOW.search(source.head_text))
 
 
 RHEOCOMPASS = Family("rheocompass", "Anton Paar RheoCompass, a table an interval", recognises)

@@ -26,7 +26,14 @@ def open_workbook(path: Path, file: str) -> tuple[Source, ...]:
     """
     with path.open("rb") as stream:
         if stream.read(4) == _OLD_EXCEL:
-            raise ReadError(Problem("old_excel", "the old .xls format", file=file, allowed=".xlsx or text"))
+            raise ReadError(
+                Problem(
+                    "old_excel",
+                    "the old .xls format cannot be read",
+                    file=file,
+                    allowed="the sheet saved as .xlsx or as CSV",
+                )
+            )
     try:
         with zipfile.ZipFile(path) as packed:
             unpacked = sum(entry.file_size for entry in packed.infolist())
