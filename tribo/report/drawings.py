@@ -29,6 +29,12 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, int, int], None]
 STAGE = "drawing figures"
+THEME = {
+    "#ffffff": "var(--paper)",
+    "#000000": "currentColor",
+    "#0072b2": "var(--blue)",
+    r"#([2-8][0-9a-f])\2\2": "var(--soft)",  # greys of lettering
+}
 
 
 @dataclass(frozen=True)
@@ -111,17 +117,19 @@ def svg_text(figure: Figure, title: str = "", origin: str = "") -> str:
 def inline_svg(svg: str, name: str, label: str) -> str:
     """An SVG to stand inside an HTML page: names unique to it, a label for screen readers, theme colours.
 
-    White paper becomes transparent and black ink the colour of the text, so that it reads on light and dark; a
-    style sheet of its own would hold for the whole page, so it is taken out.
+    White paper becomes transparent and black ink the colour of the text, so that it reads on light and dark; a figure
+    with a colour scale keeps its white paper, since its ink was chosen for the colours under it. A style sheet of its
+    own would hold for the whole page, so it is taken out.
     """
     body = svg[svg.index("<svg") :]
     body = re.sub(r"<(metadata|style)\b.*?</\1>\s*|<title>.*?</title>\s*", "", body, flags=re.DOTALL)
     body = re.sub(r'\bid="', f'id="{name}-', body)
     body = re.sub(r'(href="#|url\(#)', rf"\g<1>{name}-", body)
-    body = re.sub(r"(fill|stroke): #ffffff", r"\1: var(--paper)", body)
-    body = re.sub(r"(fill|stroke): #000000", r"\1: currentColor", body)
-    body = re.sub(r"(fill|stroke): #0072b2", r"\1: var(--blue)", body)
+    has_colour_scale = "<image" in body
+    for colour, theme in () if has_colour_scale else THEME.items():
+        body = re.sub(rf"\b(fill|stroke): {colour}\b", rf"\1: {theme}", body)
     body = re.sub(r'<svg([^>]*?) (width|height)="[^"]*"', r"<svg\1", body, count=1)
     body = re.sub(r'<svg([^>]*?) (width|height)="[^"]*"', r"<svg\1", body, count=1)
-    body = body.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
+    paper = ' class="on-paper"' if has_colour_scale else ""
+    body = body.replace("<svg", f'<svg{paper} role="img" aria-label="{label}"', 1)
     return "\n".join(line.rstrip() for line in body.splitlines())
