@@ -46,3 +46,27 @@ def test_a_displacement_that_does_not_run_at_the_speed_of_the_test_is_doubted() 
         assert not isinstance(outcome, SetAside)
         trace, pull = outcome
         assert ("off_speed" in pull.flags) is ("off_speed" in {p.kind for p in trace.problems}) is doubted
+
+
+def test_a_doubt_stands_in_the_table_with_its_row_and_can_be_found_on_the_trace(tmp_path: Path) -> None:
+    import shutil
+
+    from tribo.records import Study
+    from tribo.report.tables import tests_table
+
+    shutil.copytree(EXAMPLE, tmp_path / "campaign")
+    path = tmp_path / "campaign" / "raw" / "T005.csv"
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    row = len(lines) - 60
+    cells = lines[row - 1].split(",")
+    lines[row - 1] = ",".join([*cells[:-1], cells[-1].replace(cells[-1].strip().strip('"'), "99.00000")])
+    path.write_text("".join(lines), encoding="utf-8")
+    ingested = stages.ingest(load_campaign(tmp_path / "campaign"))
+    told = tests_table(Study(ingested)).set_index("test_id")
+    assert told.loc["T005", "flags"] == "spike"
+    assert f"raw/T005.csv, row {row}, column force" in told.loc["T005", "doubts"]
+    assert (told.drop("T005")["doubts"] == "").all()
+    trace = ingested.traces["T005"]
+    (problem,) = ingested.pulls["T005"].problems
+    assert problem.row is not None
+    assert trace.force_N[problem.row - trace.first_row] == 99.0

@@ -20,7 +20,7 @@ TESTS_COLUMNS = [
     "set_aside", "sample", "specimen", "normal_load_N", "peak_s", "onset_s", "window_start_s", "window_end_s",
     "zero_u_N", "rise_N_per_s", "rise_stiffness_N_per_m", "stick_slip_amplitude_N", "stick_slip_period_s", "noise_N",
     "drift_N_per_s", "direction", "speed_m_s", "hold_s", "repeat", "run_order", "specimen_run", "started_at",
-    "temperature_C", "humidity_pct", "operator", "file",
+    "temperature_C", "humidity_pct", "operator", "file", "doubts",
 ]  # fmt: skip
 FITS_COLUMNS = [
     "sample", "regime", "mu", "mu_u", "tau0_kPa", "tau0_u_kPa", "cov", "n_specimens", "n_tests", "method",
@@ -51,8 +51,13 @@ def tests_table(study: Study) -> pd.DataFrame:
     """One row a test in the order of the campaign, used or set aside; its own covariates come last."""
     ingested = study.ingested
     aside = all_set_aside(study)
+    doubts = {doubted.test_id: doubted.reason for doubted in ingested.doubts()}
     placed = [
-        (t.row, _test_row(t, ingested.pulls.get(t.test_id), aside.pop(t.test_id, None)))
+        (
+            t.row,
+            _test_row(t, ingested.pulls.get(t.test_id), aside.pop(t.test_id, None))
+            | {"doubts": doubts.get(t.test_id, "")},
+        )
         for t in ingested.campaign.tests
     ]
     placed += [(_faulty_row(fault), {"test_id": fault.test_id, "set_aside": fault.reason}) for fault in aside.values()]
@@ -155,7 +160,7 @@ def to_csv(table: pd.DataFrame) -> str:
 
 
 def write_tables(study: Study, out: Path) -> list[Path]:
-    """tests.csv, and fits.csv, other_fits.csv, budget.csv, differences.csv and comparison.csv as far as the study went."""
+    """tests.csv, and fits, other_fits, budget, differences and comparison as far as the study went."""
     tables = {"tests.csv": tests_table(study)}
     if study.fits:
         tables["fits.csv"] = fits_table(study.fits)
