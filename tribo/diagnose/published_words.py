@@ -129,8 +129,21 @@ def guess_sentences(outlooks: Sequence[Outlook]) -> list[str]:
                 f"Deformed patterns are supported: friction that parts along and across the long cavities of S earns "
                 f"{min(gains):.1f} to {max(gains):.1f} units of log likelihood over these readings. Floors of cavities "
                 f"that touch down would raise friction and are not behind it. {_adhesion_along_y(main)}"
+                f"{_instrument_instead(possible)}"
             )
     return found
+
+
+def _instrument_instead(outlooks: Sequence[Outlook]) -> str:
+    """In how many readings an error of the instrument would explain more than any guess."""
+    guesses = {name for names in GUESSES.values() for name in names}
+    ahead = [o.weighed[0].name for o in outlooks if o.weighed[0].name not in guesses]
+    if not ahead:
+        return ""
+    names = " or ".join(sorted(set(ahead)))
+    return (
+        f" In {len(ahead)} of these readings {names} would explain more; the paper prints nothing that rules it out."
+    )
 
 
 def _adhesion_along_y(outlook: Outlook) -> str:
