@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import matplotlib
 import pandas as pd
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
@@ -28,13 +29,20 @@ if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
 
 Progress = Callable[[str, int, int], None]
+Keep = Callable[[str, object, Callable[[], Any], Iterable[str]], Any]
 STAGE = "drawing figures"
+DRAWN_BY = ("figures", "report/drawings", "report/hover")
 THEME = {
     "#ffffff": "var(--paper)",
     "#000000": "currentColor",
     "#0072b2": "var(--blue)",
     r"#([2-8][0-9a-f])\2\2": "var(--soft)",  # greys of lettering
 }
+
+
+def make_anew(name: str, made_from: object, make: Callable[[], Any], rooms: Iterable[str]) -> Any:
+    """Keep nothing."""
+    return make()
 
 
 @dataclass(frozen=True)
@@ -59,12 +67,14 @@ def write_figures(
     diagnosis: Diagnosis | None = None,
     origin: str = "",
     jobs: int = 1,
+    keep: Keep = make_anew,
 ) -> dict[str, Drawn]:
     """Write out/figures/NAME.svg, .pdf, .png and .csv of every figure there are numbers for, and return them.
 
-    ``origin`` says in the metadata of every file what it was made from; ``jobs`` processes share the drawing.
+    ``origin`` says in the metadata of every file what it was made from; ``jobs`` processes share the drawing;
+    ``keep`` (:meth:`tribo.kept.Shelf.take`) spares drawing a figure whose numbers are what they were.
     """
-    drawn = draw_all(study, diagnosis, origin, progress, jobs)
+    drawn = draw_all(study, diagnosis, origin, progress, jobs, keep)
     for figure in drawn.values():
         for ending, content in figure.files.items():
             write_bytes(out / "figures" / f"{figure.name}.{ending}", content)
@@ -77,11 +87,12 @@ def draw_all(
     origin: str = "",
     progress: Progress | None = None,
     jobs: int = 1,
+    keep: Keep = make_anew,
 ) -> dict[str, Drawn]:
     """Every figure there are numbers for, by name, those of the study before those of the diagnosis; no files."""
     todo = list(_with_numbers(study, diagnosis))
     found = {}
-    for done, figure in enumerate(each(partial(_draw, origin), todo, jobs), start=1):
+    for done, figure in enumerate(each(partial(_draw, origin, keep), todo, jobs), start=1):
         # not in the other processes: typst keeps threads of its own, which do not survive a fork
         rest = figure_files(figure.files["svg"], figure.title, origin)
         found[figure.name] = replace(figure, files={**figure.files, **rest})
@@ -96,13 +107,19 @@ def _with_numbers(study: Study | None, diagnosis: Diagnosis | None) -> Iterator[
     yield from ((name, numbers) for name, numbers in (*of_study, *of_diagnosis) if not numbers.empty)
 
 
-def _draw(origin: str, todo: tuple[str, pd.DataFrame]) -> Drawn:
+def _draw(origin: str, keep: Keep, todo: tuple[str, pd.DataFrame]) -> Drawn:
     name, numbers = todo
     record: FigureOf[Any] = FIGURES[name] if name in FIGURES else DIAGNOSIS_FIGURES[name]
-    figure = record.draw(numbers)
-    svg = svg_text(figure, record.title, origin).encode("utf-8")
+    made_from = (numbers, record.title, origin, matplotlib.__version__)
+    svg, series = keep(f"figure-{name}", made_from, lambda: _svg_and_series(record, numbers, origin), DRAWN_BY)
     csv = to_csv(numbers).encode("utf-8")
-    return Drawn(name, record.title, record.caption, {"csv": csv, "svg": svg}, series_of(figure))
+    return Drawn(name, record.title, record.caption, {"csv": csv, "svg": svg.encode("utf-8")}, list(series))
+
+
+def _svg_and_series(record: FigureOf[Any], numbers: pd.DataFrame, origin: str) -> tuple[str, tuple[Series, ...]]:
+    figure = record.draw(numbers)
+    svg = svg_text(figure, record.title, origin)
+    return svg, tuple(series_of(figure))
 
 
 def svg_text(figure: Figure, title: str = "", origin: str = "") -> str:

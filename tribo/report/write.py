@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from tribo.records import Study
 from tribo.report.diagnosis import write_verdict
-from tribo.report.drawings import write_figures
+from tribo.report.drawings import Keep, make_anew, write_figures
 from tribo.report.provenance import Provenance, gather_provenance, read_record, settle_outputs, write_provenance
 from tribo.report.store import write_store
 from tribo.report.tables import write_tables
@@ -29,13 +29,15 @@ def write_until(
     verdict: Mapping[str, Any] | None = None,
     diagnosis: Diagnosis | None = None,
     jobs: int = 1,
+    keep: Keep = make_anew,
 ) -> None:
     """Write what a walk as far as ``until`` (ingest, fit, compare or report) yields.
 
     Tables and campaign.nc always, as far as the study went; verdict.json and its figures where there is a
     ``verdict`` or the whole ``diagnosis`` of it; the figures of the study from ``compare`` on; then page, PDF and
-    crate. Every file is whole or absent: it is written under a temporary name and renamed. Last comes
-    provenance.json with the hash of each; files of an earlier run that no longer hold are removed.
+    crate. ``keep`` spares drawing anew what is kept. Every file is whole or absent: it is written under a temporary
+    name and renamed. Last comes provenance.json with the hash of each; files of an earlier run that no longer hold
+    are removed.
     """
     before = read_record(out)
     made_by = provenance if provenance is not None else gather_provenance(study)
@@ -45,7 +47,7 @@ def write_until(
         written.append(write_verdict(verdict, out))
     if until in ("compare", "report") or diagnosis is not None:
         shown = study if until in ("compare", "report") else None
-        drawn = write_figures(shown, out, progress, diagnosis, made_by.origin, jobs)
+        drawn = write_figures(shown, out, progress, diagnosis, made_by.origin, jobs, keep)
         written += [out / "figures" / f"{f.name}.{ending}" for f in drawn.values() for ending in f.files]
     if until == "report":
         from tribo.report.crate import write_crate
@@ -66,6 +68,7 @@ def write_report(
     verdict: Mapping[str, Any] | None = None,
     diagnosis: Diagnosis | None = None,
     jobs: int = 1,
+    keep: Keep = make_anew,
 ) -> None:
     """All of OUT: tables, campaign.nc, figures, verdict.json where there is a verdict, page, PDF and crate."""
-    write_until(study, Path(out), "report", progress, provenance, verdict, diagnosis, jobs)
+    write_until(study, Path(out), "report", progress, provenance, verdict, diagnosis, jobs, keep)

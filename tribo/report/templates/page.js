@@ -271,6 +271,8 @@
       if (near) path += `${path ? "L" : "M"}${clamp(s.x(t), s.left, s.right).toFixed(1)} ${s.y(current.f[k]).toFixed(1)}`;
     });
     svg.append(make("path", { class: out ? "trace out" : "trace", d: path }));
+    const mean = now.start === null ? null : meanOver(now.start, now.end);
+    if (mean !== null) svg.append(make("line", { class: "mean", x1: inView(now.start), x2: inView(now.end), y1: s.y(mean), y2: s.y(mean) }));
     const cross = make("line", { class: "cross", y1: s.top, y2: s.bottom, visibility: "hidden" });
     svg.append(cross);
     handle(svg, s, "start", "Start of the sliding window", now.start);

@@ -1,0 +1,60 @@
+"""A figure is drawn once for the same numbers, the same on several processes, and reads on light and on dark."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tribo.kept import Shelf
+from tribo.records import Study
+from tribo.report import drawings
+from tribo.report.drawings import draw_all, inline_svg
+
+
+@pytest.fixture(scope="module")
+def measured(study: Study) -> Study:
+    """Only what was measured: four figures."""
+    return replace(study, comparison=None, fits=(), other_fits=(), example_runs=())
+
+
+def test_a_kept_figure_is_not_drawn_again_unless_its_numbers_change(
+    measured: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keep = Shelf(tmp_path).take
+    first = draw_all(measured, keep=keep)
+    drawn = []
+    noted = lambda record, numbers, origin: drawn.append(record.name) or ("", ())  # noqa: E731
+    monkeypatch.setattr(drawings, "_svg_and_series", noted)
+    monkeypatch.setattr(drawings, "figure_files", lambda svg, title, origin: {})
+    again = draw_all(measured, keep=keep)
+    assert drawn == []
+    assert {n: f.files["svg"] for n, f in again.items()} == {n: f.files["svg"] for n, f in first.items()}
+    ingested = measured.ingested
+    pulls = {**ingested.pulls, "T0001": replace(ingested.pulls["T0001"], static_N=9.0)}
+    draw_all(replace(measured, ingested=replace(ingested, pulls=pulls)), keep=keep)
+    assert set(drawn) == {"fig4", "fig6"}  # no other one shows the static force of a pull
+
+
+def test_several_processes_draw_the_same_bytes(measured: Study) -> None:
+    one, two = draw_all(measured), draw_all(measured, jobs=2)
+    assert list(one) == list(two)
+    assert all(one[name].files == two[name].files for name in one)
+
+
+def test_ink_and_paper_follow_the_theme_but_not_under_a_colour_scale() -> None:
+    paths = '<path style="fill: #000000; stroke: #ffffff"/><g style="fill: #666666"/>'
+    ink = f'<svg width="1" height="2" viewBox="0 0 1 2">{paths}'
+    plain = inline_svg(ink + "</svg>", "a", "label")
+    assert "fill: currentColor; stroke: var(--paper)" in plain
+    assert "fill: var(--soft)" in plain
+    scaled = inline_svg(ink + '<image href="data:x"/></svg>', "a", "label")
+    assert "fill: #000000; stroke: #ffffff" in scaled
+    assert 'class="on-paper"' in scaled
+
+
+def test_the_names_inside_a_figure_are_its_own() -> None:
+    body = inline_svg('<svg viewBox="0 0 1 1"><defs><path id="m1"/></defs><use href="#m1"/></svg>', "fig6", "label")
+    assert 'id="fig6-m1"' in body
+    assert 'href="#fig6-m1"' in body
