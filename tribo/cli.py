@@ -304,6 +304,7 @@ def _walk(
     """Walk the street with one campaign as far as ``until`` and write what that yields."""
     from tribo import stages
     from tribo.campaign import open_campaign
+    from tribo.kept import Shelf
     from tribo.report import write_until
 
     chosen = stages.StudyOptions(kept=out / KEPT, **options)
@@ -317,7 +318,8 @@ def _walk(
             study = stages.study(campaign, chosen, until=until, progress=progress)
             study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
             provenance = _provenance(study, path, chosen)
-            write_until(study, out, until, progress, provenance, diagnosis=found, jobs=chosen.jobs)
+            keep = Shelf(chosen.kept).take
+            write_until(study, out, until, progress, provenance, diagnosis=found, jobs=chosen.jobs, keep=keep)
     return _conclude(console, study, out, found.verdict if found else None)
 
 
