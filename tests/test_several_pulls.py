@@ -201,3 +201,21 @@ def test_tables_and_pulls_are_counted_as_the_reader_gives_them(tmp_path: Path) -
     (tmp_path / "log.csv").write_text(umt_text(np.concatenate([strokes((1.0,), 2, 1.0, 0.0, seed=k) for k in (0, 1)])))
     tables = read_blocks(tmp_path / "log.csv")
     assert [t.first_row for t in tables] == [5, 5 + 8 * RATE_HZ]
+
+
+def test_an_inspection_lists_the_pulls_as_tests_csv_names_them(tmp_path: Path) -> None:
+    write_campaign(tmp_path, ["R1,raw/F1.csv#*,F,F1,"])
+    result = CliRunner().invoke(main, ["inspect", str(tmp_path / "raw" / "F1.csv"), "--json"])
+    (seen,) = json.loads(result.stdout)["files"]
+    assert [line.partition(":")[0] for line in seen["pulls"]] == [f"#1/{k}" for k in range(1, 13)]
+    under = [float(line.split("under ")[1].split(" N")[0]) for line in seen["pulls"]]
+    assert under == pytest.approx(np.repeat((1.0, 2.0, 4.0), 4), rel=2e-3)
+    words = CliRunner().invoke(main, ["inspect", str(tmp_path / "raw" / "F1.csv")]).stdout
+    assert "pull      #1/12: 44" in words
+
+
+@pytest.mark.parametrize("file", ["../F1.csv#*", "/F1.csv#1/2", "raw/../../F1.csv#2"])
+def test_a_choice_does_not_lead_out_of_the_campaign(tmp_path: Path, file: str) -> None:
+    campaign = write_campaign(tmp_path, [f"R1,{file},F,F1,1", "R2,raw/F2.csv#*,F,F2,"])
+    (aside,) = campaign.set_aside
+    assert [p.kind for p in aside.problems] == ["path_outside_campaign"]

@@ -261,11 +261,12 @@ def demo(console: Console, out: Path, **options: Any) -> int:
 @COLUMNS
 @command_options
 def inspect(console: Console, files: tuple[Path, ...], columns: str, **_: Any) -> int:
-    """What an export is: format, encoding, columns, units, time base, doubts."""
-    from tribo.readers import columns_from_text, inspect_export
+    """What an export is: format, encoding, columns, units, time base, the pulls in it, doubts."""
+    from tribo.exports import inspect_file
+    from tribo.readers import columns_from_text
 
     given = columns_from_text(columns) if columns else None
-    found = [inspect_export(file, columns=given) for file in files]
+    found = [inspect_file(file, given) for file in files]
     console.result({"files": [f.record() for f in found]}, "\n\n".join(f.in_words() for f in found))
     return 1 if all(f.refused for f in found) else 0
 

@@ -11,12 +11,16 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tribo.campaign.choice import is_chosen, names_pulls, split_choice
 from tribo.errors import Problem, TraceError, TriboError
 from tribo.records import Campaign, Pull, SetAside, Test, Trace
+
+if TYPE_CHECKING:
+    from tribo.readers import Inspection
 
 FEWEST_FOR_PROCESSES = 100  # below, starting processes costs more than it gains
 CHUNK = 16
@@ -39,6 +43,35 @@ def read_row(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> t
         return (_whole(root, columns, rule, test),)
     except TriboError as why:
         return ((test, _set_aside(test, why)),)
+
+
+def inspect_file(path: Path, columns: Mapping[str, str] | None = None) -> Inspection:
+    """What an export is, with the pulls that its tables hold, each by the choice that names it in tests.csv."""
+    from tribo.readers import inspect_export, read_blocks
+
+    seen = inspect_export(path, columns=columns)
+    if seen.refused or any(doubt.kind == "only_beginning" for doubt in seen.doubts):
+        return seen
+    try:
+        return replace(seen, pulls=_pulls_in_words(read_blocks(path, columns=columns)))
+    except TriboError:
+        return seen
+
+
+def _pulls_in_words(tables: Sequence[Trace]) -> tuple[str, ...]:
+    """One line a pull; nothing where no table holds more than one."""
+    from tribo.traces import load_of, split_pulls
+
+    pieces = {f"#{t}/{p}": piece for t, table in enumerate(tables, 1) for p, piece in enumerate(split_pulls(table), 1)}
+    if len(pieces) == len(tables):
+        return ()
+    found = []
+    for choice, piece in pieces.items():
+        load = load_of(piece)[0]
+        under = "" if math.isnan(load) else f" under {load:.4g} N"
+        middle = piece.force_N[piece.force_N.size // 4 : 3 * piece.force_N.size // 4]
+        found.append(f"{choice}: {piece.time_s[0]:.6g} to {piece.time_s[-1]:.6g} s{under}, force {middle.mean():.4g} N")
+    return tuple(found)
 
 
 def _set_aside(test: Test, why: TriboError) -> SetAside:

@@ -59,7 +59,8 @@ class Inspection:
     """What an export is.
 
     ``problems`` say why it cannot be read as it stands, ``advice`` in one sentence what to give so that it can;
-    ``doubts`` what to look at.
+    ``doubts`` what to look at. ``pulls`` are the pulls within its tables, where there are several, by the choice that
+    names them in tests.csv.
     """
 
     file: str
@@ -72,6 +73,7 @@ class Inspection:
     columns: tuple[ColumnSeen, ...] = ()
     tables: tuple[TableSeen, ...] = ()
     other_tables: tuple[str, ...] = ()
+    pulls: tuple[str, ...] = ()
     metadata: Mapping[str, str] | None = None
     signs: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
@@ -99,6 +101,9 @@ class Inspection:
         lines += [f"  table     {_table_in_words(t)}" for t in self.tables[:12]]
         if len(self.tables) > 12:
             lines.append(f"  table     and {len(self.tables) - 12} more")
+        lines += [f"  pull      {text}" for text in self.pulls[:12]]
+        if len(self.pulls) > 12:
+            lines.append(f"  pull      and {len(self.pulls) - 12} more")
         if self.other_tables:
             lines.append(f"  no trace  {', '.join(self.other_tables[:12])}")
         lines += [f"  signs     {text}" for text in self.signs]
