@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 SOURCES = ("simulate", "laws", "records")  # packages whose sources decide a run
 SUFFIX = ".nc"
+CELLS_AWAY = 16  # cells given to a scheduler at once
 
 
 @dataclass(frozen=True)
@@ -92,6 +93,8 @@ def run_cells(
 
     at_once = max(1, jobs // max(1, min(len(cell.configs) for cell in cells)))
     threads = -(-jobs // at_once)
+    if scheduler is not None:  # the work is elsewhere: keep its workers busy
+        at_once = CELLS_AWAY
     if at_once == 1:
         tables = [run(cell) for cell in cells]
     else:
