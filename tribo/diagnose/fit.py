@@ -14,7 +14,7 @@ from tribo.records import FloatArray
 
 SPECIMEN_PRIOR = (0.05, 4.0)  # expected gain of a specimen, and how many specimens that is worth
 REPEAT_PRIOR = (0.08, 4.0)
-TRIAL_STEPS = 5
+TRIAL_GAIN, END_GAIN = 0.5, 2e-3  # log likelihood that a step has to earn for another one to be made
 STILL = 0.02  # standard errors of a step below which derivatives are not taken anew
 SMALLEST_SD = 0.003  # of ln T: no reading repeats better
 _SCALE = np.array([1.0, 5.0, 1.0, 5.0])
@@ -58,21 +58,25 @@ def fit(
     start: ModelFit | None = None,
     noise: Noise | None = None,
     iterations: int = 30,
+    to_the_end: bool = True,
 ) -> ModelFit:
-    """The fit from the best start of the mechanisms' further parameters; a few steps from each find out which.
+    """The fit from the best start of the mechanisms' further parameters; a trial from each finds out which.
 
-    ``noise`` given is kept; otherwise it is estimated along with everything else.
+    ``noise`` given is kept; otherwise it is estimated along with everything else. A trial ends where a step no
+    longer earns much; without ``to_the_end`` the best trial is what is returned.
     """
     law = start.law if start is not None else first_law(s)
     begin = noise or (start.noise if start is not None else first_noise(s))
     starts = _starts(acting, start)
-    if len(starts) > 1:
-        short = [_fit_from(s, tuple(acting), law, values, begin, noise is None, TRIAL_STEPS) for values in starts]
-        best = max(short, key=lambda f: f.score)
-        if iterations <= TRIAL_STEPS:
+    if len(starts) > 1 or not to_the_end:
+        trials = [
+            _fit_from(s, tuple(acting), law, values, begin, noise is None, iterations, TRIAL_GAIN) for values in starts
+        ]
+        best = max(trials, key=lambda f: f.score)
+        if not to_the_end:
             return best
-        law, starts, begin = best.law, [list(best.values)], best.noise
-    return _fit_from(s, tuple(acting), law, starts[0], begin, noise is None, iterations)
+        law, starts, begin = best.law, [list(best.values)], best.noise if noise is None else noise
+    return _fit_from(s, tuple(acting), law, starts[0], begin, noise is None, iterations, END_GAIN)
 
 
 def _starts(acting: Sequence[Acting], start: ModelFit | None) -> list[list[FloatArray]]:
@@ -98,6 +102,7 @@ def _fit_from(
     noise: Noise,
     estimate: bool,
     iterations: int,
+    least_gain: float,
 ) -> ModelFit:
     sizes = [len(v) for v in values]
     x = np.concatenate([law, *values])
@@ -119,7 +124,7 @@ def _fit_from(
         if estimate:
             noise = _update(s, noise, weight, residual - fitted, effects, system, moments)
         last, score = score, _score(s, noise, residual, fitted, effects)
-        if abs(score - last) < 2e-3:
+        if abs(score - last) < least_gain:
             break
     return ModelFit(
         s, acting, x[:N_LAW], tuple(np.split(x[N_LAW:], np.cumsum(sizes)[:-1])) if acting else (),

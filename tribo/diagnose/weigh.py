@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tribo.diagnose.fit import TRIAL_STEPS, fit
+from tribo.diagnose.fit import fit
 from tribo.diagnose.looks import candidates
 from tribo.diagnose.model import Acting, ModelFit, log_forces, predict
 from tribo.diagnose.screen import cleared
@@ -43,7 +43,7 @@ class Candidate:
 def weigh(start: ModelFit, excluded: Sequence[str] = ()) -> list[Candidate]:
     """Every mechanism that is not excluded, added to ``start``; the best choice of each, best first.
 
-    All are tried in a few steps, and those within reach of the best are fitted to the end.
+    All are tried, and those within reach of the best are fitted to the end.
     """
     groups: dict[str, list[Acting]] = {}
     for acting in candidates(start.setup, start.law):
@@ -51,7 +51,7 @@ def weigh(start: ModelFit, excluded: Sequence[str] = ()) -> list[Candidate]:
             groups.setdefault(acting.mechanism.name, []).append(acting)
     tried: dict[str, Candidate] = {}
     for group in groups.values():
-        short = [_candidate(start, acting, len(group), TRIAL_STEPS) for acting in _most_promising(start, group)]
+        short = [_candidate(start, acting, len(group)) for acting in _most_promising(start, group)]
         tried |= {c.name: c for c in sorted(short, key=lambda c: c.gain)}
     best = max((c.gain for c in tried.values()), default=0.0)
     hopeful = IN_REACH * best - CLOSE_BY
@@ -74,8 +74,8 @@ def _most_promising(start: ModelFit, group: list[Acting]) -> list[Acting]:
     return [group[i] for i in np.argsort(-rank)[:CHOICES_FITTED]]
 
 
-def _candidate(start: ModelFit, acting: Acting, choices: int, iterations: int) -> Candidate:
-    fitted = fit(start.setup, (*start.acting, acting), start=start, iterations=iterations)
+def _candidate(start: ModelFit, acting: Acting, choices: int) -> Candidate:
+    fitted = fit(start.setup, (*start.acting, acting), start=start, to_the_end=False)
     return _judged(start, fitted, float(np.log(choices)))
 
 
@@ -116,15 +116,19 @@ def likeness(start: ModelFit, best: Candidate, others: Sequence[Candidate]) -> F
 
 
 def unseen(start: ModelFit) -> dict[str, float]:
-    """Mechanisms that the free flat law takes up almost wholly, and the share of their effect that is left."""
+    """Mechanisms that the free flat law takes up almost wholly at every size that a fit would start from, and the
+    largest share of their effect that is left."""
     found = {}
     before = predict(start.setup, start.law, (), ())
     for acting in candidates(start.setup, start.law):
         if acting.choice:
             continue
-        change = predict(start.setup, start.law, (acting,), (acting.mechanism.start(),)) - before
-        kept = float(np.sum(cleared(start, change[:, :, None])[0] ** 2))
-        whole = float(np.sum(change**2) / np.mean(np.diag(start.noise.repeat)))
-        if kept < SEEN * max(whole, 1e-30):
-            found[acting.name] = kept / max(whole, 1e-30)
+        values = [acting.mechanism.start()]
+        values += [np.array([size, *values[0][1:]]) for size in acting.mechanism.amplitude.tries]
+        changes = [predict(start.setup, start.law, (acting,), (v,)) - before for v in values]
+        kept = np.sum(cleared(start, np.stack(changes, axis=2))[0] ** 2, axis=0)
+        whole = np.sum(np.square(changes), axis=(1, 2)) / np.mean(np.diag(start.noise.repeat))
+        share = float(np.max(kept / np.maximum(whole, 1e-30)))
+        if share < SEEN:
+            found[acting.name] = share
     return found

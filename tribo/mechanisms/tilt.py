@@ -33,7 +33,7 @@ MECHANISM = Mechanism(
     kind="instrument",
     formula="tau0 A -> tau0 A min(1, 3 (1/2 - (T / N) h / L))",
     parameters=(  # nothing happens below e = 1/6, so that a fit has to start from several heights
-        amplitude("h_over_L", "", 0.0, 0.3, 0.02, "height of the wire over length of the sled", (0.01, 0.02, 0.04)),
+        amplitude("h_over_L", "", 0.0, 0.3, 0.02, "height of the wire over length of the sled", (0.01, 0.02, 0.04, 0.08)),
     ),
     law=law,
     sign=-1,
