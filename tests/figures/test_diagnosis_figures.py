@@ -125,6 +125,16 @@ def test_no_label_lies_outside_the_figure_or_on_another(name: str, temperature: 
     assert not [(s, u) for k, (s, a) in enumerate(upright) for u, b in upright[k + 1 :] if a.overlaps(b)]
 
 
+def test_long_words_beside_a_long_bar_stay_on_the_page(temperature: Diagnosis) -> None:
+    rows = DIAGNOSIS_FIGURES["evidence"].numbers(temperature)
+    rows.loc[0, ["choice", "gain"]] = ["Sx2 of Sx swapped with B3 of B, a long choice", 500.0]
+    rows.loc[1, ["status", "reason", "gain"]] = ["out", "what this design does not vary cannot be told " * 2, float("nan")]
+    figure = DIAGNOSIS_FIGURES["evidence"].draw(rows)
+    with house_style():
+        figure.draw_without_rendering()
+    assert all(t.get_window_extent().x1 <= figure.bbox.x1 for t in figure.axes[0].texts)
+
+
 def _inside(ax: object, text: Text) -> bool:
     """Tick labels beyond the limits are not drawn."""
     (x0, x1), (y0, y1) = sorted(ax.get_xlim()), sorted(ax.get_ylim())  # type: ignore[attr-defined]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from tribo.figures import style
+from tribo.records import FloatArray
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
@@ -25,6 +26,7 @@ STATUS = {
 }
 ROW_MM, FRAME_MM = 4.4, 24.0
 LEAST_SHOWN = -2.0
+LETTERS_ACROSS = 100  # of the words beside the bars, over the width of the axis
 
 
 def numbers(d: Diagnosis) -> pd.DataFrame:
@@ -67,21 +69,36 @@ def draw(numbers: pd.DataFrame) -> Figure:
     ax = figure.subplots()
     rows = numbers.reset_index(drop=True)
     weighed = rows[rows["status"] != "out"]
-    reach = max(float(weighed["gain"].max()), 5.0)
+    words = [_words(row) for row in rows.to_dict("records")]
+    reach = _reach(rows["gain"].fillna(0.0).to_numpy(float), words)
     for status, part in weighed.groupby("status"):
         ax.barh(part.index, part["gain"].clip(lower=LEAST_SHOWN), color=STATUS[str(status)][1], height=0.72)
-    for k, row in weighed.iterrows():
-        name = f"{row['estimate']}" + (f"  ({row['choice']})" if row["choice"] else "")
-        weight = f"weight {row['weight']:.2f},  " if row["weight"] >= 0.005 else ""
-        words = f"{row['gain'] + 0.0:.1f}   {weight}{name}".replace("-0.0 ", "0.0 ").replace("-", "−")
-        ax.text(max(row["gain"], 0.0) + 0.012 * reach, int(str(k)), words, va="center", fontsize=6.5)
-    for k, row in rows[rows["status"] == "out"].iterrows():
-        reason = _short(row["reason"])
-        ax.text(0.012 * reach, int(str(k)), reason, va="center", fontsize=6.5, color="0.35", style="italic")
+    for k, row in enumerate(rows.to_dict("records")):
+        out: dict[str, Any] = {"color": "0.35", "style": "italic"} if row["status"] == "out" else {}
+        start = max(row["gain"], 0.0) if np.isfinite(row["gain"]) else 0.0
+        ax.text(start + 0.008 * reach, k, words[k], va="center", fontsize=6.5, in_layout=False, **out)
     _frame(ax, rows, reach)
     shown = [s for s in STATUS if (weighed["status"] == s).any()]
     style.legend_below(figure, [Patch(color=STATUS[s][1], label=STATUS[s][0]) for s in shown])
     return figure
+
+
+def _words(row: dict[Any, Any]) -> str:
+    """What stands beside a bar, or in its place."""
+    if row["status"] == "out":
+        return _short(row["reason"])
+    name = f"{row['estimate']}" + (f"  ({row['choice']})" if row["choice"] else "")
+    weight = f"weight {row['weight']:.2f},  " if row["weight"] >= 0.005 else ""
+    return f"{row['gain'] + 0.0:.1f}   {weight}{name}".replace("-0.0 ", "0.0 ").replace("-", "−")
+
+
+def _reach(gains: FloatArray, words: list[str]) -> float:
+    """The right end of the axis, such that the words beside every bar fit on the page."""
+    ends = [
+        LEAST_SHOWN + (max(gain, 0.0) - LEAST_SHOWN) / max(1.0 - len(text) / LETTERS_ACROSS, 0.1)
+        for gain, text in zip(gains, words, strict=True)
+    ]
+    return max(*ends, 5.0)
 
 
 def _frame(ax: Axes, rows: pd.DataFrame, reach: float) -> None:
@@ -91,7 +108,7 @@ def _frame(ax: Axes, rows: pd.DataFrame, reach: float) -> None:
         label.set_fontweight("bold" if status in ("cause", "tied") else "normal")
         label.set_color("0.45" if status == "out" else "black")
     ax.set_ylim(len(rows) - 0.4, -0.6)
-    ax.set_xlim(LEAST_SHOWN - 0.02 * reach, 1.55 * reach)
+    ax.set_xlim(LEAST_SHOWN, reach)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
     ax.set_xlabel("Log likelihood gained over the calibrated model, net of its freedom")
