@@ -128,7 +128,8 @@ def test_no_label_lies_outside_the_figure_or_on_another(name: str, temperature: 
 def test_long_words_beside_a_long_bar_stay_on_the_page(temperature: Diagnosis) -> None:
     rows = DIAGNOSIS_FIGURES["evidence"].numbers(temperature)
     rows.loc[0, ["choice", "gain"]] = ["Sx2 of Sx swapped with B3 of B, a long choice", 500.0]
-    rows.loc[1, ["status", "reason", "gain"]] = ["out", "what this design does not vary cannot be told " * 2, float("nan")]
+    reason = "what this design does not vary cannot be told " * 2
+    rows.loc[1, ["status", "reason", "gain"]] = ["out", reason, float("nan")]
     figure = DIAGNOSIS_FIGURES["evidence"].draw(rows)
     with house_style():
         figure.draw_without_rendering()
