@@ -85,3 +85,13 @@ def test_local_friction_gives_the_flat_law_it_was_made_for() -> None:
     (mu, tau0), (mu_other, tau0_other) = parts(*plain), parts(*other)
     assert mu_other / mu == pytest.approx(6.0 / 4.79, rel=1e-3)
     assert tau0_other / tau0 == pytest.approx(15.0 / 23.44, rel=1e-3)
+
+
+def test_a_diagnosis_with_its_simulation_can_be_kept_and_read_back(hot: Diagnosis) -> None:
+    import json
+
+    from tribo.kept import decoded, encoded
+
+    again = decoded(json.loads(json.dumps(encoded(hot))))
+    assert again.verdict.to_json() == hot.verdict.to_json()
+    assert simulated(again).table.equals(simulated(hot).table)
