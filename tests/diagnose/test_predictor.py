@@ -59,3 +59,14 @@ def test_a_sample_without_enough_loads_is_taken_from_the_table_and_said_so() -> 
     assert p.shares["C"] == tabled_predictor(PATTERNS).shares["C"]
     assert "without C" in p.source
     assert simulated_predictor(PATTERNS, runs[runs["sample"] != "F"], "F", AREA_M2).source == "tabulated simulations"
+
+
+def test_a_pattern_of_ones_own_is_trusted_as_a_tabulated_one_once_it_is_simulated() -> None:
+    from dataclasses import replace
+
+    wide = replace(PATTERNS["C"], name="W", pitch_m=(27e-6, 27e-6))
+    runs = own_runs()
+    simulated = pd.concat([runs, runs[runs["sample"] == "C"].assign(sample="W")])
+    patterns = {**PATTERNS, "W": wide}
+    assert tabled_predictor(patterns).offset["W"][0] > OFFSET[0]
+    assert simulated_predictor(patterns, simulated, "F", AREA_M2).offset["W"] == pytest.approx(OFFSET)

@@ -71,7 +71,7 @@ def on_every_block(
     friction = config.friction
     for name, values in acting.items():
         if name == "contact_area_loss":
-            friction = scaled(friction, *(_area_kept(config, values, pulled, recorded),) * 2)
+            friction = scaled(friction, *(_area_kept(config, values, pulled),) * 2)
         elif name == "pull_angle":
             lift = np.tan(values[0])
             friction = lighter(friction, 1.0 - pulled.static * lift, 1.0 - pulled.sliding * lift)
@@ -92,7 +92,7 @@ BEYOND_BLOCKS = (
 """Mechanisms that act on the springs, in the measuring chain, or on which sample lies there at all."""
 
 
-def _area_kept(config: SimConfig, values: Values, pulled: Pulled, recorded: Mapping[str, float]) -> float:
+def _area_kept(config: SimConfig, values: Values, pulled: Pulled) -> float:
     """Share of the contact left at the traction of the peak, 1 - c (T / (AF A))^2."""
     traction_Pa = pulled.static * config.pressure_Pa / config.cavities.area_fraction
     return float(np.clip(1.0 - values[0] * traction_Pa**2, 0.05, 1.0))
@@ -187,7 +187,7 @@ def conditions_of_run(config: SimConfig, recorded: Mapping[str, float]) -> Condi
         sample=np.array([config.sample]), specimen=np.array([""]), speed_m_s=one(known["speed_m_s"]),
         hold_s=one(known["hold_s"]), specimen_run=one(known["specimen_run"]), run_order=one(1.0),
         elapsed_s=one(known["elapsed_s"]), temperature_C=one(known["temperature_C"]),
-        humidity_pct=one(known["humidity_pct"]), clip_N=one(known.get("clip_N", 0.0)),
+        humidity_pct=one(known["humidity_pct"]), clip_N=one(0.0),
         columns={"column": np.array(["this"])},
     )  # fmt: skip
 

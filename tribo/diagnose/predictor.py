@@ -7,7 +7,7 @@ four numbers: T = (m mu) N + (a tau0) A in each regime. They are tabulated from 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -82,7 +82,8 @@ def simulated_predictor(
     }
     lacking = sorted(s for s, p in patterns.items() if p.area_fraction < 1.0 and s not in own)
     source = "an ensemble simulated for this campaign"
-    return _with_error(patterns, shares | own, f"{source} (without {', '.join(lacking)})" if lacking else source)
+    said = f"{source} (without {', '.join(lacking)})" if lacking else source
+    return _with_error(patterns, shares | own, said, simulated=own)
 
 
 def _law_of_runs(rows: pd.DataFrame, area_m2: float) -> FloatArray:
@@ -96,8 +97,10 @@ def _law_of_runs(rows: pd.DataFrame, area_m2: float) -> FloatArray:
     return np.array(found)
 
 
-def _with_error(patterns: Mapping[str, Pattern], shares: Mapping[str, Shares], source: str) -> Predictor:
-    wide = {name: _width(name, pattern) for name, pattern in patterns.items()}
+def _with_error(
+    patterns: Mapping[str, Pattern], shares: Mapping[str, Shares], source: str, simulated: Collection[str] = ()
+) -> Predictor:
+    wide = {name: _width(name, pattern, name in simulated) for name, pattern in patterns.items()}
     return Predictor(
         shares={**shares, "flat": (1.0, 1.0, 1.0, 1.0)},
         offset={name: (OFFSET[0] * w, OFFSET[1] * w) for name, w in wide.items()},
@@ -106,11 +109,11 @@ def _with_error(patterns: Mapping[str, Pattern], shares: Mapping[str, Shares], s
     )
 
 
-def _width(name: str, pattern: Pattern) -> float:
-    """0 for a flat sample, 1 for a tabulated pattern, more for one that is not."""
+def _width(name: str, pattern: Pattern, simulated: bool) -> float:
+    """0 for a flat sample, 1 for a pattern that was simulated, more for one that is interpolated."""
     if pattern.area_fraction == 1.0:
         return 0.0
-    return 1.0 if _key(name, pattern) is not None else UNTABLED
+    return 1.0 if simulated or _key(name, pattern) is not None else UNTABLED
 
 
 def _shares(name: str, pattern: Pattern) -> Shares:
