@@ -58,7 +58,7 @@ def test_an_effect_is_the_strongest_look_at_its_own_column() -> None:
 def test_no_more_replicates_are_made_than_the_decision_needs() -> None:
     plain = baseline()
     looks = [look for look in all_looks(plain) if look.kind == "trend"]
-    within = screen(plain, looks[:1], replicates=200, rng=np.random.default_rng(2))
+    within = screen(plain, looks[1:2], replicates=200, rng=np.random.default_rng(2))
     f = baseline(("run_in", 1.0))
     beyond = screen(f, all_looks(f), replicates=200, rng=np.random.default_rng(2))
     assert len(within.chance) < 200
