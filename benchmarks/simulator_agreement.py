@@ -5,13 +5,17 @@
     python benchmarks/simulator_agreement.py tolerance docs/data/simulator-tolerance.csv docs/data/simulator-peaks.csv
     python benchmarks/simulator_agreement.py order docs/data/simulator-order.csv docs/data/simulator-peaks.csv
     python benchmarks/simulator_agreement.py itself docs/data/simulator-itself.csv docs/data/simulator-peaks.csv
+    python benchmarks/simulator_agreement.py convergence docs/data/simulator-convergence.csv
+    python benchmarks/simulator_agreement.py energy docs/data/simulator-energy.csv
 
 ``peaks`` compares static friction (the highest force, and the first local peak) and the order of the first failures
 in 42 cases, cavities resting below 1e-4 and below the default tolerance (half an hour on one core); ``sliding`` the
 mean over the same window, ten seeds of every sample (half an hour). ``tolerance`` repeats the fast runs of the 42
 cases under other tolerances against the reference peaks already in the file (a minute), ``order`` says how far apart
 in time the first failures lie in the cases where their order differs (a minute), and ``itself`` holds the reference
-engine against itself, started a little earlier, in the cases where the engines differ by more than 0.1 % (minutes).
+engine against itself, at other time steps, in the cases where the engines differ by more than 0.1 % (minutes).
+``convergence`` runs the fast engine alone at four time steps, six seeds a sample (two minutes), and ``energy`` closes
+its balance of energy, and that of the reference engine, over one rupture (a minute).
 What a file holds already is not computed again: a stopped start goes on.
 """
 
@@ -25,7 +29,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tribo.simulate import SimConfig, reference as r
+from tribo.simulate import SimConfig, reference as r, simulate
+from tribo.simulate.energy import energy_balance
 from tribo.simulate.engine import Trajectory, drive_of, first_failure_s, lattice_of, run_fast, thresholds_of
 from tribo.simulate.reference import run_reference
 
@@ -162,19 +167,20 @@ def order(reference_peaks: str) -> Iterator[Task]:
 
 
 def itself(reference_peaks: str) -> Iterator[Task]:
-    """The reference engine against itself: started at 0.98 instead of 0.99 of the first failure, all else equal."""
+    """The reference engine at 1.5e-8 and 2e-8 s against itself at 1e-8 s, where the fast one differs from it."""
     known = pd.read_csv(reference_peaks)
     cases = {case_key(c): c for c in peak_cases()}
     for row in known[known["difference_percent"].abs() > 0.1].itertuples(index=False):
         key = (row.sample, row.pressure_kPa, row.angle_deg)
-        config = cases[key].with_(duration_s=row.end_ms * 1e-3)
-        yield key, lambda config=config, row=row: against_itself(config, row.static_reference, row.difference_percent)
+        for dt_s in (1.5e-8, 2e-8):
+            config = cases[key].with_(duration_s=row.end_ms * 1e-3, dt_s=dt_s)
+            yield (*key, dt_s), lambda config=config, static=row.static_reference: against_itself(config, static)
 
 
-def against_itself(config: SimConfig, static: float, fast_percent: float) -> Row:
+def against_itself(config: SimConfig, static: float) -> Row:
     lattice = lattice_of(config)
-    again = run_reference(config, lattice, thresholds_of(config, lattice), 0.98).peak_N / config.normal_load_N
-    return {"reference_difference_percent": 100 * (again / static - 1), "fast_difference_percent": fast_percent}
+    again = run_reference(config, lattice, thresholds_of(config, lattice), 0.99).peak_N / config.normal_load_N
+    return {"reference_difference_percent": 100 * (again / static - 1)}
 
 
 def orders_of(config: SimConfig) -> Row:
@@ -207,11 +213,45 @@ def reference_failures(config: SimConfig, count: int = 6) -> list[tuple[int, int
     return list(found.items())[:count]
 
 
+def convergence() -> Iterator[Task]:
+    """Static and sliding friction of the fast engine at one step after another, the same thresholds."""
+    for sample in ("F", "C", "Sx"):
+        for seed in range(6):
+            for dt_s in (1e-8, 2e-8, 5e-8, 1e-7):
+                config = SimConfig(sample=sample, seed=seed, blocks=(48, 48), dt_s=dt_s, duration_peaks=2.5)
+                config = config.with_(angle_deg=3.0 * seed - 7.5 if sample == "Sx" else 15.0 * seed + 7.5)
+                yield (sample, seed, dt_s), lambda config=config: frictions_of(config)
+
+
+def frictions_of(config: SimConfig) -> Row:
+    run = simulate(config)
+    return {"static": run.static_friction, "sliding": run.sliding_friction}
+
+
+def energy() -> Iterator[Task]:
+    """What is missing of the work of the slider, as a share of it, over one rupture of 24 x 24 blocks."""
+    for sample in ("F", "C"):
+        for engine, dt_s in (("fast", 1e-8), ("fast", 2e-8), ("fast", 5e-8), ("fast", 1e-7), ("reference", 1e-8)):
+            config = SimConfig(sample=sample, blocks=(24, 24), angle_deg=15.0, seed=2, dt_s=dt_s, engine=engine)
+            yield (sample, engine, dt_s), lambda config=config: missing_energy(config)
+
+
+def missing_energy(config: SimConfig) -> Row:
+    lattice = lattice_of(config)
+    thresholds = thresholds_of(config, lattice)
+    config = config.with_(duration_s=1.02 * run_fast(config, lattice, thresholds).peak_s)
+    run = run_fast if config.engine == "fast" else run_reference
+    return {"missing_share": energy_balance(config, lattice, run(config, lattice, thresholds)).residual}
+
+
 PEAK_KEY = ("sample", "pressure_kPa", "angle_deg")
 KEYS = {"peaks": PEAK_KEY, "sliding": ("sample", "seed"), "tolerance": (*PEAK_KEY, "rest_tolerance"), "order": PEAK_KEY}
-KEYS["itself"] = PEAK_KEY
+KEYS |= {
+    "itself": (*PEAK_KEY, "dt_s"), "convergence": ("sample", "seed", "dt_s"), "energy": ("sample", "engine", "dt_s"),
+}
 TASKS: dict[str, Callable[..., Iterator[Task]]] = {
-    "peaks": peaks, "sliding": sliding, "tolerance": tolerance, "order": order, "itself": itself
+    "peaks": peaks, "sliding": sliding, "tolerance": tolerance, "order": order, "itself": itself,
+    "convergence": convergence, "energy": energy,
 }  # fmt: skip
 
 

@@ -5,8 +5,8 @@
     python benchmarks/simulator_table2.py study FOLDER docs/data [jobs]
 
 ``column`` writes the column of the 960 runs of the command before it to docs/data/table2.csv and to the bundled
-table2_tribo.csv, and prints the rows of the page. ``study`` makes ten variants of six samples, four pressures and six
-runs each, at dt = 1e-7 s and with cavities resting below 1e-2: a quarter of the time, the same static friction,
+table2_tribo.csv, and prints the rows of the page. ``study`` makes nine variants of six samples, three pressures and
+four runs each, at dt = 1e-7 s and with cavities resting below 1e-2: a quarter of the time, the same static friction,
 sliding friction 0.5 % higher. FOLDER keeps every run, and a second start goes on where the first was stopped.
 """
 
@@ -22,7 +22,6 @@ from tribo.simulate.study import combinations, run_study
 from tribo.simulate.tables import beside, distance, fitted
 
 BASE = SimConfig(dt_s=1e-7, rest_tolerance=1e-2)
-RUNS = 6  # at each pressure
 
 
 def said(done: int, total: int) -> None:
@@ -32,7 +31,7 @@ def said(done: int, total: int) -> None:
 
 def study(folder: str, out: str, jobs: str = "2") -> None:
     Path(folder).mkdir(parents=True, exist_ok=True)
-    fits, distances = combinations(run_study(folder, BASE, RUNS, jobs=int(jobs), progress=said), load_table2())
+    fits, distances = combinations(run_study(folder, BASE, jobs=int(jobs), progress=said), load_table2())
     for name, table in (("table2-study", fits), ("table2-distances", distances)):
         table.to_csv(Path(out) / f"{name}.csv", index=False, float_format="%.5g")
     for regime, table in distances.groupby("regime", sort=False):
