@@ -1,99 +1,155 @@
-"""The same time step on all blocks at once, laid out so that the processor's vector units can be used."""
+"""The same time step on all blocks at once, laid out so that the processor's vector units can be used.
+
+The lattice lies row by row in one array with a frame of blocks around it that never move (or, with periodic edges,
+repeat the opposite side), so that one loop without branches runs over all rows. Displacements and velocities are the
+true ones here, not counted from the quasi-static motion: the slider then pulls every block with the same force.
+A velocity is stored as m v / dt, the force in N that would stop the block within one step.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tribo.records import FloatArray
 from tribo.simulate import kernels as k
 from tribo.simulate.friction import sliding_threshold, static_threshold
-from tribo.simulate.jit import compiled
-from tribo.simulate.kernels import (
-    CODE,
-    DENSE_STEPS,
-    RUNNING,
-    STEP,
-    Numerics,
-    Samples,
-    State,
-    last_stretch,
-    observe,
-)
-from tribo.simulate.lattice import Lattice
-from tribo.simulate.masks import BoolArray
+from tribo.simulate.jit import compiled, vectorised
+from tribo.simulate.kernels import CODE, DENSE_STEPS, RUNNING, STEP, Numerics, Samples, State, observe
+from tribo.simulate.lattice import INNER, Lattice
 
-# planes of the dense layout, each (ny, nx)
-VX, VY, RX, RY, OX, OY, FS, FD, KXX, KYY, KXY, SINCE, GOES, PLANES = range(14)
-_FROM_CELLS = {
-    VX: k.VX, VY: k.VY, RX: k.RX, RY: k.RY, FS: k.FS, FD: k.FD, KXX: k.KXX, KYY: k.KYY, KXY: k.KXY, SINCE: k.SINCE
-}  # fmt: skip
+# rows of Field.planes: m v / dt and its amount (zero at rest), thresholds, time of the last stop
+PX, PY, PACE, FS, FD, SINCE, PLANES = range(7)
 
 
-def advance_dense(state: State, out: Samples, numerics: Numerics, until_step: int, lattice: Lattice) -> None:
-    """Integrate all blocks until few enough move, then hand them back to the active set."""
-    ny, nx = lattice.ny, lattice.nx
+class Field(NamedTuple):
+    """All blocks of a run, one array place a block and one for each block of the frame; N and m."""
+
+    width: int  # places a row
+    positions: FloatArray  # (4, places): x and y displacement before and after a step, in turns
+    planes: FloatArray  # (PLANES, places)
+    edge: NDArray[np.int64]  # (m,) places of the blocks at free edges
+    spare: FloatArray  # (m, 3) N/m: own stiffness (xx, yy, xy) that these lack against an inner block
+    follow: float  # m a step: what the quasi-static motion adds to the sum of displacements along the pull
+    pull_x: float  # N/s: rate of the slider's pull on every block
+    pull_y: float
+
+
+def field_of(state: State, numerics: Numerics, lattice: Lattice, follow: FloatArray) -> Field:
+    """The blocks of a state; ``follow`` (n, 2) is the quasi-static velocity of the cavities in m/s."""
+    width = lattice.nx + 2
+    inside = _places(lattice)
+    now = numerics.start + int(state.counts[STEP]) * numerics.dt
     cells = state.cells[:-1]
-    q = np.zeros((2, ny + 2, nx + 2))
-    q[:, 1:-1, 1:-1] = cells[:, k.QX : k.QY + 1].T.reshape(2, ny, nx)
-    planes = np.zeros((PLANES, ny, nx))
-    for plane, column in _FROM_CELLS.items():
-        planes[plane] = cells[:, column].reshape(ny, nx)
-    # what of G does not come from q: the constant drag on cavities that follow the slider
-    constant = cells[:, k.GX : k.GY + 1] - numerics.stiffness * lattice.spring_forces(cells[:, k.QX : k.QY + 1])
-    constant[lattice.contact] = 0.0
-    planes[[OX, OY]] = constant.T.reshape(2, ny, nx)
+    positions, planes = np.zeros((4, width * (lattice.ny + 2))), np.zeros((PLANES, width * (lattice.ny + 2)))
+    positions[:2, inside] = (cells[:, k.QX : k.QY + 1] + follow * now).T
+    positions[2:] = positions[:2]
+    planes[PX : PY + 1, inside] = (cells[:, k.VX : k.VY + 1] + follow).T * (numerics.mass / numerics.dt)
+    planes[PACE] = np.hypot(planes[PX], planes[PY])
+    planes[FS] = np.inf
+    planes[FS, inside], planes[FD, inside], planes[SINCE, inside] = cells[:, [k.FS, k.FD, k.SINCE]].T
+    inner = numerics.stiffness * (np.array(INNER) + (lattice.shear, lattice.shear, 0.0))
+    spare = inner - cells[:, k.KXX : k.KXY + 1]
+    edge = np.flatnonzero(np.abs(spare).max(axis=1) > 1e-9 * numerics.stiffness)
+    direction = np.array([numerics.direction_x, numerics.direction_y])
+    pull = numerics.shear_stiffness * numerics.speed * direction
+    along = numerics.dt * float((follow @ direction).sum())
+    return Field(width, positions, planes, inside[edge], spare[edge], along, float(pull[0]), float(pull[1]))
+
+
+def _places(lattice: Lattice) -> NDArray[np.int64]:
+    """Places of the blocks of the lattice within the frame."""
+    y, x = np.divmod(np.arange(lattice.nx * lattice.ny), lattice.nx)
+    return np.asarray((y + 1) * (lattice.nx + 2) + x + 1)
+
+
+def advance_dense(
+    state: State, out: Samples, numerics: Numerics, until_step: int, lattice: Lattice, follow: FloatArray
+) -> None:
+    """Integrate all blocks until few enough move, then hand them back to the active set."""
+    field = field_of(state, numerics, lattice, follow)
     state.counts[CODE] = RUNNING
-    integrate(q[0], q[1], planes, lattice.contact.reshape(ny, nx), np.zeros((4, nx)), state, out, numerics, until_step)
-    cells[:, k.QX : k.QY + 1] = q[:, 1:-1, 1:-1].reshape(2, -1).T
-    with np.errstate(over="ignore", invalid="ignore"):  # the caller refuses a run that met such a number
-        cells[:, k.GX : k.GY + 1] = numerics.stiffness * lattice.spring_forces(cells[:, k.QX : k.QY + 1]) + constant
-    for plane, column in ((VX, k.VX), (VY, k.VY), (SINCE, k.SINCE)):
-        cells[:, column] = planes[plane].ravel()
-    _rest_cavities(cells, lattice, numerics)
+    swapped = integrate(field, state, out, numerics, until_step)
+    put_back(field, swapped, state, numerics, lattice, follow)
     k.start_lists(state, numerics)
 
 
-def _rest_cavities(cells: FloatArray, lattice: Lattice, numerics: Numerics) -> None:
-    speed, force = np.hypot(*cells[:, k.VX : k.VY + 1].T), np.hypot(*cells[:, k.GX : k.GY + 1].T)
-    rest_speed = numerics.rest_force / math.sqrt(numerics.stiffness * numerics.mass)
-    calm = ~lattice.contact & (speed < rest_speed) & (force < numerics.rest_force)
+def put_back(
+    field: Field, swapped: bool, state: State, numerics: Numerics, lattice: Lattice, follow: FloatArray
+) -> None:
+    """Write displacements, velocities and forces into the state; calm cavity blocks come to rest."""
+    inside = _places(lattice)
+    cells, contact = state.cells[:-1], lattice.contact
+    now = numerics.start + int(state.counts[STEP]) * numerics.dt
+    with np.errstate(over="ignore", invalid="ignore"):  # the caller refuses a run that met such a number
+        newest = field.positions[2:] if swapped else field.positions[:2]
+        cells[:, k.QX : k.QY + 1] = newest[:, inside].T - follow * now
+        cells[:, k.VX : k.VY + 1] = field.planes[PX : PY + 1, inside].T * (numerics.dt / numerics.mass) - follow
+        cells[:, k.SINCE] = field.planes[SINCE, inside]
+        drag = -numerics.mass * numerics.damping * follow
+        force = numerics.stiffness * lattice.spring_forces(cells[:, k.QX : k.QY + 1]) + drag
+        cells[:, k.GX : k.GY + 1] = force
+        speed = np.hypot(*cells[:, k.VX : k.VY + 1].T)
+        rest_speed = numerics.rest_force / math.sqrt(numerics.stiffness * numerics.mass)
+        calm = ~contact & (speed < rest_speed) & (np.hypot(*force.T) < numerics.rest_force)
     cells[calm, k.VX : k.VY + 1] = 0.0
 
 
 @compiled
-def integrate(
-    qx: FloatArray,
-    qy: FloatArray,
-    planes: FloatArray,
-    contact: BoolArray,
-    sums: FloatArray,
-    s: State,
-    out: Samples,
-    c: Numerics,
-    until_step: int,
-) -> None:
-    """Steps of all blocks up to ``until_step``, or fewer once the active set would be faster."""
+def integrate(f: Field, s: State, out: Samples, c: Numerics, until_step: int) -> bool:
+    """Steps of all blocks up to ``until_step``, or fewer once the active set would be faster.
+
+    True if the newest positions are the second two rows.
+    """
+    swapped = False
+    first, last = f.width + 1, f.planes.shape[1] - f.width - 1  # inner blocks; between the rows lies the frame
+    p_x, p_y, pace = f.planes[PX, first:last], f.planes[PY, first:last], f.planes[PACE, first:last]
+    fs, fd, since = f.planes[FS, first:last], f.planes[FD, first:last], f.planes[SINCE, first:last]
+    own = 12.0 + 4.0 * c.shear_stiffness / c.stiffness
+    way = c.dt * c.dt / c.mass
+    rest = c.rest_force * math.sqrt(c.mass / c.stiffness) / c.dt
     while s.counts[STEP] < until_step and s.counts[CODE] == RUNNING:
+        before, after = (2, 0) if swapped else (0, 2)
+        x, y = f.positions[before], f.positions[before + 1]
         if c.periodic:
-            wrap(qx)
-            wrap(qy)
-        kick_all(qx, qy, planes, sums, c.start + s.counts[STEP] * c.dt, c)
-        move_all(qx, qy, planes, sums, c)
-        for x in range(c.nx):
-            s.totals[k.ALONG] += sums[0, x]
-            s.totals[k.FRICTION_WORK] += sums[1, x]
-            s.totals[k.VISCOUS_WORK] += sums[2, x] * c.mass * c.damping / c.dt
+            wrap(x.reshape(-1, f.width))
+            wrap(y.reshape(-1, f.width))
+        t = c.start + s.counts[STEP] * c.dt
+        pushed(
+            x[first + f.width - 1 :], x[first - 1 : last + 1], x[: last - f.width + 1],
+            y[first + f.width - 1 :], y[first - 1 : last + 1], y[: last - f.width + 1],
+            p_x, p_y, 0.25 * c.stiffness, own, 1.0 - c.damping * c.dt, f.pull_x * t, f.pull_y * t,
+        )  # fmt: skip
+        free_edges(f, x, y)
+        sum_x, sum_y, squares, work = rubbed(
+            x[first:last], y[first:last], f.positions[after, first:last], f.positions[after + 1, first:last],
+            p_x, p_y, pace, fs, fd, since, t, way, c.dt / c.mass, c.law,
+        )  # fmt: skip
+        swapped = not swapped
+        s.totals[k.ALONG] += way * (sum_x * c.direction_x + sum_y * c.direction_y) - f.follow
+        s.totals[k.FRICTION_WORK] += way * work
+        s.totals[k.VISCOUS_WORK] += way * squares * c.damping * c.dt
         s.counts[DENSE_STEPS] += 1
-        moving = 0
-        active = c.nx * c.ny
+        moving, active = 0, c.nx * c.ny
         check = (s.counts[STEP] + 1) % 16 == 0
         if check or (s.counts[STEP] + 1) % c.stride == 0:
-            moving, active = count_moving(planes, contact, c)
+            moving, active = count_moving(pace, fs, rest)
         observe(1, moving, s, out, c)
         if check and active < c.dense_above // 2:
             break
+    return swapped
+
+
+@compiled
+def free_edges(f: Field, x: FloatArray, y: FloatArray) -> None:
+    """Take back what :func:`pushed` has of springs that are not there."""
+    for m in range(len(f.edge)):
+        i = f.edge[m]
+        f.planes[PX, i] += f.spare[m, 0] * x[i] + f.spare[m, 2] * y[i]
+        f.planes[PY, i] += f.spare[m, 2] * x[i] + f.spare[m, 1] * y[i]
 
 
 @compiled
@@ -108,113 +164,103 @@ def wrap(a: FloatArray) -> None:
         a[y, nx - 1] = a[y, 1]
 
 
-@compiled
-def kick_all(qx: FloatArray, qy: FloatArray, planes: FloatArray, sums: FloatArray, t: float, c: Numerics) -> None:
-    """As :func:`tribo.simulate.kernels.kick`, the forces gathered from the eight neighbours.
-
-    One root and one quotient a block, no branch: what a block needs to stop is rare and left to a second look.
-    """
-    stiffness = c.stiffness
-    quarter = 0.25 * stiffness
-    gain = c.dt / c.mass
-    keep = 1.0 - c.damping * c.dt
-    sums[:] = 0.0
-    work = sums[1]
-    before2 = sums[3]
-    for y in range(c.ny):
-        x_up, x_row, x_down = qx[y + 2], qx[y + 1], qx[y]
-        y_up, y_row, y_down = qy[y + 2], qy[y + 1], qy[y]
-        v_x, v_y, r_x, r_y = planes[VX, y], planes[VY, y], planes[RX, y], planes[RY, y]
-        o_x, o_y = planes[OX, y], planes[OY, y]
-        fs, fd, since, goes = planes[FS, y], planes[FD, y], planes[SINCE, y], planes[GOES, y]
-        kxx, kyy, kxy = planes[KXX, y], planes[KYY, y], planes[KXY, y]
-        stops = 0
-        for x in range(c.nx):
-            rising = quarter * (x_up[x + 2] + y_up[x + 2] + x_down[x] + y_down[x])
-            falling = quarter * (x_up[x] - y_up[x] + x_down[x + 2] - y_down[x + 2])
-            fx = stiffness * (x_row[x + 2] + x_row[x]) + rising + falling + o_x[x] + r_x[x] * t
-            fy = stiffness * (y_up[x + 1] + y_down[x + 1]) + rising - falling + o_y[x] + r_y[x] * t
-            fx -= kxx[x] * x_row[x + 1] + kxy[x] * y_row[x + 1]
-            fy -= kxy[x] * x_row[x + 1] + kyy[x] * y_row[x + 1]
-            speed2 = v_x[x] * v_x[x] + v_y[x] * v_y[x]
-            vx = keep * v_x[x] + gain * fx
-            vy = keep * v_y[x] + gain * fy
-            drive = math.sqrt(vx * vx + vy * vy)
-            sliding = gain * sliding_threshold(fd[x], math.sqrt(speed2), c.law)
-            holding = gain * static_threshold(fs[x], t - since[x], c.law)
-            slides = drive > sliding
-            resting = (speed2 == 0.0) & (fs[x] > 0.0)
-            stopping = (speed2 > 0.0) & (fs[x] > 0.0) & (drive <= sliding)
-            share = 1.0 - sliding / drive if slides else 0.0
-            start = 0.5 * share if drive > holding else 0.0
-            share = start if resting else share
-            work[x] += share * drive * fd[x]
-            share = 1.0 if stopping else share
-            v_x[x] = share * vx
-            v_y[x] = share * vy
-            before2[x] = speed2
-            goes[x] = 0.0 if stopping else 1.0
-            stops += 1 if stopping else 0
-        if stops > 0:
-            stop_row(v_x, v_y, fd, before2, goes, since, work, t, c)
-    for x in range(c.nx):
-        work[x] *= c.dt
-
-
-@compiled
-def stop_row(
-    v_x: FloatArray,
-    v_y: FloatArray,
-    fd: FloatArray,
-    before2: FloatArray,
-    goes: FloatArray,
-    since: FloatArray,
-    work: FloatArray,
-    t: float,
-    c: Numerics,
+@vectorised
+def pushed(
+    x_up: FloatArray,
+    x_row: FloatArray,
+    x_down: FloatArray,
+    y_up: FloatArray,
+    y_row: FloatArray,
+    y_down: FloatArray,
+    p_x: FloatArray,
+    p_y: FloatArray,
+    quarter: float,
+    own: float,
+    keep: float,
+    pull_x: float,
+    pull_y: float,
 ) -> None:
-    """Give the blocks of a row that stop in this step the last stretch of their way."""
-    gain = c.dt / c.mass
-    for x in range(len(v_x)):
-        if goes[x] == 0.0:
-            speed = math.sqrt(before2[x])
-            drive = math.sqrt(v_x[x] * v_x[x] + v_y[x] * v_y[x])
-            share = last_stretch(speed, drive, gain * sliding_threshold(fd[x], speed, c.law))
-            work[x] += share * drive * fd[x]
-            v_x[x] *= share
-            v_y[x] *= share
-            since[x] = t
+    """m v / dt after damping, springs and slider, before friction, as if all blocks had eight neighbours.
+
+    Positions reach one place further on both sides than ``p_x``. ``quarter`` is K_int / 4, ``own`` the stiffness of a
+    block against all its springs in units of that.
+    """
+    for i in range(len(p_x)):
+        rising = x_up[i + 2] + y_up[i + 2] + x_down[i] + y_down[i]
+        falling = x_up[i] - y_up[i] + x_down[i + 2] - y_down[i + 2]
+        bent_x = 4.0 * (x_row[i + 2] + x_row[i]) + rising + falling - own * x_row[i + 1]
+        bent_y = 4.0 * (y_up[i + 1] + y_down[i + 1]) + rising - falling - own * y_row[i + 1]
+        p_x[i] = keep * p_x[i] + quarter * bent_x + pull_x
+        p_y[i] = keep * p_y[i] + quarter * bent_y + pull_y
 
 
-@compiled
-def move_all(qx: FloatArray, qy: FloatArray, planes: FloatArray, sums: FloatArray, c: Numerics) -> None:
-    """Displace all blocks; ``sums`` receives by column the displacement along the pull and the way squared."""
-    along, ways2 = sums[0], sums[2]
-    for y in range(c.ny):
-        x_row, y_row, v_x, v_y = qx[y + 1], qy[y + 1], planes[VX, y], planes[VY, y]
-        goes = planes[GOES, y]
-        for x in range(c.nx):
-            dx = c.dt * v_x[x]
-            dy = c.dt * v_y[x]
-            x_row[x + 1] += dx
-            y_row[x + 1] += dy
-            along[x] += dx * c.direction_x + dy * c.direction_y
-            ways2[x] += dx * dx + dy * dy
-            v_x[x] *= goes[x]
-            v_y[x] *= goes[x]
+@vectorised
+def rubbed(
+    x: FloatArray,
+    y: FloatArray,
+    new_x: FloatArray,
+    new_y: FloatArray,
+    p_x: FloatArray,
+    p_y: FloatArray,
+    pace: FloatArray,
+    fs: FloatArray,
+    fd: FloatArray,
+    since: FloatArray,
+    t: float,
+    way: float,
+    speed_of: float,
+    law: FloatArray | None,
+) -> tuple[float, float, float, float]:
+    """Friction and displacement of all blocks: :func:`tribo.simulate.kernels.kick` in N, with neither branch nor call.
+
+    ``pace`` is |p| after the last step, zero at rest; ``way`` turns p into the displacement of a step, ``speed_of``
+    into a speed. Returns the sums of p_x, p_y, p2 and |p| times friction.
+    """
+    sum_x = 0.0
+    sum_y = 0.0
+    squares = 0.0
+    work = 0.0
+    for i in range(len(p_x)):
+        a = p_x[i]
+        b = p_y[i]
+        drive = math.sqrt(a * a + b * b)
+        was = pace[i]
+        sliding = sliding_threshold(fd[i], speed_of * was, law)
+        holding = static_threshold(fs[i], t - since[i], law)
+        excess = drive - sliding
+        rubs = fs[i] > 0.0
+        stops = rubs & (was > 0.0) & (excess <= 0.0)
+        rests = rubs & (was == 0.0)
+        begins = 0.5 if drive > holding else 0.0  # the first kick of a slip is half a step long
+        part = (begins if rests else 1.0) * max(excess, 0.0)
+        middle = was + excess
+        part = 0.125 * middle * middle if stops else part  # kernels.last_stretch
+        whole = drive * (was - excess if stops else 1.0)
+        share = part / (whole if whole > 0.0 else 1.0)
+        length = share * drive
+        a *= share
+        b *= share
+        new_x[i] = x[i] + way * a
+        new_y[i] = y[i] + way * b
+        sum_x += a
+        sum_y += b
+        squares += length * length
+        work += length * sliding
+        pace[i] = 0.0 if stops else length
+        p_x[i] = 0.0 if stops else a
+        p_y[i] = 0.0 if stops else b
+        if law is not None:
+            since[i] = t if stops else since[i]
+    return sum_x, sum_y, squares, work
 
 
-@compiled
-def count_moving(planes: FloatArray, contact: BoolArray, c: Numerics) -> tuple[int, int]:
-    """Contact blocks that move, and with them the cavity blocks faster than their rest speed."""
-    rest2 = c.rest_force * c.rest_force / (c.stiffness * c.mass)
+@vectorised
+def count_moving(pace: FloatArray, fs: FloatArray, rest: float) -> tuple[int, int]:
+    """Contact blocks that move, and with them the cavity blocks faster than ``rest``."""
     contacts = 0
-    cavities = 0
-    for y in range(c.ny):
-        for x in range(c.nx):
-            speed2 = planes[VX, y, x] * planes[VX, y, x] + planes[VY, y, x] * planes[VY, y, x]
-            if contact[y, x]:
-                contacts += speed2 > 0.0
-            else:
-                cavities += speed2 > rest2
-    return contacts, contacts + cavities
+    active = 0
+    for i in range(len(pace)):
+        rubs = fs[i] > 0.0
+        contacts += 1 if rubs & (pace[i] > 0.0) else 0
+        active += 1 if pace[i] > (0.0 if rubs else rest) else 0
+    return contacts, active

@@ -138,7 +138,7 @@ def run_fast(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Tra
         while state.counts[k.CODE] == k.RUNNING and state.counts[k.STEP] < until:
             k.advance(state, samples, numerics, until)
             if state.counts[k.CODE] == k.CROWDED:
-                advance_dense(state, samples, numerics, until, lattice)
+                advance_dense(state, samples, numerics, until, lattice, drive.follow)
         chunks.append(_first(samples, int(state.counts[k.N_SAMPLES])))
     _refuse_not_finite(state, numerics)
     return _trajectory(chunks, state, numerics, drive, failure)
@@ -168,6 +168,7 @@ def _numerics(
         shear_stiffness=config.shear_stiffness_N_m,
         mass=config.mass_kg,
         damping=config.damping_per_s,
+        speed=config.speed_m_s,
         direction_x=float(direction[0]),
         direction_y=float(direction[1]),
         force_rate=drive.force_rate,

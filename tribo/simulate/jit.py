@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import config, njit
+from numba.core.compiler import Compiler
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -49,11 +50,32 @@ def compiled(function: Function) -> Function:
 
     No fastmath: it would let the compiler drop the checks for NaN.
     """
+    return _cached(function)
+
+
+def vectorised(function: Function) -> Function:
+    """As :func:`compiled`, for a loop over arrays that share no memory, in a form the vector units can run.
+
+    The compiler is told that no two array arguments overlap, may reorder sums and may fuse products into them. NaN and
+    infinity stay what they are. Passing overlapping arrays, one of them written to, gives wrong numbers.
+    """
+    return _cached(function, pipeline_class=_Apart, fastmath={"reassoc", "contract", "nsz"})
+
+
+class _Apart(Compiler):
+    """The compiler with array arguments that do not overlap."""
+
+    def define_pipelines(self) -> Any:
+        self.state.flags.noalias = True
+        return super().define_pipelines()
+
+
+def _cached(function: Function, **options: Any) -> Function:
     settings: Any = config
     before = settings.CACHE_DIR
     settings.CACHE_DIR = str(cache_directory())
     try:
-        dispatcher: Any = njit(cache=True, nogil=True, error_model="numpy")(function)
+        dispatcher: Any = njit(cache=True, nogil=True, error_model="numpy", **options)(function)
     finally:
         settings.CACHE_DIR = before
     return cast(Function, dispatcher)

@@ -73,6 +73,7 @@ class Numerics(NamedTuple):
     shear_stiffness: float  # K_s
     mass: float
     damping: float  # gamma, 1/s
+    speed: float  # of the slider
     direction_x: float
     direction_y: float
     force_rate: float  # slider force per time while everything sticks
@@ -81,7 +82,7 @@ class Numerics(NamedTuple):
     stop_at_peaks: float  # stop once the time exceeds this multiple of the peak time
     peak_drop: float  # the first peak is found once the force has fallen by this share
     dense_above: int  # active blocks above which all blocks are integrated
-    law: FloatArray  # parameters of the friction terms
+    law: FloatArray | None  # parameters of the friction terms; None compiles to a loop without them
 
 
 @compiled

@@ -15,6 +15,7 @@ from tribo.simulate.masks import BoolArray
 OFFSETS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (-1, 1), (1, -1))  # E W N S NE SW NW SE
 # K_int n nT of each of the eight springs, in units of K_int: (xx, yy, xy); diagonals have half the stiffness
 SPRINGS = ((1, 0, 0), (1, 0, 0), (0, 1, 0), (0, 1, 0)) + ((0.25, 0.25, 0.25),) * 2 + ((0.25, 0.25, -0.25),) * 2
+INNER = (3.0, 3.0, 0.0)  # their sum
 
 
 @dataclass(frozen=True)
