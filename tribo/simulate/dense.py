@@ -1,6 +1,6 @@
 """The same time step on all blocks at once, laid out so that the processor's vector units can be used.
 
-The lattice lies row by row in one array with a frame of blocks around it that never move (or, with periodic edges,
+The lattice lies row by row in one array, between rows and columns of blocks that never move (or, with periodic edges,
 repeat the opposite side), so that one loop without branches runs over all rows. Displacements and velocities are the
 true ones here, not counted from the quasi-static motion: the slider then pulls every block with the same force.
 A velocity is stored as m v / dt, the force in N that would stop the block within one step.
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tribo.records import FloatArray
 from tribo.simulate import kernels as k
 from tribo.simulate.friction import sliding_threshold, static_threshold
-from tribo.simulate.jit import compiled, vectorised
+from tribo.simulate.jit import compiled, vectorised, widest_vectors
 from tribo.simulate.kernels import CODE, DENSE_STEPS, RUNNING, STEP, Numerics, Samples, State, observe
 from tribo.simulate.lattice import INNER, Lattice
 
@@ -25,10 +25,22 @@ from tribo.simulate.lattice import INNER, Lattice
 PX, PY, PACE, FS, FD, SINCE, PLANES = range(7)
 
 
-class Field(NamedTuple):
-    """All blocks of a run, one array place a block and one for each block of the frame; N and m."""
+LINE, PAGE = 8, 512  # numbers in a cache line, and in the bytes after which cache sets repeat
 
-    width: int  # places a row
+
+class Layout(NamedTuple):
+    """Where the blocks lie: block (x, y) at ``first + y width + x``."""
+
+    width: int
+    first: int
+    last: int  # end of the stretch that is worked on, a whole number of vectors
+    places: int
+
+
+class Field(NamedTuple):
+    """All blocks of a run, one place a block and some between the rows for the frame; N and m."""
+
+    layout: Layout
     positions: FloatArray  # (4, places): x and y displacement before and after a step, in turns
     planes: FloatArray  # (PLANES, places)
     edge: NDArray[np.int64]  # (m,) places of the blocks at free edges
@@ -38,15 +50,23 @@ class Field(NamedTuple):
     pull_y: float
 
 
+def layout_of(nx: int, ny: int) -> Layout:
+    """Rows and first blocks begin at cache lines; equal places of two planes never share a cache set."""
+    width = -(-(nx + 2) // LINE) * LINE
+    first = LINE + width
+    last = first + -(-ny * width // (4 * LINE)) * 4 * LINE
+    least = last + width + LINE
+    return Layout(width, first, last, least + (PAGE // 7 // LINE * LINE - least) % PAGE)
+
+
 def field_of(state: State, numerics: Numerics, lattice: Lattice, follow: FloatArray) -> Field:
     """The blocks of a state; ``follow`` (n, 2) is the quasi-static velocity of the cavities in m/s."""
-    width = lattice.nx + 2
-    inside = _places(lattice)
+    layout = layout_of(lattice.nx, lattice.ny)
+    inside = _places(layout, lattice)
     now = numerics.start + int(state.counts[STEP]) * numerics.dt
     cells = state.cells[:-1]
-    positions, planes = np.zeros((4, width * (lattice.ny + 2))), np.zeros((PLANES, width * (lattice.ny + 2)))
+    positions, planes = _aligned(4, layout.places), _aligned(PLANES, layout.places)
     positions[:2, inside] = (cells[:, k.QX : k.QY + 1] + follow * now).T
-    positions[2:] = positions[:2]
     planes[PX : PY + 1, inside] = (cells[:, k.VX : k.VY + 1] + follow).T * (numerics.mass / numerics.dt)
     planes[PACE] = np.hypot(planes[PX], planes[PY])
     planes[FS] = np.inf
@@ -57,13 +77,19 @@ def field_of(state: State, numerics: Numerics, lattice: Lattice, follow: FloatAr
     direction = np.array([numerics.direction_x, numerics.direction_y])
     pull = numerics.shear_stiffness * numerics.speed * direction
     along = numerics.dt * float((follow @ direction).sum())
-    return Field(width, positions, planes, inside[edge], spare[edge], along, float(pull[0]), float(pull[1]))
+    return Field(layout, positions, planes, inside[edge], spare[edge], along, float(pull[0]), float(pull[1]))
 
 
-def _places(lattice: Lattice) -> NDArray[np.int64]:
-    """Places of the blocks of the lattice within the frame."""
+def _aligned(rows: int, places: int) -> FloatArray:
+    """Zeros that begin at a cache line."""
+    room = np.zeros(rows * places + LINE)
+    skip = -room.ctypes.data % (8 * LINE) // 8
+    return room[skip : skip + rows * places].reshape(rows, places)
+
+
+def _places(layout: Layout, lattice: Lattice) -> NDArray[np.int64]:
     y, x = np.divmod(np.arange(lattice.nx * lattice.ny), lattice.nx)
-    return np.asarray((y + 1) * (lattice.nx + 2) + x + 1)
+    return np.asarray(layout.first + y * layout.width + x)
 
 
 def advance_dense(
@@ -81,7 +107,7 @@ def put_back(
     field: Field, swapped: bool, state: State, numerics: Numerics, lattice: Lattice, follow: FloatArray
 ) -> None:
     """Write displacements, velocities and forces into the state; calm cavity blocks come to rest."""
-    inside = _places(lattice)
+    inside = _places(field.layout, lattice)
     cells, contact = state.cells[:-1], lattice.contact
     now = numerics.start + int(state.counts[STEP]) * numerics.dt
     with np.errstate(over="ignore", invalid="ignore"):  # the caller refuses a run that met such a number
@@ -105,7 +131,7 @@ def integrate(f: Field, s: State, out: Samples, c: Numerics, until_step: int) ->
     True if the newest positions are the second two rows.
     """
     swapped = False
-    first, last = f.width + 1, f.planes.shape[1] - f.width - 1  # inner blocks; between the rows lies the frame
+    first, last, width = f.layout.first, f.layout.last, f.layout.width
     p_x, p_y, pace = f.planes[PX, first:last], f.planes[PY, first:last], f.planes[PACE, first:last]
     fs, fd, since = f.planes[FS, first:last], f.planes[FD, first:last], f.planes[SINCE, first:last]
     own = 12.0 + 4.0 * c.shear_stiffness / c.stiffness
@@ -115,12 +141,12 @@ def integrate(f: Field, s: State, out: Samples, c: Numerics, until_step: int) ->
         before, after = (2, 0) if swapped else (0, 2)
         x, y = f.positions[before], f.positions[before + 1]
         if c.periodic:
-            wrap(x.reshape(-1, f.width))
-            wrap(y.reshape(-1, f.width))
+            wrap(x, f.layout, c.nx, c.ny)
+            wrap(y, f.layout, c.nx, c.ny)
         t = c.start + s.counts[STEP] * c.dt
         pushed(
-            x[first + f.width - 1 :], x[first - 1 : last + 1], x[: last - f.width + 1],
-            y[first + f.width - 1 :], y[first - 1 : last + 1], y[: last - f.width + 1],
+            x[first + width - 1 :], x[first - 1 : last + 1], x[first - width - 1 : last - width + 1],
+            y[first + width - 1 :], y[first - 1 : last + 1], y[first - width - 1 : last - width + 1],
             p_x, p_y, 0.25 * c.stiffness, own, 1.0 - c.damping * c.dt, f.pull_x * t, f.pull_y * t,
         )  # fmt: skip
         free_edges(f, x, y)
@@ -153,15 +179,16 @@ def free_edges(f: Field, x: FloatArray, y: FloatArray) -> None:
 
 
 @compiled
-def wrap(a: FloatArray) -> None:
-    """Fill the frame of a padded array with the opposite sides."""
-    ny, nx = a.shape
+def wrap(a: FloatArray, layout: Layout, nx: int, ny: int) -> None:
+    """Put a copy of each side beyond the opposite one."""
+    top = layout.first + (ny - 1) * layout.width
+    below, above = layout.first - layout.width, top + layout.width
     for x in range(nx):
-        a[0, x] = a[ny - 2, x]
-        a[ny - 1, x] = a[1, x]
-    for y in range(ny):
-        a[y, 0] = a[y, nx - 2]
-        a[y, nx - 1] = a[y, 1]
+        a[below + x] = a[top + x]
+        a[above + x] = a[layout.first + x]
+    for row in range(below, above + 1, layout.width):
+        a[row - 1] = a[row + nx - 1]
+        a[row + nx] = a[row]
 
 
 @vectorised
@@ -185,6 +212,7 @@ def pushed(
     Positions reach one place further on both sides than ``p_x``. ``quarter`` is K_int / 4, ``own`` the stiffness of a
     block against all its springs in units of that.
     """
+    widest_vectors()
     for i in range(len(p_x)):
         rising = x_up[i + 2] + y_up[i + 2] + x_down[i] + y_down[i]
         falling = x_up[i] - y_up[i] + x_down[i + 2] - y_down[i + 2]
@@ -216,6 +244,7 @@ def rubbed(
     ``pace`` is |p| after the last step, zero at rest; ``way`` turns p into the displacement of a step, ``speed_of``
     into a speed. Returns the sums of p_x, p_y, p2 and |p| times friction.
     """
+    widest_vectors()
     sum_x = 0.0
     sum_y = 0.0
     squares = 0.0

@@ -123,6 +123,7 @@ def run_fast(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Tra
     SimulationError
         A force became non-finite; the message names the block and the time.
     """
+    _refuse_thresholds(thresholds, lattice)
     drive = drive_of(config, lattice)
     failure = first_failure_s(lattice, thresholds, drive, config.stiffness_N_m)
     numerics = _numerics(config, lattice, thresholds, drive, failure - 2 * config.dt_s)
@@ -136,12 +137,19 @@ def run_fast(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Tra
         state.counts[k.N_SAMPLES] = 0
         until = min(int(state.counts[k.STEP]) + _CHUNK * numerics.stride, last_step)
         while state.counts[k.CODE] == k.RUNNING and state.counts[k.STEP] < until:
-            k.advance(state, samples, numerics, until)
-            if state.counts[k.CODE] == k.CROWDED:
-                advance_dense(state, samples, numerics, until, lattice, drive.follow)
+            advance(state, samples, numerics, until, lattice, drive)
         chunks.append(_first(samples, int(state.counts[k.N_SAMPLES])))
     _refuse_not_finite(state, numerics)
     return _trajectory(chunks, state, numerics, drive, failure)
+
+
+def advance(
+    state: k.State, samples: k.Samples, numerics: k.Numerics, until_step: int, lattice: Lattice, drive: Drive
+) -> None:
+    """Steps of the moving blocks, or of all while most move, up to ``until_step`` or the end of the run."""
+    k.advance(state, samples, numerics, until_step)
+    if state.counts[k.CODE] == k.CROWDED:
+        advance_dense(state, samples, numerics, until_step, lattice, drive.follow)
 
 
 def once(blocks: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -225,10 +233,23 @@ def _last_step(config: SimConfig, thresholds: Thresholds, numerics: k.Numerics) 
     return max(1, int(np.ceil((end - numerics.start) / config.dt_s)))
 
 
+def _refuse_thresholds(thresholds: Thresholds, lattice: Lattice) -> None:
+    fine = [np.isfinite(values) & (values >= 0.0) for values in (thresholds.static_N, thresholds.sliding_N)]
+    bad = np.flatnonzero(~(fine[0] & fine[1]))
+    if bad.size:
+        y, x = divmod(int(bad[0]), lattice.nx)
+        raise SimulationError(
+            Problem(
+                "threshold", "the friction of a block is not a finite number >= 0",
+                found=f"{bad.size} blocks, the first at x = {x}, y = {y}", allowed="finite forces in N, >= 0",
+            )
+        )
+
+
 def _refuse_not_finite(state: k.State, numerics: k.Numerics) -> None:
     if state.counts[k.CODE] != k.NOT_FINITE:
         return
-    bad = np.flatnonzero(~np.isfinite(state.cells[:-1]).all(axis=1))
+    bad = np.flatnonzero(~np.isfinite(state.cells[:-1, k.QX : k.VY + 1]).all(axis=1))
     y, x = divmod(int(bad[0]), numerics.nx) if bad.size else (-1, -1)
     t = numerics.start + state.counts[k.STEP] * numerics.dt
     raise SimulationError(

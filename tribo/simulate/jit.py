@@ -15,8 +15,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from numba import config, njit
+from numba import config, njit, types
 from numba.core.compiler import Compiler
+from numba.extending import intrinsic
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -53,21 +54,41 @@ def compiled(function: Function) -> Function:
     return _cached(function)
 
 
-def vectorised(function: Function) -> Function:
-    """As :func:`compiled`, for a loop over arrays that share no memory, in a form the vector units can run.
-
-    The compiler is told that no two array arguments overlap, may reorder sums and may fuse products into them. NaN and
-    infinity stay what they are. Passing overlapping arrays, one of them written to, gives wrong numbers.
-    """
-    return _cached(function, pipeline_class=_Apart, fastmath={"reassoc", "contract", "nsz"})
-
-
 class _Apart(Compiler):
     """The compiler with array arguments that do not overlap."""
 
     def define_pipelines(self) -> Any:
         self.state.flags.noalias = True
         return super().define_pipelines()
+
+
+VECTOR_OPTIONS: dict[str, Any] = {"pipeline_class": _Apart, "fastmath": {"reassoc", "contract", "nsz"}}
+
+
+def vectorised(function: Function) -> Function:
+    """As :func:`compiled`, for a loop over arrays that share no memory, in a form the vector units can run.
+
+    The compiler is told that no two array arguments overlap, may reorder sums and may fuse products into them. NaN and
+    infinity stay what they are. Passing overlapping arrays, one of them written to, gives wrong numbers.
+    """
+    return _cached(function, **VECTOR_OPTIONS)
+
+
+@intrinsic
+def widest_vectors(typing_context: Any) -> Any:
+    """Called first in a function: the compiler may use the widest vectors the processor has (a hint, no-op elsewhere).
+
+    LLVM keeps to 256 bits on many processors with 512, for fear of their clock rate. The function stays one of its
+    own, since the hint is lost where it is inlined.
+    """
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        attributes = builder.function.attributes
+        attributes.add("noinline")
+        set.add(attributes, '"prefer-vector-width"="512"')  # llvmlite's own add knows no attributes with values
+        return context.get_dummy_value()
+
+    return types.void(), code
 
 
 def _cached(function: Function, **options: Any) -> Function:

@@ -1,0 +1,160 @@
+"""The step of all blocks: against a plain one, on vector units, and stopped by numbers that are not finite."""
+
+from __future__ import annotations
+
+import platform
+import re
+
+import numpy as np
+import pytest
+from numba import njit, types
+
+from tribo.errors import SimulationError
+from tribo.records import FloatArray
+from tribo.simulate import FrictionTerms, SimConfig
+from tribo.simulate import dense
+from tribo.simulate import kernels as k
+from tribo.simulate.engine import (
+    Thresholds,
+    _initial_state,
+    _numerics,
+    _refuse_not_finite,
+    advance,
+    drive_of,
+    lattice_of,
+    run_fast,
+    thresholds_of,
+)
+from tribo.simulate.friction import sliding_threshold, static_threshold
+from tribo.simulate.jit import VECTOR_OPTIONS
+from tribo.simulate.lattice import Lattice
+
+
+STEPS = 14
+
+
+def samples(n: int) -> k.Samples:
+    return k.Samples(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, np.int64))
+
+
+def friction_of_block(cell: FloatArray, drive: FloatArray, t: float, c: k.Numerics) -> tuple[FloatArray, bool]:
+    """Velocity of a contact block after friction, and whether it comes to rest in this step."""
+    before, size = np.hypot(*cell[k.VX : k.VY + 1]), np.hypot(*drive)
+    sliding = c.dt / c.mass * sliding_threshold(cell[k.FD], before, c.law)
+    if before == 0.0:
+        begins = size > c.dt / c.mass * static_threshold(cell[k.FS], t - cell[k.SINCE], c.law) and size > sliding
+        return (0.5 * (1.0 - sliding / size) * drive if begins else 0.0 * drive), False
+    if size > sliding:
+        return (1.0 - sliding / size) * drive, False
+    return drive * k.last_stretch(before, size, sliding), True
+
+
+def plain_steps(cells: FloatArray, steps: int, lattice: Lattice, c: k.Numerics) -> float:
+    """The model block by block, counted from the quasi-static motion; returns the friction work."""
+    work = 0.0
+    drag = cells[:, k.GX : k.GY + 1] - c.stiffness * lattice.spring_forces(cells[:, k.QX : k.QY + 1])
+    for step in range(steps):
+        t = c.start + step * c.dt
+        springs = c.stiffness * lattice.spring_forces(cells[:, k.QX : k.QY + 1])
+        force = springs + drag + cells[:, k.RX : k.RY + 1] * t
+        stopped = []
+        for i, cell in enumerate(cells):
+            drive = (1.0 - c.damping * c.dt) * cell[k.VX : k.VY + 1] + c.dt / c.mass * force[i]
+            if lattice.contact[i]:
+                sliding = sliding_threshold(cell[k.FD], np.hypot(*cell[k.VX : k.VY + 1]), c.law)
+                drive, stops = friction_of_block(cell, drive, t, c)
+                work += sliding * c.dt * np.hypot(*drive)
+                if stops:
+                    stopped.append(i)
+            cell[k.VX : k.VY + 1] = drive
+        cells[:, k.QX : k.QY + 1] += c.dt * cells[:, k.VX : k.VY + 1]
+        cells[stopped, k.VX : k.VY + 1] = 0.0
+        cells[stopped, k.SINCE] = t
+    return work
+
+
+@pytest.mark.parametrize("terms", [FrictionTerms(), FrictionTerms(ageing_b=0.05, ageing_t0_s=1e-6, speed_a=0.02)])
+@pytest.mark.parametrize(("sample", "edges"), [("F", "free"), ("C", "free"), ("B", "periodic")])
+def test_all_blocks_at_once_are_the_plain_step(sample: str, edges: str, terms: FrictionTerms):
+    """Blocks that start, slide and stop, with and without friction terms: the same to rounding."""
+    config = SimConfig(
+        sample=sample, edges=edges, blocks=(15, 12), angle_deg=25.0, seed=1, engine="dense", terms=terms,
+        rest_tolerance=1e-12,
+    )  # fmt: skip
+    lattice = lattice_of(config)
+    thresholds, drive = thresholds_of(config, lattice), drive_of(config, lattice)
+    numerics = _numerics(config, lattice, thresholds, drive, 3e-3)
+    state = _initial_state(config, lattice, thresholds, drive, numerics)
+    rng = np.random.default_rng(3)
+    cells = state.cells[:-1]
+    moves = rng.random(len(cells)) < 0.5
+    cells[:, k.VX : k.VY + 1] = rng.normal(0.0, 5.0, (len(cells), 2)) * moves[:, None]
+    cells[:, k.QX : k.QY + 1] += rng.normal(0.0, 3e-7, (len(cells), 2))
+    drag = -config.mass_kg * config.damping_per_s * drive.follow
+    cells[:, k.GX : k.GY + 1] = config.stiffness_N_m * lattice.spring_forces(cells[:, k.QX : k.QY + 1]) + drag
+    twin = cells.copy()
+    moved = cells[:, k.QX : k.QY + 1] @ drive.velocity / config.speed_m_s
+    before = float(moved.sum())
+    state.totals[k.ALONG] = before
+    dense.advance_dense(state, samples(80), numerics, STEPS, lattice, drive.follow)
+    work = plain_steps(twin, STEPS, lattice, numerics)
+    rests = (twin[lattice.contact, k.VX] == 0.0).mean()
+    assert 0.05 < rests < 0.95
+    for columns in (slice(k.QX, k.QY + 1), slice(k.VX, k.VY + 1), slice(k.SINCE, k.SINCE + 1)):
+        if columns.start == k.SINCE and not terms.active:
+            continue  # only ageing asks when a block stopped
+        assert np.allclose(cells[:, columns], twin[:, columns], rtol=1e-9, atol=1e-9 * np.abs(twin[:, columns]).max())
+    along = float((twin[:, k.QX : k.QY + 1] @ drive.velocity).sum()) / config.speed_m_s
+    assert state.totals[k.ALONG] == pytest.approx(along, rel=1e-9)
+    assert state.totals[k.FRICTION_WORK] == pytest.approx(work, rel=1e-9)
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 instructions")
+@pytest.mark.parametrize("loop", [dense.pushed, dense.rubbed])
+def test_loops_over_all_blocks_use_vector_instructions(loop):
+    """Without the promise that arrays do not overlap the compiler falls back to one block at a time."""
+    array, number = types.float64[::1], types.float64
+    arrays = 8 if loop is dense.pushed else 10
+    rest = (number,) * 5 if loop is dense.pushed else (number, number, number, types.none)
+    fresh = njit(error_model="numpy", **VECTOR_OPTIONS)(loop.py_func)
+    fresh.compile((array,) * arrays + rest)
+    assembly = next(iter(fresh.inspect_asm().values()))
+    wanted = r"sqrtpd" if loop is dense.rubbed else r"v?(fn?madd\w*|mul)pd\s.*%[yz]mm|mulpd\s"
+    assert re.search(wanted, assembly)
+
+
+@pytest.mark.parametrize("engine", ["fast", "dense"])
+@pytest.mark.parametrize("sample", ["F", "C"])
+def test_an_unstable_step_stops_the_run_and_names_a_block(engine: str, sample: str):
+    """On both paths of the fast engine; the step is far beyond stability."""
+    config = SimConfig(sample=sample, blocks=(17, 17), dt_s=4e-7, engine=engine)
+    lattice = lattice_of(config)
+    with pytest.raises(SimulationError, match=r"no longer finite at t = .*x = \d+, y = \d+"):
+        run_fast(config, lattice, thresholds_of(config, lattice))
+
+
+def test_a_block_without_velocity_is_named_in_the_step_it_appears():
+    """On both paths: one block turns NaN, and the very next step ends the run with its place."""
+    for engine in ("fast", "dense"):
+        config = SimConfig(blocks=(20, 15), engine=engine, seed=2)
+        lattice = lattice_of(config)
+        thresholds, drive = thresholds_of(config, lattice), drive_of(config, lattice)
+        numerics = _numerics(config, lattice, thresholds, drive, 3e-3)
+        state = _initial_state(config, lattice, thresholds, drive, numerics)
+        state.cells[7 * 20 + 4, k.VX] = np.nan
+        k.start_lists(state, numerics)
+        advance(state, samples(80), numerics, 60, lattice, drive)
+        with pytest.raises(SimulationError, match=r"t = 0\.00300005 s; found '1 blocks, the first at x = 4, y = 7'"):
+            _refuse_not_finite(state, numerics)
+
+
+def test_thresholds_that_are_not_numbers_are_refused():
+    """NaN or infinite friction of a block is found before the run."""
+    config = SimConfig(blocks=(20, 20))
+    lattice = lattice_of(config)
+    drawn = thresholds_of(config, lattice)
+    for bad in (np.nan, np.inf, -1.0):
+        sliding = drawn.sliding_N.copy()
+        sliding[45] = bad
+        with pytest.raises(SimulationError, match="x = 5, y = 2"):
+            run_fast(config, lattice, Thresholds(drawn.static_N, sliding))
