@@ -2,14 +2,16 @@
 
 numba's ``cache=True`` looks only at the file a function stands in, so an edit of something it calls is missed.
 Here the cache directory carries a hash of every source file of this package: a changed file means a new
-directory. ``TRIBO_CACHE_DIR`` moves it.
+directory, and directories no start has used for a month are removed. ``TRIBO_CACHE_DIR`` moves it.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import tempfile
+import time
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -19,6 +21,7 @@ from numba import config, njit, types
 from numba.core.compiler import Compiler
 from numba.extending import intrinsic
 
+UNUSED_DAYS = 30.0
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -34,10 +37,30 @@ def cache_directory() -> Path:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
+                os.utime(folder)
+                remove_unused(base)
                 return folder
         except OSError:
             continue
     return Path(tempfile.mkdtemp(prefix=name))
+
+
+def remove_unused(base: Path, days: float = UNUSED_DAYS) -> None:
+    """Remove the code of other sources that no start has used for so many days.
+
+    A start marks its directory before this. A directory is renamed before it is emptied, so two starts never empty the
+    same one; whatever cannot be removed stays.
+    """
+    oldest = time.time() - 86400 * days
+    for folder in base.glob("numba-*"):
+        try:
+            if folder.stat().st_mtime > oldest:
+                continue
+            doomed = folder.with_name(f"removed-{os.getpid()}-{folder.name}")
+            folder.rename(doomed)
+        except OSError:  # another start was faster, or it is not ours
+            continue
+        shutil.rmtree(doomed, ignore_errors=True)
 
 
 def _cache_bases() -> list[Path]:

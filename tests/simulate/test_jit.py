@@ -1,0 +1,49 @@
+"""The directory of compiled code: what is unused goes, what is used stays, also with many starts at once."""
+
+from __future__ import annotations
+
+import os
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from tribo.simulate import jit
+
+
+def aged(folder: Path, days: float) -> Path:
+    (folder / "part").mkdir(parents=True)
+    (folder / "part" / "code.nbc").write_bytes(b"x")
+    long_ago = time.time() - 86400 * days
+    os.utime(folder, (long_ago, long_ago))
+    return folder
+
+
+def test_code_unused_for_a_month_is_removed_and_the_rest_stays(tmp_path: Path):
+    """Only directories of compiled code, and only old ones."""
+    old, young = aged(tmp_path / "numba-0123", 31), aged(tmp_path / "numba-4567", 29)
+    other = aged(tmp_path / "something-else", 400)
+    jit.remove_unused(tmp_path)
+    assert not old.exists()
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([young.name, other.name])
+
+
+def test_many_starts_at_once_remove_without_a_fault(tmp_path: Path):
+    """Sixteen threads over forty old directories; nothing is raised and nothing is left."""
+    for n in range(40):
+        aged(tmp_path / f"numba-{n:04d}", 50)
+    with ThreadPoolExecutor(16) as pool:
+        list(pool.map(jit.remove_unused, [tmp_path] * 16))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_start_marks_its_directory_as_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A directory of these very sources that is a year old is used, not removed."""
+    monkeypatch.setenv("TRIBO_CACHE_DIR", str(tmp_path))
+    fresh = jit.cache_directory.__wrapped__
+    folder = fresh()
+    long_ago = time.time() - 86400 * 365
+    os.utime(folder, (long_ago, long_ago))
+    assert fresh() == folder
+    assert folder.exists() and time.time() - folder.stat().st_mtime < 3600
