@@ -77,12 +77,15 @@ def engine_ratios(dt_s: float = 1e-8, reference_steps: int = 300) -> Iterator[Ti
 
 
 def dense_rate() -> Iterator[Timing]:
-    """Block updates a second of the dense step on one core, in float64."""
-    config = SimConfig(engine="dense", duration_s=4e-3)
-    run_fast(config.with_(duration_s=3.0e-3), *_prepared(config))
-    seconds, run = timed_run(config)
-    rate = run.dense_steps * config.blocks[0] * config.blocks[1] / seconds
-    yield Timing("dense step", rate, "block updates/s", 2.5e8, note=f"{run.dense_steps} steps in {seconds:.2f} s")
+    """Block updates a second of the dense step on one core, in float64: a long run less a short one, best of three."""
+    config = SimConfig(engine="dense")
+    (short_s, short), (long_s, long) = (
+        min((timed_run(config.with_(duration_s=end)) for _ in range(3)), key=lambda timed: timed[0])
+        for end in (3.0e-3, 4.5e-3)
+    )
+    steps, seconds = long.dense_steps - short.dense_steps, long_s - short_s
+    rate = steps * config.blocks[0] * config.blocks[1] / seconds
+    yield Timing("dense step", rate, "block updates/s", 2.5e8, note=f"{steps} steps in {seconds:.2f} s")
 
 
 def table2_cost(repeats: int = 20, pressures: int = 8, jobs: int = 2) -> Iterator[Timing]:
