@@ -11,9 +11,7 @@ from numba import njit, types
 
 from tribo.errors import SimulationError
 from tribo.records import FloatArray
-from tribo.simulate import FrictionTerms, SimConfig
-from tribo.simulate import dense
-from tribo.simulate import kernels as k
+from tribo.simulate import FrictionTerms, SimConfig, dense, kernels as k
 from tribo.simulate.engine import (
     Thresholds,
     _initial_state,
@@ -28,7 +26,6 @@ from tribo.simulate.engine import (
 from tribo.simulate.friction import sliding_threshold, static_threshold
 from tribo.simulate.jit import VECTOR_OPTIONS
 from tribo.simulate.lattice import Lattice
-
 
 STEPS = 14
 

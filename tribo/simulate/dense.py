@@ -71,7 +71,7 @@ def field_of(state: State, numerics: Numerics, lattice: Lattice, follow: FloatAr
     planes[PACE] = np.hypot(planes[PX], planes[PY])
     planes[FS] = np.inf
     planes[FS, inside], planes[FD, inside], planes[SINCE, inside] = cells[:, [k.FS, k.FD, k.SINCE]].T
-    inner = numerics.stiffness * (np.array(INNER) + (lattice.shear, lattice.shear, 0.0))
+    inner = numerics.stiffness * np.add(INNER, (lattice.shear, lattice.shear, 0.0))
     spare = inner - cells[:, k.KXX : k.KXY + 1]
     edge = np.flatnonzero(np.abs(spare).max(axis=1) > 1e-9 * numerics.stiffness)
     direction = np.array([numerics.direction_x, numerics.direction_y])

@@ -97,8 +97,7 @@ def vectorised(function: Function) -> Function:
     return _cached(function, **VECTOR_OPTIONS)
 
 
-@intrinsic
-def widest_vectors(typing_context: Any) -> Any:
+def _widest_vectors(typing_context: Any) -> Any:
     """Called first in a function: the compiler may use the widest vectors the processor has (a hint, no-op elsewhere).
 
     LLVM keeps to 256 bits on many processors with 512, for fear of their clock rate. The function stays one of its
@@ -112,6 +111,9 @@ def widest_vectors(typing_context: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(), code
+
+
+widest_vectors: Callable[[], None] = cast(Any, intrinsic)(_widest_vectors)
 
 
 def _cached(function: Function, **options: Any) -> Function:
