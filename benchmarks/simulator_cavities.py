@@ -112,7 +112,8 @@ def line(config: SimConfig, lattice: Lattice, matrix: FloatArray, follow: FloatA
     force = np.zeros(int((whole.end_s - first) / config.dt_s))
     arguments = (
         sparse.indptr.astype(np.int64), sparse.indices.astype(np.int64), sparse.data, drive.rate[held].T.ravel(),
-        weight, thresholds.static_N[held], thresholds.sliding_N[held], first, config.dt_s, config.mass_kg, config.damping_per_s,
+        weight, thresholds.static_N[held], thresholds.sliding_N[held], first, config.dt_s, config.mass_kg,
+        config.damping_per_s,
         drive.force_rate, config.shear_stiffness_N_m,
     )  # fmt: skip
     integrate(*arguments, force[:10])
@@ -151,7 +152,8 @@ def main(path: Path, seeds: int = 10, blocks: int = 36) -> None:
                 error = change.std(ddof=1) / math.sqrt(seeds)
                 print(f"{sample} {name}: {change.mean():+.2f} % ({error:.2f}), single to {np.abs(change).max():.1f} %")
             times, updates = numbers[:, 4:6].sum(axis=0), numbers[:, [6, 8]].sum(axis=0)
-            print(f"{sample} engine over prototype: time {times[0] / times[1]:.2f}, updates {updates[0] / updates[1]:.1f}")
+            ratios = f"time {times[0] / times[1]:.2f}, updates {updates[0] / updates[1]:.1f}"
+            print(f"{sample} engine over prototype: {ratios}")
             print(f"{sample} entries of the matrix a block {numbers[0, 9]:.0f}", flush=True)
 
 
