@@ -44,7 +44,8 @@ links: $(VENV)/.docs
 	$(BIN)/python -m sphinx -q -b linkcheck docs out/links  # external ones are listed in out/links/output.txt
 
 bench: $(VENV)/.dev
-	$(BIN)/tribo bench
+	$(BIN)/tribo bench --large
+	$(BIN)/python -m pytest -m slow
 
 blind: $(VENV)/.dev
 	$(BIN)/python benchmarks/blind.py run out/blind.jsonl
