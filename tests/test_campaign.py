@@ -389,3 +389,12 @@ def test_the_practice_campaigns_hold_324_usable_tests_of_six_samples(practice, n
     campaign = load_campaign(practice(number))
     assert (len(campaign.tests), campaign.set_aside, campaign.problems) == (324, (), ())
     assert list(campaign.samples) == ["F", "A", "B", "C", "Sx", "Sy"]
+
+
+def test_a_load_that_is_not_the_weight_put_on_is_noted_and_used(folder: Path) -> None:
+    rows = ["T1,raw/T1.csv,F,F1,50,0.505,,1,", "T2,raw/T2.csv,F,F1,50,5.05,,2,", "T3,raw/T3.csv,F,F1,,5.05,,3,"]
+    write(folder, rows)
+    campaign = load_campaign(folder)
+    assert [t.normal_load_N for t in campaign.tests] == [0.505, 5.05, 5.05]
+    (note,) = campaign.problems
+    assert (note.kind, note.test_id, note.row, note.column) == ("loads_disagree", "T2", 3, "normal_load_N")

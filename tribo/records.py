@@ -318,13 +318,14 @@ class Ingested:
     by_hand: Mapping[str, ByHand] = field(default_factory=dict)
 
     def doubts(self) -> tuple[SetAside, ...]:
-        """Tests that were used although their export or pull shows something odd, such as an impulse spike."""
+        """Tests that were used although their row, export or pull shows something odd, such as an impulse spike."""
         found = []
         for test_id, pull in self.pulls.items():
             problems = tuple(
                 replace(p, file=self.traces[test_id].file or p.file, test_id=test_id)
                 for p in dict.fromkeys((*self.traces[test_id].problems, *pull.problems))
             )
+            problems += tuple(note for note in self.campaign.problems if note.test_id == test_id)
             if problems:
                 found.append(SetAside(test_id, "; ".join(map(str, problems)), problems))
         return tuple(found)

@@ -19,6 +19,7 @@ TOML = "campaign.toml"
 TESTS = "tests.csv"
 RAW = "raw"
 _MM2, _GRAM, _MM, _UM = 1e-6, 1e-3, 1e-3, 1e-6
+_LOADS_AGREE = 0.05  # share by which normal_load_N may differ from the weight put on
 _NUMBER_ROW = re.compile(rb'^\s*"?[-+]?[.,]?\d+[.,\d]*"?\s*[,;\t|]', re.M)
 
 
@@ -52,6 +53,7 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
         nothing = Problem("no_usable_test", "no test of this campaign can be used", file=TESTS)
         raise CampaignError([*problems, nothing])
     problems += _unlisted(root, rows)
+    problems += [note for row in usable if (note := _loads_disagree(row, described))]
     tests = tuple(_test(row, described) for row in usable)
     return _campaign(root, described, patterns, tests, set_aside, problems)
 
@@ -280,6 +282,19 @@ def _test(row: TestRow, described: CampaignFile) -> Test:
         covariates={name: cell for name, cell in cells.items() if name and name not in KNOWN},
         row=row.row,
     )
+
+
+def _loads_disagree(row: TestRow, described: CampaignFile) -> Problem | None:
+    """A note where both loads are given and are not the same; normal_load_N is used."""
+    mass, load = _number(row, "mass_g"), _number(row, "normal_load_N")
+    if mass is None or load is None:
+        return None
+    weight = (mass + described.campaign.slider_mass_g) * _GRAM * STANDARD_GRAVITY
+    if abs(weight / load - 1.0) < _LOADS_AGREE:
+        return None
+    what, found = "this load is used, and it is not the weight of mass and slider", f"{load:g} N"
+    place = (TESTS, row.row, "normal_load_N", found, f"about {weight:.4g} N")
+    return Problem("loads_disagree", what, *place, test_id=row.test_id)
 
 
 def _unlisted(root: Path, rows: Sequence[TestRow]) -> list[Problem]:
