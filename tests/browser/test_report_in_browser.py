@@ -196,6 +196,7 @@ def test_it_prints_to_pdf_with_every_pull_and_no_buttons(report: Opened) -> None
     report.page.emulate_media(media="print")
     expect(report.page.locator("#pull-tools")).to_be_hidden()
     expect(report.page.locator("#pull-list > li").first).to_be_visible()
+    expect(report.page.get_by_text("Roughness and preparation of the surfaces")).to_be_visible()  # folded on screen
 
 
 def test_without_scripts_everything_is_still_there(browser: Browser, out: Path) -> None:
