@@ -81,6 +81,20 @@ def test_a_damaged_file_is_made_anew(tmp_path: Path, content: bytes) -> None:
     assert [counted(Shelf(tmp_path), 1)[1] for _ in range(2)] == [1, 0]
 
 
+def test_a_result_of_other_sources_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shelf = Shelf(tmp_path)
+    made = []
+    for text in ("before the edit", "before the edit", "after it"):
+        monkeypatch.setattr("tribo.kept.sources", lambda *rooms, text=text: text)
+        made.append(counted(shelf, 1)[1])
+    assert made == [1, 0, 1]
+
+
+def test_no_function_of_others_comes_back() -> None:
+    with pytest.raises(TypeError, match="no function of tribo"):
+        decoded({"function": "os:walk"})
+
+
 @pytest.mark.parametrize("place", ["os:PathLike", "tribo.kept:json", "tribo.report.files:os"])
 def test_nothing_but_records_of_tribo_is_ever_constructed(place: str) -> None:
     with pytest.raises(TypeError, match="no record of tribo"):
