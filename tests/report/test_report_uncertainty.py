@@ -11,7 +11,7 @@ import pytest
 from tribo.records import Study
 from tribo.report.page import html
 from tribo.report.tables import write_tables
-from tribo.report.uncertainty import budget_origins, budget_tables
+from tribo.report.uncertainty import budget_origins, budget_tables, paired_sentences
 
 
 def components(sample: str, regime: str, specimens: float) -> list[dict[str, object]]:
@@ -59,3 +59,16 @@ def test_the_budget_is_a_table_of_its_own(budgeted: Study, tmp_path: Path) -> No
 def test_a_study_without_a_budget_has_no_such_section(study: Study) -> None:
     assert 'id="uncertainty"' not in html(study, drawn={})
     assert budget_tables(study) == []
+
+
+def test_samples_on_the_same_specimens_are_compared_by_their_difference(study: Study) -> None:
+    row = {
+        "sample": "Sx", "other": "Sy", "regime": "static", "number": "T_N", "pressure_Pa": 10e3, "difference": -0.25,
+        "u": 0.0123, "unpaired_u": 0.0456, "low": -0.30, "high": -0.20, "specimens": "S1;S2;S3",
+    }  # fmt: skip
+    paired = replace(study, differences=pd.DataFrame([row, {**row, "number": "mu"}]))
+    (sentence,) = paired_sentences(paired)
+    assert "of Sx less that of Sy, on the same 3 specimens: −0.250 ± 0.012 N" in sentence
+    assert "Specimens of their own would leave ± 0.046 N" in sentence
+    assert "on the same 3 specimens" in html(paired, drawn={}).replace("\u00a0", " ")
+    assert paired_sentences(study) == []

@@ -18,7 +18,7 @@ from tribo.report.pulls import pull_cards
 from tribo.report.tables import all_set_aside
 from tribo.report.text import fit_cells
 from tribo.report.tribosystem import conditions
-from tribo.report.uncertainty import budget_origins, budget_tables
+from tribo.report.uncertainty import budget_origins, budget_tables, paired_sentences
 
 LEAD_FIGURE = "agreement"
 MISFIT_FIGURES = ("misfit", "residuals")
@@ -34,6 +34,7 @@ def content(study: Study, provenance: Provenance | None, verdict: Mapping[str, A
         "verdict": verdict_in_words(verdict) if verdict is not None else None,
         "summary": _summary(study),
         "table2": _table2(study),
+        "paired": paired_sentences(study),
         "budget": budget_tables(study),
         "budget_origins": budget_origins(study),
         "agreement": _agreement_tables(study),

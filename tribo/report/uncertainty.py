@@ -9,6 +9,7 @@ import pandas as pd
 from tribo.figures import select
 from tribo.records import REGIMES, Regime, Study
 from tribo.report.numerals import joined, significant
+from tribo.report.tables import PA_PER_KPA
 
 SUM = "combined"
 
@@ -64,3 +65,19 @@ def budget_origins(study: Study) -> list[tuple[str, str]]:
     type_b = study.budget[study.budget["type"] == "B"]
     origins = type_b.groupby("component", sort=False)["origin"].unique()
     return [(str(c), str(found[0]) if len(found) == 1 else "own to each sample") for c, found in origins.items()]
+
+
+def paired_sentences(study: Study) -> list[str]:
+    """How far the forces of samples that were measured on the same specimens are apart, one sentence a pair."""
+    if study.differences is None:
+        return []
+    return [_paired_sentence(row) for _, row in study.differences.iterrows() if row["number"] == "T_N"]
+
+
+def _paired_sentence(row: pd.Series) -> str:
+    pair = f"of {row['sample']} less that of {row['other']}, on the same {len(row['specimens'].split(';'))} specimens"
+    return (
+        f"{row['regime'].capitalize()} friction at {significant(row['pressure_Pa'] / PA_PER_KPA)} kPa {pair}: "
+        f"{significant(row['difference'])} ± {significant(row['u'], 2)} N (95 %: {significant(row['low'])} to "
+        f"{significant(row['high'])} N). Specimens of their own would leave ± {significant(row['unpaired_u'], 2)} N."
+    )
