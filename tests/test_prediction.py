@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +82,8 @@ def test_cells_run_one_by_one_are_what_a_prediction_takes(fitted: Fitted, tmp_pa
     assert len(cells) == 2
     _, computed = run(fitted, tmp_path)
     assert computed == set()
+    stages.simulate_cells(ingested, fits, replace(options, seed=1), "calibration")
+    assert list(tmp_path.glob("*.nc")) == []
     with pytest.raises(CampaignError, match="nothing of this name"):
         stages.simulate_cells(ingested, fits, options, "B@1Pa")
 
@@ -100,8 +103,6 @@ def test_a_campaign_without_a_flat_law_is_refused(fitted: Fitted) -> None:
 
 
 def test_many_loads_are_thinned_over_their_whole_range(small_campaign: Path) -> None:
-    from dataclasses import replace
-
     campaign = load_campaign(small_campaign)
     tests = tuple(replace(campaign.tests[0], normal_load_N=0.1 * k) for k in range(1, 30))
     loads = loads_to_simulate(replace(campaign, tests=tests))
@@ -110,8 +111,6 @@ def test_many_loads_are_thinned_over_their_whole_range(small_campaign: Path) -> 
 
 
 def test_a_flat_sample_of_another_name_is_found_and_two_are_asked_about(small_campaign: Path) -> None:
-    from dataclasses import replace
-
     campaign = load_campaign(small_campaign)
     assert stages.flat_sample(campaign, "nothing of this name") == "F"
     both = {**campaign.samples, "B": replace(campaign.samples["F"], name="B")}

@@ -201,7 +201,7 @@ def simulate_cells(
         No flat sample to calibrate on, or ``only`` names nothing this campaign measured.
     """
     from tribo.prediction import calibrated_cells
-    from tribo.simulations import example_config, example_run, run_cells
+    from tribo.simulations import example_config, example_run, remove_strangers, run_cells
 
     campaign = ingested.campaign
     flat = flat_sample(campaign, options.flat)
@@ -209,6 +209,8 @@ def simulate_cells(
         campaign, fits, flat, runs=options.runs, seed=options.seed, jobs=options.jobs, kept=options.kept,
         progress=progress,
     )  # fmt: skip
+    if options.kept is not None:
+        remove_strangers(cells, options.kept)  # what a diagnosis finds kept is then of this calibration
     chosen = tuple(c for c in cells if only in ("", c.sample, c.name))
     if not chosen and only != "calibration":
         allowed = ", ".join(["calibration", *dict.fromkeys(c.sample for c in cells), *(c.name for c in cells)])
