@@ -172,6 +172,14 @@ def with_shape_left_open(
     return replace(sharp, shape_u_N=max(lower, 0.0) / math.sqrt(3.0))
 
 
+def _inverse(matrix: FloatArray) -> FloatArray:
+    """Inverse of a matrix of normal equations; where samples share their times, the pseudo-inverse."""
+    try:
+        return np.asarray(np.linalg.inv(matrix))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.pinv(matrix))
+
+
 def _parabola_top(time_s: FloatArray, force: FloatArray, peak: int, half: int, noise: float) -> Apex:
     low, high = max(peak - half, 0), min(peak + half, force.size - 1)
     t, f = time_s[low : high + 1] - time_s[peak], force[low : high + 1]
@@ -180,7 +188,7 @@ def _parabola_top(time_s: FloatArray, force: FloatArray, peak: int, half: int, n
         return Apex(float(time_s[peak]), reach, mean(f), noise / math.sqrt(t.size), math.inf, "rounded")
     x = t / reach
     basis = np.array((np.ones_like(x), x, x * x))
-    inverse = np.linalg.pinv(basis @ basis.T)
+    inverse = _inverse(basis @ basis.T)
     c = inverse @ (basis @ f)
     fitted = c @ basis
     chi2_red = float((f - fitted) @ (f - fitted)) / max(t.size - 3, 1) / noise**2
