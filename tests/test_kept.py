@@ -101,9 +101,11 @@ def test_nothing_but_records_of_tribo_is_ever_constructed(place: str) -> None:
         decoded({"record": place, "fields": []})
 
 
-def test_what_cannot_be_kept_is_refused_aloud(tmp_path: Path) -> None:
-    with pytest.raises(TypeError, match="cannot be kept"):
-        Shelf(tmp_path).take("x", 1, lambda: object())
+def test_what_cannot_be_kept_is_given_all_the_same_and_said_aloud(tmp_path: Path) -> None:
+    thing = object()
+    with pytest.warns(RuntimeWarning, match="x is not kept: a object cannot be kept"):
+        assert Shelf(tmp_path).take("x", 1, lambda: thing) is thing
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_without_a_folder_everything_is_made() -> None:

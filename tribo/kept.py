@@ -11,6 +11,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import lru_cache
@@ -50,9 +51,14 @@ class Shelf:
         if kept is not None and kept["made_from"] == key:
             return cast(T, decoded(kept["result"]))
         result = make()
+        try:
+            text = json.dumps({"made_from": key, "result": encoded(result)})
+        except TypeError as why:  # a result in hand is worth more than keeping it
+            warnings.warn(f"{name} is not kept: {why}", RuntimeWarning, stacklevel=2)
+            return result
         from tribo.report.files import write_text
 
-        write_text(path, json.dumps({"made_from": key, "result": encoded(result)}) + "\n")
+        write_text(path, text + "\n")
         return result
 
 
