@@ -67,15 +67,18 @@ def _humidity(b: Bench, size: float, rng: np.random.Generator) -> None:
 
 
 def _mislabelled(b: Bench, size: float, rng: np.random.Generator) -> None:
-    """Two specimens carry each other's label, or one that of another sample; the samples differ by a third."""
+    """Two specimens carry each other's label, or one that of another sample; the samples differ by a third.
+
+    A specimen of S is pulled along x and y: what bears its label gives one force in both, what bears another's shows
+    the direction it happens to lie in.
+    """
     level = {s: float(np.median(b.static[(b.tests["sample"] == s).to_numpy()])) for s in set(b.tests["sample"])}
-    single = [s for s in level if len(s) == 1]
-    pairs = [(p, q) for p in single for q in single if p != q and abs(np.log(level[p] / level[q])) > 0.3]
+    pairs = [(p, q) for p in level for q in level if p[0] != q[0] and abs(np.log(level[p] / level[q])) > 0.3]
     label, other = sorted(pairs)[rng.integers(len(pairs))]
     number = str(rng.choice(sorted({s[1:] for s in b.tests["specimen"]})))
-    moved = {f"{label}{number}": other}
+    moved = {f"{label[0]}{number}": other}
     if rng.random() < 0.5:
-        moved[f"{other}{number}"] = label
+        moved[f"{other[0]}{number}"] = label
     samples = [moved.get(s, t) for s, t in zip(b.tests["specimen"], b.tests["sample"], strict=True)]
     b.remake(b.column("N"), samples)
 

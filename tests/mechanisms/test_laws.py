@@ -70,6 +70,8 @@ def test_a_wrong_label_is_the_other_sample_to_the_bit_of_rounding() -> None:
     assert after.static_N[here] == pytest.approx(mu * c.normal_load_N[here] + adhesion)
     assert np.array_equal(after.static_N[~here], before().static_N[~here])
     assert moves("B1 of B swapped with S2 of Sx") == (("B1", "B", "Sx"), ("S2", "Sx", "B"))
+    assert moves("S1 of Sy and Sx swapped with F1 of F") == (("S1", "Sy", "F"), ("S1", "Sx", "F"), ("F1", "F", "Sy"))
+    assert moves("S1 of Sx and Sy behaves as B") == (("S1", "Sx", "B"), ("S1", "Sy", "B"))
 
 
 def test_collapsed_cavities_follow_the_flat_law() -> None:

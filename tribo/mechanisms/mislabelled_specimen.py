@@ -7,46 +7,77 @@ from itertools import combinations
 import numpy as np
 
 from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+from tribo.records import FloatArray
 
 BEHAVES = " behaves as "
 SWAPPED = " swapped with "
+AND = " and "  # a specimen that is pulled in two directions has two labels
+LEAST_N = 1e-9
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str) -> Forces:
     """The tests of one specimen follow another sample, or those of two specimens each other's.
 
-    ``choice`` is "S2 of Sx behaves as Sy" or "B2 of B swapped with C1 of C"; ``values`` = [share] moves ln T
-    from the label (0) to the other sample (1).
+    ``choice`` is "S2 of Sx behaves as Sy", "S2 of Sx and Sy behaves as B" or "B2 of B swapped with C1 of C";
+    ``values`` = [share] moves ln T from the label (0) to the other sample (1).
     """
     before = base.forces(conditions.normal_load_N)
     static, sliding = before.static_N, before.sliding_N
     for specimen, label, other in moves(choice):
         after = base.as_sample(other).forces(conditions.normal_load_N)
         share = np.where((conditions.specimen == specimen) & (conditions.sample == label), values[0], 0.0)
-        static = static * (after.static_N / before.static_N) ** share
-        sliding = sliding * (after.sliding_N / before.sliding_N) ** share
+        static = static * _ratio(after.static_N, before.static_N) ** share
+        sliding = sliding * _ratio(after.sliding_N, before.sliding_N) ** share
     return Forces(static, sliding)
 
 
+def _ratio(after_N: FloatArray, before_N: FloatArray) -> FloatArray:
+    return np.maximum(after_N, LEAST_N) / np.maximum(before_N, LEAST_N)
+
+
 def moves(choice: str) -> tuple[tuple[str, str, str], ...]:
-    """(specimen, its label, what it behaves as) for each specimen a choice speaks of."""
+    """(specimen, its label, what it behaves as) for each specimen and label a choice speaks of.
+
+    Of a specimen with two labels that was swapped, the other one takes the first.
+    """
     if BEHAVES in choice:
         who, other = choice.split(BEHAVES)
-        specimen, label = who.split(" of ")
-        return ((specimen, label, other),)
-    (first, a), (second, b) = (who.split(" of ") for who in choice.split(SWAPPED))
-    return (first, a, b), (second, b, a)
+        specimen, labels = _who(who)
+        return tuple((specimen, label, other) for label in labels)
+    (first, a), (second, b) = (_who(who) for who in choice.split(SWAPPED))
+    return (*((first, label, b[0]) for label in a), *((second, label, a[0]) for label in b))
+
+
+def _who(text: str) -> tuple[str, list[str]]:
+    specimen, labels = text.split(" of ")
+    return specimen, labels.split(AND)
 
 
 def choices(base: Base, conditions: Conditions) -> tuple[str, ...]:
     """Every specimen under every other label of the campaign, and every swap of two specimens."""
     made = sorted(set(zip(conditions.specimen.tolist(), conditions.sample.tolist(), strict=True)))
     labels = sorted({label for _, label in made})
-    alone = [
-        f"{specimen} of {label}{BEHAVES}{other}" for specimen, label in made for other in labels if other != label
+    whole = _whole(made)
+    alone = [f"{p} of {a}{BEHAVES}{other}" for p, a in made for other in labels if other != a]
+    alone += [
+        f"{p} of {AND.join(a)}{BEHAVES}{other}" for p, a in whole if len(a) > 1 for other in labels if other not in a
     ]
     swaps = [f"{p} of {a}{SWAPPED}{q} of {b}" for (p, a), (q, b) in combinations(made, 2) if a != b]
-    return (*alone, *swaps)
+    several = [
+        f"{p} of {AND.join(turned)}{SWAPPED}{q} of {AND.join(b)}"
+        for (p, a), (q, b) in combinations(whole, 2)
+        if len(a) + len(b) > 2 and not set(a) & set(b)
+        for turned in ((a, a[::-1]) if len(a) > 1 else (a,))
+    ]
+    return (*alone, *swaps, *several)
+
+
+def _whole(made: list[tuple[str, str]]) -> list[tuple[str, list[str]]]:
+    """Specimens with all their labels, those of several labels first."""
+    labels: dict[str, list[str]] = {}
+    for specimen, label in made:
+        labels.setdefault(specimen, []).append(label)
+    return sorted(labels.items(), key=lambda item: (-len(item[1]), item[0]))
 
 
 MECHANISM = Mechanism(

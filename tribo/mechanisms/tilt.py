@@ -7,6 +7,8 @@ import numpy as np
 from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
 from tribo.records import FloatArray
 
+HEIGHTS = (0.01, 0.02, 0.04, 0.08)
+
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
     """The wire at height h over a sled of length L moves the load by e = (T / N) h / L of the length.
@@ -33,7 +35,7 @@ MECHANISM = Mechanism(
     kind="instrument",
     formula="tau0 A -> tau0 A min(1, 3 (1/2 - (T / N) h / L))",
     parameters=(  # nothing happens below e = 1/6, so that a fit has to start from several heights
-        amplitude("h_over_L", "", 0.0, 0.3, 0.02, "height of the wire over length of the sled", (0.01, 0.02, 0.04, 0.08)),
+        amplitude("h_over_L", "", 0.0, 0.3, 0.02, "height of the wire over length of the sled", HEIGHTS),
     ),
     law=law,
     sign=-1,
