@@ -296,7 +296,7 @@ def with_simulation(
         }  # fmt: skip
         words.append(
             f"With {' and '.join(found.mechanisms)} in the simulator itself ({len(found.table)} pairs of runs) the "
-            f"effect is {found.ratio:.2f} +- {found.ratio_u:.2f} times that of the law, and the residuals fall from "
+            f"effect is {found.ratio:.3f} +- {found.ratio_u:.3f} times that of the law, and the residuals fall from "
             f"{before:.1f} to {after:.1f} % (by the law {quick:.1f} %)."
         )
     return replace(d, simulated=found, verdict=replace(d.verdict, text=" ".join(words), model=model))
