@@ -115,6 +115,8 @@ def test_the_verdict_says_what_holds_of_each_guess_and_accounts_for_every_mechan
     assert v.gain is not None
     assert v.gain.held_out == "samples"
     assert {m.sample for m in v.misfits} >= {"Sy"}
+    told = v.as_dict()["model"]["readings"]
+    assert [r["outcome"] for r in told] == [o.outcome for o in whole.outlooks]
 
 
 @pytest.mark.parametrize("name", list(PUBLISHED_FIGURES))

@@ -36,8 +36,18 @@ def verdict_of(outlooks: Sequence[Outlook], gain: Gain) -> Verdict:
         gain=gain if main.outcome != "no_misfit" else None,
         next_test=_next_test(),
         text=" ".join([misfit_sentence(outlooks), *guess_sentences(outlooks), extension_sentence(main, best, gain)]),
-        smallest_effects={},
+        model={"shares_from": "the numerical column of Table 2", "readings": [reading_record(o) for o in outlooks]},
     )
+
+
+def reading_record(o: Outlook) -> dict[str, object]:
+    """One reading in plain values: what was assumed, and what came out."""
+    return {
+        "model": o.reading.model, "correlation": o.reading.correlation, "correlation_is": o.reading.why,
+        "standard_deviations_of": "a mean" if o.reading.specimens == 1 else f"{o.reading.specimens} specimens",
+        "outcome": o.outcome, "p_misfit": o.p_misfit, "best": o.weighed[0].name, "gain_of_best": o.weighed[0].gain,
+        "p_left": o.p_left,
+    }  # fmt: skip
 
 
 def misfits(outlook: Outlook) -> list[Misfit]:
