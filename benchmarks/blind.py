@@ -46,7 +46,7 @@ LADDER: dict[str, dict[str, Any]] = {
     "sampling_clip": {"speeds_mm_s": SPEEDS}, "contact_ageing": {"holds_s": HOLDS},
 }  # fmt: skip
 # what no design of this kind can show: the flat law takes it up, it does not touch the forces, or (a slow recorder)
-# the reader already puts back what the peak lost; in sixteen campaigns down to two samples a second one was noticed
+# the reader already puts back what the peak lost: of sixteen campaigns down to two samples a second, two were noticed
 HIDDEN_FROM_ALL = ("pull_angle", "pulley_friction", "machine_compliance", "sampling_clip")
 ALL_OR_NOTHING = ("mislabelled_specimen",)
 ON_ENGINE = (
