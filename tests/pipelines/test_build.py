@@ -86,6 +86,7 @@ class Story:
     mixed: Round
     added: Round
     again: Round
+    restored: Round
 
 
 def rows(campaign: Path) -> list[dict[str, str]]:
@@ -136,7 +137,9 @@ def story(tmp_path_factory: pytest.TempPathFactory) -> Story:
     added = lab.build()
     for file in lab.drop.rglob("*"):
         os.utime(file, (1.7e9, 1.7e9))
-    return Story(lab, killed, resumed, refused, idle, mixed, added, lab.build())
+    again = lab.build()
+    (lab.site / "current" / "a" / "report.html").unlink()
+    return Story(lab, killed, resumed, refused, idle, mixed, added, again, lab.build())
 
 
 def touched(before: dict[str, bytes], after: dict[str, bytes]) -> set[str]:
@@ -213,8 +216,14 @@ def test_new_dates_on_the_same_contents_build_nothing(story: Story) -> None:
     assert (story.again.said["steps"], story.again.after) == ([], story.added.after)
 
 
+def test_a_report_that_was_deleted_is_made_again_from_what_is_there(story: Story) -> None:
+    assert story.restored.said["due"] == {"a": "its report.html is gone"}
+    assert [step.split(":")[0] for step in story.restored.said["steps"]] == ["report (a)", "index"]
+    assert "current/a/report.html" in story.restored.after
+
+
 def test_each_build_that_changed_something_is_kept_by_its_date(story: Story) -> None:
-    made = [Path(r.said["dated"]) for r in (story.resumed, story.mixed, story.added)]
+    made = [Path(r.said["dated"]) for r in (story.resumed, story.mixed, story.added, story.restored)]
     assert sorted(p.name for p in (story.lab.site / "builds").iterdir()) == [p.name for p in made]
     assert (story.lab.site / "latest").resolve() == made[-1].resolve()
 

@@ -29,6 +29,7 @@ from tribo.report.files import write_text
 
 STATE = ".tribo"
 CURRENT = "current"
+GONE = "its report.html is gone"
 PROFILES = ("local", "slurm")
 _BLOCKS = re.compile(r"(?m)^(?=\[|\s*$)")  # Snakemake says one thing after a blank line or a date in brackets
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -122,6 +123,9 @@ def _built(drop: Path, state: Path, options: BuildOptions, *, dry_run: bool, des
     if dry_run:
         said = _snakemake(state, config, options, ("--dry-run",), None)
         return Built(state.parent, due, waiting, steps=tuple(planned_steps(said.stdout)))
+    for name, why in due.items():
+        if why == GONE:
+            (state / "steps" / name / "report.json").unlink()
     said = _snakemake(state, config, options, (), descriptor)
     write_text(state / "log" / "snakemake.log", said.stdout)
     dated = date_build(state.parent, options.keep)
@@ -140,8 +144,14 @@ def _why_due(campaign: Dropped, state: Path, options: BuildOptions) -> str:
     changed = difference(record["files"], campaign.files)
     if changed:
         return changed
+    if _report_is_gone(campaign.name, record, state):
+        return GONE
     same = record["digest"] == step_digest(campaign.digest, options)
     return "" if same else "other options or another version of tribo"
+
+
+def _report_is_gone(name: str, record: Mapping[str, Any], state: Path) -> bool:
+    return record["status"] != "unusable" and not (state.parent / CURRENT / name / "report.html").is_file()
 
 
 def step_digest(digest: str, options: BuildOptions) -> str:

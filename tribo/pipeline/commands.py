@@ -63,7 +63,7 @@ def _words(built: Built, dry_run: bool) -> str:
     if dry_run:
         lines += [f"  {step}" for step in built.steps]
     if not built.due:
-        lines.append("nothing changed; no report to build")
+        lines.append("no campaign changed" if built.steps else "nothing changed, nothing to build")
     if not dry_run:
         lines.append(f"open {built.dated or built.site / 'latest'}/index.html")
     return "\n".join(lines)
