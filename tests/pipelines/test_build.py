@@ -86,6 +86,7 @@ class Story:
     mixed: Round
     added: Round
     again: Round
+    nothing: Round
     restored: Round
 
 
@@ -137,9 +138,9 @@ def story(tmp_path_factory: pytest.TempPathFactory) -> Story:
     added = lab.build()
     for file in lab.drop.rglob("*"):
         os.utime(file, (1.7e9, 1.7e9))
-    again = lab.build()
+    again, nothing = lab.build(), lab.build("--dry-run")
     (lab.site / "current" / "a" / "report.html").unlink()
-    return Story(lab, killed, resumed, refused, idle, mixed, added, again, lab.build())
+    return Story(lab, killed, resumed, refused, idle, mixed, added, again, nothing, lab.build())
 
 
 def touched(before: dict[str, bytes], after: dict[str, bytes]) -> set[str]:
@@ -214,6 +215,10 @@ def test_an_added_export_builds_its_campaign_and_no_other(story: Story) -> None:
 
 def test_new_dates_on_the_same_contents_build_nothing(story: Story) -> None:
     assert (story.again.said["steps"], story.again.after) == ([], story.added.after)
+
+
+def test_a_dry_run_with_nothing_to_do_names_no_step(story: Story) -> None:
+    assert (story.nothing.said["steps"], story.nothing.said["due"]) == ([], {})
 
 
 def test_a_report_that_was_deleted_is_made_again_from_what_is_there(story: Story) -> None:

@@ -120,13 +120,11 @@ def _built(drop: Path, state: Path, options: BuildOptions, *, dry_run: bool, des
     waiting = {c.name: c.waiting for c in found if c.waiting}
     target = state / ("dry-run" if dry_run else "inputs")
     config = _configuration(found, target, state, options)
+    forced = _forced(due, state)
     if dry_run:
-        said = _snakemake(state, config, options, ("--dry-run",), None)
+        said = _snakemake(state, config, options, ("--dry-run", *forced), None)
         return Built(state.parent, due, waiting, steps=tuple(planned_steps(said.stdout)))
-    for name, why in due.items():
-        if why == GONE:
-            (state / "steps" / name / "report.json").unlink()
-    said = _snakemake(state, config, options, (), descriptor)
+    said = _snakemake(state, config, options, forced, descriptor)
     write_text(state / "log" / "snakemake.log", said.stdout)
     dated = date_build(state.parent, options.keep)
     if said.returncode:
@@ -148,6 +146,15 @@ def _why_due(campaign: Dropped, state: Path, options: BuildOptions) -> str:
         return GONE
     same = record["digest"] == step_digest(campaign.digest, options)
     return "" if same else "other options or another version of tribo"
+
+
+def _forced(due: Mapping[str, str], state: Path) -> tuple[str, ...]:
+    """Reports that Snakemake would not miss: gone ones, and records lost behind an index that is there."""
+    if not (state / "index.json").is_file():
+        return ()
+    records = {name: f"steps/{name}/report.json" for name in due}
+    lost = [r for name, r in records.items() if due[name] == GONE or not (state / r).is_file()]
+    return ("--forcerun", *lost) if lost else ()
 
 
 def _report_is_gone(name: str, record: Mapping[str, Any], state: Path) -> bool:
@@ -190,7 +197,7 @@ def _inputs(campaign: Dropped, folder: Path) -> dict[str, Any]:
         write_text(file, json.dumps(known, indent=1) + "\n")
     return {
         "path": str(campaign.path), "digest": campaign.digest, "samples": known["samples"], "cells": known["cells"],
-        "files": str(file.relative_to(folder.parent)),
+        "files": f"inputs/{campaign.name}.json",
         "overrides": shlex.join(["--overrides", str(campaign.overrides)]) if campaign.overrides else "",
     }  # fmt: skip
 
@@ -248,6 +255,8 @@ def _plain_reason(reason: str) -> str:
     """Snakemake's reason in fewer words."""
     if reason.startswith("Params have changed"):
         return "its inputs, by content, or its options changed"
+    if reason.startswith("Forced execution"):
+        return "its report is not there"
     if reason.startswith("Missing output files"):
         return "never finished before"
     if reason.startswith("Input files updated by another job"):
