@@ -41,7 +41,7 @@ def blocks(known: pd.DataFrame) -> Iterator[dict[str, object]]:
 
 def mesh(known: pd.DataFrame) -> Iterator[dict[str, object]]:
     """One row a run."""
-    for sample in ("B", "C", "A", "F", "Sx", "Sy"):
+    for sample in ("B", "A", "F", "C", "Sx", "Sy"):
         for spacing_um, shape in MESHES:
             if shape == "round" and sample in ("F", "A", "Sx", "Sy"):
                 continue  # nothing round, or two blocks across, which is the square again
@@ -103,7 +103,7 @@ def figures(data: Path, out: Path) -> None:
 
     out.mkdir(parents=True, exist_ok=True)
     for name, draw in (("size", draw_sizes), ("mesh", draw_meshes)):
-        figure = Figure(figsize=(6.4, 3.8), layout="constrained")
+        figure = Figure(figsize=(6.4, 4.0), layout="constrained")
         FigureCanvasSVG(figure)
         draw(figure, data)
         figure.savefig(out / f"simulator-{name}.svg", metadata={"Date": None})
@@ -114,7 +114,7 @@ def draw_sizes(figure: object, data: Path) -> None:
     table = by_size(pd.read_csv(data / "simulator-blocks.csv"))
     axes = figure.add_subplot()
     n = np.geomspace(table["blocks_a_side"].min(), table["blocks_a_side"].max(), 60)
-    axes.plot(n, [PAPER.mu_s + PAPER.mu_s_sd * expected_minimum(int(k) ** 2) for k in n], color="0.5",
+    axes.plot(n, [PAPER.mu_s + PAPER.mu_s_sd * expected_minimum(round(k * k)) for k in n], color="0.5",
               label="expected minimum of n Gaussian numbers")  # fmt: skip
     axes.errorbar(table["blocks_a_side"], table["mean"], 2 * table["sem"], fmt="o", ms=4, capsize=3,
                   label="simulated, mean and two standard errors")  # fmt: skip
@@ -140,7 +140,7 @@ def draw_meshes(figure: object, data: Path) -> None:
         axes.set(ylabel=f"{regime} T/N", yscale="log")
         axes.yaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_minor_formatter("{x:g}")
-    axes.legend(frameon=False, fontsize=7)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=8)
 
 
 if __name__ == "__main__":
