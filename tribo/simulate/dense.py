@@ -19,7 +19,7 @@ from tribo.simulate import kernels as k
 from tribo.simulate.friction import sliding_threshold, static_threshold
 from tribo.simulate.jit import compiled, vectorised, widest_vectors
 from tribo.simulate.kernels import CODE, DENSE_STEPS, RUNNING, STEP, Numerics, Samples, State, observe
-from tribo.simulate.lattice import INNER, Lattice
+from tribo.simulate.lattice import INNER, OFFSETS, Lattice
 
 # rows of Field.planes: m v / dt and its amount (zero at rest), thresholds, time of the last stop
 PX, PY, PACE, FS, FD, SINCE, PLANES = range(7)
@@ -45,6 +45,7 @@ class Field(NamedTuple):
     planes: FloatArray  # (PLANES, places)
     edge: NDArray[np.int64]  # (m,) places of the blocks at free edges
     spare: FloatArray  # (m, 3) N/m: own stiffness (xx, yy, xy) that these lack against an inner block
+    there: FloatArray  # (places,) 1 where a spring may end: on blocks and, with periodic edges, on their copies
     follow: float  # m a step: what the quasi-static motion adds to the sum of displacements along the pull
     pull_x: float  # N/s: rate of the slider's pull on every block
     pull_y: float
@@ -74,10 +75,14 @@ def field_of(state: State, numerics: Numerics, lattice: Lattice, follow: FloatAr
     inner = numerics.stiffness * np.add(INNER, (lattice.shear, lattice.shear, 0.0))
     spare = inner - cells[:, k.KXX : k.KXY + 1]
     edge = np.flatnonzero(np.abs(spare).max(axis=1) > 1e-9 * numerics.stiffness)
+    there = _aligned(1, layout.places)[0]
+    there[inside] = 1.0
+    if lattice.periodic:
+        wrap(there, layout, lattice.nx, lattice.ny)
     direction = np.array([numerics.direction_x, numerics.direction_y])
     pull = numerics.shear_stiffness * numerics.speed * direction
     along = numerics.dt * float((follow @ direction).sum())
-    return Field(layout, positions, planes, inside[edge], spare[edge], along, float(pull[0]), float(pull[1]))
+    return Field(layout, positions, planes, inside[edge], spare[edge], there, along, *map(float, pull))
 
 
 def _aligned(rows: int, places: int) -> FloatArray:
@@ -144,12 +149,15 @@ def integrate(f: Field, s: State, out: Samples, c: Numerics, until_step: int) ->
             wrap(x, f.layout, c.nx, c.ny)
             wrap(y, f.layout, c.nx, c.ny)
         t = c.start + s.counts[STEP] * c.dt
-        pushed(
-            x[first + width - 1 :], x[first - 1 : last + 1], x[first - width - 1 : last - width + 1],
-            y[first + width - 1 :], y[first - 1 : last + 1], y[first - width - 1 : last - width + 1],
-            p_x, p_y, 0.25 * c.stiffness, own, 1.0 - c.damping * c.dt, f.pull_x * t, f.pull_y * t,
-        )  # fmt: skip
-        free_edges(f, x, y)
+        if c.spacing > 0.0:
+            pushed_apart(f, x, y, c, t)
+        else:
+            pushed(
+                x[first + width - 1 :], x[first - 1 : last + 1], x[first - width - 1 : last - width + 1],
+                y[first + width - 1 :], y[first - 1 : last + 1], y[first - width - 1 : last - width + 1],
+                p_x, p_y, 0.25 * c.stiffness, own, 1.0 - c.damping * c.dt, f.pull_x * t, f.pull_y * t,
+            )  # fmt: skip
+            free_edges(f, x, y)
         sum_x, sum_y, squares, work = rubbed(
             x[first:last], y[first:last], f.positions[after, first:last], f.positions[after + 1, first:last],
             p_x, p_y, pace, fs, fd, since, t, way, c.dt / c.mass, c.law,
@@ -167,6 +175,27 @@ def integrate(f: Field, s: State, out: Samples, c: Numerics, until_step: int) ->
         if check and active < c.dense_above // 2:
             break
     return swapped
+
+
+@compiled
+def pushed_apart(f: Field, x: FloatArray, y: FloatArray, c: Numerics, t: float) -> None:
+    """As :func:`pushed` and :func:`free_edges`, with springs that turn with their ends (the full r_ij of the paper)."""
+    keep = 1.0 - c.damping * c.dt
+    for i in range(f.layout.first, f.layout.last):
+        force_x = f.pull_x * t - c.shear_stiffness * x[i]
+        force_y = f.pull_y * t - c.shear_stiffness * y[i]
+        for column, row in OFFSETS:
+            j = i + row * f.layout.width + column
+            long = column * row != 0
+            rest = c.spacing * (math.sqrt(2.0) if long else 1.0)
+            r_x = c.spacing * column + x[j] - x[i]
+            r_y = c.spacing * row + y[j] - y[i]
+            r = math.sqrt(r_x * r_x + r_y * r_y)
+            pull = f.there[j] * c.stiffness * (0.5 if long else 1.0) * (r - rest) / r
+            force_x += pull * r_x
+            force_y += pull * r_y
+        f.planes[PX, i] = keep * f.planes[PX, i] + f.there[i] * force_x
+        f.planes[PY, i] = keep * f.planes[PY, i] + f.there[i] * force_y
 
 
 @compiled

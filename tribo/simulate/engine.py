@@ -170,6 +170,7 @@ def _numerics(
         nx=lattice.nx,
         ny=lattice.ny,
         periodic=lattice.periodic,
+        spacing=config.spacing_m if config.rotation == "finite" else 0.0,
         start=start,
         dt=config.dt_s,
         stiffness=config.stiffness_N_m,

@@ -67,6 +67,7 @@ class Numerics(NamedTuple):
     nx: int
     ny: int
     periodic: bool
+    spacing: float  # l for springs of finite rotation, 0 for linear ones
     start: float  # time of step 0
     dt: float
     stiffness: float  # K_int
