@@ -9,9 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tribo.errors import Problem
 from tribo.records import Study
 from tribo.report.embedded import figure_data, trace_data
 from tribo.report.hover import Series
+from tribo.report.pulls import trace_picture
 
 
 def unpacked(record: dict[str, object]) -> np.ndarray:
@@ -40,6 +42,22 @@ def test_a_long_trace_is_thinned_without_losing_its_extremes(study: Study) -> No
     assert len(values) <= 1002
     assert record["whole"] is False
     assert values.max() == pytest.approx(9.0 - study.ingested.pulls["T0001"].zero_N, abs=1e-3)
+
+
+def test_every_doubt_about_a_sample_is_shown_at_its_time(study: Study) -> None:
+    """On the picture of the card and in the data of the chart, said once; one about no sample is not."""
+    trace, pull = study.ingested.traces["T0001"], study.ingested.pulls["T0001"]
+    gap = Problem("nan_gap", "the force is missing", row=trace.first_row + 30)
+    about_none = Problem("off_speed", "the travel is off its speed")
+    doubted = replace(trace, problems=(gap, about_none))
+    ingested = replace(study.ingested, traces={**study.ingested.traces, "T0001": doubted})
+    both = replace(pull, problems=(gap,))
+    ingested = replace(ingested, pulls={**ingested.pulls, "T0001": both})
+    record = json.loads(trace_data(replace(study, ingested=ingested), ["T0001"]))["T0001"]
+    [[time_s, what]] = record["doubts"]
+    assert (time_s, what) == (pytest.approx(trace.time_s[30], rel=1e-5), "the force is missing")
+    assert trace_picture(doubted, both).count('class="d"') == 1
+    assert 'class="d"' not in trace_picture(trace, pull)
 
 
 def test_no_name_can_end_the_script_element() -> None:

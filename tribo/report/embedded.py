@@ -14,7 +14,7 @@ from markupsafe import Markup
 from tribo.figures import select
 from tribo.records import FloatArray, Pull, Study, Trace
 from tribo.report.hover import Series
-from tribo.report.pulls import reading
+from tribo.report.pulls import doubted_s, reading
 
 TRACE_BYTES = 2_000_000  # all traces together
 FULL_SCALE = 65535
@@ -30,6 +30,9 @@ def trace_data(study: Study, test_ids: Iterable[str]) -> Markup:
 def _pull_record(study: Study, test_id: str, points: int) -> dict[str, Any]:
     pull, trace, decided = reading(study, test_id)
     record = _trace_record(trace, pull, points) | _marks(pull)
+    doubts = doubted_s(trace, pull)
+    if doubts:
+        record["doubts"] = [[_short(time), "; ".join(what)] for time, what in doubts.items()]
     if decided is not None:
         override = decided.override
         record["automatic"] = _marks(decided.automatic)

@@ -55,6 +55,17 @@ def pull_cards(study: Study) -> list[PullCard]:
     return sorted(cards, key=lambda card: (-card.oddness, card.test_id))
 
 
+def doubted_s(trace: Trace, pull: Pull) -> dict[float, tuple[str, ...]]:
+    """Times of the samples that somebody should look at, in s, each with what was found there."""
+    found: dict[float, tuple[str, ...]] = {}
+    for problem in dict.fromkeys((*trace.problems, *pull.problems)):
+        sample = -1 if problem.row is None else problem.row - trace.first_row
+        if 0 <= sample < len(trace.time_s) and math.isfinite(trace.time_s[sample]):
+            time = float(trace.time_s[sample])
+            found[time] = (*found.get(time, ()), problem.what)
+    return dict(sorted(found.items()))
+
+
 def load_labels(study: Study) -> dict[str, str]:
     """The load level of every test in newton, as it is filtered by."""
     tests = study.ingested.campaign.tests
@@ -97,7 +108,10 @@ def _card(study: Study, test: Test, load: str, standing: OddPull | None, points:
 
 
 def trace_picture(trace: Trace, pull: Pull, points: int = 120) -> Markup:
-    """A small SVG of a trace, its zero subtracted: a line at zero, a shaded window with its mean, a dot at the peak."""
+    """A small SVG of a trace, its zero subtracted: a line at zero, a shaded window with its mean, a dot at the peak.
+
+    Notches from above point at samples with a doubt.
+    """
     time, force = select.thin_trace(trace.time_s, trace.force_N - pull.zero_N, points)
     time, force = time[np.isfinite(force)], force[np.isfinite(force)]
     if len(force) < 2 or time[-1] <= time[0]:
@@ -119,5 +133,7 @@ def trace_picture(trace: Trace, pull: Pull, points: int = 120) -> Markup:
         marks += f'<path class="w" d="M{start:.0f} {y(pull.sliding_N):.1f}H{end:.0f}"/>'
     if math.isfinite(pull.peak_s) and math.isfinite(pull.static_N):
         marks += f'<circle class="k" cx="{x(pull.peak_s):.0f}" cy="{y(pull.static_N):.1f}" r="2.6"/>'
+    doubts = "".join(f"M{x(t):.0f} 0v7" for t in doubted_s(trace, pull))
+    marks += f'<path class="d" d="{doubts}"/>' if doubts else ""
     view = f'viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}"'
     return Markup(f'<svg class="trace" aria-hidden="true" {view}>{marks}</svg>')

@@ -128,7 +128,8 @@
       `Read by the rule: static ${number(automatic(record).peak[1])} N at ${number(automatic(record).peak[0])} s, ` +
       `sliding ${number(automatic(record).sliding)} N from ${number(automatic(record).window[0])} to ` +
       `${number(automatic(record).window[1])} s; zero ${number(automatic(record).zero, 3)} N.` +
-      (card.dataset.flags ? ` Flags: ${card.dataset.flags.replaceAll("_", " ").split(" ").join(" ")}.` : "");
+      (card.dataset.flags ? ` Flags: ${card.dataset.flags.split(" ").join(", ").replaceAll("_", " ")}.` : "") +
+      (record.doubts || []).map(([time, what]) => ` At ${number(time)} s: ${what}.`).join("");
     if (!dialog.open) dialog.showModal();
     fill();
     draw();
@@ -273,6 +274,11 @@
     svg.append(make("path", { class: out ? "trace out" : "trace", d: path }));
     const mean = now.start === null ? null : meanOver(now.start, now.end);
     if (mean !== null) svg.append(make("line", { class: "mean", x1: inView(now.start), x2: inView(now.end), y1: s.y(mean), y2: s.y(mean) }));
+    for (const [time, what] of current.record.doubts || []) {
+      if (time < view[0] || time > view[1]) continue;
+      const px = s.x(time);
+      svg.append(make("path", { class: "doubt", d: `M${px - 5} ${s.top}h10l-5 9z` }, make("title", {}, `${number(time)} s: ${what}`)));
+    }
     const cross = make("line", { class: "cross", y1: s.top, y2: s.bottom, visibility: "hidden" });
     svg.append(cross);
     handle(svg, s, "start", "Start of the sliding window", now.start);
