@@ -72,3 +72,12 @@ def test_the_slope_before_contact_comes_from_the_trace() -> None:
     o = observe(replace(ingested, traces=traces, pulls=pulls))
     assert o.zero_slope_N_per_s == pytest.approx(0.01)
     assert o.conditions.clip_N == pytest.approx(0.5 * 1.2 * 0.01)
+
+
+def test_a_drift_that_rests_overnight_is_still_a_drift() -> None:
+    """The zero follows the hours at the bench, not those of the clock; the offset it leaves is not one of its own."""
+    o = observe(hidden(("load_cell_drift", 0.12), seed=4))
+    drift = zero_drift(o)
+    assert drift is not None
+    assert drift.certain
+    assert drift.change == pytest.approx(0.15 * 0.12, rel=0.2)

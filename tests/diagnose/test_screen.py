@@ -73,3 +73,12 @@ def test_a_p_value_beyond_all_replicates_is_small_and_finite() -> None:
     found = screen(f, looks, replicates=30, rng=np.random.default_rng(2))
     assert 0.0 < found.p_adjusted() < 1e-3
     assert found.p_adjusted(0.0) == 1.0
+
+
+def test_a_stretch_of_the_series_that_differs_is_found_as_such() -> None:
+    """Another counterface for a third of the series: the strongest look is one at a stretch of the run order."""
+    f = baseline(("outside:counterface", 2.0))
+    looks = all_looks(f)
+    strongest = looks[int(screen(f, looks, replicates=0, rng=np.random.default_rng(0)).strength.argmax())]
+    assert strongest.kind == "block"
+    assert strongest.covariate.startswith("run_order, from")

@@ -48,9 +48,24 @@ def zero_drift(o: Observations) -> Evidence | None:
 
 
 def _drift_across(o: Observations) -> Evidence | None:
+    """Over the hours of the clock, or those at the bench (nights left out), whichever the zero follows more surely."""
+    clocks = (o.conditions.elapsed_s / 3600.0, _bench_hours(o.conditions.elapsed_s))
+    found = [e for e in (_drift_along(o, hours) for hours in clocks) if e is not None]
+    return max(found, key=lambda e: abs(e.value) / e.standard_error, default=None)
+
+
+def _bench_hours(elapsed_s: FloatArray) -> FloatArray:
+    """Hours since the first pull, no pause counted for more than five times the usual one."""
+    order = np.argsort(elapsed_s)
+    gaps = np.diff(elapsed_s[order], prepend=elapsed_s[order[0]])
+    hours = np.empty_like(elapsed_s)
+    hours[order] = np.cumsum(np.minimum(gaps, 5.0 * np.median(gaps))) / 3600.0
+    return hours
+
+
+def _drift_along(o: Observations, hours: FloatArray) -> Evidence | None:
     from scipy.stats import theilslopes
 
-    hours = o.conditions.elapsed_s / 3600.0
     good = np.isfinite(o.zero_N) & np.isfinite(hours)
     if good.sum() < 10 or np.ptp(hours[good]) <= 0:
         return None

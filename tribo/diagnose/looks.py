@@ -13,6 +13,7 @@ from tribo.records import FloatArray
 
 OBSERVABLES = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (1.0, 1.0), "drop": (1.0, -1.0)}
 BINS = 6
+TENTHS = 10
 CYCLES = 24  # periods down to a twenty-fourth of the series
 
 
@@ -20,7 +21,7 @@ CYCLES = 24  # periods down to a twenty-fourth of the series
 class Look:
     """One look: which observable against which covariate, and the columns (n, 2, d) it would follow."""
 
-    kind: str  # mechanism, trend, shape, level, sample, specimen, period
+    kind: str  # mechanism, trend, shape, level, sample, specimen, period, block
     observable: str
     covariate: str
     sample: str
@@ -35,7 +36,7 @@ class Look:
 def all_looks(f: ModelFit) -> list[Look]:
     """Every look that this design allows, given the fitted model (its own mechanisms left out)."""
     s = f.setup
-    looks = [*_mechanisms(f), *_covariates(s), *_levels(s), *_samples(s), *_specimens(s), *_periods(s)]
+    looks = [*_mechanisms(f), *_covariates(s), *_levels(s), *_samples(s), *_specimens(s), *_periods(s), *_blocks(s)]
     return [look for look in looks if np.isfinite(look.columns).all() and np.ptp(look.columns) > 0]
 
 
@@ -158,6 +159,20 @@ def _periods(s: Setup) -> Iterator[Look]:
     if np.isfinite(hours).all() and np.ptp(hours) > 2:
         for k in (1, 2, 3):
             yield Look("period", "both", "time of day", "", _spread(_wave(k * hours / 24.0), "both"))
+
+
+def _blocks(s: Setup) -> Iterator[Look]:
+    """Stretches of the series in which something else may have been mounted: runs of successive tenths, up to half."""
+    order = s.observations.conditions.run_order
+    if not np.isfinite(order).all() or s.observations.n < 3 * TENTHS:
+        return
+    rank = np.argsort(np.argsort(order))
+    tenth = (rank * TENTHS) // s.observations.n
+    for first in range(TENTHS):
+        for last in range(first + 1, min(first + TENTHS // 2, TENTHS)):
+            inside = ((tenth >= first) & (tenth <= last)).astype(float)
+            where = f"run_order, from {order[inside > 0].min():.0f} to {order[inside > 0].max():.0f}"
+            yield Look("block", "both", where, "", _spread(inside[:, None], "both"))
 
 
 def _wave(turns: FloatArray) -> FloatArray:

@@ -69,6 +69,8 @@ def _shape(look: Look, coefficients: np.ndarray) -> str:
         return ", rising" if coefficients[0] > 0 else ", falling"
     if look.kind == "period":
         return ", as a wave"
+    if look.kind == "block":
+        return ", higher there" if coefficients[0] > 0 else ", lower there"
     if look.kind == "shape":
         steps = np.diff(np.concatenate([[0.0], coefficients]))
         if np.all(steps > 0):
