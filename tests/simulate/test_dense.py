@@ -109,7 +109,7 @@ def test_all_blocks_at_once_are_the_plain_step(sample: str, edges: str, terms: F
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 instructions")
 @pytest.mark.parametrize("loop", [dense.pushed, dense.rubbed])
 def test_loops_over_all_blocks_use_vector_instructions(loop):
-    """Without the promise that arrays do not overlap the compiler falls back to one block at a time."""
+    """Were sums not allowed to be reordered, or a branch to creep in, one block would be done at a time."""
     array, number = types.float64[::1], types.float64
     arrays = 8 if loop is dense.pushed else 10
     rest = (number,) * 5 if loop is dense.pushed else (number, number, number, types.none)
