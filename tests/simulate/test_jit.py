@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -47,3 +49,20 @@ def test_a_start_marks_its_directory_as_used(tmp_path: Path, monkeypatch: pytest
     os.utime(folder, (long_ago, long_ago))
     assert fresh() == folder
     assert time.time() - folder.stat().st_mtime < 3600
+
+
+RUN = """
+from tribo.simulate import SimConfig, simulate
+run = simulate(SimConfig(sample="B", blocks=(24, 24), engine="dense", seed=2))
+print(run.sliding_friction.hex(), run.static_friction.hex())
+"""
+
+
+def test_a_start_that_finds_nothing_compiled_gives_the_bits_of_the_next(tmp_path: Path):
+    """Whoever compiles must not link the loops otherwise than those who load them."""
+    environment = {**os.environ, "TRIBO_CACHE_DIR": str(tmp_path)}
+    first, second = (
+        subprocess.run([sys.executable, "-c", RUN], env=environment, capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    )
+    assert first == second != ""

@@ -10,6 +10,8 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -43,6 +45,25 @@ def cache_directory() -> Path:
         except OSError:
             continue
     return Path(tempfile.mkdtemp(prefix=name))
+
+
+_COMPILING = "TRIBO_COMPILING"
+_COMPILE = "from tribo.simulate.engine import compile_all; compile_all()"
+
+
+@lru_cache(maxsize=1)
+def compile_apart() -> None:
+    """Have another process fill an empty cache, so that every run loads the same code and gives the same bits.
+
+    A process that compiles a loop itself links it otherwise than one that loads it, and the order of its sums differs.
+    """
+    folder = cache_directory()
+    done = folder / "compiled"
+    if done.exists() or _COMPILING in os.environ:
+        return
+    environment = {**os.environ, _COMPILING: "1", "TRIBO_CACHE_DIR": str(folder.parent)}
+    if subprocess.run([sys.executable, "-c", _COMPILE], env=environment, capture_output=True).returncode == 0:
+        done.touch()
 
 
 def remove_unused(base: Path, days: float = UNUSED_DAYS) -> None:
