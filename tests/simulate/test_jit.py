@@ -58,11 +58,19 @@ print(run.sliding_friction.hex(), run.static_friction.hex())
 """
 
 
-def test_a_start_that_finds_nothing_compiled_gives_the_bits_of_the_next(tmp_path: Path):
-    """Whoever compiles must not link the loops otherwise than those who load them."""
+LOOP_BY_ITSELF = """
+import numpy as np
+from tribo.simulate import dense
+block = [np.zeros(8) for _ in range(10)]
+dense.rubbed(*block, 0.0, 1.0, 1.0, None)
+"""
+
+
+def test_all_starts_give_the_same_bits(tmp_path: Path):
+    """One that compiles, one that loads what was compiled, and one that has called an inner loop by itself before."""
     environment = {**os.environ, "TRIBO_CACHE_DIR": str(tmp_path)}
-    first, second = (
-        subprocess.run([sys.executable, "-c", RUN], env=environment, capture_output=True, text=True, check=True).stdout
-        for _ in range(2)
+    compiles, loads, called = (
+        subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True).stdout
+        for code in (RUN, RUN, LOOP_BY_ITSELF + RUN)
     )
-    assert first == second != ""
+    assert compiles == loads == called != ""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tribo.records import FloatArray
 from tribo.simulate import kernels as k
 from tribo.simulate.friction import sliding_threshold, static_threshold
-from tribo.simulate.jit import compiled, vectorised, widest_vectors
+from tribo.simulate.jit import compiled, copied_into_callers, vectorised, widest_vectors
 from tribo.simulate.kernels import CODE, DENSE_STEPS, RUNNING, STEP, Numerics, Samples, State, observe
 from tribo.simulate.lattice import INNER, OFFSETS, Lattice
 
@@ -44,7 +44,7 @@ class Field(NamedTuple):
     positions: FloatArray  # (4, places): x and y displacement before and after a step, in turns
     planes: FloatArray  # (PLANES, places)
     edge: NDArray[np.int64]  # (m,) places of the blocks at free edges
-    spare: FloatArray  # (m, 3) N/m: own stiffness (xx, yy, xy) that these lack against an inner block
+    spare: FloatArray  # (3, m) N/m: own stiffness (xx, yy, xy) that these lack against an inner block
     there: FloatArray  # (places,) 1 where a spring may end: on blocks and, with periodic edges, on their copies
     follow: float  # m a step: what the quasi-static motion adds to the sum of displacements along the pull
     pull_x: float  # N/s: rate of the slider's pull on every block
@@ -75,6 +75,7 @@ def field_of(state: State, numerics: Numerics, lattice: Lattice, follow: FloatAr
     inner = numerics.stiffness * np.add(INNER, (lattice.shear, lattice.shear, 0.0))
     spare = inner - cells[:, k.KXX : k.KXY + 1]
     edge = np.flatnonzero(np.abs(spare).max(axis=1) > 1e-9 * numerics.stiffness)
+    spare = np.ascontiguousarray(spare[edge].T)
     there = _aligned(1, layout.places)[0]
     there[inside] = 1.0
     if lattice.periodic:
@@ -82,7 +83,7 @@ def field_of(state: State, numerics: Numerics, lattice: Lattice, follow: FloatAr
     direction = np.array([numerics.direction_x, numerics.direction_y])
     pull = numerics.shear_stiffness * numerics.speed * direction
     along = numerics.dt * float((follow @ direction).sum())
-    return Field(layout, positions, planes, inside[edge], spare[edge], there, along, *map(float, pull))
+    return Field(layout, positions, planes, inside[edge], spare, there, along, *map(float, pull))
 
 
 def _aligned(rows: int, places: int) -> FloatArray:
@@ -135,6 +136,7 @@ def integrate(f: Field, s: State, out: Samples, c: Numerics, until_step: int) ->
 
     True if the newest positions are the second two rows.
     """
+    widest_vectors()
     swapped = False
     first, last, width = f.layout.first, f.layout.last, f.layout.width
     p_x, p_y, pace = f.planes[PX, first:last], f.planes[PY, first:last], f.planes[PACE, first:last]
@@ -201,10 +203,12 @@ def pushed_apart(f: Field, x: FloatArray, y: FloatArray, c: Numerics, t: float) 
 @compiled
 def free_edges(f: Field, x: FloatArray, y: FloatArray) -> None:
     """Take back what :func:`pushed` has of springs that are not there."""
+    p_x, p_y = f.planes[PX], f.planes[PY]
+    own_x, own_y, across = f.spare[0], f.spare[1], f.spare[2]
     for m in range(len(f.edge)):
-        i = f.edge[m]
-        f.planes[PX, i] += f.spare[m, 0] * x[i] + f.spare[m, 2] * y[i]
-        f.planes[PY, i] += f.spare[m, 2] * x[i] + f.spare[m, 1] * y[i]
+        i = np.uint64(f.edge[m])
+        p_x[i] += own_x[m] * x[i] + across[m] * y[i]
+        p_y[i] += across[m] * x[i] + own_y[m] * y[i]
 
 
 @compiled
@@ -242,6 +246,7 @@ def pushed(
     block against all its springs in units of that.
     """
     widest_vectors()
+    copied_into_callers()
     for i in range(len(p_x)):
         rising = x_up[i + 2] + y_up[i + 2] + x_down[i] + y_down[i]
         falling = x_up[i] - y_up[i] + x_down[i + 2] - y_down[i + 2]
@@ -274,6 +279,7 @@ def rubbed(
     into a speed. Returns the sums of p_x, p_y, p2 and |p| times friction.
     """
     widest_vectors()
+    copied_into_callers()
     sum_x = 0.0
     sum_y = 0.0
     squares = 0.0
@@ -315,6 +321,8 @@ def rubbed(
 @vectorised
 def count_moving(pace: FloatArray, fs: FloatArray, rest: float) -> tuple[int, int]:
     """Contact blocks that move, and with them the cavity blocks faster than ``rest``."""
+    widest_vectors()
+    copied_into_callers()
     contacts = 0
     active = 0
     for i in range(len(pace)):

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from tribo.errors import Problem, SimulationError
 from tribo.records import FloatArray
 from tribo.simulate import kernels as k
-from tribo.simulate.config import FrictionTerms, SimConfig, mask_of
+from tribo.simulate.config import SimConfig, mask_of
 from tribo.simulate.dense import advance_dense
 from tribo.simulate.friction import packed
-from tribo.simulate.jit import compile_apart
 from tribo.simulate.lattice import Lattice, make_lattice
 
 _RING = 1 << 15  # steps the failure queue looks ahead
@@ -125,7 +124,6 @@ def run_fast(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Tra
         A force became non-finite; the message names the block and the time.
     """
     _refuse_thresholds(thresholds, lattice)
-    compile_apart()
     drive = drive_of(config, lattice)
     failure = first_failure_s(lattice, thresholds, drive, config.stiffness_N_m)
     numerics = _numerics(config, lattice, thresholds, drive, failure - 2 * config.dt_s)
@@ -143,15 +141,6 @@ def run_fast(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Tra
         chunks.append(_first(samples, int(state.counts[k.N_SAMPLES])))
     _refuse_not_finite(state, numerics)
     return _trajectory(chunks, state, numerics, drive, failure)
-
-
-def compile_all() -> None:
-    """Run every loop once, with and without friction terms."""
-    for terms in (FrictionTerms(), FrictionTerms(ageing_b=0.01)):
-        for engine in ("fast", "dense"):
-            config = SimConfig(blocks=(12, 12), engine=engine, terms=terms, duration_s=6e-3)
-            lattice = lattice_of(config)
-            run_fast(config, lattice, thresholds_of(config, lattice))
 
 
 def advance(

@@ -10,8 +10,6 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -45,25 +43,6 @@ def cache_directory() -> Path:
         except OSError:
             continue
     return Path(tempfile.mkdtemp(prefix=name))
-
-
-_COMPILING = "TRIBO_COMPILING"
-_COMPILE = "from tribo.simulate.engine import compile_all; compile_all()"
-
-
-@lru_cache(maxsize=1)
-def compile_apart() -> None:
-    """Have another process fill an empty cache, so that every run loads the same code and gives the same bits.
-
-    A process that compiles a loop itself links it otherwise than one that loads it, and the order of its sums differs.
-    """
-    folder = cache_directory()
-    done = folder / "compiled"
-    if done.exists() or _COMPILING in os.environ:
-        return
-    environment = {**os.environ, _COMPILING: "1", "TRIBO_CACHE_DIR": str(folder.parent)}
-    if subprocess.run([sys.executable, "-c", _COMPILE], env=environment, capture_output=True).returncode == 0:
-        done.touch()
 
 
 def remove_unused(base: Path, days: float = UNUSED_DAYS) -> None:
@@ -118,23 +97,26 @@ def vectorised(function: Function) -> Function:
     return _cached(function, **VECTOR_OPTIONS)
 
 
-def _widest_vectors(typing_context: Any) -> Any:
-    """Called first in a function: the compiler may use the widest vectors the processor has (a hint, no-op elsewhere).
+def _attribute(name: str) -> Callable[[], None]:
+    """A call that, compiled, does nothing but give the function it stands in this attribute of LLVM."""
 
-    LLVM keeps to 256 bits on many processors with 512, for fear of their clock rate. The function stays one of its
-    own, since the hint is lost where it is inlined.
-    """
+    def set_on(typing_context: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            set.add(builder.function.attributes, name)  # llvmlite's own add knows no attributes with values
+            return context.get_dummy_value()
 
-    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        attributes = builder.function.attributes
-        attributes.add("noinline")
-        set.add(attributes, '"prefer-vector-width"="512"')  # llvmlite's own add knows no attributes with values
-        return context.get_dummy_value()
+        return types.void(), code
 
-    return types.void(), code
+    return cast(Callable[[], None], cast(Any, intrinsic)(set_on))
 
 
-widest_vectors: Callable[[], None] = cast(Any, intrinsic)(_widest_vectors)
+# The compiler may use the widest vectors the processor has: LLVM keeps to 256 bits on many processors with 512, for
+# fear of their clock rate. Where the function is copied into another, that one needs it too.
+widest_vectors = _attribute('"prefer-vector-width"="512"')
+
+# The function is copied into those that call it. A call would reach whichever of several copies the process loaded
+# first, and these differ in the order of their sums: a process that compiles has others than one that loads.
+copied_into_callers = _attribute("alwaysinline")
 
 
 def _cached(function: Function, **options: Any) -> Function:
