@@ -124,3 +124,11 @@ def test_a_campaign_without_misfit_is_told_what_it_never_varied() -> None:
     v = examine(hidden(seed=8), replicates=(20, 10)).verdict
     assert v.next_test is not None
     assert v.next_test.separates == ("velocity_dependence", "contact_ageing")
+
+
+def test_a_misfit_is_said_in_words_of_the_field_and_not_of_the_flat_sample(tied: Diagnosis) -> None:
+    """C falls with the normal load: suction and a load error both raise it where the load is small."""
+    found = tied.verdict.misfits
+    assert any("of C falls with the normal load" in m.text for m in found)
+    assert not any("normal_load_N" in m.text for m in found)
+    assert not any(m.sample == "F" and m.covariate in ("sample", "normal_load_N") for m in found)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,6 +13,7 @@ from matplotlib.text import Text
 
 from tribo.diagnose import examine
 from tribo.diagnose.diagnosis import Diagnosis
+from tribo.diagnose.fit import fit
 from tribo.figures import extended, misfit, power, residuals
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
 from tribo.figures.style import house_style
@@ -49,11 +52,21 @@ def test_the_heat_map_of_a_campaign_without_effect_marks_nothing(nothing: Diagno
     assert set(cells["observable"]) >= {"both", "static", "sliding", "drop"}
 
 
-def test_a_mean_cell_is_the_mean_residual_of_its_sample(nothing: Diagnosis) -> None:
-    cells = misfit.numbers(nothing)
-    cell = cells[(cells["row"] == "C") & (cells["covariate"] == "mean") & (cells["observable"] == "static")]
-    here = nothing.baseline.setup.observations.conditions.sample == "C"
-    assert cell["effect_percent"].item() == pytest.approx(100 * np.expm1(nothing.baseline.residual[here, 0].mean()))
+def test_the_mean_of_a_pattern_that_rubs_more_is_that_much_higher_and_no_other_is(nothing: Diagnosis) -> None:
+    """The model is calibrated on the flat sample, so what C does changes neither it nor the cells of A and B."""
+    s = nothing.baseline.setup
+    o = s.observations
+    raised = o.log_force + np.log(1.2) * (o.conditions.sample == "C")[:, None]
+    louder = fit(replace(s, observations=replace(o, log_force=raised)))
+    means = [mean_cells(d) for d in (nothing, replace(nothing, baseline=louder))]
+    assert "F" not in means[0].index
+    factor = (1 + means[1] / 100) / (1 + means[0] / 100)
+    assert factor.to_dict() == pytest.approx({s: 1.2 if s == "C" else 1.0 for s in means[0].index}, abs=0.005)
+
+
+def mean_cells(d: Diagnosis) -> pd.Series:
+    cells = misfit.numbers(d)
+    return cells[(cells["covariate"] == "mean") & (cells["observable"] == "static")].set_index("row")["effect_percent"]
 
 
 def test_the_strongest_look_comes_first_with_the_curve_of_the_named_mechanism(temperature: Diagnosis) -> None:

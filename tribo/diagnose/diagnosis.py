@@ -145,12 +145,13 @@ def _verdict(
     level: float,
     rng: np.random.Generator,
 ) -> Verdict:
+    flat = baseline.setup.observations.flat
     direct = [cause_from_evidence(n, e, evidence) for n, e in _certain(evidence).items()]
-    misfits = [m for _, m in direct] + misfits_of(screened, level)
+    misfits = [m for _, m in direct] + misfits_of(screened, level, flat)
     outcome = _outcome(named, bool(direct), level)
     causes = [c for c, _ in direct] + (_causes(named, baseline) if outcome in ("named", "undetermined") else [])
     rest = named is not None and named.causes and outcome == "unknown" and not patterns_apart(misfits)
-    left = misfits_of(named.left, level) if named is not None and rest else []
+    left = misfits_of(named.left, level, flat) if named is not None and rest else []
     smallest = smallest_effects(baseline, screened, level, {e.mechanism for e in barred})
     return Verdict(
         verdict=outcome,

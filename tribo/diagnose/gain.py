@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import gammaln
 
-from tribo.diagnose.fit import fit, jacobian_at
+from tribo.diagnose.fit import fit_without, jacobian_at
 from tribo.diagnose.model import Acting, ModelFit, Setup, predict
 from tribo.diagnose.observations import Observations
 from tribo.diagnose.verdict import Gain
@@ -58,7 +58,7 @@ def _folds(s: Setup, acting: Sequence[Acting]) -> tuple[str, np.ndarray]:
 
 def _held_out(model: ModelFit, out: np.ndarray) -> tuple[FloatArray, FloatArray]:
     """Log density per held-out test and its error in ln T (m, 2), the model fitted to all other tests."""
-    trained = _fit_without(model, out)
+    trained = fit_without(model, out)
     s = model.setup
     residual = s.observations.log_force - predict(s, trained.law, trained.acting, trained.values)
     error = (residual - s.random @ trained.effects)[out]
@@ -72,16 +72,6 @@ def _held_out(model: ModelFit, out: np.ndarray) -> tuple[FloatArray, FloatArray]
     constant = gammaln(tail / 2 + 1) - gammaln(tail / 2) - np.log(np.pi * tail)
     density = constant - 0.5 * np.linalg.slogdet(scale)[1] - (tail / 2 + 1) * np.log1p(distance / tail)
     return density, error
-
-
-def _fit_without(model: ModelFit, out: np.ndarray) -> ModelFit:
-    s, keep = model.setup, ~out
-    fewer = replace(
-        s, observations=s.observations.take(keep), shares=s.shares[keep], random=s.random[keep],
-        log_pressure=s.log_pressure[keep],
-    )  # fmt: skip
-    start = replace(model, setup=fewer, residual=model.residual[keep], weight=model.weight[keep])
-    return fit(fewer, model.acting, start=start, iterations=12)
 
 
 def gain_of_zero(o: Observations, drifting: bool, rng: np.random.Generator) -> Gain | None:

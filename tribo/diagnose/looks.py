@@ -14,6 +14,7 @@ from tribo.records import FloatArray
 OBSERVABLES = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (1.0, 1.0), "drop": (1.0, -1.0)}
 BINS = 6
 TENTHS = 10
+BENT = ", bend"  # what a look at the curve of a sample adds to its column
 CYCLES = 24  # periods down to a twenty-fourth of the series
 
 
@@ -132,7 +133,7 @@ def _samples(s: Setup) -> Iterator[Look]:
         here = (c.sample == sample).astype(float)
         for observable in OBSERVABLES:
             for name, shape in shapes.items():
-                covariate = "sample" if name == "offset" else "normal_load_N"
+                covariate = {"offset": "sample", "slope": "normal_load_N"}.get(name, f"normal_load_N{BENT}")
                 yield Look("sample", observable, covariate, str(sample), _spread((here * shape)[:, None], observable))
 
 

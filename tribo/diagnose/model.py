@@ -8,7 +8,7 @@ estimated from the campaign.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,13 @@ class Setup:
     fixed_sd: FloatArray
     group: NDArray[np.int64]
     log_pressure: FloatArray
+
+    def take(self, keep: NDArray[np.bool_]) -> Setup:
+        """The same for the tests that ``keep`` (n,) marks."""
+        return replace(
+            self, observations=self.observations.take(keep), shares=self.shares[keep], random=self.random[keep],
+            log_pressure=self.log_pressure[keep],
+        )  # fmt: skip
 
     def base(self, law: FloatArray) -> Base:
         """The baseline of every test for the flat law ``law`` = (mu, tau0 kPa) static, then sliding."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from tribo.diagnose.instrument import Evidence
 from tribo.diagnose.interval import intervals
-from tribo.diagnose.looks import OBSERVABLES, Look, candidates
+from tribo.diagnose.looks import BENT, OBSERVABLES, Look, candidates
 from tribo.diagnose.model import ModelFit, predict
 from tribo.diagnose.screen import Screen, beyond_law, cleared
 from tribo.diagnose.verdict import Cause, Estimate, Excluded, Misfit, Outcome
@@ -20,10 +20,19 @@ WHAT = {
     "static": "static friction", "sliding": "sliding friction",
     "both": "static and sliding friction alike", "drop": "the drop from static to sliding",
 }  # fmt: skip
+COLUMN = {
+    "normal_load_N": "the normal load", "speed_mm_s": "the speed", "hold_s": "the hold", "run_order": "the run order",
+    "specimen_run": "how often the specimen was pulled", "started_at": "the time since the first pull",
+    "temperature_C": "the temperature", "humidity_pct": "the humidity", "time of day": "the time of day",
+    "tau0": "the share that adhesion has in it",
+}  # fmt: skip
 
 
-def misfits_of(screened: Screen, level: float) -> list[Misfit]:
-    """The looks that chance does not explain, the strongest first; mechanisms speak for themselves elsewhere."""
+def misfits_of(screened: Screen, level: float, flat: str = "") -> list[Misfit]:
+    """The looks that chance does not explain, the strongest first; mechanisms speak for themselves elsewhere.
+
+    What parts the sample ``flat`` from all others is said of the others: the model is calibrated on it.
+    """
     found: list[Misfit] = []
     order = np.argsort(-screened.strength)
     seen: set[tuple[str, str]] = set()
@@ -33,7 +42,8 @@ def misfits_of(screened: Screen, level: float) -> list[Misfit]:
         key = (_covariate(look), look.sample)
         if p >= level or len(found) >= SHOWN:
             break
-        if look.kind != "mechanism" and key not in seen:
+        calibrated = look.kind == "sample" and look.sample == flat and not look.covariate.endswith(BENT)
+        if look.kind != "mechanism" and not calibrated and key not in seen:
             seen.add(key)
             found.append(_misfit(look, float(screened.size[k]), screened.coefficients[k], p))
     if not found and len(order) and screened.p_adjusted() < level:
@@ -54,32 +64,56 @@ def _covariate(look: Look) -> str:
 
 def _misfit(look: Look, size: float, coefficients: np.ndarray, p: float) -> Misfit:
     percent = 100.0 * float(np.expm1(min(size, 5.0)))
-    where = f" of {look.sample}" if look.sample else ""
-    shape = _shape(look, coefficients)
-    follows = f"follows {look.covariate}"
-    if look.acting is not None:
-        follows = f"has the shape that {look.acting.mechanism.name} {look.acting.choice}".rstrip() + " would give"
-    text = f"{WHAT[look.observable][0].upper()}{WHAT[look.observable][1:]}{where} {follows}"
-    text += f"{shape}: {percent:.0f} % from end to end (adjusted p {_p(p)})."
+    of = f" of {look.sample}" if look.sample and look.kind != "specimen" else ""
+    text = f"{WHAT[look.observable][0].upper()}{WHAT[look.observable][1:]}{of} {_predicate(look, coefficients)}"
+    text += f": {percent:.0f} % from end to end (adjusted p {_p(p)})."
     return Misfit(look.observable, look.sample, _covariate(look), percent, p, text)
 
 
-def _shape(look: Look, coefficients: np.ndarray) -> str:
+def _predicate(look: Look, coefficients: np.ndarray) -> str:
+    """What the observable does, in words."""
+    column, _, detail = look.covariate.partition(", ")
+    words = COLUMN.get(column, column)
+    up = coefficients[0] > 0
+    if look.acting is not None:
+        named = f"{look.acting.mechanism.name} {look.acting.choice}".rstrip()
+        return f"has the shape that {named} would give"
+    if look.kind == "sample":
+        if column == "sample":
+            return f"is {'higher' if up else 'lower'} as a whole than the other samples lead one to expect"
+        bent = "upwards" if up else "downwards"
+        return f"bends {bent} with {words}" if detail else f"{_goes(up)} with {words} beyond the model"
+    if look.kind == "specimen":
+        by_load = f"{_goes(up)} more with the normal load" if column.endswith(" by load") else ""
+        return f"of {column.removesuffix(' by load')} ({look.sample}) {by_load or _lies(up)} than of its siblings"
     if look.kind == "trend":
-        return ", rising" if coefficients[0] > 0 else ", falling"
+        return f"{_goes(up)} with {words}"
     if look.kind == "period":
-        return ", as a wave"
+        return f"follows {words} as a wave" + (f" of {detail}" if detail else "")
     if look.kind == "block":
-        return ", higher there" if coefficients[0] > 0 else ", lower there"
-    if look.kind == "shape":
-        steps = np.diff(np.concatenate([[0.0], coefficients]))
-        if np.all(steps > 0):
-            return ", rising throughout"
-        if np.all(steps < 0):
-            return ", falling throughout"
-        middle = coefficients[:-1].mean() if len(coefficients) > 1 else coefficients[0]
-        return ", highest in the middle" if middle > 0.5 * coefficients[-1] else ", lowest in the middle"
-    return ""
+        return f"{_lies(up)} in the stretch of {words} {detail} than elsewhere"
+    if look.kind == "level":
+        return f"differs with {words}"
+    return f"follows {words}, {_course(coefficients)}"
+
+
+def _goes(up: bool) -> str:
+    return "rises" if up else "falls"
+
+
+def _lies(up: bool) -> str:
+    return "is higher" if up else "is lower"
+
+
+def _course(coefficients: np.ndarray) -> str:
+    """The run of the bins' means; the first is zero."""
+    steps = np.diff(np.concatenate([[0.0], coefficients]))
+    if np.all(steps > 0):
+        return "rising throughout"
+    if np.all(steps < 0):
+        return "falling throughout"
+    middle = coefficients[:-1].mean() if len(coefficients) > 1 else coefficients[0]
+    return "highest in the middle" if middle > 0.5 * coefficients[-1] else "lowest in the middle"
 
 
 def _p(p: float) -> str:

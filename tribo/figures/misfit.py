@@ -36,26 +36,32 @@ FAINT = 0.35  # how strongly a cell is coloured that chance explains
 def numbers(d: Diagnosis) -> pd.DataFrame:
     """Change of the residual from end to end of each covariate (percent), for each sample and observable.
 
-    ``strength`` is the signed score in standard deviations once the flat law, the model's own error of a sample and
-    the specimens are taken out; ``p_adjusted`` sets it against the strongest of all looks at simulated campaigns. The
-    column "mean" is the mean residual of a sample. The observable "trace" has the rank correlation of the zero, the
-    slope of the rise and the stick-slip amplitude with the covariate, adjusted for the number of cells.
+    The change is that of the measurement over the model calibrated on the flat sample alone. The column "mean" is its
+    mean over a sample; the flat sample has neither that nor one along the load, since the calibration takes both up.
+    ``strength`` is the signed score in standard deviations once the flat law, the model's own error of a sample and the
+    specimens are taken out; ``p_adjusted`` sets it against the strongest of all looks at simulated campaigns. The
+    observable "trace" has the rank correlation of the zero, the slope of the rise and the stick-slip amplitude with the
+    covariate, adjusted for the number of cells.
     """
+    from tribo.diagnose.fit import residual_on_flat
+
     columns = covariates(d.baseline.setup)
-    rows = [_cells(d, columns, observable) for observable in REGIMES]
+    residual = residual_on_flat(d.baseline)
+    rows = [_cells(d, columns, observable, residual @ np.array(weight)) for observable, weight in REGIMES.items()]
     return pd.DataFrame([*(cell for part in rows for cell in part), *_trace_cells(d, columns)], columns=COLUMNS)
 
 
-def _cells(d: Diagnosis, columns: list[Covariate], observable: str) -> list[dict[str, Any]]:
-    f = d.baseline
+def _cells(
+    d: Diagnosis, columns: list[Covariate], observable: str, residual: FloatArray
+) -> list[dict[str, Any]]:
+    f, flat = d.baseline, d.baseline.setup.observations.flat
     sample = f.setup.observations.conditions.sample
-    samples = sorted(set(sample.tolist()), key=lambda s: (s != f.setup.observations.flat, s))
-    residual = f.residual @ np.array(REGIMES[observable])
+    samples = sorted(set(sample.tolist()), key=lambda s: (s != flat, s))
     cells, shapes = [], []
     for row in (*samples, ALL):
         here = np.ones(len(sample), bool) if row == ALL else sample == row
         for column in columns:
-            if row == ALL and column.name == "mean":
+            if column.name in {ALL: ("mean",), flat: ("mean", "normal_load_N")}.get(row, ()):
                 continue  # the free flat law and the sample error leave nothing to see here
             shape = _shape(column, here)
             if np.ptp(shape) <= 1e-9:

@@ -44,10 +44,15 @@ class Panel:
 def numbers(d: Diagnosis) -> pd.DataFrame:
     """Residuals (percent: 100 ln of measured over modelled) of the strongest looks, one panel each.
 
+    The model is the one calibrated on the flat sample alone.
+
     ``mark`` is test; mean and band, the mean of a bin and two standard deviations of single tests by the fitted
     noise (repeats, specimens, the model's own error of a sample); curve, what the named model adds there.
     """
-    frames = [_rows(d, k, panel) for k, panel in enumerate(panels(d))]
+    from tribo.diagnose.fit import residual_on_flat
+
+    residual = residual_on_flat(d.baseline)
+    frames = [_rows(d, k, panel, residual) for k, panel in enumerate(panels(d))]
     return pd.DataFrame([row for rows in frames for row in rows], columns=COLUMNS)
 
 
@@ -58,7 +63,8 @@ def panels(d: Diagnosis) -> list[Panel]:
     for k in np.argsort(-s.strength):
         look = s.looks[k]
         panel = _panel(d, look, s.p_adjusted(float(s.strength[k])))
-        if panel is not None:
+        calibrated = look.kind == "sample" and look.sample == d.baseline.setup.observations.flat
+        if panel is not None and not calibrated:
             found.setdefault((panel.covariate.name, look.sample if look.kind == "sample" else ""), panel)
         if len(found) == MOST_PANELS:
             break
@@ -96,14 +102,15 @@ def _column_of(choice: str) -> str:
     return choice.split(" is ")[0] if choice else ""
 
 
-def _rows(d: Diagnosis, k: int, panel: Panel) -> list[dict[str, Any]]:
-    f, look, here = d.baseline, panel.look, panel.here
-    o = f.setup.observations
+def _rows(d: Diagnosis, k: int, panel: Panel, residual: FloatArray) -> list[dict[str, Any]]:
+    look, here = panel.look, panel.here
+    o = d.baseline.setup.observations
     observable = _observable(look)
     weight = np.array(WEIGHTS[observable])
     samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
     places = {s: i for i, s in enumerate(samples)}
-    x, y = panel.covariate.values, 100.0 * f.residual @ weight
+    x, y = panel.covariate.values, 100.0 * residual @ weight
+    added = _added(d, residual, weight)
     common = {
         "panel": k, "title": _title(look), "detail": f"p {_p(panel.p)}", "axis": panel.covariate.axis,
         "y_axis": f"{NAMES[observable]} (%)",
@@ -115,17 +122,22 @@ def _rows(d: Diagnosis, k: int, panel: Panel) -> list[dict[str, Any]]:
         }
         for i in np.flatnonzero(here)
     ]  # fmt: skip
-    return [common | row for row in (*tests, *_summaries(d, panel, x, y, weight))]
+    return [common | row for row in (*tests, *_summaries(d, panel, x, y, weight, added))]
+
+
+def _added(d: Diagnosis, residual: FloatArray, weight: FloatArray) -> FloatArray | None:
+    """What the named model predicts beyond the calibrated one, in percent (n,); None where none is named."""
+    if d.named is None or not d.named.causes or d.verdict.verdict == "unknown":
+        return None
+    calibrated = d.baseline.setup.observations.log_force - residual
+    return np.asarray(100.0 * (d.named.model.predicted - calibrated) @ weight)
 
 
 def _summaries(
-    d: Diagnosis, panel: Panel, x: FloatArray, y: FloatArray, weight: FloatArray
+    d: Diagnosis, panel: Panel, x: FloatArray, y: FloatArray, weight: FloatArray, added: FloatArray | None
 ) -> list[dict[str, Any]]:
     """Mean with its standard error, noise band and curve of the named mechanism, bin by bin."""
     noise = 100.0 * np.sqrt(_variance(d, weight))
-    passes = d.named is not None and d.named.causes and d.verdict.verdict != "unknown"
-    named = d.named.model if d.named is not None and passes else None
-    added = None if named is None else 100.0 * (named.predicted - d.baseline.predicted) @ weight
     found: list[dict[str, Any]] = []
     for rows in _bins(x, panel.here, panel.covariate):
         centre = float(np.exp(np.log(x[rows]).mean())) if _logarithmic(panel.covariate) else float(x[rows].mean())
