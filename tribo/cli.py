@@ -161,7 +161,7 @@ def compare(console: Console, campaign: Path, out: Path, dry_run: bool, **option
 @command_options
 def diagnose(
     console: Console, campaign: Path | None, out: Path, published: str | None, rule: str, columns: str,
-    overrides: Path | None, seed: int, **_: Any,
+    overrides: Path | None, seed: int, jobs: int, **_: Any,
 ) -> int:  # fmt: skip
     """What the calibrated model gets wrong, and why, or that it cannot be told: verdict.json and its figures."""
     if (campaign is None) == (published is None):
@@ -170,16 +170,18 @@ def diagnose(
         return _diagnose_published(console, out, seed)
     from tribo import stages
     from tribo.campaign import open_campaign
+    from tribo.kept import Shelf
     from tribo.report import write_until
     from tribo.report.verdict import verdict_text
 
     with open_campaign(campaign) as opened, console.progress() as progress:
         described = _with_columns(opened, columns)
-        ingested = stages.ingest(described, rule=rule, overrides=overrides, progress=progress)
-        found = stages.diagnosis(ingested, seed=seed, kept=out / KEPT, progress=progress)
+        ingested = stages.ingest(described, rule=rule, jobs=jobs, overrides=overrides, progress=progress)
+        found = stages.diagnosis(ingested, seed=seed, jobs=jobs, kept=out / KEPT, progress=progress)
         study = stages.Study(ingested)
         provenance = _provenance(study, campaign, stages.StudyOptions(rule=rule, seed=seed, overrides=overrides))
-        write_until(study, out, "ingest", progress, provenance, diagnosis=found)
+        keep = Shelf(out / KEPT).take
+        write_until(study, out, "ingest", progress, provenance, diagnosis=found, jobs=jobs, keep=keep)
     verdict = found.verdict
     console.result(verdict.as_dict(), verdict_text(verdict))
     console.list_tests("set aside", ingested.set_aside, level=-1)

@@ -2,8 +2,7 @@
 
 The quick law finds a mechanism; here it acts on the blocks. Pairs of runs share local friction, angle and load, so that
 their ratio is the effect of the mechanism alone. The local friction is that of the extended fit's flat law. Every
-sample is pulled at a low, a middle and a high load under the conditions of real tests there: of the one the law moves
-least and of the one it moves most, where they differ.
+sample is pulled at a low, a middle and a high load, under the conditions of the test there that the law moves most.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
     from tribo.diagnose.diagnosis import Diagnosis
 
 DT_S = 1e-7  # pairs of runs share their step, so that its error cancels
-SAME = 0.01  # changes of ln T closer than this are one
+SAME = 1e-4  # of ln T: a smaller change is none
 MOST_LOADS = 3  # the effect is smooth in the load: more are interpolated
 LONG_PEAKS = 2.2  # length of a run in peak times
 MOST_CHANGE = 1.2  # of ln T; beyond it hardly any force was there before, and a ratio says nothing
@@ -84,33 +83,34 @@ def simulate_extension(
     picked = representatives(model, quick)
     if not picked:
         return None
-    pairs = [_pair(model, test, seed + turn) for test, turn in picked]
+    pairs = [_pair(model, test, seed) for test in picked]
     try:
         runs = _run_pairs(pairs, jobs, progress)
     except SimulationError:
         return None
-    table = _table(model, [test for test, _ in picked], quick, runs)
+    table = _table(model, picked, quick, runs)
     change = interpolated(model, table, quick)
     names = tuple(a.name for a in model.acting)
     return SimulatedExtension(names, model.predicted - quick + change, change, quick, table, *_ratio(table))
 
 
-def representatives(model: ModelFit, quick: FloatArray) -> list[tuple[int, int]]:
-    """Tests to simulate and their turn in the cell: the least and the most moved of every sample and load."""
+def representatives(model: ModelFit, quick: FloatArray) -> list[int]:
+    """Tests to simulate: the most moved of every sample at up to MOST_LOADS of its loads."""
     c = model.setup.observations.conditions
     loads = _loads(c.normal_load_N)
-    size = quick.mean(axis=1)
+    size = np.abs(quick[:, leading(quick)])
     found = []
     for sample in np.unique(c.sample):
-        for load in _spread(loads[(c.sample == sample) & (np.abs(quick) < MOST_CHANGE).all(axis=1)]):
-            rows = np.flatnonzero((c.sample == sample) & (loads == load))
-            if np.abs(quick[rows]).max() < 1e-9:
-                continue
-            low, high = rows[np.argmin(size[rows])], rows[np.argmax(size[rows])]
-            found.append((int(low), 0))
-            if size[high] - size[low] > SAME:
-                found.append((int(high), 1))
+        usable = (c.sample == sample) & (np.abs(quick) < MOST_CHANGE).all(axis=1) & (size > SAME)
+        for load in _spread(loads[usable]):
+            rows = np.flatnonzero(usable & (loads == load))
+            found.append(int(rows[np.argmax(size[rows])]))
     return found
+
+
+def leading(quick: FloatArray) -> int:
+    """The regime that the effect moves more: 0 static, 1 sliding."""
+    return int(np.argmax(np.abs(quick).mean(axis=0)))
 
 
 def _loads(normal_load_N: FloatArray) -> FloatArray:
@@ -229,35 +229,23 @@ def _table(
 def interpolated(model: ModelFit, table: pd.DataFrame, quick: FloatArray) -> FloatArray:
     """Change of ln T of every test, (n, 2): the quick one, corrected as the pairs of its sample were.
 
-    Between the two pairs of a load the correction is linear in the quick change, between loads in ln N.
+    The correction of both regimes is in proportion to the quick change of the leading one (no effect, no correction).
+    Between loads the factor is linear in ln N.
     """
     c = model.setup.observations.conditions
     places = _places(model, table)
-    loads = _loads(c.normal_load_N)[places]
+    lead = leading(quick)
+    off = table[["simulated_static", "simulated_sliding"]].to_numpy() - quick[places]
+    factor = off / quick[places, lead][:, None]
     change = quick.copy()
-    for k, regime in enumerate(("static", "sliding")):
-        at = table[f"quick_{regime}"].to_numpy()
-        off = table[f"simulated_{regime}"].to_numpy() - at
-        for sample in np.unique(c.sample[places]):
-            rows = np.flatnonzero(c.sample == sample)
-            levels = np.unique(loads[c.sample[places] == sample])
-            each = []
-            for load in levels:
-                pairs = np.flatnonzero((c.sample[places] == sample) & (loads == load))
-                order = pairs[np.argsort(at[pairs])]
-                each.append(np.interp(quick[rows, k], at[order], off[order]))
-            change[rows, k] += _between(np.log(levels), np.array(each), np.log(c.normal_load_N[rows]))
+    for sample in np.unique(c.sample[places]):
+        rows = np.flatnonzero(c.sample == sample)
+        pairs = np.flatnonzero(c.sample[places] == sample)
+        pairs = pairs[np.argsort(c.normal_load_N[places[pairs]])]
+        known, wanted = np.log(c.normal_load_N[places[pairs]]), np.log(c.normal_load_N[rows])
+        for k in (0, 1):
+            change[rows, k] += quick[rows, lead] * np.interp(wanted, known, factor[pairs, k])
     return change
-
-
-def _between(levels: FloatArray, values: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Column i of ``values`` (levels, n) at ``wanted[i]``, linear between levels and level beyond them."""
-    if len(levels) == 1:
-        return np.asarray(values[0])
-    upper = np.clip(np.searchsorted(levels, wanted), 1, len(levels) - 1)
-    share = np.clip((wanted - levels[upper - 1]) / (levels[upper] - levels[upper - 1]), 0.0, 1.0)
-    columns = np.arange(len(wanted))
-    return np.asarray((1 - share) * values[upper - 1, columns] + share * values[upper, columns])
 
 
 def _places(model: ModelFit, table: pd.DataFrame) -> np.ndarray:
