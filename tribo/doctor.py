@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import sys
 from importlib import metadata
 from typing import Any
 
-NEEDED = (
-    "numpy", "scipy", "pandas", "statsmodels", "xarray", "h5py", "h5netcdf", "matplotlib", "numba", "pydantic",
-    "click", "rich", "pint", "jinja2", "odrpack", "charset-normalizer", "typst", "rocrate",
-)  # fmt: skip
 OPTIONAL = {
     "distributed": "simulations on a dask cluster (--scheduler)",
     "openpyxl": "exports saved as .xlsx",
@@ -26,12 +23,18 @@ def _version(package: str) -> str | None:
         return None
 
 
+def needed() -> list[str]:
+    """The packages that tribo's own metadata ask for, without those of its extras."""
+    asked = [line for line in metadata.requires("tribo") or [] if "extra ==" not in line]
+    return [re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in asked]
+
+
 def examine() -> dict[str, Any]:
     """Versions of everything tribo needs or can use; ``healthy`` is False where something needed is missing."""
     from tribo import __version__
     from tribo.published import data_dir
 
-    needed = {p: _version(p) for p in NEEDED}
+    versions = {p: _version(p) for p in needed()}
     example = (data_dir() / "example" / "campaign.toml").is_file()
     return {
         "tribo": __version__,
@@ -39,10 +42,10 @@ def examine() -> dict[str, Any]:
         "executable": sys.executable,
         "system": platform.platform(),
         "cores": os.cpu_count(),
-        "needed": needed,
+        "needed": versions,
         "optional": {p: _version(p) for p in OPTIONAL},
         "bundled_example": example,
-        "healthy": example and all(needed.values()),
+        "healthy": example and bool(versions) and all(versions.values()),
     }
 
 
