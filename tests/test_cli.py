@@ -254,3 +254,14 @@ def test_diagnose_takes_a_campaign_or_a_published_table_and_not_both(tmp_path: P
     both = run("diagnose", tmp_path, "--published", "berardo2019", "-o", tmp_path)
     assert (neither.exit_code, both.exit_code) == (2, 2)
     assert "CAMPAIGN" in neither.output
+
+
+def test_the_diagnosis_of_a_published_table_can_be_verified(tmp_path: Path) -> None:
+    """Its record names the two tables it rests on, and every file it wrote."""
+    assert run("diagnose", "--published", "berardo2019", "-o", tmp_path, "-q").exit_code == 0
+    record = json.loads((tmp_path / "provenance.json").read_text(encoding="utf-8"))
+    assert set(record["inputs"]) == {"table2.csv", "table2_tribo.csv"}
+    assert "verdict.json" in record["outputs"]
+    assert run("verify", tmp_path).exit_code == 0
+    (tmp_path / "verdict.json").write_text("{}", encoding="utf-8")
+    assert run("verify", tmp_path).exit_code == 1

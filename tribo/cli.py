@@ -191,13 +191,15 @@ def diagnose(
 def _diagnose_published(console: Console, out: Path, seed: int) -> int:
     """The verdict on Table 2 of Berardo et al. (2019), in every way to read what it leaves open."""
     from tribo.diagnose.published import diagnose_published
-    from tribo.published import load_table2, load_table2_simulated_anew
+    from tribo.published import BERARDO2019, data_dir, load_table2, load_table2_simulated_anew
+    from tribo.report.provenance import provenance_of_table
     from tribo.report.published import write_published
     from tribo.report.verdict import verdict_text
 
     with console.progress() as progress:
         found = diagnose_published(load_table2(), load_table2_simulated_anew(), seed=seed, progress=progress)
-        write_published(found, out)
+        folder, tables = data_dir() / BERARDO2019, ("table2.csv", "table2_tribo.csv")
+        write_published(found, out, provenance_of_table(folder, tables, _command_line(), seed, _now()))
     console.result(found.verdict.as_dict(), verdict_text(found.verdict))
     return 0
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import xarray as xr
 from click.testing import CliRunner
 
 from tribo.cli import main
@@ -126,6 +127,9 @@ def test_a_later_command_over_the_same_inputs_keeps_what_an_earlier_one_wrote(
     write_until(only_read, out, "ingest", provenance=gather_provenance(only_read, options={"rule": "seed"}))
     assert "fits.csv" in outputs(out)
     assert verify(out).unchanged
+    with xr.open_datatree(out / "campaign.nc", engine="h5netcdf") as tree:
+        assert tree["fits"].sizes["fit"] == len(study.fits)
+        assert "row_size" in tree["traces"]
 
 
 def test_what_no_longer_holds_is_removed_unless_someone_changed_it(

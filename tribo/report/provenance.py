@@ -102,6 +102,14 @@ def gather_provenance(
     return Provenance(command, started_at, seed, dict(options or {}), _versions(), inputs, where, decided)
 
 
+def provenance_of_table(
+    folder: Path, names: Iterable[str], command: str = "", seed: int | None = None, started_at: str = ""
+) -> Provenance:
+    """The same for a published table in place of a campaign: the files ``names`` of a folder."""
+    inputs = {name: file_hash(folder / name) for name in names}
+    return Provenance(command, started_at, seed, {}, _versions(), inputs, str(folder))
+
+
 def input_names(root: Path) -> Iterator[str]:
     """What a campaign folder holds: its two tables and every file of raw/, in order."""
     yield from (name for name in DESCRIBED_IN if (root / name).is_file())
@@ -164,7 +172,7 @@ def settle_outputs(
     An earlier file stays where its run had the same inputs and choices and this run did not write everything itself
     (``complete``). A file that someone changed since is never removed.
     """
-    stands = before is not None and not complete and _same_origin(before, provenance)
+    stands = before is not None and not complete and same_origin(before, provenance)
     outputs = {path.relative_to(out).as_posix(): file_hash(path) for path in written}
     for name, digest in (before or {}).get("outputs", {}).items():
         path = out / name
@@ -177,7 +185,7 @@ def settle_outputs(
     return outputs
 
 
-def _same_origin(before: Mapping[str, Any], provenance: Provenance) -> bool:
+def same_origin(before: Mapping[str, Any], provenance: Provenance) -> bool:
     """Whether an earlier run had the same inputs and version, and made the same choices where it had to choose."""
     earlier, now = before["options"], provenance.options
     return (

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from tribo.figures.catalogue import PUBLISHED_FIGURES
 from tribo.report.diagnosis import write_verdict
 from tribo.report.drawings import svg_text
-from tribo.report.files import write_bytes, write_text
+from tribo.report.files import write_bytes
+from tribo.report.provenance import Provenance, read_record, settle_outputs, write_provenance
 from tribo.report.tables import to_csv
 from tribo.report.typeset import figure_files
 
@@ -16,14 +17,14 @@ if TYPE_CHECKING:
     from tribo.diagnose.published import PublishedDiagnosis
 
 
-def write_published(d: PublishedDiagnosis, out: Path) -> None:
-    """Write out/verdict.json and out/figures/NAME.svg, .pdf, .png and .csv."""
-    write_verdict(d.verdict.as_dict(), out)
-    origin = f"published table {d.source}"
+def write_published(d: PublishedDiagnosis, out: Path, provenance: Provenance) -> None:
+    """Write out/verdict.json, out/figures/NAME.svg, .pdf, .png and .csv, and provenance.json with the hash of each."""
+    before = read_record(out)
+    written = [write_verdict(d.verdict.as_dict(), out)]
+    origin = f"published table {d.source}; {provenance.origin}"
     for figure in PUBLISHED_FIGURES.values():
         numbers = figure.numbers(d)
-        svg = svg_text(figure.draw(numbers), figure.title, origin)
-        write_text(out / "figures" / f"{figure.name}.csv", to_csv(numbers))
-        write_text(out / "figures" / f"{figure.name}.svg", svg)
-        for ending, content in figure_files(svg.encode("utf-8"), figure.title, origin).items():
-            write_bytes(out / "figures" / f"{figure.name}.{ending}", content)
+        svg = svg_text(figure.draw(numbers), figure.title, origin).encode("utf-8")
+        files = {"csv": to_csv(numbers).encode("utf-8"), "svg": svg, **figure_files(svg, figure.title, origin)}
+        written += [write_bytes(out / "figures" / f"{figure.name}.{end}", files[end]) for end in files]
+    write_provenance(provenance, out, settle_outputs(out, before, provenance, written, complete=True))

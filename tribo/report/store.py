@@ -44,14 +44,19 @@ def _units(column: str) -> dict[str, str]:
 
 
 def write_store(
-    study: Study, out: Path, provenance: Provenance | None = None, diagnosis: Diagnosis | None = None
+    study: Study,
+    out: Path,
+    provenance: Provenance | None = None,
+    diagnosis: Diagnosis | None = None,
+    keep_earlier: bool = False,
 ) -> Path:
     """Write out/campaign.nc, a DataTree with the groups tests, fits, comparison, simulated and traces.
 
     With a ``diagnosis`` also residuals, a row a test and regime under the calibrated and the extended model, and
     extended_runs, the pairs of runs of the simulator without and with the named mechanisms.
 
-    ``provenance`` stands in the attributes of the file, as JSON.
+    ``provenance`` stands in the attributes of the file, as JSON. With ``keep_earlier``, groups that a longer walk over
+    the same inputs left in the file, and this study has not, stay.
 
     ``traces`` is a contiguous ragged array (CF conventions 9.3.3): the samples of all traces end to end, with
     ``row_size`` samples and the first at ``row_start`` for each test. Times in s, forces in N as recorded
@@ -83,9 +88,20 @@ def write_store(
     if diagnosis is not None:
         groups |= _diagnosed(diagnosis)
     path = out / "campaign.nc"
+    if keep_earlier:
+        groups = _earlier(path) | groups
     with whole_file(path) as part:
         xr.DataTree.from_dict(groups).to_netcdf(part, engine="h5netcdf")
     return path
+
+
+def _earlier(path: Path) -> dict[str, xr.Dataset]:
+    """The groups of a file that is there, but the root; none where it cannot be read."""
+    try:
+        with xr.open_datatree(path, engine="h5netcdf") as tree:
+            return {f"/{node.name}": node.to_dataset().load() for node in tree.children.values()}
+    except (OSError, ValueError):
+        return {}
 
 
 def _diagnosed(diagnosis: Diagnosis) -> dict[str, xr.Dataset]:

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any, Literal
 from tribo.records import Study
 from tribo.report.diagnosis import write_verdict
 from tribo.report.drawings import Keep, make_anew, write_figures
-from tribo.report.provenance import Provenance, gather_provenance, read_record, settle_outputs, write_provenance
+from tribo.report.provenance import (
+    Provenance,
+    gather_provenance,
+    read_record,
+    same_origin,
+    settle_outputs,
+    write_provenance,
+)
 from tribo.report.store import write_store
 from tribo.report.tables import write_tables
 
@@ -42,7 +49,8 @@ def write_until(
     before = read_record(out)
     made_by = provenance if provenance is not None else gather_provenance(study)
     verdict = diagnosis.verdict.as_dict() if diagnosis is not None else verdict
-    written = [*write_tables(study, out), write_store(study, out, made_by, diagnosis)]
+    keep_earlier = before is not None and until != "report" and same_origin(before, made_by)
+    written = [*write_tables(study, out), write_store(study, out, made_by, diagnosis, keep_earlier)]
     if verdict is not None:
         written.append(write_verdict(verdict, out))
     if until in ("compare", "report") or diagnosis is not None:
