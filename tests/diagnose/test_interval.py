@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from tribo.diagnose.fit import fit
-from tribo.diagnose.interval import DROP_90, _score_at, intervals, standard_errors
+from tribo.diagnose.interval import DROP_90, _score_at, intervals, recovered, standard_errors
 from tribo.diagnose.looks import candidates
 from tribo.diagnose.model import ModelFit
 
@@ -37,3 +40,27 @@ def test_the_ends_of_a_profile_interval_lose_what_they_should() -> None:
     f = fitted("suction", ("normal_load_error", -0.4))
     high = intervals(f, 0)[0][1]
     assert f.score - _score_at(f, 0, 0, high) == pytest.approx(DROP_90, rel=0.2)
+
+
+@pytest.mark.parametrize("factor", [0.5, 4.0])
+def test_the_patterns_of_the_campaign_tell_how_wrong_the_model_is_about_them(factor: float) -> None:
+    """Where the patterns differ from the model by half its assumed error the interval is narrower, by four times wider.
+
+    Each of A, B and C is off by so many standard deviations of that error, alternately up and down.
+    """
+    f = fitted("edge_adhesion", ("edge_adhesion", 1.0))
+    o = f.setup.observations
+    off = sum(
+        sign * factor * np.array(f.setup.predictor.offset[sample]) * (o.conditions.sample == sample)[:, None]
+        for sample, sign in (("A", 1), ("B", -1), ("C", 1))
+    )
+    s = replace(f.setup, observations=replace(o, log_force=o.log_force + off))
+    moved = fit(s, f.acting)
+    (_, low, high), (at_least, at_most) = recovered(moved, 0)[0], intervals(moved, 0)[0]
+    assert (high - low < at_most - at_least) == (factor < 1)
+
+
+def test_an_averaged_interval_keeps_to_the_bounds() -> None:
+    f = fitted("suction", ("normal_load_error", -0.4))
+    value, low, high = recovered(f, 0)[0]
+    assert low == 0.0 <= value < high

@@ -1,4 +1,8 @@
-"""Intervals of a mechanism's parameters: from the curvature, or by profile likelihood near a bound."""
+"""Values and intervals of a mechanism's parameters.
+
+From the curvature, or by profile likelihood near a bound, and averaged over how wrong the model's patterns may be:
+their error is known from codes that disagree, and a campaign of several patterns tells whether it is that large here.
+"""
 
 from __future__ import annotations
 
@@ -9,18 +13,56 @@ import numpy as np
 from tribo.diagnose.fit import fit
 from tribo.diagnose.model import N_LAW, ModelFit
 from tribo.mechanisms.record import Mechanism
+from tribo.records import FloatArray
 
 NORMAL_90 = 1.645
 DROP_90 = 0.5 * NORMAL_90**2  # of the log likelihood at the ends of a 90 % interval
 NEAR = 2.0 * NORMAL_90  # standard errors from a bound within which the curvature is not trusted
 SMALLEST_SHARE = 1e-6  # of the way to a bound
+PATTERN_ERRORS = np.array([0.25, 0.35, 0.5, 0.7, 1.0, 1.4])  # of the assumed error of the model's patterns
+PATTERN_ERROR_SD = 0.7  # of the logarithm of that factor: it may well be half or twice as large
+
+
+def recovered(f: ModelFit, index: int) -> list[tuple[float, float, float]]:
+    """Value and 90 % interval (value, low, high) of every parameter of the mechanism ``index`` of a fit.
+
+    The average over PATTERN_ERRORS, each weighed by how likely it makes the campaign.
+    """
+    if not np.isfinite(f.setup.fixed_sd).any():
+        return [(float(v), *ends) for v, ends in zip(f.values[index], intervals(f, index), strict=True)]
+    fits = [_with_pattern_error(f, factor) for factor in PATTERN_ERRORS]
+    log_weight = np.array([g.score for g in fits]) - 0.5 * (np.log(PATTERN_ERRORS) / PATTERN_ERROR_SD) ** 2
+    weight = np.exp(log_weight - log_weight.max())
+    weight /= weight.sum()
+    ends = np.array([intervals(g, index) for g in fits])  # (errors, parameters, 2)
+    values = np.array([g.values[index] for g in fits])
+    return [
+        _averaged(weight, values[:, k], ends[:, k], (p.low, p.high))
+        for k, p in enumerate(f.acting[index].mechanism.parameters)
+    ]
+
+
+def _with_pattern_error(f: ModelFit, factor: float) -> ModelFit:
+    s = replace(f.setup, fixed_sd=f.setup.fixed_sd * factor)
+    return fit(s, f.acting, start=replace(f, setup=s), iterations=15)
+
+
+def _averaged(
+    weight: FloatArray, values: FloatArray, ends: FloatArray, bounds: tuple[float, float]
+) -> tuple[float, float, float]:
+    """Mean, and ends whose distance has the mean square of the single ones and of what the values differ by."""
+    value = float(weight @ values)
+    apart = weight @ (NORMAL_90 * (values - value)) ** 2
+    below, above = (float(np.sqrt(weight @ (ends[:, k] - values) ** 2 + apart)) for k in (0, 1))
+    return value, max(value - below, bounds[0]), min(value + above, bounds[1])
 
 
 def intervals(f: ModelFit, index: int) -> list[tuple[float, float]]:
     """90 % interval of every parameter of the mechanism ``index`` of a fit, kept inside the bounds.
 
-    Where one of them lies at a bound or near it, the intervals of all are profile likelihoods, the others and the
-    flat law fitted anew at each value; the noise stays that of the fit.
+    The error of the model's patterns is taken as assumed. Where one parameter lies at a bound or near it, the intervals
+    of all are profile likelihoods, the others and the flat law fitted anew at each value; the noise stays that of the
+    fit.
     """
     errors = standard_errors(f, index)
     parameters = f.acting[index].mechanism.parameters

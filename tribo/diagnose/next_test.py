@@ -126,7 +126,7 @@ def _loads(first: Candidate, second: Candidate) -> list[NextTest]:
         rows = np.resize(np.flatnonzero(conditions.sample == sample), PULLS)
         for load in (loads[0] / 2, loads[0], loads[-1], loads[-1] * 2):
             difference = _predicted_at(first.fit, rows, load) - _predicted_at(second.fit, rows, load)
-            text = f"{PULLS} further pulls of {sample} at {1e3 * load:.0f} mN."
+            text = f"{PULLS} further pulls of {sample} at {load:.3g} N."
             design = {"sample": str(sample), "normal_load_N": float(load), "pulls": PULLS}
             design["hours"] = PULLS * HOURS_PER_PULL
             found.append(_named(first, second, text, design, bits(_distance2(first.fit, difference, rows))))

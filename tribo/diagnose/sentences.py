@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from tribo.diagnose.instrument import Evidence
-from tribo.diagnose.interval import intervals
+from tribo.diagnose.interval import recovered
 from tribo.diagnose.looks import BENT, OBSERVABLES, Look, candidates
 from tribo.diagnose.model import ModelFit, predict
 from tribo.diagnose.screen import Screen, beyond_law, cleared
@@ -140,8 +140,8 @@ def estimates(f: ModelFit, index: int) -> dict[str, Estimate]:
     """Parameters of one mechanism of a fit with their 90 % intervals."""
     parameters = f.acting[index].mechanism.parameters
     return {
-        p.name: Estimate(float(value), low, high, p.unit)
-        for p, value, (low, high) in zip(parameters, f.values[index], intervals(f, index), strict=True)
+        p.name: Estimate(value, low, high, p.unit)
+        for p, (value, low, high) in zip(parameters, recovered(f, index), strict=True)
     }
 
 

@@ -1,7 +1,5 @@
 from .diagnosis import write_verdict as write_verdict
 from .drawings import write_figures as write_figures
-from .page import write_html as write_html
-from .pdf import write_pdf as write_pdf
 from .provenance import Provenance as Provenance, gather_provenance as gather_provenance
 from .store import write_store as write_store
 from .tables import write_tables as write_tables

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -18,26 +17,10 @@ from tribo.records import Study
 from tribo.report.content import content, figure_places
 from tribo.report.drawings import Drawn, draw_all, inline_svg
 from tribo.report.embedded import figure_data, trace_data
-from tribo.report.files import write_text
 from tribo.report.numerals import ratio_text, significant, unbroken
 from tribo.report.provenance import Provenance
 from tribo.report.pulls import PullCard
 from tribo.report.wording import flags_in_words
-
-
-def write_html(
-    study: Study,
-    out: Path,
-    provenance: Provenance | None = None,
-    drawn: Mapping[str, Drawn] | None = None,
-    verdict: Mapping[str, Any] | None = None,
-) -> Path:
-    """Write out/report.html.
-
-    ``drawn`` are the figures by name where they are at hand already, ``verdict`` the diagnosis in the form of
-    verdict.json.
-    """
-    return write_text(out / "report.html", html(study, provenance, drawn, verdict))
 
 
 def html(
@@ -46,7 +29,11 @@ def html(
     drawn: Mapping[str, Drawn] | None = None,
     verdict: Mapping[str, Any] | None = None,
 ) -> str:
-    """The page as text: the same bytes for the same study, provenance and verdict."""
+    """The page as text: the same bytes for the same study, provenance and verdict.
+
+    ``drawn`` are the figures by name where they are at hand already, ``verdict`` the diagnosis in the form of
+    verdict.json.
+    """
     figures = draw_all(study) if drawn is None else drawn
     said = content(study, provenance, verdict)
     places = {k: [_shown(figures[n]) for n in names] for k, names in figure_places(list(figures)).items()}

@@ -6,13 +6,11 @@ import json
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 from tribo.records import Study
 from tribo.report.content import content, figure_places
 from tribo.report.drawings import Drawn, draw_all
-from tribo.report.files import write_bytes
 from tribo.report.numerals import significant, unbroken
 from tribo.report.provenance import Provenance
 from tribo.report.pulls import PullCard
@@ -20,17 +18,6 @@ from tribo.report.typeset import document
 
 TEMPLATE = "report.typ"
 NOT_OF_THE_INPUTS = ("Command", "Started")  # differ from run to run, which the bytes of the PDF must not
-
-
-def write_pdf(
-    study: Study,
-    out: Path,
-    provenance: Provenance | None = None,
-    drawn: Mapping[str, Drawn] | None = None,
-    verdict: Mapping[str, Any] | None = None,
-) -> Path:
-    """Write out/report.pdf; parameters as for the page."""
-    return write_bytes(out / "report.pdf", pdf(study, provenance, drawn, verdict))
 
 
 def pdf(

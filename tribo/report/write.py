@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from tribo.records import Study
 from tribo.report.diagnosis import write_verdict
 from tribo.report.drawings import Keep, make_anew, write_figures
+from tribo.report.files import write_bytes, write_text
 from tribo.report.provenance import (
     Provenance,
     gather_provenance,
@@ -59,11 +60,11 @@ def write_until(
         written += [out / "figures" / f"{f.name}.{ending}" for f in drawn.values() for ending in f.files]
     if until == "report":
         from tribo.report.crate import write_crate
-        from tribo.report.page import write_html
-        from tribo.report.pdf import write_pdf
+        from tribo.report.page import html
+        from tribo.report.pdf import pdf
 
-        written.append(write_html(study, out, made_by, drawn, verdict))
-        written.append(write_pdf(study, out, made_by, drawn, verdict))
+        written.append(write_text(out / "report.html", html(study, made_by, drawn, verdict)))
+        written.append(write_bytes(out / "report.pdf", pdf(study, made_by, drawn, verdict)))
         written.append(write_crate(study, out, made_by, written))
     write_provenance(made_by, out, settle_outputs(out, before, made_by, written, complete=until == "report"))
 
