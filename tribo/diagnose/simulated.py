@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from tribo.diagnose.diagnosis import Diagnosis
 
 DT_S = 1e-7  # pairs of runs share their step, so that its error cancels
-SAME = 1e-4  # of ln T: a smaller change is none
+LEAST_CHANGE = 0.01  # of ln T; the ratio of simulated to quick change would be noise below
 MOST_LOADS = 3  # the effect is smooth in the load: more are interpolated
 LONG_PEAKS = 2.2  # length of a run in peak times
 MOST_CHANGE = 1.2  # of ln T; beyond it hardly any force was there before, and a ratio says nothing
@@ -101,7 +101,7 @@ def representatives(model: ModelFit, quick: FloatArray) -> list[int]:
     size = np.abs(quick[:, leading(quick)])
     found = []
     for sample in np.unique(c.sample):
-        usable = (c.sample == sample) & (np.abs(quick) < MOST_CHANGE).all(axis=1) & (size > SAME)
+        usable = (c.sample == sample) & (np.abs(quick) < MOST_CHANGE).all(axis=1) & (size > LEAST_CHANGE)
         for load in _spread(loads[usable]):
             rows = np.flatnonzero(usable & (loads == load))
             found.append(int(rows[np.argmax(size[rows])]))
