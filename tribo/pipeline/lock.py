@@ -11,6 +11,7 @@ from pathlib import Path
 from tribo.errors import Problem, TriboError
 
 POLL_S = 0.5
+GRACE_S = 3.0  # what the steps of a build that was killed just now take to die
 
 
 class SiteBusyError(TriboError):
@@ -24,7 +25,7 @@ def only_build(state: Path, wait_s: float = 0.0) -> Iterator[int]:
     Raises
     ------
     SiteBusyError
-        Another build holds it, and still does after ``wait_s`` seconds.
+        Another build holds it, and still does after ``wait_s`` seconds, or a few where that is less.
     """
     import fcntl
 
@@ -32,7 +33,7 @@ def only_build(state: Path, wait_s: float = 0.0) -> Iterator[int]:
     path = state / "lock"
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
-        until = time.monotonic() + wait_s
+        until = time.monotonic() + max(wait_s, GRACE_S)
         while True:
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
