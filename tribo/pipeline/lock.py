@@ -11,7 +11,6 @@ from pathlib import Path
 from tribo.errors import Problem, TriboError
 
 POLL_S = 0.5
-GRACE_S = 3.0  # what the steps of a build that was killed just now take to die
 
 
 class SiteBusyError(TriboError):
@@ -25,7 +24,7 @@ def only_build(state: Path, wait_s: float = 0.0) -> Iterator[int]:
     Raises
     ------
     SiteBusyError
-        Another build holds it, and still does after ``wait_s`` seconds, or a few where that is less.
+        Another build holds it, and still does after ``wait_s`` seconds.
     """
     import fcntl
 
@@ -33,7 +32,7 @@ def only_build(state: Path, wait_s: float = 0.0) -> Iterator[int]:
     path = state / "lock"
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
-        until = time.monotonic() + max(wait_s, GRACE_S)
+        until = time.monotonic() + wait_s
         while True:
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
