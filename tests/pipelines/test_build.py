@@ -73,7 +73,8 @@ class Lab:
     def records(self) -> set[str]:
         """Names alone: while a build runs, a file that is listed may be gone before it is read."""
         steps = self.site / ".tribo" / "steps"
-        return {str(p.relative_to(self.site)) for p in steps.rglob("*")} if steps.is_dir() else set()
+        found = [p for p in steps.rglob("*") if p.is_file()] if steps.is_dir() else []
+        return {str(p.relative_to(self.site)) for p in found}
 
 
 @dataclass(frozen=True)
