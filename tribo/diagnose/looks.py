@@ -29,6 +29,10 @@ class Look:
     columns: FloatArray
     acting: Acting | None = None
 
+    def is_taken_up(self, flat: str) -> bool:
+        """Whether calibrating on the sample ``flat`` takes this up: how high its force lies, and its slope with load."""
+        return self.kind == "sample" and self.sample == flat and not self.covariate.endswith(BENT)
+
     @property
     def freedom(self) -> int:
         return int(self.columns.shape[2])

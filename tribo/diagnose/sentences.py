@@ -8,7 +8,7 @@ import numpy as np
 
 from tribo.diagnose.instrument import Evidence
 from tribo.diagnose.interval import recovered
-from tribo.diagnose.looks import BENT, OBSERVABLES, Look, candidates
+from tribo.diagnose.looks import OBSERVABLES, Look, candidates
 from tribo.diagnose.model import ModelFit, predict
 from tribo.diagnose.screen import Screen, beyond_law, cleared
 from tribo.diagnose.verdict import Cause, Estimate, Excluded, Misfit, Outcome
@@ -42,8 +42,7 @@ def misfits_of(screened: Screen, level: float, flat: str = "") -> list[Misfit]:
         key = (_covariate(look), look.sample)
         if p >= level or len(found) >= SHOWN:
             break
-        calibrated = look.kind == "sample" and look.sample == flat and not look.covariate.endswith(BENT)
-        if look.kind != "mechanism" and not calibrated and key not in seen:
+        if look.kind != "mechanism" and not look.is_taken_up(flat) and key not in seen:
             seen.add(key)
             found.append(_misfit(look, float(screened.size[k]), screened.coefficients[k], p))
     if not found and len(order) and screened.p_adjusted() < level:

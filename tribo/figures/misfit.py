@@ -57,12 +57,13 @@ def _cells(
     f, flat = d.baseline, d.baseline.setup.observations.flat
     sample = f.setup.observations.conditions.sample
     samples = sorted(set(sample.tolist()), key=lambda s: (s != flat, s))
+    taken_up = {ALL: ("mean",), flat: ("mean", "normal_load_N")}  # by the flat law and the model's error of a sample
     cells, shapes = [], []
     for row in (*samples, ALL):
         here = np.ones(len(sample), bool) if row == ALL else sample == row
         for column in columns:
-            if column.name in {ALL: ("mean",), flat: ("mean", "normal_load_N")}.get(row, ()):
-                continue  # the free flat law and the sample error leave nothing to see here
+            if column.name in taken_up.get(row, ()):
+                continue
             shape = _shape(column, here)
             if np.ptp(shape) <= 1e-9:
                 continue

@@ -63,8 +63,7 @@ def panels(d: Diagnosis) -> list[Panel]:
     for k in np.argsort(-s.strength):
         look = s.looks[k]
         panel = _panel(d, look, s.p_adjusted(float(s.strength[k])))
-        calibrated = look.kind == "sample" and look.sample == d.baseline.setup.observations.flat
-        if panel is not None and not calibrated:
+        if panel is not None and not look.is_taken_up(d.baseline.setup.observations.flat):
             found.setdefault((panel.covariate.name, look.sample if look.kind == "sample" else ""), panel)
         if len(found) == MOST_PANELS:
             break

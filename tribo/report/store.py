@@ -27,6 +27,7 @@ UNIT_ENDINGS = {
     "_u_N": "N", "_s": "s", "_m": "m", "_kg": "kg", "_deg": "degree", "_C": "degC", "_pct": "percent",
     "_percent": "percent",
 }  # fmt: skip
+OF_DIAGNOSIS = ("/residuals", "/extended_runs")  # groups that a diagnosis writes anew, or leaves out, as a whole
 UNITLESS = {"mu": "1", "mu_u": "1", "ratio": "1", "ratio_low": "1", "ratio_high": "1", "cov": "kPa"}
 
 
@@ -89,7 +90,8 @@ def write_store(
         groups |= _diagnosed(diagnosis)
     path = out / "campaign.nc"
     if keep_earlier:
-        groups = _earlier(path) | groups
+        renewed = OF_DIAGNOSIS if diagnosis is not None else ()
+        groups = {name: group for name, group in _earlier(path).items() if name not in renewed} | groups
     with whole_file(path) as part:
         xr.DataTree.from_dict(groups).to_netcdf(part, engine="h5netcdf")
     return path
@@ -107,10 +109,11 @@ def _earlier(path: Path) -> dict[str, xr.Dataset]:
 def _diagnosed(diagnosis: Diagnosis) -> dict[str, xr.Dataset]:
     from tribo.diagnose import residual_table
 
-    groups = {"/residuals": _table(residual_table(diagnosis), "residual_row")}
+    residuals, runs = OF_DIAGNOSIS
+    groups = {residuals: _table(residual_table(diagnosis), "residual_row")}
     if diagnosis.simulated is not None:
-        groups["/extended_runs"] = _table(diagnosis.simulated.table, "pair")
-        groups["/extended_runs"].attrs["mechanisms"] = ", ".join(diagnosis.simulated.mechanisms)
+        groups[runs] = _table(diagnosis.simulated.table, "pair")
+        groups[runs].attrs["mechanisms"] = ", ".join(diagnosis.simulated.mechanisms)
     return groups
 
 

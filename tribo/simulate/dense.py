@@ -206,7 +206,7 @@ def free_edges(f: Field, x: FloatArray, y: FloatArray) -> None:
     p_x, p_y = f.planes[PX], f.planes[PY]
     own_x, own_y, across = f.spare[0], f.spare[1], f.spare[2]
     for m in range(len(f.edge)):
-        i = np.uint64(f.edge[m])
+        i = np.uint64(f.edge[m])  # spares the check for indices that count from the end
         p_x[i] += own_x[m] * x[i] + across[m] * y[i]
         p_y[i] += across[m] * x[i] + own_y[m] * y[i]
 
