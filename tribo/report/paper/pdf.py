@@ -123,7 +123,7 @@ def _diagnosis_tables(verdict: Mapping[str, Any] | None) -> dict[str, list[Any]]
 
 
 def _pull_row(card: PullCard) -> list[str]:
-    said = [card.flags_in_words, {"used": "", "moved": "moved by hand", "excluded": "left out by hand"}[card.state]]
+    said = [card.flags_in_words, {"used": "", "moved": "moved by hand", "excluded": "excluded by hand"}[card.state]]
     return [
         card.test_id, card.sample, card.specimen, card.load, card.static, card.sliding, card.window,
         significant(card.oddness, 2), "; ".join(part for part in said if part),
