@@ -1,4 +1,4 @@
-"""Published tables that travel with tribo, in the units of their source."""
+"""Published tables bundled with tribo, in the units of their source."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def data_dir() -> Path:
     for folder in places:
         if folder.is_dir():
             return folder
-    raise FileNotFoundError(f"the bundled data is neither in {places[0]} nor in {places[1]}")
+    raise FileNotFoundError(f"the bundled data are neither in {places[0]} nor in {places[1]}; install tribo again")
 
 
 def load_table1() -> pd.DataFrame:
@@ -47,7 +47,7 @@ def load_table2() -> pd.DataFrame:
 
 
 def load_table2_simulated_anew() -> pd.DataFrame:
-    """The simulated part of Table 2 as tribo's own engine gives it (960 runs at stratified angles, docs/table2.md).
+    """The simulated part of Table 2 recomputed with tribo (960 runs at stratified angles, docs/table2.md).
 
     Columns: sample, regime, mu, mu_se, tau0_kPa, tau0_kPa_se.
     """
@@ -60,7 +60,7 @@ def load_model_parameters() -> pd.DataFrame:
 
 
 def contradictions() -> pd.DataFrame:
-    """Where the paper is at odds with itself or silent.
+    """Points on which the paper contradicts itself or gives no value.
 
     Columns: topic, one_place, other_place, effect, tribo_default.
     """

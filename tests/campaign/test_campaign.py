@@ -378,7 +378,7 @@ def test_the_template_is_a_campaign_once_exports_are_there(tmp_path: Path) -> No
 
 def test_the_template_never_overwrites(tmp_path: Path) -> None:
     (tmp_path / "tests.csv").write_text("mine")
-    with pytest.raises(CampaignError, match="nothing is overwritten"):
+    with pytest.raises(CampaignError, match="is not overwritten"):
         write_template(tmp_path)
     assert (tmp_path / "tests.csv").read_text() == "mine"
     assert not (tmp_path / "campaign.toml").exists()

@@ -139,5 +139,5 @@ def test_silence_of_the_campaign_is_filled_with_stated_defaults() -> None:
 def test_a_law_without_tau0_has_no_budget() -> None:
     table = pulls()
     (fit,) = fit_power_law(table, "static", AREA)
-    with pytest.raises(FitError, match="no budget"):
+    with pytest.raises(FitError, match="a budget needs a fitted law"):
         uncertainty_budget(table, fit, {})

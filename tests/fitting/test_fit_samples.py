@@ -206,7 +206,7 @@ def test_tests_at_zero_load_are_left_out_of_t_over_n_and_kept_by_the_other_weigh
 def test_unknown_weights_are_refused_with_what_is_allowed() -> None:
     with pytest.raises(FitError, match="relative, ratio, force"):
         fit_samples(campaign({"F": THREE}), "static", AREA, weights="heavy")
-    with pytest.raises(FitError, match="specimens, tests"):
+    with pytest.raises(FitError, match="specimens or tests"):
         fit_samples(campaign({"F": THREE}), "static", AREA, by="days")
 
 

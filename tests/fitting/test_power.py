@@ -64,7 +64,7 @@ def test_repeats_help_where_repeats_scatter_and_not_where_specimens_do() -> None
     assert noisy[2].repeats_needed is not None
     assert noisy[2].repeats_needed > 2
     assert unlike[2].repeats_needed is None
-    assert "more repeats alone would not" in unlike[2].text()
+    assert "more repeats alone are not" in unlike[2].text()
 
 
 def test_the_sentence_states_level_power_and_what_it_takes() -> None:

@@ -93,7 +93,7 @@ def draw(numbers: pd.DataFrame) -> Figure:
         ax.set_xlabel("Normal load N (N)")
         ax.tick_params(labelbottom=True)
         if style.is_leftmost(ax):
-            ax.set_ylabel("T measured / T simulated")
+            ax.set_ylabel("Measured T / simulated T")
     _ratio_axis(axes, numbers)
     style.legend_below(
         figure,

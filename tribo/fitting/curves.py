@@ -37,13 +37,13 @@ def fit_curve(
     Raises
     ------
     FitError
-        No convergence, fewer pulls than parameters, or parameters that the data cannot part.
+        No convergence, fewer pulls than parameters, or parameters that the data cannot separate.
     """
     from scipy.optimize import least_squares as minimise
 
     if len(force_N) < len(law.parameters):
         found, allowed = f"{len(force_N)} pulls", f"{len(law.parameters)} or more"
-        raise FitError(Problem("too_few_tests", f"too few pulls for {law.formula}", found=found, allowed=allowed))
+        raise FitError(Problem("too_few_tests", f"too few pulls to fit {law.formula}", found=found, allowed=allowed))
     root = np.ones(len(force_N)) if weights is None else np.sqrt(weights)
 
     def residuals(values: FloatArray) -> FloatArray:
@@ -54,7 +54,7 @@ def fit_curve(
 
     found = minimise(residuals, start, slopes, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
     if not found.success or not np.isfinite(found.x).all():
-        raise FitError(Problem("no_convergence", f"{law.formula} does not converge", found=found.message))
+        raise FitError(Problem("no_convergence", f"the fit of {law.formula} does not converge", found=found.message))
     tangent = least_squares(law.design_matrix(*conditions, at=found.x), -found.fun / root, weights)
     return LinearFit(found.x, tangent.unscaled, -found.fun, tangent.dof)
 
@@ -107,7 +107,7 @@ def _fit_sample(
     values, covariance = np.full(len(law.parameters), np.nan), alone
     if len(own) == 1:
         (values,) = own.values()
-        notes.append("one specimen: the interval holds for it alone, not for the pattern")
+        notes.append("only one specimen: the interval applies to this specimen, not to the pattern")
     elif own:
         values, covariance = combine(np.array(list(own.values())))
         dof = len(own) - 1.0

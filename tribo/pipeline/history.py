@@ -85,13 +85,13 @@ def _row(name: str, site: Path, config: Mapping[str, Any]) -> CampaignRow:
 def _state(name: str, record: Mapping[str, Any] | None, config: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
     """How a campaign stands after a build, and why."""
     if name not in config["campaigns"]:
-        return "gone", ("no longer in the drop folder; its last report stands",)
+        return "gone", ("no longer in the folder of campaigns; the last report is kept",)
     waiting = config["campaigns"][name]["waiting"]
     if waiting:
         return "waiting", tuple(waiting)
     expected = f"{config['ready'][name]['digest']} {config['version']} {config['options']['words']}"
     if record is None or record["digest"] != expected:
-        return "failed", ("a step failed; its log is in .tribo/log, and the next build tries it again",)
+        return "failed", ("a step failed; see its log in .tribo/log; the next build will try it again",)
     if record["status"] == "unusable":
         return "unusable", tuple(_problem(p) for p in record["problems"])
     return record["status"].replace("_", " "), ()

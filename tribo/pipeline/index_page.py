@@ -19,11 +19,11 @@ from tribo.pipeline.history import CampaignRow, Law, history
 from tribo.pipeline.trend import FEWEST, LEVEL, SHORTEST, Change, change_points
 
 STATES = {
-    "done": "done", "some set aside": "done, some tests set aside", "unusable": "unusable input",
-    "failed": "failed", "waiting": "left for the next round", "gone": "no longer in the folder",
+    "done": "done", "some set aside": "done, some tests set aside", "unusable": "input not usable",
+    "failed": "failed", "waiting": "postponed to the next build", "gone": "no longer in the folder",
 }  # fmt: skip
 VERDICTS = {
-    "no_misfit": "no misfit", "named": "cause named", "undetermined": "several causes possible",
+    "no_misfit": "no misfit", "named": "cause identified", "undetermined": "several possible causes",
     "unknown": "misfit of unknown cause", "": "–",
 }  # fmt: skip
 SYMBOLS = {"mu": ("μ", ""), "tau0": ("τ₀", "kPa")}

@@ -45,7 +45,7 @@ class Schedule:
         if mail and not re.fullmatch(r"[\w.+-]+@[\w.-]+", mail):
             problems.append(Problem("not_an_address", "not a mail address", column="--mail", found=mail))
         if mail and notify:
-            problems.append(Problem("two_notices", "one way to tell of a failure", allowed="--notify or --mail"))
+            problems.append(Problem("two_notices", "give only one of these options", allowed="--notify or --mail"))
         if problems or time is None:
             raise TriboError(problems)
         told = f'mail -s "tribo: $1 failed" {mail}' if mail else notify

@@ -1,8 +1,8 @@
 """mu and tau0 of each sample from campaign to campaign, and where they changed.
 
 A change point splits the campaigns of a series, in the order in which they were measured, in two runs of different
-mean. Each split is weighed by the two-sample t test; the smallest p over all splits and all series stands for the
-looks that were taken. It is compared with the smallest p under random orders of the campaigns (the same order for
+mean. Each split is judged by the two-sample t test. The smallest p over all splits and all series accounts for the
+number of comparisons. It is compared with the smallest p under random orders of the campaigns (the same order for
 all series, since a campaign moves all of them at once): the single-step method of Westfall and Young (1993) with
 permutations, which needs neither normal scatter nor independent series. A run found this way is looked at again for
 further changes.

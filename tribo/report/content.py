@@ -23,7 +23,18 @@ from tribo.report.words.terminal_text import fit_cells
 LEAD_FIGURE = "agreement"
 MISFIT_FIGURES = ("misfit", "residuals")
 CAUSE_FIGURES = ("extended", "evidence")
-VERDICT_MARKS = {"agrees": "=", "model too high": "▲", "model too low": "▼", "cannot tell": "?"}
+CALIBRATED = {
+    "mu_s": "Static friction coefficient of a block, mean",
+    "mu_s_sd": "Static friction coefficient of a block, standard deviation",
+    "mu_d": "Sliding friction coefficient of a block, mean",
+    "mu_d_sd": "Sliding friction coefficient of a block, standard deviation",
+    "static_adhesion_Pa": "Static adhesion of a block per area (Pa)",
+    "sliding_adhesion_Pa": "Sliding adhesion of a block per area (Pa)",
+    "blocks_x": "Blocks along x",
+    "blocks_y": "Blocks along y",
+    "dt_s": "Time step (s)",
+}
+VERDICT_MARKS = {"agrees": "=", "model too high": "▲", "model too low": "▼", "inconclusive": "?"}
 
 
 def content(study: Study, provenance: Provenance | None, verdict: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -131,7 +142,8 @@ def _agreement_table(agreements: list[findings.Agreement], regime: Regime) -> di
 def _calibration(study: Study) -> list[tuple[str, str]]:
     if study.comparison is None:
         return []
-    return [(name, f"{float(value):.5g}".replace("-", "−")) for name, value in study.comparison.calibration.items()]
+    found = study.comparison.calibration
+    return [(CALIBRATED.get(name, name), f"{float(value):.5g}".replace("-", "−")) for name, value in found.items()]
 
 
 def _flag_counts(study: Study) -> list[tuple[str, int, list[str]]]:
@@ -140,4 +152,5 @@ def _flag_counts(study: Study) -> list[tuple[str, int, list[str]]]:
     for test_id, pull in study.ingested.pulls.items():
         for flag in pull.flags:
             found.setdefault(flag, []).append(test_id)
-    return sorted(((f.replace("_", " "), len(tests), tests) for f, tests in found.items()), key=lambda x: (-x[1], x[0]))
+    counts = ((wording.flags_in_words([flag]), len(tests), tests) for flag, tests in found.items())
+    return sorted(counts, key=lambda x: (-x[1], x[0]))

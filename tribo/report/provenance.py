@@ -22,6 +22,7 @@ PACKAGES = (
 )  # fmt: skip
 DESCRIBED_IN = ("campaign.toml", "tests.csv")
 RAW = "raw"
+OPTIONS = {"rule": "Rule", "weights": "Weights", "flat": "Flat sample", "runs": "Simulations per load"}
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class Provenance:
 
     def in_words(self) -> list[tuple[str, str]]:
         """Names and values as a report shows them."""
-        chosen = {name.replace("_", " "): str(value) for name, value in self.options.items()}
+        chosen = {OPTIONS.get(name, name.replace("_", " ")): str(value) for name, value in self.options.items()}
         overrides = f"{self.overrides['file']}, SHA-256 {self.overrides['sha256']}" if self.overrides else ""
         known = {
             "Command": self.command,
@@ -70,7 +71,7 @@ class Provenance:
             "Seed": "" if self.seed is None else str(self.seed),
             **chosen,
             "Versions": ", ".join(f"{name} {number}" for name, number in self.versions.items()),
-            "Inputs": f"{len(self.inputs)} files, SHA-256 of their names and hashes together {self.inputs_digest}",
+            "Inputs": f"{len(self.inputs)} files, combined SHA-256 of their names and hashes {self.inputs_digest}",
             "Overrides": overrides,
         }
         return [(name, value) for name, value in known.items() if value]

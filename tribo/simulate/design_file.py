@@ -62,7 +62,7 @@ class DesignTable(BaseModel):
     @classmethod
     def _known_rule(cls, angles: list[float] | str) -> list[float] | str:
         if angles not in ("midpoints", "random") and (isinstance(angles, str) or not angles):
-            raise ValueError("no such rule")
+            raise ValueError("unknown rule for the angles")
         return angles
 
 
@@ -82,7 +82,7 @@ def read_design(path: str | Path, seed: int = 0) -> list[SimConfig]:
         kind = "JSON" if path.suffix.lower() == ".json" else "TOML"
         raise SimulationError(Problem("unreadable", f"cannot be read as {kind}: {why}", file=str(path))) from why
     if not isinstance(table, dict):
-        raise SimulationError(Problem("wrong_value", "a design is a table", file=str(path), found=type(table).__name__))
+        raise SimulationError(Problem("wrong_value", "must be a table", file=str(path), found=type(table).__name__))
     return runs_of_design({"seed": seed, **table}, file=str(path))
 
 

@@ -1,4 +1,4 @@
-"""Many runs: a design of samples, pressures and stratified angles, and threads that work it off."""
+"""Ensembles: a design of samples, pressures and stratified angles, run on several threads."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _angles_deg(
 
 
 def run_row(run: Run) -> dict[str, Any]:
-    """What the table of an ensemble keeps of a run."""
+    """The row of a run in the table of an ensemble."""
     return {
         "sample": run.sample,
         "pressure_Pa": run.pressure_Pa,

@@ -1,4 +1,4 @@
-"""What the choices that the paper's text leaves open do to its Table 2.
+"""Effect on Table 2 of the choices that the text of the paper leaves open.
 
 Some choices change the runs; each is a :class:`Variant`. Others only change what is read off a run and how it is
 fitted: which peak is static friction, which stretch is sliding, how the loads are weighted. Those are read off every

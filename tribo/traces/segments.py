@@ -1,4 +1,4 @@
-"""One record of many pulls: strokes in both directions, steps of load or speed, cut and brought to one sign."""
+"""Records of several pulls: strokes in both directions, steps of load or speed; split and brought to one sign."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def orient_strokes(strokes: Sequence[Trace]) -> Strokes:
         ``no_strokes``: nothing is given.
     """
     if not strokes:
-        raise TraceError(Problem("no_strokes", "no stroke is given"))
+        raise TraceError(Problem("no_strokes", "no strokes are given"))
     middles = [_middle(stroke) for stroke in strokes]
     forces = np.array([mean(f) for f in middles])
     u = np.array([wander(f, 1.0).mean_u for f in middles])

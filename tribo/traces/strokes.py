@@ -1,4 +1,4 @@
-"""Every pull of a record that holds many: reciprocating strokes, steps of load or speed."""
+"""All pulls of a record that contains several: reciprocating strokes, steps of load or speed."""
 
 from __future__ import annotations
 

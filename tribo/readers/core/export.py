@@ -1,4 +1,4 @@
-"""From an export to traces in SI units, with everything doubtful named."""
+"""From an export to traces in SI units, with all doubts."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def read_export(
     if choice is not None and 1 <= choice <= len(traces):
         return traces[choice - 1]
     shown = path.name
-    what = f"{len(traces)} tables that each are a trace"
-    allowed = f"one of them: {shown}#1 to {shown}#{len(traces)}; in a campaign also {shown}#*, every pull of all"
+    what = f"this export contains {len(traces)} traces"
+    allowed = f"one of {shown}#1 to {shown}#{len(traces)}; in a campaign also {shown}#* for all pulls"
     raise ReadError(Problem("several_tables", what, file=file or str(path), allowed=allowed))
 
 

@@ -152,7 +152,7 @@ def _of_a_clock(problem: Problem, source: Source, block: Block) -> Problem:
     if index >= len(cells) or not _CLOCK.search(cells[index]):
         return problem
     what = "a time of day, not a time in seconds"
-    allowed = 'a column of seconds, or one that counts rows with the sampling step as its unit: time = "NAME [0.01 s]"'
+    allowed = 'a column in seconds, or a row counter with the sampling interval as its unit: time = "NAME [0.01 s]"'
     return replace(problem, kind="time_of_day", what=what, found=cells[index], allowed=f"{allowed} in columns")
 
 

@@ -53,7 +53,7 @@ def hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
     found = []
     dimension = layout.metadata.get("X_Dimension", "Time")
     if "X_Value" in layout.names and dimension.startswith("Time"):
-        found.append(Hint("time", "X_Value [s]", "X_Value of a LabVIEW file is seconds"))
+        found.append(Hint("time", "X_Value [s]", "X_Value of a LabVIEW file is in seconds"))
     labels = layout.metadata.get("Y_Unit_Label", "").split()
     channels = [name for name in layout.names[1:] if name and name != "Comment"]
     for name, unit in zip(channels, labels, strict=False):

@@ -1,4 +1,4 @@
-"""A verdict, and what a planned design can tell, in words for a terminal."""
+"""Terminal output of a verdict and of the assessment of a planned design."""
 
 from __future__ import annotations
 

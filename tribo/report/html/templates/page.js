@@ -128,7 +128,7 @@
       `Automatic values: static ${number(automatic(record).peak[1])} N at ${number(automatic(record).peak[0])} s, ` +
       `sliding ${number(automatic(record).sliding)} N from ${number(automatic(record).window[0])} to ` +
       `${number(automatic(record).window[1])} s; zero ${number(automatic(record).zero, 3)} N.` +
-      (card.dataset.flags ? ` Flags: ${card.dataset.flags.split(" ").join(", ").replaceAll("_", " ")}.` : "") +
+      (card.querySelector(".flag") ? ` Flags: ${card.querySelector(".flag").textContent}.` : "") +
       (record.doubts || []).map(([time, what]) => ` At ${number(time)} s: ${what}.`).join("");
     if (!dialog.open) dialog.showModal();
     fill();
