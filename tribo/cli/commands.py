@@ -225,7 +225,7 @@ def diagnose(
 
 
 def _diagnose_published(console: Console, out: Path, seed: int) -> int:
-    """The verdict on Table 2 of Berardo et al. (2019), in every way to read what it leaves open."""
+    """The verdict on Table 2 of Berardo et al. (2019), for every interpretation of what it leaves open."""
     from tribo.diagnose.from_table.table_diagnosis import diagnose_published
     from tribo.published import BERARDO2019, data_dir, load_table2, load_table2_simulated_anew
     from tribo.report.provenance import provenance_of_table
@@ -405,7 +405,7 @@ def _provenance(study: Study, campaign: Path, chosen: StudyOptions) -> Provenanc
 
 
 def _with_columns(campaign: Campaign, columns: str) -> Campaign:
-    """The campaign with the columns given on the command line on top of its own."""
+    """The campaign with the columns of the command line added to, or replacing, its own."""
     from dataclasses import replace
 
     from tribo.readers import columns_from_text

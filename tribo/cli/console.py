@@ -7,7 +7,9 @@ import json
 import logging
 import math
 import os
+import shutil
 import sys
+import textwrap
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -42,7 +44,11 @@ class Console:
 
     def result(self, record: dict[str, Any], text: str) -> None:
         """The result itself: JSON where asked for, else ``text``."""
-        click.echo(json.dumps(without_nan(record), indent=1, default=str) if self.as_json else text)
+        if self.as_json:
+            text = json.dumps(without_nan(record), indent=1, default=str)
+        elif sys.stdout.isatty():
+            text = wrapped(text, shutil.get_terminal_size().columns)
+        click.echo(text)
 
     @contextmanager
     def progress(self) -> Iterator[Callable[[str, int, int], None]]:
@@ -56,8 +62,20 @@ class Console:
             yield _PlainLines(self)
 
 
+def wrapped(text: str, width: int) -> str:
+    """The text with long sentences wrapped at ``width`` columns; tables (columns two spaces apart) stay as they are."""
+    lines = []
+    for line in text.splitlines():
+        indent = line[: len(line) - len(line.lstrip())]
+        if len(line) <= width or "  " in line.strip():
+            lines.append(line)
+        else:
+            lines += textwrap.wrap(line, width, subsequent_indent=f"{indent}  " if indent else "")
+    return "\n".join(lines)
+
+
 class _PlainLines:
-    """A line every ten seconds while a stage lasts, and when it ends."""
+    """Print a line every ten seconds while a stage runs, and when it ends."""
 
     def __init__(self, console: Console):
         self._console = console
@@ -108,7 +126,7 @@ def _bars() -> Iterator[Callable[[str, int, int], None]]:
 
 
 def without_nan(value: Any) -> Any:
-    """The same record with null for every number that does not exist, as JSON wants it."""
+    """The same record with null for NaN and infinite numbers, which JSON does not have."""
     if isinstance(value, dict):
         return {key: without_nan(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -25,10 +25,10 @@ ROW_MM, FRAME_MM = 4.4, 26.0
 
 
 def numbers(d: Diagnosis, level: float = LEVEL) -> pd.DataFrame:
-    """Chance: the strongest look in each simulated campaign without effect. Observed: the strongest look here.
+    """Chance: the strongest deviation in each simulated campaign without effect. Observed: the strongest in this one.
 
-    Then one row a mechanism: the effect on T, in percent from end to end, that is found one, five and nine times
-    in ten; the strength of a look grows in proportion to the effect and scatters by one standard deviation.
+    Then one row per mechanism: the effect on T, in percent over the range of the variable, that is detected with 10, 50
+    and 90 % probability. The strength of a deviation is proportional to the effect and has a standard deviation of 1.
     """
     chance = [("chance", "", float(z), *[float("nan")] * 3) for z in d.screened.chance]
     best = int(np.argmax(d.screened.strength))

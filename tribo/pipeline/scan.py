@@ -23,8 +23,8 @@ class Dropped:
     """A campaign folder or .zip of a drop folder.
 
     ``files`` maps each file (relative to the campaign) to its SHA-256, ``waiting`` says which files are not whole
-    yet and why; a campaign with such files is left for the next round. ``overrides`` is NAME.overrides.csv beside the
-    campaign: what a person decided about single pulls.
+    yet and why; a campaign with such files is postponed. ``overrides`` is NAME.overrides.csv beside the
+    campaign: decisions made by hand about single pulls.
     """
 
     name: str
@@ -137,7 +137,7 @@ def _hashed(file: Path) -> tuple[str, bool]:
 
 
 def difference(old: Mapping[str, str] | None, new: Mapping[str, str]) -> str:
-    """What changed between two sets of files, in words; empty where nothing did."""
+    """Changes between two sets of files as text; empty if there are none."""
     if old is None:
         return "new"
     kinds = {

@@ -4,7 +4,7 @@ A change point splits the campaigns of a series, in the order in which they were
 mean. Each split is judged by the two-sample t test. The smallest p over all splits and all series accounts for the
 number of comparisons. It is compared with the smallest p under random orders of the campaigns (the same order for
 all series, since a campaign moves all of them at once): the single-step method of Westfall and Young (1993) with
-permutations, which needs neither normal scatter nor independent series. A run found this way is looked at again for
+permutations, which needs neither normal scatter nor independent series. Each part found this way is searched for
 further changes.
 """
 
@@ -47,7 +47,7 @@ def change_points(
     Returns
     -------
     tuple of Change
-        By series and place. ``p`` is adjusted for all splits and series that were looked at.
+        By series and place. ``p`` is adjusted for all splits and series examined.
     """
     values = {name: np.asarray(v, float) for name, v in series.items()}
     if not values:

@@ -1,4 +1,4 @@
-"""What a report says, in the order it says it: made once, set as a page (page.py) and as a PDF (pdf.py)."""
+"""The content of a report in its order: made once, then laid out as a page (page.py) and as a PDF (pdf.py)."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def content(study: Study, provenance: Provenance | None, verdict: Mapping[str, A
 
 
 def figure_places(names: list[str]) -> dict[str, list[str]]:
-    """Where each figure stands: beside the verdict, among Figs. 3 to 8, at the misfits, at the cause, at the end."""
+    """Place of each figure: beside the verdict, among Figs. 3 to 8, at the misfits, at the cause, at the end."""
     places: dict[str, list[str]] = {"lead": [], "figures": [], "misfit": [], "cause": [], "rest": []}
     for name in names:
         if name == LEAD_FIGURE:
@@ -76,7 +76,7 @@ def figure_places(names: list[str]) -> dict[str, list[str]]:
 
 
 def by_hand(study: Study) -> list[tuple[str, str]]:
-    """Every pull that was read elsewhere by hand, with what that changed; those left out are among the set aside."""
+    """Every pull with a peak or window moved by hand, with the change; excluded ones are among those set aside."""
     ingested = study.ingested
     return [
         (test_id, wording.by_hand_sentence(decided, ingested.pulls[test_id]))

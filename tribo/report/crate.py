@@ -22,9 +22,9 @@ UNDATED = "1970-01-01"
 
 
 def write_crate(study: Study, out: Path, provenance: Provenance, written: Iterable[Path]) -> Path:
-    """Write out/ro-crate-metadata.json over the files ``written``: what they are, their hashes, what made them of what.
+    """Write out/ro-crate-metadata.json over the files ``written``: their types and hashes, and how they were made.
 
-    The tribosystem stands in it as ASTM G115 asks, with terms of the TriboDataFAIR ontology where there are any.
+    It includes the tribosystem as required by ASTM G115, with terms of the TriboDataFAIR ontology where they exist.
     """
     record = crate_record(study, out, provenance, written)
     return write_text(out / FILE, json.dumps(record, indent=1, ensure_ascii=False) + "\n")

@@ -29,7 +29,7 @@ OPTIONS = {"rule": "Rule", "weights": "Weights", "flat": "Flat sample", "runs": 
 class Provenance:
     """How a report was made. ``inputs`` maps each file of the campaign, by its path in it, to its SHA-256.
 
-    ``campaign`` is where the campaign was, ``overrides`` the path and SHA-256 of the table of decisions by hand, if
+    ``campaign`` is where the campaign was, ``overrides`` the path and SHA-256 of the table of manual decisions, if
     one was given.
     """
 
@@ -51,7 +51,7 @@ class Provenance:
 
     @property
     def origin(self) -> str:
-        """What decides the numbers, in one line: the same for the same inputs, whenever and wherever they are read."""
+        """Everything that determines the numbers, in one line: the same for the same inputs at any time and place."""
         chosen = {"seed": self.seed, **self.options}
         return "; ".join(
             [
@@ -157,7 +157,7 @@ def _from(out: Path, place: str) -> str:
 
 
 def read_record(out: Path) -> dict[str, Any] | None:
-    """What provenance.json of a folder says; None where there is none, or none of this kind."""
+    """The contents of provenance.json of a folder; None if there is none, or none of this kind."""
     try:
         record = json.loads((out / FILE).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -168,7 +168,7 @@ def read_record(out: Path) -> dict[str, Any] | None:
 def settle_outputs(
     out: Path, before: Mapping[str, Any] | None, provenance: Provenance, written: Iterable[Path], complete: bool
 ) -> dict[str, str]:
-    """The files that stand for this record, with their hashes; those of an earlier record that do not are removed.
+    """The files that belong to this record, with their hashes; those of an earlier record that do not are removed.
 
     An earlier file stays where its run had the same inputs and choices and this run did not write everything itself
     (``complete``). A file that someone changed since is never removed.

@@ -39,9 +39,9 @@ PAPER = LocalFriction()
 
 @dataclass(frozen=True)
 class FrictionTerms:
-    """Local friction that changes during a run; amplitudes of zero, the default, leave the baseline as it is.
+    """Local friction that changes during a run; amplitudes of zero, the default, leave the baseline unchanged.
 
-    The laws stand in :mod:`tribo.simulate.friction`.
+    The laws are in :mod:`tribo.simulate.friction`.
 
     Parameters
     ----------

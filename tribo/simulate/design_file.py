@@ -44,7 +44,7 @@ PAIRS = {"blocks", "pattern_first"}  # two numbers are one value
 
 
 class DesignTable(BaseModel):
-    """The keys of a design; what they allow stands in their descriptions."""
+    """The keys of a design; their descriptions state the allowed values."""
 
     model_config = ConfigDict(extra="forbid")
 

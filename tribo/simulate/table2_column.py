@@ -114,7 +114,7 @@ def resampled_laws(
 
 
 def beside(table: pd.DataFrame, published: pd.DataFrame) -> pd.DataFrame:
-    """A fitted table with the published simulation beside it and the deviation of each number in percent.
+    """A fitted table with the published simulation and the deviation of each number in percent.
 
     ``friction_deviation_percent`` compares T/N at 10 kPa, since mu and tau0 are correlated.
     """
@@ -152,7 +152,7 @@ def table2_text(table: pd.DataFrame) -> str:
 
 
 def described(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame, str]:
-    """Means at every pressure, laws where a sample has several pressures, and both in words."""
+    """Means at every pressure, laws of samples with several pressures, and both as text."""
     import pandas as pd
 
     by = ["sample", *varied_columns(runs)]

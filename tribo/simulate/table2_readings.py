@@ -117,7 +117,7 @@ def run_study(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> dict[str, pd.DataFrame]:
-    """The runs of every variant with all their readings, one store a variant in ``folder``; a stopped study goes on."""
+    """The runs of every variant with all readings, one store per variant in ``folder``; a stopped study continues."""
     base = base or SimConfig()
     designs = {name: v.design(samples, pressures_Pa, repeats, base) for name, v in variants.items()}
     total, before, tables = sum(map(len, designs.values())), 0, {}

@@ -27,7 +27,7 @@ _COARSE = 0.5  # share of equal neighbours from which on a resolution is too coa
 
 
 def file_row(trace: Trace, index: int) -> int:
-    """Line of the export (from 1) that sample ``index`` stands on, as far as the reader said."""
+    """Line of the export (from 1) that sample ``index`` stands on, if the reader recorded it."""
     return trace.first_row + index
 
 
@@ -182,6 +182,6 @@ def standstill(force: FloatArray) -> tuple[int, int] | None:
 
 
 def noise_of(force: FloatArray) -> float:
-    """Sample noise, or a sliver of the range where the trace has none, so that it can stand in a denominator."""
+    """Sample noise, or a small fraction of the range if the trace has none, so that it can be a denominator."""
     floor = 1e-6 * float(np.ptp(force))
     return max(sample_noise(force), floor)

@@ -19,7 +19,7 @@ Window = tuple[int, int]
 
 @dataclass(frozen=True)
 class Rule:
-    """A rule: what it takes as static and as sliding friction, in words and as functions, and where it stands.
+    """A rule: how it defines static and sliding friction, as text and as functions, and its source.
 
     ``static(motion, parameters)`` returns the peak, ``sliding(motion, parameters)`` the range of samples to
     average. Lengths are in metres, shares dimensionless.

@@ -20,7 +20,7 @@ _MEANS_NORMAL_BESIDE_FRICTION = {"load", "last", "applied load", "charge"}
 
 @dataclass(frozen=True)
 class Hint:
-    """A column for a quantity, by name and unit ("Fx [gf]") or position ("#3 [N]"), and who says so."""
+    """A column for a quantity, by name and unit ("Fx [gf]") or position ("#3 [N]"), and its source."""
 
     quantity: str
     wanted: str

@@ -27,7 +27,7 @@ RowOf = Callable[[int], int]
 
 @dataclass(frozen=True)
 class Finding:
-    """A doubt: the flag it sets on the trace, and the problem that says where; ``fatal`` sets the trace aside."""
+    """A doubt: the flag it sets on the trace, and the problem with its place; ``fatal`` sets the trace aside."""
 
     flag: str
     problem: Problem

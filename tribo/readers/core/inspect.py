@@ -39,7 +39,7 @@ class ColumnSeen:
 
 @dataclass(frozen=True)
 class TableSeen:
-    """A table that is a trace: where it stands, its time base in seconds, its forces in newton."""
+    """A table that is a trace: its position, its time base in seconds, its forces in newton."""
 
     label: str
     first_row: int
@@ -82,7 +82,7 @@ class Inspection:
 
     @property
     def refused(self) -> bool:
-        """Whether the export cannot be read as it stands."""
+        """Whether the export cannot be read."""
         return bool(self.problems)
 
     def record(self) -> dict[str, Any]:
@@ -90,12 +90,12 @@ class Inspection:
         return {"refused": self.refused, **asdict(self)}
 
     def in_words(self) -> str:
-        """All of it for a person."""
+        """All of it as text."""
         lines = [self.file]
         if self.family:
             marks = f"{_MARKS.get(self.delimiter, self.delimiter)!s} between cells, decimal {_mark(self.decimal)}"
             lines.append(f"  format    {self.family_text} ({self.family})")
-            lines.append(f"  written   {self.encoding}, {marks}, {self.header_rows} header rows")
+            lines.append(f"  encoding  {self.encoding}, {marks}, {self.header_rows} header rows")
         lines += [f"  column    {_column_in_words(c)}" for c in self.columns]
         lines += [f"  table     {_table_in_words(t)}" for t in self.tables[:12]]
         if len(self.tables) > 12:
@@ -110,15 +110,15 @@ class Inspection:
         lines += [f"  doubt     {problem}" for problem in self.doubts]
         lines += [f"  refused   {problem}" for problem in self.problems]
         if self.advice:
-            lines.append(f"  give      {self.advice}")
+            lines.append(f"  advice    {self.advice}")
         return "\n".join(lines)
 
 
 def inspect_export(path: Path | str, *, columns: Mapping[str, str] | None = None) -> Inspection:
     """Description of an export: family, encoding, columns and why, units, tables, time base, doubts.
 
-    Never raises for what is in the file: an export that cannot be read has its ``problems`` here.
-    Of a large file only the beginning is looked at, and a doubt says so. ``columns`` as in
+    Never raises because of the contents of the file: for an export that cannot be read, ``problems`` states why.
+    Only the beginning of a large file is checked; a doubt then says so. ``columns`` as in
     :func:`tribo.readers.read_export`.
     """
     path = Path(path)
@@ -132,7 +132,7 @@ def inspect_export(path: Path | str, *, columns: Mapping[str, str] | None = None
 
 
 def _unseen(path: Path, file: str) -> tuple[Problem, ...]:
-    """The doubt about a large file, of which only the beginning was looked at; with its last line."""
+    """The doubt about a large file of which only the beginning was checked; with its last line."""
     source = open_sources(path, file)[0] if path.stat().st_size > MAPPED_BYTES else None
     if source is None or not source.is_large:
         return ()
@@ -147,7 +147,7 @@ def parse_hints(columns: Mapping[str, str] | None) -> tuple[Hint, ...]:
 
 
 def _refused(path: Path, file: str, problems: tuple[Problem, ...], asked: tuple[Hint, ...]) -> Inspection:
-    """As much as can be said about an export that cannot be read."""
+    """What is known about an export that cannot be read."""
     try:
         source = open_sources(path, file)[0]
     except ReadError:

@@ -27,11 +27,11 @@ _BLANK = ' \t;,"|'
 
 @dataclass(frozen=True)
 class Layout:
-    """How a table stands in a file. ``names``, ``units`` and ``filled`` have ``n_cells`` entries.
+    """The layout of a table in a file. ``names``, ``units`` and ``filled`` have ``n_cells`` entries.
 
     ``header_rows`` counts the lines of the file above the first data row; ``names_row`` and ``units_row`` count
-    from 1. ``filled`` is False for a column that is empty in the first rows; ``misfit`` says that the
-    names of the file cannot be told apart, and are left out.
+    from 1. ``filled`` is False for a column that is empty in the first rows; ``misfit`` states that the
+    names of the file cannot be matched to columns and are ignored.
     """
 
     delimiter: str

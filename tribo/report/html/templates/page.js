@@ -358,7 +358,7 @@
   byId("zoom-all").addEventListener("click", () => look(current.t[0], current.t[current.t.length - 1]));
   addEventListener("resize", () => { if (dialog.open) draw(); });
 
-  // What is handed back.
+  // The file of decisions.
   const cell = (value) => /[",;\n\r]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value;
   byId("save-overrides").addEventListener("click", () => {
     const lacking = [...decisions].find(([, d]) => d.action === "exclude" && !d.reason.trim());
