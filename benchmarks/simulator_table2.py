@@ -1,4 +1,4 @@
-"""What the choices that the paper's text leaves open do to its Table 2 (docs/table2.md).
+"""What the choices that the paper's text leaves open do to its Table 2 (docs/results/table2-recomputed.md).
 
     tribo simulate --table2 -o table2.nc
     python benchmarks/simulator_table2.py column table2.nc docs/data data/berardo2019
@@ -18,8 +18,8 @@ from pathlib import Path
 
 from tribo.published import load_table2
 from tribo.simulate import SimConfig, read_stored
-from tribo.simulate.study import combinations, run_study
-from tribo.simulate.tables import beside, distance, fitted
+from tribo.simulate.table2_column import beside, distance, fitted
+from tribo.simulate.table2_readings import combinations, run_study
 
 BASE = SimConfig(dt_s=1e-7, rest_tolerance=1e-2)
 

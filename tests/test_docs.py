@@ -13,8 +13,8 @@ import pytest
 import tribo
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
+PACKAGES = sorted(file.parent.name for file in Path(tribo.__file__).parent.glob("*/__init__.py"))
 REFERENCE = sorted((DOCS / "reference").glob("*.md"))
-PACKAGES = ("campaign", "readers", "traces", "fitting", "simulate", "diagnose", "report")
 RECORDS = ("records", "errors")
 DIRECTIVE = re.compile(r"^\.\. auto(function|class|data|module|exception):: (\S+)", re.MULTILINE)
 LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)(?:#[^)]*)?\)")
@@ -37,7 +37,7 @@ def public_names() -> list[str]:
     """Names that users meet: of tribo, of its packages, and every record and error."""
     names = [f"tribo.{name}" for name in tribo.__all__]
     for package in PACKAGES:
-        names += [f"tribo.{package}.{name}" for name in import_module(f"tribo.{package}").__all__]
+        names += [f"tribo.{package}.{name}" for name in getattr(import_module(f"tribo.{package}"), "__all__", ())]
     for module in RECORDS:
         members = vars(import_module(f"tribo.{module}")).items()
         names += [

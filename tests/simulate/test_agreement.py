@@ -1,4 +1,4 @@
-"""The fast engine against the paper's algorithm, case by case; docs/simulator.md holds the whole table.
+"""The fast engine against the paper's algorithm, case by case; the table is in docs/results/simulator-accuracy.md.
 
 The quick cases run with every test. The slow ones are some of those of ``benchmarks/simulator_agreement.py``.
 """
@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 from tribo.simulate import SimConfig
-from tribo.simulate.engine import Trajectory, lattice_of, run_fast, thresholds_of
-from tribo.simulate.reference import run_reference
+from tribo.simulate.engines.fast import Trajectory, lattice_of, run_fast, thresholds_of
+from tribo.simulate.engines.reference import run_reference
 from tribo.simulate.run import run_of
 
 RECORD = Path(__file__).resolve().parents[2] / "docs" / "data"
