@@ -17,7 +17,7 @@ from playwright.sync_api import Page, sync_playwright
 
 # file name -> CSS selector of the element that it shows
 PICTURES = {
-    "report-verdict": "#short > p.verdict",
+    "report-ratio": "#figure-agreement",
     "report-sliding-window": "#figure-fig3",
     "report-law": "#table2 div.wide",
     "report-agreement": "#agreement div.wide",
