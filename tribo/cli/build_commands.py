@@ -46,7 +46,7 @@ KEEP = click.option(
     "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
 )
 @click.option("--weights", default="relative", show_default=True, help="Weights of the fit, as in tribo fit.")
-@click.option("--flat", default="F", show_default=True, help="Flat sample on which the model is calibrated.")
+@click.option("--flat", default="", metavar="SAMPLE", help="Flat sample for the calibration, as in tribo report.")
 @click.option("--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulations per load.")
 @click.option("--scheduler", help="Address of a dask scheduler; its workers run the simulations.")
 @command_options

@@ -35,6 +35,11 @@ COLUMNS = click.option(
     "#3 means the third column.",
 )
 
+FLAT = click.option(
+    "--flat", default="", metavar="SAMPLE",
+    help="Flat sample on which the model is calibrated. [default: F, or the only flat sample]",
+)  # fmt: skip
+
 OVERRIDES = click.option(
     "--overrides",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
@@ -64,7 +69,7 @@ def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _model_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
-        click.option("--flat", default="F", show_default=True, help="Flat sample on which the model is calibrated."),
+        FLAT,
         click.option("--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulations per load."),
         SCHEDULER,
     ):
@@ -188,13 +193,13 @@ def compare(console: Console, campaign: Path, out: Path, dry_run: bool, **option
 @click.option(
     "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
 )
+@FLAT
 @COLUMNS
 @OVERRIDES
 @command_options
 def diagnose(
-    console: Console, campaign: Path | None, out: Path, published: str | None, rule: str, columns: str,
-    overrides: Path | None, seed: int, jobs: int, **_: Any,
-) -> int:  # fmt: skip
+    console: Console, campaign: Path | None, out: Path, published: str | None, columns: str, **options: Any
+) -> int:
     """Find where the model fails, and the likely cause.
 
     Writes verdict.json and the figures of the diagnosis. Where the data do not allow a conclusion, the verdict says
@@ -203,7 +208,7 @@ def diagnose(
     if (campaign is None) == (published is None):
         raise click.UsageError("give either a CAMPAIGN or --published with the name of a table")
     if campaign is None:
-        return _diagnose_published(console, out, seed)
+        return _diagnose_published(console, out, options["seed"])
     from tribo import stages
     from tribo.campaign import open_campaign
     from tribo.report import write_until
@@ -211,17 +216,16 @@ def diagnose(
     from tribo.store.kept_results import Shelf
 
     with open_campaign(campaign) as opened, console.progress() as progress:
-        described = _with_columns(opened, columns)
-        ingested = stages.ingest(described, rule=rule, jobs=jobs, overrides=overrides, progress=progress)
-        found = stages.diagnosis(ingested, seed=seed, jobs=jobs, kept=out / KEPT, progress=progress)
-        study = stages.Study(ingested)
-        provenance = _provenance(study, campaign, stages.StudyOptions(rule=rule, seed=seed, overrides=overrides))
-        keep = Shelf(out / KEPT).take
-        write_until(study, out, "ingest", progress, provenance, diagnosis=found, jobs=jobs, keep=keep)
+        chosen = stages.StudyOptions(kept=out / KEPT, **options)
+        study = stages.study(_with_columns(opened, columns), chosen, until="ingest", progress=progress)
+        found = _diagnosis(study, chosen, progress)
+        keep = Shelf(chosen.kept).take
+        provenance = _provenance(study, campaign, chosen)
+        write_until(study, out, "ingest", progress, provenance, diagnosis=found, jobs=chosen.jobs, keep=keep)
     verdict = found.verdict
     console.result(verdict.as_dict(), verdict_text(verdict))
-    console.list_tests("set aside", ingested.set_aside, level=-1)
-    return status_of(ingested.set_aside)
+    console.list_tests("set aside", study.ingested.set_aside, level=-1)
+    return status_of(study.ingested.set_aside)
 
 
 def _diagnose_published(console: Console, out: Path, seed: int) -> int:
@@ -398,7 +402,7 @@ def _provenance(study: Study, campaign: Path, chosen: StudyOptions) -> Provenanc
         command=_command_line(),
         seed=chosen.seed,
         started_at=_now(),
-        options=chosen.as_words(),
+        options={**chosen.as_words(), "flat": study.ingested.campaign.flat_sample},
         campaign=campaign,
         overrides=chosen.overrides,
     )
@@ -418,12 +422,17 @@ def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[
     from dataclasses import replace
 
     from tribo.errors import FitError
-    from tribo.stages import diagnosis
 
     try:
-        return study, diagnosis(study.ingested, seed=chosen.seed, kept=chosen.kept, progress=progress)
+        return study, _diagnosis(study, chosen, progress)
     except FitError as why:
         return replace(study, notes=(*study.notes, f"no diagnosis: {why}")), None
+
+
+def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis:
+    from tribo.stages import diagnosis
+
+    return diagnosis(study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, progress=progress)
 
 
 def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None = None) -> int:
