@@ -43,7 +43,7 @@ def open_campaign(path: Path | str, *, measured: bool = True) -> Iterator[Campai
             _unpack(path, Path(folder))
             yield load_campaign(_campaign_folder(Path(folder), path.name), measured=measured)
     else:
-        raise CampaignError(Problem("missing", "no such folder or .zip", file=str(path)))
+        raise CampaignError(Problem("missing", "this folder or .zip does not exist", file=str(path)))
 
 
 def _campaign_folder(folder: Path, shown: str) -> Path:

@@ -84,7 +84,7 @@ def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
     except OSError:
         raise CampaignError(Problem("missing_file", "this file does not exist", file=str(path))) from None
     if table is None:
-        raise CampaignError(Problem("empty", "no header", file=file, allowed=",".join(COLUMNS)))
+        raise CampaignError(Problem("empty", "the file has no header", file=file, allowed=",".join(COLUMNS)))
     if faults := list(_header_faults(table, file)):
         raise CampaignError(faults)
     known = _known_tests(ingested)
