@@ -101,7 +101,7 @@ def _set(values: Values, mechanism: Mechanism, item: str, problems: list[Problem
         value = float("nan")
     if not p.low <= value <= p.high:
         allowed = f"{p.low:g} to {p.high:g} {p.unit}".rstrip()
-        problems.append(Problem("bad_value", f"{mechanism.name}:{key} is out of range or not a number", found=number, allowed=allowed))
+        problems.append(Problem("bad_value", f"{mechanism.name}:{key} is out of range", found=number, allowed=allowed))
         return
     values[names.index(key)] = value
 

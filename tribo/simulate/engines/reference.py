@@ -1,4 +1,4 @@
-"""The model as Berardo et al. 2019 print it, on all blocks at every step: slow, short, the reference for the other engines.
+"""The model as printed by Berardo et al. (2019), on all blocks at every step: the reference for the other engines.
 
 Springs of the full r_ij (or linearised, for comparison), fourth-order Runge-Kutta, 1e-8 s in the paper. Where
 the text gives no details, these choices were made:
