@@ -28,17 +28,17 @@ def data_dir() -> Path:
 
 
 def load_table1() -> pd.DataFrame:
-    """Table 1 of Berardo et al. (2019): the patterns, one row a sample.
+    """Table 1 of Berardo et al. (2019): the patterns, one row per sample.
 
     Columns: sample, cavity (none, circle, rectangle), size_x_um, size_y_um (the diameter twice for a circle),
     pitch_x_um, pitch_y_um, area_fraction_printed, area_fraction_computed (from the sizes printed beside it),
-    area_fraction_model (of the paper's 85 x 85 blocks). Empty (NaN) where a flat sample has none.
+    area_fraction_model (of the paper's 85 x 85 blocks). NaN where a flat sample has no value.
     """
     return _read("table1.csv")
 
 
 def load_table2() -> pd.DataFrame:
-    """Table 2 of Berardo et al. (2019) in long form, one row a sample, regime and source.
+    """Table 2 of Berardo et al. (2019) in long form, one row per sample, regime and source.
 
     Columns: sample, regime (static, sliding), source (experiment, simulation), mu, mu_sd, tau0_kPa,
     tau0_sd_kPa. The standard deviations are as printed; the covariance of mu and tau0 is not published.

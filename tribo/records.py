@@ -387,7 +387,7 @@ class Study:
     """One campaign with the results of all stages.
 
     ``fits`` holds the measured law of every sample and regime (T = mu N + tau0 A, the default weights),
-    ``other_fits`` the same under other weights or laws. ``simulated`` is the ensemble, one row a run: sample,
+    ``other_fits`` the same under other weights or laws. ``simulated`` is the ensemble, one row per run: sample,
     pressure_Pa, normal_load_N (p times the nominal area of the campaign), angle_deg, seed, static_N,
     sliding_N. ``example_runs`` holds one full force trace of the model per sample. ``budget`` is the uncertainty
     budget of every fitted number, one row per component. ``power`` states the differences this campaign could detect,

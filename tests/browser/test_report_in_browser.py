@@ -161,7 +161,7 @@ def test_what_the_page_hands_back_is_applied_and_comes_back_on_the_next_page(
     page.keyboard.press("Tab")
     page.fill("#hand-reason", "drift at first")
     page.click("#pull-close")
-    expect(page.locator("#decision-count")).to_have_text("Left out: 1. Moved: 1.")
+    expect(page.locator("#decision-count")).to_have_text("Excluded: 1. Moved: 1.")
     overrides = save(page, tmp_path)
     assert report.messages == []
 
@@ -182,7 +182,7 @@ def test_what_the_page_hands_back_is_applied_and_comes_back_on_the_next_page(
 
     opened = open_report(browser, anew)
     again = opened.page
-    expect(again.locator("#decision-count")).to_have_text("Left out: 1. Moved: 1.")
+    expect(again.locator("#decision-count")).to_have_text("Excluded: 1. Moved: 1.")
     expect(again.locator("[data-id=T003]")).to_contain_text("Excluded by hand (sled tipped over).")
     expect(again.locator("#measured")).to_contain_text("drift at first")
     assert save(again, tmp_path / "again").read_bytes() == overrides.read_bytes()

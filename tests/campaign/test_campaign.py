@@ -355,7 +355,7 @@ def test_what_is_no_zip_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_path_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(CampaignError, match=r"no such folder or \.zip"), open_campaign(tmp_path / "nothing"):
+    with pytest.raises(CampaignError, match=r"folder or \.zip does not exist"), open_campaign(tmp_path / "nothing"):
         pass
 
 

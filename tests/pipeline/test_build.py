@@ -243,7 +243,7 @@ def test_a_dry_run_says_why_each_step_would_run_and_does_nothing(tmp_path: Path)
     assert dry.said["due"] == {"a": "new"}
     steps = {step.split(" (")[0].split(":")[0] for step in dry.said["steps"]}
     assert steps == {"ingest", "fit", "calibrate", "simulate", "diagnose", "report", "index"}
-    assert all(step.endswith(": never finished before") for step in dry.said["steps"])
+    assert all(step.endswith(": not finished before") for step in dry.said["steps"])
     assert dry.after == {}
 
 

@@ -75,7 +75,7 @@ def test_a_file_that_grows_while_it_is_read_is_named(drop: Path, monkeypatch: py
 
     monkeypatch.setattr(scanning, "hashlib", SimpleNamespace(sha256=WhileItIsWritten))
     (found,) = scan(drop, 0.0)
-    assert found.waiting == ("raw/T1.csv is still growing",)
+    assert found.waiting == ("raw/T1.csv is still being written",)
 
 
 def test_a_folder_without_a_campaign_yet_waits(tmp_path: Path) -> None:

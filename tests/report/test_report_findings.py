@@ -119,7 +119,7 @@ def test_the_direction_ratio_is_that_of_the_fitted_forces(study: Study) -> None:
     assert first.low < first.measured < first.high
     sentence = wording.direction_sentences(ratios)[0]
     assert sentence.startswith("Ratio of static friction Sx / Sy")
-    assert "outside its interval at 3 of them" in sentence
+    assert "outside the 95 % interval of the measurement at 3 of them" in sentence
 
 
 def test_a_campaign_without_directions_says_nothing_of_them(study: Study) -> None:

@@ -25,15 +25,15 @@ _NOT_A_ZIP = (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, Runtim
 
 @contextmanager
 def open_campaign(path: Path | str, *, measured: bool = True) -> Iterator[Campaign]:
-    """Open a campaign folder, or a .zip that holds one (unpacked into a temporary folder for the duration).
+    """Open a campaign folder, or a .zip that holds one (unpacked into a temporary folder while it is open).
 
-    ``measured`` is that of :func:`tribo.campaign.load_campaign`.
+    ``measured`` as in :func:`tribo.campaign.load_campaign`.
 
     Raises
     ------
     CampaignError
-        The campaign is unusable; or the archive is no zip, or holds links, paths that leave it, encrypted or
-        oversized entries, no campaign.toml, or several.
+        The campaign is unusable; or the archive is not a .zip, or contains links, paths outside it, encrypted or
+        oversized entries, no campaign.toml, or more than one.
     """
     path = Path(path)
     if path.is_dir():

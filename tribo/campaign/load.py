@@ -24,20 +24,20 @@ _NUMBER_ROW = re.compile(rb'^\s*"?[-+]?[.,]?\d+[.,\d]*"?\s*[,;\t|]', re.M)
 
 
 def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
-    """Read campaign.toml and tests.csv of a folder; of raw/ only which files there are.
+    """Read campaign.toml and tests.csv of a folder, and the list of files in raw/.
 
     With ``measured=False`` the exports need not exist yet: the campaign is a plan.
 
     Returns
     -------
     Campaign
-        SI units. ``tests`` are the usable rows, ``set_aside`` those with a fault or an ``exclude`` reason,
-        ``problems`` every fault and note.
+        SI units. ``tests`` are the usable rows, ``set_aside`` those with an error or an ``exclude`` reason,
+        ``problems`` all errors and notes.
 
     Raises
     ------
     CampaignError
-        campaign.toml is wrong, a required column is missing, or no test is usable: with the faults of both
+        campaign.toml is wrong, a required column is missing, or no test is usable; with the errors of both
         files.
     """
     root = Path(folder)

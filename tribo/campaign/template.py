@@ -77,7 +77,7 @@ def write_template(folder: Path | str) -> tuple[Path, ...]:
     Raises
     ------
     CampaignError
-        One of them already exists. Nothing is overwritten, and then nothing is written at all.
+        One of them already exists. In this case nothing is written.
     """
     folder = Path(folder)
     texts = {folder / TOML: _TOML_TEXT, folder / TESTS: _TESTS_TEXT}

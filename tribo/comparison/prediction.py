@@ -80,7 +80,7 @@ def predict(
     Parameters
     ----------
     fits : laws measured on the samples, the flat one among them
-    runs : simulated runs a sample and load, at stratified pull angles with fresh local friction
+    runs : simulated runs per sample and load, at stratified pull angles with fresh local friction
     weights : of the fits to the simulated forces
     kept : folder for the calibration and every finished run; results made from other inputs are not used
     scheduler : address of a dask.distributed scheduler whose workers run the simulations

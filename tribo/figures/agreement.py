@@ -74,7 +74,7 @@ def _ratio(row: ComparisonRow, measured_dof: float, simulated_dof: float) -> dic
 
 @style.in_house_style
 def draw(numbers: pd.DataFrame) -> Figure:
-    """One panel a sample, static beside sliding at each load; the line at 1 is perfect agreement."""
+    """One panel per sample, static beside sliding at each load; the line at 1 is perfect agreement."""
     groups = style.by_sample(numbers)
     figure, axes = style.panel_grid(len(groups), 45, sharex=True, sharey=True)
     for ax, (_, sample) in zip(axes, groups, strict=True):

@@ -74,7 +74,7 @@ def _row(
 
 @style.in_house_style
 def draw(numbers: pd.DataFrame) -> Figure:
-    """A column a sample, static above sliding; on the line at zero the model is right."""
+    """One column per sample, static above sliding; on the line at zero the model is right."""
     samples = style.by_sample(numbers)
     figure, axes = style.panel_grid(2 * len(samples), 44, columns=len(samples), sharex=True, sharey=True)
     for k, (_, part) in enumerate(samples):

@@ -72,7 +72,7 @@ def _relative_u(outlook: Outlook, correlation: float | None) -> np.ndarray:
 
 @style.in_house_style
 def draw_ratio(numbers: pd.DataFrame) -> Figure:
-    """A column a sample, static above sliding; on the line at 1 the paper's model is right."""
+    """One column per sample, static above sliding; on the line at 1 the paper's model is right."""
     samples = list(dict.fromkeys(numbers["sample"]))
     figure, axes = style.panel_grid(2 * len(samples), 42, columns=len(samples), sharex=True, sharey=True)
     for k, sample in enumerate(samples):
@@ -112,7 +112,7 @@ def _ratio_panel(ax: Axes, part: pd.DataFrame) -> None:
 
 
 def reading_numbers(d: PublishedDiagnosis) -> pd.DataFrame:
-    """One row a reading and mechanism: log likelihood gained, amplitude with its 90 % interval, the guess it is."""
+    """One row per reading and mechanism: log likelihood gained, amplitude with its 90 % interval, the guess it is."""
     from tribo.diagnose.from_table.table_diagnosis import GUESSES, estimate_of
 
     guess_of = {name: guess for guess, names in GUESSES.items() for name in names}

@@ -21,7 +21,7 @@ Of = TypeVar("Of")
 class FigureOf(Generic[Of]):
     """One figure of a record of type ``Of``.
 
-    ``numbers(record)`` gives exactly what is plotted, one row a point, units in the column names; an empty
+    ``numbers(record)`` gives exactly what is plotted, one row per point, units in the column names; an empty
     frame where the record lacks what the figure needs. ``draw(numbers)`` has no other input, so a table
     written from the numbers holds exactly what the figure shows.
     """

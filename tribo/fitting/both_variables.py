@@ -38,8 +38,8 @@ def fit_errors_in_both(
 ) -> tuple[LawFit, ...]:
     """As ``fit_samples``, each specimen by odrpack with N known to sqrt(load_u_N^2 + (load_u_share N)^2).
 
-    The standard uncertainty of N is that of one pull, independent from pull to pull. The scatter of T is what
-    the pulls scatter about their line by ``weights``, less what the stated errors of N explain of it.
+    The standard uncertainty of N is that of one pull, independent from pull to pull. The scatter of T is
+    that of the pulls about their line (with ``weights``), minus the part explained by the stated errors of N.
 
     Raises
     ------

@@ -104,7 +104,7 @@ class Budget:
         return max(self.components, key=lambda component: component.u[number])
 
     def table(self) -> pd.DataFrame:
-        """One row a component and a last one "combined": type, dof, origin, u_NUMBER, share_pct_NUMBER."""
+        """One row per component and a last one "combined": type, dof, origin, u_NUMBER, share_pct_NUMBER."""
         import pandas as pd
 
         combined = {number: self.standard_uncertainty(number) for number in NUMBERS}

@@ -70,13 +70,13 @@ def fit_power_law(
 ) -> tuple[LawFit, ...]:
     """A power law of pressure ("pressure_power" or "pressure_power_adhesion") of every sample, specimens first.
 
-    ``dof`` and covariance as in ``fit_samples``. Samples whose specimens cannot fix the law have NaN values
-    and a note. An exponent n whose interval holds zero says that T against N shows no bend.
+    ``dof`` and covariance as in ``fit_samples``. Samples whose specimens do not determine the law have NaN
+    values and a note. If the interval of the exponent n contains zero, T against N shows no significant curvature.
 
     Raises
     ------
     FitError
-        Another law, or faults of the table.
+        Another law, or errors in the table.
     """
     power = LAWS.get(law)
     if power is None or power.linear:

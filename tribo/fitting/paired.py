@@ -95,7 +95,7 @@ def _difference(one: LawFit, other: LawFit, number: str, pressure_Pa: float) -> 
 
 
 def differences_table(differences: Iterable[PairedDifference]) -> pd.DataFrame:
-    """One row a difference; the specimens in one cell."""
+    """One row per difference; the specimens in one cell."""
     import pandas as pd
 
     columns = [name for name in PairedDifference.__dataclass_fields__ if name != "specimens"]

@@ -146,7 +146,7 @@ def _noncentrality(dof: float, level: float, power: float) -> float:
 
 @dataclass(frozen=True)
 class _WithinSpecimen:
-    """Mean covariance (2, 2) of one specimen's (mu, tau0_Pa) with one pull a load; mean pulls at a load."""
+    """Mean covariance (2, 2) of one specimen's (mu, tau0_Pa) with one pull per load; mean pulls at a load."""
 
     covariance: FloatArray
     repeats: float

@@ -56,8 +56,8 @@ def fit_samples(
     -------
     tuple of LawFit
         ``covariance`` of (mu, tau0_Pa) is that of the mean over specimens, ``dof`` = G - 1. One specimen:
-        its own covariance, dof = n - 2, and a note. tau0 is never clamped. A sample whose tests cannot fix
-        the law has NaN values and a note that says why. ``chi2_red`` is the reduced chi-squared of the load
+        its own covariance, dof = n - 2, and a note. tau0 is never clamped. A sample whose tests do not
+        determine the law has NaN values and a note with the reason. ``chi2_red`` is the reduced chi-squared of the load
         means about each specimen's line, the variance of a mean taken from its repeats (NaN without repeats).
 
     Raises

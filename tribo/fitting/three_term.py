@@ -96,7 +96,7 @@ def _without(design: FloatArray, force: FloatArray, weight: FloatArray, out: np.
 
 
 def _misfit_of_samples(used: list[Rows], whole: LinearFit, specimen: np.ndarray) -> float:
-    """F ratio of sample means to specimen means of the weighted residuals; NaN with one specimen a sample."""
+    """F ratio of sample means to specimen means of the weighted residuals; NaN with one specimen per sample."""
     sample = np.concatenate([np.full(len(rows), k) for k, rows in enumerate(used)])
     own = np.array([f"{k}/{name}" for k, name in zip(sample, specimen, strict=True)])
     cells, index = np.unique(own, return_inverse=True)

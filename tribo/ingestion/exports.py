@@ -59,7 +59,7 @@ def inspect_file(path: Path, columns: Mapping[str, str] | None = None) -> Inspec
 
 
 def _pulls_in_words(tables: Sequence[Trace]) -> tuple[str, ...]:
-    """One line a pull; nothing where no table holds more than one."""
+    """One line per pull; nothing where no table holds more than one."""
     from tribo.traces import load_of, split_pulls
 
     pieces = {f"#{t}/{p}": piece for t, table in enumerate(tables, 1) for p, piece in enumerate(split_pulls(table), 1)}

@@ -132,7 +132,7 @@ def parse_given(text: str) -> dict[str, float]:
 
 
 def simulate_with(config: SimConfig, mechanisms: Mapping[str, Values], **recorded: float) -> Run:
-    """One run with mechanisms at work; with none, or all at zero, the run of ``config`` to the bit.
+    """One run with mechanisms in the model; with none, or with all at zero, bit for bit the run of ``config``.
 
     Parameters
     ----------

@@ -79,7 +79,7 @@ def series(rows: Sequence[CampaignRow]) -> dict[Key, list[float]]:
 
 
 def trend_csv(rows: Sequence[CampaignRow]) -> str:
-    """The plotted numbers: a row a campaign, sample, regime and parameter."""
+    """The plotted numbers: one row per campaign, sample, regime and parameter."""
     lines = ["campaign,measured,sample,regime,parameter,value,low,high"]
     for row in rows:
         for law in row.laws:

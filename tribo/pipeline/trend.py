@@ -41,7 +41,7 @@ def change_points(
 
     Parameters
     ----------
-    series : name -> one value a campaign, NaN where the campaign has none
+    series : name -> one value per campaign, NaN where the campaign has none
     level : chance of a false alarm in the first round, over all series together
 
     Returns

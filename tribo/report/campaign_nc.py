@@ -53,8 +53,8 @@ def write_store(
 ) -> Path:
     """Write out/campaign.nc, a DataTree with the groups tests, fits, comparison, simulated and traces.
 
-    With a ``diagnosis`` also residuals, a row a test and regime under the calibrated and the extended model, and
-    extended_runs, the pairs of runs of the simulator without and with the named mechanisms.
+    With a ``diagnosis`` also residuals, one row per test and regime under the calibrated and the extended model, and
+    extended_runs, pairs of simulated runs without and with the named mechanisms.
 
     ``provenance`` is stored in the attributes of the file, as JSON. With ``keep_earlier``, groups stay that an earlier
     run of more stages on the same inputs wrote and that this study does not have.

@@ -124,7 +124,7 @@ def _agreement_tables(study: Study) -> list[dict[str, Any]]:
 
 
 def _agreement_table(agreements: list[findings.Agreement], regime: Regime) -> dict[str, Any]:
-    """Ratios of one regime: a row a sample, a column a load level, and the sentence of each sample."""
+    """Ratios of one regime: one row per sample, one column per load level, and the sentence of each sample."""
     part = [a for a in agreements if a.regime == regime]
     if not part:
         return {}

@@ -71,7 +71,7 @@ def write_figures(
 ) -> dict[str, Drawn]:
     """Write out/figures/NAME.svg, .pdf, .png and .csv of every figure there are numbers for, and return them.
 
-    ``origin`` says in the metadata of every file what it was made from; ``jobs`` processes share the drawing;
+    ``origin`` is written to the metadata of every file and states its source; ``jobs`` processes share the drawing;
     ``keep`` (:meth:`tribo.store.kept_results.Shelf.take`) avoids redrawing a figure whose numbers have not changed.
     """
     drawn = draw_all(study, diagnosis, origin, progress, jobs, keep)

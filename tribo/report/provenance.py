@@ -90,9 +90,9 @@ def gather_provenance(
     campaign: Path | None = None,
     overrides: Path | None = None,
 ) -> Provenance:
-    """Versions of what computes, and hashes of everything in the campaign.
+    """Versions of the software, and hashes of all files of the campaign.
 
-    ``campaign`` is the folder or .zip as the user gave it, ``overrides`` the table of decisions by hand.
+    ``campaign`` is the folder or .zip as the user gave it, ``overrides`` the table of manual decisions.
     """
     root = study.ingested.campaign.root
     named = {test.file.partition("#")[0] for test in study.ingested.campaign.tests}

@@ -16,7 +16,7 @@ SUM = "combined"
 
 @dataclass(frozen=True)
 class BudgetTable:
-    """Shares (percent of the variance of T) of one regime: a row a sample, a column a component."""
+    """Shares (percent of the variance of T) of one regime: one row per sample, one column per component."""
 
     regime: Regime
     components: tuple[str, ...]

@@ -79,5 +79,5 @@ def write_report(
     jobs: int = 1,
     keep: Keep = make_anew,
 ) -> None:
-    """All of OUT: tables, campaign.nc, figures, verdict.json where there is a verdict, page, PDF and crate."""
+    """Write all of OUT: tables, campaign.nc, figures, verdict.json where there is a verdict, page, PDF and crate."""
     write_until(study, Path(out), "report", progress, provenance, verdict, diagnosis, jobs, keep)

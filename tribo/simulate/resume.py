@@ -67,7 +67,7 @@ def run_stored(
     progress: Progress | None = None,
     work: Work = FRICTION,
 ) -> pd.DataFrame:
-    """Run what ``path`` does not hold yet of a design, and return all of it.
+    """Compute the runs of a design that ``path`` does not hold yet, and return all of them.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def _create(design: Sequence[SimConfig], path: Path, work: Work) -> None:
 
     def write(target: Path) -> None:
         with h5py.File(target, "w") as file:
-            file.attrs["title"] = "an ensemble of the spring-block model, one entry a run"
+            file.attrs["title"] = "an ensemble of the spring-block model, one entry per run"
             file.attrs["design"] = fingerprint(design, work)
             file.attrs["columns"] = list(columns)
             for name, value in (attributes(_shared_parameters(design)) | versions()).items():

@@ -54,7 +54,7 @@ def stick_slip_cycles(trace: Trace, *, smallest_drop: float = 0.05) -> StickSlip
     """Find every stick and slip of a trace.
 
     A peak is a stick if the force falls after it by at least ``smallest_drop`` times the range of the force (from its
-    1st to its 99th percentile). Impulses are taken out by a median filter; a first search gives the length of a cycle,
+    1st to its 99th percentile). Spikes are removed by a median filter; a first search gives the length of a cycle,
     the second works on averages over a fiftieth of it.
 
     Raises

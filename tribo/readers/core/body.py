@@ -1,4 +1,4 @@
-"""The numbers of a table, parsed by one call in C a piece; damage is looked for only where that fails."""
+"""The numbers of a table, parsed by one call in C per piece; damage is looked for only where that fails."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ def read_export(
     name: str | None = None,
     file: str | None = None,
 ) -> Trace:
-    """Read an export that holds one pull into SI units; the samples stay as recorded.
+    """Read an export with one pull and convert it to SI units; the data points stay as recorded.
 
     Parameters
     ----------
@@ -72,8 +72,8 @@ def read_blocks(
 ) -> tuple[Trace, ...]:
     """Every table of an export that is a trace: steps, segments, strokes or specimens, in the order of the file.
 
-    Takes and raises what :func:`read_export` does, but for several_tables. A table whose time starts again from
-    the beginning is cut there. The traces are named ``name#1``, ``name#2`` and so on if there are several.
+    Arguments and errors are those of :func:`read_export`, except several_tables. A table whose time starts again
+    is split there. The traces are named ``name#1``, ``name#2`` and so on if there are several.
     """
     return _read(Path(path), columns, name, file, split=True)
 

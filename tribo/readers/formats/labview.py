@@ -1,4 +1,4 @@
-"""LabVIEW measurement files (.lvm): a header a segment, units in the names or in Y_Unit_Label.
+"""LabVIEW measurement files (.lvm): one header per segment, units in the names or in Y_Unit_Label.
 
 With "X_Columns No" the rows hold no time: it follows from X0 and Delta_X of the header of their segment.
 """

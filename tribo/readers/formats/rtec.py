@@ -1,4 +1,4 @@
-"""Rtec and alike: a table a step, each with its own header, or one log whose time starts again with each step.
+"""Rtec and alike: one table per step, each with its own header, or one log whose time starts again with each step.
 
 The log writes its timestamp without a unit; it is in seconds.
 """

@@ -1,4 +1,4 @@
-"""CETR and Bruker UMT: a table a step, forces in gram-force written as g, the normal force negative."""
+"""CETR and Bruker UMT: one table per step, forces in gram-force written as g, the normal force negative."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ def is_workbook(head: bytes) -> bool:
 
 
 def open_workbook(path: Path, file: str) -> tuple[Source, ...]:
-    """One source a sheet that holds anything.
+    """One source per sheet that holds anything.
 
     Raises
     ------
