@@ -242,7 +242,7 @@ def test_without_one_usable_test_every_fault_is_listed(folder: Path) -> None:
         (("= 55.0", '= "55"'), "wrong_value", "campaign.nominal_area_mm2", 3, "number"),
         (("= 55.0", "= -55.0"), "wrong_value", "campaign.nominal_area_mm2", 3, "greater than 0"),
         (('"circle"', '"round"'), "wrong_value", "patterns.A.cavity", 11, "'circle'"),
-        (("diameter_um = 5.0\n", ""), "wrong_value", "patterns.A", 10, "needs diameter_um"),
+        (("diameter_um = 5.0\n", ""), "wrong_value", "patterns.A", 10, "requires diameter_um"),
         (("diameter_um = 5.0", "diameter_um = 25.0"), "wrong_value", "patterns.A", 10, "touch"),
         (("[20.0, 20.0]", "[20.0]"), "wrong_value", "patterns.A", 10, "one number or [x, y]"),
         (
@@ -250,7 +250,7 @@ def test_without_one_usable_test_every_fault_is_listed(folder: Path) -> None:
             "wrong_value",
             "patterns.F",
             7,
-            "no pitch_um",
+            "does not allow pitch_um",
         ),
         (("true", 'true\n[columns]\ntiem = "T [s]"'), "wrong_value", "columns", 20, "did you mean time?"),
         (("true", "true\n[instrument]\nmas_u_g = 1.0"), "unknown_key", "instrument.mas_u_g", 21, "mass_u_g"),

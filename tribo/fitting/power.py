@@ -67,13 +67,15 @@ class Power:
             else f"more than {MOST_SPECIMENS} specimens per sample"
         )
         repeats = (
-            f"or {self.repeats_needed} repeats at each load" if self.repeats_needed else "more repeats alone are not"
+            f" or {self.repeats_needed} repeats at each load"
+            if self.repeats_needed
+            else "; more repeats alone are not sufficient"
         )
         what = f"{self.regime} {label(self.number, self.pressure_Pa)}"
         return (
             f"{what}: a difference of {self.smallest_difference_pct:.0f} % between two samples would be "
-            f"detected with probability {self.power:g} at significance level {self.level:g}. To detect "
-            f"{self.wanted_pct:g} % requires {more}, {repeats}."
+            f"detected with probability {self.power:g} at significance level {self.level:g}. Detecting "
+            f"{self.wanted_pct:g} % requires {more}{repeats}."
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tribo.diagnose.plan import Plan
+from tribo.diagnose.plan import Finding, Plan
 from tribo.diagnose.verdict import Verdict
 from tribo.report.verdict_file import verdict_in_words
 
@@ -25,8 +25,12 @@ def plan_text(plan: Plan) -> str:
     lines = [f"{plan.n_tests} planned tests. Smallest effects detected with 90 % probability, easiest first:"]
     for f in shown:
         size = f"{f.amplitude:.3g} {f.unit}".rstrip()
-        names = ", ".join(f.confused_with)
+        names = ", ".join(name.replace("_", " ") for name in f.confused_with)
         tie = f"; not distinguishable from {names}; to separate them: {f.separates}" if names else ""
-        lines.append(f"  {f.mechanism}: {size} or more ({f.effect_percent:.0f} % of T over the design){tie}")
-    lines += [f"  {f.mechanism}: not detectable with this design ({f.why})" for f in plan.findings if f.why]
+        lines.append(f"  {_name(f)}: {size} or more (changes T by {f.effect_percent:.0f} % over the design){tie}")
+    lines += [f"  {_name(f)}: not detectable with this design ({f.why})" for f in plan.findings if f.why]
     return "\n".join(lines)
+
+
+def _name(finding: Finding) -> str:
+    return finding.mechanism.replace("_", " ")
