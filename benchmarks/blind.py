@@ -4,7 +4,7 @@
     python benchmarks/blind.py run    out/blind.jsonl                        all campaigns; goes on where it was stopped
     python benchmarks/blind.py run    out/blind.jsonl --only promised        only the parts that promises are made of
     python benchmarks/blind.py tables out/blind.jsonl                        the tables, printed
-    python benchmarks/blind.py page   out/blind.jsonl                        the same into docs/blind.md, with the curves
+    python benchmarks/blind.py page   out/blind.jsonl                        the same into docs/blind.md, and curves
 
 The generator is in tests/blind and shares no code with the diagnosis; docs/blind.md says how campaigns are made. A run
 appends one line a campaign, in random order, so that a part of a run is a fair sample of it. ``half`` uses seeds of

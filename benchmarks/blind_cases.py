@@ -137,7 +137,7 @@ def _seed(seed: int, cell: str, k: int) -> int:
 def singles(half: Mapping[str, float]) -> Iterator[Cell]:
     """What is promised: three times the half-found size, pattern error 1.5, slopes of 4 %, every noise law."""
     for name in EFFECTS:
-        if name in half or name in ALL_OR_NOTHING:
+        if name not in UNSEEN and (name in half or name in ALL_OR_NOTHING):
             size = 1.0 if name in ALL_OR_NOTHING else times_half(name, half, 3)
             yield f"{name} x 3, swept", ((name, size),), {"pattern_error": 1.5, "specimen_slope": 0.04}
 
@@ -228,13 +228,13 @@ def true_parameter(name: str, size: float) -> dict[str, float]:
     From the definitions in ``tests/blind/effects.py``; growth per decade and per e-fold, per first pull and the like
     are converted. Effects whose law has no such parameter are left out.
     """
-    per_efold = 0.085 * size / math.log(10)  # of the contact after 0.8 s; the library counts from 1 s
+    per_efold = 0.0853 * size / math.log(10)  # of the contact after 0.79 s; the library counts from 1 s
     truths = {
-        "suction": ("dp", 5.4e3 * size), "normal_load_error": ("dN", 0.013 * 9.80665 * size),
-        "pressure_dependent_friction": ("n", 0.17 * size), "velocity_dependence": ("a", 0.057 * size),
-        "contact_ageing": ("b", per_efold / (1 + per_efold * math.log(1 / 0.8))), "run_in": ("c", 0.24 * size),
-        "temperature": ("c", 43e3 * size / 8.314 / 296.0**2), "edge_adhesion": ("e", 0.085 * size),
-        "covariate:operator": ("g", math.log(1 + 0.115 * size)), "load_cell_offset": ("F_0", 0.11 * size),
+        "suction": ("dp", 5.37e3 * size), "normal_load_error": ("dN", 0.0133 * 9.80665 * size),
+        "pressure_dependent_friction": ("n", 0.173 * size), "velocity_dependence": ("a", 0.0571 * size),
+        "contact_ageing": ("b", per_efold / (1 + per_efold * math.log(1 / 0.79))), "run_in": ("c", 0.237 * size),
+        "temperature": ("c", 43.4e3 * size / 8.314 / 296.0**2), "edge_adhesion": ("e", 0.0847 * size),
+        "covariate:operator": ("g", math.log(1 + 0.117 * size)), "load_cell_offset": ("F_0", 0.113 * size),
     }  # fmt: skip
     return {truths[name][0]: truths[name][1]} if name in truths else {}
 

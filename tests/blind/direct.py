@@ -16,7 +16,7 @@ from tribo.records import Campaign, Ingested, Pattern, Pull, Test
 from .bench import AREA_MM2, Bench
 from .patterns import CAVITIES
 
-READING_N = (0.04, 0.004)  # standard uncertainty of a static peak and of a sliding mean, as raw files of this noise give
+READING_N = (0.04, 0.004)  # of a static peak and of a sliding mean, about what raw files of this noise give
 ZERO_N = 0.001
 IN_TRACE = {"bulk_viscoelasticity", "sampling_clip", "machine_compliance", "load_cell_offset", "load_cell_drift"}
 

@@ -23,7 +23,7 @@ def hide(seed: int, effects: list[tuple[str, float]], design: Design = STANDARD)
     The draws do not depend on the effects, so that the same seed without them is the campaign to compare with.
     """
     tests, law, errors, chance, scatter = (np.random.default_rng([seed, k]) for k in range(5))
-    flat = (law.uniform(4.1, 5.6), law.uniform(19, 28), law.uniform(2.6, 3.5), law.uniform(10, 13))
+    flat = (law.uniform(4.07, 5.57), law.uniform(19, 28), law.uniform(2.57, 3.47), law.uniform(10, 13))
     drawn = draw_errors(design.sizes(), design.pattern_error, design.pattern_draw, errors)
     bench = Bench(_table(design, tests), flat, drawn)
     for name, size in sorted(effects, key=lambda e: e[0] not in FIRST):
@@ -107,7 +107,7 @@ def _trace(bench: Bench, k: int, speed_mm_s: float, rng: np.random.Generator) ->
     time = np.linspace(0.0, end_s, int(min(SAMPLES_A_PULL, max(end_s * bench.samples_per_s, 60))))
     after = time - rest_s - rise_s
     force = np.where(time < rest_s, 0.0, static * (time - rest_s) / rise_s)
-    swing = 0.01 * sliding * np.sin(2 * np.pi * after * speed_mm_s / 0.15) * np.exp(-np.maximum(after, 0) * speed_mm_s)
+    swing = 0.01 * sliding * np.sin(2 * np.pi * after * speed_mm_s / 0.147) * np.exp(-np.maximum(after, 0) * speed_mm_s)
     settled = sliding + (static - sliding) * np.exp(-np.maximum(after, 0) / fall_s) + swing
     force = np.where(after > 0, settled, force)
     return time, force + bench.zero[k] + rng.normal(0, 0.006, time.size)
