@@ -92,7 +92,7 @@ def find_half(path: Path, jobs: int) -> None:
 def planned(options: argparse.Namespace) -> list[Case]:
     """The campaigns that were asked for, in random order."""
     half = {row["effect"]: row["half"] for row in read_rows(options.half)}
-    plan = Plan(options.clean, options.large_error, options.campaigns, options.campaigns, options.campaigns)
+    plan = Plan(options.clean, options.large_error, options.campaigns, options.campaigns, options.points)
     todo = [case for case in cases(half, plan, options.seed) if PARTS[options.only](case.cell)]
     np.random.default_rng(options.seed).shuffle(todo)  # type: ignore[arg-type]
     return todo
@@ -126,7 +126,8 @@ def main() -> None:
     parser.add_argument("path", type=Path, help="JSON lines, one a campaign")
     parser.add_argument("--half", type=Path, default=DOCS / "data" / "blind-half.jsonl")
     parser.add_argument("--only", choices=sorted(PARTS), default="all", help="which part of a run")
-    parser.add_argument("--campaigns", type=int, default=20, help="per cell with something hidden, and per curve point")
+    parser.add_argument("--campaigns", type=int, default=20, help="per cell with something hidden")
+    parser.add_argument("--points", type=int, default=10, help="per point of a curve and effect")
     parser.add_argument("--clean", type=int, default=300)
     parser.add_argument("--large-error", type=int, default=100, help="clean campaigns at pattern error 2, and at 3")
     parser.add_argument("--seed", type=int, default=83)
