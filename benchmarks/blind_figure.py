@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-from blind_tables import COUNTED, Row, Test, curve_rows, seen, wilson
+from blind_tables import COUNTED, Row, Test, blamed, curve_rows, seen, wilson
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -67,6 +67,8 @@ def _line(ax: Axes, groups: dict[str, list[Row]], test: Test, label: str, colour
     ends = [wilson(k, n) for k, n in counts]
     below = [a - 100 * low for a, (low, _) in zip(y, ends, strict=True)]
     above = [100 * high - a for a, (_, high) in zip(y, ends, strict=True)]
+    if not all(isinstance(v, float) for v in x):
+        ax.margins(x=0.2)
     style = "o-" if all(isinstance(v, float) for v in x) else "o"
     ax.errorbar(x, y, [below, above], fmt=style, ms=3, lw=1, elinewidth=0.6, label=label, color=colour)
 
