@@ -114,7 +114,8 @@ def put_on_page(rows: list[dict[str, Any]], todo: list[Case], options: argparse.
     rows = [row for row in rows if (row["cell"], row["seed"]) in asked]
     above = page.read_text().split(MARK)[0]
     made = f"Seed {options.seed}: {len(rows)} of {len(todo)} campaigns.\n\n"
-    page.write_text(above + MARK + "\n\n" + made + tables(rows))
+    picture = "![Answers over pattern error, specimen slope and noise law](figures/blind-curves.svg)\n\n"
+    page.write_text(above + MARK + "\n\n" + made + picture + tables(rows))
     data = DOCS / "data" / "blind.jsonl"
     data.write_text("".join(json.dumps(row) + "\n" for row in sorted(rows, key=lambda r: (r["cell"], r["seed"]))))
     draw_curves(rows, DOCS / "figures" / "blind-curves.svg")
