@@ -72,8 +72,8 @@ def assumed_errors() -> Mapping[str, ErrorSize]:
 
     Read from the diagnosis here, where campaigns are counted; the generator is only told the numbers.
     """
-    from tribo.diagnose.model import CURVE_SD
-    from tribo.diagnose.predictor import tabled_predictor
+    from tribo.diagnose.statistics.model import CURVE_SD
+    from tribo.diagnose.statistics.predictor import tabled_predictor
 
     samples = [s for s in Design.samples if s != "F"]
     p = tabled_predictor({s: pattern_of(s) for s in Design.samples})
@@ -241,8 +241,8 @@ def true_parameter(name: str, size: float) -> dict[str, float]:
 
 def gain_of_the_best(d: Diagnosis, seed: int) -> list[float]:
     """What the mechanism that fits best by chance gains on samples left out: mean log score, standard error."""
-    from tribo.diagnose.gain import gain
-    from tribo.diagnose.weigh import weigh
+    from tribo.diagnose.search.weigh import weigh
+    from tribo.diagnose.statistics.gain import gain
 
     found = gain(d.baseline, weigh(d.baseline)[0].fit, np.random.default_rng(seed))
     return [round(found.difference, 5), round(found.se, 5)] if found is not None else []
@@ -250,13 +250,13 @@ def gain_of_the_best(d: Diagnosis, seed: int) -> list[float]:
 
 def is_seen(case: Case) -> bool:
     """Whether anything is seen at all: the first part of a diagnosis, without naming."""
-    from tribo.diagnose.fit import fit
-    from tribo.diagnose.instrument import rise_stiffening, zero_drift, zero_offset
-    from tribo.diagnose.looks import all_looks
-    from tribo.diagnose.model import setup
-    from tribo.diagnose.observations import observe
-    from tribo.diagnose.predictor import tabled_predictor
-    from tribo.diagnose.screen import screen
+    from tribo.diagnose.search.looks import all_looks
+    from tribo.diagnose.search.screen import screen
+    from tribo.diagnose.statistics.direct_evidence import rise_stiffening, zero_drift, zero_offset
+    from tribo.diagnose.statistics.fit import fit
+    from tribo.diagnose.statistics.model import setup
+    from tribo.diagnose.statistics.observations import observe
+    from tribo.diagnose.statistics.predictor import tabled_predictor
 
     o = observe(make_campaign(case))
     if any(e is not None and e.certain for e in (zero_offset(o), zero_drift(o), rise_stiffening(o))):

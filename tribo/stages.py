@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from tribo.campaign.flat_sample import required_flat_sample, with_flat_sample
 from tribo.errors import CampaignError, FitError, Problem
-from tribo.kept import Shelf
 from tribo.records import (
     REGIMES,
     Campaign,
@@ -26,16 +26,19 @@ from tribo.records import (
     Test,
     Trace,
 )
+from tribo.store.kept_results import Shelf
 
 if TYPE_CHECKING:
+    from tribo.comparison.prediction_runs import Cell
     from tribo.diagnose import Diagnosis
-    from tribo.diagnose.predictor import Predictor
-    from tribo.simulations import Cell
+    from tribo.diagnose.statistics.predictor import Predictor
 
 Progress = Callable[[str, int, int], None]
 Weights = Literal["relative", "ratio", "force", "repeats"]
 Until = Literal["ingest", "fit", "compare", "report"]
-DIAGNOSED_BY = ("diagnose", "mechanisms", "fitting", "laws", "simulate", "records")
+DIAGNOSED_BY = (
+    "diagnose", "mechanisms", "mechanisms_in_model", "virtual_tribometer", "fitting", "laws", "simulate", "records",
+)  # fmt: skip
 ASSESSED_BY = ("stages", "fitting", "laws", "records")
 
 
@@ -49,7 +52,7 @@ class StudyOptions:
 
     rule: str = "seed"
     weights: Weights = "relative"
-    flat: str = "F"
+    flat: str = ""  # the sample that calibrates the model; empty: F, or the only flat sample
     runs: int = 4
     seed: int = 0
     jobs: int = 2
@@ -77,14 +80,14 @@ def ingest(
 
     A test that cannot be read is set aside with its problems; the rest goes on. A row that names many pulls within
     its export is a test for each of them. ``overrides`` is a table of what a person decided about single pulls
-    (:mod:`tribo.overrides`). The result does not depend on ``jobs``.
+    (:mod:`tribo.ingestion.overrides`). The result does not depend on ``jobs``.
 
     Raises
     ------
     CampaignError
         Not one test could be read, or the overrides have faults.
     """
-    from tribo.exports import read_all
+    from tribo.ingestion.exports import read_all
     from tribo.traces.copies import under_the_wrong_test
 
     traces: dict[str, Trace] = {}
@@ -111,7 +114,7 @@ def ingest(
     ingested = Ingested(replace(campaign, tests=tuple(tests)), traces, pulls, tuple(set_aside))
     if overrides is None:
         return ingested
-    from tribo.overrides import apply_overrides
+    from tribo.ingestion.overrides import apply_overrides
 
     return apply_overrides(ingested, overrides, rule)
 
@@ -144,32 +147,6 @@ def fit(ingested: Ingested, *, weights: Weights = "relative") -> tuple[LawFit, .
     return tuple(found)
 
 
-def flat_sample(campaign: Campaign, wanted: str = "F") -> str:
-    """Name of the sample the model is calibrated on: ``wanted``, or else the only one without cavities.
-
-    Raises
-    ------
-    CampaignError
-        The campaign measured no flat sample, or several and none of that name.
-    """
-    measured = {t.sample for t in campaign.tests}
-    if wanted in measured and campaign.samples[wanted].cavity == "none":
-        return wanted
-    flat = sorted(s for s in measured if campaign.samples[s].cavity == "none")
-    if len(flat) == 1:
-        return flat[0]
-    raise CampaignError(
-        Problem(
-            "no_flat_sample",
-            "the model is calibrated on one flat sample",
-            file="tests.csv",
-            column="sample",
-            found=", ".join(flat) or "no sample whose pattern has cavity none",
-            allowed="one flat sample, or --flat NAME",
-        )
-    )
-
-
 def load_means(ingested: Ingested, sample: str, regime: Regime) -> list[tuple[float, float, float]]:
     """(normal load, mean force, its standard uncertainty) of a sample at each load, in newton.
 
@@ -200,11 +177,11 @@ def simulate_cells(
     CampaignError
         No flat sample to calibrate on, or ``only`` names nothing this campaign measured.
     """
-    from tribo.prediction import calibrated_cells
-    from tribo.simulations import example_config, example_run, remove_strangers, run_cells
+    from tribo.comparison.prediction import calibrated_cells
+    from tribo.comparison.prediction_runs import example_config, example_run, remove_strangers, run_cells
 
-    campaign = ingested.campaign
-    flat = flat_sample(campaign, options.flat)
+    campaign = with_flat_sample(ingested.campaign, options.flat)
+    flat = required_flat_sample(campaign)
     _, cells = calibrated_cells(
         campaign, fits, flat, runs=options.runs, seed=options.seed, jobs=options.jobs, kept=options.kept,
         progress=progress,
@@ -239,10 +216,11 @@ def compare(
     FitError, SimulationError
         The flat sample gives no law, or the model cannot be run for a pattern.
     """
-    from tribo.prediction import predict
+    from tribo.comparison.prediction import predict
 
-    campaign = ingested.campaign
-    flat = flat_sample(campaign, options.flat)
+    campaign = with_flat_sample(ingested.campaign, options.flat)
+    flat = required_flat_sample(campaign)
+    ingested = replace(ingested, campaign=campaign)
     prediction = predict(
         campaign, fits, flat, weights=options.weights, runs=options.runs, seed=options.seed, jobs=options.jobs,
         kept=options.kept, scheduler=options.scheduler, progress=progress,
@@ -272,9 +250,8 @@ def study(
     campaign: Campaign, options: StudyOptions = DEFAULTS, *, until: Until = "report", progress: Progress = _silent
 ) -> Study:
     """Walk the street with one campaign as far as ``until``."""
-    ingested = ingest(
-        campaign, rule=options.rule, jobs=options.jobs, overrides=options.overrides, progress=progress
-    )
+    chosen = with_flat_sample(campaign, options.flat)
+    ingested = ingest(chosen, rule=options.rule, jobs=options.jobs, overrides=options.overrides, progress=progress)
     if until == "ingest":
         return Study(ingested)
     fits = fit(ingested, weights=options.weights)
@@ -343,8 +320,8 @@ def diagnosis(
 
 def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:
     """The predictor from simulations of this campaign, where ``kept`` holds them for the flat sample at least."""
+    from tribo.comparison.prediction_runs import kept_runs
     from tribo.diagnose import simulated_predictor
-    from tribo.simulations import kept_runs
 
     runs = kept_runs(kept, campaign.samples) if kept is not None else None
     if runs is None:
@@ -353,8 +330,10 @@ def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:
     forces = runs.assign(
         normal_load_N=load, static_N=runs["static_friction"] * load, sliding_N=runs["sliding_friction"] * load
     )
-    flat = [s for s in dict.fromkeys(forces["sample"]) if campaign.samples[s].cavity == "none"]
-    return simulated_predictor(campaign.samples, forces, flat[0], campaign.nominal_area_m2) if flat else None
+    flat = campaign.flat_sample
+    if flat not in set(forces["sample"]):
+        return None
+    return simulated_predictor(campaign.samples, forces, flat, campaign.nominal_area_m2)
 
 
 def _other_fits(ingested: Ingested, options: StudyOptions) -> tuple[LawFit, ...]:
@@ -378,9 +357,10 @@ def _other_fits(ingested: Ingested, options: StudyOptions) -> tuple[LawFit, ...]
 
 def plan(campaign: Campaign, options: StudyOptions, until: Until) -> dict[str, Any]:
     """What a walk would do, without doing it: ``steps`` in words, ``set_aside``, and the faults in full."""
-    from tribo.prediction import loads_to_simulate
+    from tribo.comparison.prediction import loads_to_simulate
 
     steps = [f"read {len(campaign.tests)} exports of {campaign.root} by rule {options.rule}"]
+    campaign = with_flat_sample(campaign, options.flat)
     samples = sorted({t.sample for t in campaign.tests})
     if unknown := sum(np.isnan(t.normal_load_N) for t in campaign.tests):
         steps.append(f"take the load of {unknown} tests from their exports")
@@ -388,7 +368,7 @@ def plan(campaign: Campaign, options: StudyOptions, until: Until) -> dict[str, A
         steps.append(f"fit mu and tau0 of {len(samples)} samples ({', '.join(samples)}), weights {options.weights}")
     if until in ("compare", "report"):
         loads = loads_to_simulate(campaign)
-        flat = flat_sample(campaign, options.flat)
+        flat = required_flat_sample(campaign)
         runs = len(samples) * len(loads) * options.runs
         steps.append(f"calibrate the model on sample {flat} and run it {runs} times at {len(loads)} loads")
     return {

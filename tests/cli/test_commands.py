@@ -1,0 +1,285 @@
+"""The commands keep the promises of their interface: outputs, exit statuses, faults in words, nothing half done."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from click.testing import CliRunner, Result
+
+from tribo.cli import main
+from tribo.errors import FitError, Problem
+from tribo.records import Study
+
+
+def run(*arguments: object) -> Result:
+    """One command, with its standard output and standard error apart."""
+    result = CliRunner().invoke(main, [str(a) for a in arguments])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
+
+
+def digest(folder: Path) -> dict[str, str]:
+    """Every file of a folder and what is in it."""
+    files = sorted(p for p in folder.rglob("*") if p.is_file())
+    return {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
+
+
+@pytest.fixture
+def spoiled(small_campaign: Path, tmp_path: Path) -> Path:
+    """The small campaign with one export emptied and one row naming an unknown sample."""
+    folder = tmp_path / "spoiled"
+    shutil.copytree(small_campaign, folder)
+    (folder / "raw" / "T003.csv").write_bytes(b"")
+    table = (folder / "tests.csv").read_text(encoding="utf-8").splitlines()
+    table[5] = table[5].replace(",F,", ",Q,").replace(",B,", ",Q,")
+    (folder / "tests.csv").write_text("\n".join(table) + "\n", encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def report(small_campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Path]:
+    """`tribo report` on the small campaign, once for all tests that look at its output."""
+    out = tmp_path_factory.mktemp("report") / "out"
+    return run("report", small_campaign, "-o", out, "--runs", 2, "--json"), out
+
+
+def test_report_ends_with_status_0_and_writes_every_file_of_the_interface(report: tuple[Result, Path]) -> None:
+    result, out = report
+    assert result.exit_code == 0
+    expected = {"tests.csv", "fits.csv", "comparison.csv", "campaign.nc", "report.html"}
+    assert expected <= {p.name for p in out.iterdir()}
+    for number in (3, 4, 5, 6, 7, 8):
+        for kind in ("svg", "png", "csv"):
+            assert list((out / "figures").glob(f"fig{number}*.{kind}")), (number, kind)
+
+
+def test_report_leaves_no_temporary_file(report: tuple[Result, Path]) -> None:
+    _, out = report
+    assert [p for p in out.rglob("*") if p.name.startswith(".") or p.suffix in {".tmp", ".part"}] == []
+
+
+def test_tables_have_the_columns_of_the_interface_in_its_order(report: tuple[Result, Path]) -> None:
+    _, out = report
+    columns = {
+        "tests.csv": "test_id static_N static_u_N sliding_N sliding_u_N rule window zero_N flags set_aside",
+        "fits.csv": "sample regime mu mu_u tau0_kPa tau0_u_kPa cov n_specimens n_tests method chi2_red",
+        "comparison.csv": "sample regime normal_load_N measured_N measured_u_N simulated_N simulated_u_N",
+    }
+    for name, wanted in columns.items():
+        found = list(pd.read_csv(out / name).columns)
+        assert found[: len(wanted.split())] == wanted.split()
+
+
+def test_the_calibrated_model_gives_back_the_flat_sample(report: tuple[Result, Path]) -> None:
+    _, out = report
+    flat = pd.read_csv(out / "comparison.csv").query("sample == 'F'")
+    fits = pd.read_csv(out / "fits.csv").query("sample == 'F'").set_index("regime")
+    for _, row in flat.iterrows():
+        law = fits.loc[row["regime"]]
+        expected = law["mu"] * row["normal_load_N"] + law["tau0_kPa"] * 1e3 * 55e-6
+        assert row["simulated_N"] == pytest.approx(expected, rel=0.02)
+
+
+def test_json_of_report_carries_the_fits_and_no_talk(report: tuple[Result, Path]) -> None:
+    record = json.loads(report[0].stdout)
+    assert {(f["sample"], f["regime"]) for f in record["fits"]} == {
+        (s, r) for s in ("F", "B") for r in ("static", "sliding")
+    }
+    assert record["set_aside"] == []
+
+
+def test_nothing_is_written_into_the_campaign(small_campaign: Path, tmp_path: Path) -> None:
+    before = digest(small_campaign)
+    assert run("fit", small_campaign, "-o", tmp_path / "out").exit_code == 0
+    assert digest(small_campaign) == before
+
+
+def test_a_zip_gives_the_same_tables_as_its_folder(small_campaign: Path, tmp_path: Path) -> None:
+    archive = shutil.make_archive(str(tmp_path / "campaign"), "zip", small_campaign)
+    run("fit", small_campaign, "-o", tmp_path / "a")
+    run("fit", archive, "-o", tmp_path / "b")
+    for name in ("tests.csv", "fits.csv"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def test_faulty_tests_are_set_aside_and_listed_and_the_rest_stands(spoiled: Path, tmp_path: Path) -> None:
+    result = run("fit", spoiled, "-o", tmp_path / "out")
+    assert result.exit_code == 3
+    assert "raw/T003.csv: the file is empty" in result.stderr
+    assert "tests.csv, row 6, column sample" in result.stderr
+    table = pd.read_csv(tmp_path / "out" / "tests.csv")
+    assert table["set_aside"].notna().sum() == 2
+    assert table["static_N"].notna().sum() == 22
+
+
+def test_a_test_excluded_by_hand_is_no_fault(small_campaign: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "campaign"
+    shutil.copytree(small_campaign, folder)
+    table = pd.read_csv(folder / "tests.csv")
+    table["exclude"] = ["sled tipped over"] + [""] * (len(table) - 1)
+    table.to_csv(folder / "tests.csv", index=False)
+    result = run("fit", folder, "-o", tmp_path / "out", "--json")
+    assert result.exit_code == 0
+    (reason,) = (s["reason"] for s in json.loads(result.stdout)["set_aside"])
+    assert "sled tipped over" in reason
+
+
+def test_an_unusable_campaign_lists_every_fault_at_once_and_writes_nothing(spoiled: Path, tmp_path: Path) -> None:
+    toml = (spoiled / "campaign.toml").read_text(encoding="utf-8")
+    toml = toml.replace("nominal_area_mm2 = 55.0", "nominal_aera_mm2 = 55.0")
+    (spoiled / "campaign.toml").write_text(toml.replace("slider_mass_g = 1.5", 'slider_mass_g = "heavy"'))
+    result = run("fit", spoiled, "-o", tmp_path / "out", "--json")
+    assert result.exit_code == 1
+    assert "nominal_aera_mm2" in result.stderr
+    assert "slider_mass_g" in result.stderr
+    assert "Traceback" not in result.stderr
+    assert len(json.loads(result.stdout)["problems"]) >= 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_campaign_without_a_flat_sample_cannot_calibrate_the_model(small_campaign: Path, tmp_path: Path) -> None:
+    result = run("compare", small_campaign, "-o", tmp_path / "out", "--dry-run", "--flat", "B")
+    assert result.exit_code == 1  # B has cavities
+    assert "--flat F" in result.stderr
+    folder = tmp_path / "campaign"
+    shutil.copytree(small_campaign, folder)
+    table = pd.read_csv(folder / "tests.csv")
+    table[table["sample"] == "B"].to_csv(folder / "tests.csv", index=False)
+    result = run("compare", folder, "-o", tmp_path / "out")
+    assert result.exit_code == 1
+    assert "flat sample" in result.stderr
+
+
+def test_the_number_of_processes_reaches_the_diagnosis_of_a_report(
+    small_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[int] = []
+
+    def stop(*_: object, jobs: int, **__: object) -> None:
+        seen.append(jobs)
+        raise FitError(Problem("stopped", "the test has seen enough"))
+
+    monkeypatch.setattr("tribo.stages.diagnosis", stop)
+    monkeypatch.setattr("tribo.stages.compare", lambda ingested, fits, *_, **__: Study(ingested, fits))
+    run("report", small_campaign, "-o", tmp_path / "out", "--jobs", "3")
+    assert seen == [3]
+
+
+def test_a_dry_run_says_what_would_be_done_and_writes_nothing(small_campaign: Path, tmp_path: Path) -> None:
+    result = run("report", small_campaign, "-o", tmp_path / "out", "--dry-run")
+    assert result.exit_code == 0
+    assert "would read 24 exports" in result.stdout
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("arguments", [["report"], ["fit", "nowhere", "-o", "x"], ["fits"], ["simulate", "--sample"]])
+def test_wrong_usage_ends_with_status_2(arguments: list[str]) -> None:
+    assert run(*arguments).exit_code == 2
+
+
+def test_init_writes_a_campaign_that_loads_and_never_overwrites(tmp_path: Path) -> None:
+    assert run("init", tmp_path / "mine").exit_code == 0
+    before = digest(tmp_path / "mine")
+    assert {"campaign.toml", "tests.csv"} <= set(before)
+    assert run("init", tmp_path / "mine").exit_code == 1
+    assert digest(tmp_path / "mine") == before
+
+
+def test_doctor_finds_everything_here() -> None:
+    found = json.loads(run("doctor", "--json").stdout)
+    assert found["healthy"] is True
+    assert found["bundled_example"] is True
+
+
+def test_simulate_writes_a_run_that_xarray_and_h5py_read(tmp_path: Path) -> None:
+    import h5py
+    import xarray as xr
+
+    out = tmp_path / "run.nc"
+    result = run(
+        "simulate", "--sample", "F", "--pressure", 10, "--angle", 30, "--seed", 1, "--blocks", 20, "--duration", 5,
+        "-o", out, "--json",
+    )  # fmt: skip
+    assert result.exit_code == 0
+    with xr.open_dataset(out, engine="h5netcdf") as data:
+        assert {"time", "force", "moving"} <= set(data.variables)
+        assert data["force"].attrs["units"] == "N"
+        assert data.attrs["static_friction"] == pytest.approx(json.loads(result.stdout)["static_friction"])
+    with h5py.File(out) as file:
+        assert file["force"].shape == file["time"].shape
+
+
+def test_an_impossible_simulation_is_refused_with_everything_that_is_wrong(tmp_path: Path) -> None:
+    result = run("simulate", "--sample", "F", "--pressure", -1, "--dt", 1e-3, "-o", tmp_path / "run.nc")
+    assert result.exit_code == 1
+    assert "pressure" in result.stderr
+    assert not (tmp_path / "run.nc").exists()
+
+
+def test_report_carries_a_verdict_in_the_binding_schema(report: tuple[Result, Path]) -> None:
+    verdict = json.loads((report[1] / "verdict.json").read_text(encoding="utf-8"))
+    assert verdict["schema"] == "tribo.verdict/1"
+    assert verdict["verdict"] in {"no_misfit", "named", "undetermined", "unknown"}
+    assert {"misfits", "causes", "equivalent", "excluded", "gain", "set_aside", "next_test"} <= set(verdict)
+
+
+def test_fit_says_what_the_campaign_could_have_shown(report: tuple[Result, Path]) -> None:
+    power = json.loads(report[0].stdout)["power"]
+    assert any("static T at 10 kPa" in line for line in power)
+
+
+def test_a_plan_needs_no_export(small_campaign: Path, tmp_path: Path) -> None:
+    shutil.copytree(small_campaign, tmp_path / "plan", ignore=shutil.ignore_patterns("raw"))
+    result = run("plan", tmp_path / "plan", "--json")
+    assert result.exit_code == 0
+    found = {f["mechanism"]: f for f in json.loads(result.stdout)["findings"]}
+    assert found["velocity_dependence"]["why"]
+    assert found["pull_angle"]["why"]
+
+
+def test_suction_raises_the_simulated_friction_of_a_patterned_sample(tmp_path: Path) -> None:
+    friction = []
+    for extra in ([], ["--with", "suction:dp=3000"]):
+        result = run(
+            "simulate", "--sample", "B", "--pressure", 5, "--blocks", 24, "-o", tmp_path / "run.nc", "--json", *extra
+        )
+        friction.append(json.loads(result.stdout)["static_friction"])
+    assert friction[1] > 1.05 * friction[0]
+
+
+def test_an_unknown_mechanism_is_refused_with_the_known_ones(tmp_path: Path) -> None:
+    out = tmp_path / "run.nc"
+    result = run("simulate", "--sample", "B", "--pressure", 5, "--with", "sucktion:dp=1", "-o", out)
+    assert result.exit_code == 1
+    assert "suction" in result.stderr
+
+
+@pytest.mark.parametrize("command", ["ingest", "fit", "compare", "diagnose", "report"])
+def test_every_command_on_a_campaign_takes_columns(small_campaign: Path, tmp_path: Path, command: str) -> None:
+    """Columns that name no quantity make every export unreadable, so that each command shows it obeys them."""
+    result = run(command, small_campaign, "-o", tmp_path / "out", "--columns", "fricton_force=Load [N]", "-q")
+    assert result.exit_code == 1
+    assert "did you mean friction_force?" in result.stderr
+
+
+def test_diagnose_takes_a_campaign_or_a_published_table_and_not_both(tmp_path: Path) -> None:
+    neither = run("diagnose", "-o", tmp_path)
+    both = run("diagnose", tmp_path, "--published", "berardo2019", "-o", tmp_path)
+    assert (neither.exit_code, both.exit_code) == (2, 2)
+    assert "CAMPAIGN" in neither.output
+
+
+def test_the_diagnosis_of_a_published_table_can_be_verified(tmp_path: Path) -> None:
+    """Its record names the two tables it rests on, and every file it wrote."""
+    assert run("diagnose", "--published", "berardo2019", "-o", tmp_path, "-q").exit_code == 0
+    record = json.loads((tmp_path / "provenance.json").read_text(encoding="utf-8"))
+    assert set(record["inputs"]) == {"table2.csv", "table2_tribo.csv"}
+    assert "verdict.json" in record["outputs"]
+    assert run("verify", tmp_path).exit_code == 0
+    (tmp_path / "verdict.json").write_text("{}", encoding="utf-8")
+    assert run("verify", tmp_path).exit_code == 1
