@@ -18,7 +18,7 @@ from tribo.stages import ingest
 from .tribometer import LARGEST, Design, hide, write
 
 QUICK = Design(samples=("F", "A", "B", "C"), masses_g=(5.0, 25.0, 90.0, 138.5))
-LOADS = Design(samples=("F", "A", "B", "C"))  # lost contact and a power of the pressure separate at more than four loads
+LOADS = Design(samples=("F", "A", "B", "C"))  # more loads separate lost contact from a power of p
 LADDER = Design(samples=("F", "B", "C"), masses_g=(12.0, 50.0, 138.5), speeds_mm_s=(0.05, 0.2, 0.8))
 ALL = Design(masses_g=(5.0, 25.0, 90.0, 138.5))
 
