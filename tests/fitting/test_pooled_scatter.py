@@ -70,7 +70,7 @@ def test_a_sample_of_one_specimen_gains_an_interval_for_its_pattern() -> None:
 
 
 def test_specimens_alone_in_their_samples_have_nothing_to_pool() -> None:
-    with pytest.raises(FitError, match="between specimens is unknown"):
+    with pytest.raises(FitError, match="between specimens cannot be determined"):
         pool_specimen_scatter(fits(specimens=1))
 
 

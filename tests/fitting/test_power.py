@@ -75,5 +75,5 @@ def test_the_sentence_states_level_power_and_what_it_takes() -> None:
 
 
 def test_one_specimen_a_sample_has_no_power_to_speak_of() -> None:
-    with pytest.raises(FitError, match="between specimens is unknown"):
+    with pytest.raises(FitError, match="between specimens cannot be determined"):
         power_of_campaign(pulls(0.05, 0.05, specimens=1), "static", AREA)

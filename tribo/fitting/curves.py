@@ -9,7 +9,7 @@ import numpy as np
 from tribo.errors import FitError, Problem
 from tribo.fitting.linear import LinearFit, least_squares
 from tribo.fitting.rows import Rows, sample_rows
-from tribo.fitting.samples import combine
+from tribo.fitting.samples import ONE_SPECIMEN, combine
 from tribo.fitting.weighting import WEIGHTS, weights_of
 from tribo.laws.record import Law
 from tribo.laws.table import LAWS
@@ -107,7 +107,7 @@ def _fit_sample(
     values, covariance = np.full(len(law.parameters), np.nan), alone
     if len(own) == 1:
         (values,) = own.values()
-        notes.append("only one specimen: the interval applies to this specimen, not to the pattern")
+        notes.append(ONE_SPECIMEN)
     elif own:
         values, covariance = combine(np.array(list(own.values())))
         dof = len(own) - 1.0

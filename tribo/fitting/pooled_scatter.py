@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from tribo.errors import FitError, Problem
-from tribo.fitting.samples import LAW
+from tribo.fitting.samples import LAW, ONE_SPECIMEN
 from tribo.records import FloatArray, LawFit
 
 PRESSURES_PA = (3e3, 25e3)  # where the share of scatter is taken: the paper's range
@@ -62,7 +62,7 @@ def _pool(fits: tuple[LawFit, ...], pressures_Pa: tuple[float, float]) -> dict[s
             covariance=_back(common, fit, pressures_Pa) / len(fit.specimens),
             dof=dof,
             method=f"{fit.method}; scatter of specimens pooled over {len(several)} samples, t({dof:g})",
-            notes=(*(n for n in fit.notes if not n.startswith("one specimen")), *notes),
+            notes=(*(n for n in fit.notes if n != ONE_SPECIMEN), *notes),
         )
     return found
 

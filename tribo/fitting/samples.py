@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 LAW = LAWS["coulomb_adhesion"]
+ONE_SPECIMEN = "only one specimen: the interval applies to this specimen, not to the pattern"
 LACK_OF_FIT_LEVEL = 0.01
 
 
@@ -143,9 +144,8 @@ def _specimens(rows: Rows, weight: FloatArray, area: float, own: dict[str, Linea
         return _one_load_each(rows, weight, area)
     if len(own) == 1:
         (fit,) = own.values()
-        note = "only one specimen: the interval applies to this specimen, not to the pattern"
         method = "one specimen, scatter of its tests"
-        return _Part(fit.values, fit.covariance, float(fit.dof), method, (note,))
+        return _Part(fit.values, fit.covariance, float(fit.dof), method, (ONE_SPECIMEN,))
     values, covariance = combine(np.array([fit.values for fit in own.values()]))
     method = f"each specimen fitted, mean of {len(own)} specimens, t({len(own) - 1})"
     return _Part(values, covariance, float(len(own) - 1), method)
