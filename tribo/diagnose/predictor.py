@@ -8,7 +8,7 @@ four numbers: T = (m mu) N + (a tau0) A in each regime. They are tabulated from 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,6 +33,7 @@ _SIMULATED: dict[tuple[float, float, float, float, str], Shares] = {
 # edge, window and angle law move a pattern's static force by 3 to 13 % and its sliding force by 2 to 8 %.
 OFFSET = (0.055, 0.045)
 SLOPE = (0.02, 0.02)  # per e-fold of pressure
+CURVE = (0.008, 0.008)  # per squared e-fold of pressure
 LEAST_SPREAD = 2.0  # largest over smallest load from which mu and tau0 part
 UNTABLED = 1.6  # a pattern that was never simulated is predicted that much worse
 
@@ -41,13 +42,29 @@ UNTABLED = 1.6  # a pattern that was never simulated is predicted that much wors
 class Predictor:
     """Shares of the flat law per sample and the model's own error, as standard deviations of ln T.
 
-    ``offset`` and ``slope`` (per e-fold of pressure) hold (static, sliding) per sample; a flat sample has none.
+    ``offset``, ``slope`` (per e-fold of pressure) and ``curve`` (per squared e-fold) hold (static, sliding) per
+    sample; a flat sample has none.
     """
 
     shares: Mapping[str, Shares]
     offset: Mapping[str, tuple[float, float]]
     slope: Mapping[str, tuple[float, float]]
+    curve: Mapping[str, tuple[float, float]]
     source: str
+
+    def scaled(self, factor: float) -> Predictor:
+        """The same shares with the model's own error ``factor`` times as large.
+
+        Raises
+        ------
+        ValueError
+            The factor is negative or not a number.
+        """
+        if not factor >= 0.0:
+            raise ValueError(f"the error of the model is scaled by {factor}, allowed is a factor of 0 or more")
+        sizes = (self.offset, self.slope, self.curve)
+        offset, slope, curve = ({s: (factor * v[0], factor * v[1]) for s, v in size.items()} for size in sizes)
+        return replace(self, offset=offset, slope=slope, curve=curve)
 
     def table(self, samples: FloatArray | np.ndarray) -> FloatArray:
         """Shares of every test, shape (n, 4)."""
@@ -105,6 +122,7 @@ def _with_error(
         shares={**shares, "flat": (1.0, 1.0, 1.0, 1.0)},
         offset={name: (OFFSET[0] * w, OFFSET[1] * w) for name, w in wide.items()},
         slope={name: (SLOPE[0] * w, SLOPE[1] * w) for name, w in wide.items()},
+        curve={name: (CURVE[0] * w, CURVE[1] * w) for name, w in wide.items()},
         source=source,
     )
 
