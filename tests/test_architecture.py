@@ -24,7 +24,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "fitting": {"laws"},
     "simulate": {"laws"},
     "mechanisms": {"laws"},
-    "diagnose": {"laws", "fitting", "simulate", "mechanisms"},
+    "diagnose": {"laws", "fitting", "simulate", "mechanisms", "published"},
     "figures": {"laws", "diagnose", "published"},
     "report": {"laws", "diagnose", "figures", "published"},
 }
