@@ -146,12 +146,14 @@ def interpolated_shares(area_fraction: float, known: Sequence[TabledPattern]) ->
 
 def _simulated_as(name: str, pattern: Pattern) -> TabledPattern | None:
     """The simulated pattern with this cavity and pitch, pulled along the direction that ends the sample's name."""
-    if pattern.size_m is None or pattern.pitch_m is None:
-        return None
-    wanted = (*pattern.size_m, *pattern.pitch_m)
-    for row in simulated_patterns():
-        assert row.pattern.size_m is not None and row.pattern.pitch_m is not None
-        same = np.allclose((*row.pattern.size_m, *row.pattern.pitch_m), wanted, rtol=ALIKE, atol=0.0)
+    wanted = _lengths_m(pattern)
+    for row in simulated_patterns() if wanted else ():
+        same = np.allclose(_lengths_m(row.pattern), wanted, rtol=ALIKE, atol=0.0)
         if same and row.direction in ("", name[-1:].lower()):
             return row
     return None
+
+
+def _lengths_m(pattern: Pattern) -> tuple[float, ...]:
+    """Size and pitch of the cavities, nothing for a pattern that does not say them."""
+    return (*pattern.size_m, *pattern.pitch_m) if pattern.size_m and pattern.pitch_m else ()
