@@ -19,12 +19,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tribo.diagnose import pattern_error
-from tribo.diagnose.pattern_table import flat_law, simulated_patterns
-from tribo.kept import sources
+from tribo.diagnose.statistics import pattern_error
+from tribo.diagnose.statistics.pattern_table import flat_law, simulated_patterns
 from tribo.simulate import run_stored
 from tribo.simulate.pattern_laws import KEPT, origin, pattern_laws, write_table
-from tribo.simulate.tables import table2_design
+from tribo.simulate.table2_column import table2_design
+from tribo.store.kept_results import sources
 
 SEED = 0
 COMMAND = "python benchmarks/pattern_shares.py"

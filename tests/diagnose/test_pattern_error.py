@@ -1,4 +1,4 @@
-"""The sizes of the model's own error: how a case is split, how cases are pooled, and that the bundled file is theirs."""
+"""The sizes of the model's own error: how a case is split and cases are pooled, and that the bundled file is theirs."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tribo.diagnose import pattern_error as e
-from tribo.diagnose.pattern_table import error_sizes, simulated_patterns
+from tribo.diagnose.statistics import pattern_error as e
+from tribo.diagnose.statistics.pattern_table import error_sizes, simulated_patterns
 from tribo.published import data_dir
 from tribo.records import Pattern
 

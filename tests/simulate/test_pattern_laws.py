@@ -10,7 +10,7 @@ import pytest
 from tribo.published import data_dir
 from tribo.simulate import simulate
 from tribo.simulate.pattern_laws import origin, pattern_laws, write_table
-from tribo.simulate.tables import table2_design
+from tribo.simulate.table2_column import table2_design
 
 FOLDER = data_dir() / "pattern_shares"
 RUNS = pd.read_csv(FOLDER / "runs.csv", comment="#")

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 from tribo.simulate.config import SimConfig
 from tribo.simulate.ensemble import angle_range_deg
 from tribo.simulate.masks import UM, pattern_of
-from tribo.simulate.store import versions, written
-from tribo.simulate.tables import fitted
+from tribo.simulate.results_file import versions
+from tribo.simulate.table2_column import fitted
+from tribo.store.whole_files import write_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,5 +96,4 @@ def origin(design: Sequence[SimConfig], seed: int, sources: str) -> dict[str, st
 def write_table(table: pd.DataFrame, path: Path, said: Mapping[str, str], digits: str = "%.6g") -> Path:
     """Write a table as CSV behind comment lines ``# name: what is said``; the file appears whole or not at all."""
     head = "".join(f"# {name}: {words}\n" for name, words in said.items())
-    text = head + table.to_csv(index=False, float_format=digits, lineterminator="\n")
-    return written(path, lambda target: target.write_text(text, encoding="utf-8"))
+    return write_text(path, head + table.to_csv(index=False, float_format=digits, lineterminator="\n"))
