@@ -28,6 +28,7 @@ from tribo.store.kept_results import sources
 
 SEED = 0
 COMMAND = "python benchmarks/pattern_shares.py"
+ENGINE = tuple(f"simulate/{name}" for name in ("engines", "config", "ensemble", "friction", "masks", "run"))
 
 
 def said(done: int, total: int) -> None:
@@ -39,7 +40,7 @@ def laws(store: str, out: str, jobs: str = "2") -> None:
     design = table2_design(seed=SEED)
     Path(store).parent.mkdir(parents=True, exist_ok=True)
     runs = run_stored(design, store, int(jobs), progress=said)[list(KEPT)]
-    words = {"made by": f"{COMMAND} laws"} | origin(design, SEED, sources("simulate", "records"))
+    words = {"made by": f"{COMMAND} laws"} | origin(design, SEED, sources(*ENGINE))
     write_table(runs, Path(out) / "runs.csv", words, digits="%.8g")
     write_table(pattern_laws(runs), Path(out) / "laws.csv", words)
 
