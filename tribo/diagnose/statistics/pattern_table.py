@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
 
-from tribo.published import data_dir
+from tribo.published import PATTERN_SHARES, data_dir
 from tribo.records import REGIMES, Pattern
 
 Law = tuple[float, float, float, float]
 """Static mu, static tau0, sliding mu, sliding tau0 (in kPa), or their shares of those of the flat sample."""
-FOLDER = "pattern_shares"
 LAW, SHARES = ("mu", "tau0_kPa"), ("mu_share", "tau0_share")  # columns
 UM = 1e-6
 
@@ -86,8 +85,13 @@ def error_sizes() -> Mapping[str, ErrorSize]:
     })  # fmt: skip
 
 
+def record() -> tuple[object, ...]:
+    """Everything a diagnosis takes from the files: what a kept result of it was made from."""
+    return flat_law(), simulated_patterns(), error_sizes()
+
+
 def _rows(name: str) -> list[dict[str, str]]:
-    with (data_dir() / FOLDER / name).open(encoding="utf-8", newline="") as file:
+    with (data_dir() / PATTERN_SHARES / name).open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
