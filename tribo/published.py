@@ -48,7 +48,9 @@ def load_table2() -> pd.DataFrame:
 
 
 def load_table2_simulated_anew() -> pd.DataFrame:
-    """The simulated part of Table 2 as tribo's own engine gives it (960 runs at stratified angles, docs/table2.md).
+    """The simulated part of Table 2 as tribo's own engine gives it, from 960 runs at stratified angles.
+
+    docs/results/table2-recomputed.md compares it with the paper.
 
     Columns: sample, regime, mu, mu_se, tau0_kPa, tau0_kPa_se.
     """
@@ -59,7 +61,7 @@ def load_pattern_laws() -> pd.DataFrame:
     """Law of each pattern of the paper by tribo's own simulator, and its shares of that of the flat sample.
 
     Columns: sample, regime, the geometry (lengths in um), runs, mu, tau0_kPa, their shares of those of the flat sample
-    (mu_share, tau0_share), and the standard error of each (``_se``). docs/model-error.md says how it was made.
+    (mu_share, tau0_share), and the standard error of each (``_se``). docs/results/model-error.md says how it was made.
     """
     return _read("laws.csv", PATTERN_SHARES)
 
