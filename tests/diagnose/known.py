@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from blind.tribometer import Design, hide
 
-from tribo.diagnose.fit import fit
-from tribo.diagnose.model import Acting, ModelFit, Setup, predict, setup
-from tribo.diagnose.observations import observe
-from tribo.diagnose.predictor import tabled_predictor
+from tribo.diagnose.statistics.fit import fit
+from tribo.diagnose.statistics.model import Acting, ModelFit, Setup, predict, setup
+from tribo.diagnose.statistics.observations import observe
+from tribo.diagnose.statistics.predictor import tabled_predictor
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Ingested
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose.chance import as_measured, columns_of, drawn_residuals, refit, scores
-from tribo.diagnose.fit import fit
-from tribo.diagnose.looks import all_looks
-from tribo.diagnose.model import setup
-from tribo.diagnose.observations import observe
-from tribo.diagnose.predictor import tabled_predictor
-from tribo.diagnose.screen import screen
+from tribo.diagnose.search.looks import all_looks
+from tribo.diagnose.search.screen import screen
+from tribo.diagnose.statistics.chance import as_measured, columns_of, drawn_residuals, refit, scores
+from tribo.diagnose.statistics.fit import fit
+from tribo.diagnose.statistics.model import setup
+from tribo.diagnose.statistics.observations import observe
+from tribo.diagnose.statistics.predictor import tabled_predictor
 
 from .synthetic import SMALL, hidden
 from .test_screen import baseline
@@ -59,7 +59,7 @@ def test_repeats_of_a_replicate_scatter_as_those_of_the_campaign_were_made_to() 
 
 
 def test_a_column_that_the_law_takes_up_counts_for_nothing() -> None:
-    from tribo.diagnose.fit import jacobian_at
+    from tribo.diagnose.statistics.fit import jacobian_at
 
     f = baseline()
     law = columns_of(jacobian_at(f), [slice(k, k + 1) for k in range(4)])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tribo.diagnose import examine
-from tribo.diagnose.model import Setup
-from tribo.diagnose.weigh import weigh
+from tribo.diagnose.search.weigh import weigh
+from tribo.diagnose.statistics.model import Setup
 
 from .known import acting, baseline, made
 
