@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +12,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 from made_campaigns import DIALECTS as MADE_DIALECTS, MadeCampaign
 
-from tribo.campaign import load_campaign
 from tribo.errors import Problem, ReadError
 from tribo.readers import read_export
 
@@ -393,27 +391,6 @@ def _doubled_mark(line: bytes) -> bytes:
     cut = line.rstrip(b'"\r\n')
     mark = b"," if b";" in line else b"."
     return cut[:-2] + mark + cut[-2:] + line[len(cut) :]
-
-
-def test_the_spoiled_campaign_is_named_fault_by_fault_and_the_rest_reads_as_in_the_clean_one(
-    shared: Path, practice: Callable[[str], Path]
-) -> None:
-    truth = json.loads((shared / "campaigns" / "series-11-spoiled.truth.json").read_text())
-    of_traces = {"stopped_before_peak", "spike", "sign_flipped", "saturated"}
-    spoiled, clean = load_campaign(practice("11-spoiled")), practice("11-clean")
-    named = {s.test_id: {p.kind for p in s.problems} for s in spoiled.set_aside}
-    named |= {p.file: {p.kind} for p in spoiled.problems if p.test_id is None}
-    for test in spoiled.tests:
-        try:
-            trace = read_export(spoiled.root / test.file, name=test.test_id, file=test.file)
-        except ReadError as why:
-            named[test.test_id] = {p.kind for p in why.problems}
-            continue
-        if test.test_id not in truth:
-            unspoiled = read_export(clean / test.file)
-            np.testing.assert_array_equal(trace.force_N, unspoiled.force_N)
-            np.testing.assert_array_equal(trace.time_s, unspoiled.time_s)
-    assert named == {where: {kind} for where, kind in truth.items() if kind not in of_traces}
 
 
 FUZZ = Path(__file__).parents[2] / "benchmarks" / "fuzz_readers.py"
