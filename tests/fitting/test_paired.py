@@ -63,7 +63,7 @@ def test_only_samples_that_share_two_specimens_are_compared() -> None:
 
 def test_a_difference_is_said_with_its_interval() -> None:
     found = differences(3, own=0.02, specimens=6)
-    assert found["T_N"].text().startswith("Sx and Sy differ in static T at 10 kPa: +")
+    assert found["T_N"].text().startswith("Sx and Sy differ significantly in static T at 10 kPa: +")
     table = differences_table(found.values())
     assert list(table["number"]) == ["mu", "tau0_kPa", "T_N"]
     assert table["specimens"][0] == "S0;S1;S2;S3;S4;S5"

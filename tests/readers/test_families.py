@@ -431,7 +431,7 @@ def test_a_table_without_units_is_refused_with_what_to_give(tmp_path: Path) -> N
 
 def test_a_torque_needs_its_lever(tmp_path: Path) -> None:
     path = saved(tmp_path, NEWPORT)
-    with pytest.raises(ReadError, match="give its lever"):
+    with pytest.raises(ReadError, match="give the lever arm"):
         read_export(path)
     trace = read_export(path, columns={"friction_force": "#4 [N m / 2.5 mm]"})
     np.testing.assert_allclose(trace.force_N, 0.002 * np.arange(8) / 2.5e-3)
@@ -461,7 +461,7 @@ def test_a_sidecar_names_the_columns_of_a_nameless_export(tmp_path: Path, suffix
 def test_a_sidecar_that_does_not_fit_is_not_used(tmp_path: Path, text: str) -> None:
     path = saved(tmp_path, NEWPORT)
     path.with_suffix(".json").write_text(text)
-    with pytest.raises(ReadError, match="give its lever"):
+    with pytest.raises(ReadError, match="give the lever arm"):
         read_export(path)
 
 
@@ -533,7 +533,7 @@ def test_variables_of_a_mat_file_are_taken_by_name(tmp_path: Path) -> None:
 
     time, ratio = 0.01 * np.arange(50), 0.3 + 0.01 * np.sin(np.arange(50))
     savemat(tmp_path / "a.mat", {"t": time[:, None], "Fnorm": ratio[None, :], "k": 168.0, "note": "paper"})
-    with pytest.raises(ReadError, match="carry no units"):
+    with pytest.raises(ReadError, match="have no units"):
         read_export(tmp_path / "a.mat")
     trace = read_export(tmp_path / "a.mat", columns={"time": "t [s]", "force": "Fnorm [30.7 gf]"})
     np.testing.assert_array_equal(trace.time_s, time)

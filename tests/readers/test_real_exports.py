@@ -42,14 +42,14 @@ READ = {
 # file: what must be given, and how
 REFUSED = {
     "fr_afm_trace_retrace_profile.txt": ("without names", {"time": "#1 [s]", "force": "#2 [N]"}),
-    "fr_csm_trib_c1.csv": ("carries no units", {"time": "Time [s]", "force": "FrictionForce [N]"}),
-    "fr_csm_trib_c2.csv": ("carries no units", {"time": "Time [s]", "force": "FrictionForce [N]"}),
+    "fr_csm_trib_c1.csv": ("has no units", {"time": "Time [s]", "force": "FrictionForce [N]"}),
+    "fr_csm_trib_c2.csv": ("has no units", {"time": "Time [s]", "force": "FrictionForce [N]"}),
     **{
-        f"fr_newport_1rps{load}N.txt": ("give its lever", {"force": "#4 [N m / 2.6667 mm]"})
+        f"fr_newport_1rps{load}N.txt": ("give the lever arm", {"force": "#4 [N m / 2.6667 mm]"})
         for load in ("0-3", "1", "3", "5", "10", "15")
     },
     **{
-        f"fr_paper_stickslip_{name}.mat": ("carry no units", {"time": "t [s]", "force": "Fnorm [30.7 gf]"})
+        f"fr_paper_stickslip_{name}.mat": ("have no units", {"time": "t [s]", "force": "Fnorm [30.7 gf]"})
         for name in ("k168Nm_v42", "k168Nm_v1100", "k1002Nm_v4300")
     },
 }
