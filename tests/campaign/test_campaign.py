@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import stat
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from made_campaigns import DIALECTS, MadeCampaign
 
 from tribo.campaign import load_campaign, open_campaign, write_template
 from tribo.errors import CampaignError, Problem
@@ -384,11 +386,19 @@ def test_the_template_never_overwrites(tmp_path: Path) -> None:
     assert not (tmp_path / "campaign.toml").exists()
 
 
-@pytest.mark.parametrize("number", ["01", "02", "03", "04"])
-def test_the_practice_campaigns_hold_324_usable_tests_of_six_samples(practice, number: str) -> None:
-    campaign = load_campaign(practice(number))
-    assert (len(campaign.tests), campaign.set_aside, campaign.problems) == (324, (), ())
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_a_campaign_of_the_virtual_tribometer_holds_180_usable_tests_of_six_samples(
+    made: Callable[[str], MadeCampaign], dialect: str
+) -> None:
+    campaign = load_campaign(made(dialect).folder)
+    assert (len(campaign.tests), campaign.set_aside, campaign.problems) == (180, (), ())
     assert list(campaign.samples) == ["F", "A", "B", "C", "Sx", "Sy"]
+
+
+def test_the_practice_campaigns_hold_324_usable_tests_of_six_samples(practice: Callable[[str], Path]) -> None:
+    found = [load_campaign(practice(number)) for number in ("01", "02", "03", "04")]
+    assert [(len(c.tests), c.set_aside, c.problems) for c in found] == [(324, (), ())] * 4
+    assert [list(c.samples) for c in found] == [["F", "A", "B", "C", "Sx", "Sy"]] * 4
 
 
 def test_a_load_that_is_not_the_weight_put_on_is_noted_and_used(folder: Path) -> None:
