@@ -9,6 +9,7 @@ import numpy as np
 from tribo.diagnose.search.looks import candidates
 from tribo.diagnose.search.screen import beyond_law, cleared
 from tribo.diagnose.search.weigh import ALIKE, unseen
+from tribo.diagnose.sentences import ABSORBED, not_varied
 from tribo.diagnose.statistics.model import Acting, ModelFit, Noise, Setup, predict, setup
 from tribo.diagnose.statistics.observations import Observations, conditions_of, flat_sample
 from tribo.diagnose.statistics.predictor import Predictor, tabled_predictor
@@ -25,9 +26,9 @@ NINE_IN_TEN = FOUND + 1.28
 class Finding:
     """What a design would show of one mechanism.
 
-    ``amplitude`` (in ``unit``) and ``effect_percent`` (peak to peak of T beyond what the flat law takes up) are
-    found nine times in ten; both are NaN where the design cannot show it, and ``why`` says so.
-    ``confused_with`` looks the same in this design.
+    ``amplitude`` (in ``unit``) and ``effect_percent`` (change of T, peak to peak, that the calibration on the flat
+    sample does not absorb) are found nine times in ten; both are NaN where the design cannot show it, and ``why``
+    says so. ``confused_with`` lists mechanisms with the same effect in this design.
     """
 
     mechanism: str
@@ -121,7 +122,7 @@ def _finding(
     a = acting[k]
     m = a.mechanism
     if a.name in hidden:
-        why = "the free flat law takes it up"
+        why = ABSORBED
         return Finding(a.name, float("nan"), m.amplitude.unit, float("nan"), (), why, m.separates)
     times = NINE_IN_TEN / max(float(size[k]), 1e-12)
     alike = [
@@ -135,10 +136,10 @@ def _not_applying(s: Setup) -> list[Finding]:
     """Mechanisms whose columns this design does not vary, or that do not show in the friction forces."""
     found = []
     for m in MECHANISMS.values():
-        if m.name == "covariate" or (m.applies(s.observations.conditions) and m.regimes != ("rise",)):
-            continue
         varied = m.applies(s.observations.conditions)
-        in_shape = "it shows in the shape of the trace, not in its forces"
-        why = in_shape if varied or not m.needs else f"{', '.join(m.needs)} does not vary"
+        if varied and m.changes_forces:
+            continue
+        in_shape = "it changes the shape of the trace, not the friction forces"
+        why = in_shape if varied else not_varied(m)
         found.append(Finding(m.name, float("nan"), m.amplitude.unit, float("nan"), (), why, m.separates))
     return found
