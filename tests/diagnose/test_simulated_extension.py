@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from tribo.diagnose import examine, residual_table, with_simulation
-from tribo.diagnose.diagnosis import Diagnosis
+from tribo.diagnose.diagnosis_record import Diagnosis, SimulatedExtension
 from tribo.diagnose.search.weigh import effect
 from tribo.diagnose.simulated_extension import (
     MOST_LOADS,
-    SimulatedExtension,
     local_friction,
     representatives,
     residual_percent,

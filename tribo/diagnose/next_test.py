@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from tribo.diagnose.search.weigh import Candidate, effect
-from tribo.diagnose.sentences import in_words
 from tribo.diagnose.statistics.model import ModelFit, log_forces
+from tribo.diagnose.terms import in_words
 from tribo.diagnose.verdict import NextTest
 from tribo.mechanisms.record import Conditions
 from tribo.mechanisms.table import MECHANISMS

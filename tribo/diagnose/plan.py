@@ -9,10 +9,10 @@ import numpy as np
 from tribo.diagnose.search.looks import candidates
 from tribo.diagnose.search.screen import beyond_law, cleared
 from tribo.diagnose.search.weigh import ALIKE, unseen
-from tribo.diagnose.sentences import ABSORBED, not_varied
 from tribo.diagnose.statistics.model import Acting, ModelFit, Noise, Setup, predict, setup
 from tribo.diagnose.statistics.observations import Observations, conditions_of, flat_sample
 from tribo.diagnose.statistics.predictor import Predictor, tabled_predictor
+from tribo.diagnose.terms import ABSORBED, not_varied
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray
 

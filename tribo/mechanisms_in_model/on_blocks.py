@@ -57,7 +57,8 @@ def run_with(
     bare = changed.with_(pattern=Pattern("F")) if floors else changed
     lattice = lattice_of(bare)
     start = on_floors(changed, floors) if floors else even(lattice)
-    static, sliding = (carried_along(changed, lattice, placed, ratio, start) for ratio in (pulled.static, pulled.sliding))
+    ratios = (pulled.static, pulled.sliding)
+    static, sliding = (carried_along(changed, lattice, placed, ratio, start) for ratio in ratios)
     thresholds = weighted(bare, lattice, static, sliding)
     for placement, values in placed:
         if placement.rims is not None:

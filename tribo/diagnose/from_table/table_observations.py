@@ -259,11 +259,11 @@ def _split(x: FloatArray, sizes: Sequence[int]) -> list[FloatArray]:
 
 
 def candidates_of(table: Table) -> list[Acting]:
-    """Every mechanism and choice that could show in a table of means: a wrong label and columns cannot."""
+    """Every mechanism and choice that could show in a table of means."""
     base = _base(table, table.values.reshape(-1, 4)[table.samples.index("F")])
     found = []
-    for name, m in MECHANISMS.items():
-        if name in ("mislabelled_specimen", "covariate") or m.regimes == ("rise",) or not m.applies(table.conditions):
+    for m in MECHANISMS.values():
+        if m.in_table.missing or m.in_table.barred or not m.changes_forces or not m.applies(table.conditions):
             continue
         found += [Acting(m, str(choice)) for choice in m.choices(base, table.conditions)]
     return found

@@ -41,7 +41,7 @@ class Evidence:
 
     def p_adjusted(self, looks: int) -> float:
         """Two-sided p value of the estimate over its standard error (normal), Bonferroni over ``looks``."""
-        p = float(erfc(abs(self.value) / self.standard_error / np.sqrt(2.0)))
+        p = float(erfc(abs(self.value) / max(self.standard_error, 1e-300) / np.sqrt(2.0)))
         return min(max(looks * p, LEAST_P), 1.0)
 
 
