@@ -102,8 +102,8 @@ def misfit_sentence(outlooks: Sequence[Outlook]) -> str:
     text = (
         f"The model calibrated on the flat sample fails on Table 2 beyond chance: adjusted p {p_text(main.p_misfit)} "
         f"for a correlation of mu and tau0 of {main.reading.correlation:.2f}, which loads spread evenly over 3 to 25 "
-        f"kPa would give. It fails in {failing} of {len(possible)} readings with a correlation that is possible for a line "
-        "fit over these loads."
+        f"kPa would give. It fails in {failing} of {len(possible)} readings with a correlation that is possible for a "
+        "line fit over these loads."
     )
     if free and all(o.p_misfit >= LEVEL for o in free):
         text += (
