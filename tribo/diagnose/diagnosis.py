@@ -48,7 +48,7 @@ def diagnose(
     predictor: Predictor | None = None,
     progress: Progress | None = None,
 ) -> Verdict:
-    """Name what the calibrated model gets wrong in a campaign, or say that nothing is, or that it cannot be told.
+    """Find out whether the calibrated model fails on a campaign beyond chance, and which mechanism explains it.
 
     Parameters
     ----------

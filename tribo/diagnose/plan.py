@@ -1,4 +1,4 @@
-"""Before anything is measured: which mechanisms a design would find, of which size, and which it confuses."""
+"""Before anything is measured: which mechanisms a design would find, from which size, and which it confuses."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ class Finding:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a design can tell, mechanism by mechanism, the easiest first."""
+    """What a design can show of each mechanism, the easiest first."""
 
     n_tests: int
     findings: tuple[Finding, ...]
 
     @property
     def tied(self) -> tuple[tuple[str, ...], ...]:
-        """Sets that this design cannot tell apart."""
+        """Sets of mechanisms that this design cannot distinguish."""
         sets = {tuple(sorted((f.mechanism, *f.confused_with))) for f in self.findings if f.confused_with}
         return tuple(sorted(sets))
 
@@ -104,7 +104,7 @@ def _expected(campaign: Campaign, noise: Noise, law: FloatArray, predictor: Pred
 
 
 def _one_each(s: Setup, law: FloatArray) -> list[Acting]:
-    """The first choice of every mechanism; every covariate by itself."""
+    """The first choice of every mechanism, and every column."""
     seen: dict[str, Acting] = {}
     for a in candidates(s, law):
         seen.setdefault(a.name, a)

@@ -279,9 +279,10 @@ def _named(causes: Sequence[Cause], equivalent: Sequence[Sequence[str]]) -> str:
     alone = [name_in_words(c.mechanism) for c in causes if not any(c.mechanism in names for names in equivalent)]
     reasons = list(dict.fromkeys([*tied, *alone]))
     told = " This design cannot distinguish the mechanisms joined by \"or\"." if tied else ""
+    cause, these = ("Cause", "this mechanism") if len(reasons) == 1 else ("Causes", "these mechanisms")
     return (
-        f"The model fails beyond chance. {'Cause' if len(reasons) == 1 else 'Causes'}: {'; '.join(reasons)}. With this "
-        f"included, the remaining differences are within chance.{told}"
+        f"The model fails beyond chance. {cause}: {'; '.join(reasons)}. With {these} included, the remaining "
+        f"differences are within chance.{told}"
     )
 
 

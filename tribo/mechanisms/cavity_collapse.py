@@ -51,10 +51,10 @@ def floors(values: Values, conditions: Conditions) -> float:
 
 
 def finding(readings: Readings) -> str:
-    return (
-        "Cavity floors that touch the counterface would raise friction; they earn at most "
-        f"{max(readings.gains):.1f} units of log likelihood."
-    )
+    """What the table says about cavities whose floors touch down."""
+    most = max(readings.gains)
+    worth = f"earn at most {most:.1f} units of log likelihood" if most > 0 else "do not improve the fit"
+    return f"Cavity floors that touch the counterface would raise friction, and {worth}."
 
 
 MECHANISM = Mechanism(

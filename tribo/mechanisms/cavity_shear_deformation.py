@@ -25,6 +25,7 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
 
 
 def finding(readings: Readings) -> str:
+    """What the table says about a difference between the pull directions."""
     low, high = min(readings.gains), max(readings.gains)
     return (
         f"Deformed patterns are {'supported' if low > 3.0 else 'possible'}: friction that differs along and across the "
@@ -41,7 +42,7 @@ MECHANISM = Mechanism(
     sign=0,
     regimes=("static", "sliding"),
     enters="mask: cavity width, by the traction and its direction",
-    shows="a difference between Sx and Sy, static and sliding alike",
+    shows="static and sliding friction differ between Sx and Sy",
     confused_with="a wrong area fraction, or a misaligned pull",
     separates="reverse the pull, and pull at 45 degrees",
     silenced_by=("pull the long cavities at 45 degrees and in reverse",),

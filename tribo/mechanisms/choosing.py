@@ -1,4 +1,4 @@
-"""What a mechanism has to be told besides numbers: which specimen, which pattern, which column."""
+"""What a mechanism needs besides numbers: which specimen, which pattern, which column."""
 
 from __future__ import annotations
 

@@ -38,6 +38,7 @@ def area_left(values: Values, contact: Contact) -> tuple[float, float]:
 
 
 def finding(readings: Readings) -> str:
+    """What the table says about a loss of contact area."""
     lost = 100 * readings.limit() * readings.flat_traction_Pa**2
     return (
         f"A contact area that shrinks with traction is {'not supported' if max(readings.gains) < 3.0 else 'possible'}: "

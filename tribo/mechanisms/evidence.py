@@ -1,4 +1,4 @@
-"""What shows a mechanism by itself: evidence in the traces, a measurement of its amplitude, a condition to vary."""
+"""Evidence of a mechanism besides the friction forces: in the traces, by a measurement, by varying a condition."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class TraceEvidence:
     source
         Where the value was read, as a clause of a sentence.
     absent
-        What is said where the evidence is not certain, with ``{value}`` and ``{percent}``.
+        The sentence where the evidence is not certain, with ``{value}`` and ``{percent}``.
     corrected
         Whether the effect was subtracted from every force, so that it cannot explain the friction forces.
     contains

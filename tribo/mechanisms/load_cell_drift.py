@@ -44,7 +44,7 @@ MECHANISM = Mechanism(
     separates="read the force before contact, or use a fresh specimen in the middle of the series",
     silenced_by=("read the zero before and after each pull",),
     needs=("elapsed_s",),
-    plain="drift of the load cell",
+    plain="a drift of the load cell",
     placement=Placement(chain=in_chain),
     evidence=TraceEvidence(
         quantity="zero drift",

@@ -24,6 +24,7 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
 
 
 def in_chain(values: Values, recorded: Mapping[str, float]) -> dict[str, float]:
+    """The same force at every time."""
     return {"offset_N": float(values[0])}
 
 
@@ -40,7 +41,7 @@ MECHANISM = Mechanism(
     confused_with="suction",
     separates="read the zero before and after each pull",
     silenced_by=("read the zero before and after each pull",),
-    plain="offset of the load cell",
+    plain="an offset of the load cell",
     placement=Placement(chain=in_chain),
     evidence=TraceEvidence(
         quantity="zero",

@@ -19,6 +19,7 @@ def rise(values: Values, stiffness_N_per_m: FloatArray, conditions: Conditions) 
 
 
 def in_chain(values: Values, recorded: Mapping[str, float]) -> dict[str, float]:
+    """A spring in series with the sled."""
     return {"compliance_m_per_N": float(values[0])}
 
 

@@ -28,7 +28,7 @@ Profile = Callable[[Values, float, FloatArray], tuple[FloatArray, FloatArray]]
 
 @dataclass(frozen=True)
 class Placement:
-    """What a mechanism changes in the model; what is left out it does not touch. Every gain is 1 at zero amplitude.
+    """What a mechanism changes in the model; a field that is not given changes nothing. Gains are 1 at zero amplitude.
 
     Parameters
     ----------

@@ -23,6 +23,7 @@ def lifted(values: Values, contact: Contact) -> tuple[float, float]:
 
 
 def in_chain(values: Values, recorded: Mapping[str, float]) -> dict[str, float]:
+    """The angle of the wire."""
     return {"wire_angle_rad": float(values[0])}
 
 

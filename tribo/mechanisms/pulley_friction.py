@@ -17,6 +17,7 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
 
 
 def in_chain(values: Values, recorded: Mapping[str, float]) -> dict[str, float]:
+    """The friction coefficient of the roller."""
     return {"roller_friction": float(values[0])}
 
 

@@ -61,7 +61,7 @@ class Mechanism:
     needs
         Arrays of :class:`Conditions` that must vary for it to show.
     choices, choosing
-        What it has to be told besides numbers (which specimen, which pattern), and what that means.
+        What it needs besides numbers (which specimen, which pattern), and what that means.
     enters, shows, confused_with, separates, silenced_by
         Where it acts in the model; its signs; what gives similar signs; how to distinguish them; extra measurements
         that remove or settle it. All in words.

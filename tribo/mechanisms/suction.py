@@ -12,6 +12,7 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
 
 
 def finding(readings: Readings) -> str:
+    """What the table says about suction."""
     none = sum(size < 1.0 for size in readings.sizes)
     return (
         f"Suction cups are {'excluded' if none == len(readings.sizes) else 'not excluded'}: suction can only increase "

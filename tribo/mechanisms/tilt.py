@@ -74,7 +74,7 @@ MECHANISM = Mechanism(
     separates="lower the wire to the height of the interface",
     silenced_by=("lower the wire to the height of the interface",),
     needs=("normal_load_N",),
-    plain="tilt of the sled",
+    plain="a tilt of the sled",
     placement=Placement(along=along, own_friction=True),
     measurement=DirectMeasurement("Measure the height of the wire over the interface.", 0.002, 0.25),
 )

@@ -102,7 +102,7 @@ def diagnose_published(
 
 
 def look_at(table: Table, reading: Reading, rng: np.random.Generator) -> Outlook:
-    """Fit the baseline, judge its strongest look against chance, weigh every mechanism, look at what is left."""
+    """Fit the baseline, compare its strongest look with chance, weigh every mechanism, examine what remains."""
     baseline = fit_table(table)
     looks = _screen(baseline, rng)
     weighed = weigh_table(baseline)

@@ -38,7 +38,7 @@ WORDS = {"static": "static friction", "sliding": "sliding friction"}
 
 @dataclass(frozen=True)
 class Table:
-    """A published table as the diagnosis takes it: rows are samples, then regimes; (mu, tau0 in kPa) of each.
+    """A published table as the diagnosis uses it: rows are samples, then regimes; (mu, tau0 in kPa) of each.
 
     ``values`` and the covariance have 2 x regimes x samples entries in the order sample, regime, (mu, tau0);
     ``shares`` (samples, 4) are those of a simulated table over its own flat sample; ``conditions`` holds every
@@ -129,7 +129,7 @@ def read_table(
 
 
 def _conditions(samples: Sequence[str], loads_Pa: FloatArray) -> Conditions:
-    """Every sample at every load, samples first; speed, hold and the room are one and the same."""
+    """Every sample at every load, samples first; speed, hold and environment are the same."""
     patterns = [_pattern(s) for s in samples]
     n, m = len(samples), len(loads_Pa)
 

@@ -1,4 +1,4 @@
-"""Weighing the mechanisms: fitting each, penalising freedom, and finding which cannot be told apart."""
+"""Weighing the mechanisms: fitting each, penalising freedom, and finding which cannot be distinguished."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tribo.records import FloatArray
 PER_PARAMETER = 1.0  # log likelihood that a further parameter has to earn
 CHOICES_FITTED = 4  # of a mechanism with many choices, how many are fitted in full
 IN_REACH, CLOSE_BY = 0.5, 3.0  # share of the best first gain, less so much, from which a mechanism is fitted to the end
-ALIKE = 0.95  # cosine from which two mechanisms cannot be told apart
+ALIKE = 0.95  # cosine from which two mechanisms cannot be distinguished
 SEEN = 1e-3  # share of a mechanism's effect that must be left once the flat law is free
 
 
@@ -106,7 +106,7 @@ def effect(f: ModelFit, index: int = -1) -> FloatArray:
 def likeness(start: ModelFit, best: Candidate, others: Sequence[Candidate]) -> FloatArray:
     """Cosine between what ``best`` changes in the fitted ln T and what each other changes, (others,).
 
-    Every model has its own flat law fitted, so what the flat law can take up is already out; the sample error
+    Every model has its own flat law fitted, so what the flat law can absorb is already removed; the sample error
     and the specimens are taken out here.
     """
     ground = replace(best.fit, acting=best.fit.acting[:-1], values=best.fit.values[:-1])
