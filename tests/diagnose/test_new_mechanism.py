@@ -16,7 +16,6 @@ from tribo.mechanisms.record import (
     DirectMeasurement,
     Forces,
     Mechanism,
-    OnTest,
     TraceEvidence,
     Values,
     amplitude,
@@ -115,17 +114,8 @@ def test_evidence_that_it_states_in_the_traces_is_read_and_bars_it(monkeypatch: 
     """A mechanism with the force before contact as its evidence is named from that, without a line elsewhere."""
     stated = TraceEvidence("zero", "", "read from the force before contact", corrected=True)
     monkeypatch.setitem(MECHANISMS, NAME, replace(TOY, evidence=stated))
-    monkeypatch.delitem(MECHANISMS, "load_cell_offset")
+    monkeypatch.setitem(MECHANISMS, "load_cell_offset", replace(MECHANISMS["load_cell_offset"], evidence=None))
     v = examine(hidden(("load_cell_offset", 1.0)), replicates=(20, 10)).verdict
     assert [c.mechanism for c in v.causes] == [NAME]
     assert v.causes[0].text.endswith("read from the force before contact.")
     assert v.gain is not None
-
-
-def test_a_choice_of_its_own_reaches_the_single_test(toy: Mechanism) -> None:
-    c = hidden(seed=8)
-    from tribo.diagnose.statistics.observations import observe
-
-    here = toy.on_test(toy.start(), "", observe(c).conditions, 0)
-    assert isinstance(here, OnTest)
-    assert here.values[0] == 0.1
