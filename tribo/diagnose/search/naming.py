@@ -47,7 +47,7 @@ def name_causes(
     rng: np.random.Generator,
     progress: Progress | None = None,
 ) -> Named:
-    """Add mechanisms while each is real by itself and something is left to explain."""
+    """Add mechanisms while each is beyond chance and a misfit remains."""
     model, seen = baseline, first
     causes: list[tuple[Candidate, ...]] = []
     weighed: tuple[Candidate, ...] = ()
@@ -90,7 +90,7 @@ def _is_real(candidate: Candidate, seen: Screen, level: float) -> bool:
 def _sort_rivals(
     start: ModelFit, ranked: Sequence[Candidate]
 ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
-    """Those the design cannot tell from the best, and distinct ones that explain about as much."""
+    """Those that the design cannot distinguish from the best, and distinct ones that explain about as much."""
     best = ranked[0]
     tied = max(TIED[0], TIED[1] * best.gain)
     near = [c for c in ranked[1:] if c.gain > best.gain - max(CLOSE, tied)]

@@ -26,7 +26,7 @@ class Screen:
 
     ``chance`` (replicates,) is the strongest look in each simulated campaign of the fitted model,
     ``chance_library`` the strongest of the mechanisms alone. ``size`` (looks,) is the peak-to-peak effect
-    in ln T beyond what the law takes up, ``coefficients`` those of each look's columns.
+    in ln T that the calibration does not absorb, ``coefficients`` those of each look's columns.
     """
 
     looks: tuple[Look, ...]
@@ -69,7 +69,7 @@ def screen(
 ) -> Screen:
     """Look at a fitted model in every way, then do the same with up to ``replicates`` campaigns it makes itself.
 
-    No more replicates are made once the strongest look is plainly within chance, or plainly beyond it.
+    Replicates end once the strongest look is clearly within chance, or clearly beyond it.
     """
     stacked = np.concatenate([look.columns for look in looks], axis=2)
     ends = np.cumsum([look.freedom for look in looks])
@@ -139,7 +139,7 @@ def deviate(chi2: FloatArray, freedom: FloatArray) -> FloatArray:
 
 
 def beyond_law(f: ModelFit, columns: FloatArray) -> FloatArray:
-    """Columns (n, 2, k) less what law and mechanisms of the fit can take up."""
+    """Columns (n, 2, k) less what the law and the mechanisms of the fit can absorb."""
     flat = jacobian_at(f).reshape(-1, len(np.concatenate([f.law, *f.values])))
     q = np.linalg.qr(flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300))[0]
     rows = columns.reshape(-1, columns.shape[2])

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from tribo.diagnose.statistics.observations import Observations
 from tribo.diagnose.statistics.predictor import Predictor
-from tribo.mechanisms.covariate import column_of
 from tribo.mechanisms.record import Base, Forces, Mechanism
 from tribo.records import FloatArray
 
@@ -32,10 +31,8 @@ class Acting:
 
     @property
     def name(self) -> str:
-        """The name a verdict uses: ``covariate:operator`` for a covariate."""
-        if self.mechanism.name == "covariate":
-            return f"covariate:{column_of(self.choice)}"
-        return self.mechanism.name
+        """The name in a verdict: ``covariate:operator``."""
+        return self.mechanism.called(self.choice)
 
 
 @dataclass(frozen=True)
