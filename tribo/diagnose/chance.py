@@ -1,6 +1,6 @@
 """What chance gives: campaigns that a fitted model makes itself, many at a time, fitted and looked at again.
 
-Replicates keep the design and draw specimens, sample errors and repeats anew. The law is linear over the little it
+Replicates keep the design and draw specimens, pattern errors and repeats anew. The law is linear over the little it
 moves from replicate to replicate, so that derivatives are those of the fit; robust weights, noise sizes and random
 effects are estimated for every replicate by the steps of :mod:`tribo.diagnose.fit`.
 """
@@ -8,20 +8,21 @@ effects are estimated for every replicate by the steps of :mod:`tribo.diagnose.f
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.diagnose.fit import (
-    REPEAT_PRIOR,
-    SMALLEST_SD,
-    SPECIMEN_PRIOR,
-    jacobian_at,
+from tribo.diagnose.fit import jacobian_at
+from tribo.diagnose.model import ModelFit, Setup
+from tribo.diagnose.noise import (
     prior_precision,
+    prior_sd,
+    updated_repeat,
+    updated_scatter,
+    updated_sizes,
     whitener,
 )
-from tribo.diagnose.model import ModelFit
 from tribo.records import FloatArray
 
 STEPS = 4
@@ -72,46 +73,80 @@ class Replicates:
     along: FloatArray
 
 
+@dataclass(frozen=True)
+class Sizes:
+    """The noise of every replicate: ``repeat`` (r, 2, 2), sizes of the random ``effects`` (r, N_SIZES), and what the
+    repeats depend on, ``scatter`` (r, k).
+    """
+
+    repeat: FloatArray
+    effects: FloatArray
+    scatter: FloatArray
+
+
 def as_measured(f: ModelFit) -> Replicates:
     """The fitted campaign itself, as if it were one replicate."""
-    p = len(np.concatenate([f.law, *f.values]))
-    along = np.ascontiguousarray(np.concatenate([jacobian_at(f), f.setup.random], axis=2).transpose(1, 0, 2))
     left = (f.residual - f.setup.random @ f.effects).T[None]
-    precision = _precision(f, f.noise.repeat[None], _weights(f, f.noise.repeat[None], left))
-    return Replicates(precision, f.residual.T[None], _prior(f, f.noise.specimen[None], p), along)
+    sizes = _fitted_sizes(f, 1)
+    inverse = _inverse_noise(f.setup, sizes)
+    return Replicates(inverse * _weights(f, inverse, left)[:, None], f.residual.T[None], _prior(f, sizes), _along_of(f))
+
+
+def _along_of(f: ModelFit) -> FloatArray:
+    """The model's columns, (2, n, p + q)."""
+    return np.ascontiguousarray(np.concatenate([jacobian_at(f), f.setup.random], axis=2).transpose(1, 0, 2))
+
+
+def _fitted_sizes(f: ModelFit, replicates: int) -> Sizes:
+    scatter = np.zeros(f.setup.scatter.shape[1]) if f.noise.scatter is None else f.noise.scatter
+    parts = (f.noise.repeat, f.noise.sizes, scatter)
+    return Sizes(*(np.repeat(part[None], replicates, axis=0) for part in parts))
 
 
 def drawn_residuals(f: ModelFit, rng: np.random.Generator, replicates: int) -> FloatArray:
-    """ln T less what the fit predicts, (replicates, 2, n): new specimens and sample errors, repeats resampled."""
+    """ln T less what the fit predicts, (replicates, 2, n): new specimens and pattern errors, repeats resampled."""
     s = f.setup
     n = s.observations.n
     effects = rng.normal(size=(replicates, s.random.shape[2])) / np.sqrt(prior_precision(s, f.noise))
     factor = whitener(s, f.noise)
-    left = np.einsum("nij,nj->ni", factor, f.residual - s.random @ f.effects)
-    left = (left - left.mean(axis=0)) * np.sqrt(n / (n - 4.0))
+    left = standardised(f, factor)
     noise = np.linalg.solve(factor, left[rng.integers(0, n, (replicates, n))][..., None])[..., 0]
     return np.asarray(noise.transpose(0, 2, 1) + np.tensordot(effects, s.random, axes=(1, 2)).transpose(0, 2, 1))
 
 
+def standardised(f: ModelFit, factor: FloatArray) -> FloatArray:
+    """What is left of every test in units of the fitted noise, (n, 2).
+
+    The random effects follow the tests, so that what is left is smaller than the noise: it is scaled to the noise that
+    the fit states, to a weighted covariance of one.
+    """
+    s = f.setup
+    left = np.einsum("nij,nj->ni", factor, f.residual - s.random @ f.effects)
+    left = left - left.mean(axis=0)
+    for _ in range(3):
+        weight = (f.noise.tail + 2.0) / (f.noise.tail + np.sum(left**2, axis=1))
+        root = np.linalg.cholesky((left * weight[:, None]).T @ left / len(left))
+        left = np.linalg.solve(root, left.T).T
+    return np.asarray(left)
+
+
 def refit(f: ModelFit, residual: FloatArray) -> Replicates:
-    """Law, random effects, weights and noise sizes of campaigns that part from ``f`` by ``residual`` (r, 2, n)."""
-    s, r = f.setup, len(residual)
-    p = len(np.concatenate([f.law, *f.values]))
-    along = np.ascontiguousarray(np.concatenate([jacobian_at(f), s.random], axis=2).transpose(1, 0, 2))
-    random = along[:, :, p:]
-    moments = np.einsum("anp,bnq->abpq", random, random, optimize=True)
-    repeat, specimen = np.repeat(f.noise.repeat[None], r, axis=0), np.repeat(f.noise.specimen[None], r, axis=0)
-    left, solution = residual, np.zeros((r, along.shape[2]))
+    """Law, random effects, weights and noise sizes of campaigns that differ from ``f`` by ``residual`` (r, 2, n)."""
+    s, along = f.setup, _along_of(f)
+    p = along.shape[2] - s.random.shape[2]
+    sizes, left = _fitted_sizes(f, len(residual)), residual
+    solution = np.zeros((len(residual), along.shape[2]))
     for _ in range(STEPS):
-        weight = _weights(f, repeat, left)
-        inverse, solution = _solve(along, _precision(f, repeat, weight), residual, _prior(f, specimen, p))
+        inverse = _inverse_noise(s, sizes)
+        weight = _weights(f, inverse, left)
+        spread, solution = _solve(along, inverse * weight[:, None], residual, _prior(f, sizes))
         left = residual - _along(along, solution)
-        spread = inverse[:, p:, p:]
-        repeat = _repeat(f, weight, left, np.einsum("rpq,abpq->rab", spread, moments, optimize=True), p)
-        specimen = _specimen(s.group, solution[:, p:] ** 2 + np.diagonal(spread, axis1=1, axis2=2))
-    precision = _precision(f, repeat, _weights(f, repeat, left))
-    without_effects = left + _along(random, solution[:, p:])
-    return Replicates(precision, without_effects, _prior(f, specimen, p), along)
+        effects = updated_sizes(s, sizes.effects, solution[:, p:], np.diagonal(spread, axis1=1, axis2=2)[:, p:])
+        sizes = _updated_repeats(f, sizes, weight[:, None] * (_squares(left) + _blurred(along, spread)))
+        sizes = replace(sizes, effects=effects)
+    inverse = _inverse_noise(s, sizes)
+    precision = inverse * _weights(f, inverse, left)[:, None]
+    return Replicates(precision, left + _along(along[:, :, p:], solution[:, p:]), _prior(f, sizes), along)
 
 
 def _along(along: FloatArray, solution: FloatArray) -> FloatArray:
@@ -119,31 +154,49 @@ def _along(along: FloatArray, solution: FloatArray) -> FloatArray:
     return np.asarray(np.tensordot(solution, along, axes=(1, 2)))
 
 
-def _inverse_noise(f: ModelFit, repeat: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Inverse of the noise of every test, repeats plus reading: its three entries, each (r, n)."""
-    reading = f.setup.observations.reading**2
-    static, sliding = repeat[:, 0, 0, None] + reading[:, 0], repeat[:, 1, 1, None] + reading[:, 1]
-    mixed = repeat[:, 0, 1, None]
-    determinant = static * sliding - mixed**2
-    return sliding / determinant, -mixed / determinant, static / determinant
+def _squares(left: FloatArray) -> FloatArray:
+    """Static, mixed and sliding products of what is left, (r, 3, n)."""
+    return np.stack([left[:, 0] ** 2, left[:, 0] * left[:, 1], left[:, 1] ** 2], axis=1)
 
 
-def _weights(f: ModelFit, repeat: FloatArray, left: FloatArray) -> FloatArray:
-    """Weight of every test under the bivariate t, (r, n)."""
-    static, mixed, sliding = _inverse_noise(f, repeat)
-    distance = static * left[:, 0] ** 2 + 2 * mixed * left[:, 0] * left[:, 1] + sliding * left[:, 1] ** 2
+def _blurred(along: FloatArray, spread: FloatArray) -> FloatArray:
+    """The same products expected from the uncertainty ``spread`` (r, k, k) of the coefficients, (r, 3, n)."""
+    n, k = along.shape[1:]
+    moved = (along.reshape(-1, k) @ spread).reshape(len(spread), 2, n, k)
+    pairs = ((0, 0), (0, 1), (1, 1))
+    return np.stack([np.einsum("rnk,nk->rn", moved[:, a], along[b]) for a, b in pairs], axis=1)
+
+
+def _updated_repeats(f: ModelFit, sizes: Sizes, squares: FloatArray) -> Sizes:
+    """Covariance of the repeats and what it depends on, from weighted products (r, 3, n) of what is left."""
+    s = f.setup
+    total = np.einsum("ran,rn->ra", squares, np.exp(-2.0 * sizes.scatter @ s.scatter.T))
+    sizes = replace(sizes, repeat=updated_repeat(s, total[:, [[0, 1], [1, 2]]]))
+    if f.noise.scatter is None:
+        return sizes
+    excess = np.einsum("ran,ran,a->rn", _inverse_noise(s, sizes), squares, [1.0, 2.0, 1.0]) - 2.0
+    return replace(sizes, scatter=updated_scatter(s, sizes.scatter, excess, f.noise.tail))
+
+
+def _inverse_noise(s: Setup, sizes: Sizes) -> FloatArray:
+    """Inverse of the noise of every test, repeats plus reading: its static, mixed and sliding entries, (r, 3, n)."""
+    reading = s.observations.reading**2
+    times, repeat = np.exp(2.0 * sizes.scatter @ s.scatter.T), sizes.repeat[:, :, :, None]
+    static, sliding = repeat[:, 0, 0] * times + reading[:, 0], repeat[:, 1, 1] * times + reading[:, 1]
+    mixed = repeat[:, 0, 1] * times
+    return np.stack([sliding, -mixed, static], axis=1) / (static * sliding - mixed**2)[:, None]
+
+
+def _weights(f: ModelFit, inverse: FloatArray, left: FloatArray) -> FloatArray:
+    """Weight of every test under the bivariate t, (r, n), for the inverse of its noise (r, 3, n)."""
+    distance = np.einsum("ran,ran,a->rn", inverse, _squares(left), [1.0, 2.0, 1.0])
     return np.asarray((f.noise.tail + 2.0) / (f.noise.tail + distance))
 
 
-def _precision(f: ModelFit, repeat: FloatArray, weight: FloatArray) -> FloatArray:
-    return np.stack([entry * weight for entry in _inverse_noise(f, repeat)], axis=1)
-
-
-def _prior(f: ModelFit, specimen: FloatArray, p: int) -> FloatArray:
+def _prior(f: ModelFit, sizes: Sizes) -> FloatArray:
     """Precision of the columns of the model, (r, p + q): next to none for law and mechanisms."""
-    s = f.setup
-    sd = np.where(s.group >= 0, specimen[:, np.maximum(s.group, 0)], s.fixed_sd)
-    return np.concatenate([np.full((len(specimen), p), 1e-12), 1.0 / sd**2], axis=1)
+    p = len(np.concatenate([f.law, *f.values]))
+    return np.concatenate([np.full((len(sizes.effects), p), 1e-12), prior_sd(f.setup, sizes.effects) ** -2], axis=1)
 
 
 def _weighted(precision: FloatArray, columns: FloatArray) -> FloatArray:
@@ -171,25 +224,6 @@ def _solve(
     inverse = np.linalg.inv(normal * both + ROUNDING * np.eye(along.shape[2])) * both
     right = np.einsum("rpm,rm->rp", weighted, residual.reshape(len(residual), -1))
     return inverse, np.einsum("rpq,rq->rp", inverse, right)
-
-
-def _repeat(f: ModelFit, weight: FloatArray, left: FloatArray, blurred: FloatArray, p: int) -> FloatArray:
-    """Covariance of the repeats, (r, 2, 2), one step of expectation-maximisation."""
-    n = f.setup.observations.n
-    total = np.einsum("rn,ran,rbn->rab", weight, left, left, optimize=True) + blurred
-    size, worth = REPEAT_PRIOR
-    reading = np.diag(np.mean(f.setup.observations.reading**2, axis=0))
-    repeat = (total + worth * size**2 * np.eye(2)) / (n - p / 2 + worth) - reading
-    values, vectors = np.linalg.eigh(0.5 * (repeat + repeat.transpose(0, 2, 1)))
-    return np.asarray((vectors * np.maximum(values, SMALLEST_SD**2)[:, None, :]) @ vectors.transpose(0, 2, 1))
-
-
-def _specimen(group: NDArray[np.int64], variance: FloatArray) -> FloatArray:
-    """Standard deviation of the specimen gains per regime, (r, 2)."""
-    size, worth = SPECIMEN_PRIOR
-    regimes = [group == regime for regime in (0, 1)]
-    found = [(variance[:, g].sum(axis=1) + worth * size**2) / (g.sum() + worth) for g in regimes]
-    return np.sqrt(np.stack(found, axis=1))
 
 
 def scores(fitted: Replicates, looks: Columns) -> tuple[FloatArray, list[FloatArray]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from tribo.diagnose.fit import fit
 from tribo.diagnose.looks import all_looks
-from tribo.diagnose.model import ModelFit, Setup
+from tribo.diagnose.model import FIXED, ModelFit, Setup
 from tribo.diagnose.screen import Progress, Screen, screen
 from tribo.diagnose.weigh import ALIKE, Candidate, effect, likeness, weigh
 from tribo.records import FloatArray
@@ -131,8 +131,8 @@ def with_form_error(model: ModelFit) -> Setup:
     return replace(
         s,
         random=np.concatenate([s.random, np.stack(columns, axis=2)], axis=2),
-        fixed_sd=np.concatenate([s.fixed_sd, np.array(sizes)]),
-        group=np.concatenate([s.group, np.full(len(sizes), -1)]),
+        unit=np.concatenate([s.unit, np.array(sizes)]),
+        group=np.concatenate([s.group, np.full(len(sizes), FIXED)]),
     )
 
 
