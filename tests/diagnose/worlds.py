@@ -77,5 +77,5 @@ def _repeats(bench: Bench, of: World, rng: np.random.Generator) -> np.ndarray:
         return np.log(np.maximum(1.0 + relative, 0.1))
     if of.noise == "unequal":
         times = {s: np.exp(rng.normal(0, 0.5)) for s in sorted(set(bench.tests["sample"]))}
-        noise *= bench.of_sample(times)[:, None] if False else np.array([[times[s]] for s in bench.tests["sample"]])
+        noise *= np.array([[times[s]] for s in bench.tests["sample"]])
     return noise * sd

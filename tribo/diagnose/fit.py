@@ -106,7 +106,8 @@ def fit(
     begin = noise or (start.noise if start is not None else first_noise(s))
     starts, target, estimate = _starts(acting, start), Target(s, tuple(acting)), noise is None
     if len(starts) > 1 or not to_the_end:
-        trials = [_fitted(target, _begin(target, law, values, begin), estimate, iterations, TRIAL_GAIN) for values in starts]
+        states = [_begin(target, law, values, begin) for values in starts]
+        trials = [_fitted(target, state, estimate, iterations, TRIAL_GAIN) for state in states]
         best = max(trials, key=lambda f: f.score)
         if not to_the_end:
             return best

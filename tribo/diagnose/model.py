@@ -83,7 +83,7 @@ class Setup:
 
 
 def setup(observations: Observations, predictor: Predictor) -> Setup:
-    """Random effects: per specimen and regime a gain and a slope; per pattern and regime an offset, a slope, a curve."""
+    """Random effects, each per regime: gain and slope of a specimen; offset, slope and curve of a pattern."""
     o, c = observations, observations.conditions
     log_p = np.log(c.pressure_Pa)
     log_p = log_p - log_p.mean()

@@ -155,7 +155,8 @@ def _variance(d: Diagnosis, weight: FloatArray) -> FloatArray:
     from tribo.diagnose.noise import prior_precision
 
     f = d.baseline
-    repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup), weight) + (f.setup.observations.reading**2) @ weight**2
+    repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup), weight)
+    repeats += f.setup.observations.reading**2 @ weight**2
     effects = np.einsum("nrq,r->nq", f.setup.random, weight) ** 2 @ (1.0 / prior_precision(f.setup, f.noise))
     return np.asarray(repeats + effects)
 
