@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
+from tribo.diagnose.chance import as_measured, columns_of, scores
 from tribo.diagnose.fit import fit
 from tribo.diagnose.looks import all_looks
 from tribo.diagnose.model import ModelFit, setup
@@ -42,7 +43,9 @@ def test_the_quick_score_is_that_of_the_cleared_columns() -> None:
     left, target = cleared(f, np.concatenate([look.columns for look in looks], axis=2))
     size = np.sqrt(np.sum(left**2, axis=0))
     seen = size > 1e-3
-    quick = screen(f, looks, replicates=0, rng=np.random.default_rng(0)).strength
+    ends = [slice(k, k + 1) for k in range(len(looks))]
+    ready = columns_of(np.concatenate([look.columns for look in looks], axis=2), ends)
+    quick = np.sqrt(scores(as_measured(f), ready, steps=(0.0,))[0][0])
     assert quick[seen] == pytest.approx(np.abs(left.T @ target / size)[seen], rel=1e-4, abs=1e-5)
 
 

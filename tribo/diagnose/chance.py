@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.diagnose.fit import jacobian_at
-from tribo.diagnose.model import ModelFit, Setup
+from tribo.diagnose.model import PATTERN, ModelFit, Setup
 from tribo.diagnose.noise import (
+    PATTERN_PRIOR,
     prior_precision,
     prior_sd,
     updated_repeat,
@@ -26,6 +27,8 @@ from tribo.diagnose.noise import (
 from tribo.records import FloatArray
 
 STEPS = 4
+# Of the logarithm of the pattern error: what a look explains of the patterns makes their error smaller
+PATTERN_STEPS = (0.0, -0.5, -1.0)
 ROUNDING = 1e-9
 TAKEN_UP = 1e-6  # share of a column's information below which nothing of it is left to see
 
@@ -64,18 +67,21 @@ def _products(columns: FloatArray, first: NDArray[np.int64], second: NDArray[np.
 @dataclass(frozen=True)
 class Replicates:
     """Fitted replicates: ``precision`` (r, 3, n) of every test, robust weight included, as static, mixed, sliding;
-    ``residual`` (r, 2, n) of ln T; ``prior`` (r, p + q), the precision of the model's columns ``along`` (2, n, p + q).
+    ``residual`` (r, 2, n) of ln T; ``prior`` (r, p + q), the precision of the model's columns ``along`` (2, n, p + q);
+    ``pattern`` (p + q,) marks those of the pattern error, whose factor is ``factor`` (r,).
     """
 
     precision: FloatArray
     residual: FloatArray
     prior: FloatArray
     along: FloatArray
+    pattern: NDArray[np.bool_]
+    factor: FloatArray
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """The noise of every replicate: ``repeat`` (r, 2, 2), sizes of the random ``effects`` (r, N_SIZES), and what the
+    """The noise of every replicate: ``repeat`` (r, 2, 2), sizes of the random ``effects`` (r, 5), and what the
     repeats depend on, ``scatter`` (r, k).
     """
 
@@ -89,7 +95,15 @@ def as_measured(f: ModelFit) -> Replicates:
     left = (f.residual - f.setup.random @ f.effects).T[None]
     sizes = _fitted_sizes(f, 1)
     inverse = _inverse_noise(f.setup, sizes)
-    return Replicates(inverse * _weights(f, inverse, left)[:, None], f.residual.T[None], _prior(f, sizes), _along_of(f))
+    return _replicates(f, sizes, inverse * _weights(f, inverse, left)[:, None], f.residual.T[None])
+
+
+def _replicates(f: ModelFit, sizes: Sizes, precision: FloatArray, residual: FloatArray) -> Replicates:
+    p = len(np.concatenate([f.law, *f.values]))
+    pattern = np.concatenate([np.zeros(p, bool), f.setup.group == PATTERN])
+    return Replicates(
+        precision, residual, _prior(f, sizes), _along_of(f), pattern, sizes.effects[:, PATTERN]
+    )
 
 
 def _along_of(f: ModelFit) -> FloatArray:
@@ -146,7 +160,7 @@ def refit(f: ModelFit, residual: FloatArray) -> Replicates:
         sizes = replace(sizes, effects=effects)
     inverse = _inverse_noise(s, sizes)
     precision = inverse * _weights(f, inverse, left)[:, None]
-    return Replicates(precision, left + _along(along[:, :, p:], solution[:, p:]), _prior(f, sizes), along)
+    return _replicates(f, sizes, precision, left + _along(along[:, :, p:], solution[:, p:]))
 
 
 def _along(along: FloatArray, solution: FloatArray) -> FloatArray:
@@ -205,12 +219,11 @@ def _weighted(precision: FloatArray, columns: FloatArray) -> FloatArray:
     return np.stack([static * columns[0] + mixed * columns[1], mixed * columns[0] + sliding * columns[1]], axis=1)
 
 
-def _normal(along: FloatArray, precision: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Weighted columns (r, p, 2n) and the normal matrices (r, p, p)."""
+def _normal(along: FloatArray, precision: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Weighted columns (r, p, 2n) and the normal matrices (r, p, p) without the prior."""
     r, k = len(precision), along.shape[2]
     weighted = np.ascontiguousarray(_weighted(precision, along).reshape(r, -1, k).transpose(0, 2, 1))
     normal = (weighted.reshape(r * k, -1) @ along.reshape(-1, k)).reshape(r, k, k)
-    normal[:, np.arange(k), np.arange(k)] += prior
     return weighted, normal
 
 
@@ -218,7 +231,8 @@ def _solve(
     along: FloatArray, precision: FloatArray, residual: FloatArray, prior: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Inverse normal matrices (r, p, p) and solutions (r, p), the diagonal scaled to one."""
-    weighted, normal = _normal(along, precision, prior)
+    weighted, normal = _normal(along, precision)
+    normal[:, np.arange(along.shape[2]), np.arange(along.shape[2])] += prior
     scale = 1.0 / np.sqrt(np.diagonal(normal, axis1=1, axis2=2))
     both = scale[:, :, None] * scale[:, None, :]
     inverse = np.linalg.inv(normal * both + ROUNDING * np.eye(along.shape[2])) * both
@@ -226,26 +240,72 @@ def _solve(
     return inverse, np.einsum("rpq,rq->rp", inverse, right)
 
 
-def scores(fitted: Replicates, looks: Columns) -> tuple[FloatArray, list[FloatArray]]:
+@dataclass(frozen=True)
+class Products:
+    """Products of the model's columns, the looks and the residual of every replicate, whatever the random sizes are."""
+
+    normal: FloatArray  # (r, p, p)
+    right: FloatArray  # (r, p)
+    crossed: FloatArray  # (r, p, k)
+    pull: FloatArray  # (r, k)
+    whole: FloatArray  # (r, m)
+
+
+def scores(
+    fitted: Replicates, looks: Columns, steps: Sequence[float] = PATTERN_STEPS
+) -> tuple[FloatArray, list[FloatArray]]:
     """Score test of every look beyond the model's own columns.
 
-    Returns chi-squared values (r, looks) and the coefficients of each look's columns, (r, d) each.
+    The scores are taken at several sizes of the pattern error, ``steps`` of its logarithm from the fitted one, each
+    size paying what it loses of the likelihood of the model without the look. Returns the largest chi-squared values
+    (r, looks) and the coefficients of each look's columns, (r, d) each, at the fitted size.
     """
+    found = _products_of(fitted, looks)
+    steps = steps if fitted.pattern.any() else (0.0,)
+    each = [_scores_at(fitted, looks, found, step) for step in steps]
+    evidence = np.stack([e for _, _, e in each])
+    chi2 = np.stack([c for c, _, _ in each]) + 2.0 * (evidence - evidence.max(axis=0))[:, :, None]
+    return np.maximum(chi2.max(axis=0), 0.0), each[0][1]
+
+
+def _products_of(fitted: Replicates, looks: Columns) -> Products:
     r, columns = len(fitted.precision), looks.columns.reshape(-1, looks.columns.shape[2])
-    weighted, normal = _normal(fitted.along, fitted.precision, fitted.prior)
+    weighted, normal = _normal(fitted.along, fitted.precision)
     k = weighted.shape[1]
+    return Products(
+        normal=normal,
+        right=np.einsum("rpm,rm->rp", weighted, fitted.residual.reshape(r, -1)),
+        crossed=(weighted.reshape(r * k, -1) @ columns).reshape(r, k, -1),
+        pull=_weighted_residual(fitted) @ columns,
+        whole=fitted.precision.reshape(r, -1) @ looks.products.reshape(-1, looks.products.shape[2]),
+    )
+
+
+def _scores_at(
+    fitted: Replicates, looks: Columns, found: Products, step: float
+) -> tuple[FloatArray, list[FloatArray], FloatArray]:
+    """Chi-squared values, coefficients, and the log likelihood (r,) of the model without the looks, at one size of the
+    pattern error."""
+    r, k = found.right.shape
+    prior = fitted.prior * np.where(fitted.pattern, np.exp(-2.0 * step), 1.0)
+    normal = found.normal.copy()
+    normal[:, np.arange(k), np.arange(k)] += prior
     scale = 1.0 / np.sqrt(np.diagonal(normal, axis1=1, axis2=2) + 1e-300)
     root = np.linalg.cholesky(normal * scale[:, :, None] * scale[:, None, :] + ROUNDING * np.eye(k))
     clear = np.linalg.inv(root) * scale[:, None, :]
-    crossed = clear @ (weighted.reshape(r * k, -1) @ columns).reshape(r, k, -1)
-    own = clear @ np.einsum("rpm,rm->rp", weighted, fitted.residual.reshape(r, -1))[:, :, None]
-    pull = _weighted_residual(fitted) @ columns - (crossed.transpose(0, 2, 1) @ own)[:, :, 0]
-    whole = fitted.precision.reshape(r, -1) @ looks.products.reshape(-1, looks.products.shape[2])
+    crossed = clear @ found.crossed
+    own = (clear @ found.right[:, :, None])[:, :, 0]
+    pull = found.pull - np.einsum("rpk,rp->rk", crossed, own)
     chi2, coefficients = np.zeros((r, len(looks.spans))), []
     for i, (span, pair) in enumerate(zip(looks.spans, looks.pairs, strict=True)):
-        coefficients.append(_solution(pull[:, span], whole[:, pair], crossed[:, :, span]))
+        coefficients.append(_solution(pull[:, span], found.whole[:, pair], crossed[:, :, span]))
         chi2[:, i] = np.sum(pull[:, span] * coefficients[-1], axis=1)
-    return chi2, coefficients
+    curvature = np.log(np.diagonal(root, axis1=1, axis2=2) / scale).sum(axis=1)
+    expected, worth = PATTERN_PRIOR
+    size = fitted.factor * np.exp(step)
+    sizes = -worth * (np.log(size) + 0.5 * (expected / size) ** 2)
+    evidence = 0.5 * np.log(prior).sum(axis=1) - curvature + 0.5 * np.sum(own**2, axis=1) + sizes
+    return chi2, coefficients, evidence
 
 
 def _weighted_residual(fitted: Replicates) -> FloatArray:

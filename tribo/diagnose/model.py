@@ -22,8 +22,10 @@ from tribo.records import FloatArray
 N_LAW = 4  # mu static, tau0 static (kPa), mu sliding, tau0 sliding (kPa)
 CURVE_SD = 0.008  # model error of a pattern per squared e-fold of pressure
 FLOOR_N = 1e-6
-# Groups of random effects that share one size: gain and slope of the specimens, static and sliding; the patterns.
-GAIN, SLOPE, PATTERN, N_SIZES = 0, 2, 4, 5
+# Groups of random effects that share one size: gain and slope of the specimens, each in the mean of both regimes and
+# in their difference, which a specimen shares to an unknown degree; the patterns.
+GAIN, SLOPE, PATTERN = 0, 2, 4
+ALIKE_IN_BOTH, APART = np.array([1.0, 1.0]) / np.sqrt(2.0), np.array([1.0, -1.0]) / np.sqrt(2.0)
 FIXED = -1  # the group of effects whose size is not estimated
 
 
@@ -47,7 +49,7 @@ class Setup:
     """What every model of one campaign shares: shares, random-effect design, groups.
 
     ``random`` has shape (n, 2, q). The standard deviation of effect j is ``unit[j]`` times the size of its ``group[j]``
-    (GAIN and SLOPE plus the regime, PATTERN), or ``unit[j]`` itself where the group is FIXED. ``scatter`` (n, k) holds
+    (GAIN and SLOPE, plus one for the difference of the regimes; PATTERN), or ``unit[j]`` itself where the group is FIXED. ``scatter`` (n, k) holds
     what the repeats may depend on: the sample, and the logarithm of the force.
     """
 
@@ -83,17 +85,17 @@ class Setup:
 
 
 def setup(observations: Observations, predictor: Predictor) -> Setup:
-    """Random effects, each per regime: gain and slope of a specimen; offset, slope and curve of a pattern."""
+    """Random effects in both regimes: gain and slope of a specimen; offset, slope and curve of a pattern."""
     o, c = observations, observations.conditions
     log_p = np.log(c.pressure_Pa)
     log_p = log_p - log_p.mean()
     columns, units, groups = [], [], []
     for specimen in np.unique(c.specimen):
-        for regime in (0, 1):
+        for k, regimes in enumerate((ALIKE_IN_BOTH, APART)):
             for group, shape in ((GAIN, np.ones(o.n)), (SLOPE, log_p)):
-                columns.append(_column((c.specimen == specimen) * shape, regime))
+                columns.append(((c.specimen == specimen) * shape)[:, None] * regimes)
                 units.append(1.0)
-                groups.append(group + regime)
+                groups.append(group + k)
     for sample in np.unique(c.sample):
         for regime in (0, 1):
             offset, slope = predictor.offset[sample][regime], predictor.slope[sample][regime]
@@ -157,8 +159,8 @@ def predict(s: Setup, law: FloatArray, acting: Sequence[Acting], values: Sequenc
 
 @dataclass(frozen=True)
 class Noise:
-    """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance, specimen gains (2,) and
-    slopes (2,) per e-fold of load.
+    """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance; specimen gains (2,) and
+    slopes (2,) per e-fold of load, along the mean of static and sliding friction and along their difference.
 
     ``pattern`` is the factor on the error that the predictor states for its patterns. The standard deviation of the
     repeats of a test is multiplied by exp(``scatter`` @ setup.scatter). ``tail`` is the number of degrees of freedom of
@@ -174,7 +176,7 @@ class Noise:
 
     @property
     def sizes(self) -> FloatArray:
-        """Of every group of random effects, (N_SIZES,)."""
+        """Of every group of random effects, (5,)."""
         return np.array([*self.specimen, *self.slope, self.pattern])
 
     def with_sizes(self, sizes: FloatArray) -> Noise:

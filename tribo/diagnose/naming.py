@@ -17,7 +17,6 @@ from tribo.records import FloatArray
 CLOSE = 3.0  # log likelihood within which a distinct mechanism explains about equally
 TIED = (5.0, 0.08)  # the same for one that the design cannot tell apart: at least, and as a share of the gain
 FORM = 0.12  # by how much of its own effect a law may be wrong in form, sample by sample
-FIRST = 0.05  # chance at which a mechanism may explain a misfit that is certain already, if nothing is left then
 MAX_CAUSES = 2
 
 
@@ -55,7 +54,7 @@ def name_causes(
     while len(causes) < MAX_CAUSES and seen.p_adjusted() < level:
         ranked = weigh(model, excluded)
         weighed = weighed or tuple(ranked)
-        if not ranked or not _is_real(ranked[0], seen, level if causes else max(level, FIRST)):
+        if not ranked or not _is_real(ranked[0], seen, level):
             break
         alike, rivals = _sort_rivals(model, ranked)
         causes.append(alike)

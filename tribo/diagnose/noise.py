@@ -12,7 +12,7 @@ import numpy as np
 from tribo.diagnose.model import Noise, Setup
 from tribo.records import FloatArray
 
-# Expected size, and how many effects that is worth: specimen gains and slopes (static, sliding), pattern factor
+# Expected size, and how many effects that is worth: specimen gains and slopes, pattern factor
 SPECIMEN_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR = (0.05, 4.0), (0.02, 4.0), (1.0, 2.0)
 SIZE_PRIORS = np.array([SPECIMEN_PRIOR, SPECIMEN_PRIOR, SLOPE_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR])
 REPEAT_PRIOR = (0.08, 4.0)
@@ -49,7 +49,7 @@ def distance(factor: FloatArray, left: FloatArray) -> FloatArray:
 
 
 def prior_sd(s: Setup, sizes: FloatArray) -> FloatArray:
-    """Standard deviation of every random effect for sizes (..., N_SIZES), shape (..., q)."""
+    """Standard deviation of every random effect for sizes (..., 5), shape (..., q)."""
     known = np.ones((*sizes.shape[:-1], 1))
     return np.asarray(s.unit * np.concatenate([sizes, known], axis=-1)[..., s.group])
 
@@ -60,7 +60,7 @@ def prior_precision(s: Setup, noise: Noise) -> FloatArray:
 
 
 def updated_sizes(s: Setup, sizes: FloatArray, effects: FloatArray, variance: FloatArray) -> FloatArray:
-    """Sizes (..., N_SIZES) from predicted effects (..., q) and their variances (..., q)."""
+    """Sizes (..., 5) from predicted effects (..., q) and their variances (..., q)."""
     known = 1.0 - variance / prior_sd(s, sizes) ** 2
     squares = (effects / s.unit) ** 2
     found = sizes.copy()
