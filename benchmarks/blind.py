@@ -162,8 +162,8 @@ def one(case: Case) -> dict[str, Any]:
 
 def gain_of_the_best(d: Diagnosis, seed: int) -> list[float]:
     """What the mechanism that fits best by chance gains on samples left out: mean log score, standard error."""
-    from tribo.diagnose.gain import gain
-    from tribo.diagnose.weigh import weigh
+    from tribo.diagnose.search.weigh import weigh
+    from tribo.diagnose.statistics.gain import gain
 
     found = gain(d.baseline, weigh(d.baseline)[0].fit, np.random.default_rng(seed))
     return [round(found.difference, 5), round(found.se, 5)] if found is not None else []
@@ -172,13 +172,13 @@ def gain_of_the_best(d: Diagnosis, seed: int) -> list[float]:
 def is_seen(case: Case) -> bool:
     """Whether anything is seen at all: the first part of a diagnosis, without naming."""
     from tribo.campaign import load_campaign
-    from tribo.diagnose.fit import fit
-    from tribo.diagnose.instrument import rise_stiffening, zero_drift, zero_offset
-    from tribo.diagnose.looks import all_looks
-    from tribo.diagnose.model import setup
-    from tribo.diagnose.observations import observe
-    from tribo.diagnose.predictor import tabled_predictor
-    from tribo.diagnose.screen import screen
+    from tribo.diagnose.search.looks import all_looks
+    from tribo.diagnose.search.screen import screen
+    from tribo.diagnose.statistics.direct_evidence import rise_stiffening, zero_drift, zero_offset
+    from tribo.diagnose.statistics.fit import fit
+    from tribo.diagnose.statistics.model import setup
+    from tribo.diagnose.statistics.observations import observe
+    from tribo.diagnose.statistics.predictor import tabled_predictor
     from tribo.stages import ingest
 
     with tempfile.TemporaryDirectory() as folder:

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tribo.diagnose.blocks import RECORDED, conditions_of_run
-from tribo.diagnose.extend import SIMULATED, simulate_with
 from tribo.mechanisms.record import Base
 from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms_in_model.extended_run import SIMULATED, simulate_with
+from tribo.mechanisms_in_model.on_blocks import RECORDED, conditions_of_run
 from tribo.simulate import SimConfig, simulate
 
 CASES = (("F", 8e3, 20.0), ("B", 4e3, 20.0), ("B", 16e3, 20.0), ("C", 8e3, 20.0), ("Sx", 8e3, 5.0))

@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 
 from tribo.records import FloatArray
 from tribo.simulate import SimConfig
-from tribo.simulate.engine import drive_of, first_failure_s, lattice_of, run_fast, thresholds_of
-from tribo.simulate.jit import compiled
-from tribo.simulate.kernels import last_stretch
-from tribo.simulate.lattice import Lattice
+from tribo.simulate.engines.fast import drive_of, first_failure_s, lattice_of, run_fast, thresholds_of
+from tribo.simulate.engines.jit import compiled
+from tribo.simulate.engines.kernels import last_stretch
+from tribo.simulate.engines.lattice import Lattice
 from tribo.simulate.run import run_of
 
 CASES = (("A", 20.0), ("C", 20.0))

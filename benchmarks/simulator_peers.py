@@ -47,7 +47,7 @@ def ours() -> list[Figure]:
     from importlib.metadata import version
 
     from tribo.simulate import SimConfig
-    from tribo.simulate.bench import dense_rate, timed_run
+    from tribo.simulate.engine_speed import dense_rate, timed_run
 
     figures = [Figure("tribo", version("tribo"), "step of all blocks", next(iter(dense_rate())).value)]
     for sample, angle_deg in (("F", 20.0), ("C", 20.0)):

@@ -18,8 +18,8 @@ from pathlib import Path
 
 from tribo.published import load_table2
 from tribo.simulate import SimConfig, read_stored
-from tribo.simulate.study import combinations, run_study
-from tribo.simulate.tables import beside, distance, fitted
+from tribo.simulate.table2_column import beside, distance, fitted
+from tribo.simulate.table2_readings import combinations, run_study
 
 BASE = SimConfig(dt_s=1e-7, rest_tolerance=1e-2)
 

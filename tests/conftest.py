@@ -40,7 +40,7 @@ def practice(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable
 @pytest.fixture(scope="session")
 def small_campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A campaign of 24 pulls of the virtual tribometer: samples F and B, three specimens, two loads, two repeats."""
-    from tribo.simulate.instrument import SledDesign, SledLaw, write_campaign
+    from tribo.virtual_tribometer.sled import SledDesign, SledLaw, write_campaign
 
     folder = tmp_path_factory.mktemp("small") / "campaign"
     laws = {"F": SledLaw(4.8, 23e3, 2.9, 12e3), "B": SledLaw(3.6, 10e3, 2.9, 6e3)}

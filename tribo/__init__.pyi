@@ -1,6 +1,7 @@
 from .campaign import load_campaign as load_campaign, open_campaign as open_campaign, write_template as write_template
-from .diagnose import plan_design as plan_design, simulate_with as simulate_with
+from .diagnose import plan_design as plan_design
 from .errors import Problem as Problem, TriboError as TriboError
+from .mechanisms_in_model import simulate_with as simulate_with
 from .published import (
     contradictions as contradictions,
     data_dir as data_dir,

@@ -47,6 +47,15 @@ class Pattern:
         share = np.pi / 4 if self.cavity == "circle" else 1.0
         return float(1.0 - share * self.size_m[0] * self.size_m[1] / (self.pitch_m[0] * self.pitch_m[1]))
 
+    @property
+    def rim_per_m(self) -> float:
+        """Rim length of the cavities per nominal area, 1/m; 0 for a flat sample."""
+        if self.cavity == "none" or self.size_m is None or self.pitch_m is None:
+            return 0.0
+        x, y = self.size_m
+        rim = np.pi * x if self.cavity == "circle" else 2.0 * (x + y)
+        return float(rim / (self.pitch_m[0] * self.pitch_m[1]))
+
 
 @dataclass(frozen=True)
 class Test:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from tribo.errors import CampaignError, FitError, Problem
-from tribo.kept import Shelf
 from tribo.records import (
     REGIMES,
     Campaign,
@@ -26,16 +25,19 @@ from tribo.records import (
     Test,
     Trace,
 )
+from tribo.store.kept_results import Shelf
 
 if TYPE_CHECKING:
+    from tribo.comparison.prediction_runs import Cell
     from tribo.diagnose import Diagnosis
-    from tribo.diagnose.predictor import Predictor
-    from tribo.simulations import Cell
+    from tribo.diagnose.statistics.predictor import Predictor
 
 Progress = Callable[[str, int, int], None]
 Weights = Literal["relative", "ratio", "force", "repeats"]
 Until = Literal["ingest", "fit", "compare", "report"]
-DIAGNOSED_BY = ("diagnose", "mechanisms", "fitting", "laws", "simulate", "records")
+DIAGNOSED_BY = (
+    "diagnose", "mechanisms", "mechanisms_in_model", "virtual_tribometer", "fitting", "laws", "simulate", "records",
+)  # fmt: skip
 ASSESSED_BY = ("stages", "fitting", "laws", "records")
 
 
@@ -77,14 +79,14 @@ def ingest(
 
     A test that cannot be read is set aside with its problems; the rest goes on. A row that names many pulls within
     its export is a test for each of them. ``overrides`` is a table of what a person decided about single pulls
-    (:mod:`tribo.overrides`). The result does not depend on ``jobs``.
+    (:mod:`tribo.ingestion.overrides`). The result does not depend on ``jobs``.
 
     Raises
     ------
     CampaignError
         Not one test could be read, or the overrides have faults.
     """
-    from tribo.exports import read_all
+    from tribo.ingestion.exports import read_all
     from tribo.traces.copies import under_the_wrong_test
 
     traces: dict[str, Trace] = {}
@@ -111,7 +113,7 @@ def ingest(
     ingested = Ingested(replace(campaign, tests=tuple(tests)), traces, pulls, tuple(set_aside))
     if overrides is None:
         return ingested
-    from tribo.overrides import apply_overrides
+    from tribo.ingestion.overrides import apply_overrides
 
     return apply_overrides(ingested, overrides, rule)
 
@@ -200,8 +202,8 @@ def simulate_cells(
     CampaignError
         No flat sample to calibrate on, or ``only`` names nothing this campaign measured.
     """
-    from tribo.prediction import calibrated_cells
-    from tribo.simulations import example_config, example_run, remove_strangers, run_cells
+    from tribo.comparison.prediction import calibrated_cells
+    from tribo.comparison.prediction_runs import example_config, example_run, remove_strangers, run_cells
 
     campaign = ingested.campaign
     flat = flat_sample(campaign, options.flat)
@@ -239,7 +241,7 @@ def compare(
     FitError, SimulationError
         The flat sample gives no law, or the model cannot be run for a pattern.
     """
-    from tribo.prediction import predict
+    from tribo.comparison.prediction import predict
 
     campaign = ingested.campaign
     flat = flat_sample(campaign, options.flat)
@@ -343,8 +345,8 @@ def diagnosis(
 
 def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:
     """The predictor from simulations of this campaign, where ``kept`` holds them for the flat sample at least."""
+    from tribo.comparison.prediction_runs import kept_runs
     from tribo.diagnose import simulated_predictor
-    from tribo.simulations import kept_runs
 
     runs = kept_runs(kept, campaign.samples) if kept is not None else None
     if runs is None:
@@ -378,7 +380,7 @@ def _other_fits(ingested: Ingested, options: StudyOptions) -> tuple[LawFit, ...]
 
 def plan(campaign: Campaign, options: StudyOptions, until: Until) -> dict[str, Any]:
     """What a walk would do, without doing it: ``steps`` in words, ``set_aside``, and the faults in full."""
-    from tribo.prediction import loads_to_simulate
+    from tribo.comparison.prediction import loads_to_simulate
 
     steps = [f"read {len(campaign.tests)} exports of {campaign.root} by rule {options.rule}"]
     samples = sorted({t.sample for t in campaign.tests})

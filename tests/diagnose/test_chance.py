@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose.chance import as_measured, columns_of, drawn_residuals, refit, scores
-from tribo.diagnose.fit import fit
-from tribo.diagnose.looks import all_looks
-from tribo.diagnose.screen import screen
+from tribo.diagnose.search.looks import all_looks
+from tribo.diagnose.search.screen import screen
+from tribo.diagnose.statistics.chance import as_measured, columns_of, drawn_residuals, refit, scores
+from tribo.diagnose.statistics.fit import fit
 
 from .test_screen import baseline
 
@@ -42,7 +42,7 @@ def test_the_null_is_simulated_from_the_fitted_model() -> None:
 
 
 def test_a_column_that_the_law_takes_up_counts_for_nothing() -> None:
-    from tribo.diagnose.fit import jacobian_at
+    from tribo.diagnose.statistics.fit import jacobian_at
 
     f = baseline()
     law = columns_of(jacobian_at(f), [slice(k, k + 1) for k in range(4)])

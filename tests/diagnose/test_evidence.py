@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose.instrument import rise_stiffening, zero_drift, zero_offset
-from tribo.diagnose.observations import observe
+from tribo.diagnose.statistics.direct_evidence import rise_stiffening, zero_drift, zero_offset
+from tribo.diagnose.statistics.observations import observe
 from tribo.records import Trace
 
 from .synthetic import Design, hidden

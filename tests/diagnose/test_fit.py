@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from blind.tribometer import Design, hide
 
-from tribo.diagnose.fit import fit, jacobian_at
-from tribo.diagnose.model import Acting, ModelFit, predict, setup
-from tribo.diagnose.observations import observe
-from tribo.diagnose.predictor import tabled_predictor
+from tribo.diagnose.statistics.fit import fit, jacobian_at
+from tribo.diagnose.statistics.model import Acting, ModelFit, predict, setup
+from tribo.diagnose.statistics.observations import observe
+from tribo.diagnose.statistics.predictor import tabled_predictor
 from tribo.mechanisms.table import MECHANISMS
 
 from .synthetic import PATTERNS, SMALL, hidden

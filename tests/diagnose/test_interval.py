@@ -7,10 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose.fit import fit
-from tribo.diagnose.interval import DROP_90, _score_at, intervals, recovered, standard_errors, with_pattern_error
-from tribo.diagnose.looks import candidates
-from tribo.diagnose.model import ModelFit
+from tribo.diagnose.search.looks import candidates
+from tribo.diagnose.statistics.fit import fit
+from tribo.diagnose.statistics.interval import (
+    DROP_90,
+    _score_at,
+    intervals,
+    recovered,
+    standard_errors,
+    with_pattern_error,
+)
+from tribo.diagnose.statistics.model import ModelFit
 
 from .test_screen import baseline
 

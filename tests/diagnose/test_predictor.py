@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tribo.diagnose.predictor import FLAT_LAW, OFFSET, Predictor, simulated_predictor, tabled_predictor
+from tribo.diagnose.statistics.predictor import FLAT_LAW, OFFSET, Predictor, simulated_predictor, tabled_predictor
 from tribo.published import load_table2_simulated_anew
 
 from .synthetic import PATTERNS

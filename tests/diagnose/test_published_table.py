@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tribo.diagnose.published import (
+from tribo.diagnose.from_table.table_diagnosis import (
     LEAST_CORRELATION,
     PublishedDiagnosis,
     diagnose_published,
@@ -14,7 +14,7 @@ from tribo.diagnose.published import (
     readings,
     upper_limit,
 )
-from tribo.diagnose.published_table import (
+from tribo.diagnose.from_table.table_observations import (
     design_correlation,
     even_loads,
     fit_table,
@@ -74,7 +74,7 @@ def test_a_table_made_by_the_model_itself_shows_no_misfit() -> None:
 
 @pytest.mark.parametrize("name", ["suction", "contact_area_loss", "cavity_shear_deformation"])
 def test_a_mechanism_put_into_the_table_is_found_again_with_its_size(name: str) -> None:
-    from tribo.diagnose.model import Acting
+    from tribo.diagnose.statistics.model import Acting
 
     exact = published("experiment").assign(mu_sd=0.05, tau0_sd_kPa=0.4)
     table = read_table(exact, published("simulation"), -0.79)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from tribo.diagnose.chance import as_measured, columns_of, scores
-from tribo.diagnose.fit import fit
-from tribo.diagnose.looks import all_looks
-from tribo.diagnose.model import ModelFit, setup
-from tribo.diagnose.observations import observe
-from tribo.diagnose.predictor import tabled_predictor
-from tribo.diagnose.screen import cleared, deviate, screen
+from tribo.diagnose.search.looks import all_looks
+from tribo.diagnose.search.screen import cleared, deviate, screen
+from tribo.diagnose.statistics.chance import as_measured, columns_of, scores
+from tribo.diagnose.statistics.fit import fit
+from tribo.diagnose.statistics.model import ModelFit, setup
+from tribo.diagnose.statistics.observations import observe
+from tribo.diagnose.statistics.predictor import tabled_predictor
 
 from .synthetic import hidden
 
@@ -30,7 +30,7 @@ def test_deviates_are_as_rare_as_the_chi_squared_they_stand_for() -> None:
 
 
 def test_columns_of_the_law_itself_are_cleared_away() -> None:
-    from tribo.diagnose.fit import jacobian_at
+    from tribo.diagnose.statistics.fit import jacobian_at
 
     f = baseline()
     left = cleared(f, jacobian_at(f))[0]

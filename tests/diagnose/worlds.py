@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from blind.tribometer import AREA_MM2, EFFECTS, FIRST, Bench, Design, _table
 
-from tribo.diagnose.predictor import OFFSET, SLOPE, tabled_predictor
+from tribo.diagnose.statistics.predictor import OFFSET, SLOPE, tabled_predictor
 from tribo.records import Ingested
 
 from .synthetic import PATTERNS, SMALL, ingested

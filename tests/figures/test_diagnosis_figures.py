@@ -13,8 +13,8 @@ from matplotlib.text import Text
 
 from tribo.diagnose import examine
 from tribo.diagnose.diagnosis import Diagnosis
-from tribo.diagnose.fit import fit
-from tribo.figures import extended, misfit, power, residuals
+from tribo.diagnose.statistics.fit import fit
+from tribo.figures import detectable, extended, misfit, residuals
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
 from tribo.figures.style import house_style
 
@@ -89,7 +89,7 @@ def test_the_extended_model_has_the_smaller_residuals(temperature: Diagnosis, no
 
 
 def test_power_grows_with_the_effect_around_half(nothing: Diagnosis) -> None:
-    rows = power.numbers(nothing)
+    rows = detectable.numbers(nothing)
     sizes = rows[rows["mark"] == "mechanism"]
     assert (sizes["found_10_percent"] < sizes["found_50_percent"]).all()
     assert (sizes["found_50_percent"] < sizes["found_90_percent"]).all()

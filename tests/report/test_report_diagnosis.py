@@ -10,8 +10,8 @@ import pytest
 
 from tribo.records import Study
 from tribo.report import write_verdict
-from tribo.report.diagnosis import OUTCOMES, verdict_in_words
-from tribo.report.page import html
+from tribo.report.html.page import html
+from tribo.report.verdict_file import OUTCOMES, verdict_in_words
 
 NAMED: dict[str, Any] = {
     "schema": "tribo.verdict/1",

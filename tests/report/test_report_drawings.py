@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from tribo.kept import Shelf
 from tribo.records import Study
 from tribo.report import drawings
 from tribo.report.drawings import draw_all, inline_svg
+from tribo.store.kept_results import Shelf
 
 
 @pytest.fixture(scope="module")

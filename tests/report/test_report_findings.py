@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tribo.records import REGIMES, LawFit, Study
-from tribo.report import findings, wording
-from tribo.report.findings import Agreement, LoadRatio, Ranking
-from tribo.report.numerals import percent, significant, span, with_uncertainty
-from tribo.report.text import summary_text, table2_text
+from tribo.report.words import findings, wording
+from tribo.report.words.findings import Agreement, LoadRatio, Ranking
+from tribo.report.words.numerals import percent, significant, span, with_uncertainty
+from tribo.report.words.terminal_text import summary_text, table2_text
 
 
 def ratio(value: float, low: float, high: float, load: float = 1.0) -> LoadRatio:

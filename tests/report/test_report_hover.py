@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from tribo.report.drawings import svg_text
-from tribo.report.hover import MOST_POINTS, series_of
+from tribo.report.html.hover import MOST_POINTS, series_of
 
 
 @pytest.fixture

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from tribo.records import Study
-from tribo.report import wording
+from tribo.report.html.page import html
 from tribo.report.oddness import odd_pulls
-from tribo.report.page import html
+from tribo.report.words import wording
 
 
 def with_static(study: Study, test_id: str, factor: float) -> Study:

@@ -14,8 +14,8 @@ import pytest
 
 from report.conftest import Written
 from tribo.records import Study
-from tribo.report.page import html
-from tribo.report.pulls import trace_picture
+from tribo.report.html.page import html
+from tribo.report.html.pull_cards import trace_picture
 
 VOID = {"meta", "br", "link", "img", "hr", "input"}
 

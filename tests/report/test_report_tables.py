@@ -12,8 +12,8 @@ import pytest
 
 from tribo.errors import Problem
 from tribo.records import SetAside, Study
-from tribo.report import tables
-from tribo.report.tables import to_csv, write_tables
+from tribo.report import result_tables
+from tribo.report.result_tables import to_csv, write_tables
 
 CONTRACT = {
     "tests.csv": "test_id, static_N, static_u_N, sliding_N, sliding_u_N, rule, window, zero_N, flags, set_aside",
@@ -97,12 +97,12 @@ def test_a_number_that_is_none_is_an_empty_cell() -> None:
 def test_a_test_faulty_in_its_row_and_its_export_is_listed_once(study: Study) -> None:
     fault = study.ingested.set_aside[0]
     doubled = replace(study.ingested, set_aside=(fault, *study.ingested.set_aside))
-    assert list(tables.all_set_aside(replace(study, ingested=doubled))).count(fault.test_id) == 1
+    assert list(result_tables.all_set_aside(replace(study, ingested=doubled))).count(fault.test_id) == 1
 
 
 def test_a_faulty_row_of_the_campaign_keeps_its_place(study: Study) -> None:
     fault = SetAside("T0003b", "no such file", (Problem("missing_file", "no such file", file="tests.csv", row=4),))
     with_fault = replace(study.ingested, set_aside=(*study.ingested.set_aside, fault))
-    order = tables.tests_table(replace(study, ingested=with_fault))["test_id"].tolist()
+    order = result_tables.tests_table(replace(study, ingested=with_fault))["test_id"].tolist()
     assert order.index("T0003b") == order.index("T0003") + 1
     assert order[-1] == "T9001"

@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 from tribo.simulate import SimConfig
-from tribo.simulate.engine import Trajectory, lattice_of, run_fast, thresholds_of
-from tribo.simulate.reference import run_reference
+from tribo.simulate.engines.fast import Trajectory, lattice_of, run_fast, thresholds_of
+from tribo.simulate.engines.reference import run_reference
 from tribo.simulate.run import run_of
 
 RECORD = Path(__file__).resolve().parents[2] / "docs" / "data"

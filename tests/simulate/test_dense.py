@@ -11,8 +11,9 @@ from numba import njit, types
 
 from tribo.errors import SimulationError
 from tribo.records import FloatArray
-from tribo.simulate import FrictionTerms, SimConfig, dense, kernels as k
-from tribo.simulate.engine import (
+from tribo.simulate import FrictionTerms, SimConfig
+from tribo.simulate.engines import dense, kernels as k
+from tribo.simulate.engines.fast import (
     Thresholds,
     _initial_state,
     _numerics,
@@ -23,9 +24,9 @@ from tribo.simulate.engine import (
     run_fast,
     thresholds_of,
 )
+from tribo.simulate.engines.jit import VECTOR_OPTIONS
+from tribo.simulate.engines.lattice import Lattice
 from tribo.simulate.friction import sliding_threshold, static_threshold
-from tribo.simulate.jit import VECTOR_OPTIONS
-from tribo.simulate.lattice import Lattice
 
 STEPS = 14
 

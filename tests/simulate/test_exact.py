@@ -9,7 +9,7 @@ from tribo.records import FloatArray
 from tribo.simulate import SimConfig, simulate
 from tribo.simulate.calibration import expected_minimum
 from tribo.simulate.config import PAPER
-from tribo.simulate.engine import Thresholds, drive_of, first_failure_s, lattice_of, run_fast, thresholds_of
+from tribo.simulate.engines.fast import Thresholds, drive_of, first_failure_s, lattice_of, run_fast, thresholds_of
 
 SHORT = {"blocks": (31, 31), "duration_peaks": 1.3}
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tribo.simulate import jit
+from tribo.simulate.engines import jit
 
 
 def aged(folder: Path, days: float) -> Path:

@@ -8,8 +8,8 @@ import pytest
 from tribo.errors import SimulationError
 from tribo.simulate import SimConfig, simulate
 from tribo.simulate.energy import energy_balance
-from tribo.simulate.engine import lattice_of, run_fast, thresholds_of
-from tribo.simulate.reference import run_reference
+from tribo.simulate.engines.fast import lattice_of, run_fast, thresholds_of
+from tribo.simulate.engines.reference import run_reference
 
 SMALL = SimConfig(blocks=(17, 17), dt_s=1e-8, duration_peaks=1.01)
 

@@ -1,12 +1,14 @@
 from .diagnosis import Diagnosis as Diagnosis, diagnose as diagnose, examine as examine
-from .extend import parse_given as parse_given, parse_with as parse_with, simulate_with as simulate_with
-from .plan import Plan as Plan, plan_design as plan_design
-from .predictor import simulated_predictor as simulated_predictor, tabled_predictor as tabled_predictor
-from .simulated import with_simulation as with_simulation
-from .tables import (
+from .diagnosis_tables import (
     look_table as look_table,
     misfit_map as misfit_map,
     residual_table as residual_table,
     weighing_table as weighing_table,
+)
+from .plan import Plan as Plan, plan_design as plan_design
+from .simulated_extension import with_simulation as with_simulation
+from .statistics.predictor import (
+    simulated_predictor as simulated_predictor,
+    tabled_predictor as tabled_predictor,
 )
 from .verdict import Verdict as Verdict

@@ -7,16 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribo.diagnose.fit import fit
-from tribo.diagnose.gain import gain, gain_of_zero
-from tribo.diagnose.instrument import Evidence, rise_stiffening, zero_drift, zero_offset
-from tribo.diagnose.looks import all_looks
-from tribo.diagnose.model import ModelFit, setup
-from tribo.diagnose.naming import Named, name_causes, weights_of
 from tribo.diagnose.next_test import first_test_of, next_test, widening_test
-from tribo.diagnose.observations import Observations, observe
-from tribo.diagnose.predictor import Predictor, tabled_predictor
-from tribo.diagnose.screen import Progress, Screen, screen
+from tribo.diagnose.search.looks import all_looks
+from tribo.diagnose.search.naming import Named, name_causes, weights_of
+from tribo.diagnose.search.screen import Progress, Screen, screen
+from tribo.diagnose.search.weigh import Candidate, unseen
 from tribo.diagnose.sentences import (
     cause_from_evidence,
     cause_of,
@@ -26,9 +21,14 @@ from tribo.diagnose.sentences import (
     smallest_effects,
     summary,
 )
-from tribo.diagnose.simulated import SimulatedExtension
+from tribo.diagnose.simulated_extension import SimulatedExtension
+from tribo.diagnose.statistics.direct_evidence import Evidence, rise_stiffening, zero_drift, zero_offset
+from tribo.diagnose.statistics.fit import fit
+from tribo.diagnose.statistics.gain import gain, gain_of_zero
+from tribo.diagnose.statistics.model import ModelFit, setup
+from tribo.diagnose.statistics.observations import Observations, observe
+from tribo.diagnose.statistics.predictor import Predictor, tabled_predictor
 from tribo.diagnose.verdict import Cause, Excluded, Gain, Misfit, NextTest, Outcome, Verdict
-from tribo.diagnose.weigh import Candidate, unseen
 from tribo.records import Ingested
 
 REPLICATES = 120

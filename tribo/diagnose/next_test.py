@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from tribo.diagnose.model import ModelFit, log_forces
+from tribo.diagnose.search.weigh import Candidate, effect
+from tribo.diagnose.statistics.model import ModelFit, log_forces
 from tribo.diagnose.verdict import NextTest
-from tribo.diagnose.weigh import Candidate, effect
 from tribo.mechanisms.record import Conditions
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tribo.diagnose.looks import candidates
-from tribo.diagnose.model import Acting, ModelFit, Noise, Setup, predict, setup
-from tribo.diagnose.observations import Observations, conditions_of, flat_sample
-from tribo.diagnose.predictor import Predictor, tabled_predictor
-from tribo.diagnose.screen import beyond_law, cleared
-from tribo.diagnose.weigh import ALIKE, unseen
+from tribo.diagnose.search.looks import candidates
+from tribo.diagnose.search.screen import beyond_law, cleared
+from tribo.diagnose.search.weigh import ALIKE, unseen
+from tribo.diagnose.statistics.model import Acting, ModelFit, Noise, Setup, predict, setup
+from tribo.diagnose.statistics.observations import Observations, conditions_of, flat_sample
+from tribo.diagnose.statistics.predictor import Predictor, tabled_predictor
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray
 

@@ -6,13 +6,13 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from tribo.diagnose.instrument import Evidence
-from tribo.diagnose.interval import recovered
-from tribo.diagnose.looks import OBSERVABLES, Look, candidates
-from tribo.diagnose.model import ModelFit, predict
-from tribo.diagnose.screen import Screen, beyond_law, cleared
+from tribo.diagnose.search.looks import OBSERVABLES, Look, candidates
+from tribo.diagnose.search.screen import Screen, beyond_law, cleared
+from tribo.diagnose.search.weigh import Candidate
+from tribo.diagnose.statistics.direct_evidence import Evidence
+from tribo.diagnose.statistics.interval import recovered
+from tribo.diagnose.statistics.model import ModelFit, predict
 from tribo.diagnose.verdict import Cause, Estimate, Excluded, Misfit, Outcome
-from tribo.diagnose.weigh import Candidate
 from tribo.mechanisms.table import MECHANISMS
 
 SHOWN = 8

@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING
 from tribo.figures import (
     agreement,
     area,
+    detectable,
     evidence,
     extended,
     force,
     misfit,
-    power,
-    published,
-    pulls,
+    normalised_pulls,
+    published_table,
     ratio,
     residuals,
-    runs,
+    simulated_runs,
 )
 from tribo.figures.record import FigureOf, StudyFigure
 
 if TYPE_CHECKING:
-    from tribo.diagnose.published import PublishedDiagnosis
+    from tribo.diagnose.from_table.table_diagnosis import PublishedDiagnosis
     from tribo.figures.record import DiagnosisFigure
 
 FIGURES: dict[str, StudyFigure] = {
@@ -42,8 +42,8 @@ FIGURES: dict[str, StudyFigure] = {
             "One pull of each sample at a middle load, with its zero subtracted and divided by its own "
             "static peak. Marked are the static peak and the window over which the sliding force is "
             "averaged.",
-            pulls.numbers,
-            pulls.draw,
+            normalised_pulls.numbers,
+            normalised_pulls.draw,
         ),
         StudyFigure(
             "fig4",
@@ -60,8 +60,8 @@ FIGURES: dict[str, StudyFigure] = {
             "The model against time",
             "Friction force over normal load in one run of the spring-block model for each sample. The "
             "filled mark is the static peak, the dotted line the mean over the sliding window.",
-            runs.numbers,
-            runs.draw,
+            simulated_runs.numbers,
+            simulated_runs.draw,
         ),
         StudyFigure(
             "fig6",
@@ -142,8 +142,8 @@ DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
             "Left: the strongest of all looks at this campaign, and at simulated campaigns of the calibrated model "
             "with the same design and noise. Right: the effect on T, from end to end and beyond what the flat law "
             "takes up, that would be found one, five and nine times in ten.",
-            power.numbers,
-            power.draw,
+            detectable.numbers,
+            detectable.draw,
         ),
     )
 }
@@ -158,8 +158,8 @@ PUBLISHED_FIGURES: dict[str, FigureOf[PublishedDiagnosis]] = {
             "The band is the 90 % interval of the measurement with the correlation of mu and tau0 that loads spread "
             "evenly over 3 to 25 kPa would give; dotted, if the two were independent. Dashed, the same model with its "
             "flat law fitted to the whole table; red, with the best mechanism of the library on top.",
-            published.ratio_numbers,
-            published.draw_ratio,
+            published_table.ratio_numbers,
+            published_table.draw_ratio,
         ),
         FigureOf(
             "published-readings",
@@ -167,8 +167,8 @@ PUBLISHED_FIGURES: dict[str, FigureOf[PublishedDiagnosis]] = {
             "Log likelihood that each mechanism earns over the calibrated model. The three guesses of the authors "
             "stand left of the line. Rows: whose simulation is the model, the correlation of mu and tau0, whether the "
             "printed standard deviations are those of a mean or of three specimens, and the outcome.",
-            published.reading_numbers,
-            published.draw_readings,
+            published_table.reading_numbers,
+            published_table.draw_readings,
         ),
     )
 }

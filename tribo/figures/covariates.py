@@ -10,7 +10,7 @@ import numpy as np
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
-    from tribo.diagnose.model import Setup
+    from tribo.diagnose.statistics.model import Setup
 
 BEND = "bend"  # the square of ln N: whether T(N) bends
 LABELS = {
@@ -71,7 +71,7 @@ def covariates(s: Setup) -> list[Covariate]:
 
 def numeric(s: Setup) -> list[str]:
     """Names of the recorded numbers that vary and are complete."""
-    from tribo.diagnose.looks import numeric_covariates
+    from tribo.diagnose.search.looks import numeric_covariates
 
     return list(numeric_covariates(s))
 

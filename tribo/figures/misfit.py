@@ -16,7 +16,7 @@ from tribo.records import FloatArray
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
-    from tribo.diagnose.model import ModelFit
+    from tribo.diagnose.statistics.model import ModelFit
 
 COLUMNS = ["observable", "row", "covariate", "label", "effect_percent", "strength", "p_adjusted", "mark"]
 ALL = "all samples"
@@ -43,7 +43,7 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     observable "trace" has the rank correlation of the zero, the slope of the rise and the stick-slip amplitude with the
     covariate, adjusted for the number of cells.
     """
-    from tribo.diagnose.fit import residual_on_flat
+    from tribo.diagnose.statistics.fit import residual_on_flat
 
     columns = covariates(d.baseline.setup)
     residual = residual_on_flat(d.baseline)
@@ -105,7 +105,7 @@ def _end_to_end(column: Covariate, residual: FloatArray, here: np.ndarray) -> fl
 
 def _strengths(f: ModelFit, shapes: FloatArray, observable: str) -> FloatArray:
     """Signed score of every shape (n, k) in one observable, as the diagnosis itself judges its looks."""
-    from tribo.diagnose.screen import cleared
+    from tribo.diagnose.search.screen import cleared
 
     stacked = shapes[:, None, :] * np.array(PATTERNS[observable])[None, :, None]
     left, target = cleared(f, stacked)

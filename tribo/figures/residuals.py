@@ -18,7 +18,7 @@ from tribo.records import FloatArray
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
-    from tribo.diagnose.looks import Look
+    from tribo.diagnose.search.looks import Look
 
 COLUMNS = [
     "panel", "title", "detail", "axis", "y_axis", "mark", "sample_number", "sample", "test_id", "x", "x_name", "y",
@@ -49,7 +49,7 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     ``mark`` is test; mean and band, the mean of a bin and two standard deviations of single tests by the fitted
     noise (repeats, specimens, the model's own error of a sample); curve, what the named model adds there.
     """
-    from tribo.diagnose.fit import residual_on_flat
+    from tribo.diagnose.statistics.fit import residual_on_flat
 
     residual = residual_on_flat(d.baseline)
     frames = [_rows(d, k, panel, residual) for k, panel in enumerate(panels(d))]
@@ -152,7 +152,7 @@ def _summaries(
 
 def _variance(d: Diagnosis, weight: FloatArray) -> FloatArray:
     """Variance of one test's residual by the fitted noise: repeats, reading, specimens, error of the sample."""
-    from tribo.diagnose.noise import prior_precision
+    from tribo.diagnose.statistics.noise import prior_precision
 
     f = d.baseline
     repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup), weight)

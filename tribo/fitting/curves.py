@@ -11,7 +11,7 @@ from tribo.fitting.linear import LinearFit, least_squares
 from tribo.fitting.rows import Rows, sample_rows
 from tribo.fitting.samples import combine
 from tribo.fitting.weighting import WEIGHTS, weights_of
-from tribo.laws.records import Law
+from tribo.laws.record import Law
 from tribo.laws.table import LAWS
 from tribo.records import FloatArray, LawFit, Regime
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tribo.laws.records import Law, Parameter, Variable
+from tribo.laws.record import Law, Parameter, Variable
 
 BERARDO = "Berardo et al., Materials & Design 181 (2019) 107930, doi:10.1016/j.matdes.2019.107930"
 

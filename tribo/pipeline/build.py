@@ -21,11 +21,11 @@ from typing import Any
 
 from tribo import __version__
 from tribo.errors import CampaignError, Problem, TriboError
-from tribo.pipeline.builds import date_build
-from tribo.pipeline.lock import only_build
+from tribo.pipeline.dated_copies import date_build
 from tribo.pipeline.scan import Dropped, difference, scan
-from tribo.pipeline.step import read_record
-from tribo.report.files import write_text
+from tribo.pipeline.step_record import read_record
+from tribo.store.lock import only_build
+from tribo.store.whole_files import write_text
 
 STATE = ".tribo"
 CURRENT = "current"
@@ -205,8 +205,8 @@ def _inputs(campaign: Dropped, folder: Path) -> dict[str, Any]:
 def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
     """Samples and cells as the description of a campaign has them; none where it cannot be read (ingest says why)."""
     from tribo.campaign import open_campaign
-    from tribo.prediction import loads_to_simulate
-    from tribo.simulations import cell_name
+    from tribo.comparison.prediction import loads_to_simulate
+    from tribo.comparison.prediction_runs import cell_name
 
     try:
         with open_campaign(campaign.path) as opened:

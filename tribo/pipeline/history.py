@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tribo.pipeline.step import read_record
+from tribo.pipeline.step_record import read_record
 
 PARAMETERS = {"mu": ("mu", "mu_low", "mu_high"), "tau0": ("tau0_kPa", "tau0_low_kPa", "tau0_high_kPa")}
 

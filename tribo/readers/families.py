@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tribo.readers.bam import BAM
-from tribo.readers.bluehill import BLUEHILL
-from tribo.readers.csm import CSM
-from tribo.readers.delimited import DELIMITED
-from tribo.readers.family import Family
-from tribo.readers.labview import LABVIEW, with_times_written
-from tribo.readers.matlab import MATLAB, is_matlab, open_matlab
-from tribo.readers.mts import MTS793, TESTSUITE
-from tribo.readers.newport import NEWPORT
-from tribo.readers.pcs import PCS
-from tribo.readers.rheocompass import RHEOCOMPASS
-from tribo.readers.rtec import RTEC
-from tribo.readers.shimadzu import TRAPEZIUM
-from tribo.readers.source import Source, open_text, read_bytes
-from tribo.readers.te67 import TE67
-from tribo.readers.testxpert import TESTXPERT
-from tribo.readers.umt import UMT
-from tribo.readers.walterbai import WALTERBAI
-from tribo.readers.workbook import is_workbook, open_workbook
+from tribo.readers.core.family import Family
+from tribo.readers.core.source import Source, open_text, read_bytes
+from tribo.readers.formats.bam import BAM
+from tribo.readers.formats.bluehill import BLUEHILL
+from tribo.readers.formats.csm import CSM
+from tribo.readers.formats.delimited import DELIMITED
+from tribo.readers.formats.labview import LABVIEW, with_times_written
+from tribo.readers.formats.matlab import MATLAB, is_matlab, open_matlab
+from tribo.readers.formats.mts import MTS793, TESTSUITE
+from tribo.readers.formats.newport import NEWPORT
+from tribo.readers.formats.pcs import PCS
+from tribo.readers.formats.rheocompass import RHEOCOMPASS
+from tribo.readers.formats.rtec import RTEC
+from tribo.readers.formats.shimadzu import TRAPEZIUM
+from tribo.readers.formats.te67 import TE67
+from tribo.readers.formats.testxpert import TESTXPERT
+from tribo.readers.formats.umt import UMT
+from tribo.readers.formats.walterbai import WALTERBAI
+from tribo.readers.formats.workbook import is_workbook, open_workbook
 
 # Tried in this order; the last one takes what nobody else recognised.
 READERS: dict[str, Family] = {

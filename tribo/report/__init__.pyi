@@ -1,8 +1,8 @@
-from .diagnosis import write_verdict as write_verdict
+from .campaign_nc import write_store as write_store
 from .drawings import write_figures as write_figures
 from .provenance import Provenance as Provenance, gather_provenance as gather_provenance
-from .store import write_store as write_store
-from .tables import write_tables as write_tables
-from .text import summary_text as summary_text, table2_text as table2_text
+from .result_tables import write_tables as write_tables
+from .verdict_file import write_verdict as write_verdict
 from .verify import Verification as Verification, verify as verify
+from .words.terminal_text import summary_text as summary_text, table2_text as table2_text
 from .write import write_report as write_report, write_until as write_until

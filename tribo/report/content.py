@@ -11,14 +11,14 @@ from tribo import __version__
 from tribo.figures import select
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
 from tribo.records import REGIMES, Regime, Study
-from tribo.report import findings, wording
-from tribo.report.diagnosis import verdict_in_words
+from tribo.report.html.pull_cards import pull_cards
 from tribo.report.provenance import Provenance
-from tribo.report.pulls import pull_cards
-from tribo.report.tables import all_set_aside
-from tribo.report.text import fit_cells
+from tribo.report.result_tables import all_set_aside
 from tribo.report.tribosystem import conditions
 from tribo.report.uncertainty import budget_origins, budget_tables, paired_sentences
+from tribo.report.verdict_file import verdict_in_words
+from tribo.report.words import findings, wording
+from tribo.report.words.terminal_text import fit_cells
 
 LEAD_FIGURE = "agreement"
 MISFIT_FIGURES = ("misfit", "residuals")

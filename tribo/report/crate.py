@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from tribo.records import Study
-from tribo.report.files import write_text
 from tribo.report.provenance import Provenance, file_hash
 from tribo.report.tribosystem import Condition, conditions
+from tribo.store.whole_files import write_text
 
 FILE = "ro-crate-metadata.json"
 PROFILE = "https://w3id.org/ro/wfrun/process/0.5"

@@ -19,11 +19,11 @@ from tribo.figures.catalogue import DIAGNOSIS_FIGURES, FIGURES
 from tribo.figures.record import FigureOf
 from tribo.figures.style import house_style
 from tribo.records import Study
-from tribo.report.files import write_bytes
-from tribo.report.hover import Series, series_of
+from tribo.report.html.hover import Series, series_of
+from tribo.report.paper.typeset import figure_files
 from tribo.report.parallel import each
-from tribo.report.tables import to_csv
-from tribo.report.typeset import figure_files
+from tribo.report.result_tables import to_csv
+from tribo.store.whole_files import write_bytes
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 Progress = Callable[[str, int, int], None]
 Keep = Callable[[str, object, Callable[[], Any], Iterable[str]], Any]
 STAGE = "drawing figures"
-DRAWN_BY = ("figures", "report/drawings", "report/hover")
+DRAWN_BY = ("figures", "report/drawings", "report/html/hover")
 THEME = {
     "#ffffff": "var(--paper)",
     "#000000": "currentColor",
@@ -72,7 +72,7 @@ def write_figures(
     """Write out/figures/NAME.svg, .pdf, .png and .csv of every figure there are numbers for, and return them.
 
     ``origin`` says in the metadata of every file what it was made from; ``jobs`` processes share the drawing;
-    ``keep`` (:meth:`tribo.kept.Shelf.take`) spares drawing a figure whose numbers are what they were.
+    ``keep`` (:meth:`tribo.store.kept_results.Shelf.take`) spares drawing a figure whose numbers are what they were.
     """
     drawn = draw_all(study, diagnosis, origin, progress, jobs, keep)
     for figure in drawn.values():

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tribo.records import Study
-from tribo.report.files import write_text
+from tribo.store.whole_files import write_text
 
 FILE = "provenance.json"
 PACKAGES = (

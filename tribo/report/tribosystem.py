@@ -13,7 +13,7 @@ import numpy as np
 
 from tribo.figures import select
 from tribo.records import Campaign, Pattern, Study, Test
-from tribo.report.numerals import counted, joined, significant
+from tribo.report.words.numerals import counted, joined, significant
 
 ONTOLOGY = "https://raw.githubusercontent.com/nick-garabedian/TriboDataFAIR-Ontology/v0.1.1/TriboDataFAIR_Ontology.owl#"
 NOT_RECORDED = "not recorded"

@@ -8,8 +8,8 @@ import pandas as pd
 
 from tribo.figures import select
 from tribo.records import REGIMES, Regime, Study
-from tribo.report.numerals import joined, significant
-from tribo.report.tables import PA_PER_KPA
+from tribo.report.result_tables import PA_PER_KPA
+from tribo.report.words.numerals import joined, significant
 
 SUM = "combined"
 

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from tribo.records import Study
-from tribo.report.diagnosis import write_verdict
+from tribo.report.campaign_nc import write_store
 from tribo.report.drawings import Keep, make_anew, write_figures
-from tribo.report.files import write_bytes, write_text
 from tribo.report.provenance import (
     Provenance,
     gather_provenance,
@@ -18,8 +17,9 @@ from tribo.report.provenance import (
     settle_outputs,
     write_provenance,
 )
-from tribo.report.store import write_store
-from tribo.report.tables import write_tables
+from tribo.report.result_tables import write_tables
+from tribo.report.verdict_file import write_verdict
+from tribo.store.whole_files import write_bytes, write_text
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
@@ -60,8 +60,8 @@ def write_until(
         written += [out / "figures" / f"{f.name}.{ending}" for f in drawn.values() for ending in f.files]
     if until == "report":
         from tribo.report.crate import write_crate
-        from tribo.report.page import html
-        from tribo.report.pdf import pdf
+        from tribo.report.html.page import html
+        from tribo.report.paper.pdf import pdf
 
         written.append(write_text(out / "report.html", html(study, made_by, drawn, verdict)))
         written.append(write_bytes(out / "report.pdf", pdf(study, made_by, drawn, verdict)))

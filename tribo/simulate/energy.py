@@ -8,8 +8,8 @@ import numpy as np
 
 from tribo.records import FloatArray
 from tribo.simulate.config import SimConfig
-from tribo.simulate.engine import Trajectory
-from tribo.simulate.lattice import OFFSETS, Lattice
+from tribo.simulate.engines.fast import Trajectory
+from tribo.simulate.engines.lattice import OFFSETS, Lattice
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 
 from tribo.records import FloatArray
 from tribo.simulate.config import FrictionTerms
-from tribo.simulate.jit import compiled
+from tribo.simulate.engines.jit import compiled
 
 # places in the parameter array
 AGEING_B, AGEING_T0, SPEED_A, SPEED_V0, N_PARAMETERS = range(5)

@@ -23,8 +23,8 @@ from tribo.errors import Problem, SimulationError
 from tribo.records import Run
 from tribo.simulate.config import SimConfig
 from tribo.simulate.ensemble import Progress, check_all, run_row
+from tribo.simulate.results_file import attributes, unit_of, versions, written
 from tribo.simulate.run import simulate
-from tribo.simulate.store import attributes, unit_of, versions, written
 
 if TYPE_CHECKING:
     import pandas as pd

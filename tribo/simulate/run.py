@@ -7,8 +7,8 @@ import numpy as np
 from tribo.errors import Problem, SimulationError
 from tribo.records import Run
 from tribo.simulate.config import SimConfig
-from tribo.simulate.engine import Trajectory, lattice_of, run_fast, thresholds_of
-from tribo.simulate.reference import run_reference
+from tribo.simulate.engines.fast import Trajectory, lattice_of, run_fast, thresholds_of
+from tribo.simulate.engines.reference import run_reference
 
 
 def simulate(config: SimConfig) -> Run:

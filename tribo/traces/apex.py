@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tribo.records import FloatArray
-from tribo.traces.statistics import mean
+from tribo.traces.noise import mean
 
 FEWEST_SAMPLES = 4
 _FEWEST_FOR_PARABOLA = 8

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribo.records import FloatArray
-from tribo.traces.statistics import mean, median, running_mean, wander
+from tribo.traces.noise import mean, median, running_mean, wander
 
 _LOW, _HIGH = 0.25, 0.75  # share of the first half-way level between which the slope of the rise is taken
 _DETECTABLE = 12.0  # a pull rises by at least this many times the sample noise

@@ -12,9 +12,9 @@ from tribo.records import FloatArray, Trace
 from tribo.traces import quality
 from tribo.traces.apex import FEWEST_SAMPLES, Apex
 from tribo.traces.contact import Rise, Zero, departure, first_rise, smoothed, starting_level, zero_before
+from tribo.traces.noise import median, median_of_three, running_mean
 from tribo.traces.peak import find_apex, first_maximum
 from tribo.traces.quality import noise_of
-from tribo.traces.statistics import median, median_of_three, running_mean
 
 _DETECTABLE = 12.0  # times the noise
 _FEWEST_SLIDING = 10

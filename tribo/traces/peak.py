@@ -9,7 +9,7 @@ import numpy as np
 
 from tribo.records import FloatArray
 from tribo.traces.apex import FEWEST_SAMPLES, Apex, rounded_apex, sharp_apex, with_shape_left_open
-from tribo.traces.statistics import condense
+from tribo.traces.noise import condense
 
 _DROP = 5.0  # a fall by this many times the noise ends the search for the first maximum
 _DROP_SHARE = 0.015  # or by this share of the force reached, whichever is more

@@ -13,9 +13,9 @@ from tribo.records import Pull, Test, Trace
 from tribo.traces.apex import Apex
 from tribo.traces.contact import line
 from tribo.traces.motion import Motion, lay_out, with_peak_at
+from tribo.traces.noise import wander
 from tribo.traces.rules import RULES, Rule, Window
 from tribo.traces.sliding import Steady, steady, stick_slip
-from tribo.traces.statistics import wander
 
 _FEWEST_SLIDING = 10
 _GAP = 3.0

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tribo.errors import Problem
 from tribo.records import FloatArray, Trace
-from tribo.traces.statistics import sample_noise
+from tribo.traces.noise import sample_noise
 
 MINIMUM_SAMPLES = 20
 SPIKE_OVER_NOISE = 8.0

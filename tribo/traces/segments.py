@@ -10,8 +10,8 @@ import numpy as np
 
 from tribo.errors import Problem, TraceError
 from tribo.records import FloatArray, Trace
+from tribo.traces.noise import mean, median, median_of_three, running_mean, sample_noise, wander
 from tribo.traces.quality import MINIMUM_SAMPLES
-from tribo.traces.statistics import mean, median, median_of_three, running_mean, sample_noise, wander
 
 _REVERSED = 0.25  # share of its swing by which a force passes the middle before its direction counts as reversed
 _OF_SPAN = 0.2  # a step is at least this share of the span of its channel,

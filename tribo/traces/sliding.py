@@ -9,7 +9,7 @@ import numpy as np
 
 from tribo.records import FloatArray
 from tribo.traces.contact import line
-from tribo.traces.statistics import condense, mean, wander
+from tribo.traces.noise import condense, mean, wander
 
 _BATCH = 5
 _MOST_BATCHES = 2000

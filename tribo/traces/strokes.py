@@ -12,10 +12,10 @@ from tribo.errors import Problem, TraceError
 from tribo.records import Pull, Test, Trace
 from tribo.traces import quality
 from tribo.traces.contact import starting_level
+from tribo.traces.noise import median_of_three
 from tribo.traces.pull import read_pull
 from tribo.traces.segments import Strokes, orient_strokes, split_pulls
 from tribo.traces.sliding import settled, steady
-from tribo.traces.statistics import median_of_three
 
 _NO_PEAK = {"stopped_before_peak", "sign_flipped", "spike"}
 _CLIMB_OVER_SWING = 5.0

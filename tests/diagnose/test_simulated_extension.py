@@ -1,0 +1,103 @@
+"""The extended model run in the simulator itself, for the tests of a campaign."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tribo.diagnose import examine, residual_table, with_simulation
+from tribo.diagnose.diagnosis import Diagnosis
+from tribo.diagnose.search.weigh import effect
+from tribo.diagnose.simulated_extension import (
+    MOST_LOADS,
+    SimulatedExtension,
+    local_friction,
+    representatives,
+    residual_percent,
+)
+from tribo.simulate import SimConfig, simulate
+
+from .synthetic import hidden
+
+FEW = (40, 25)
+
+
+@pytest.fixture(scope="module")
+def hot() -> Diagnosis:
+    """Temperature hidden in F and B; its effect is a gain on every block, which the simulator must give back."""
+    from blind.tribometer import Design
+
+    design = Design(samples=("F", "B"), masses_g=(5.0, 25.0, 90.0, 138.5), repeats=3)
+    found = examine(hidden(("temperature", 1.5), design=design), replicates=FEW)
+    return with_simulation(found)
+
+
+def simulated(d: Diagnosis) -> SimulatedExtension:
+    assert d.simulated is not None
+    return d.simulated
+
+
+def test_a_gain_on_every_block_is_the_gain_of_the_sample(hot: Diagnosis) -> None:
+    e = simulated(hot)
+    assert e.mechanisms == ("temperature",)
+    assert e.ratio == pytest.approx(1.0, abs=0.02)
+    assert e.off_percent < 1.0
+    assert e.change == pytest.approx(e.quick, abs=0.02)
+
+
+def test_few_tests_are_simulated_and_the_most_moved_is_among_them(hot: Diagnosis) -> None:
+    assert hot.named is not None
+    model = hot.named.model
+    quick = effect(model)
+    picked = representatives(model, quick)
+    assert len(picked) <= len(set(model.setup.observations.conditions.sample)) * MOST_LOADS
+    assert np.abs(quick[picked]).max() == pytest.approx(np.abs(quick).max(), rel=0.05)
+
+
+def test_the_verdict_says_what_was_simulated_and_whose_shares_it_used(hot: Diagnosis) -> None:
+    v = hot.verdict
+    assert "tabulated simulations" in v.text
+    assert "in the simulator itself" in v.text
+    model = v.as_dict()["model"]
+    assert model["simulated"]["mechanisms"] == ["temperature"]
+    before, quick, after = residual_percent(hot, simulated(hot))
+    assert model["simulated"]["rms_percent_simulated"] == pytest.approx(after)
+    assert after < before
+    assert after == pytest.approx(quick, rel=0.05)
+
+
+def test_the_residual_table_carries_the_simulated_force(hot: Diagnosis) -> None:
+    rows = residual_table(hot)
+    static = rows[rows["regime"] == "static"]
+    assert np.log(static["simulated_N"]).to_numpy() == pytest.approx(simulated(hot).log_force[:, 0])
+
+
+def test_nothing_named_means_nothing_simulated() -> None:
+    d = with_simulation(examine(hidden(), replicates=FEW))
+    assert d.simulated is None
+    assert "simulated" not in d.verdict.as_dict()["model"]
+
+
+def test_local_friction_gives_the_flat_law_it_was_made_for() -> None:
+    """The same draws under another law: mu and tau0 of the flat sample scale as asked."""
+    law = np.array([6.0, 15.0, 2.5, 14.0])
+    base = SimConfig(pressure_Pa=8e3, blocks=(25, 25), dt_s=1e-7, seed=4)
+    plain = [simulate(base.with_(pressure_Pa=p)).static_friction for p in (8e3, 16e3)]
+    other = [simulate(base.with_(pressure_Pa=p, friction=local_friction(law))).static_friction for p in (8e3, 16e3)]
+
+    def parts(low: float, high: float) -> tuple[float, float]:
+        return 2 * high - low, (low - high) * 16e3
+
+    (mu, tau0), (mu_other, tau0_other) = parts(*plain), parts(*other)
+    assert mu_other / mu == pytest.approx(6.0 / 4.79, rel=1e-3)
+    assert tau0_other / tau0 == pytest.approx(15.0 / 23.44, rel=1e-3)
+
+
+def test_a_diagnosis_with_its_simulation_can_be_kept_and_read_back(hot: Diagnosis) -> None:
+    import json
+
+    from tribo.store.kept_results import decoded, encoded
+
+    again = decoded(json.loads(json.dumps(encoded(hot))))
+    assert again.verdict.to_json() == hot.verdict.to_json()
+    assert simulated(again).table.equals(simulated(hot).table)

@@ -1,0 +1,192 @@
+"""Every mechanism in the simulator itself, against the quick predictor that is used to find it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tribo.errors import SimulationError
+from tribo.mechanisms.record import Base, Conditions
+from tribo.mechanisms.table import MECHANISMS, NAMES
+from tribo.mechanisms_in_model.extended_run import SIMULATED, choice_of, parse_given, parse_with, simulate_with
+from tribo.mechanisms_in_model.on_blocks import conditions_of_run
+from tribo.records import Run
+from tribo.simulate import SimConfig, simulate
+
+SMALL = SimConfig(sample="B", pressure_Pa=8e3, angle_deg=20.0, blocks=(25, 25), seed=3, dt_s=1e-7)
+LONG = SMALL.with_(sample="Sx", angle_deg=4.0, blocks=(45, 25))
+KNOWN = {"humidity_pct": 58.0, "hold_s": 100.0, "temperature_C": 25.0, "speed_m_s": 8e-4, "specimen_run": 2.0}
+KEYS = [f"{name}(C)" if name == "mislabelled_specimen" else name for name in SIMULATED]
+EVERY = pytest.mark.parametrize("key", KEYS)
+
+
+def mechanism_of(key: str):
+    return MECHANISMS[key.split("(")[0]]
+
+
+def config_of(key: str) -> SimConfig:
+    """Directions part only long cavities."""
+    return LONG if key == "cavity_shear_deformation" else SMALL
+
+
+def base_of(config: SimConfig) -> Base:
+    """The law of the simulated sample without mechanism, from runs at three pressures."""
+    load = conditions_of_run(config, {}).normal_load_N[0]
+    rows = []
+    for sample in dict.fromkeys((config.sample, "C", "F")):
+        own = config.with_(sample=sample)
+        light, here, heavy = (simulate(own.with_(pressure_Pa=config.pressure_Pa * f)) for f in (0.8, 1.0, 1.25))
+        for regime in ("static_friction", "sliding_friction"):
+            low, middle, high = (getattr(run, regime) for run in (light, here, heavy))
+            mu = (1.25 * high - 0.8 * low) / 0.45
+            rows.append((mu, (middle - mu) * load))
+    laws = {
+        sample: (*rows[2 * k], *rows[2 * k + 1]) for k, sample in enumerate(dict.fromkeys((config.sample, "C", "F")))
+    }
+    return Base(*(np.array([v]) for v in laws[config.sample]), by_sample=laws, flat="F")
+
+
+@pytest.fixture(scope="module")
+def bases() -> dict[str, tuple[Base, Run]]:
+    return {c.sample: (base_of(c), simulate(c)) for c in (SMALL, LONG)}
+
+
+def quick(key: str, config: SimConfig, base: Base, before: Run) -> tuple[float, float]:
+    """T/N that the law of the mechanism expects of this run."""
+    conditions = conditions_of_run(config, KNOWN)
+    load = conditions.normal_load_N
+    conditions = replace(conditions, clip_N=before.static_friction * load * 0.5 / 100)
+    forces = mechanism_of(key).law(mechanism_of(key).start(), base, conditions, _choice(key, config, conditions))
+    return float(forces.static_N[0] / load[0]), float(forces.sliding_N[0] / load[0])
+
+
+def _choice(key: str, config: SimConfig, conditions: Conditions) -> str:
+    return {
+        "pattern_geometry": config.sample[0], "covariate": "column is this",
+        "mislabelled_specimen(C)": f" of {config.sample} behaves as C",
+    }.get(key, "")  # fmt: skip
+
+
+def test_every_mechanism_of_the_library_can_be_simulated() -> None:
+    assert SIMULATED == NAMES
+
+
+@EVERY
+def test_zero_amplitude_is_the_run_without_to_the_bit(key: str, bases: dict[str, tuple[Base, Run]]) -> None:
+    config = config_of(key)
+    run = simulate_with(config, {key: mechanism_of(key).zero()}, **KNOWN)
+    assert np.array_equal(run.force_N, bases[config.sample][1].force_N)
+    assert np.array_equal(run.time_s, bases[config.sample][1].time_s)
+
+
+@EVERY
+def test_the_simulated_change_is_that_of_the_law_within_its_stated_error(
+    key: str, bases: dict[str, tuple[Base, Run]]
+) -> None:
+    m, config = mechanism_of(key), config_of(key)
+    base, before = bases[config.sample]
+    run = simulate_with(config, {key: m.start()}, **KNOWN)
+    static, sliding = quick(key, config, base, before)
+    assert run.static_friction == pytest.approx(static, rel=m.quick_error)
+    assert run.sliding_friction == pytest.approx(sliding, rel=m.quick_error)
+
+
+@EVERY
+def test_the_simulated_change_has_the_declared_sign_and_regimes(key: str, bases: dict[str, tuple[Base, Run]]) -> None:
+    m, config = mechanism_of(key), config_of(key)
+    before = bases[config.sample][1]
+    run = simulate_with(config, {key: m.start()}, **KNOWN)
+    moved = {
+        "static": run.static_friction / before.static_friction - 1,
+        "sliding": run.sliding_friction / before.sliding_friction - 1,
+    }
+    for regime, change in moved.items():
+        if regime in m.regimes and m.sign != 0:
+            assert m.sign * change > -m.quick_error / 3
+        if regime not in m.regimes:
+            assert abs(change) < m.quick_error
+    if m.regimes != ("rise",):
+        assert max(abs(change) for change in moved.values()) > 1e-4
+
+
+def test_what_acts_on_the_rise_changes_its_slope_as_its_law_says(bases: dict[str, tuple[Base, Run]]) -> None:
+    before = bases["B"][1]
+    for key in ("machine_compliance", "bulk_viscoelasticity"):
+        m = mechanism_of(key)
+        run = simulate_with(SMALL, {key: m.start()}, **KNOWN)
+        sled = conditions_of_run(SMALL, KNOWN)
+        scale = sled.normal_load_N[0] / before.normal_load_N
+        own = slope_N_per_m(before) * scale
+        assert m.rise is not None
+        expected = m.rise(m.start(), np.array([own]), sled)[0]
+        assert slope_N_per_m(run) * scale == pytest.approx(expected, rel=0.01)
+        assert abs(expected / own - 1) > 0.03
+
+
+def slope_N_per_m(run: Run) -> float:
+    """Of the force against the way of the crosshead, up to the first slip, where the run begins to be sampled."""
+    return float((run.force_N[1] - run.force_N[0]) / (run.time_s[1] - run.time_s[0]) / SMALL.speed_m_s)
+
+
+def test_floors_that_all_touch_down_make_the_sample_flat() -> None:
+    run = simulate_with(SMALL, {"cavity_collapse": np.array([1.0, 2e3, 0.0])})
+    flat = simulate(SMALL.with_(sample="F"))
+    assert run.static_friction == pytest.approx(flat.static_friction, rel=2e-3)
+
+
+def test_a_tilted_sample_has_its_load_off_the_middle_by_what_was_asked() -> None:
+    from tribo.mechanisms_in_model.on_blocks import even, on_tilted
+    from tribo.simulate.engines.fast import lattice_of
+
+    flat = SMALL.with_(sample="F", angle_deg=0.0, blocks=(60, 60))
+    lattice = lattice_of(flat)
+    place = np.arange(3600) % 60 / 59 - 0.5
+    for eccentricity in (0.05, 0.16, 0.25):
+        carried = on_tilted(flat, lattice, eccentricity, even(lattice))
+        assert carried.load.mean() == pytest.approx(1.0)
+        assert np.mean(carried.load * place) == pytest.approx(eccentricity, rel=0.05)
+    assert carried.grip.mean() == pytest.approx(3 * (0.5 - 0.25), abs=0.02)
+
+
+def test_a_wrong_label_at_share_one_is_the_other_sample_to_the_bit() -> None:
+    run = simulate_with(SMALL, {"mislabelled_specimen(C)": np.array([1.0])})
+    assert np.array_equal(run.force_N, simulate(SMALL.with_(sample="C")).force_N)
+    assert run.sample == "B"
+
+
+def test_long_cavities_do_not_count_at_45_degrees() -> None:
+    assert conditions_of_run(LONG.with_(angle_deg=45.0), {}).elongation[0] == pytest.approx(0.0, abs=1e-12)
+    assert conditions_of_run(LONG.with_(angle_deg=90.0), {}).elongation[0] == pytest.approx(-np.log(5))
+
+
+def test_two_mechanisms_act_together() -> None:
+    both = simulate_with(SMALL, parse_with("suction:dp=3000,load_cell_offset:F_0=0.1"))
+    suction = simulate_with(SMALL, parse_with("suction:dp=3000"))
+    load = conditions_of_run(SMALL, {}).normal_load_N[0]
+    assert both.static_friction - suction.static_friction == pytest.approx(0.1 / load, rel=1e-6)
+
+
+def test_values_are_parsed_with_their_bounds() -> None:
+    found = parse_with("suction:dp=3000, run_in:c=0.1,n0=4, mislabelled_specimen(C):share=1, covariate:operator:g=0.2")
+    assert found["suction"] == pytest.approx([3000.0])
+    assert found["run_in"] == pytest.approx([0.1, 4.0])
+    assert choice_of(next(key for key in found if key.startswith("mislabelled"))) == "C"
+    assert found["covariate:operator"] == pytest.approx([0.2])
+    with pytest.raises(SimulationError) as why:
+        parse_with("suction:dp=-1,suction:pd=3,sucktion:dp=3,mislabelled_specimen:share=1,suction(B):dp=3")
+    kinds = [p.kind for p in why.value.problems]
+    assert kinds == ["bad_value", "unknown_parameter", "unknown_mechanism", "unknown_sample", "unknown_choice"]
+
+
+def test_what_does_not_exist_is_refused() -> None:
+    with pytest.raises(SimulationError, match="suction"):
+        simulate_with(SMALL, {"sucktion": np.array([0.02])})
+
+
+def test_conditions_of_the_pull_are_parsed_by_name() -> None:
+    assert parse_given("hold_s=100, temperature_C=25") == {"hold_s": 100.0, "temperature_C": 25.0}
+    with pytest.raises(SimulationError) as why:
+        parse_given("hold=100,humidity_pct=wet")
+    assert [p.kind for p in why.value.problems] == ["unknown_condition", "bad_value"]

@@ -1,0 +1,76 @@
+"""Dated copies appear whole, share what did not change, and only the last so many stay."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tribo.errors import TriboError
+from tribo.pipeline.dated_copies import date_build, dated
+from tribo.store.whole_files import write_text
+
+DAY = 86400.0
+
+
+def write(site: Path, text: str, name: str = "a/report.html") -> None:
+    """A finished output, written as tribo does."""
+    write_text(site / "current" / name, text)
+
+
+def test_only_the_last_builds_stay_and_latest_is_the_newest(tmp_path: Path) -> None:
+    for day in range(5):
+        write(tmp_path, f"day {day}")
+        date_build(tmp_path, keep=3, now=day * DAY)
+    kept = dated(tmp_path / "builds")
+    assert [p.name[:10] for p in kept] == ["1970-01-03", "1970-01-04", "1970-01-05"]
+    assert [(p / "a/report.html").read_text() for p in kept] == ["day 2", "day 3", "day 4"]
+    assert (tmp_path / "latest").resolve() == kept[-1].resolve()
+    assert not os.path.isabs(os.readlink(tmp_path / "latest"))
+
+
+def test_nothing_new_makes_no_build(tmp_path: Path) -> None:
+    write(tmp_path, "same")
+    assert date_build(tmp_path, keep=3, now=0.0) is not None
+    write(tmp_path, "same")
+    assert date_build(tmp_path, keep=3, now=DAY) is None
+    assert len(dated(tmp_path / "builds")) == 1
+
+
+def test_an_old_build_does_not_change_with_the_current_one(tmp_path: Path) -> None:
+    write(tmp_path, "old")
+    write(tmp_path, "same", "b/report.html")
+    old = date_build(tmp_path, keep=3, now=0.0)
+    write(tmp_path, "new")
+    new = date_build(tmp_path, keep=3, now=DAY)
+    assert old is not None
+    assert new is not None
+    assert ((old / "a/report.html").read_text(), (new / "a/report.html").read_text()) == ("old", "new")
+    assert (old / "b/report.html").stat().st_ino == (new / "b/report.html").stat().st_ino
+
+
+def test_work_in_progress_and_leftovers_of_a_killed_build_are_not_copied(tmp_path: Path) -> None:
+    write(tmp_path, "page")
+    write(tmp_path, "runs", "a/kept/F@1Pa.nc")
+    write(tmp_path, "half", "a/.report.html.12.part")
+    (tmp_path / "builds" / ".1970-01-01T000000Z.part").mkdir(parents=True)
+    new = date_build(tmp_path, keep=1, now=0.0)
+    assert new is not None
+    assert [p.relative_to(new).as_posix() for p in new.rglob("*") if p.is_file()] == ["a/report.html"]
+    assert [p.name for p in (tmp_path / "builds").iterdir()] == [new.name]
+
+
+def test_two_builds_within_a_second_have_two_names_in_order(tmp_path: Path) -> None:
+    names = []
+    for k in range(3):
+        write(tmp_path, str(k))
+        new = date_build(tmp_path, keep=5, now=0.0)
+        assert new is not None
+        names.append(new.name)
+    assert [p.name for p in dated(tmp_path / "builds")] == names
+
+
+def test_the_newest_build_is_always_kept(tmp_path: Path) -> None:
+    with pytest.raises(TriboError, match="always kept"):
+        date_build(tmp_path, keep=0)

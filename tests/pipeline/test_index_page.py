@@ -1,0 +1,137 @@
+"""The index page shows each campaign as it stands, links its report, and marks a change where one is found."""
+
+from __future__ import annotations
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tribo.pipeline.history import CampaignRow, Law, history
+from tribo.pipeline.index_page import change_sentence, page, series, trend_csv, write_index
+from tribo.pipeline.trend import change_points
+
+
+def campaigns(jump: float = 0.0) -> list[CampaignRow]:
+    """Twelve campaigns of one sample, the last five with another static mu."""
+    rng = np.random.default_rng(7)
+    rows = []
+    for k in range(12):
+        value = 4.8 + rng.normal(0, 0.05) + (jump if k >= 7 else 0.0)
+        laws = (Law("F", "static", "mu", value, value - 0.1, value + 0.1),)
+        rows.append(CampaignRow(f"no {k}", "A & B <x>", "done", (), f"2026-{k + 1:02d}-01", has_report=True, laws=laws))
+    return rows
+
+
+def rendered(rows: list[CampaignRow]) -> str:
+    changes = change_points({"|".join(k): v for k, v in series(rows).items()})
+    return page(rows, changes)
+
+
+def test_a_change_is_marked_and_said_with_its_campaign() -> None:
+    text = rendered(campaigns(1.0))
+    assert text.count('<line class="change"') == 1
+    assert re.search(r"Static μ of F rises from 4\.\d+ to 5\.\d+ at no 7 \(adjusted p 0\.00\d\)", text)
+
+
+def test_without_a_change_none_is_marked_and_the_page_says_so() -> None:
+    text = rendered(campaigns())
+    assert '<line class="change"' not in text
+    assert "No change between campaigns beyond chance" in text
+
+
+def test_too_few_campaigns_are_said_to_be_too_few() -> None:
+    assert "series of at least 8 campaigns; there is none yet" in rendered(campaigns(1.0)[5:10])
+
+
+def test_the_page_needs_nothing_from_anywhere_and_is_well_formed() -> None:
+    text = rendered(campaigns(1.0))
+    assert not re.search(r"https?://|<script|<link|@import|url\(", text)
+    open_tags: list[str] = []
+
+    class Balance(HTMLParser):
+        def handle_starttag(self, tag: str, attrs: object) -> None:
+            if tag not in ("meta", "br"):
+                open_tags.append(tag)
+
+        def handle_startendtag(self, tag: str, attrs: object) -> None:
+            pass
+
+        def handle_endtag(self, tag: str) -> None:
+            assert open_tags.pop() == tag
+
+    Balance().feed(text)
+    assert open_tags == []
+    assert "A &amp; B &lt;x&gt;" in text
+    assert 'href="no%207/report.html"' in text
+
+
+def test_every_point_lies_inside_its_panel_whatever_its_interval() -> None:
+    rows = campaigns(1.0)
+    wide = Law("F", "static", "mu", 5.0, -1e6, float("nan"))
+    rows[3] = CampaignRow("wide", "wide", "done", laws=(wide,))
+    for y in re.findall(r'(?:cy|y1|y2)="([\d.-]+)"', rendered(rows)):
+        assert 0 <= float(y) <= 136
+
+
+def test_the_numbers_of_the_figures_stand_in_the_table() -> None:
+    lines = trend_csv(campaigns()).splitlines()
+    assert lines[0] == "campaign,measured,sample,regime,parameter,value,low,high"
+    assert len(lines) == 13
+
+
+@pytest.mark.parametrize(("after", "verb"), [(1.0, "rises"), (-1.0, "falls")])
+def test_a_change_is_said_in_its_direction(after: float, verb: str) -> None:
+    rows = campaigns(after)
+    (change,) = change_points({"F|static|mu": series(rows)["F", "static", "mu"]})
+    assert verb in change_sentence(change, rows)
+
+
+def site_with(tmp_path: Path, record: dict[str, object] | None, waiting: list[str], listed: bool = True) -> Path:
+    """A site of one campaign ``a``, as far as the index looks at it."""
+    state = tmp_path / ".tribo"
+    (state / "steps" / "a").mkdir(parents=True)
+    (tmp_path / "current").mkdir()
+    config = {
+        "campaigns": {"a": {"waiting": waiting}} if listed else {}, "ready": {"a": {"digest": "D"}},
+        "version": "1", "options": {"words": "w"},
+    }  # fmt: skip
+    (state / "build.json").write_text(json.dumps(config))
+    if record is not None:
+        known = {"digest": "D 1 w", "status": "done", "problems": [], "finished": "2026-01-02T03:04:05Z"}
+        (state / "steps" / "a" / "report.json").write_text(json.dumps({**known, **record}))
+    return tmp_path
+
+
+PROBLEM = {"kind": "k", "what": "no such file", "file": "tests.csv", "row": 2}
+
+
+@pytest.mark.parametrize(
+    ("record", "waiting", "listed", "state", "why"),
+    [
+        ({}, [], True, "done", ""),
+        ({"status": "some_set_aside"}, [], True, "some set aside", ""),
+        ({"status": "unusable", "problems": [PROBLEM]}, [], True, "unusable", "tests.csv, row 2: no such file"),
+        ({"digest": "older"}, [], True, "failed", "the next build tries it again"),
+        (None, [], True, "failed", "the next build tries it again"),
+        ({}, ["raw/x.part is being uploaded"], True, "waiting", "raw/x.part is being uploaded"),
+        ({}, [], False, "gone", "its last report stands"),
+    ],
+)
+def test_each_state_of_a_campaign_is_told_with_its_reason(
+    tmp_path: Path, record: dict[str, object] | None, waiting: list[str], listed: bool, state: str, why: str
+) -> None:
+    (row,) = history(site_with(tmp_path, record, waiting, listed))
+    assert row.state == state
+    assert why in " ".join(row.why)
+
+
+def test_the_page_is_written_only_where_it_differs(tmp_path: Path) -> None:
+    site = site_with(tmp_path, {}, [])
+    first = write_index(site)
+    before = (site / "current" / "index.html").stat().st_mtime_ns
+    assert write_index(site) == first
+    assert (site / "current" / "index.html").stat().st_mtime_ns == before

@@ -1,0 +1,112 @@
+"""A kept result is given again only if everything it was made from is the same."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tribo.records import LawFit
+from tribo.store.kept_results import Shelf, decoded, encoded, fingerprint, sources
+
+FIT = LawFit(
+    "B", "static", "coulomb_adhesion", ("mu", "tau0_Pa"), np.array([4.0, 2e4]), np.diag([0.1, 1e6]), 2.0, 3, 12,
+    "specimens", 1.1, 55e-6, {"B1": np.array([4.1, 1.9e4])}, ("a note",),
+)  # fmt: skip
+
+
+def counted(shelf: Shelf, made_from: object) -> tuple[object, int]:
+    """What the shelf gives, and how often it had to be made."""
+    made = []
+
+    def make() -> object:
+        made.append(1)
+        return {"fit": FIT, "of": (1, float("nan"), None, True)}
+
+    return shelf.take("result", made_from, make, ("laws",)), len(made)
+
+
+def test_the_same_inputs_give_the_kept_result_and_others_a_new_one(tmp_path: Path) -> None:
+    shelf = Shelf(tmp_path)
+    keys = ([FIT, 1], [FIT, 1], [replace(FIT, dof=3.0), 1], [FIT, 1])
+    assert [counted(shelf, key)[1] for key in keys] == [1, 0, 1, 1]
+
+
+def test_one_changed_number_in_an_array_is_another_input() -> None:
+    nudged = replace(FIT, values=np.nextafter(FIT.values, np.inf))
+    assert fingerprint(FIT) == fingerprint(replace(FIT, values=FIT.values.copy())) != fingerprint(nudged)
+
+
+def test_where_a_campaign_lies_does_not_matter_and_what_is_in_it_does() -> None:
+    assert fingerprint(Path("a"), 1) == fingerprint(Path("b"), 1) != fingerprint(Path("a"), 2)
+
+
+def test_a_table_with_other_numbers_or_names_is_another_input() -> None:
+    table = pd.DataFrame({"x": [1.0, 2.0], "name": ["a", "b"]})
+    others = [table.rename(columns={"x": "y"}), table.assign(x=[1.0, 3.0]), table.assign(name=["a", "c"])]
+    assert len({fingerprint(t) for t in (table, table.copy(), *others)}) == 4
+
+
+def test_an_edit_of_a_source_is_another_input(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "laws").mkdir()
+    source = tmp_path / "laws" / "one.py"
+    monkeypatch.setattr("tribo.store.kept_results._PACKAGE", tmp_path)
+    seen = []
+    for text in ("a = 1", "a = 2"):
+        source.write_text(text)
+        sources.cache_clear()
+        seen.append(sources("laws"))
+    sources.cache_clear()
+    assert seen[0] != seen[1]
+
+
+def test_records_arrays_and_tables_come_back_equal_through_json() -> None:
+    table = pd.DataFrame({"x": [1.0, np.nan], "n": [1, 2], "name": ["a", "b"]})
+    value = {"fit": FIT, "table": table, ("a", 1): [np.arange(6).reshape(2, 3), np.float64(0.1), "text", None]}
+    back = decoded(json.loads(json.dumps(encoded(value))))
+    assert fingerprint(back["fit"]) == fingerprint(FIT)
+    pd.testing.assert_frame_equal(back["table"], table)
+    array, number, text, nothing = back["a", 1]
+    assert array.tolist() == [[0, 1, 2], [3, 4, 5]]
+    assert (number, text, nothing) == (0.1, "text", None)
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", b"{}", b"\xff"])
+def test_a_damaged_file_is_made_anew(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "result.json").write_bytes(content)
+    assert [counted(Shelf(tmp_path), 1)[1] for _ in range(2)] == [1, 0]
+
+
+def test_a_result_of_other_sources_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shelf = Shelf(tmp_path)
+    made = []
+    for text in ("before the edit", "before the edit", "after it"):
+        monkeypatch.setattr("tribo.store.kept_results.sources", lambda *rooms, text=text: text)
+        made.append(counted(shelf, 1)[1])
+    assert made == [1, 0, 1]
+
+
+def test_no_function_of_others_comes_back() -> None:
+    with pytest.raises(TypeError, match="no function of tribo"):
+        decoded({"function": "os:walk"})
+
+
+@pytest.mark.parametrize("place", ["os:PathLike", "tribo.store.kept_results:json", "tribo.store.whole_files:os"])
+def test_nothing_but_records_of_tribo_is_ever_constructed(place: str) -> None:
+    with pytest.raises(TypeError, match="no record of tribo"):
+        decoded({"record": place, "fields": []})
+
+
+def test_what_cannot_be_kept_is_given_all_the_same_and_said_aloud(tmp_path: Path) -> None:
+    thing = object()
+    with pytest.warns(RuntimeWarning, match="x is not kept: a object cannot be kept"):
+        assert Shelf(tmp_path).take("x", 1, lambda: thing) is thing
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_folder_everything_is_made() -> None:
+    assert [counted(Shelf(), 1)[1] for _ in range(2)] == [1, 1]

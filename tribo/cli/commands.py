@@ -1,0 +1,420 @@
+"""The command line. Thin: each command reads options, walks the street, and hands the records to the report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tribo import __version__
+from tribo.cli.build_commands import build, schedule
+from tribo.cli.console import Console, command_options, set_aside_record, status_of
+from tribo.cli.simulate_command import simulate
+
+if TYPE_CHECKING:
+    from tribo.diagnose import Diagnosis
+    from tribo.diagnose.verdict import Verdict
+    from tribo.records import Campaign, Study
+    from tribo.report import Provenance
+    from tribo.stages import Progress, StudyOptions, Until
+
+CAMPAIGN = click.argument("campaign", type=click.Path(exists=True, path_type=Path))
+FOLDER = click.Path(file_okay=False, path_type=Path)
+OUT = click.option("-o", "--out", type=FOLDER, required=True, help="Output folder.")
+KEPT = "kept"  # folder of OUT with finished simulations and the like, for the next start
+SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler whose workers run the simulations.")
+DRY_RUN = click.option("--dry-run", is_flag=True, help="Say what would be done, and do nothing.")
+
+
+COLUMNS = click.option(
+    "--columns", default="", help="QUANTITY=NAME [UNIT],... as in [columns] of campaign.toml; #3 is the third column."
+)
+
+OVERRIDES = click.option(
+    "--overrides",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Pulls left out or read elsewhere by hand, as the report page hands them back.",
+)
+
+
+def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    for option in (
+        COLUMNS,
+        OVERRIDES,
+        click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off."),
+        click.option(
+            "--weights",
+            type=click.Choice(["relative", "ratio", "force", "repeats"]),
+            default="relative",
+            show_default=True,
+            help="What scatters alike at all loads: T over its own size, T/N = mu + tau0/p, T, or as repeats say.",
+        ),
+    ):
+        function = option(function)
+    return function
+
+
+def _model_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    for option in (
+        click.option("--flat", default="F", show_default=True, help="The sample that calibrates the model."),
+        click.option(
+            "--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulated runs a load."
+        ),
+        SCHEDULER,
+    ):
+        function = option(function)
+    return function
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="tribo")
+def main() -> None:
+    """From raw friction exports to mu and tau0, beside a calibrated spring-block model.
+
+    \b
+    Start with:  tribo demo -o out
+                 tribo init my-campaign
+                 tribo report my-campaign -o out
+    """
+
+
+main.add_command(build)
+main.add_command(schedule)
+main.add_command(simulate)
+
+
+@main.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@command_options
+def init(console: Console, folder: Path, **_: Any) -> None:
+    """Write a commented campaign into FOLDER, to fill in."""
+    from tribo.campaign import write_template
+
+    write_template(folder)
+    console.result({"folder": str(folder)}, f"{folder}: fill in campaign.toml and tests.csv, put the exports into raw/")
+
+
+@main.command()
+@CAMPAIGN
+@OUT
+@DRY_RUN
+@_fit_options
+@command_options
+def ingest(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
+    """Traces and per-test features of CAMPAIGN: tests.csv and campaign.nc."""
+    return _walk(console, campaign, out, "ingest", dry_run, **options)
+
+
+@main.command()
+@CAMPAIGN
+@OUT
+@DRY_RUN
+@_fit_options
+@command_options
+def fit(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
+    """mu and tau0 of every sample with uncertainties: fits.csv."""
+    return _walk(console, campaign, out, "fit", dry_run, **options)
+
+
+@main.command()
+@CAMPAIGN
+@OUT
+@click.option("--only", default="", help="calibration, a sample, or SAMPLE@PRESSUREPa as in kept/; all by default.")
+@_fit_options
+@_model_options
+@command_options
+def predict(console: Console, campaign: Path, out: Path, only: str, columns: str, **options: Any) -> int:
+    """Calibrate the model on the flat sample and run it for CAMPAIGN, into OUT/kept; compare and report go on there."""
+    from tribo import stages
+    from tribo.campaign import open_campaign
+
+    chosen = stages.StudyOptions(kept=out / KEPT, **options)
+    with open_campaign(campaign) as described, console.progress() as progress:
+        ingested = stages.study(_with_columns(described, columns), chosen, until="ingest", progress=progress).ingested
+        cells = stages.simulate_cells(ingested, stages.fit(ingested, weights=chosen.weights), chosen, only, progress)
+    names = [cell.name for cell in cells]
+    console.result({"out": str(out), "cells": names}, f"calibrated; simulated {', '.join(names) or 'nothing more'}")
+    return status_of(ingested.set_aside)
+
+
+@main.command()
+@CAMPAIGN
+@OUT
+@DRY_RUN
+@_fit_options
+@_model_options
+@command_options
+def compare(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
+    """Experiment against the model calibrated on the flat sample: comparison.csv and the figures."""
+    return _walk(console, campaign, out, "compare", dry_run, **options)
+
+
+@main.command()
+@click.argument("campaign", required=False, type=click.Path(exists=True, path_type=Path))
+@OUT
+@click.option("--published", type=click.Choice(["berardo2019"]), help="The table of a paper in place of CAMPAIGN.")
+@click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off.")
+@COLUMNS
+@OVERRIDES
+@command_options
+def diagnose(
+    console: Console, campaign: Path | None, out: Path, published: str | None, rule: str, columns: str,
+    overrides: Path | None, seed: int, jobs: int, **_: Any,
+) -> int:  # fmt: skip
+    """What the calibrated model gets wrong, and why, or that it cannot be told: verdict.json and its figures."""
+    if (campaign is None) == (published is None):
+        raise click.UsageError("give a CAMPAIGN, or --published and the name of a table")
+    if campaign is None:
+        return _diagnose_published(console, out, seed)
+    from tribo import stages
+    from tribo.campaign import open_campaign
+    from tribo.report import write_until
+    from tribo.report.words.verdict_text import verdict_text
+    from tribo.store.kept_results import Shelf
+
+    with open_campaign(campaign) as opened, console.progress() as progress:
+        described = _with_columns(opened, columns)
+        ingested = stages.ingest(described, rule=rule, jobs=jobs, overrides=overrides, progress=progress)
+        found = stages.diagnosis(ingested, seed=seed, jobs=jobs, kept=out / KEPT, progress=progress)
+        study = stages.Study(ingested)
+        provenance = _provenance(study, campaign, stages.StudyOptions(rule=rule, seed=seed, overrides=overrides))
+        keep = Shelf(out / KEPT).take
+        write_until(study, out, "ingest", progress, provenance, diagnosis=found, jobs=jobs, keep=keep)
+    verdict = found.verdict
+    console.result(verdict.as_dict(), verdict_text(verdict))
+    console.list_tests("set aside", ingested.set_aside, level=-1)
+    return status_of(ingested.set_aside)
+
+
+def _diagnose_published(console: Console, out: Path, seed: int) -> int:
+    """The verdict on Table 2 of Berardo et al. (2019), in every way to read what it leaves open."""
+    from tribo.diagnose.from_table.table_diagnosis import diagnose_published
+    from tribo.published import BERARDO2019, data_dir, load_table2, load_table2_simulated_anew
+    from tribo.report.provenance import provenance_of_table
+    from tribo.report.table_report import write_published
+    from tribo.report.words.verdict_text import verdict_text
+
+    with console.progress() as progress:
+        found = diagnose_published(load_table2(), load_table2_simulated_anew(), seed=seed, progress=progress)
+        folder, tables = data_dir() / BERARDO2019, ("table2.csv", "table2_tribo.csv")
+        write_published(found, out, provenance_of_table(folder, tables, _command_line(), seed, _now()))
+    console.result(found.verdict.as_dict(), verdict_text(found.verdict))
+    return 0
+
+
+@main.command()
+@CAMPAIGN
+@OUT
+@DRY_RUN
+@_fit_options
+@_model_options
+@command_options
+def report(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
+    """All of the above, report.html and report.pdf."""
+    return _walk(console, campaign, out, "report", dry_run, **options)
+
+
+@main.command()
+@click.argument("out", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("--campaign", type=click.Path(exists=True, path_type=Path), help="The campaign, if it was moved.")
+@command_options
+def verify(console: Console, out: Path, campaign: Path | None, **_: Any) -> int:
+    """Whether the inputs and outputs of OUT are what they were: says what changed, is missing or was added."""
+    from tribo.report import verify as compared
+
+    found = compared(out, campaign)
+    console.result(found.as_record(), found.in_words())
+    return 0 if found.unchanged else 1
+
+
+@main.command()
+@CAMPAIGN
+@command_options
+def plan(console: Console, campaign: Path, **_: Any) -> None:
+    """What a design can and cannot tell apart, before measuring; the exports need not exist."""
+    from dataclasses import asdict
+
+    from tribo.campaign import open_campaign
+    from tribo.diagnose import plan_design
+    from tribo.report.words.verdict_text import plan_text
+
+    with open_campaign(campaign, measured=False) as opened:
+        planned = plan_design(opened)
+    record = {"tests": planned.n_tests, "findings": [asdict(f) for f in planned.findings], "tied": planned.tied}
+    console.result(record, plan_text(planned))
+
+
+@main.command()
+@click.option("-o", "--out", type=FOLDER, default="out/demo", show_default=True, help="Output folder.")
+@_fit_options
+@_model_options
+@command_options
+def demo(console: Console, out: Path, **options: Any) -> int:
+    """The report on the bundled example."""
+    from tribo.published import data_dir
+
+    status = _walk(console, data_dir() / "example", out, "report", False, **options)
+    console.say(f"open {out / 'report.html'}")
+    return status
+
+
+@main.command()
+@click.argument("files", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@COLUMNS
+@command_options
+def inspect(console: Console, files: tuple[Path, ...], columns: str, **_: Any) -> int:
+    """What an export is: format, encoding, columns, units, time base, the pulls in it, doubts."""
+    from tribo.ingestion.exports import inspect_file
+    from tribo.readers import columns_from_text
+
+    given = columns_from_text(columns) if columns else None
+    found = [inspect_file(file, given) for file in files]
+    console.result({"files": [f.record() for f in found]}, "\n\n".join(f.in_words() for f in found))
+    return 1 if all(f.refused for f in found) else 0
+
+
+@main.command()
+@click.option("--campaign", type=click.Path(exists=True, path_type=Path), help="Exports to read (the bundled example).")
+@click.option("--large", is_flag=True, help="Also the 1000 x 1000 lattice, some minutes.")
+@command_options
+def bench(console: Console, campaign: Path | None, large: bool, jobs: int, **_: Any) -> None:
+    """Speed, as ratios measured in one run."""
+    from tribo.cli.reading_speed import against_pandas, in_words, timing_in_words
+    from tribo.published import data_dir
+    from tribo.simulate.engine_speed import simulator_benchmarks
+
+    with console.progress() as progress:
+        ratios = against_pandas(campaign or data_dir() / "example", jobs)
+        timings = simulator_benchmarks(lambda done, total: progress("timing the simulator", done, total), large=large)
+    record = {"reading": [vars(r) for r in ratios], "simulator": [t.record() for t in timings]}
+    console.result(record, "\n".join([*map(in_words, ratios), *map(timing_in_words, timings)]))
+
+
+@main.command()
+@command_options
+def doctor(console: Console, **_: Any) -> int:
+    """Versions, cores, optional parts found or missing."""
+    from tribo.cli.doctor import examine, in_words
+
+    found = examine()
+    console.result(found, in_words(found))
+    return 0 if found["healthy"] else 1
+
+
+def _walk(
+    console: Console, path: Path, out: Path, until: Until, dry_run: bool, columns: str, **options: Any
+) -> int:
+    """Walk the street with one campaign as far as ``until`` and write what that yields."""
+    from tribo import stages
+    from tribo.campaign import open_campaign
+    from tribo.report import write_until
+    from tribo.store.kept_results import Shelf
+
+    chosen = stages.StudyOptions(kept=out / KEPT, **options)
+    with open_campaign(path) as described:
+        campaign = _with_columns(described, columns)
+        if dry_run:
+            planned = stages.plan(campaign, chosen, until)
+            console.result(planned, _plan_text(planned, out))
+            return status_of(campaign.set_aside)
+        with console.progress() as progress:
+            study = stages.study(campaign, chosen, until=until, progress=progress)
+            study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
+            provenance = _provenance(study, path, chosen)
+            keep = Shelf(chosen.kept).take
+            write_until(study, out, until, progress, provenance, diagnosis=found, jobs=chosen.jobs, keep=keep)
+    return _conclude(console, study, out, found.verdict if found else None)
+
+
+def _provenance(study: Study, campaign: Path, chosen: StudyOptions) -> Provenance:
+    """Where a study comes from, as this command was given it."""
+    from tribo.report import gather_provenance
+
+    return gather_provenance(
+        study,
+        command=_command_line(),
+        seed=chosen.seed,
+        started_at=_now(),
+        options=chosen.as_words(),
+        campaign=campaign,
+        overrides=chosen.overrides,
+    )
+
+
+def _with_columns(campaign: Campaign, columns: str) -> Campaign:
+    """The campaign with the columns given on the command line on top of its own."""
+    from dataclasses import replace
+
+    from tribo.readers import columns_from_text
+
+    return replace(campaign, columns={**campaign.columns, **columns_from_text(columns)}) if columns else campaign
+
+
+def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[Study, Diagnosis | None]:
+    """The diagnosis of a study; a note instead where there is too little to diagnose."""
+    from dataclasses import replace
+
+    from tribo.errors import FitError
+    from tribo.stages import diagnosis
+
+    try:
+        return study, diagnosis(study.ingested, seed=chosen.seed, kept=chosen.kept, progress=progress)
+    except FitError as why:
+        return replace(study, notes=(*study.notes, f"no diagnosis: {why}")), None
+
+
+def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None = None) -> int:
+    """Say what came out, what was set aside, and with what status it ends."""
+    from dataclasses import asdict
+
+    from tribo.report import summary_text, table2_text
+    from tribo.report.result_tables import fits_table
+    from tribo.report.words.verdict_text import verdict_text
+
+    set_aside = study.ingested.set_aside
+    doubts = study.ingested.doubts()
+    fits = fits_table(study.fits).astype(object)
+    record = {
+        "out": str(out),
+        "tests": len(study.ingested.pulls),
+        "set_aside": set_aside_record(set_aside),
+        "used_with_doubts": set_aside_record(doubts),
+        "problems": [asdict(p) for p in study.ingested.campaign.problems],
+        "notes": list(study.notes),
+        "fits": fits.where(fits.notna(), None).to_dict("records"),
+        "power": list(study.power),
+        "outlying": list(study.outlying),
+        "differences": [] if study.differences is None else study.differences.to_dict("records"),
+        "verdict": verdict.verdict if verdict else None,
+    }
+    words = [table2_text(study)] if study.fits else []
+    looks = ["\n".join(lines) for lines in (study.power, study.outlying) if lines]
+    said = [verdict_text(verdict)] if verdict else []
+    console.result(record, "\n\n".join([*words, summary_text(study), *said, *looks]))
+    console.list_tests("set aside", set_aside, level=-1)
+    console.list_tests("used with doubts", doubts)
+    return status_of(set_aside)
+
+
+def _plan_text(planned: dict[str, Any], out: Path) -> str:
+    lines = [f"would {step}" for step in planned["steps"]]
+    return "\n".join([*lines, f"would write into {out}", *(f"set aside: {s}" for s in planned["set_aside"])])
+
+
+def _command_line() -> str:
+    import shlex
+    import sys
+
+    return shlex.join(["tribo", *sys.argv[1:]])
+
+
+def _now() -> str:
+    """The time of this run, or that of SOURCE_DATE_EPOCH (reproducible-builds.org) where it is set."""
+    import os
+    from datetime import UTC, datetime
+
+    fixed = os.environ.get("SOURCE_DATE_EPOCH")
+    now = datetime.fromtimestamp(int(fixed), UTC) if fixed else datetime.now(UTC)
+    return now.isoformat(timespec="seconds")

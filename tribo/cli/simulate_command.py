@@ -1,0 +1,130 @@
+"""tribo simulate: one run of the spring-block model or an ensemble of runs, described by options or by a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tribo.cli.console import Console, command_options
+
+if TYPE_CHECKING:
+    from tribo.records import Run
+    from tribo.simulate import SimConfig
+
+# what describes the runs, in place of which a design file may stand
+_RUNS = (
+    click.option("--sample", "samples", multiple=True, help="F, A, B, C, Sx or Sy, the paper's samples; repeatable."),
+    click.option("--pressure", "pressures_kPa", multiple=True, type=float, help="Nominal pressure in kPa; repeatable."),
+    click.option(
+        "--angle", "angles_deg", multiple=True, type=float,
+        help="Pull direction against x in degrees; repeatable. Without it one run takes the direction the sample is "
+        "named after, an ensemble spreads them.",
+    ),
+    click.option("--repeats", type=int, help="Runs at each sample and pressure, local friction drawn anew (4)."),
+    click.option(
+        "--set", "settings", multiple=True, metavar="NAME=VALUE[,VALUE...]",
+        help="Any parameter of the model in SI units; several values are one more dimension; repeatable.",
+    ),
+    click.option("--blocks", type=int, help="Blocks a side (85)."),
+    click.option("--dt", "dt_s", type=float, help="Time step in s (5e-8)."),
+    click.option("--duration", "duration_ms", type=float, help="Length of a run in ms (three times the peak time)."),
+    click.option("--engine", help="fast (default), dense or reference."),
+)  # fmt: skip
+
+
+def _described(command: Any) -> Any:
+    for option in reversed(_RUNS):
+        command = option(command)
+    return command
+
+
+@click.command()
+@_described
+@click.option("--design", type=click.Path(exists=True, dir_okay=False, path_type=Path),
+              help="TOML or JSON: samples, pressures_kPa, angles_deg, repeats, seed, [parameters], [patterns.NAME].")
+@click.option("--table2", is_flag=True, help="The paper's numerical column: 6 samples, 8 pressures, 20 runs each.")
+@click.option("--with", "mechanisms", default="", help="MECHANISM:PARAM=VALUE,... put into the model.")
+@click.option("--given", default="", help="Conditions of the pull for --with: hold_s=100,temperature_C=25,...")
+@click.option("--scheduler", metavar="ADDRESS", help="Run an ensemble on the workers of this dask scheduler.")
+@click.option("-o", "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="FILE.nc to write.")
+@command_options
+def simulate(
+    console: Console, design: Path | None, table2: bool, mechanisms: str, given: str, scheduler: str | None, out: Path,
+    seed: int, jobs: int, **options: Any,
+) -> None:  # fmt: skip
+    """One run of the spring-block model with the paper's parameters, or an ensemble of runs.
+
+    One --sample and one --pressure without --repeats are one run: FILE.nc holds its force over time. Several of
+    them, --repeats, --design or --table2 are an ensemble: FILE.nc holds one entry a run, and a second start of the
+    same command computes only what it lacks.
+    """
+    from tribo.mechanisms_in_model import parse_given, parse_with
+    from tribo.simulate.design_file import asked_runs, described_by_options, read_design, together
+
+    if design and (table2 or any(value not in (None, ()) for value in options.values())):
+        raise click.UsageError("--design says all of it; give no other option about the runs beside it")
+    if not (design or table2 or (options["samples"] and options["pressures_kPa"])):
+        raise click.UsageError("give --sample and --pressure, --design or --table2")
+    one, table = (False, {}) if design else described_by_options(options, seed, table2)
+    runs, acting, conditions = together(
+        lambda: read_design(design, seed) if design else asked_runs(table, seed if one else None),
+        lambda: parse_with(mechanisms),
+        lambda: parse_given(given),
+    )
+    if one:
+        _one_run(console, pulled(runs[0], acting, conditions), out)
+    else:
+        _ensemble(console, runs, out, jobs, scheduler, table2, acting, conditions)
+
+
+def pulled(config: SimConfig, acting: Mapping[str, Any], conditions: Mapping[str, float]) -> Run:
+    """One run with mechanisms at work; of this module, so that workers find it."""
+    from tribo.mechanisms_in_model import simulate_with
+
+    return simulate_with(config, acting, **conditions)
+
+
+def _one_run(console: Console, run: Run, out: Path) -> None:
+    from tribo.simulate import write_run
+
+    write_run(run, out)
+    record = {
+        "out": str(out),
+        "static_friction": run.static_friction,
+        "sliding_friction": run.sliding_friction,
+        "window_s": run.window_s,
+    }
+    start, end = (1e3 * t for t in run.window_s)
+    console.result(
+        record,
+        f"{run.sample} at {run.pressure_Pa / 1e3:g} kPa: static T/N {run.static_friction:.4f}, sliding T/N "
+        f"{run.sliding_friction:.4f} (mean from {start:.2f} to {end:.2f} ms), written to {out}",
+    )
+
+
+def _ensemble(
+    console: Console, runs: list[SimConfig], out: Path, jobs: int, scheduler: str | None, table2: bool,
+    acting: Mapping[str, Any], conditions: Mapping[str, float],
+) -> None:  # fmt: skip
+    from functools import partial
+
+    from tribo.published import load_table2
+    from tribo.simulate.resume import FRICTION, Work, run_stored
+    from tribo.simulate.table2_column import beside, described, fitted, table2_text
+
+    work = FRICTION
+    if acting:
+        work = Work(partial(pulled, acting=acting, conditions=conditions), label=repr((acting, conditions)))
+    with console.progress() as progress:
+        table = run_stored(runs, out, jobs, scheduler, lambda done, total: progress("simulating", done, total), work)
+    record: dict[str, Any] = {"out": str(out), "runs": len(table)}
+    if table2:
+        found = beside(fitted(table), load_table2())
+        record["table2"], words = found.to_dict("records"), table2_text(found)
+    else:
+        means, laws, words = described(table)
+        record |= {"means": means.to_dict("records"), "fits": laws.to_dict("records")}
+    console.result(record, f"{words}\n\n{len(table)} runs in {out}")

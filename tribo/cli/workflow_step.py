@@ -1,0 +1,91 @@
+"""One step of the workflow: a tribo command, and a record of what it was made from and how it ended.
+
+``python -m tribo.cli.workflow_step RECORD --digest D [--after RECORD...] [--files FILES.json] -- COMMAND...`` runs
+``tribo COMMAND... --json``. Unusable input is a result and not a failure: it is recorded, the steps after it are not
+run, and the build goes on with the other campaigns. Anything else that goes wrong ends the step with a failure, so
+that the next build tries it again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any
+
+from tribo.cli.console import DONE, SOME_SET_ASIDE, UNUSABLE
+from tribo.pipeline.step_record import read_record
+
+DONE_WORDS = {DONE: "done", SOME_SET_ASIDE: "some_set_aside", UNUSABLE: "unusable"}
+
+
+def run_step(
+    record: Path, command: Sequence[str], digest: str, after: Sequence[Path] = (), files: Path | None = None
+) -> int:
+    """Run a tribo command as a step and write its record; returns the exit status for the workflow."""
+    before = next((r for r in map(read_record, after) if r and r["status"] == "unusable"), None)
+    started = time.time()
+    if before is not None:
+        status, said = UNUSABLE, {"problems": before["problems"]}
+    else:
+        status, said = _run(command)
+    if status not in DONE_WORDS:
+        return status
+    finished = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+    written = {
+        "command": ["tribo", *command],
+        "digest": digest,
+        "status": DONE_WORDS[status],
+        "problems": said.get("problems", []) if status == UNUSABLE else [],
+        "set_aside": len(said.get("set_aside") or ()),
+        "files": json.loads(files.read_text(encoding="utf-8"))["files"] if files else None,
+        "seconds": round(time.time() - started, 1),
+        "finished": finished,
+    }
+    from tribo.store.whole_files import write_text
+
+    write_text(record, json.dumps(written, indent=1) + "\n")
+    return 0
+
+
+def _run(command: Sequence[str]) -> tuple[int, dict[str, Any]]:
+    """Exit status and JSON result of a tribo command, run in this process."""
+    from tribo.cli import main
+
+    said = io.StringIO()
+    status = 0
+    try:
+        with redirect_stdout(said):
+            main([*command, "--json"], prog_name="tribo")
+    except SystemExit as ended:
+        status = ended.code if isinstance(ended.code, int) else 70
+    try:
+        return status, json.loads(said.getvalue() or "{}")
+    except ValueError:
+        return status, {}
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run the step that the arguments describe."""
+    own, _, command = _split(list(arguments))
+    parser = argparse.ArgumentParser(prog="python -m tribo.cli.workflow_step")
+    parser.add_argument("record", type=Path)
+    parser.add_argument("--digest", required=True)
+    parser.add_argument("--after", type=Path, nargs="*", default=[])
+    parser.add_argument("--files", type=Path)
+    given = parser.parse_args(own)
+    return run_step(given.record, command, given.digest, given.after, given.files)
+
+
+def _split(arguments: list[str]) -> tuple[list[str], str, list[str]]:
+    place = arguments.index("--") if "--" in arguments else len(arguments)
+    return arguments[:place], "--", arguments[place + 1 :]
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

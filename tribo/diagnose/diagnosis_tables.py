@@ -1,0 +1,100 @@
+"""The numbers behind the diagnosis figures, as tables: residuals, the misfit map, the weighing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tribo.diagnose.diagnosis import Diagnosis
+from tribo.diagnose.search.naming import weights_of
+from tribo.records import REGIMES
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def residual_table(d: Diagnosis) -> pd.DataFrame:
+    """One row a test and regime: what was measured, what the models say, and what parts them.
+
+    Columns: test_id, sample, specimen, regime, normal_load_N, run_order, specimen_run, temperature_C,
+    humidity_pct, speed_m_s, hold_s, measured_N, baseline_N, extended_N, residual_percent and
+    residual_extended_percent (100 ln of measured over modelled). Without a named mechanism the extended
+    columns repeat the baseline. Where the extended model was run in the simulator itself, simulated_N is what it says.
+    """
+    import pandas as pd
+
+    o = d.baseline.setup.observations
+    c = o.conditions
+    extended = d.named.model if d.named is not None and d.named.causes else d.baseline
+    parts = []
+    for k, regime in enumerate(REGIMES):
+        measured, before, after = o.log_force[:, k], d.baseline.predicted[:, k], extended.predicted[:, k]
+        simulated = {} if d.simulated is None else {"simulated_N": np.exp(d.simulated.log_force[:, k])}
+        parts.append(
+            pd.DataFrame(
+                {
+                    "test_id": o.test_ids, "sample": c.sample, "specimen": c.specimen, "regime": regime,
+                    "normal_load_N": c.normal_load_N, "run_order": c.run_order, "specimen_run": c.specimen_run,
+                    "temperature_C": c.temperature_C, "humidity_pct": c.humidity_pct, "speed_m_s": c.speed_m_s,
+                    "hold_s": c.hold_s, "measured_N": np.exp(measured), "baseline_N": np.exp(before),
+                    "extended_N": np.exp(after), "residual_percent": 100 * (measured - before),
+                    "residual_extended_percent": 100 * (measured - after),
+                }
+                | simulated
+            )
+        )  # fmt: skip
+    return pd.concat(parts, ignore_index=True)
+
+
+def misfit_map(d: Diagnosis) -> pd.DataFrame:
+    """Sample by load by regime: mean residual in percent, its standard error and the number of tests."""
+    import pandas as pd
+
+    rows = residual_table(d)
+    rows["load"] = rows["normal_load_N"].round(5)
+    groups = rows.groupby(["regime", "sample", "load"])
+    found = [
+        {
+            "regime": regime, "sample": sample, "normal_load_N": load, "n_tests": len(cell),
+            "residual_percent": cell["residual_percent"].mean(),
+            "residual_u_percent": cell["residual_percent"].std(ddof=1) / np.sqrt(len(cell)),
+            "residual_extended_percent": cell["residual_extended_percent"].mean(),
+        }
+        for (regime, sample, load), cell in groups
+    ]  # fmt: skip
+    return pd.DataFrame(found)
+
+
+def look_table(d: Diagnosis) -> pd.DataFrame:
+    """Every look at the baseline: its strength in standard deviations, adjusted p and size, strongest first."""
+    import pandas as pd
+
+    s = d.screened
+    rows = [
+        {
+            "kind": look.kind, "observable": look.observable, "covariate": look.covariate, "sample": look.sample,
+            "choice": look.acting.choice if look.acting else "", "strength": strength,
+            "p_adjusted": s.p_adjusted(float(strength)), "effect_percent": 100 * float(np.expm1(min(size, 5.0))),
+        }
+        for look, strength, size in zip(s.looks, s.strength, s.size, strict=True)
+    ]  # fmt: skip
+    return pd.DataFrame(rows).sort_values("strength", ascending=False, ignore_index=True)
+
+
+def weighing_table(d: Diagnosis) -> pd.DataFrame:
+    """Every mechanism that was weighed for the first cause: log likelihood gained, share, amplitude."""
+    import pandas as pd
+
+    if d.named is None or not d.named.weighed:
+        return pd.DataFrame(columns=["mechanism", "choice", "gain", "weight", "parameter", "value", "unit"])
+    weighed = d.named.weighed
+    rows = [
+        {
+            "mechanism": c.name, "choice": c.acting.choice, "gain": c.gain, "weight": weight,
+            "parameter": c.acting.mechanism.amplitude.name, "value": float(c.values[0]),
+            "unit": c.acting.mechanism.amplitude.unit,
+        }
+        for c, weight in zip(weighed, weights_of(weighed), strict=True)
+    ]  # fmt: skip
+    return pd.DataFrame(rows)

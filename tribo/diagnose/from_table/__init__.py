@@ -1,0 +1,1 @@
+"""The diagnosis of a published table of mu and tau0."""

@@ -1,0 +1,1 @@
+"""The search for causes: looks at the residuals, their screening, weighing and naming."""

@@ -1,0 +1,184 @@
+"""Every way the diagnosis looks at the residuals: by mechanism, covariate, shape, sample, specimen and period."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tribo.diagnose.statistics.model import Acting, ModelFit, Setup, log_forces, predict
+from tribo.mechanisms.table import MECHANISMS
+from tribo.records import FloatArray
+
+OBSERVABLES = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (1.0, 1.0), "drop": (1.0, -1.0)}
+BINS = 6
+TENTHS = 10
+BENT = ", bend"  # what a look at the curve of a sample adds to its column
+CYCLES = 24  # periods down to a twenty-fourth of the series
+
+
+@dataclass(frozen=True)
+class Look:
+    """One look: which observable against which covariate, and the columns (n, 2, d) it would follow."""
+
+    kind: str  # mechanism, trend, shape, level, sample, specimen, period, block
+    observable: str
+    covariate: str
+    sample: str
+    columns: FloatArray
+    acting: Acting | None = None
+
+    def is_taken_up(self, flat: str) -> bool:
+        """Whether calibrating on the sample ``flat`` removes this: the level of its force, and its slope with load."""
+        return self.kind == "sample" and self.sample == flat and not self.covariate.endswith(BENT)
+
+    @property
+    def freedom(self) -> int:
+        return int(self.columns.shape[2])
+
+
+def all_looks(f: ModelFit) -> list[Look]:
+    """Every look that this design allows, given the fitted model (its own mechanisms left out)."""
+    s = f.setup
+    looks = [*_mechanisms(f), *_covariates(s), *_levels(s), *_samples(s), *_specimens(s), *_periods(s), *_blocks(s)]
+    return [look for look in looks if np.isfinite(look.columns).all() and np.ptp(look.columns) > 0]
+
+
+def candidates(s: Setup, law: FloatArray) -> list[Acting]:
+    """Every mechanism and choice that could show in the friction forces of this design."""
+    base, conditions = s.base(law), s.observations.conditions
+    found = []
+    for mechanism in MECHANISMS.values():
+        if mechanism.regimes == ("rise",) or not mechanism.applies(conditions):
+            continue
+        found += [Acting(mechanism, str(choice)) for choice in mechanism.choices(base, conditions)]
+    return found
+
+
+def _mechanisms(f: ModelFit) -> Iterator[Look]:
+    s = f.setup
+    before = predict(s, f.law, (), ())
+    for acting in candidates(s, f.law):
+        change = predict(s, f.law, (acting,), (acting.mechanism.start(),)) - before
+        yield Look("mechanism", "both", acting.name, "", change[:, :, None], acting)
+    law = s.base(f.law)
+    adhesion = log_forces(law.forces(np.zeros(s.observations.n)))
+    yield Look("trend", "both", "tau0", "", np.exp(adhesion - before)[:, :, None])
+
+
+def numeric_covariates(s: Setup) -> dict[str, FloatArray]:
+    """Recorded numbers a residual may follow, standardised; only those that vary and are complete."""
+    c = s.observations.conditions
+    numbers = {
+        "run_order": c.run_order,
+        "specimen_run": c.specimen_run,
+        "started_at": c.elapsed_s,
+        "time of day": s.observations.clock_h,
+        "temperature_C": c.temperature_C,
+        "humidity_pct": c.humidity_pct,
+        "speed_mm_s": _log(c.speed_m_s),
+        "hold_s": _log(c.hold_s),
+    }
+    for name, column in c.columns.items():
+        numbers.setdefault(name, _maybe_numbers(column))
+    return {n: (v - v.mean()) / v.std() for n, v in numbers.items() if np.isfinite(v).all() and v.std() > 1e-9}
+
+
+def _log(values: FloatArray) -> FloatArray:
+    return np.log(np.where(values > 0, values, np.nan))
+
+
+def _maybe_numbers(column: np.ndarray) -> FloatArray:
+    try:
+        return np.asarray(column, float)
+    except ValueError:
+        return np.full(len(column), np.nan)
+
+
+def _spread(values: FloatArray, observable: str) -> FloatArray:
+    """Columns (n, d) onto the two regimes, (n, 2, d)."""
+    return values[:, None, :] * np.array(OBSERVABLES[observable])[None, :, None]
+
+
+def _covariates(s: Setup) -> Iterator[Look]:
+    for name, values in numeric_covariates(s).items():
+        for observable in OBSERVABLES:
+            yield Look("trend", observable, name, "", _spread(values[:, None], observable))
+        bins = _bins(values)
+        if bins.shape[1] > 1:
+            for observable in ("static", "sliding", "both"):
+                yield Look("shape", observable, name, "", _spread(bins, observable))
+
+
+def _bins(values: FloatArray) -> FloatArray:
+    """Indicator columns of up to BINS groups of alike size, less one."""
+    distinct = np.unique(values)
+    edges = distinct[1:] if len(distinct) <= BINS else np.unique(np.quantile(values, np.arange(1, BINS) / BINS))
+    code = np.searchsorted(edges, values, side="right")
+    return np.column_stack([code == k for k in range(1, len(edges) + 1)]).astype(float)
+
+
+def _levels(s: Setup) -> Iterator[Look]:
+    """Text columns: one gain per name."""
+    for name, column in s.observations.conditions.columns.items():
+        names = np.unique(column)
+        if 1 < len(names) <= s.observations.n // 8:
+            levels = np.column_stack([column == level for level in names[1:]]).astype(float)
+            for observable in ("static", "sliding", "both"):
+                yield Look("level", observable, name, "", _spread(levels, observable))
+
+
+def _samples(s: Setup) -> Iterator[Look]:
+    """Each sample's offset, its slope and its curve against ln p."""
+    c, p = s.observations.conditions, s.log_pressure
+    shapes = {"offset": np.ones_like(p), "slope": p, "curve": p**2 - np.mean(p**2)}
+    for sample in np.unique(c.sample):
+        here = (c.sample == sample).astype(float)
+        for observable in OBSERVABLES:
+            for name, shape in shapes.items():
+                covariate = {"offset": "sample", "slope": "normal_load_N"}.get(name, f"normal_load_N{BENT}")
+                yield Look("sample", observable, covariate, str(sample), _spread((here * shape)[:, None], observable))
+
+
+def _specimens(s: Setup) -> Iterator[Look]:
+    """Each specimen's offset against its siblings, and its slope against ln p."""
+    c, p = s.observations.conditions, s.log_pressure
+    for specimen in np.unique(c.specimen):
+        here = (c.specimen == specimen).astype(float)
+        where = "/".join(sorted(set(c.sample[c.specimen == specimen])))
+        for observable in ("static", "sliding", "both"):
+            yield Look("specimen", observable, f"specimen {specimen}", where, _spread(here[:, None], observable))
+        yield Look("specimen", "both", f"specimen {specimen} by load", where, _spread((here * p)[:, None], "both"))
+
+
+def _periods(s: Setup) -> Iterator[Look]:
+    """Harmonics of the run order, and of the day."""
+    c = s.observations.conditions
+    if np.isfinite(c.run_order).all() and len(np.unique(c.run_order)) > 3 * BINS:
+        rank = np.argsort(np.argsort(c.run_order)) / s.observations.n
+        for k in range(1, min(CYCLES, s.observations.n // 4) + 1):
+            period = f"run_order, period {s.observations.n / k:.3g}"
+            yield Look("period", "both", period, "", _spread(_wave(k * rank), "both"))
+    hours = s.observations.clock_h
+    if np.isfinite(hours).all() and np.ptp(hours) > 2:
+        for k in (1, 2, 3):
+            yield Look("period", "both", "time of day", "", _spread(_wave(k * hours / 24.0), "both"))
+
+
+def _blocks(s: Setup) -> Iterator[Look]:
+    """Stretches of the series in which something else may have been mounted: runs of successive tenths, up to half."""
+    order = s.observations.conditions.run_order
+    if not np.isfinite(order).all() or s.observations.n < 3 * TENTHS:
+        return
+    rank = np.argsort(np.argsort(order))
+    tenth = (rank * TENTHS) // s.observations.n
+    for first in range(TENTHS):
+        for last in range(first + 1, min(first + TENTHS // 2, TENTHS)):
+            inside = ((tenth >= first) & (tenth <= last)).astype(float)
+            where = f"run_order, from {order[inside > 0].min():.0f} to {order[inside > 0].max():.0f}"
+            yield Look("block", "both", where, "", _spread(inside[:, None], "both"))
+
+
+def _wave(turns: FloatArray) -> FloatArray:
+    return np.column_stack([np.sin(2 * np.pi * turns), np.cos(2 * np.pi * turns)])

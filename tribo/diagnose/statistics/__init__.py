@@ -1,0 +1,1 @@
+"""The statistical model of a campaign: observations, fit, chance, intervals and gain."""

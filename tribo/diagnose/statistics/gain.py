@@ -1,0 +1,109 @@
+"""What a named mechanism gains on tests the fit has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import gammaln
+
+from tribo.diagnose.statistics.fit import fit_without, jacobian_at
+from tribo.diagnose.statistics.model import Acting, ModelFit, Setup, predict
+from tribo.diagnose.statistics.observations import Observations
+from tribo.diagnose.verdict import Gain
+from tribo.records import FloatArray
+
+RESAMPLES = 400
+
+
+def gain(before: ModelFit, after: ModelFit, rng: np.random.Generator) -> Gain | None:
+    """Log score and RMSE of ``after`` against ``before`` on whole samples, specimens or loads left out.
+
+    Both are fitted anew without the held-out tests, noise and all. What is held out is chosen by what the
+    mechanism is: a wrong label or a wrong pattern cannot be learned from other specimens, so loads are left
+    out there; samples where at least four remain; specimens otherwise.
+    """
+    s = after.setup
+    kind, labels = _folds(s, after.acting)
+    if len(np.unique(labels)) < 2:
+        return None
+    scores = np.zeros((s.observations.n, 2))
+    errors = np.zeros((s.observations.n, 2, 2))
+    for label in np.unique(labels):
+        out = labels == label
+        for k, model in enumerate((before, after)):
+            scores[out, k], errors[out, k] = _held_out(model, out)
+    difference = scores[:, 1] - scores[:, 0]
+    rmse = 100 * np.sqrt(np.mean(errors**2, axis=(0, 2)))
+    return Gain(
+        held_out=kind,
+        log_score_baseline=float(scores[:, 0].mean()),
+        log_score_extended=float(scores[:, 1].mean()),
+        difference=float(difference.mean()),
+        se=_specimen_bootstrap(difference, s.observations.conditions.specimen, rng),
+        rmse_percent_before=float(rmse[0]),
+        rmse_percent_after=float(rmse[1]),
+    )
+
+
+def _folds(s: Setup, acting: Sequence[Acting]) -> tuple[str, np.ndarray]:
+    c = s.observations.conditions
+    if any(a.choice and a.mechanism.name != "covariate" for a in acting):
+        return "loads", np.round(c.normal_load_N, 4).astype(str)
+    if len(np.unique(c.sample)) >= 4:
+        return "samples", c.sample
+    return "specimens", c.specimen
+
+
+def _held_out(model: ModelFit, out: np.ndarray) -> tuple[FloatArray, FloatArray]:
+    """Log density per held-out test and its error in ln T (m, 2), the model fitted to all other tests."""
+    trained = fit_without(model, out)
+    s = model.setup
+    residual = s.observations.log_force - predict(s, trained.law, trained.acting, trained.values)
+    error = (residual - s.random @ trained.effects)[out]
+    jacobian = jacobian_at(replace(trained, setup=s, residual=residual))
+    columns = np.concatenate([jacobian, s.random], axis=2)[out]
+    spread = np.einsum("nip,pq,njq->nij", columns, trained.covariance, columns, optimize=True)
+    reading = s.observations.reading[out][:, :, None] ** 2 * np.eye(2)
+    scale = spread + trained.noise.per_test(s)[out] + reading
+    distance = np.einsum("ni,nij,nj->n", error, np.linalg.inv(scale), error)
+    tail = trained.noise.tail
+    constant = gammaln(tail / 2 + 1) - gammaln(tail / 2) - np.log(np.pi * tail)
+    density = constant - 0.5 * np.linalg.slogdet(scale)[1] - (tail / 2 + 1) * np.log1p(distance / tail)
+    return density, error
+
+
+def gain_of_zero(o: Observations, drifting: bool, rng: np.random.Generator) -> Gain | None:
+    """The same for the force before contact: a zero load cell against one that is off, or that wanders in time.
+
+    Whole specimens are left out; RMSE is in percent of the median sliding force.
+    """
+    hours = o.conditions.elapsed_s / 3600.0
+    usable = np.isfinite(o.zero_N) & (np.isfinite(hours) if drifting else True)
+    zero, hours, specimen = o.zero_N[usable], hours[usable], o.conditions.specimen[usable]
+    if len(np.unique(specimen)) < 2:
+        return None
+    scores, errors = np.zeros((len(zero), 2)), np.zeros((len(zero), 2))
+    for name in np.unique(specimen):
+        out = specimen == name
+        line = np.polyfit(hours[~out], zero[~out], 1) if drifting else np.array([np.median(zero[~out])])
+        for k, polynomial in enumerate((np.zeros(1), line)):
+            spread = max(float(np.sqrt(np.mean((zero - np.polyval(polynomial, hours))[~out] ** 2))), 1e-9)
+            errors[out, k] = zero[out] - np.polyval(polynomial, hours[out])
+            scores[out, k] = -np.log(spread * np.sqrt(2 * np.pi)) - 0.5 * (errors[out, k] / spread) ** 2
+    difference = scores[:, 1] - scores[:, 0]
+    rmse = 100 * np.sqrt(np.mean(errors**2, axis=0)) / float(np.exp(np.median(o.log_force[:, 1])))
+    return Gain(
+        "specimens", float(scores[:, 0].mean()), float(scores[:, 1].mean()), float(difference.mean()),
+        _specimen_bootstrap(difference, specimen, rng), float(rmse[0]), float(rmse[1]),
+    )  # fmt: skip
+
+
+def _specimen_bootstrap(difference: FloatArray, specimen: np.ndarray, rng: np.random.Generator) -> float:
+    """Standard error of the mean difference, whole specimens resampled."""
+    names, code = np.unique(specimen, return_inverse=True)
+    total = np.bincount(code, difference)
+    count = np.bincount(code).astype(float)
+    drawn = rng.integers(0, len(names), (RESAMPLES, len(names)))
+    return float(np.std(total[drawn].sum(axis=1) / count[drawn].sum(axis=1)))

@@ -1,0 +1,127 @@
+"""Values and intervals of a mechanism's parameters.
+
+From the curvature, or by profile likelihood near a bound, and averaged over how wrong the model's patterns may be:
+the predictor states a size for their error, and a campaign of several patterns tells whether it is that large here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from tribo.diagnose.statistics.fit import fit
+from tribo.diagnose.statistics.model import FIXED, N_LAW, PATTERN, ModelFit
+from tribo.diagnose.statistics.noise import PATTERN_PRIOR
+from tribo.mechanisms.record import Mechanism
+from tribo.records import FloatArray
+
+NORMAL_90 = 1.645
+DROP_90 = 0.5 * NORMAL_90**2  # of the log likelihood at the ends of a 90 % interval
+NEAR = 2.0 * NORMAL_90  # standard errors from a bound within which the curvature is not trusted
+SMALLEST_SHARE = 1e-6  # of the way to a bound
+PATTERN_STEPS = np.linspace(-0.8, 0.8, 5)  # of the logarithm of the pattern error about its estimate, to average over
+
+
+def recovered(f: ModelFit, index: int) -> list[tuple[float, float, float]]:
+    """Value and 90 % interval (value, low, high) of every parameter of the mechanism ``index`` of a fit.
+
+    The average over the error of the model's patterns, each size weighed by how likely it makes the campaign.
+    """
+    if not (f.setup.group == PATTERN).any():
+        return [(float(v), *ends) for v, ends in zip(f.values[index], intervals(f, index), strict=True)]
+    factors = f.noise.pattern * np.exp(PATTERN_STEPS)
+    fits = [with_pattern_error(f, factor) for factor in factors]
+    expected, worth = PATTERN_PRIOR
+    log_weight = np.array([g.score for g in fits]) - worth * (np.log(factors) + 0.5 * (expected / factors) ** 2)
+    weight = np.exp(log_weight - log_weight.max())
+    weight /= weight.sum()
+    ends = np.array([intervals(g, index) for g in fits])  # (errors, parameters, 2)
+    values = np.array([g.values[index] for g in fits])
+    return [
+        _averaged(weight, values[:, k], ends[:, k], (p.low, p.high))
+        for k, p in enumerate(f.acting[index].mechanism.parameters)
+    ]
+
+
+def with_pattern_error(f: ModelFit, factor: float) -> ModelFit:
+    """The fit with the error of the patterns held at ``factor`` times what the predictor states."""
+    s = f.setup
+    here = s.group == PATTERN
+    held = replace(s, unit=np.where(here, factor * s.unit, s.unit), group=np.where(here, FIXED, s.group))
+    return fit(held, f.acting, start=replace(f, setup=held), iterations=15)
+
+
+def _averaged(
+    weight: FloatArray, values: FloatArray, ends: FloatArray, bounds: tuple[float, float]
+) -> tuple[float, float, float]:
+    """Mean, and ends whose distance has the mean square of the single ones and of what the values differ by."""
+    value = float(weight @ values)
+    apart = weight @ (NORMAL_90 * (values - value)) ** 2
+    below, above = (float(np.sqrt(weight @ (ends[:, k] - values) ** 2 + apart)) for k in (0, 1))
+    return value, max(value - below, bounds[0]), min(value + above, bounds[1])
+
+
+def intervals(f: ModelFit, index: int) -> list[tuple[float, float]]:
+    """90 % interval of every parameter of the mechanism ``index`` of a fit, kept inside the bounds.
+
+    The error of the model's patterns is taken as assumed. Where one parameter lies at a bound or near it, the intervals
+    of all are profile likelihoods, the others and the flat law fitted anew at each value; the noise stays that of the
+    fit.
+    """
+    errors = standard_errors(f, index)
+    parameters = f.acting[index].mechanism.parameters
+    values = f.values[index]
+    clear = all(
+        e > 0 and v - NEAR * e > p.low and v + NEAR * e < p.high
+        for v, e, p in zip(values, errors, parameters, strict=True)
+    )
+    if clear:
+        return [(float(v - NORMAL_90 * e), float(v + NORMAL_90 * e)) for v, e in zip(values, errors, strict=True)]
+    return [_profile(f, index, k, errors[k]) for k in range(len(parameters))]
+
+
+def standard_errors(f: ModelFit, index: int) -> list[float]:
+    """Of every parameter of one mechanism, from the curvature; zero for one held at a bound."""
+    first = N_LAW + sum(len(v) for v in f.values[:index])
+    diagonal = np.diag(f.covariance)[first : first + len(f.values[index])]
+    return [float(np.sqrt(max(d, 0.0))) for d in diagonal]
+
+
+def _profile(f: ModelFit, index: int, k: int, error: float) -> tuple[float, float]:
+    p = f.acting[index].mechanism.parameters[k]
+    return _end(f, index, k, p.low, error), _end(f, index, k, p.high, error)
+
+
+def _end(f: ModelFit, index: int, k: int, bound: float, error: float) -> float:
+    """Where the profile falls by DROP_90 between the estimate and a bound; the bound where it does not."""
+    from scipy.optimize import brentq
+
+    best = float(f.values[index][k])
+    if best == bound or f.score - _score_at(f, index, k, bound) < DROP_90:
+        return bound
+
+    def excess(share: float) -> float:
+        return f.score - _score_at(f, index, k, best + share * (bound - best)) - DROP_90
+
+    outside = 1.0
+    inside = min(2.0 * error / abs(bound - best), 0.5) or 0.1
+    while excess(inside) > 0.0 and inside > SMALLEST_SHARE:
+        inside, outside = 0.2 * inside, inside
+    share = brentq(excess, inside, outside, rtol=0.05) if inside > SMALLEST_SHARE else inside
+    return best + float(share) * (bound - best)
+
+
+def _score_at(f: ModelFit, index: int, k: int, value: float) -> float:
+    """Log likelihood with one parameter held at a value and everything but the noise fitted anew."""
+    acting, values = list(f.acting), [v.copy() for v in f.values]
+    acting[index] = replace(acting[index], mechanism=_held(acting[index].mechanism, k, value))
+    values[index][k] = value
+    begin = replace(f, acting=tuple(acting), values=tuple(values))
+    return fit(f.setup, acting, start=begin, noise=f.noise, iterations=12).score
+
+
+def _held(mechanism: Mechanism, k: int, value: float) -> Mechanism:
+    parameters = list(mechanism.parameters)
+    parameters[k] = replace(parameters[k], low=value, high=value)
+    return replace(mechanism, parameters=tuple(parameters))

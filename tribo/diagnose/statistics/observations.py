@@ -1,0 +1,202 @@
+"""From an ingested campaign to the arrays that the diagnosis works on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+import numpy as np
+
+from tribo.mechanisms.record import Conditions, StringArray
+from tribo.records import Campaign, FloatArray, Ingested, Pattern, Pull, SetAside, Test, Trace
+
+STATIC, SLIDING = 0, 1
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Every usable test: ln T, shape (n, 2) with static first, and what else its trace showed, shape (n,).
+
+    ``reading`` is the relative standard uncertainty of each force within its trace, (n, 2).
+    ``zero_slope_N_per_s`` is the slope of the force before contact.
+    """
+
+    test_ids: StringArray
+    conditions: Conditions
+    patterns: Mapping[str, Pattern]
+    log_force: FloatArray
+    reading: FloatArray
+    zero_N: FloatArray
+    zero_u_N: FloatArray
+    zero_slope_N_per_s: FloatArray
+    rise_N_per_m: FloatArray
+    stick_slip_N: FloatArray
+    noise_N: FloatArray
+    clock_h: FloatArray
+    day: StringArray
+    flat: str
+    set_aside: tuple[SetAside, ...] = ()
+
+    @property
+    def n(self) -> int:
+        return len(self.test_ids)
+
+    @property
+    def samples(self) -> tuple[str, ...]:
+        return tuple(self.patterns)
+
+    def take(self, keep: np.ndarray) -> Observations:
+        """The tests picked by a mask or by indices, in that order."""
+        from dataclasses import fields, replace
+
+        def cut(value: object) -> object:
+            return value[keep] if isinstance(value, np.ndarray) and value.shape[:1] == (self.n,) else value
+
+        def cut_record(record: object) -> dict[str, object]:
+            return {f.name: cut(getattr(record, f.name)) for f in fields(record)}  # type: ignore[arg-type]
+
+        columns = {name: column[keep] for name, column in self.conditions.columns.items()}
+        conditions = replace(self.conditions, **{**cut_record(self.conditions), "columns": columns})  # type: ignore[arg-type]
+        return replace(self, **{**cut_record(self), "conditions": conditions})  # type: ignore[arg-type]
+
+
+def observe(ingested: Ingested) -> Observations:
+    """The observations of a campaign; tests without a positive static and sliding force are left out."""
+    campaign = ingested.campaign
+    pairs = [(t, ingested.pulls[t.test_id]) for t in campaign.tests if t.test_id in ingested.pulls]
+    good = [(t, p) for t, p in pairs if p.static_N > 0 and p.sliding_N > 0]
+    left_out = tuple(
+        SetAside(t.test_id, "no positive friction force was read off its trace")
+        for t, p in pairs
+        if not (p.static_N > 0 and p.sliding_N > 0)
+    )
+    tests, pulls = [t for t, _ in good], [p for _, p in good]
+    traces = [ingested.traces.get(t.test_id) for t in tests]
+    force = np.array([[p.static_N, p.sliding_N] for p in pulls]).reshape(-1, 2)
+    error = np.array([[p.static_u_N, p.sliding_u_N] for p in pulls]).reshape(-1, 2)
+    return Observations(
+        test_ids=np.array([t.test_id for t in tests], str),
+        conditions=conditions_of(campaign, tests, pulls, traces),
+        patterns=dict(campaign.samples),
+        log_force=np.log(force),
+        reading=np.nan_to_num(error / force, nan=0.0, posinf=0.0),
+        zero_N=np.array([p.zero_N for p in pulls]),
+        zero_u_N=np.array([p.zero_u_N for p in pulls]),
+        zero_slope_N_per_s=np.array([_slope_before(t, p) for t, p in zip(traces, pulls, strict=True)]),
+        rise_N_per_m=np.array([p.rise_stiffness_N_per_m for p in pulls]),
+        stick_slip_N=np.array([p.stick_slip_amplitude_N for p in pulls]),
+        noise_N=np.array([p.noise_N for p in pulls]),
+        clock_h=np.array([_clock_h(t.started_at) for t in tests]),
+        day=np.array([t.started_at[:10] for t in tests], str),
+        flat=flat_sample(campaign.samples),
+        set_aside=(*ingested.set_aside, *left_out),
+    )
+
+
+def conditions_of(
+    campaign: Campaign,
+    tests: list[Test],
+    pulls: list[Pull] | None = None,
+    traces: list[Trace | None] | None = None,
+) -> Conditions:
+    """What tests.csv records about ``tests``, as arrays; without traces the peak loses nothing by sampling."""
+    patterns = [campaign.samples[t.sample] for t in tests]
+    speed = _numbers([t.speed_m_s or campaign.pull_speed_m_s for t in tests])
+    clip = np.zeros(len(tests))
+    if pulls is not None and traces is not None:
+        clip = np.array([_clip(p, t) for p, t in zip(pulls, traces, strict=True)])
+    started = _numbers([_seconds(t.started_at) for t in tests])
+    return Conditions(
+        normal_load_N=_numbers([t.normal_load_N for t in tests]),
+        nominal_area_m2=campaign.nominal_area_m2,
+        area_fraction=np.array([p.area_fraction for p in patterns]),
+        rim_per_m=np.array([p.rim_per_m for p in patterns]),
+        cavity_width_m=np.array([min(p.size_m) if p.size_m else 0.0 for p in patterns]),
+        elongation=np.array([_elongation(t, p) for t, p in zip(tests, patterns, strict=True)]),
+        sample=np.array([t.sample for t in tests], str),
+        specimen=np.array([t.specimen for t in tests], str),
+        speed_m_s=speed,
+        hold_s=_numbers([t.hold_s for t in tests]),
+        specimen_run=_specimen_runs(tests),
+        run_order=_numbers([t.run_order for t in tests]),
+        elapsed_s=started - np.nanmin(started) if np.isfinite(started).any() else started,
+        temperature_C=_numbers([t.temperature_C for t in tests]),
+        humidity_pct=_numbers([t.humidity_pct for t in tests]),
+        clip_N=clip,
+        columns=_further_columns(tests),
+    )
+
+
+def flat_sample(patterns: Mapping[str, Pattern]) -> str:
+    """The sample without cavities; "flat" where there is none."""
+    return next((name for name, p in patterns.items() if p.area_fraction == 1.0), "flat")
+
+
+def _elongation(test: Test, pattern: Pattern) -> float:
+    if pattern.size_m is None or pattern.size_m[0] == pattern.size_m[1]:
+        return 0.0
+    direction = test.direction or test.sample[-1:]
+    along_x = {"x": 1.0, "y": -1.0}.get(direction.lower(), 0.0)
+    return float(along_x * np.log(pattern.size_m[0] / pattern.size_m[1]))
+
+
+def _specimen_runs(tests: list[Test]) -> FloatArray:
+    """specimen_run as recorded, else counted along run_order; NaN where neither is known."""
+    if all(t.specimen_run is not None for t in tests):
+        return _numbers([t.specimen_run for t in tests])
+    if any(t.run_order is None for t in tests):
+        return np.full(len(tests), np.nan)
+    runs, seen = np.zeros(len(tests)), dict[str, int]()
+    for i in sorted(range(len(tests)), key=lambda i: tests[i].run_order or 0):
+        seen[tests[i].specimen] = seen.get(tests[i].specimen, 0) + 1
+        runs[i] = seen[tests[i].specimen]
+    return runs
+
+
+def _further_columns(tests: list[Test]) -> dict[str, StringArray]:
+    """Recorded columns that take part only as covariates, where every test has a value."""
+    names = sorted({name for t in tests for name in t.covariates})
+    columns = {name: np.array([str(t.covariates.get(name, "")) for t in tests], str) for name in names}
+    columns["operator"] = np.array([t.operator for t in tests], str)
+    columns["date"] = np.array([t.started_at[:10] for t in tests], str)
+    return {n: c for n, c in columns.items() if (c != "").all() and len(np.unique(c)) > 1}
+
+
+def _numbers(values: Sequence[float | None]) -> FloatArray:
+    return np.array([np.nan if v is None else float(v) for v in values])
+
+
+def _seconds(stamp: str) -> float | None:
+    try:
+        return datetime.fromisoformat(stamp).timestamp()
+    except ValueError:
+        return None
+
+
+def _clock_h(stamp: str) -> float:
+    try:
+        when = datetime.fromisoformat(stamp)
+    except ValueError:
+        return float("nan")
+    return when.hour + when.minute / 60 + when.second / 3600
+
+
+def _clip(pull: Pull, trace: Trace | None) -> float:
+    """k v / (2 f_s) from the slope of the rise in time and the sampling interval at the peak."""
+    if trace is None or len(trace.time_s) < 3 or not np.isfinite(pull.rise_N_per_s):
+        return 0.0
+    near = np.clip(np.searchsorted(trace.time_s, pull.peak_s), 1, len(trace.time_s) - 2)
+    step = float(np.median(np.diff(trace.time_s[max(near - 10, 0) : near + 10])))
+    return 0.5 * max(pull.rise_N_per_s, 0.0) * max(step, 0.0)
+
+
+def _slope_before(trace: Trace | None, pull: Pull) -> float:
+    """Slope of the force before contact, N/s; NaN where fewer than eight samples come before."""
+    if trace is None or not np.isfinite(pull.onset_s):
+        return float("nan")
+    length = pull.onset_s - trace.time_s[0]
+    before = trace.time_s < pull.onset_s - 0.1 * length
+    if before.sum() < 8:
+        return float("nan")
+    return float(np.polyfit(trace.time_s[before], trace.force_N[before], 1)[0])

@@ -1,0 +1,1 @@
+from .extended_run import parse_given as parse_given, parse_with as parse_with, simulate_with as simulate_with

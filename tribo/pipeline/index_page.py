@@ -1,0 +1,199 @@
+"""index.html of a site: every campaign with its verdict and state, and mu and tau0 of each sample over time.
+
+``python -m tribo.pipeline.index_page SITE MARKER`` writes it, and MARKER for the workflow (``-`` for none).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+from tribo import __version__
+from tribo.pipeline.history import CampaignRow, Law, history
+from tribo.pipeline.trend import FEWEST, LEVEL, SHORTEST, Change, change_points
+
+STATES = {
+    "done": "done", "some set aside": "done, some tests set aside", "unusable": "unusable input",
+    "failed": "failed", "waiting": "left for the next round", "gone": "no longer in the folder",
+}  # fmt: skip
+VERDICTS = {
+    "no_misfit": "no misfit", "named": "cause named", "undetermined": "several causes possible",
+    "unknown": "misfit of unknown cause", "": "–",
+}  # fmt: skip
+SYMBOLS = {"mu": ("μ", ""), "tau0": ("τ₀", "kPa")}
+WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 300.0, 136.0, 44.0, 8.0, 16.0, 18.0
+
+Key = tuple[str, str, str]  # sample, regime, parameter
+
+
+@dataclass(frozen=True)
+class Point:
+    """One campaign in a panel, in its coordinates; ``text`` is what hovering says."""
+
+    x: float
+    y: float
+    y_low: float
+    y_high: float
+    text: str
+    link: str
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One parameter of one sample over the campaigns: tick labels are (y, text), changes (x, text)."""
+
+    title: str
+    label: str
+    points: tuple[Point, ...]
+    ticks: tuple[tuple[float, str], ...]
+    dates: tuple[str, str]
+    changes: tuple[tuple[float, str], ...]
+
+
+def write_index(site: Path) -> str:
+    """Write SITE/current/index.html and trend.csv where they differ from what is there; returns their SHA-256."""
+    from tribo.store.whole_files import write_text
+
+    rows = history(site)
+    changes = change_points({"|".join(key): values for key, values in series(rows).items()})
+    digest = hashlib.sha256()
+    for name, text in {"index.html": page(rows, changes), "trend.csv": trend_csv(rows)}.items():
+        path = site / "current" / name
+        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+            write_text(path, text)
+        digest.update(text.encode())
+    return digest.hexdigest()
+
+
+def series(rows: Sequence[CampaignRow]) -> dict[Key, list[float]]:
+    """Values of each parameter of each sample, one a campaign, NaN where it has none."""
+    laws = [{(law.sample, law.regime, law.parameter): law.value for law in row.laws} for row in rows]
+    keys = sorted({key for found in laws for key in found}, key=lambda k: (k[0], k[1] != "static", k[2]))
+    return {key: [found.get(key, math.nan) for found in laws] for key in keys}
+
+
+def trend_csv(rows: Sequence[CampaignRow]) -> str:
+    """The plotted numbers: a row a campaign, sample, regime and parameter."""
+    lines = ["campaign,measured,sample,regime,parameter,value,low,high"]
+    for row in rows:
+        for law in row.laws:
+            numbers = ",".join("" if math.isnan(v) else f"{v:.8g}" for v in (law.value, law.low, law.high))
+            lines.append(f'"{row.name}",{row.measured},"{law.sample}",{law.regime},{law.parameter},{numbers}')
+    return "\n".join(lines) + "\n"
+
+
+def page(rows: Sequence[CampaignRow], changes: Sequence[Change]) -> str:
+    """The page as text: the same bytes for the same campaigns."""
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+
+    loader = ChoiceLoader([PackageLoader("tribo.pipeline"), PackageLoader("tribo.report.html")])
+    environment = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    by_sample: dict[str, list[Panel]] = {}
+    for key in series(rows):
+        by_sample.setdefault(key[0], []).append(panel(key, rows, [c for c in changes if c.series == "|".join(key)]))
+    longest = max((sum(map(math.isfinite, v)) for v in series(rows).values()), default=0)
+    return environment.get_template("index.html").render(
+        rows=list(reversed(rows)), states=STATES, verdicts=VERDICTS, link=report_link, panels=by_sample,
+        sentences=[change_sentence(c, rows) for c in changes], looked=longest >= FEWEST, fewest=FEWEST,
+        shortest=SHORTEST, level=LEVEL, width=WIDTH, height=HEIGHT, left=LEFT, right=RIGHT, top=TOP, bottom=BOTTOM,
+        version=__version__,
+    )  # fmt: skip
+
+
+def report_link(name: str) -> str:
+    """Where the report of a campaign lies, from the index page."""
+    return f"{quote(name)}/report.html"
+
+
+def panel(key: Key, rows: Sequence[CampaignRow], changes: Sequence[Change]) -> Panel:
+    """One parameter of one sample, laid out in WIDTH by HEIGHT."""
+    sample, regime, parameter = key
+    symbol, unit = SYMBOLS[parameter]
+    fitted = [k for k, row in enumerate(rows) if row.laws]
+    place = {k: at for at, k in enumerate(fitted)}  # campaigns without a fit take no room
+    placed = [(k, row, law) for k, row in enumerate(rows) for law in row.laws if _key(law) == key]
+    low, high = _range([law for _, _, law in placed])
+    step = (WIDTH - LEFT - RIGHT) / len(fitted)
+
+    def x(k: int, aside: float = 0.0) -> float:
+        return round(LEFT + step * (place[k] + 0.5 + aside), 1)
+
+    def y(value: float) -> float:
+        share = min(max((value - low) / (high - low), 0.0), 1.0)
+        return round(HEIGHT - BOTTOM - share * (HEIGHT - TOP - BOTTOM), 1)
+
+    def end(value: float, law: Law) -> float:
+        return y(value if math.isfinite(value) else law.value)
+
+    points = tuple(
+        Point(x(k), y(law.value), end(law.low, law), end(law.high, law), _hover(row, law),
+              report_link(row.name) if row.has_report else "")
+        for k, row, law in placed
+    )  # fmt: skip
+    return Panel(
+        title=f"{regime} {symbol}{f' in {unit}' if unit else ''}",
+        label=f"{regime} {symbol} of {sample} in {len(points)} campaigns: " + "; ".join(p.text for p in points),
+        points=points,
+        ticks=tuple((y(v), _short(v)) for v in (low, (low + high) / 2, high)),
+        dates=(rows[fitted[0]].measured, rows[fitted[-1]].measured) if len(fitted) > 1 else ("", ""),
+        changes=tuple((x(c.at, -0.5), f"{_short(c.before)} to {_short(c.after)}") for c in changes),
+    )
+
+
+def _key(law: Law) -> Key:
+    return law.sample, law.regime, law.parameter
+
+
+def _range(laws: Sequence[Law]) -> tuple[float, float]:
+    """Lowest and highest number shown: all values, and intervals as far as they are not absurdly wide."""
+    values = [law.value for law in laws]
+    centre, span = sum(values) / len(values), max(values) - min(values) or abs(values[0]) * 0.1 or 1.0
+    ends = [e for law in laws for e in (law.low, law.high) if math.isfinite(e) and abs(e - centre) < 4 * span]
+    low, high = min(values + ends), max(values + ends)
+    return (low, high) if high > low else (low - 1.0, high + 1.0)
+
+
+def _hover(row: CampaignRow, law: Law) -> str:
+    unit = f" {SYMBOLS[law.parameter][1]}".rstrip()
+    interval = f" ({_short(law.low)} to {_short(law.high)})" if math.isfinite(law.low) else ""
+    return f"{row.name}: {_short(law.value)}{interval}{unit}"
+
+
+def _short(value: float) -> str:
+    return f"{value:.3g}".replace("-", "−")
+
+
+def change_sentence(change: Change, rows: Sequence[CampaignRow]) -> str:
+    """A change in words."""
+    sample, regime, parameter = change.series.split("|")
+    symbol, unit = SYMBOLS[parameter]
+    verb = "rises" if change.after > change.before else "falls"
+    p = "below 0.001" if change.p < 0.001 else f"{change.p:.3f}"
+    return (
+        f"{regime.capitalize()} {symbol} of {sample} {verb} from {_short(change.before)} to {_short(change.after)}"
+        f"{f' {unit}' if unit else ''} at {rows[change.at].name} (adjusted p {p})."
+    )
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Write the index of a site, and the marker of the workflow."""
+    from tribo.store.whole_files import write_text
+
+    site, marker = arguments
+    digest = write_index(Path(site))
+    if marker != "-":
+        record: Mapping[str, str] = {"index": digest}
+        write_text(Path(marker), json.dumps(record) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

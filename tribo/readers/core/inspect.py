@@ -1,0 +1,346 @@
+"""Everything that can be said about an export before using it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tribo.errors import Problem, ReadError
+from tribo.quantities import quantity_named
+from tribo.readers.core.assign import NEEDED, Column, Hint, assign, match_column
+from tribo.readers.core.export import read_contents
+from tribo.readers.core.family import Family
+from tribo.readers.core.layout import Layout
+from tribo.readers.core.reading import Contents, Reading, layout_of, split_at_restarts
+from tribo.readers.core.source import MAPPED_BYTES, Source
+from tribo.readers.families import family_of, open_sources
+from tribo.records import FloatArray
+
+_BASELINE_SHARE = 0.05  # of the largest force: a pull that starts above it has no zero phase
+_FLAT_TOP = 5  # equal samples at an extreme in a row
+_UNEVEN = 0.2  # spread of the time steps over their median
+_MARKS = {"\t": "tab", " ": "blanks", "": "nothing", ",": "comma", ";": "semicolon", "|": "bar"}
+
+
+@dataclass(frozen=True)
+class ColumnSeen:
+    """A column as the file has it, and the quantity it was taken for ("" if none) and why."""
+
+    position: int
+    name: str
+    unit: str
+    quantity: str = ""
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class TableSeen:
+    """A table that is a trace: where it stands, its time base in seconds, its forces in newton."""
+
+    label: str
+    first_row: int
+    rows: int
+    start_s: float
+    end_s: float
+    step_s: float
+    shortest_step_s: float
+    longest_step_s: float
+    lowest_force_N: float
+    highest_force_N: float
+    normal_load_N: float | None
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What an export is.
+
+    ``problems`` say why it cannot be read as it stands, ``advice`` in one sentence what to give so that it can;
+    ``doubts`` what to look at. ``pulls`` are the pulls within its tables, where there are several, by the choice that
+    names them in tests.csv.
+    """
+
+    file: str
+    family: str = ""
+    family_text: str = ""
+    encoding: str = ""
+    delimiter: str = ""
+    decimal: str = ""
+    header_rows: int = 0
+    columns: tuple[ColumnSeen, ...] = ()
+    tables: tuple[TableSeen, ...] = ()
+    other_tables: tuple[str, ...] = ()
+    pulls: tuple[str, ...] = ()
+    metadata: Mapping[str, str] | None = None
+    signs: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
+    doubts: tuple[Problem, ...] = ()
+    problems: tuple[Problem, ...] = ()
+    advice: str = ""
+
+    @property
+    def refused(self) -> bool:
+        """Whether the export cannot be read as it stands."""
+        return bool(self.problems)
+
+    def record(self) -> dict[str, Any]:
+        """All of it for JSON."""
+        return {"refused": self.refused, **asdict(self)}
+
+    def in_words(self) -> str:
+        """All of it for a person."""
+        lines = [self.file]
+        if self.family:
+            marks = f"{_MARKS.get(self.delimiter, self.delimiter)!s} between cells, decimal {_mark(self.decimal)}"
+            lines.append(f"  format    {self.family_text} ({self.family})")
+            lines.append(f"  written   {self.encoding}, {marks}, {self.header_rows} header rows")
+        lines += [f"  column    {_column_in_words(c)}" for c in self.columns]
+        lines += [f"  table     {_table_in_words(t)}" for t in self.tables[:12]]
+        if len(self.tables) > 12:
+            lines.append(f"  table     and {len(self.tables) - 12} more")
+        lines += [f"  pull      {text}" for text in self.pulls[:12]]
+        if len(self.pulls) > 12:
+            lines.append(f"  pull      and {len(self.pulls) - 12} more")
+        if self.other_tables:
+            lines.append(f"  no trace  {', '.join(self.other_tables[:12])}")
+        lines += [f"  signs     {text}" for text in self.signs]
+        lines += [f"  missing   {text}" for text in self.missing]
+        lines += [f"  doubt     {problem}" for problem in self.doubts]
+        lines += [f"  refused   {problem}" for problem in self.problems]
+        if self.advice:
+            lines.append(f"  give      {self.advice}")
+        return "\n".join(lines)
+
+
+def inspect_export(path: Path | str, *, columns: Mapping[str, str] | None = None) -> Inspection:
+    """What an export is: family, encoding, columns and why, units, tables, time base, doubts.
+
+    Never raises for what is in the file: an export that cannot be read has its ``problems`` here.
+    Of a large file only the beginning is looked at, and a doubt says so. ``columns`` as in
+    :func:`tribo.readers.read_export`.
+    """
+    path = Path(path)
+    file = str(path)
+    try:
+        contents = read_contents(path, columns, file, beginning_only=True)
+    except ReadError as why:
+        return _refused(path, file, why.problems, parse_hints(columns))
+    seen = _read(file, contents)
+    return replace(seen, doubts=(*_unseen(path, file), *seen.doubts))
+
+
+def _unseen(path: Path, file: str) -> tuple[Problem, ...]:
+    """The doubt about a large file, of which only the beginning was looked at; with its last line."""
+    source = open_sources(path, file)[0] if path.stat().st_size > MAPPED_BYTES else None
+    if source is None or not source.is_large:
+        return ()
+    seen, everything = len(source.beginning_only().data), len(source.data)
+    what = f"the first {seen / 1e6:.0f} of {everything / 1e6:.0f} MB were looked at; the last line stands beside this"
+    return (Problem("only_beginning", what, file, found=source.last_line()[:60]),)
+
+
+def parse_hints(columns: Mapping[str, str] | None) -> tuple[Hint, ...]:
+    """Columns asked for, without those that name no quantity."""
+    return tuple(Hint(q, wanted) for key, wanted in (columns or {}).items() if (q := quantity_named(key)))
+
+
+def _refused(path: Path, file: str, problems: tuple[Problem, ...], asked: tuple[Hint, ...]) -> Inspection:
+    """As much as can be said about an export that cannot be read."""
+    try:
+        source = open_sources(path, file)[0]
+    except ReadError:
+        return Inspection(file, problems=problems)
+    family = family_of(source)
+    seen = Inspection(file, family.name, family.text, source.encoding, problems=problems)
+    try:
+        layout = layout_of(source, asked)
+    except ReadError:
+        return seen
+    return replace(
+        seen,
+        delimiter=layout.delimiter,
+        decimal=layout.decimal,
+        header_rows=layout.header_rows,
+        columns=_columns(layout, _taken(source, family, layout, asked)),
+        metadata=layout.metadata,
+        advice=_advice(problems, family, layout),
+    )
+
+
+def _taken(source: Source, family: Family, layout: Layout, asked: tuple[Hint, ...]) -> tuple[Column, ...]:
+    hints = asked + family.hints(source, layout)
+    try:
+        return assign(layout.names, layout.units, layout.filled, hints).columns
+    except ReadError:
+        return ()
+
+
+def _advice(problems: tuple[Problem, ...], family: Family, layout: Layout) -> str:
+    """What to give so that the export can be read, where that is a matter of names and units."""
+    if not all(p.kind in ("missing_column", "missing_unit", "unknown_unit") for p in problems):
+        return ""
+    if family.advice:
+        return family.advice
+    name = "NAME [unit]" if any(layout.names) else "#1 [unit]"
+    other = "NAME [unit]" if any(layout.names) else "#2 [unit]"
+    return f'in columns: time = "{name}", friction_force = "{other}"'
+
+
+def _read(file: str, contents: Contents) -> Inspection:
+    first = contents.readings[0]
+    layout = first.block.layout
+    parts = [part for reading in contents.readings for part in split_at_restarts(reading)]
+    findings = [finding for part in parts for finding in part.findings]
+    doubts = [f.problem for f in findings if not f.fatal]
+    doubts += [doubt for part in parts[:1] for doubt in _doubts(part, file)]
+    if len(parts) > 1:
+        what, allowed = f"{len(parts)} tables that each are a trace", f"{file}#1 to {file}#{len(parts)}"
+        doubts.append(Problem("several_tables", what, file=file, allowed=allowed))
+    if contents.footer:
+        what = f"{len(contents.footer)} closing lines without data"
+        doubts.append(Problem("footer", what, file=file, found=contents.footer[0]))
+    return Inspection(
+        file=file,
+        family=first.family.name,
+        family_text=first.family.text,
+        encoding=first.source.encoding,
+        delimiter=layout.delimiter,
+        decimal=layout.decimal,
+        header_rows=layout.header_rows,
+        columns=_columns(layout, first.assignment.columns),
+        tables=tuple(_table(part) for part in parts),
+        other_tables=contents.others,
+        metadata=layout.metadata,
+        signs=_signs(parts),
+        missing=_missing(first),
+        doubts=tuple(doubts),
+        problems=tuple(f.problem for f in findings if f.fatal),
+    )
+
+
+def _columns(layout: Layout, columns: tuple[Column, ...]) -> tuple[ColumnSeen, ...]:
+    taken = {c.index: c for c in columns}
+    seen = []
+    for k in range(layout.n_cells):
+        column = taken.get(k)
+        if column is None:
+            seen.append(ColumnSeen(k + 1, layout.names[k], layout.units[k]))
+        else:
+            unit = column.label.rpartition("[")[2].rstrip("]") if "[" in column.label else ""
+            seen.append(ColumnSeen(k + 1, layout.names[k], unit, column.quantity, column.reason))
+    return tuple(seen)
+
+
+def _table(reading: Reading) -> TableSeen:
+    time, force = reading.arrays["time"], reading.arrays["friction force"]
+    step = np.diff(time) if time.size > 1 else np.zeros(1)
+    normal = reading.arrays.get("normal force")
+    return TableSeen(
+        label=reading.block.label,
+        first_row=reading.block.layout.header_rows + 1 + reading.skipped,
+        rows=int(time.size),
+        start_s=float(time[0]),
+        end_s=float(time[-1]),
+        step_s=float(np.median(step)),
+        shortest_step_s=float(step.min()),
+        longest_step_s=float(step.max()),
+        lowest_force_N=float(force.min()),
+        highest_force_N=float(force.max()),
+        normal_load_N=None if normal is None else float(np.median(np.abs(normal))),
+    )
+
+
+def _signs(parts: list[Reading]) -> tuple[str, ...]:
+    found = []
+    normal = parts[0].arrays.get("normal force")
+    if normal is not None and np.median(normal) < 0:
+        found.append("the normal force is negative under load")
+    means = [float(np.mean(part.arrays["friction force"][part.arrays["time"].size // 2 :])) for part in parts]
+    if max(means) > 0 > min(means):
+        found.append("the friction force takes both signs from table to table: strokes in opposite directions")
+    elif max(means) < 0:
+        found.append("the friction force is negative")
+    return tuple(found)
+
+
+def _missing(reading: Reading) -> tuple[str, ...]:
+    found = []
+    if "normal force" not in reading.arrays:
+        found.append("no normal load in the file: it comes from tests.csv")
+    if "displacement" not in reading.arrays:
+        found.append("no displacement")
+    return tuple(found)
+
+
+def _doubts(reading: Reading, file: str) -> list[Problem]:
+    label = {c.quantity: c.label for c in reading.assignment.columns}
+    time, force = reading.arrays["time"], reading.arrays["friction force"]
+    doubts = _other_candidates(reading)
+    step = np.diff(time)
+    if step.size and np.percentile(step, 95) - np.percentile(step, 5) > _UNEVEN * max(np.median(step), 1e-12):
+        found = f"{step.min():.4g} to {step.max():.4g} s"
+        doubts.append(Problem("uneven_time", "the time steps are uneven", file, None, label["time"], found))
+    start = float(np.median(force[:5]))
+    if abs(start) > _BASELINE_SHARE * float(np.abs(force).max()):
+        what = "the force does not start near zero: no zero phase to subtract"
+        place = (file, reading.row_of(0), label["friction force"], f"{start:.4g} N")
+        doubts.append(Problem("no_zero_phase", what, *place))
+    top = _flat_top(force)
+    if top is not None:
+        what = f"{top[1]} equal samples at the largest force: clipped?"
+        place = (file, reading.row_of(top[0]), label["friction force"], f"{force[top[0]]:.5g} N")
+        doubts.append(Problem("flat_top", what, *place))
+    for quantity, values in reading.arrays.items():
+        if quantity not in NEEDED and values.size > 1 and not np.ptp(values) and not values[0]:
+            doubts.append(Problem("all_zero", f"the {quantity} is zero throughout", file, None, label[quantity]))
+    return doubts
+
+
+def _other_candidates(reading: Reading) -> list[Problem]:
+    """Columns that could stand for a needed quantity as well as the one that was taken."""
+    layout = reading.block.layout
+    taken = {c.index for c in reading.assignment.columns}
+    doubts = []
+    for column in (c for c in reading.assignment.columns if c.quantity in NEEDED):
+        others = [
+            layout.names[k]
+            for k in range(layout.n_cells)
+            if k not in taken
+            and layout.filled[k]
+            and (hit := match_column(layout.names[k]))
+            and hit[0] == column.quantity
+        ]
+        if others:
+            what = f"the {column.quantity} could be {' or '.join(others)} as well"
+            place = (reading.source.file, layout.names_row, column.label)
+            doubts.append(Problem("other_candidate", what, *place))
+    return doubts
+
+
+def _flat_top(force: FloatArray) -> tuple[int, int] | None:
+    """(first sample, length) of the longest run of equal samples at the largest force, or None if it is short."""
+    at_top = np.flatnonzero(force == force.max())
+    runs = np.split(at_top, np.flatnonzero(np.diff(at_top) > 1) + 1)
+    longest = max(runs, key=len)
+    return (int(longest[0]), len(longest)) if len(longest) >= _FLAT_TOP and np.ptp(force) else None
+
+
+def _mark(decimal: str) -> str:
+    return "comma" if decimal == "," else "point"
+
+
+def _column_in_words(column: ColumnSeen) -> str:
+    name = f'{column.position} "{column.name}"{f" [{column.unit}]" if column.unit else ""}'
+    return f"{name} -> {column.quantity} ({column.reason})" if column.quantity else name
+
+
+def _table_in_words(table: TableSeen) -> str:
+    label = f"{table.label}: " if table.label else ""
+    load = "" if table.normal_load_N is None else f", normal load {table.normal_load_N:.4g} N"
+    return (
+        f"{label}{table.rows} rows from row {table.first_row}, {table.start_s:.6g} to {table.end_s:.6g} s in steps of "
+        f"{table.step_s:.4g} s, force {table.lowest_force_N:.4g} to {table.highest_force_N:.4g} N{load}"
+    )

@@ -1,0 +1,66 @@
+"""LabVIEW measurement files (.lvm): a header a segment, units in the names or in Y_Unit_Label.
+
+With "X_Columns No" the rows hold no time: it follows from X0 and Delta_X of the header of their segment.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from tribo.readers.core.assign import Hint, match_column, split_unit
+from tribo.readers.core.family import Family
+from tribo.readers.core.layout import Layout
+from tribo.readers.core.source import Source
+
+_HEADER_END = "***End_of_Header***"
+
+
+def recognises(source: Source) -> bool:
+    return source.head[0].startswith("LabVIEW Measurement")
+
+
+def with_times_written(source: Source) -> Source:
+    """The file with the times that its rows leave out written into their empty first cells; any other as it is."""
+    if not recognises(source) or source.is_large:
+        return source
+    lines = source.text(bytes(source.data)).split("\n")
+    header: dict[str, str] = {}
+    row: int | None = None
+    for k, line in enumerate(lines):
+        key, _, rest = line.partition("\t")
+        if key.startswith((_HEADER_END, "X_Value")):
+            row = 0 if key == "X_Value" else None
+        elif key:
+            header[key] = rest.split("\t")[0]
+        elif row is not None and rest.strip() and header.get("X_Columns") == "No":
+            lines[k] = f"{_time(header, row)}\t{rest}"
+            row += 1
+    return replace(source, data="\n".join(lines).encode(source.codec, errors="replace"))
+
+
+def _time(header: dict[str, str], row: int) -> str:
+    """X0 + row Delta_X in the decimal mark of the file; "" where the header does not give them."""
+    try:
+        start, step = (float(header.get(key, "").replace(",", ".")) for key in ("X0", "Delta_X"))
+    except ValueError:
+        return ""
+    mark = header.get("Decimal_Separator", ".") or "."
+    return f"{start + row * step:.9f}".replace(".", mark)
+
+
+def hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
+    """X_Value is time in seconds where X_Dimension says Time; Y_Unit_Label gives the units of the channels."""
+    found = []
+    dimension = layout.metadata.get("X_Dimension", "Time")
+    if "X_Value" in layout.names and dimension.startswith("Time"):
+        found.append(Hint("time", "X_Value [s]", "X_Value of a LabVIEW file is seconds"))
+    labels = layout.metadata.get("Y_Unit_Label", "").split()
+    channels = [name for name in layout.names[1:] if name and name != "Comment"]
+    for name, unit in zip(channels, labels, strict=False):
+        hit = match_column(name)
+        if hit and split_unit(name)[1] is None and not any(h.quantity == hit[0] for h in found):
+            found.append(Hint(hit[0], f"{name} [{unit}]", "unit from Y_Unit_Label"))
+    return tuple(found)
+
+
+LABVIEW = Family("labview", "LabVIEW measurement file, .lvm", recognises, hints)

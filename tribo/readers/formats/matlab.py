@@ -1,0 +1,79 @@
+"""MATLAB .mat files with named variables; they carry no units, so these are given in columns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tribo.errors import Problem, ReadError
+from tribo.readers.core.family import Family
+from tribo.readers.core.source import Source
+from tribo.records import FloatArray
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+def is_matlab(head: bytes) -> bool:
+    return head.startswith((b"MATLAB 5.0", b"MATLAB 7.3")) or head.startswith(_HDF5)
+
+
+def open_matlab(path: Path, file: str) -> Source:
+    """All vectors of the most frequent length, as named columns.
+
+    Raises
+    ------
+    ReadError
+        bad_mat, or not_an_export where no two vectors share a length.
+    """
+    vectors = _vectors(path, file)
+    lengths = [v.size for v in vectors.values() if v.size > 1]
+    if not lengths:
+        raise ReadError(Problem("not_an_export", "no vectors in it", file=file, found=", ".join(vectors) or None))
+    n = max(set(lengths), key=lambda size: (lengths.count(size), size))
+    kept = {name: v for name, v in vectors.items() if v.size == n}
+    return Source(path, file, b"", "binary", names=tuple(kept), arrays=tuple(kept.values()))
+
+
+def _vectors(path: Path, file: str) -> dict[str, FloatArray]:
+    try:
+        found = _from_hdf5(path) if _is_hdf5(path) else _from_mat5(path)
+    except ReadError:
+        raise
+    except Exception as why:  # scipy and h5py raise many kinds on damaged files
+        raise ReadError(Problem("bad_mat", f"not a readable .mat file ({why})", file=file)) from why
+    return {
+        name: np.ascontiguousarray(np.ravel(value), dtype=float)
+        for name, value in found.items()
+        if isinstance(value, np.ndarray) and value.dtype.kind in "fiu" and value.size == max(value.shape, default=0)
+    }
+
+
+def _is_hdf5(path: Path) -> bool:
+    with path.open("rb") as stream:
+        return _HDF5 in stream.read(520)
+
+
+def _from_mat5(path: Path) -> dict[str, Any]:
+    from scipy.io import loadmat
+
+    return {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+
+
+def _from_hdf5(path: Path) -> dict[str, Any]:
+    import h5py
+
+    with h5py.File(path, "r") as stored:
+        return {name: item[()] for name, item in stored.items() if isinstance(item, h5py.Dataset)}
+
+
+def recognises(source: Source) -> bool:
+    return bool(source.arrays)
+
+
+ADVICE = (
+    "variables carry no units; give them in columns "
+    '(a force divided by a weight takes that weight as its unit: friction_force = "Fnorm [30.7 gf]")'
+)
+MATLAB = Family("matlab", "MATLAB .mat, named variables", recognises, advice=ADVICE)

@@ -1,0 +1,35 @@
+"""Newport rotary rig: one tab-separated line of settings, then semicolon-separated numbers without names.
+
+Columns by the rig's own evaluation script: step time, time, force across the contact, torque, position, turns a
+second, sliding speed. The friction is a torque, so its lever must be given.
+"""
+
+from __future__ import annotations
+
+import re
+
+from tribo.readers.core.assign import Hint
+from tribo.readers.core.family import Family
+from tribo.readers.core.layout import Layout
+from tribo.readers.core.source import Source
+
+_SETTINGS = re.compile(r"(?:-?\d+\.\d+\t){15}-?\d+\.\d+\s*")
+_ROW = re.compile(r"(?:-?\d+\.\d+;){6}-?\d+\.\d+\s*")
+
+
+def recognises(source: Source) -> bool:
+    head = source.head
+    return len(head) > 1 and bool(_SETTINGS.fullmatch(head[0])) and bool(_ROW.fullmatch(head[1]))
+
+
+def hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
+    reason = "order of columns of this rig"
+    return (
+        Hint("time", "#2 [s]", reason),
+        Hint("normal force", "#3 [N]", reason),
+        Hint("displacement", "#5 [um]", reason),
+    )
+
+
+ADVICE = 'the friction is a torque in column 4; give its lever: friction_force = "#4 [N m / LEVER mm]" in columns'
+NEWPORT = Family("newport", "Newport rotary rig, settings line and nameless columns", recognises, hints, ADVICE)

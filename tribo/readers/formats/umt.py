@@ -1,0 +1,14 @@
+"""CETR and Bruker UMT: a table a step, forces in gram-force written as g, the normal force negative."""
+
+from __future__ import annotations
+
+from tribo.readers.core.family import Family
+from tribo.readers.core.source import Source
+
+
+def recognises(source: Source) -> bool:
+    first = source.head[0]
+    return first.startswith(("Created by CETR", "Created by Bruker UMT", "Created by UMT"))
+
+
+UMT = Family("umt", "CETR and Bruker UMT, CSV of the data viewer, a table a step", recognises)

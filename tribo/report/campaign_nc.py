@@ -1,0 +1,163 @@
+"""campaign.nc: tables and traces of a study in one HDF5 file, readable by plain h5py and by xarray."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from tribo.records import Study, Trace
+from tribo.report import result_tables
+from tribo.report.provenance import Provenance
+from tribo.store.whole_files import whole_file
+
+if TYPE_CHECKING:
+    from tribo.diagnose import Diagnosis
+
+# How the end of a column name says its unit; the longest ending wins.
+UNIT_ENDINGS = {
+    "_N_per_s": "N/s", "_N_per_m": "N/m", "_m_s": "m/s", "_u_kPa": "kPa", "_kPa": "kPa", "_Pa": "Pa",
+    "_N": "N",
+    "_u_N": "N", "_s": "s", "_m": "m", "_kg": "kg", "_deg": "degree", "_C": "degC", "_pct": "percent",
+    "_percent": "percent",
+}  # fmt: skip
+OF_DIAGNOSIS = ("/residuals", "/extended_runs")  # groups that a diagnosis writes anew, or leaves out, as a whole
+UNITLESS = {"mu": "1", "mu_u": "1", "ratio": "1", "ratio_low": "1", "ratio_high": "1", "cov": "kPa"}
+
+
+def unit_of(column: str) -> str | None:
+    """Unit of a column by the house rule that the unit ends the name; None where it has none."""
+    if column in UNITLESS:
+        return UNITLESS[column]
+    endings = [e for e in UNIT_ENDINGS if column.endswith(e)]
+    return UNIT_ENDINGS[max(endings, key=len)] if endings else None
+
+
+def _units(column: str) -> dict[str, str]:
+    unit = unit_of(column)
+    return {"units": unit} if unit else {}
+
+
+def write_store(
+    study: Study,
+    out: Path,
+    provenance: Provenance | None = None,
+    diagnosis: Diagnosis | None = None,
+    keep_earlier: bool = False,
+) -> Path:
+    """Write out/campaign.nc, a DataTree with the groups tests, fits, comparison, simulated and traces.
+
+    With a ``diagnosis`` also residuals, a row a test and regime under the calibrated and the extended model, and
+    extended_runs, the pairs of runs of the simulator without and with the named mechanisms.
+
+    ``provenance`` stands in the attributes of the file, as JSON. With ``keep_earlier``, groups that a longer walk over
+    the same inputs left in the file, and this study has not, stay.
+
+    ``traces`` is a contiguous ragged array (CF conventions 9.3.3): the samples of all traces end to end, with
+    ``row_size`` samples and the first at ``row_start`` for each test. Times in s, forces in N as recorded
+    (the zero is not subtracted; it is ``zero_N`` in tests).
+    """
+    campaign = study.ingested.campaign
+    about = {
+        "title": campaign.title,
+        "material": campaign.material,
+        "counterface": campaign.counterface,
+        "nominal_area_m2": campaign.nominal_area_m2,
+        "Conventions": "CF-1.11",
+    }
+    if provenance is not None:
+        about |= {"source": provenance.origin, "history": f"{provenance.started_at} {provenance.command}".strip()}
+        about["provenance"] = json.dumps(provenance.as_record(), ensure_ascii=False, default=str)
+    groups = {"/": xr.Dataset(attrs=about), "/tests": _table(result_tables.tests_table(study), "test")}
+    groups["/traces"] = _ragged(study)
+    if study.fits:
+        groups["/fits"] = _table(result_tables.fits_table(study.fits), "fit")
+        groups["/other_fits"] = _table(result_tables.other_fits_table(study), "parameter_row")
+    if study.budget is not None:
+        groups["/budget"] = _table(study.budget, "budget_row")
+    if study.comparison is not None:
+        groups["/comparison"] = _table(result_tables.comparison_table(study), "comparison_row")
+        groups["/comparison"].attrs["flat"] = study.comparison.flat
+    if study.simulated is not None:
+        groups["/simulated"] = _table(study.simulated, "run")
+    if diagnosis is not None:
+        groups |= _diagnosed(diagnosis)
+    path = out / "campaign.nc"
+    if keep_earlier:
+        renewed = OF_DIAGNOSIS if diagnosis is not None else ()
+        groups = {name: group for name, group in _earlier(path).items() if name not in renewed} | groups
+    with whole_file(path) as part:
+        xr.DataTree.from_dict(groups).to_netcdf(part, engine="h5netcdf")
+    return path
+
+
+def _earlier(path: Path) -> dict[str, xr.Dataset]:
+    """The groups of a file that is there, but the root; none where it cannot be read."""
+    try:
+        with xr.open_datatree(path, engine="h5netcdf") as tree:
+            return {f"/{node.name}": node.to_dataset().load() for node in tree.children.values()}
+    except (OSError, ValueError):
+        return {}
+
+
+def _diagnosed(diagnosis: Diagnosis) -> dict[str, xr.Dataset]:
+    from tribo.diagnose import residual_table
+
+    residuals, runs = OF_DIAGNOSIS
+    groups = {residuals: _table(residual_table(diagnosis), "residual_row")}
+    if diagnosis.simulated is not None:
+        groups[runs] = _table(diagnosis.simulated.table, "pair")
+        groups[runs].attrs["mechanisms"] = ", ".join(diagnosis.simulated.mechanisms)
+    return groups
+
+
+def _table(frame: pd.DataFrame, dimension: str) -> xr.Dataset:
+    variables = {}
+    for name in frame.columns:
+        safe = re.sub(r"[/\s]+", "_", str(name))
+        variables[safe] = (dimension, _values(frame[name]), _units(str(name)))
+    return xr.Dataset(variables)
+
+
+def _values(column: pd.Series) -> np.ndarray:
+    """Numbers as float64 or int64, everything else as text; a missing number is NaN, a missing text empty."""
+    if pd.api.types.is_numeric_dtype(column) or column.isna().all():
+        return column.to_numpy(float) if not pd.api.types.is_integer_dtype(column) else column.to_numpy(np.int64)
+    try:
+        return pd.to_numeric(column).to_numpy(float)
+    except (ValueError, TypeError):
+        return column.fillna("").astype(str).to_numpy(object)
+
+
+def _ragged(study: Study) -> xr.Dataset:
+    traces = study.ingested.traces
+    sizes = np.array([len(t.time_s) for t in traces.values()], np.int64)
+    names = list(dict.fromkeys(name for t in traces.values() for name in t.columns))
+    data = {"time_s": _joined(traces, "time_s"), "force_N": _joined(traces, "force_N")}
+    if any(t.displacement_m is not None for t in traces.values()):
+        data["displacement_m"] = _joined(traces, "displacement_m")
+    data |= {name: _joined(traces, name) for name in names if name not in data}
+    variables = {name: ("sample", values, _units(name)) for name, values in data.items()}
+    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64) if len(sizes) else sizes
+    per_test = {
+        "test_id": ("test", np.array(list(traces), object), {"cf_role": "timeseries_id"}),
+        "file": ("test", np.array([t.file for t in traces.values()], object), {}),
+        "row_size": ("test", sizes, {"sample_dimension": "sample"}),
+        "row_start": ("test", starts, {}),
+    }
+    return xr.Dataset({**per_test, **variables}, attrs={"featureType": "timeSeries"})
+
+
+def _joined(traces: Mapping[str, Trace], name: str) -> np.ndarray:
+    """One quantity of all traces end to end, NaN where a trace lacks it."""
+    parts = []
+    for trace in traces.values():
+        values = trace.columns.get(name) if name in trace.columns else getattr(trace, name, None)
+        parts.append(np.full(len(trace.time_s), np.nan) if values is None else np.asarray(values, float))
+    return np.concatenate(parts) if parts else np.empty(0)

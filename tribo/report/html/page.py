@@ -1,0 +1,112 @@
+"""report.html: one file that works offline, on a phone and on paper, light and dark, and without scripts too."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from hashlib import sha256
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
+
+from tribo.records import Study
+from tribo.report.content import content, figure_places
+from tribo.report.drawings import Drawn, draw_all, inline_svg
+from tribo.report.html.embedded import figure_data, trace_data
+from tribo.report.html.pull_cards import PullCard
+from tribo.report.provenance import Provenance
+from tribo.report.words.numerals import ratio_text, significant, unbroken
+from tribo.report.words.wording import flags_in_words
+
+
+def html(
+    study: Study,
+    provenance: Provenance | None = None,
+    drawn: Mapping[str, Drawn] | None = None,
+    verdict: Mapping[str, Any] | None = None,
+) -> str:
+    """The page as text: the same bytes for the same study, provenance and verdict.
+
+    ``drawn`` are the figures by name where they are at hand already, ``verdict`` the diagnosis in the form of
+    verdict.json.
+    """
+    figures = draw_all(study) if drawn is None else drawn
+    said = content(study, provenance, verdict)
+    places = {k: [_shown(figures[n]) for n in names] for k, names in figure_places(list(figures)).items()}
+    style, script = (_static(name) for name in ("style.css", "page.js"))
+    return (
+        _environment()
+        .get_template("report.html")
+        .render(
+            **said,
+            lead=places["lead"],
+            figures=places["figures"],
+            diagnosis_figures=places,
+            filters=_filters(said["cards"]),
+            figure_data=figure_data({name: figure.series for name, figure in figures.items()}),
+            trace_data=trace_data(study, [card.test_id for card in said["cards"]]),
+            style=Markup(style),
+            style_hash=_csp_hash(style),
+            script=Markup(script),
+            script_hash=_csp_hash(script),
+        )
+    )
+
+
+def _static(name: str) -> str:
+    return (files("tribo.report.html") / "templates" / name).read_text(encoding="utf-8")
+
+
+def _csp_hash(text: str) -> str:
+    """The source expression by which the page allows exactly this style or script and no other."""
+    return "sha256-" + base64.b64encode(sha256(text.encode("utf-8")).digest()).decode("ascii")
+
+
+def _filters(cards: list[PullCard]) -> list[tuple[str, str, list[tuple[str, str]]]]:
+    """What pulls can be filtered by: attribute of a card, label, and values with their words."""
+    flags = sorted({flag for card in cards for flag in card.flags})
+    specimens = sorted({card.specimen for card in cards})
+    samples = sorted({card.sample for card in cards})
+    loads = sorted({card.load for card in cards}, key=float)
+    return [
+        ("sample", "Sample", [(s, s) for s in samples]),
+        ("load", "Load", [(load, f"{load} N") for load in loads]),
+        ("specimen", "Specimen", [(s, s) for s in specimens]),
+        ("flags", "Flag", [(flag, flags_in_words([flag])) for flag in flags]),
+        ("state", "State", [("used", "used"), ("moved", "moved by hand"), ("excluded", "left out by hand")]),
+    ]
+
+
+@lru_cache(maxsize=1)
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("tribo.report.html"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["sig"] = significant
+    environment.filters["ratio"] = ratio_text
+    environment.filters["unbroken"] = unbroken
+    return environment
+
+
+@dataclass(frozen=True)
+class ShownFigure:
+    """A figure as the page shows it."""
+
+    name: str
+    title: str
+    caption: str
+    svg: Markup
+
+
+def _shown(figure: Drawn) -> ShownFigure:
+    picture = Markup(inline_svg(figure.svg, figure.name, str(escape(f"{figure.title}. {figure.caption}"))))
+    return ShownFigure(figure.name, figure.title, figure.caption, picture)

@@ -1,0 +1,141 @@
+"""report.pdf: the same record as the page, set on A4 with typst; the same bytes for the same inputs and choices."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
+from importlib.resources import files
+from typing import Any
+
+from tribo.records import Study
+from tribo.report.content import content, figure_places
+from tribo.report.drawings import Drawn, draw_all
+from tribo.report.html.pull_cards import PullCard
+from tribo.report.paper.typeset import document
+from tribo.report.provenance import Provenance
+from tribo.report.words.numerals import significant, unbroken
+
+TEMPLATE = "report.typ"
+NOT_OF_THE_INPUTS = ("Command", "Started")  # differ from run to run, which the bytes of the PDF must not
+
+
+def pdf(
+    study: Study,
+    provenance: Provenance | None = None,
+    drawn: Mapping[str, Drawn] | None = None,
+    verdict: Mapping[str, Any] | None = None,
+) -> bytes:
+    """The document. Its date is that of the last test, and none where no test says when it was made.
+
+    The command and the time of the run are left to provenance.json, so that two runs over the same inputs with the
+    same choices give the same bytes.
+    """
+    figures = draw_all(study) if drawn is None else drawn
+    said = content(study, provenance, verdict)
+    record = _record(said, figures)
+    record["origin"] = provenance.origin if provenance is not None else ""
+    pictures = {f"{name}.svg": figure.files["svg"] for name, figure in figures.items()}
+    template = (files("tribo.report.paper") / "templates" / TEMPLATE).read_text(encoding="utf-8")
+    data = json.dumps(record, ensure_ascii=False).encode("utf-8")
+    return document(template, {"data.json": data, **pictures}, _last_day(study))
+
+
+def _last_day(study: Study) -> datetime:
+    """When the newest test was made; without any, the beginning of time as computers count it."""
+    days = []
+    for test in study.ingested.campaign.tests:
+        try:
+            day = datetime.fromisoformat(test.started_at)
+        except ValueError:
+            continue
+        days.append(day if day.tzinfo else day.replace(tzinfo=UTC))
+    return max(days, default=datetime.fromtimestamp(0, UTC))
+
+
+def _record(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str, Any]:
+    """The content as plain strings and tables of strings."""
+    verdict, summary, campaign, study = said["verdict"], said["summary"], said["campaign"], said["study"]
+    bodies = f"{campaign.material or 'sample'} on {campaign.counterface or 'counterface'}"
+    record = {
+        "title": campaign.title,
+        "about": f"{bodies}, nominal area {campaign.nominal_area_m2 * 1e6:g} mm²",
+        "verdict": verdict,
+        "model": summary["model"],
+        "flat": summary["flat"],
+        "measured": summary["measured"],
+        "set_aside": [[fault.test_id, fault.reason] for fault in said["set_aside"]],
+        "by_hand": said["by_hand"],
+        "flags": [[flag, str(count), ", ".join(tests)] for flag, count, tests in said["flags"]],
+        "tribosystem": [[c.name, c.in_words] for c in said["tribosystem"]],
+        "load": significant(said["table2"]["load_N"]),
+        "correlation": summary["correlation"],
+        "table2": _table2(said["table2"]),
+        "paired": said["paired"],
+        "agreement": [{"title": _title(p["regime"]), "rows": p["sentences"]} for p in said["agreement"]],
+        "how_to_read": summary["how_to_read"],
+        "order": summary["order"],
+        "directions": summary["directions"],
+        "budget": [table.sentence for table in said["budget"]],
+        "power": study.power,
+        "notes": study.notes,
+        "provenance": [[n, v] for n, v in said["provenance"] or () if n not in NOT_OF_THE_INPUTS],
+        "pulls": [_pull_row(card) for card in sorted(said["cards"], key=lambda card: card.test_id)],
+        **_diagnosis_tables(verdict),
+    }
+    spaced: dict[str, Any] = _spaced(record)
+    return spaced | {
+        "places": figure_places(list(figures)),
+        "figures": {f.name: {"title": f.title, "caption": f.caption} for f in figures.values()},
+    }
+
+
+def _title(regime: str) -> str:
+    return f"{regime.capitalize()} friction"
+
+
+def _table2(table: Mapping[str, Any]) -> list[dict[str, Any]]:
+    head = ["Sample", "AF", "μ", "τ₀ (kPa)", "T (N)", "Specimens, tests"]
+    if table["simulated"]:
+        head[5:5] = ["μ simulated", "τ₀ simulated", "T simulated"]
+    return [
+        {
+            "title": _title(regime),
+            "head": head,
+            "rows": [
+                [sample, f"{af:.3f}", *measured, *(model if table["simulated"] else ()),
+                 f"{fit.n_specimens}, {fit.n_tests}"]
+                for sample, af, measured, model, fit in rows
+            ],
+        }
+        for regime, rows in table["regimes"]
+    ]  # fmt: skip
+
+
+def _diagnosis_tables(verdict: Mapping[str, Any] | None) -> dict[str, list[Any]]:
+    if verdict is None:
+        return {"misfits": [], "causes": [], "excluded": []}
+    return {
+        "misfits": [[m["observable"], m["p"], m["sample"], m["covariate"], m["text"]] for m in verdict["misfits"]],
+        "causes": [[c["mechanism"], c["weight"], "; ".join(c["sizes"]), c["text"]] for c in verdict["causes"]],
+        "excluded": verdict["excluded"],
+    }
+
+
+def _pull_row(card: PullCard) -> list[str]:
+    said = [card.flags_in_words, {"used": "", "moved": "moved by hand", "excluded": "left out by hand"}[card.state]]
+    return [
+        card.test_id, card.sample, card.specimen, card.load, card.static, card.sliding, card.window,
+        significant(card.oddness, 2), "; ".join(part for part in said if part),
+    ]  # fmt: skip
+
+
+def _spaced(value: Any) -> Any:
+    """The same record with unbreakable spaces where numbers and units stand."""
+    if isinstance(value, str):
+        return unbroken(value)
+    if isinstance(value, Mapping):
+        return {key: _spaced(part) for key, part in value.items()}
+    if isinstance(value, Iterable):
+        return [_spaced(part) for part in value]
+    return value

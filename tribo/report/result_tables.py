@@ -1,0 +1,174 @@
+"""The tables of a study as data frames and CSV files. Units end the column names; NaN is an empty cell."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from tribo.figures import agreement
+from tribo.records import LawFit, Pull, SetAside, Study, Test
+from tribo.store.whole_files import write_text
+
+FLOAT_FORMAT = "%.8g"
+PA_PER_KPA = 1e3
+TESTS_COLUMNS = [
+    "test_id", "static_N", "static_u_N", "sliding_N", "sliding_u_N", "rule", "window", "zero_N", "flags",
+    "set_aside", "sample", "specimen", "normal_load_N", "peak_s", "onset_s", "window_start_s", "window_end_s",
+    "zero_u_N", "rise_N_per_s", "rise_stiffness_N_per_m", "stick_slip_amplitude_N", "stick_slip_period_s", "noise_N",
+    "drift_N_per_s", "direction", "speed_m_s", "hold_s", "repeat", "run_order", "specimen_run", "started_at",
+    "temperature_C", "humidity_pct", "operator", "file", "doubts",
+]  # fmt: skip
+FITS_COLUMNS = [
+    "sample", "regime", "mu", "mu_u", "tau0_kPa", "tau0_u_kPa", "cov", "n_specimens", "n_tests", "method",
+    "chi2_red", "law", "dof", "mu_low", "mu_high", "tau0_low_kPa", "tau0_high_kPa", "notes",
+]  # fmt: skip
+COMPARISON_COLUMNS = [
+    "sample", "regime", "normal_load_N", "measured_N", "measured_u_N", "simulated_N", "simulated_u_N",
+    "ratio", "ratio_low", "ratio_high",
+]  # fmt: skip
+_READINGS = [
+    "static_N", "static_u_N", "sliding_N", "sliding_u_N", "rule", "zero_N", "peak_s", "onset_s", "zero_u_N",
+    "rise_N_per_s", "rise_stiffness_N_per_m", "stick_slip_amplitude_N", "stick_slip_period_s", "noise_N",
+    "drift_N_per_s",
+]  # fmt: skip
+_CONDITIONS = [
+    "sample", "specimen", "normal_load_N", "direction", "speed_m_s", "hold_s", "repeat", "run_order",
+    "specimen_run", "started_at", "temperature_C", "humidity_pct", "operator", "file",
+]  # fmt: skip
+
+
+def all_set_aside(study: Study) -> dict[str, SetAside]:
+    """Every test that takes no part, by its id: faulty rows of tests.csv and exports that fail."""
+    ingested = study.ingested
+    return {fault.test_id: fault for fault in (*ingested.campaign.set_aside, *ingested.set_aside)}
+
+
+def tests_table(study: Study) -> pd.DataFrame:
+    """One row a test in the order of the campaign, used or set aside; its own covariates come last."""
+    ingested = study.ingested
+    aside = all_set_aside(study)
+    doubts = {doubted.test_id: doubted.reason for doubted in ingested.doubts()}
+    placed = [
+        (
+            t.row,
+            _test_row(t, ingested.pulls.get(t.test_id), aside.pop(t.test_id, None))
+            | {"doubts": doubts.get(t.test_id, "")},
+        )
+        for t in ingested.campaign.tests
+    ]
+    placed += [(_faulty_row(fault), {"test_id": fault.test_id, "set_aside": fault.reason}) for fault in aside.values()]
+    rows = [row for _, row in sorted(placed, key=lambda item: math.inf if item[0] is None else item[0])]
+    covariates = list(dict.fromkeys(name for t in ingested.campaign.tests for name in t.covariates))
+    extra = [name for name in covariates if name not in TESTS_COLUMNS]
+    return pd.DataFrame(rows, columns=[*TESTS_COLUMNS, *extra])
+
+
+def _faulty_row(fault: SetAside) -> int | None:
+    """The row of tests.csv that a test set aside before its export was read stands in, where it is known."""
+    return next((p.row for p in fault.problems if p.row is not None), None)
+
+
+def _test_row(test: Test, pull: Pull | None, fault: SetAside | None) -> dict[str, object]:
+    row: dict[str, object] = {**test.covariates, "test_id": test.test_id}
+    row |= {name: getattr(test, name) for name in _CONDITIONS}
+    row["set_aside"] = fault.reason if fault is not None else ""
+    if pull is not None:
+        start, end = pull.window_s
+        row |= {name: getattr(pull, name) for name in _READINGS}
+        row |= {"window": f"{start:.6g}:{end:.6g}", "window_start_s": start, "window_end_s": end}
+        row["flags"] = ";".join(pull.flags)
+    return row
+
+
+def fits_table(fits: Iterable[LawFit]) -> pd.DataFrame:
+    """mu and tau0 (kPa) of every fit; ``cov`` is cov(mu, tau0) in kPa, ``*_low`` to ``*_high`` 95 %."""
+    return pd.DataFrame([_fit_row(fit) for fit in fits if "tau0_Pa" in fit.parameters], columns=FITS_COLUMNS)
+
+
+def _fit_row(fit: LawFit) -> dict[str, object]:
+    mu, tau0 = fit.parameters.index("mu"), fit.parameters.index("tau0_Pa")
+    mu_low, mu_high = fit.interval("mu")
+    tau0_low, tau0_high = fit.interval("tau0_Pa")
+    return {
+        "sample": fit.sample,
+        "regime": fit.regime,
+        "mu": fit.value("mu"),
+        "mu_u": fit.standard_uncertainty("mu"),
+        "tau0_kPa": fit.value("tau0_Pa") / PA_PER_KPA,
+        "tau0_u_kPa": fit.standard_uncertainty("tau0_Pa") / PA_PER_KPA,
+        "cov": float(fit.covariance[mu, tau0]) / PA_PER_KPA,
+        "n_specimens": fit.n_specimens,
+        "n_tests": fit.n_tests,
+        "method": fit.method,
+        "chi2_red": fit.chi2_red,
+        "law": fit.law,
+        "dof": fit.dof,
+        "mu_low": mu_low,
+        "mu_high": mu_high,
+        "tau0_low_kPa": tau0_low / PA_PER_KPA,
+        "tau0_high_kPa": tau0_high / PA_PER_KPA,
+        "notes": "; ".join(fit.notes),
+    }
+
+
+def other_fits_table(study: Study) -> pd.DataFrame:
+    """The data under other weights or laws, and the model's own fits: a row a parameter, SI units."""
+    simulated = study.comparison.simulated if study.comparison is not None else ()
+    labelled = [("measured", f) for f in study.other_fits] + [("simulated", f) for f in simulated]
+    rows = [
+        (
+            source,
+            f.sample,
+            f.regime,
+            f.law,
+            f.method,
+            name,
+            f.value(name),
+            f.standard_uncertainty(name),
+            *f.interval(name),
+            f.dof,
+            f.n_specimens,
+            f.n_tests,
+            f.chi2_red,
+        )
+        for source, f in labelled
+        for name in f.parameters
+    ]
+    columns = ["source", "sample", "regime", "law", "method", "parameter", "value", "u", "low", "high"]
+    return pd.DataFrame(rows, columns=[*columns, "dof", "n_specimens", "n_tests", "chi2_red"])
+
+
+def comparison_table(study: Study) -> pd.DataFrame:
+    """Measured and simulated force at each load; ``ratio`` is measured over simulated, with 95 %."""
+    if study.comparison is None:
+        return pd.DataFrame(columns=COMPARISON_COLUMNS)
+    rows = pd.DataFrame([vars(row) for row in study.comparison.rows], columns=COMPARISON_COLUMNS[:7])
+    ratios = agreement.numbers(study).drop(columns="sample_number")
+    return rows.merge(ratios, on=["sample", "regime", "normal_load_N"], how="left", validate="1:1")
+
+
+def to_csv(table: pd.DataFrame) -> str:
+    """CSV text, the same for the same table on every machine."""
+    table = table.copy()
+    for name in table.select_dtypes("float"):
+        table[name] = table[name].replace(-0.0, 0.0).where(np.isfinite(table[name]) | table[name].isna(), np.nan)
+    return str(table.to_csv(index=False, float_format=FLOAT_FORMAT, lineterminator="\n"))
+
+
+def write_tables(study: Study, out: Path) -> list[Path]:
+    """tests.csv, and fits, other_fits, budget, differences and comparison as far as the study went."""
+    tables = {"tests.csv": tests_table(study)}
+    if study.fits:
+        tables["fits.csv"] = fits_table(study.fits)
+        tables["other_fits.csv"] = other_fits_table(study)
+    if study.budget is not None:
+        tables["budget.csv"] = study.budget
+    if study.differences is not None:
+        tables["differences.csv"] = study.differences
+    if study.comparison is not None:
+        tables["comparison.csv"] = comparison_table(study)
+    return [write_text(out / name, to_csv(table)) for name, table in tables.items()]

@@ -1,0 +1,72 @@
+"""The study on a terminal: the Table-2-like table, what was set aside, what agrees."""
+
+from __future__ import annotations
+
+from tribo.figures import select
+from tribo.records import REGIMES, LawFit, Regime, Study
+from tribo.report.result_tables import PA_PER_KPA
+from tribo.report.words import findings, wording
+from tribo.report.words.numerals import with_uncertainty
+
+HEAD = ("sample", "mu", "tau0 (kPa)", "T (N)", "mu", "tau0 (kPa)", "T (N)", "specimens", "tests")
+
+
+def table2_text(study: Study) -> str:
+    """Table 2 of the paper for this campaign: mu, tau0 and T at the middle load, measured and simulated."""
+    if not study.fits:
+        return "nothing was fitted"
+    load = findings.common_loads(study)[1]
+    blocks = [_regime_block(study, regime, load) for regime in REGIMES]
+    foot = f"T at N = {load:.3g} N. Standard uncertainties (k = 1). mu and tau0 of one fit trade off: compare T."
+    return "\n\n".join([*(b for b in blocks if b), foot])
+
+
+def _regime_block(study: Study, regime: Regime, load: float) -> str:
+    simulated = study.comparison.simulated if study.comparison is not None else ()
+    rows = []
+    for sample in select.sample_numbers(study):
+        measured, model = select.fit_of(study.fits, sample, regime), select.fit_of(simulated, sample, regime)
+        if measured is not None:
+            counts = (str(measured.n_specimens), str(measured.n_tests))
+            rows.append((sample, *fit_cells(measured, load), *fit_cells(model, load), *counts))
+    if not rows:
+        return ""
+    if not simulated:
+        return "\n".join([regime.upper(), *_aligned([(*row[:4], *row[7:]) for row in (HEAD, *rows)])])
+    lines = _aligned([HEAD, *rows])
+    left, right = lines[0].index(" mu") + 1, lines[0].rindex(" mu") + 1
+    head = f"{regime.upper():<{left}}measured"
+    return "\n".join([f"{head:<{right}}simulated", *lines])
+
+
+def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
+    """Columns of equal width, the first to the left, the others to the right."""
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    return [_line(row, widths) for row in rows]
+
+
+def _line(row: tuple[str, ...], widths: list[int]) -> str:
+    first, *rest = (
+        cell.rjust(width) if k else cell.ljust(width) for k, (cell, width) in enumerate(zip(row, widths, strict=True))
+    )
+    return "  ".join([first, *rest])
+
+
+def fit_cells(fit: LawFit | None, load_N: float) -> tuple[str, str, str]:
+    """mu, tau0 in kPa and T at a load in newton, each with its standard uncertainty; dashes without a fit."""
+    if fit is None:
+        return "–", "–", "–"
+    return (
+        with_uncertainty(fit.value("mu"), fit.standard_uncertainty("mu")),
+        with_uncertainty(fit.value("tau0_Pa") / PA_PER_KPA, fit.standard_uncertainty("tau0_Pa") / PA_PER_KPA),
+        with_uncertainty(float(fit.force_N(load_N)), float(fit.force_u_N(load_N))),
+    )
+
+
+def summary_text(study: Study) -> str:
+    """What was measured and what agrees, as the report says it, one sentence a line."""
+    agreements = findings.agreements(study)
+    lines = [wording.what_was_measured(study), *wording.in_short(agreements, select.flat_sample(study))]
+    lines += [wording.ranking_sentence(r) for r in findings.rankings(study)]
+    lines += wording.direction_sentences(findings.direction_ratios(study))
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""The engines of the spring-block model: fast, dense and reference, and the compiled loops they run."""

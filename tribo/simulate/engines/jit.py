@@ -1,0 +1,130 @@
+"""Compiled functions whose cache can never answer for older sources.
+
+numba's ``cache=True`` looks only at the file a function stands in, so an edit of something it calls is missed.
+Here the cache directory carries a hash of every source file of this package: a changed file means a new
+directory, and directories no start has used for a month are removed. ``TRIBO_CACHE_DIR`` moves it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from numba import config, njit, types
+from numba.core.compiler import Compiler
+from numba.extending import intrinsic
+
+UNUSED_DAYS = 30.0
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+@lru_cache(maxsize=1)
+def cache_directory() -> Path:
+    """The directory of compiled code for exactly these sources, created where it can be written."""
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parents[1].rglob("*.py")):
+        digest.update(source.name.encode() + b"\0" + source.read_bytes())
+    name = f"numba-{digest.hexdigest()[:16]}"
+    for base in _cache_bases():
+        folder = base / name
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                os.utime(folder)
+                remove_unused(base)
+                return folder
+        except OSError:
+            continue
+    return Path(tempfile.mkdtemp(prefix=name))
+
+
+def remove_unused(base: Path, days: float = UNUSED_DAYS) -> None:
+    """Remove the code of other sources that no start has used for so many days.
+
+    A start marks its directory before this. A directory is renamed before it is emptied, so two starts never empty the
+    same one; whatever cannot be removed stays.
+    """
+    oldest = time.time() - 86400 * days
+    for folder in base.glob("numba-*"):
+        try:
+            if folder.stat().st_mtime > oldest:
+                continue
+            doomed = folder.with_name(f"removed-{os.getpid()}-{folder.name}")
+            folder.rename(doomed)
+        except OSError:  # another start was faster, or it is not ours
+            continue
+        shutil.rmtree(doomed, ignore_errors=True)
+
+
+def _cache_bases() -> list[Path]:
+    chosen = os.environ.get("TRIBO_CACHE_DIR")
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return ([Path(chosen)] if chosen else []) + [Path(home) / "tribo", Path(tempfile.gettempdir()) / "tribo-cache"]
+
+
+def compiled(function: Function) -> Function:
+    """``numba.njit`` without the global interpreter lock, cached under :func:`cache_directory`.
+
+    No fastmath: it would let the compiler drop the checks for NaN.
+    """
+    return _cached(function)
+
+
+class _Apart(Compiler):
+    """The compiler with array arguments that do not overlap."""
+
+    def define_pipelines(self) -> Any:
+        self.state.flags.noalias = True
+        return super().define_pipelines()
+
+
+VECTOR_OPTIONS: dict[str, Any] = {"pipeline_class": _Apart, "fastmath": {"reassoc", "contract", "nsz"}}
+
+
+def vectorised(function: Function) -> Function:
+    """As :func:`compiled`, for a loop over arrays that share no memory, in a form the vector units can run.
+
+    The compiler is told that no two array arguments overlap, may reorder sums and may fuse products into them. NaN and
+    infinity stay what they are. Passing overlapping arrays, one of them written to, gives wrong numbers.
+    """
+    return _cached(function, **VECTOR_OPTIONS)
+
+
+def _attribute(name: str) -> Callable[[], None]:
+    """A call that, compiled, does nothing but give the function it stands in this attribute of LLVM."""
+
+    def set_on(typing_context: Any) -> Any:
+        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            set.add(builder.function.attributes, name)  # llvmlite's own add knows no attributes with values
+            return context.get_dummy_value()
+
+        return types.void(), code
+
+    return cast(Callable[[], None], cast(Any, intrinsic)(set_on))
+
+
+# The compiler may use the widest vectors the processor has: LLVM keeps to 256 bits on many processors with 512, for
+# fear of their clock rate. Where the function is copied into another, that one needs it too.
+widest_vectors = _attribute('"prefer-vector-width"="512"')
+
+# The function is copied into those that call it. A call would reach whichever of several copies the process loaded
+# first, and these differ in the order of their sums: a process that compiles has others than one that loads.
+copied_into_callers = _attribute("alwaysinline")
+
+
+def _cached(function: Function, **options: Any) -> Function:
+    settings: Any = config
+    before = settings.CACHE_DIR
+    settings.CACHE_DIR = str(cache_directory())
+    try:
+        dispatcher: Any = njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+    finally:
+        settings.CACHE_DIR = before
+    return cast(Function, dispatcher)

@@ -1,0 +1,1 @@
+"""Results kept between starts, files written whole, and locks."""

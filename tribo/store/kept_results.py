@@ -1,0 +1,191 @@
+"""Results of costly steps, kept beside the outputs with a hash of everything they were made from.
+
+A step asks for its result by name and says what it is made from; where the file holds exactly that, it is read,
+else the result is made and written. The hash covers the values that went in, the sources of the packages that
+compute, and the versions of the libraries under them, so that an edit or an upgrade never answers with an old
+result. The files are JSON: deleting one, or the folder, costs time and nothing else.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from functools import lru_cache
+from importlib import import_module, metadata
+from pathlib import Path
+from types import FunctionType
+from typing import Any, TypeVar, cast
+
+import numpy as np
+
+T = TypeVar("T")
+LIBRARIES = ("numpy", "scipy", "pandas", "statsmodels", "numba", "odrpack")
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+@dataclass(frozen=True)
+class Shelf:
+    """A folder of kept results; without a folder nothing is kept and everything is made."""
+
+    folder: Path | None = None
+
+    def take(self, name: str, made_from: object, make: Callable[[], T], rooms: Iterable[str] = ()) -> T:
+        """The result kept as ``name`` if it was made from exactly this; else that of ``make``, which is then kept.
+
+        Parameters
+        ----------
+        name : file name without its ending
+        made_from : every value the result depends on (records, arrays, tables, plain values)
+        make : computes the result: records of tribo, arrays, tables and plain values, in any nesting
+        rooms : packages of tribo whose sources decide the result
+        """
+        if self.folder is None:
+            return make()
+        key = fingerprint(made_from, sources(*rooms))
+        path = self.folder / f"{name}.json"
+        kept = _read(path)
+        if kept is not None and kept["made_from"] == key:
+            return cast(T, decoded(kept["result"]))
+        result = make()
+        try:
+            text = json.dumps({"made_from": key, "result": encoded(result)})
+        except TypeError as why:  # a result in hand is worth more than keeping it
+            warnings.warn(f"{name} is not kept: {why}", RuntimeWarning, stacklevel=2)
+            return result
+        from tribo.store.whole_files import write_text
+
+        write_text(path, text + "\n")
+        return result
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    """What a kept file says; None where there is none or it is damaged."""
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return kept if isinstance(kept, dict) and {"made_from", "result"} <= set(kept) else None
+
+
+@lru_cache(maxsize=32)
+def sources(*rooms: str) -> str:
+    """SHA-256 over the sources of packages or modules of tribo and the versions of the libraries they compute with."""
+    digest = hashlib.sha256()
+    for room in sorted(rooms):
+        folder = _PACKAGE / room
+        for source in sorted(folder.rglob("*.py")) if folder.is_dir() else [folder.with_suffix(".py")]:
+            digest.update(f"{source.relative_to(_PACKAGE)}\0".encode() + source.read_bytes())
+    for library in LIBRARIES:
+        digest.update(f"{library} {metadata.version(library)}\0".encode())
+    return digest.hexdigest()
+
+
+def fingerprint(*values: object) -> str:
+    """SHA-256 of values, records and arrays by content; of a path nothing, since results do not depend on places."""
+    digest = hashlib.sha256()
+    for value in values:
+        _feed(digest.update, value)
+    return digest.hexdigest()
+
+
+def _feed(update: Callable[[bytes], object], value: object) -> None:
+    update(f"<{type(value).__name__}".encode())
+    if isinstance(value, FunctionType):
+        update(f"{value.__module__}:{value.__qualname__}".encode())
+    elif isinstance(value, np.ndarray) and value.dtype.kind != "O":
+        update(f"{value.dtype}{value.shape}".encode())
+        update(np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, Path):
+        pass
+    else:
+        parts = _parts(value)
+        if parts is None:
+            update(repr(value).encode())
+        else:
+            for part in parts:
+                _feed(update, part)
+    update(b">")
+
+
+def _parts(value: object) -> Iterable[object] | None:
+    """What a compound value consists of, in order; None for a plain one."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return [getattr(value, field.name) for field in fields(value)]
+    if isinstance(value, Mapping):
+        return [part for item in value.items() for part in item]
+    if isinstance(value, list | tuple | np.ndarray):
+        return list(value)
+    if hasattr(value, "columns") and hasattr(value, "to_numpy"):  # a table, without importing pandas to ask
+        table = cast(Any, value)
+        return [part for name in table.columns for part in (name, table[name].to_numpy())]
+    return None
+
+
+def encoded(value: Any) -> Any:
+    """A value as JSON can hold it, such that :func:`decoded` gives an equal one.
+
+    Raises
+    ------
+    TypeError
+        It holds something that is no record or function of tribo, array, table or plain value.
+    """
+    if value is None or isinstance(value, str | bool):
+        return value
+    if isinstance(value, int | float | np.generic):
+        return value.item() if isinstance(value, np.generic) else value
+    if isinstance(value, np.ndarray) and value.dtype.kind != "O":
+        data = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode("ascii")
+        return {"array": data, "dtype": value.dtype.str, "shape": list(value.shape)}
+    if isinstance(value, list | np.ndarray):
+        return [encoded(part) for part in value]
+    if isinstance(value, tuple):
+        return {"tuple": [encoded(part) for part in value]}
+    if isinstance(value, Mapping):
+        return {"mapping": [[encoded(key), encoded(part)] for key, part in value.items()]}
+    if hasattr(value, "columns") and hasattr(value, "to_numpy"):
+        return {"table": [[str(name), encoded(value[name].to_numpy())] for name in value.columns]}
+    if is_dataclass(value) and type(value).__module__.startswith("tribo."):
+        values = [[field.name, encoded(getattr(value, field.name))] for field in fields(value) if field.init]
+        return {"record": f"{type(value).__module__}:{type(value).__qualname__}", "fields": values}
+    if isinstance(value, FunctionType) and _named(place := f"{value.__module__}:{value.__qualname__}") is value:
+        return {"function": place}
+    raise TypeError(f"a {type(value).__qualname__} cannot be kept")
+
+
+def decoded(value: Any) -> Any:
+    """The value that :func:`encoded` was given. Only records of tribo are ever constructed, and nothing is called."""
+    if isinstance(value, list):
+        return [decoded(part) for part in value]
+    if not isinstance(value, dict):
+        return value
+    if "array" in value:
+        flat = np.frombuffer(base64.b64decode(value["array"]), np.dtype(value["dtype"]))
+        return flat.reshape(value["shape"]).copy()
+    if "tuple" in value:
+        return tuple(decoded(part) for part in value["tuple"])
+    if "mapping" in value:
+        return {decoded(key): decoded(part) for key, part in value["mapping"]}
+    if "table" in value:
+        import pandas as pd
+
+        return pd.DataFrame({name: decoded(column) for name, column in value["table"]})
+    if "function" in value:
+        function = _named(value["function"])
+        if not isinstance(function, FunctionType):
+            raise TypeError(f"{value['function']} is no function of tribo")
+        return function
+    record = _named(value["record"])
+    if not (isinstance(record, type) and is_dataclass(record)):
+        raise TypeError(f"{value['record']} is no record of tribo")
+    return record(**{name: decoded(part) for name, part in value["fields"]})
+
+
+def _named(place: str) -> object:
+    """What tribo itself defines at "module:name"; None where it defines nothing of that name there."""
+    module, _, name = place.partition(":")
+    found = getattr(import_module(module), name, None) if module.startswith("tribo.") else None
+    return found if getattr(found, "__module__", None) == module else None
