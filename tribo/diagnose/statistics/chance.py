@@ -146,6 +146,15 @@ def standardised(f: ModelFit, factor: FloatArray) -> FloatArray:
 
 def refit(f: ModelFit, residual: FloatArray) -> Replicates:
     """Law, random effects, weights and noise sizes of campaigns that differ from ``f`` by ``residual`` (r, 2, n)."""
+    return _refitted(f, residual)[0]
+
+
+def refit_sizes(f: ModelFit, residual: FloatArray) -> Sizes:
+    """The noise alone, estimated in each of these campaigns."""
+    return _refitted(f, residual)[1]
+
+
+def _refitted(f: ModelFit, residual: FloatArray) -> tuple[Replicates, Sizes]:
     s, along = f.setup, _along_of(f)
     p = along.shape[2] - s.random.shape[2]
     sizes, left = _fitted_sizes(f, len(residual)), residual
@@ -160,7 +169,7 @@ def refit(f: ModelFit, residual: FloatArray) -> Replicates:
         sizes = replace(sizes, effects=effects)
     inverse = _inverse_noise(s, sizes)
     precision = inverse * _weights(f, inverse, left)[:, None]
-    return _replicates(f, sizes, precision, left + _along(along[:, :, p:], solution[:, p:]))
+    return _replicates(f, sizes, precision, left + _along(along[:, :, p:], solution[:, p:])), sizes
 
 
 def _along(along: FloatArray, solution: FloatArray) -> FloatArray:
