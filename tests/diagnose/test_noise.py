@@ -109,7 +109,7 @@ def precision(f: ModelFit) -> np.ndarray:
 
 
 def test_sizes_are_estimated_anew_in_every_simulated_campaign() -> None:
-    """Replicates of a campaign with slopes of 8 % and patterns off by three times: the sizes scatter about the fit's."""
+    """Replicates of a campaign with slopes of 8 % and patterns off by three times: sizes scatter about the fit's."""
     f = baseline(7, off(3.0, specimen_slope=0.08, specimens=8))
     sizes = refit_sizes(f, drawn_residuals(f, np.random.default_rng(2), 60)).effects
     assert np.exp(np.mean(np.log(sizes), axis=0)) == pytest.approx(f.noise.sizes, rel=0.25)

@@ -8,19 +8,19 @@ effects are estimated for every replicate by the steps of :mod:`tribo.diagnose.s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tribo.diagnose.statistics.fit import jacobian_at
-from tribo.diagnose.statistics.model import PATTERN, ModelFit, Setup
+from tribo.diagnose.statistics.model import PATTERN, ModelFit
 from tribo.diagnose.statistics.noise import (
     PATTERN_PRIOR,
+    inverse_noise,
     prior_precision,
     prior_sd,
-    updated_repeat,
-    updated_scatter,
+    updated_repeats,
     updated_sizes,
     whitener,
 )
@@ -81,20 +81,20 @@ class Replicates:
 
 @dataclass(frozen=True)
 class Sizes:
-    """The noise of every replicate: ``repeat`` (r, 2, 2), sizes of the random ``effects`` (r, 5), and what the
-    repeats depend on, ``scatter`` (r, k).
+    """The noise of every replicate: ``repeat`` (r, 2, 2), what the repeats depend on, ``scatter`` (r, k), and sizes of
+    the random ``effects`` (r, 5).
     """
 
     repeat: FloatArray
-    effects: FloatArray
     scatter: FloatArray
+    effects: FloatArray
 
 
 def as_measured(f: ModelFit) -> Replicates:
     """The fitted campaign itself, as if it were one replicate."""
     left = (f.residual - f.setup.random @ f.effects).T[None]
     sizes = _fitted_sizes(f, 1)
-    inverse = _inverse_noise(f.setup, sizes)
+    inverse = inverse_noise(f.setup, sizes.repeat, sizes.scatter)
     return _replicates(f, sizes, inverse * _weights(f, inverse, left)[:, None], f.residual.T[None])
 
 
@@ -113,7 +113,7 @@ def _along_of(f: ModelFit) -> FloatArray:
 
 def _fitted_sizes(f: ModelFit, replicates: int) -> Sizes:
     scatter = np.zeros(f.setup.scatter.shape[1]) if f.noise.scatter is None else f.noise.scatter
-    parts = (f.noise.repeat, f.noise.sizes, scatter)
+    parts = (f.noise.repeat, scatter, f.noise.sizes)
     return Sizes(*(np.repeat(part[None], replicates, axis=0) for part in parts))
 
 
@@ -160,14 +160,14 @@ def _refitted(f: ModelFit, residual: FloatArray) -> tuple[Replicates, Sizes]:
     sizes, left = _fitted_sizes(f, len(residual)), residual
     solution = np.zeros((len(residual), along.shape[2]))
     for _ in range(STEPS):
-        inverse = _inverse_noise(s, sizes)
+        inverse = inverse_noise(s, sizes.repeat, sizes.scatter)
         weight = _weights(f, inverse, left)
         spread, solution = _solve(along, inverse * weight[:, None], residual, _prior(f, sizes))
         left = residual - _along(along, solution)
         effects = updated_sizes(s, sizes.effects, solution[:, p:], np.diagonal(spread, axis1=1, axis2=2)[:, p:])
-        sizes = _updated_repeats(f, sizes, weight[:, None] * (_squares(left) + _blurred(along, spread)))
-        sizes = replace(sizes, effects=effects)
-    inverse = _inverse_noise(s, sizes)
+        squares = weight[:, None] * (_squares(left) + _blurred(along, spread))
+        sizes = Sizes(*updated_repeats(s, (sizes.repeat, sizes.scatter), squares, f.noise.tail), effects)
+    inverse = inverse_noise(s, sizes.repeat, sizes.scatter)
     precision = inverse * _weights(f, inverse, left)[:, None]
     return _replicates(f, sizes, precision, left + _along(along[:, :, p:], solution[:, p:])), sizes
 
@@ -188,26 +188,6 @@ def _blurred(along: FloatArray, spread: FloatArray) -> FloatArray:
     moved = (along.reshape(-1, k) @ spread).reshape(len(spread), 2, n, k)
     pairs = ((0, 0), (0, 1), (1, 1))
     return np.stack([np.einsum("rnk,nk->rn", moved[:, a], along[b]) for a, b in pairs], axis=1)
-
-
-def _updated_repeats(f: ModelFit, sizes: Sizes, squares: FloatArray) -> Sizes:
-    """Covariance of the repeats and what it depends on, from weighted products (r, 3, n) of what is left."""
-    s = f.setup
-    total = np.einsum("ran,rn->ra", squares, np.exp(-2.0 * sizes.scatter @ s.scatter.T))
-    sizes = replace(sizes, repeat=updated_repeat(s, total[:, [[0, 1], [1, 2]]]))
-    if f.noise.scatter is None:
-        return sizes
-    excess = np.einsum("ran,ran,a->rn", _inverse_noise(s, sizes), squares, [1.0, 2.0, 1.0]) - 2.0
-    return replace(sizes, scatter=updated_scatter(s, sizes.scatter, excess, f.noise.tail))
-
-
-def _inverse_noise(s: Setup, sizes: Sizes) -> FloatArray:
-    """Inverse of the noise of every test, repeats plus reading: its static, mixed and sliding entries, (r, 3, n)."""
-    reading = s.observations.reading**2
-    times, repeat = np.exp(2.0 * sizes.scatter @ s.scatter.T), sizes.repeat[:, :, :, None]
-    static, sliding = repeat[:, 0, 0] * times + reading[:, 0], repeat[:, 1, 1] * times + reading[:, 1]
-    mixed = repeat[:, 0, 1] * times
-    return np.stack([sliding, -mixed, static], axis=1) / (static * sliding - mixed**2)[:, None]
 
 
 def _weights(f: ModelFit, inverse: FloatArray, left: FloatArray) -> FloatArray:

@@ -16,8 +16,7 @@ from tribo.diagnose.statistics.noise import (
     first_noise,
     log_prior,
     prior_precision,
-    updated_repeat,
-    updated_scatter,
+    updated_repeats,
     updated_sizes,
     weights,
     whitener,
@@ -271,11 +270,7 @@ def _updated(s: Setup, state: State, weight: FloatArray, columns: FloatArray, in
     flat = columns.reshape(-1, columns.shape[2])
     blurred = np.einsum("nrk,nsk->nrs", (flat @ inverse).reshape(columns.shape), columns, optimize=True)
     squares = weight[:, None, None] * (left[:, :, None] * left[:, None, :] + blurred)
-    relative = np.linalg.det(noise.repeat) / np.linalg.det(noise.per_test(s))
-    repeat = updated_repeat(s, np.sum(np.sqrt(relative)[:, None, None] * squares, axis=0))
-    noise = replace(noise, repeat=repeat).with_sizes(sizes)
-    if noise.scatter is None:
-        return noise
-    factor = whitener(s, noise)
-    excess = np.einsum("nri,nrj,nij->n", factor, factor, squares, optimize=True) - 2.0
-    return replace(noise, scatter=updated_scatter(s, noise.scatter, excess, noise.tail))
+    scatter = np.zeros(s.scatter.shape[1]) if noise.scatter is None else noise.scatter
+    packed = squares[:, [0, 0, 1], [0, 1, 1]].T
+    repeat, scatter = updated_repeats(s, (noise.repeat, scatter), packed, noise.tail)
+    return replace(noise, repeat=repeat, scatter=scatter).with_sizes(sizes)

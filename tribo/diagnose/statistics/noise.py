@@ -72,9 +72,41 @@ def updated_sizes(s: Setup, sizes: FloatArray, effects: FloatArray, variance: Fl
     return found
 
 
-def updated_scatter(s: Setup, scatter: FloatArray, excess: FloatArray, tail: float) -> FloatArray:
-    """One scoring step of what the repeats depend on, (..., k); ``excess`` (..., n) is the weighted squared distance of
-    every test above its expectation of two."""
+def updated_repeats(
+    s: Setup, noise: tuple[FloatArray, FloatArray], squares: FloatArray, tail: float
+) -> tuple[FloatArray, FloatArray]:
+    """One step for the covariance of the repeats (..., 2, 2) and what it depends on, (..., k).
+
+    ``squares`` (..., 3, n) are the weighted static, mixed and sliding products expected of what is left of every test.
+    """
+    repeat, scatter = noise
+    times = np.exp(2.0 * scatter @ s.scatter.T)[..., None, :]
+    own = repeat[..., [0, 0, 1], [0, 1, 1]][..., None] * times
+    inverse = inverse_noise(s, repeat, scatter)
+    share = own[..., ::2, :] / (own[..., ::2, :] + (s.observations.reading**2).T)
+    both = np.stack([share[..., 0, :] ** 2, share[..., 0, :] * share[..., 1, :], share[..., 1, :] ** 2], axis=-2)
+    rest = 1.0 - np.stack([share[..., 0, :], both[..., 1, :], share[..., 1, :]], axis=-2)
+    total = np.sum((both * squares + rest * own) / times, axis=-1)
+    size, worth = REPEAT_PRIOR
+    found = (total[..., [[0, 1], [1, 2]]] + worth * size**2 * np.eye(2)) / (s.observations.n + worth)
+    distances = np.einsum("...an,...an,a->...n", inverse, squares, [1.0, 2.0, 1.0])
+    scatter = _updated_scatter(s, scatter, (distances - 2.0) * share.mean(axis=-2), tail)
+    common = scatter[..., :-1].mean(axis=-1, keepdims=True)  # of all samples: that is the covariance itself
+    scatter = np.concatenate([scatter[..., :-1] - common, scatter[..., -1:]], axis=-1)
+    return _floored(found * np.exp(2.0 * common)[..., None]), scatter
+
+
+def inverse_noise(s: Setup, repeat: FloatArray, scatter: FloatArray) -> FloatArray:
+    """Inverse of the noise of every test, repeats plus reading: static, mixed and sliding entries, (..., 3, n)."""
+    times, reading = np.exp(2.0 * scatter @ s.scatter.T), s.observations.reading**2
+    static = repeat[..., 0, 0, None] * times + reading[:, 0]
+    sliding = repeat[..., 1, 1, None] * times + reading[:, 1]
+    mixed = repeat[..., 0, 1, None] * times
+    return np.stack([sliding, -mixed, static], axis=-2) / (static * sliding - mixed**2)[..., None, :]
+
+
+def _updated_scatter(s: Setup, scatter: FloatArray, excess: FloatArray, tail: float) -> FloatArray:
+    """One scoring step; ``excess`` (..., n) is the weighted squared distance of every test above its expectation."""
     information = 4.0 * tail / (tail + 4.0)
     precision = np.eye(s.scatter.shape[1]) / SCATTER_SD**2
     normal = information * s.scatter.T @ s.scatter + precision
@@ -82,14 +114,10 @@ def updated_scatter(s: Setup, scatter: FloatArray, excess: FloatArray, tail: flo
     return np.asarray(scatter + np.clip(step, -0.5, 0.5))
 
 
-def updated_repeat(s: Setup, total: FloatArray) -> FloatArray:
-    """Covariance of the repeats (..., 2, 2) from its weighted sum of squares over the tests (..., 2, 2)."""
-    size, worth = REPEAT_PRIOR
-    reading = np.diag(np.mean(s.observations.reading**2, axis=0))
-    repeat = (total + worth * size**2 * np.eye(2)) / (s.observations.n + worth) - reading
-    values, vectors = np.linalg.eigh(0.5 * (repeat + np.swapaxes(repeat, -1, -2)))
-    floored = vectors * np.maximum(values, SMALLEST_SD**2)[..., None, :]
-    return np.asarray(floored @ np.swapaxes(vectors, -1, -2))
+def _floored(repeat: FloatArray) -> FloatArray:
+    """The nearest covariance (..., 2, 2) with no standard deviation below SMALLEST_SD."""
+    values, vectors = np.linalg.eigh(repeat)
+    return np.asarray((vectors * np.maximum(values, SMALLEST_SD**2)[..., None, :]) @ np.swapaxes(vectors, -1, -2))
 
 
 def log_prior(s: Setup, noise: Noise) -> float:
