@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from tribo.diagnose.statistics.fit import jacobian_at
 from tribo.diagnose.statistics.model import PATTERN, ModelFit
 from tribo.diagnose.statistics.noise import (
-    PATTERN_PRIOR,
     inverse_noise,
+    log_size_prior,
     prior_precision,
     prior_sd,
     updated_repeats,
@@ -290,9 +290,7 @@ def _scores_at(
         coefficients.append(_solution(pull[:, span], found.whole[:, pair], crossed[:, :, span]))
         chi2[:, i] = np.sum(pull[:, span] * coefficients[-1], axis=1)
     curvature = np.log(np.diagonal(root, axis1=1, axis2=2) / scale).sum(axis=1)
-    expected, worth = PATTERN_PRIOR
-    size = fitted.factor * np.exp(step)
-    sizes = -worth * (np.log(size) + 0.5 * (expected / size) ** 2)
+    sizes = log_size_prior(PATTERN, fitted.factor * np.exp(step))
     evidence = 0.5 * np.log(prior).sum(axis=1) - curvature + 0.5 * np.sum(own**2, axis=1) + sizes
     return chi2, coefficients, evidence
 

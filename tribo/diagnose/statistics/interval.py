@@ -12,7 +12,7 @@ import numpy as np
 
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.model import FIXED, N_LAW, PATTERN, ModelFit
-from tribo.diagnose.statistics.noise import PATTERN_PRIOR
+from tribo.diagnose.statistics.noise import log_size_prior
 from tribo.mechanisms.record import Mechanism
 from tribo.records import FloatArray
 
@@ -32,8 +32,7 @@ def recovered(f: ModelFit, index: int) -> list[tuple[float, float, float]]:
         return [(float(v), *ends) for v, ends in zip(f.values[index], intervals(f, index), strict=True)]
     factors = f.noise.pattern * np.exp(PATTERN_STEPS)
     fits = [with_pattern_error(f, factor) for factor in factors]
-    expected, worth = PATTERN_PRIOR
-    log_weight = np.array([g.score for g in fits]) - worth * (np.log(factors) + 0.5 * (expected / factors) ** 2)
+    log_weight = np.array([g.score for g in fits]) + log_size_prior(PATTERN, factors)
     weight = np.exp(log_weight - log_weight.max())
     weight /= weight.sum()
     ends = np.array([intervals(g, index) for g in fits])  # (errors, parameters, 2)

@@ -120,12 +120,18 @@ def _floored(repeat: FloatArray) -> FloatArray:
     return np.asarray((vectors * np.maximum(values, SMALLEST_SD**2)[..., None, :]) @ np.swapaxes(vectors, -1, -2))
 
 
+def log_size_prior(group: int, size: FloatArray) -> FloatArray:
+    """Log density of the logarithm of a size, without constants: a scaled inverse chi."""
+    expected, worth = SIZE_PRIORS[group]
+    return np.asarray(-worth * (np.log(size) + 0.5 * (expected / size) ** 2))
+
+
 def log_prior(s: Setup, noise: Noise) -> float:
     """Log density of the sizes, without constants; of those alone that some random effect has."""
     found = -0.5 * float(np.sum(noise.scatter**2)) / SCATTER_SD**2 if noise.scatter is not None else 0.0
-    for group, (size, (expected, worth)) in enumerate(zip(noise.sizes, SIZE_PRIORS, strict=True)):
+    for group, size in enumerate(noise.sizes):
         if (s.group == group).any():
-            found -= worth * (np.log(size) + 0.5 * (expected / size) ** 2)
+            found += float(log_size_prior(group, size))
     size, worth = REPEAT_PRIOR
     determinant = float(np.linalg.slogdet(noise.repeat)[1])
     return float(found - 0.5 * worth * (determinant + size**2 * np.trace(np.linalg.inv(noise.repeat))))
