@@ -20,7 +20,7 @@ NORMAL_90 = 1.645
 DROP_90 = 0.5 * NORMAL_90**2  # of the log likelihood at the ends of a 90 % interval
 NEAR = 2.0 * NORMAL_90  # standard errors from a bound within which the curvature is not trusted
 SMALLEST_SHARE = 1e-6  # of the way to a bound
-PATTERN_STEPS = np.linspace(-0.8, 0.8, 5)  # of the logarithm of the pattern error about its estimate, to average over
+PATTERN_STEPS = np.linspace(-0.8, 1.2, 6)  # of the logarithm of the pattern error about its estimate, to average over
 
 
 def recovered(f: ModelFit, index: int) -> list[tuple[float, float, float]]:
@@ -32,7 +32,7 @@ def recovered(f: ModelFit, index: int) -> list[tuple[float, float, float]]:
         return [(float(v), *ends) for v, ends in zip(f.values[index], intervals(f, index), strict=True)]
     factors = f.noise.pattern * np.exp(PATTERN_STEPS)
     fits = [with_pattern_error(f, factor) for factor in factors]
-    log_weight = np.array([g.score for g in fits]) + log_size_prior(PATTERN, factors)
+    log_weight = np.array([g.score + _log_freedom(g) for g in fits]) + log_size_prior(PATTERN, factors)
     weight = np.exp(log_weight - log_weight.max())
     weight /= weight.sum()
     ends = np.array([intervals(g, index) for g in fits])  # (errors, parameters, 2)
@@ -41,6 +41,15 @@ def recovered(f: ModelFit, index: int) -> list[tuple[float, float, float]]:
         _averaged(weight, values[:, k], ends[:, k], (p.low, p.high))
         for k, p in enumerate(f.acting[index].mechanism.parameters)
     ]
+
+
+def _log_freedom(f: ModelFit) -> float:
+    """What integrating over law and mechanisms adds to the log likelihood (restricted likelihood), up to a constant."""
+    p = N_LAW + sum(len(v) for v in f.values)
+    free = np.diag(f.covariance)[:p] > 0.0
+    scale = np.sqrt(np.diag(f.covariance)[:p][free])
+    correlation = f.covariance[:p, :p][np.ix_(free, free)] / np.outer(scale, scale)
+    return float(np.sum(np.log(scale)) + 0.5 * np.linalg.slogdet(correlation)[1])
 
 
 def with_pattern_error(f: ModelFit, factor: float) -> ModelFit:
