@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 BERARDO2019 = "berardo2019"
+PATTERN_SHARES = "pattern_shares"
 _PACKAGE = Path(__file__).resolve().parent
 
 
@@ -56,6 +57,24 @@ def load_table2_simulated_anew() -> pd.DataFrame:
     return _read("table2_tribo.csv")
 
 
+def load_pattern_laws() -> pd.DataFrame:
+    """Law of each pattern of the paper by tribo's own simulator, and its shares of that of the flat sample.
+
+    Columns: sample, regime, the geometry (lengths in um), runs, mu, tau0_kPa, their shares of those of the flat sample
+    (mu_share, tau0_share), and the standard error of each (``_se``). docs/model-error.md says how it was made.
+    """
+    return _read("laws.csv", PATTERN_SHARES)
+
+
+def load_pattern_errors() -> pd.DataFrame:
+    """How wrong the spring-block model may be about a pattern: standard deviations of ln T by source and regime.
+
+    Columns: source, regime, offset, slope (per e-fold of pressure), curve (per squared e-fold), cases (how many were
+    compared), made_from. "total" holds for a simulated pattern, "interpolation" is added to it for any other.
+    """
+    return _read("errors.csv", PATTERN_SHARES)
+
+
 def load_model_parameters() -> pd.DataFrame:
     """Parameters of the paper's spring-block model: name, symbol, value, unit, place (section)."""
     return _read("model_parameters.csv")
@@ -69,7 +88,7 @@ def contradictions() -> pd.DataFrame:
     return _read("contradictions.csv")
 
 
-def _read(name: str) -> pd.DataFrame:
+def _read(name: str, folder: str = BERARDO2019) -> pd.DataFrame:
     import pandas as pd
 
-    return pd.read_csv(data_dir() / BERARDO2019 / name, comment="#", keep_default_na=False, na_values=[""])
+    return pd.read_csv(data_dir() / folder / name, comment="#", keep_default_na=False, na_values=[""])

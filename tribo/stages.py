@@ -308,6 +308,7 @@ def diagnosis(
         Fewer than twelve usable tests.
     """
     from tribo.diagnose import examine, with_simulation
+    from tribo.diagnose.statistics import pattern_table
 
     predictor = own_predictor(ingested.campaign, kept)
 
@@ -315,7 +316,7 @@ def diagnosis(
         examined = examine(ingested, seed=seed, predictor=predictor, progress=progress)
         return with_simulation(examined, seed=seed, jobs=jobs, progress=progress)
 
-    return Shelf(kept).take("diagnosis", (ingested, seed, predictor), found, DIAGNOSED_BY)
+    return Shelf(kept).take("diagnosis", (ingested, seed, predictor, pattern_table.record()), found, DIAGNOSED_BY)
 
 
 def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:

@@ -14,13 +14,12 @@ from tribo.diagnose.search.looks import all_looks
 from tribo.diagnose.search.screen import screen
 from tribo.diagnose.statistics.chance import drawn_residuals, refit_sizes
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.model import CURVE_SD, ModelFit, setup
+from tribo.diagnose.statistics.model import ModelFit, setup
 from tribo.diagnose.statistics.observations import observe
-from tribo.diagnose.statistics.predictor import OFFSET, SLOPE, tabled_predictor
+from tribo.diagnose.statistics.predictor import tabled_predictor
 
-from .synthetic import SMALL, hidden
+from .synthetic import PATTERNS, SMALL, hidden
 
-ASSUMED = ErrorSize(OFFSET, SLOPE, (CURVE_SD, CURVE_SD))
 LARGE = Design(samples=("F", "A", "B", "C"), specimens=6)
 
 
@@ -31,7 +30,8 @@ def baseline(seed: int, design: Design) -> ModelFit:
 
 def off(pattern_error: float, **changes: object) -> Design:
     """A design whose patterns are off by so many times what the diagnosis assumes."""
-    sizes = dict.fromkeys(("A", "B", "C", "Sx", "Sy"), ASSUMED)
+    p = tabled_predictor(PATTERNS)
+    sizes = {s: ErrorSize(p.offset[s], p.slope[s], p.curve[s]) for s in PATTERNS if s != "F"}
     return replace(SMALL, pattern_error=pattern_error, error_sizes=sizes, **changes)  # type: ignore[arg-type]
 
 

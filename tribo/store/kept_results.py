@@ -22,6 +22,8 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from tribo.published import PATTERN_SHARES, data_dir
+
 T = TypeVar("T")
 LIBRARIES = ("numpy", "scipy", "pandas", "statsmodels", "numba", "odrpack")
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -86,10 +88,13 @@ def sources(*rooms: str) -> str:
 
 @lru_cache(maxsize=1)
 def package_sources() -> str:
-    """SHA-256 over every file of the package, templates and style sheets included, and the library versions."""
+    """SHA-256 over every file of the package, templates and style sheets included, the bundled table of pattern shares,
+    and the library versions."""
     digest = hashlib.sha256(sources().encode())
     for file in sorted(p for p in _PACKAGE.rglob("*") if p.is_file() and "__pycache__" not in p.parts):
         digest.update(f"{file.relative_to(_PACKAGE)}\0".encode() + file.read_bytes())
+    for file in sorted((data_dir() / PATTERN_SHARES).glob("*.csv")):
+        digest.update(f"{file.name}\0".encode() + file.read_bytes())
     return digest.hexdigest()
 
 
