@@ -92,7 +92,7 @@ def find_half(path: Path, jobs: int) -> None:
 def planned(options: argparse.Namespace) -> list[Case]:
     """The campaigns that were asked for, in random order."""
     half = {row["effect"]: row["half"] for row in read_rows(options.half)}
-    plan = Plan(options.clean, options.large_error, options.campaigns, options.campaigns, options.campaigns)
+    plan = Plan(options.clean, options.large_error, options.campaigns, options.campaigns, options.points)
     todo = [case for case in cases(half, plan, options.seed) if PARTS[options.only](case.cell)]
     np.random.default_rng(options.seed).shuffle(todo)  # type: ignore[arg-type]
     return todo
@@ -114,7 +114,8 @@ def put_on_page(rows: list[dict[str, Any]], todo: list[Case], options: argparse.
     rows = [row for row in rows if (row["cell"], row["seed"]) in asked]
     above = page.read_text().split(MARK)[0]
     made = f"Seed {options.seed}: {len(rows)} of {len(todo)} campaigns.\n\n"
-    page.write_text(above + MARK + "\n\n" + made + tables(rows))
+    picture = "![Answers over pattern error, specimen slope and noise law](figures/blind-curves.svg)\n\n"
+    page.write_text(above + MARK + "\n\n" + made + picture + tables(rows))
     data = DOCS / "data" / "blind.jsonl"
     data.write_text("".join(json.dumps(row) + "\n" for row in sorted(rows, key=lambda r: (r["cell"], r["seed"]))))
     draw_curves(rows, DOCS / "figures" / "blind-curves.svg")
@@ -126,7 +127,8 @@ def main() -> None:
     parser.add_argument("path", type=Path, help="JSON lines, one a campaign")
     parser.add_argument("--half", type=Path, default=DOCS / "data" / "blind-half.jsonl")
     parser.add_argument("--only", choices=sorted(PARTS), default="all", help="which part of a run")
-    parser.add_argument("--campaigns", type=int, default=20, help="per cell with something hidden, and per curve point")
+    parser.add_argument("--campaigns", type=int, default=20, help="per cell with something hidden")
+    parser.add_argument("--points", type=int, default=10, help="per point of a curve and effect")
     parser.add_argument("--clean", type=int, default=300)
     parser.add_argument("--large-error", type=int, default=100, help="clean campaigns at pattern error 2, and at 3")
     parser.add_argument("--seed", type=int, default=83)

@@ -66,6 +66,22 @@ def errors(data: str, out: str) -> None:
     write_table(table, Path(out) / "errors.csv", words, digits="%.4g")
     pd.DataFrame(found).to_csv(Path(data) / "pattern-errors.csv", index=False, float_format="%.4g")
     print(table.to_string(index=False))
+    print(shared(pd.DataFrame(found)).to_string(index=False))
+
+
+def shared(cases: pd.DataFrame) -> pd.DataFrame:
+    """How far the offsets of different patterns go together over the cases of a source that have all patterns.
+
+    ``common`` is the mean product of two patterns' offsets over the mean square of one: 1 where all move alike.
+    """
+    rows = []
+    for (source, regime), part in cases[cases["source"].isin(["readings", "mesh"])].groupby(["source", "regime"]):
+        offsets = part.pivot(index="case", columns="sample", values="offset").dropna().to_numpy()
+        products = offsets.T @ offsets
+        n = len(products)
+        others = (products.sum() - np.trace(products)) / (n * (n - 1))
+        rows.append({"source": source, "regime": regime, "common": others / (np.trace(products) / n)})
+    return pd.DataFrame(rows)
 
 
 if __name__ == "__main__":

@@ -61,7 +61,7 @@ def load_pattern_laws() -> pd.DataFrame:
     """Law of each pattern of the paper by tribo's own simulator, and its shares of that of the flat sample.
 
     Columns: sample, regime, the geometry (lengths in um), runs, mu, tau0_kPa, their shares of those of the flat sample
-    (mu_share, tau0_share), and the standard error of each (``_se``). docs/model-error.md says how it was made.
+    (mu_share, tau0_share), and the standard error of each (``_se``). docs/results/model-error.md says how it was made.
     """
     return _read("laws.csv", PATTERN_SHARES)
 

@@ -45,7 +45,7 @@ def ingested(bench: Bench, seed: int = 0) -> Ingested:
             test.test_id, "seed", bench.static[k] + rng.normal(0, READING_N[0]), READING_N[0],
             bench.sliding[k] + rng.normal(0, READING_N[1]), READING_N[1],
             zero_N=bench.zero[k] + rng.normal(0, ZERO_N), zero_u_N=ZERO_N, onset_s=1.0, peak_s=2.0,
-            window_s=(3.0, 9.0), rise_N_per_s=stiffness * row.speed_mm_s * 1e-3,
+            window_s=(3.0, 9.0), rise_N_per_s=float(bench.stiffness_N_per_mm[k]) * row.speed_mm_s,
             rise_stiffness_N_per_m=stiffness, noise_N=0.006,
         )  # fmt: skip
     samples = {s: pattern_of(s) for s in sorted(set(bench.tests["sample"]))}

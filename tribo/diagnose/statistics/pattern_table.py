@@ -1,6 +1,6 @@
 """The bundled record of what the spring-block model makes of known patterns, and of how wrong it may be.
 
-``data/pattern_shares`` says how both files were made; docs/model-error.md says what the numbers mean.
+``data/pattern_shares`` says how both files were made; docs/results/model-error.md says what the numbers mean.
 """
 
 from __future__ import annotations
