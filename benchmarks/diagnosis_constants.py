@@ -43,10 +43,6 @@ def _times(value: Value, factor: float) -> Value:
     return factor * value
 
 
-def _from_one(value: Value, factor: float) -> Value:
-    return 1.0 - factor * (1.0 - value)
-
-
 def _row(row: int, column: int) -> Callable[[Value, float], Value]:
     def changed(value: Value, factor: float) -> Value:
         table = np.array(value, float)
@@ -77,10 +73,10 @@ class Constant:
 NAMING, WEIGH = f"{SEARCH}.naming", f"{SEARCH}.weigh"
 NOISE, EVIDENCE = f"{STATISTICS}.noise", f"{STATISTICS}.direct_evidence"
 CONSTANTS = {
-    "ALIKE (distance from 1)": Constant((NAMING, WEIGH), "ALIKE", _from_one),
     "TIED (log likelihood)": Constant((NAMING,), "TIED", _first),
     "TIED (share of the gain)": Constant((NAMING,), "TIED", _second),
     "CLOSE": Constant((NAMING,), "CLOSE"),
+    "IN_COMMON": Constant((NAMING,), "IN_COMMON"),
     "FORM": Constant((NAMING,), "FORM"),
     "PER_PARAMETER": Constant((WEIGH,), "PER_PARAMETER"),
     "LABEL_SD": Constant((WEIGH,), "LABEL_SD"),
