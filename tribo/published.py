@@ -1,4 +1,4 @@
-"""Published tables that travel with tribo, in the units of their source."""
+"""Published tables bundled with tribo, in the units of their source."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ def data_dir() -> Path:
     for folder in places:
         if folder.is_dir():
             return folder
-    raise FileNotFoundError(f"the bundled data is neither in {places[0]} nor in {places[1]}")
+    raise FileNotFoundError(f"the bundled data are neither in {places[0]} nor in {places[1]}; install tribo again")
 
 
 def load_table1() -> pd.DataFrame:
-    """Table 1 of Berardo et al. (2019): the patterns, one row a sample.
+    """Table 1 of Berardo et al. (2019): the patterns, one row per sample.
 
     Columns: sample, cavity (none, circle, rectangle), size_x_um, size_y_um (the diameter twice for a circle),
     pitch_x_um, pitch_y_um, area_fraction_printed, area_fraction_computed (from the sizes printed beside it),
-    area_fraction_model (of the paper's 85 x 85 blocks). Empty (NaN) where a flat sample has none.
+    area_fraction_model (of the paper's 85 x 85 blocks). NaN where a flat sample has no value.
     """
     return _read("table1.csv")
 
 
 def load_table2() -> pd.DataFrame:
-    """Table 2 of Berardo et al. (2019) in long form, one row a sample, regime and source.
+    """Table 2 of Berardo et al. (2019) in long form, one row per sample, regime and source.
 
     Columns: sample, regime (static, sliding), source (experiment, simulation), mu, mu_sd, tau0_kPa,
     tau0_sd_kPa. The standard deviations are as printed; the covariance of mu and tau0 is not published.
@@ -48,7 +48,7 @@ def load_table2() -> pd.DataFrame:
 
 
 def load_table2_simulated_anew() -> pd.DataFrame:
-    """The simulated part of Table 2 as tribo's own engine gives it, from 960 runs at stratified angles.
+    """The simulated part of Table 2 recomputed with tribo, from 960 runs at stratified angles.
 
     docs/results/table2-recomputed.md compares it with the paper.
 
@@ -81,7 +81,7 @@ def load_model_parameters() -> pd.DataFrame:
 
 
 def contradictions() -> pd.DataFrame:
-    """Where the paper is at odds with itself or silent.
+    """Points on which the paper contradicts itself or gives no value.
 
     Columns: topic, one_place, other_place, effect, tribo_default.
     """

@@ -1,4 +1,4 @@
-"""The calibrated model's prediction of every sample of a campaign, with nothing refitted."""
+"""The calibrated model's prediction of every sample of a campaign, without refitting."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def loads_to_simulate(campaign: Campaign) -> FloatArray:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What the model says of a campaign: the runs, the laws fitted to them, and the force at any load."""
+    """Predictions of the model for a campaign: the runs, the laws fitted to them, and the force at any load."""
 
     table: pd.DataFrame
     fits: tuple[LawFit, ...]
@@ -80,9 +80,9 @@ def predict(
     Parameters
     ----------
     fits : laws measured on the samples, the flat one among them
-    runs : simulated runs a sample and load, at stratified pull angles with fresh local friction
+    runs : simulated runs per sample and load, at stratified pull angles with fresh local friction
     weights : of the fits to the simulated forces
-    kept : folder that keeps the calibration and every finished run; what was made otherwise is not taken from it
+    kept : folder for the calibration and every finished run; results made from other inputs are not used
     scheduler : address of a dask.distributed scheduler whose workers run the simulations
 
     Raises
@@ -157,7 +157,7 @@ def _flat_laws(fits: tuple[LawFit, ...], flat: str) -> dict[Regime, LawFit]:
     if len(laws) < len(REGIMES):
         notes = "; ".join(note for f in fits if f.sample == flat for note in f.notes)
         raise FitError(
-            Problem("no_flat_law", f"the model needs both laws of the flat sample {flat}", found=notes or "none")
+            Problem("no_flat_law", f"calibration needs both laws of the flat sample {flat}", found=notes or "none")
         )
     return laws
 

@@ -67,7 +67,7 @@ def run_cells(
     scheduler: str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> pd.DataFrame:
-    """All runs of the cells as one table, a row a run; those that ``kept`` holds are taken from there.
+    """All runs of the cells as one table, one row per run; those that ``kept`` holds are taken from there.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def _run_stored(
 
 
 def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | None:
-    """Finished runs of the baseline in ``kept`` that today's sources would make again, a row a run; None without any.
+    """Finished runs of the baseline in ``kept`` that the current sources would reproduce, one row per run, or None.
 
     A file counts where its name is the one that its own runs would be given.
     """

@@ -1,4 +1,4 @@
-"""What the figures ask of a study: its samples in order, its loads, its fits, traces thinned for drawing."""
+"""Parts of a study for the figures: samples in order, loads, fits, traces thinned for drawing."""
 
 from __future__ import annotations
 

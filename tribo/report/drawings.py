@@ -47,7 +47,7 @@ def make_anew(name: str, made_from: object, make: Callable[[], Any], rooms: Iter
 
 @dataclass(frozen=True)
 class Drawn:
-    """A figure as drawn: its words, its files by ending, and where its points lie for who hovers over them."""
+    """A figure as drawn: its words, its files by ending, and the positions of its points for hovering."""
 
     name: str
     title: str
@@ -71,8 +71,8 @@ def write_figures(
 ) -> dict[str, Drawn]:
     """Write out/figures/NAME.svg, .pdf, .png and .csv of every figure there are numbers for, and return them.
 
-    ``origin`` says in the metadata of every file what it was made from; ``jobs`` processes share the drawing;
-    ``keep`` (:meth:`tribo.store.kept_results.Shelf.take`) spares drawing a figure whose numbers are what they were.
+    ``origin`` is written to the metadata of every file and states its source; ``jobs`` processes share the drawing;
+    ``keep`` (:meth:`tribo.store.kept_results.Shelf.take`) avoids redrawing a figure whose numbers have not changed.
     """
     drawn = draw_all(study, diagnosis, origin, progress, jobs, keep)
     for figure in drawn.values():

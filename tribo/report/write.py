@@ -1,4 +1,4 @@
-"""Everything a study yields, written into one folder."""
+"""Write all results of a study into one folder."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ def write_until(
     jobs: int = 1,
     keep: Keep = make_anew,
 ) -> None:
-    """Write what a walk as far as ``until`` (ingest, fit, compare or report) yields.
+    """Write the results of all stages up to ``until`` (ingest, fit, compare or report).
 
     Tables and campaign.nc always, as far as the study went; verdict.json and its figures where there is a
     ``verdict`` or the whole ``diagnosis`` of it; the figures of the study from ``compare`` on; then page, PDF and
-    crate. ``keep`` spares drawing anew what is kept. Every file is whole or absent: it is written under a temporary
-    name and renamed. Last comes provenance.json with the hash of each; files of an earlier run that no longer hold
+    crate. ``keep`` avoids redrawing kept figures. Every file is whole or absent: it is written under a temporary
+    name and renamed. Last comes provenance.json with the hash of each; files of an earlier run that are no longer valid
     are removed.
     """
     before = read_record(out)
@@ -79,5 +79,5 @@ def write_report(
     jobs: int = 1,
     keep: Keep = make_anew,
 ) -> None:
-    """All of OUT: tables, campaign.nc, figures, verdict.json where there is a verdict, page, PDF and crate."""
+    """Write all of OUT: tables, campaign.nc, figures, verdict.json where there is a verdict, page, PDF and crate."""
     write_until(study, Path(out), "report", progress, provenance, verdict, diagnosis, jobs, keep)

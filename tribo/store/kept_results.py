@@ -1,9 +1,9 @@
 """Results of costly steps, kept beside the outputs with a hash of everything they were made from.
 
-A step asks for its result by name and says what it is made from; where the file holds exactly that, it is read,
-else the result is made and written. The hash covers the values that went in, the sources of the packages that
-compute, and the versions of the libraries under them, so that an edit or an upgrade never answers with an old
-result. The files are JSON: deleting one, or the folder, costs time and nothing else.
+A step asks for its result by name and gives everything the result is made from. If the file was made from exactly
+that, it is read; otherwise the result is computed and written. The hash covers the input values, the sources of the
+packages that compute and the versions of the libraries they use, so that no outdated result is returned after an edit
+or an upgrade. The files are JSON: deleting one, or the folder, costs time and nothing else.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Shelf:
 
 
 def _read(path: Path) -> dict[str, Any] | None:
-    """What a kept file says; None where there is none or it is damaged."""
+    """The contents of a kept file; None if there is none or it is damaged."""
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):

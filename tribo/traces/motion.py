@@ -83,10 +83,10 @@ def _no_pull(trace: Trace, smooth: FloatArray, start: float, rise: Rise | None, 
     """Why no rise was found, if none was: the force went the other way, or the record ends before the peak."""
     down, up = start - float(smooth.min()), float(smooth.max()) - start
     if down > 3.0 * up and down > _DETECTABLE * noise:
-        what = "the force runs against the pull"
+        what = "the force acts against the pull direction; its sign may be reversed"
         return [Problem("sign_flipped", what, trace.file or None, None, "force", f"{smooth.min():.6g} N")]
     if rise is None:
-        what = "the record ends before the force has risen to a peak"
+        what = "the record ends before the static peak"
         end = f"{trace.time_s[-1]:.6g} s, {smooth[-1]:.6g} N"
         return [Problem("stopped_before_peak", what, trace.file or None, None, "force", end)]
     return []
@@ -94,14 +94,14 @@ def _no_pull(trace: Trace, smooth: FloatArray, start: float, rise: Rise | None, 
 
 def _saturated(trace: Trace, clipped: tuple[int, int]) -> Problem:
     first, run = clipped
-    what = f"the force stands at its largest value for {run} samples: the load cell or the recorder was saturated"
+    what = f"the force stays at its largest value for {run} data points: the load cell or the recorder was saturated"
     row = quality.file_row(trace, first)
     return Problem("saturated", what, trace.file or None, row, "force", f"{trace.force_N[first]:.6g} N")
 
 
 def _stuck(trace: Trace, still: tuple[int, int]) -> Problem:
     first, run = still
-    what = f"the force repeats one value for {run} samples: the sensor or the recorder was stuck"
+    what = f"the force keeps the same value for {run} data points: the sensor or the recorder stopped working"
     row = quality.file_row(trace, first)
     return Problem("stuck", what, trace.file or None, row, "force", f"{trace.force_N[first]:.6g} N")
 

@@ -1,4 +1,4 @@
-"""Where the static peak is looked for, and at which resolution: from the loading line to the apex."""
+"""Search for the static peak: its range and resolution, from the loading line to the apex."""
 
 from __future__ import annotations
 

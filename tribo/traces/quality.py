@@ -1,4 +1,4 @@
-"""What is wrong with a trace before any friction is read off it: spikes, clipping, sign, order of time."""
+"""Faults of a trace, checked before friction is determined: spikes, clipping, sign, order of time."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _COARSE = 0.5  # share of equal neighbours from which on a resolution is too coa
 
 
 def file_row(trace: Trace, index: int) -> int:
-    """Line of the export (from 1) that sample ``index`` stands on, as far as the reader said."""
+    """Line of the export (from 1) that sample ``index`` stands on, if the reader recorded it."""
     return trace.first_row + index
 
 
@@ -35,8 +35,8 @@ def unreadable(trace: Trace) -> list[Problem]:
     """Faults that leave no signal to read: too few samples, gaps, numbers that are none, time running back."""
     n = trace.force_N.size
     if n < MINIMUM_SAMPLES:
-        what = f"a pull of {n} samples cannot be read"
-        return [Problem("too_short", what, trace.file, found=str(n), allowed=f"{MINIMUM_SAMPLES} or more")]
+        what = f"a pull of {n} data points is too short"
+        return [Problem("too_short", what, trace.file, found=str(n), allowed=f"{MINIMUM_SAMPLES} data points or more")]
     problems = []
     for name, values in (("time", trace.time_s), ("force", trace.force_N)):
         if not np.isfinite(values).all():
@@ -48,7 +48,7 @@ def unreadable(trace: Trace) -> list[Problem]:
     if back.any():
         at = int(np.argmax(back)) + 1
         found = f"{trace.time_s[at]:g} s after {trace.time_s[at - 1]:g} s"
-        problems.append(Problem("time_goes_back", "the time runs back", trace.file, file_row(trace, at), "time", found))
+        problems.append(Problem("time_goes_back", "the time decreases", trace.file, file_row(trace, at), "time", found))
     if not problems and trace.time_s[0] == trace.time_s[-1]:
         problems.append(Problem("time_stands_still", "all times are the same", trace.file or None, column="time"))
     return problems
@@ -108,7 +108,7 @@ def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ..
     problems = [
         Problem(
             "spike",
-            f"an impulse at {trace.time_s[k]:.6g} s; the sample is left out",
+            f"a spike at {trace.time_s[k]:.6g} s; this data point is left out",
             trace.file or None,
             file_row(trace, int(k)),
             "force",
@@ -117,7 +117,7 @@ def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ..
         for k in at[:_MOST_LISTED]
     ]
     if at.size > _MOST_LISTED:
-        what = f"{at.size - _MOST_LISTED} more impulses; the samples are left out"
+        what = f"{at.size - _MOST_LISTED} more spikes; these data points are left out"
         problems.append(Problem("spike", what, trace.file or None, file_row(trace, int(at[_MOST_LISTED])), "force"))
     return tuple(problems)
 
@@ -182,6 +182,6 @@ def standstill(force: FloatArray) -> tuple[int, int] | None:
 
 
 def noise_of(force: FloatArray) -> float:
-    """Sample noise, or a sliver of the range where the trace has none, so that it can stand in a denominator."""
+    """Sample noise, or a small fraction of the range if the trace has none, so that it can be a denominator."""
     floor = 1e-6 * float(np.ptp(force))
     return max(sample_noise(force), floor)
