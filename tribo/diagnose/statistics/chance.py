@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.diagnose.statistics.fit import jacobian_at
-from tribo.diagnose.statistics.model import PATTERN, ModelFit
+from tribo.diagnose.statistics.model import FIXED, ModelFit
 from tribo.diagnose.statistics.noise import (
     inverse_noise,
     log_size_prior,
@@ -27,8 +27,10 @@ from tribo.diagnose.statistics.noise import (
 from tribo.records import FloatArray
 
 STEPS = 4
-# Of the logarithm of the pattern error: what a look explains of the patterns makes their error smaller
-PATTERN_STEPS = (0.0, -0.5, -1.0)
+# Of the logarithms of the sizes (GAIN, SLOPE: two each; PATTERN): what a look explains of the patterns makes their
+# error smaller, and what it explains of a specimen makes the spread of the specimens smaller.
+SIZE_STEPS = np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, -0.7], [-0.7, -0.7, -0.7, -0.7, 0.0]])
+AS_FITTED = SIZE_STEPS[:1]
 ROUNDING = 1e-9
 TAKEN_UP = 1e-6  # share of a column's information below which nothing of it is left to see
 
@@ -68,15 +70,15 @@ def _products(columns: FloatArray, first: NDArray[np.int64], second: NDArray[np.
 class Replicates:
     """Fitted replicates: ``precision`` (r, 3, n) of every test, robust weight included, as static, mixed, sliding;
     ``residual`` (r, 2, n) of ln T; ``prior`` (r, p + q), the precision of the model's columns ``along`` (2, n, p + q);
-    ``pattern`` (p + q,) marks those of the pattern error, whose factor is ``factor`` (r,).
+    ``group`` (p + q,) is that of the size of each, FIXED where there is none, and ``sizes`` (r, 5) are the sizes.
     """
 
     precision: FloatArray
     residual: FloatArray
     prior: FloatArray
     along: FloatArray
-    pattern: NDArray[np.bool_]
-    factor: FloatArray
+    group: NDArray[np.int64]
+    sizes: FloatArray
 
 
 @dataclass(frozen=True)
@@ -100,10 +102,8 @@ def as_measured(f: ModelFit) -> Replicates:
 
 def _replicates(f: ModelFit, sizes: Sizes, precision: FloatArray, residual: FloatArray) -> Replicates:
     p = len(np.concatenate([f.law, *f.values]))
-    pattern = np.concatenate([np.zeros(p, bool), f.setup.group == PATTERN])
-    return Replicates(
-        precision, residual, _prior(f, sizes), _along_of(f), pattern, sizes.effects[:, PATTERN]
-    )
+    group = np.concatenate([np.full(p, FIXED), f.setup.group])
+    return Replicates(precision, residual, _prior(f, sizes), _along_of(f), group, sizes.effects)
 
 
 def _along_of(f: ModelFit) -> FloatArray:
@@ -241,16 +241,15 @@ class Products:
 
 
 def scores(
-    fitted: Replicates, looks: Columns, steps: Sequence[float] = PATTERN_STEPS
+    fitted: Replicates, looks: Columns, steps: FloatArray = SIZE_STEPS
 ) -> tuple[FloatArray, list[FloatArray]]:
     """Score test of every look beyond the model's own columns.
 
-    The scores are taken at several sizes of the pattern error, ``steps`` of its logarithm from the fitted one, each
-    size paying what it loses of the likelihood of the model without the look. Returns the largest chi-squared values
-    (r, looks) and the coefficients of each look's columns, (r, d) each, at the fitted size.
+    The scores are taken at several sizes of the random effects, ``steps`` (steps, 5) of their logarithms from the
+    fitted ones; each pays what it loses of the likelihood of the model without the look. Returns the largest
+    chi-squared values (r, looks) and the coefficients of each look, (r, d) each, at the first sizes.
     """
     found = _products_of(fitted, looks)
-    steps = steps if fitted.pattern.any() else (0.0,)
     each = [_scores_at(fitted, looks, found, step) for step in steps]
     evidence = np.stack([e for _, _, e in each])
     chi2 = np.stack([c for c, _, _ in each]) + 2.0 * (evidence - evidence.max(axis=0))[:, :, None]
@@ -271,12 +270,11 @@ def _products_of(fitted: Replicates, looks: Columns) -> Products:
 
 
 def _scores_at(
-    fitted: Replicates, looks: Columns, found: Products, step: float
+    fitted: Replicates, looks: Columns, found: Products, step: FloatArray
 ) -> tuple[FloatArray, list[FloatArray], FloatArray]:
-    """Chi-squared values, coefficients, and the log likelihood (r,) of the model without the looks, at one size of the
-    pattern error."""
-    r, k = found.right.shape
-    prior = fitted.prior * np.where(fitted.pattern, np.exp(-2.0 * step), 1.0)
+    """Chi-squared values, coefficients, and the log likelihood (r,) of the model without the looks, at one step."""
+    k = found.right.shape[1]
+    prior = fitted.prior * np.exp(-2.0 * np.append(step, 0.0))[fitted.group]
     normal = found.normal.copy()
     normal[:, np.arange(k), np.arange(k)] += prior
     scale = 1.0 / np.sqrt(np.diagonal(normal, axis1=1, axis2=2) + 1e-300)
@@ -285,12 +283,9 @@ def _scores_at(
     crossed = clear @ found.crossed
     own = (clear @ found.right[:, :, None])[:, :, 0]
     pull = found.pull - np.einsum("rpk,rp->rk", crossed, own)
-    chi2, coefficients = np.zeros((r, len(looks.spans))), []
-    for i, (span, pair) in enumerate(zip(looks.spans, looks.pairs, strict=True)):
-        coefficients.append(_solution(pull[:, span], found.whole[:, pair], crossed[:, :, span]))
-        chi2[:, i] = np.sum(pull[:, span] * coefficients[-1], axis=1)
+    chi2, coefficients = _solved(looks, pull, found.whole, crossed)
     curvature = np.log(np.diagonal(root, axis1=1, axis2=2) / scale).sum(axis=1)
-    sizes = log_size_prior(PATTERN, fitted.factor * np.exp(step))
+    sizes = sum(log_size_prior(g, fitted.sizes[:, g] * np.exp(step[g])) for g in range(len(step)) if g in fitted.group)
     evidence = 0.5 * np.log(prior).sum(axis=1) - curvature + 0.5 * np.sum(own**2, axis=1) + sizes
     return chi2, coefficients, evidence
 
@@ -302,13 +297,26 @@ def _weighted_residual(fitted: Replicates) -> FloatArray:
     return np.asarray(both.reshape(len(both), -1))
 
 
+def _solved(
+    looks: Columns, pull: FloatArray, whole: FloatArray, crossed: FloatArray
+) -> tuple[FloatArray, list[FloatArray]]:
+    """Chi-squared values (r, looks) and coefficients of each look, (r, d): those of one column all at once."""
+    first = [span.start for span in looks.spans]
+    left = whole[:, [pair.start for pair in looks.pairs]] - np.sum(crossed**2, axis=1)[:, first]
+    seen = left > TAKEN_UP * whole[:, [pair.start for pair in looks.pairs]]
+    alone = np.where(seen, pull[:, first] / np.maximum(left, 1e-300), 0.0)
+    chi2, coefficients = alone * pull[:, first], list(alone.T[:, :, None])
+    for i, (span, pair) in enumerate(zip(looks.spans, looks.pairs, strict=True)):
+        if span.stop > span.start + 1:
+            coefficients[i] = _solution(pull[:, span], whole[:, pair], crossed[:, :, span])
+            chi2[:, i] = np.sum(pull[:, span] * coefficients[i], axis=1)
+    return chi2, coefficients
+
+
 def _solution(pull: FloatArray, whole: FloatArray, crossed: FloatArray) -> FloatArray:
-    """Coefficients of one look (r, d) from its scores (r, d), its raw information (r, d d) and its share
-    (r, p, d) of the model's columns; zero where the model takes a single column up."""
+    """Coefficients of one look (r, d) from its scores (r, d), its raw information (r, d d) and its share (r, p, d) of
+    the model's columns."""
     r, d = pull.shape
-    if d == 1:
-        left = whole - np.sum(crossed**2, axis=1)
-        return np.asarray(np.where(left > TAKEN_UP * whole, pull / np.maximum(left, 1e-300), 0.0))
     whole = whole.reshape(r, d, d)
     floor = ROUNDING * (np.diagonal(whole, axis1=1, axis2=2) + 1e-12)
     information = whole - crossed.transpose(0, 2, 1) @ crossed + floor[:, :, None] * np.eye(d)
