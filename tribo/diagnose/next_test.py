@@ -129,8 +129,10 @@ def _predicted_at(f: ModelFit, rows: np.ndarray, load_N: float) -> FloatArray:
 
 def _distance2(f: ModelFit, difference: FloatArray, rows: np.ndarray) -> float:
     """Squared difference of two predictions in units of the noise of further pulls on the same specimens."""
+    from scipy.linalg import block_diag
+
     s = f.setup
-    noise = np.kron(np.eye(len(rows)), f.noise.repeat)
+    noise = block_diag(*f.noise.per_test(s)[rows])
     flat = s.random[rows].reshape(-1, s.random.shape[2])
     q = s.random.shape[2]
     total = noise + flat @ f.covariance[-q:, -q:] @ flat.T

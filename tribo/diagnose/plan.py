@@ -64,7 +64,7 @@ def plan_design(
     campaign : Campaign
         The planned tests with the conditions under which they will be made.
     noise : Noise
-        Expected standard deviations of ln T: repeats (2, 2) and specimens (2,).
+        Expected standard deviations of ln T: repeats (2, 2), gains and slopes of specimens (2,).
     law : array (4,)
         Expected flat law: mu and tau0 in kPa, static then sliding.
     """

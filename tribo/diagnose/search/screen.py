@@ -11,8 +11,9 @@ from scipy.special import chdtrc, ndtri
 
 from tribo.diagnose.search.looks import Look
 from tribo.diagnose.statistics.chance import as_measured, columns_of, drawn_residuals, refit, scores
-from tribo.diagnose.statistics.fit import jacobian_at, prior_precision, weights, whitened
+from tribo.diagnose.statistics.fit import jacobian_at, whitened
 from tribo.diagnose.statistics.model import ModelFit
+from tribo.diagnose.statistics.noise import prior_precision, weights, whitener
 from tribo.records import FloatArray
 
 Progress = Callable[[str, int, int], None]
@@ -114,9 +115,11 @@ def cleared(f: ModelFit, stacked: FloatArray) -> tuple[FloatArray, FloatArray]:
     an ordinary projection once the penalty is written as further rows.
     """
     s = f.setup
-    weight = weights(s, f.noise, f.residual - s.random @ f.effects)
+    factor = whitener(s, f.noise)
+    weight = weights(s, f.noise, f.residual - s.random @ f.effects, factor)
     model = np.concatenate([jacobian_at(f), s.random], axis=2)
-    white = whitened(s, f.noise, weight, np.concatenate([model, stacked, f.residual[:, :, None]], axis=2))
+    factor = factor * np.sqrt(weight)[:, None, None]
+    white = whitened(factor, np.concatenate([model, stacked, f.residual[:, :, None]], axis=2))
     q, n_random = model.shape[2], s.random.shape[2]
     penalty = np.sqrt(np.concatenate([np.full(q - n_random, 1e-9), prior_precision(s, f.noise)]))
     rows = np.zeros((q, white.shape[1]))

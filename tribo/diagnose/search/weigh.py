@@ -16,7 +16,10 @@ from tribo.records import FloatArray
 PER_PARAMETER = 1.0  # log likelihood that a further parameter has to earn
 CHOICES_FITTED = 4  # of a mechanism with many choices, how many are fitted in full
 IN_REACH, CLOSE_BY = 0.5, 3.0  # share of the best first gain, less so much, from which a mechanism is fitted to the end
-ALIKE = 0.95  # cosine from which two mechanisms cannot be distinguished
+# Log likelihood, at least and as a share of what the best gains, by which two mechanisms must differ to be told apart:
+# if the one is at work, the difference has the expected value gain (1 - cosine^2) and twice that as its variance.
+TIED = (5.0, 0.08)
+ALIKE = float(np.sqrt(1.0 - 2.0 * TIED[1]))  # cosine above which not even a strong effect tells two mechanisms apart
 SEEN = 1e-3  # share of a mechanism's effect that must be left once the flat law is free
 
 

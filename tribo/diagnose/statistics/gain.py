@@ -66,7 +66,7 @@ def _held_out(model: ModelFit, out: np.ndarray) -> tuple[FloatArray, FloatArray]
     columns = np.concatenate([jacobian, s.random], axis=2)[out]
     spread = np.einsum("nip,pq,njq->nij", columns, trained.covariance, columns, optimize=True)
     reading = s.observations.reading[out][:, :, None] ** 2 * np.eye(2)
-    scale = spread + trained.noise.repeat + reading
+    scale = spread + trained.noise.per_test(s)[out] + reading
     distance = np.einsum("ni,nij,nj->n", error, np.linalg.inv(scale), error)
     tail = trained.noise.tail
     constant = gammaln(tail / 2 + 1) - gammaln(tail / 2) - np.log(np.pi * tail)
