@@ -48,6 +48,11 @@ class Pattern:
         return float(1.0 - share * self.size_m[0] * self.size_m[1] / (self.pitch_m[0] * self.pitch_m[1]))
 
     @property
+    def is_flat(self) -> bool:
+        """Whether the sample has no cavities."""
+        return self.cavity == "none"
+
+    @property
     def rim_per_m(self) -> float:
         """Rim length of the cavities per nominal area, 1/m; 0 for a flat sample."""
         if self.cavity == "none" or self.size_m is None or self.pitch_m is None:
@@ -98,6 +103,8 @@ class Campaign:
 
     ``tests`` are the usable rows, ``set_aside`` the rows with faults or an ``exclude`` reason.
     ``samples`` maps each sample name to its pattern (``Sx`` is pattern S pulled along x).
+    ``chosen_flat`` names the flat sample that calibrates the model where a user chose one; every stage asks
+    :attr:`flat_sample`.
     """
 
     title: str
@@ -113,6 +120,21 @@ class Campaign:
     problems: tuple[Problem, ...] = ()
     columns: Mapping[str, str] = field(default_factory=dict)
     instrument: Mapping[str, float] = field(default_factory=dict)
+    chosen_flat: str = ""
+
+    @property
+    def flat_samples(self) -> tuple[str, ...]:
+        """Every measured sample without cavities, in alphabetical order."""
+        measured = {test.sample for test in self.tests}
+        return tuple(sorted(s for s in measured if s in self.samples and self.samples[s].is_flat))
+
+    @property
+    def flat_sample(self) -> str:
+        """The sample that calibrates the model: the chosen one, else F, else the only flat one, else empty."""
+        flat = self.flat_samples
+        if self.chosen_flat or "F" in flat:
+            return self.chosen_flat or "F"
+        return flat[0] if len(flat) == 1 else ""
 
     def area_fraction(self, sample: str) -> float:
         """Contact area fraction of a sample."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from tribo.campaign.flat_sample import required_flat_sample, with_flat_sample
 from tribo.errors import CampaignError, FitError, Problem
 from tribo.records import (
     REGIMES,
@@ -51,7 +52,7 @@ class StudyOptions:
 
     rule: str = "seed"
     weights: Weights = "relative"
-    flat: str = "F"
+    flat: str = ""  # the sample that calibrates the model; empty: F, or the only flat sample
     runs: int = 4
     seed: int = 0
     jobs: int = 2
@@ -146,32 +147,6 @@ def fit(ingested: Ingested, *, weights: Weights = "relative") -> tuple[LawFit, .
     return tuple(found)
 
 
-def flat_sample(campaign: Campaign, wanted: str = "F") -> str:
-    """Name of the sample the model is calibrated on: ``wanted``, or else the only one without cavities.
-
-    Raises
-    ------
-    CampaignError
-        The campaign measured no flat sample, or several and none of that name.
-    """
-    measured = {t.sample for t in campaign.tests}
-    if wanted in measured and campaign.samples[wanted].cavity == "none":
-        return wanted
-    flat = sorted(s for s in measured if campaign.samples[s].cavity == "none")
-    if len(flat) == 1:
-        return flat[0]
-    raise CampaignError(
-        Problem(
-            "no_flat_sample",
-            "the model is calibrated on one flat sample",
-            file="tests.csv",
-            column="sample",
-            found=", ".join(flat) or "no sample whose pattern has cavity none",
-            allowed="one flat sample, or --flat NAME",
-        )
-    )
-
-
 def load_means(ingested: Ingested, sample: str, regime: Regime) -> list[tuple[float, float, float]]:
     """(normal load, mean force, its standard uncertainty) of a sample at each load, in newton.
 
@@ -205,8 +180,8 @@ def simulate_cells(
     from tribo.comparison.prediction import calibrated_cells
     from tribo.comparison.prediction_runs import example_config, example_run, remove_strangers, run_cells
 
-    campaign = ingested.campaign
-    flat = flat_sample(campaign, options.flat)
+    campaign = with_flat_sample(ingested.campaign, options.flat)
+    flat = required_flat_sample(campaign)
     _, cells = calibrated_cells(
         campaign, fits, flat, runs=options.runs, seed=options.seed, jobs=options.jobs, kept=options.kept,
         progress=progress,
@@ -243,8 +218,9 @@ def compare(
     """
     from tribo.comparison.prediction import predict
 
-    campaign = ingested.campaign
-    flat = flat_sample(campaign, options.flat)
+    campaign = with_flat_sample(ingested.campaign, options.flat)
+    flat = required_flat_sample(campaign)
+    ingested = replace(ingested, campaign=campaign)
     prediction = predict(
         campaign, fits, flat, weights=options.weights, runs=options.runs, seed=options.seed, jobs=options.jobs,
         kept=options.kept, scheduler=options.scheduler, progress=progress,
@@ -274,9 +250,8 @@ def study(
     campaign: Campaign, options: StudyOptions = DEFAULTS, *, until: Until = "report", progress: Progress = _silent
 ) -> Study:
     """Walk the street with one campaign as far as ``until``."""
-    ingested = ingest(
-        campaign, rule=options.rule, jobs=options.jobs, overrides=options.overrides, progress=progress
-    )
+    chosen = with_flat_sample(campaign, options.flat)
+    ingested = ingest(chosen, rule=options.rule, jobs=options.jobs, overrides=options.overrides, progress=progress)
     if until == "ingest":
         return Study(ingested)
     fits = fit(ingested, weights=options.weights)
@@ -355,8 +330,10 @@ def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:
     forces = runs.assign(
         normal_load_N=load, static_N=runs["static_friction"] * load, sliding_N=runs["sliding_friction"] * load
     )
-    flat = [s for s in dict.fromkeys(forces["sample"]) if campaign.samples[s].cavity == "none"]
-    return simulated_predictor(campaign.samples, forces, flat[0], campaign.nominal_area_m2) if flat else None
+    flat = campaign.flat_sample
+    if flat not in set(forces["sample"]):
+        return None
+    return simulated_predictor(campaign.samples, forces, flat, campaign.nominal_area_m2)
 
 
 def _other_fits(ingested: Ingested, options: StudyOptions) -> tuple[LawFit, ...]:
@@ -383,6 +360,7 @@ def plan(campaign: Campaign, options: StudyOptions, until: Until) -> dict[str, A
     from tribo.comparison.prediction import loads_to_simulate
 
     steps = [f"read {len(campaign.tests)} exports of {campaign.root} by rule {options.rule}"]
+    campaign = with_flat_sample(campaign, options.flat)
     samples = sorted({t.sample for t in campaign.tests})
     if unknown := sum(np.isnan(t.normal_load_N) for t in campaign.tests):
         steps.append(f"take the load of {unknown} tests from their exports")
@@ -390,7 +368,7 @@ def plan(campaign: Campaign, options: StudyOptions, until: Until) -> dict[str, A
         steps.append(f"fit mu and tau0 of {len(samples)} samples ({', '.join(samples)}), weights {options.weights}")
     if until in ("compare", "report"):
         loads = loads_to_simulate(campaign)
-        flat = flat_sample(campaign, options.flat)
+        flat = required_flat_sample(campaign)
         runs = len(samples) * len(loads) * options.runs
         steps.append(f"calibrate the model on sample {flat} and run it {runs} times at {len(loads)} loads")
     return {

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from pipelines.test_index import campaigns, rendered
+from pipeline.test_index_page import campaigns, rendered
 from playwright.sync_api import Browser
 
 

@@ -12,6 +12,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tribo.cli import main
+from tribo.errors import FitError, Problem
+from tribo.records import Study
 
 
 def run(*arguments: object) -> Result:
@@ -142,7 +144,8 @@ def test_an_unusable_campaign_lists_every_fault_at_once_and_writes_nothing(spoil
 
 def test_a_campaign_without_a_flat_sample_cannot_calibrate_the_model(small_campaign: Path, tmp_path: Path) -> None:
     result = run("compare", small_campaign, "-o", tmp_path / "out", "--dry-run", "--flat", "B")
-    assert result.exit_code == 0  # B has cavities, and F is the only flat one
+    assert result.exit_code == 1  # B has cavities
+    assert "--flat F" in result.stderr
     folder = tmp_path / "campaign"
     shutil.copytree(small_campaign, folder)
     table = pd.read_csv(folder / "tests.csv")
@@ -150,6 +153,21 @@ def test_a_campaign_without_a_flat_sample_cannot_calibrate_the_model(small_campa
     result = run("compare", folder, "-o", tmp_path / "out")
     assert result.exit_code == 1
     assert "flat sample" in result.stderr
+
+
+def test_the_number_of_processes_reaches_the_diagnosis_of_a_report(
+    small_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[int] = []
+
+    def stop(*_: object, jobs: int, **__: object) -> None:
+        seen.append(jobs)
+        raise FitError(Problem("stopped", "the test has seen enough"))
+
+    monkeypatch.setattr("tribo.stages.diagnosis", stop)
+    monkeypatch.setattr("tribo.stages.compare", lambda ingested, fits, *_, **__: Study(ingested, fits))
+    run("report", small_campaign, "-o", tmp_path / "out", "--jobs", "3")
+    assert seen == [3]
 
 
 def test_a_dry_run_says_what_would_be_done_and_writes_nothing(small_campaign: Path, tmp_path: Path) -> None:

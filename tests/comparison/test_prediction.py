@@ -110,14 +110,6 @@ def test_many_loads_are_thinned_over_their_whole_range(small_campaign: Path) -> 
     assert (loads[0], loads[-1]) == pytest.approx((0.1, 2.9))
 
 
-def test_a_flat_sample_of_another_name_is_found_and_two_are_asked_about(small_campaign: Path) -> None:
-    campaign = load_campaign(small_campaign)
-    assert stages.flat_sample(campaign, "nothing of this name") == "F"
-    both = {**campaign.samples, "B": replace(campaign.samples["F"], name="B")}
-    with pytest.raises(CampaignError, match="one flat sample"):
-        stages.flat_sample(replace(campaign, samples=both), "nothing of this name")
-
-
 @pytest.mark.parametrize("regime", ["static", "sliding"])
 def test_load_means_average_specimens_first(small_campaign: Path, regime: Regime) -> None:
     ingested = stages.ingest(load_campaign(small_campaign))

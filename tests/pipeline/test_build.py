@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from pipelines.campaigns import TOML, small
+
+from pipeline.campaigns import TOML, small
 
 pytest.importorskip("snakemake")
 JOBS = 2

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from tribo.records import LawFit
-from tribo.store.kept_results import Shelf, decoded, encoded, fingerprint, sources
+from tribo.store.kept_results import Shelf, decoded, encoded, fingerprint, package_sources, sources
 
 FIT = LawFit(
     "B", "static", "coulomb_adhesion", ("mu", "tau0_Pa"), np.array([4.0, 2e4]), np.diag([0.1, 1e6]), 2.0, 3, 12,
@@ -110,3 +110,19 @@ def test_what_cannot_be_kept_is_given_all_the_same_and_said_aloud(tmp_path: Path
 
 def test_without_a_folder_everything_is_made() -> None:
     assert [counted(Shelf(), 1)[1] for _ in range(2)] == [1, 1]
+
+
+def test_the_digest_of_the_package_changes_with_any_of_its_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "templates").mkdir()
+    (tmp_path / "law.py").write_text("A = 1\n")
+    (tmp_path / "templates" / "page.html").write_text("<p>")
+    monkeypatch.setattr("tribo.store.kept_results._PACKAGE", tmp_path)
+    seen = set()
+    for name, text in (("law.py", "A = 1\n"), ("law.py", "A = 2\n"), ("templates/page.html", "<q>")):
+        (tmp_path / name).write_text(text)
+        package_sources.cache_clear()
+        seen.add(package_sources())
+    package_sources.cache_clear()
+    assert len(seen) == 3

@@ -31,7 +31,7 @@ KEEP = click.option(
 @KEEP
 @click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off.")
 @click.option("--weights", default="relative", show_default=True, help="As in tribo fit.")
-@click.option("--flat", default="F", show_default=True, help="The sample that calibrates the model.")
+@click.option("--flat", default="", metavar="SAMPLE", help="Flat sample that calibrates the model, as in tribo report.")
 @click.option("--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulated runs a load.")
 @click.option("--scheduler", help="Address of a dask scheduler whose workers run the simulations.")
 @command_options

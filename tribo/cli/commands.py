@@ -32,6 +32,11 @@ COLUMNS = click.option(
     "--columns", default="", help="QUANTITY=NAME [UNIT],... as in [columns] of campaign.toml; #3 is the third column."
 )
 
+FLAT = click.option(
+    "--flat", default="", metavar="SAMPLE",
+    help="Flat sample that calibrates the model. [default: F, or the only flat sample]",
+)  # fmt: skip
+
 OVERRIDES = click.option(
     "--overrides",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
@@ -58,7 +63,7 @@ def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _model_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
-        click.option("--flat", default="F", show_default=True, help="The sample that calibrates the model."),
+        FLAT,
         click.option(
             "--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulated runs a load."
         ),
@@ -156,18 +161,18 @@ def compare(console: Console, campaign: Path, out: Path, dry_run: bool, **option
 @OUT
 @click.option("--published", type=click.Choice(["berardo2019"]), help="The table of a paper in place of CAMPAIGN.")
 @click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off.")
+@FLAT
 @COLUMNS
 @OVERRIDES
 @command_options
 def diagnose(
-    console: Console, campaign: Path | None, out: Path, published: str | None, rule: str, columns: str,
-    overrides: Path | None, seed: int, jobs: int, **_: Any,
-) -> int:  # fmt: skip
+    console: Console, campaign: Path | None, out: Path, published: str | None, columns: str, **options: Any
+) -> int:
     """What the calibrated model gets wrong, and why, or that it cannot be told: verdict.json and its figures."""
     if (campaign is None) == (published is None):
         raise click.UsageError("give a CAMPAIGN, or --published and the name of a table")
     if campaign is None:
-        return _diagnose_published(console, out, seed)
+        return _diagnose_published(console, out, options["seed"])
     from tribo import stages
     from tribo.campaign import open_campaign
     from tribo.report import write_until
@@ -175,17 +180,16 @@ def diagnose(
     from tribo.store.kept_results import Shelf
 
     with open_campaign(campaign) as opened, console.progress() as progress:
-        described = _with_columns(opened, columns)
-        ingested = stages.ingest(described, rule=rule, jobs=jobs, overrides=overrides, progress=progress)
-        found = stages.diagnosis(ingested, seed=seed, jobs=jobs, kept=out / KEPT, progress=progress)
-        study = stages.Study(ingested)
-        provenance = _provenance(study, campaign, stages.StudyOptions(rule=rule, seed=seed, overrides=overrides))
-        keep = Shelf(out / KEPT).take
-        write_until(study, out, "ingest", progress, provenance, diagnosis=found, jobs=jobs, keep=keep)
+        chosen = stages.StudyOptions(kept=out / KEPT, **options)
+        study = stages.study(_with_columns(opened, columns), chosen, until="ingest", progress=progress)
+        found = _diagnosis(study, chosen, progress)
+        keep = Shelf(chosen.kept).take
+        provenance = _provenance(study, campaign, chosen)
+        write_until(study, out, "ingest", progress, provenance, diagnosis=found, jobs=chosen.jobs, keep=keep)
     verdict = found.verdict
     console.result(verdict.as_dict(), verdict_text(verdict))
-    console.list_tests("set aside", ingested.set_aside, level=-1)
-    return status_of(ingested.set_aside)
+    console.list_tests("set aside", study.ingested.set_aside, level=-1)
+    return status_of(study.ingested.set_aside)
 
 
 def _diagnose_published(console: Console, out: Path, seed: int) -> int:
@@ -337,7 +341,7 @@ def _provenance(study: Study, campaign: Path, chosen: StudyOptions) -> Provenanc
         command=_command_line(),
         seed=chosen.seed,
         started_at=_now(),
-        options=chosen.as_words(),
+        options={**chosen.as_words(), "flat": study.ingested.campaign.flat_sample},
         campaign=campaign,
         overrides=chosen.overrides,
     )
@@ -357,12 +361,17 @@ def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[
     from dataclasses import replace
 
     from tribo.errors import FitError
-    from tribo.stages import diagnosis
 
     try:
-        return study, diagnosis(study.ingested, seed=chosen.seed, kept=chosen.kept, progress=progress)
+        return study, _diagnosis(study, chosen, progress)
     except FitError as why:
         return replace(study, notes=(*study.notes, f"no diagnosis: {why}")), None
+
+
+def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis:
+    from tribo.stages import diagnosis
+
+    return diagnosis(study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, progress=progress)
 
 
 def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None = None) -> int:

@@ -10,7 +10,7 @@ from tribo.diagnose.search.looks import candidates
 from tribo.diagnose.search.screen import beyond_law, cleared
 from tribo.diagnose.search.weigh import ALIKE, unseen
 from tribo.diagnose.statistics.model import Acting, ModelFit, Noise, Setup, predict, setup
-from tribo.diagnose.statistics.observations import Observations, conditions_of, flat_sample
+from tribo.diagnose.statistics.observations import NO_FLAT, Observations, conditions_of
 from tribo.diagnose.statistics.predictor import Predictor, tabled_predictor
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray
@@ -76,7 +76,7 @@ def plan_design(
     cosine = (left.T @ left) / np.maximum(size[:, None] * size[None, :], 1e-12)
     hidden = unseen(f)
     shown = beyond_law(f, columns)
-    order = np.argsort(-size / np.ptp(shown, axis=(0, 1)))
+    order = np.argsort(-size / np.maximum(np.ptp(shown, axis=(0, 1)), 1e-12))
     found = [_finding(k, acting, shown, size, cosine, hidden) for k in order]
     return Plan(s.observations.n, (*found, *_not_applying(s)))
 
@@ -92,7 +92,7 @@ def _expected(campaign: Campaign, noise: Noise, law: FloatArray, predictor: Pred
         patterns=patterns, log_force=np.zeros((n, 2)), reading=np.full((n, 2), 0.005), zero_N=nothing,
         zero_u_N=nothing, zero_slope_N_per_s=nothing, rise_N_per_m=nothing, stick_slip_N=nothing,
         noise_N=nothing, clock_h=hours, day=np.array([t.started_at[:10] for t in tests], str),
-        flat=flat_sample(patterns),
+        flat=campaign.flat_sample or NO_FLAT,
     )  # fmt: skip
     s = setup(o, predictor or tabled_predictor(patterns))
     q = s.random.shape[2]

@@ -13,11 +13,8 @@ PAGE_POINTS = 1200  # a page is 190 mm wide: more points along a line cannot be 
 
 
 def flat_sample(study: Study) -> str:
-    """The flat sample: as the comparison says, else the first one whose area fraction is 1."""
-    if study.comparison is not None:
-        return study.comparison.flat
-    samples = study.ingested.campaign.samples
-    return next((s for s, pattern in samples.items() if pattern.area_fraction == 1.0), "")
+    """The flat sample of the campaign; empty where none was measured or chosen."""
+    return study.ingested.campaign.flat_sample
 
 
 def sample_numbers(study: Study) -> dict[str, int]:

@@ -24,6 +24,7 @@ from tribo.errors import CampaignError, Problem, TriboError
 from tribo.pipeline.dated_copies import date_build
 from tribo.pipeline.scan import Dropped, difference, scan
 from tribo.pipeline.step_record import read_record
+from tribo.store.kept_results import package_sources
 from tribo.store.lock import only_build
 from tribo.store.whole_files import write_text
 
@@ -45,7 +46,7 @@ class BuildOptions:
 
     rule: str = "seed"
     weights: str = "relative"
-    flat: str = "F"
+    flat: str = ""  # as --flat of the commands
     runs: int = 4
     seed: int = 0
     scheduler: str | None = None
@@ -58,9 +59,10 @@ class BuildOptions:
     def of_commands(self) -> dict[str, str]:
         """Options of the commands of the workflow, and all of them in words for what a step is made from."""
         fit = ["--rule", self.rule, "--weights", self.weights, "--seed", str(self.seed)]
-        model = [*fit, "--flat", self.flat, "--runs", str(self.runs)]
+        flat = ["--flat", self.flat] if self.flat else []
+        model = [*fit, *flat, "--runs", str(self.runs)]
         where = ["--scheduler", self.scheduler] if self.scheduler else []
-        diagnosis = ["--rule", self.rule, "--seed", str(self.seed)]
+        diagnosis = ["--rule", self.rule, "--seed", str(self.seed), *flat]
         parts = {"fit": fit, "model": [*model, *where], "diagnose": diagnosis, "words": model}
         return {name: shlex.join(words) for name, words in parts.items()}
 
@@ -145,7 +147,7 @@ def _why_due(campaign: Dropped, state: Path, options: BuildOptions) -> str:
     if _report_is_gone(campaign.name, record, state):
         return GONE
     same = record["digest"] == step_digest(campaign.digest, options)
-    return "" if same else "other options or another version of tribo"
+    return "" if same else "other options, or the code of tribo changed"
 
 
 def _forced(due: Mapping[str, str], state: Path) -> tuple[str, ...]:
@@ -162,8 +164,8 @@ def _report_is_gone(name: str, record: Mapping[str, Any], state: Path) -> bool:
 
 
 def step_digest(digest: str, options: BuildOptions) -> str:
-    """What every step of a campaign is made from, as one text: contents, version, options."""
-    return f"{digest} {__version__} {options.of_commands()['words']}"
+    """What every step of a campaign is made from, as one text: contents, sources of tribo, options."""
+    return f"{digest} {package_sources()} {options.of_commands()['words']}"
 
 
 def _configuration(found: Sequence[Dropped], inputs: Path, state: Path, options: BuildOptions) -> Path:

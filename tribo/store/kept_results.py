@@ -84,6 +84,15 @@ def sources(*rooms: str) -> str:
     return digest.hexdigest()
 
 
+@lru_cache(maxsize=1)
+def package_sources() -> str:
+    """SHA-256 over every file of the package, templates and style sheets included, and the library versions."""
+    digest = hashlib.sha256(sources().encode())
+    for file in sorted(p for p in _PACKAGE.rglob("*") if p.is_file() and "__pycache__" not in p.parts):
+        digest.update(f"{file.relative_to(_PACKAGE)}\0".encode() + file.read_bytes())
+    return digest.hexdigest()
+
+
 def fingerprint(*values: object) -> str:
     """SHA-256 of values, records and arrays by content; of a path nothing, since results do not depend on places."""
     digest = hashlib.sha256()

@@ -12,6 +12,7 @@ from tribo.mechanisms.record import Conditions, StringArray
 from tribo.records import Campaign, FloatArray, Ingested, Pattern, Pull, SetAside, Test, Trace
 
 STATIC, SLIDING = 0, 1
+NO_FLAT = "flat"  # stands for the flat law where no flat sample was measured or chosen
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def observe(ingested: Ingested) -> Observations:
         noise_N=np.array([p.noise_N for p in pulls]),
         clock_h=np.array([_clock_h(t.started_at) for t in tests]),
         day=np.array([t.started_at[:10] for t in tests], str),
-        flat=flat_sample(campaign.samples),
+        flat=campaign.flat_sample or NO_FLAT,
         set_aside=(*ingested.set_aside, *left_out),
     )
 
@@ -126,11 +127,6 @@ def conditions_of(
         clip_N=clip,
         columns=_further_columns(tests),
     )
-
-
-def flat_sample(patterns: Mapping[str, Pattern]) -> str:
-    """The sample without cavities; "flat" where there is none."""
-    return next((name for name, p in patterns.items() if p.area_fraction == 1.0), "flat")
 
 
 def _elongation(test: Test, pattern: Pattern) -> float:
