@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tribo.figures.select import flat_sample
 
 from tribo import stages
 from tribo.campaign import load_campaign
@@ -14,7 +15,6 @@ from tribo.campaign.flat_sample import required_flat_sample, with_flat_sample
 from tribo.diagnose.plan import plan_design
 from tribo.diagnose.statistics.observations import observe
 from tribo.errors import CampaignError
-from tribo.figures.select import flat_sample
 from tribo.records import Campaign, Study
 
 Of = Callable[..., Campaign]

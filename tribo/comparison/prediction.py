@@ -99,9 +99,7 @@ def predict(
     )
     if kept is not None:
         remove_strangers(cells, kept)
-    table = run_cells(
-        cells, kept, jobs, scheduler, lambda done, total: progress("simulating the samples", done, total)
-    )
+    table = run_cells(cells, kept, jobs, scheduler, lambda done, total: progress("simulating the samples", done, total))
     table = _as_forces(table, campaign)
     return Prediction(
         table,

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tribo.comparison import agreement
 from tribo.figures import (
-    agreement,
     area,
     detectable,
     evidence,
     extended,
     force,
+    measured_over_simulated,
     misfit,
     normalised_pulls,
     published_table,
@@ -33,8 +34,8 @@ FIGURES: dict[str, StudyFigure] = {
             "Ratio of the measured to the simulated friction force at each normal load, with its 95 % "
             "interval. On the line at 1 the model is right; below it the model predicts too much "
             "friction. The flat sample was used to calibrate the model, so its agreement is no test.",
-            agreement.numbers,
-            agreement.draw,
+            agreement.ratios,
+            measured_over_simulated.draw,
         ),
         StudyFigure(
             "fig3",

@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from tribo.figures import select, style
+from tribo.comparison import study_lookup
+from tribo.figures import style
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     residuals = {"before": f.residual, "after": d.named.model.residual}
     if d.simulated is not None:
         residuals["simulated"] = o.log_force - d.simulated.log_force
-    levels = select.load_levels(o.conditions.normal_load_N)
+    levels = study_lookup.load_levels(o.conditions.normal_load_N)
     samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
     rows = [
         _row(number, sample, regime, load, model, residual[:, k], here & (levels == load), here)
