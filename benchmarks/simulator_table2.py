@@ -1,4 +1,4 @@
-"""What the choices that the paper's text leaves open do to its Table 2 (docs/table2.md).
+"""What the choices that the paper's text leaves open do to its Table 2 (docs/results/table2-recomputed.md).
 
     tribo simulate --table2 -o table2.nc
     python benchmarks/simulator_table2.py column table2.nc docs/data data/berardo2019

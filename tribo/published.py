@@ -47,7 +47,9 @@ def load_table2() -> pd.DataFrame:
 
 
 def load_table2_simulated_anew() -> pd.DataFrame:
-    """The simulated part of Table 2 as tribo's own engine gives it (960 runs at stratified angles, docs/table2.md).
+    """The simulated part of Table 2 as tribo's own engine gives it, from 960 runs at stratified angles.
+
+    docs/results/table2-recomputed.md compares it with the paper.
 
     Columns: sample, regime, mu, mu_se, tau0_kPa, tau0_kPa_se.
     """

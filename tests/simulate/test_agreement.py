@@ -1,4 +1,4 @@
-"""The fast engine against the paper's algorithm, case by case; docs/simulator.md holds the whole table.
+"""The fast engine against the paper's algorithm, case by case; the table is in docs/results/simulator-accuracy.md.
 
 The quick cases run with every test. The slow ones are some of those of ``benchmarks/simulator_agreement.py``.
 """

@@ -30,7 +30,7 @@ def mixed_model(
 
     ``table`` holds the rows of one sample. None where the fit does not converge, as with two or three
     specimens it often does not. Its intervals are those of statsmodels, normal (dof infinite): with few
-    specimens they are too narrow (docs/uncertainty.md), which is why this fit only stands beside the other.
+    specimens they are too narrow (docs/results/interval-coverage.md), so this fit is not the default.
     What statsmodels warned of is in ``notes``.
 
     Raises

@@ -93,7 +93,7 @@ class SimConfig:
         "small" for linearised springs, "finite" for the full r_ij of the paper (engines dense and reference;
         the peaks differ by under 0.5 %).
     dt_s
-        Time step. 5e-8 s moves the sliding mean by under 1 % against 1e-8 s; docs/simulator.md has the figures.
+        Time step. 5e-8 s moves the sliding mean by under 1 % against 1e-8 s; see docs/results/simulator-accuracy.md.
     duration_s, duration_peaks
         The run ends at ``duration_s``, or where that is None at ``duration_peaks`` times the time of the peak.
     window_start_peaks, window_end_peaks
@@ -103,7 +103,7 @@ class SimConfig:
         the force fell by ``peak_drop``.
     rest_tolerance
         A cavity block rests once its force is below this share of the mean sliding threshold. At 2e-3 static
-        friction of single runs stays within 0.1 % of the reference engine (docs/simulator.md).
+        friction of single runs stays within 0.1 % of the reference engine (docs/results/simulator-accuracy.md).
     """
 
     sample: str = "F"

@@ -1,0 +1,77 @@
+"""Every public name has an entry in the reference, and every entry and every link leads somewhere."""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+import tribo
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+PACKAGES = sorted(file.parent.name for file in Path(tribo.__file__).parent.glob("*/__init__.py"))
+REFERENCE = sorted((DOCS / "reference").glob("*.md"))
+RECORDS = ("records", "errors")
+DIRECTIVE = re.compile(r"^\.\. auto(function|class|data|module|exception):: (\S+)", re.MULTILINE)
+LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)(?:#[^)]*)?\)")
+
+
+def object_of(name: str) -> Any:
+    """The module or the member of a module that a dotted name stands for."""
+    module, _, member = name.rpartition(".")
+    found = getattr(import_module(module), member, None)
+    return import_module(name) if found is None or isinstance(found, ModuleType) else found
+
+
+def entries() -> dict[str, str]:
+    """Dotted name -> kind of every directive of the reference pages."""
+    texts = (page.read_text(encoding="utf-8") for page in REFERENCE)
+    return {name: kind for text in texts for kind, name in DIRECTIVE.findall(text)}
+
+
+def public_names() -> list[str]:
+    """Names that users meet: of tribo, of its packages, and every record and error."""
+    names = [f"tribo.{name}" for name in tribo.__all__]
+    for package in PACKAGES:
+        names += [f"tribo.{package}.{name}" for name in getattr(import_module(f"tribo.{package}"), "__all__", ())]
+    for module in RECORDS:
+        members = vars(import_module(f"tribo.{module}")).items()
+        names += [
+            f"tribo.{module}.{name}"
+            for name, member in members
+            if isinstance(member, type) and member.__module__ == f"tribo.{module}"
+        ]
+    return names
+
+
+def documented() -> list[Any]:
+    """The objects of all entries; of a module, also its classes."""
+    found = []
+    for name, kind in entries().items():
+        here = object_of(name)
+        found.append(here)
+        if kind == "module":
+            found += [m for m in vars(here).values() if isinstance(m, type) and m.__module__ == name]
+    return found
+
+
+@pytest.mark.parametrize("name", public_names())
+def test_a_public_name_has_an_entry_in_the_reference(name: str) -> None:
+    wanted = object_of(name)
+    assert any(here is wanted for here in documented())
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda page: str(page.relative_to(DOCS)))
+def test_every_file_that_a_page_links_to_exists(page: Path) -> None:
+    links = LINK.findall(page.read_text(encoding="utf-8"))
+    assert [link for link in links if not (page.parent / link).exists()] == []
+
+
+def test_every_page_is_in_the_table_of_contents() -> None:
+    listed = re.findall(r"^[a-z][\w/-]+$", (DOCS / "index.md").read_text(encoding="utf-8"), re.MULTILINE)
+    pages = {str(page.relative_to(DOCS).with_suffix("")) for page in DOCS.rglob("*.md")} - {"index"}
+    assert sorted(pages) == sorted(listed)
