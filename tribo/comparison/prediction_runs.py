@@ -29,6 +29,22 @@ CELLS_AWAY = 16  # cells given to a scheduler at once
 
 
 @dataclass(frozen=True)
+class ModelRuns:
+    """How the model is run for a campaign.
+
+    ``runs`` runs a sample and load, at stratified pull angles with fresh local friction from ``seed``, ``jobs`` at a
+    time or by the workers of a dask ``scheduler`` (its address). The folder ``kept`` holds the calibration and every
+    finished run; what was made otherwise is not taken from it.
+    """
+
+    runs: int = 4
+    seed: int = 0
+    jobs: int = 2
+    kept: Path | None = None
+    scheduler: str | None = None
+
+
+@dataclass(frozen=True)
 class Cell:
     """The runs of one sample at one nominal pressure."""
 
