@@ -2,7 +2,7 @@
 #   make demo    the main job on the bundled example, into out/demo
 #   make test    lint, types and tests
 #   make docs    the documentation, into out/docs; warnings are errors, internal links are checked
-#   make blind   campaigns with hidden effects, about an hour on two cores; goes on where it was stopped
+#   make blind   campaigns with hidden effects, about an hour on two cores; continues a run that was stopped
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin

@@ -2,11 +2,13 @@
 
     python benchmarks/simulator_size.py blocks docs/data/simulator-blocks.csv
     python benchmarks/simulator_size.py mesh docs/data/simulator-mesh.csv
+    python benchmarks/simulator_size.py domain docs/data/simulator-domain.csv
     python benchmarks/simulator_size.py figures docs/data docs/figures
 
 ``blocks``: flat samples of 10 to 1000 blocks a side against the expected minimum of n Gaussian numbers. ``mesh``: the
 paper's domain and layer at l = 5 um with square cavities, at 2.5 um with the same squares and with round ones, eight
-runs a point at 3 and at 25 kPa over the same angles. What a file holds already is not computed again.
+runs a point at 3 and at 25 kPa over the same angles. ``domain``: the same points on square domains of 170 and of 340
+blocks a side at l = 5 um; those of 85 are the first rows of ``mesh``. What a file holds already is not computed again.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ SIDES = {10: 40, 20: 40, 43: 40, 85: 40, 170: 20, 340: 12, 680: 6, 1000: 4}  # b
 MESHES = ((5.0, "square"), (2.5, "square"), (2.5, "round"))
 MESH_PRESSURES_PA = (3e3, 25e3)
 MESH_RUNS = 8
+DOMAINS = (170, 340)  # blocks a side
 WINDOW_END = 1.5  # peak times
 
 
@@ -62,6 +65,21 @@ def mesh(known: pd.DataFrame) -> Iterator[dict[str, object]]:
                     }  # fmt: skip
 
 
+def domain(known: pd.DataFrame) -> Iterator[dict[str, object]]:
+    """One row a run."""
+    for n in DOMAINS:
+        base = SimConfig(blocks=(n, n), dt_s=1e-7, rest_tolerance=1e-2, duration_peaks=WINDOW_END)
+        for config in stratified_design(("F", "A", "B", "C", "Sx", "Sy"), MESH_PRESSURES_PA, MESH_RUNS, base=base):
+            key = {"sample": config.sample, "blocks_a_side": n, "pressure_kPa": config.pressure_Pa / 1e3,
+                   "angle_deg": round(config.angle_deg, 3)}  # fmt: skip
+            if not holds(known, **key):
+                run = simulate(config)
+                yield key | {
+                    "area_fraction": run.parameters["area_fraction"], "static": run.static_friction,
+                    "sliding": run.sliding_friction,
+                }  # fmt: skip
+
+
 def same_place(sample: str, n: int) -> tuple[int, int] | None:
     """First cavity of S where it lies on the paper's mesh; the others are centred on either mesh."""
     return (4 * n // 85, 11 * n // 85) if sample.startswith("S") else None
@@ -74,7 +92,7 @@ def holds(known: pd.DataFrame, **key: object) -> bool:
 def resumed(what: str, path: Path) -> None:
     known = pd.read_csv(path) if path.exists() else pd.DataFrame()
     rows = known.to_dict("records")
-    for row in {"blocks": blocks, "mesh": mesh}[what](known):
+    for row in {"blocks": blocks, "mesh": mesh, "domain": domain}[what](known):
         rows.append(row)
         print(*row.values(), flush=True)
         pd.DataFrame(rows).to_csv(path, index=False, float_format="%.6g")

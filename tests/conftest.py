@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from made_campaigns import DIALECTS, MadeCampaign, write_made
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
@@ -35,6 +36,19 @@ def practice(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable
         return next(folder.rglob("campaign.toml")).parent
 
     return unzip
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], MadeCampaign]:
+    """made("bluehill") -> a campaign of the virtual tribometer in that dialect, written once."""
+    base, written = tmp_path_factory.mktemp("made"), {}
+
+    def write(dialect: str) -> MadeCampaign:
+        if dialect not in written:
+            written[dialect] = write_made(base / dialect, dialect, seed=DIALECTS.index(dialect))
+        return written[dialect]
+
+    return write
 
 
 @pytest.fixture(scope="session")

@@ -1,13 +1,13 @@
-"""From the raw exports of a sled friction test to mu and tau0, beside a calibrated spring-block model.
+"""Analysis of sled friction tests: mu and tau0 with uncertainties, compared with a calibrated spring-block model.
 
-The street a measurement walks: export file -> Trace -> Pull -> LawFit -> Comparison -> report, and beside it
-SimConfig -> Run -> LawFit. Each stage takes and returns the frozen records of :mod:`tribo.records`::
+A measurement passes through these stages: export file -> Trace -> Pull -> LawFit -> Comparison -> report. A simulation
+passes through SimConfig -> Run -> LawFit. Each stage takes and returns the frozen records of :mod:`tribo.records`::
 
     import tribo
 
     campaign = tribo.load_campaign("my-campaign")
     study = tribo.study(campaign)              # ingest, fit, compare
-    found = tribo.diagnosis(study.ingested)    # what the model gets wrong, and why
+    found = tribo.diagnosis(study.ingested)    # where the model fails, and why
     tribo.write_report(study, "out", diagnosis=found)
 
 The stub beside this file lists the public names; each is imported on first use.

@@ -1,4 +1,4 @@
-"""``python -m tribo`` is the command tribo."""
+"""``python -m tribo`` runs the command tribo."""
 
 from tribo.cli import main
 

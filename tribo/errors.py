@@ -1,4 +1,4 @@
-"""One way to say what is wrong: where, what was found, what is allowed."""
+"""Errors with their place, the value found and the values allowed."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Problem:
-    """One fault, said so that a person can go and mend it.
+    """One error, described so that a user can correct it.
 
     Parameters
     ----------
     kind : str
         A short slug for programs ("unknown_unit", "missing_file", "truncated").
     what : str
-        The fault in one sentence, without the place.
+        The error in one sentence, without its place.
     file, row, column, found, allowed : str or int, optional
-        Where it is, what stands there and what could. ``row`` counts lines of the file from 1.
+        Its place, the value found there and the values allowed. ``row`` counts lines of the file from 1.
     test_id : str, optional
         The test it belongs to.
     """
@@ -45,12 +45,12 @@ class Problem:
         return "".join(parts)
 
     def at(self, *, file: str | None = None, test_id: str | None = None) -> Problem:
-        """The same problem with its file and test filled in; what is already known stays."""
+        """The same problem with file and test filled in where they are not yet known."""
         return replace(self, file=self.file or file, test_id=self.test_id or test_id)
 
 
 class TriboError(Exception):
-    """Something a user can mend. Carries every problem found, not only the first."""
+    """An error that a user can correct. Holds all problems found, not only the first."""
 
     def __init__(self, problems: Problem | Iterable[Problem]):
         self.problems: tuple[Problem, ...] = (problems,) if isinstance(problems, Problem) else tuple(problems)
@@ -62,16 +62,16 @@ class CampaignError(TriboError):
 
 
 class ReadError(TriboError):
-    """An export cannot be read, or not without guessing."""
+    """An export cannot be read, or only by guessing."""
 
 
 class TraceError(TriboError):
-    """A trace holds no friction force that can be read off it."""
+    """No friction force can be determined from a trace."""
 
 
 class FitError(TriboError):
-    """Too little or impossible data for a fit."""
+    """The data are insufficient or impossible for a fit."""
 
 
 class SimulationError(TriboError):
-    """A simulation that cannot be run, or that met a non-finite number."""
+    """A simulation cannot be run, or produced a non-finite number."""

@@ -1,6 +1,6 @@
-"""The quantities of the field: name, symbol, SI unit, and how exports spell them.
+"""Physical quantities: name, symbol, SI unit, and their names in exports.
 
-The only place where units are converted (pint). Everything inside tribo is SI.
+All unit conversions are done here (pint). Everything inside tribo is in SI units.
 """
 
 from __future__ import annotations
@@ -313,18 +313,18 @@ def unit_factor(unit: str, quantity: str) -> tuple[float, float]:
     Raises
     ------
     ReadError
-        The unit is unknown, empty, or not one of this quantity: never a guess.
+        The unit is unknown, empty, or not a unit of this quantity. Units are never guessed.
     """
     target = QUANTITIES[quantity].si_unit or "dimensionless"
     text = unit.strip()
     if not text and target != "dimensionless":
-        raise ReadError(Problem("missing_unit", f"the {quantity} has no unit", allowed=f"such as {target}"))
+        raise ReadError(Problem("missing_unit", f"the {quantity} has no unit", allowed=f"a unit such as {target}"))
     _registry()  # an installation without a working pint is no fault of the unit
     try:
         zero, one = _in_unit(0.0, text, quantity, target), _in_unit(1.0, text, quantity, target)
     except Exception as why:  # pint raises many kinds, tokenizer errors among them
         raise ReadError(
-            Problem("unknown_unit", f"not a unit of {quantity}", found=unit, allowed=f"such as {target}")
+            Problem("unknown_unit", f"not a unit of {quantity}", found=unit, allowed=f"a unit such as {target}")
         ) from why
     return one - zero, zero
 

@@ -1,4 +1,4 @@
-"""The frozen records that stages hand to each other. SI units inside; the unit ends the name."""
+"""The frozen records passed between stages, in SI units; names end in the unit."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Test:
 
 @dataclass(frozen=True)
 class SetAside:
-    """A test that takes no part in the results, and why."""
+    """A test that is not used in the results, with the reason."""
 
     test_id: str
     reason: str
@@ -99,7 +99,7 @@ class SetAside:
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign as described by campaign.toml and tests.csv; nothing of raw/ is read yet.
+    """A campaign as described by campaign.toml and tests.csv; the exports in raw/ are not read yet.
 
     ``tests`` are the usable rows, ``set_aside`` the rows with faults or an ``exclude`` reason.
     ``samples`` maps each sample name to its pattern (``Sx`` is pattern S pulled along x).
@@ -147,7 +147,7 @@ class Campaign:
 
 @dataclass(frozen=True)
 class ExportFormat:
-    """How an export was read: enough to read it again by hand."""
+    """How an export was read, in enough detail to read it again by hand."""
 
     family: str
     encoding: str
@@ -160,11 +160,11 @@ class ExportFormat:
 
 @dataclass(frozen=True)
 class Trace:
-    """Force against time of one export, in SI units, samples as recorded (never resampled).
+    """Force against time of one export, in SI units, as recorded (never resampled).
 
     Arrays share one length n >= 1. ``columns`` holds further quantities by SI name ("normal_force_N"),
-    ``metadata`` the file's own header untouched, ``flags`` what a reader doubted. ``first_row`` is the line of the
-    file, from 1, that the first sample stands on.
+    ``metadata`` the file's own header untouched, ``flags`` doubts of the reader. ``first_row`` is the line of the
+    file, counted from 1, with the first data point.
     """
 
     name: str
@@ -182,10 +182,10 @@ class Trace:
 
 @dataclass(frozen=True)
 class Pull:
-    """Static peak and sliding mean read off one trace by a named rule. Times on the trace's own clock.
+    """Static peak and mean sliding force of one trace, by a named rule. Times as recorded in the trace.
 
     ``*_u_N`` are standard uncertainties (k = 1) of the reading within the trace. ``zero_N`` was subtracted
-    from every force. ``window_s`` is the sliding window (start, end). NaN where a trace cannot tell.
+    from every force. ``window_s`` is the sliding window (start, end). NaN where a trace does not determine a value.
     """
 
     test_id: str
@@ -261,7 +261,7 @@ class LawFit:
 
 @dataclass(frozen=True)
 class Run:
-    """One run of the spring-block model: force of the slider along the pull, and what was read off it.
+    """One run of the spring-block model: force of the slider along the pull, with static and sliding friction.
 
     ``static_friction`` and ``sliding_friction`` are T/N (dimensionless), ``window_s`` the sliding window,
     ``parameters`` every input with its unit in the name, ``moving`` the number of moving blocks.
@@ -285,7 +285,7 @@ class Run:
 
 @dataclass(frozen=True)
 class ComparisonRow:
-    """Measured and simulated friction force of one sample at one load, standard uncertainties beside them."""
+    """Measured and simulated friction force of one sample at one load, with standard uncertainties."""
 
     sample: str
     regime: Regime
@@ -298,7 +298,7 @@ class ComparisonRow:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Experiment against model: fits of both, and the forces at each measured load."""
+    """Comparison of experiment and model: fits of both, and the forces at each measured load."""
 
     campaign_title: str
     nominal_area_m2: float
@@ -312,9 +312,9 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Override:
-    """What a person decided about one test: to leave it out, or to move its static peak or its sliding window.
+    """A decision made by hand about one test: exclude it, or move its static peak or sliding window.
 
-    Times on the clock of the trace; None where the automatic reading stands. ``row`` is its line in overrides.csv.
+    Times as recorded in the trace; None where the automatic value is kept. ``row`` is its line in overrides.csv.
     """
 
     test_id: str
@@ -327,7 +327,7 @@ class Override:
 
 @dataclass(frozen=True)
 class ByHand:
-    """A test that a person decided about, with its trace and the pull as the rule reads it by itself."""
+    """A test with a decision made by hand, its trace and its automatic result."""
 
     override: Override
     trace: Trace
@@ -338,8 +338,8 @@ class ByHand:
 class Ingested:
     """A campaign with its exports read: one trace and one pull per usable test, the rest set aside.
 
-    ``by_hand`` holds every test that a person decided about: one excluded is among ``set_aside``, one moved has the
-    moved reading among ``pulls``.
+    ``by_hand`` holds every test with a decision made by hand: an excluded test is also in ``set_aside``; a moved one
+    has its new result in ``pulls``.
     """
 
     campaign: Campaign
@@ -349,7 +349,7 @@ class Ingested:
     by_hand: Mapping[str, ByHand] = field(default_factory=dict)
 
     def doubts(self) -> tuple[SetAside, ...]:
-        """Tests that were used although their row, export or pull shows something odd, such as an impulse spike."""
+        """Tests that were used although their row, export or pull is doubtful, for example because of a spike."""
         found = []
         for test_id, pull in self.pulls.items():
             problems = tuple(
@@ -362,7 +362,7 @@ class Ingested:
         return tuple(found)
 
     def table(self) -> pd.DataFrame:
-        """One row a usable test: test_id, sample, specimen, normal_load_N and what the pull says."""
+        """One row per usable test: test_id, sample, specimen, normal_load_N and the results of the pull."""
         import pandas as pd
 
         rows = [
@@ -384,15 +384,15 @@ class Ingested:
 
 @dataclass(frozen=True)
 class Study:
-    """One campaign walked down the whole street.
+    """One campaign with the results of all stages.
 
     ``fits`` holds the measured law of every sample and regime (T = mu N + tau0 A, the default weights),
-    ``other_fits`` the same under other weights or laws. ``simulated`` is the ensemble, one row a run: sample,
+    ``other_fits`` the same under other weights or laws. ``simulated`` is the ensemble, one row per run: sample,
     pressure_Pa, normal_load_N (p times the nominal area of the campaign), angle_deg, seed, static_N,
-    sliding_N. ``example_runs`` keeps a full force trace of the model per sample. ``budget`` is the uncertainty
-    budget of every fitted number, one row a component; ``power`` says what this campaign could have shown and
-    ``outlying`` which pulls and specimens stand far from their siblings; ``differences`` how far samples are apart that
-    were measured on the same specimens, one row a pair of samples, regime and number.
+    sliding_N. ``example_runs`` holds one full force trace of the model per sample. ``budget`` is the uncertainty
+    budget of every fitted number, one row per component. ``power`` states the differences this campaign could detect,
+    ``outlying`` the outlying pulls and specimens. ``differences`` holds the differences between samples measured on the
+    same specimens, one row per pair of samples, regime and number.
     """
 
     ingested: Ingested

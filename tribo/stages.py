@@ -1,4 +1,4 @@
-"""The street, walked by one campaign: ingest, fit, compare. Pure computing on records; nothing is written."""
+"""The stages of a study of one campaign: ingest, fit, compare, diagnose. They compute on records and write no files."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def _silent(stage: str, done: int, total: int) -> None:
 
 @dataclass(frozen=True)
 class StudyOptions:
-    """What a user may choose; every choice is written into the results."""
+    """Options of a study; each is recorded with the results."""
 
     rule: str = "seed"
     weights: Weights = "relative"
@@ -46,8 +46,8 @@ class StudyOptions:
     runs: int = 4
     seed: int = 0
     jobs: int = 2
-    overrides: Path | None = None  # table of what a person decided about single pulls
-    kept: Path | None = None  # folder of finished simulations and diagnosis: the next start goes on from there
+    overrides: Path | None = None  # table of decisions made by hand about single pulls
+    kept: Path | None = None  # folder of finished simulations and diagnosis, used again by the next start
     scheduler: str | None = None  # address of a dask scheduler that runs the simulations
 
     @property
@@ -58,7 +58,7 @@ class StudyOptions:
         return ModelRuns(self.runs, self.seed, self.jobs, self.kept, self.scheduler)
 
     def as_words(self) -> dict[str, str]:
-        """What was chosen, for the provenance."""
+        """The options as text, for the provenance."""
         return {"rule": self.rule, "weights": self.weights, "flat": self.flat, "runs": str(self.runs)}
 
 
@@ -75,14 +75,14 @@ def ingest(
 ) -> Ingested:
     """Read every usable test of a campaign into a trace and a pull, on ``jobs`` processes where that pays.
 
-    A test that cannot be read is set aside with its problems; the rest goes on. A row that names many pulls within
-    its export is a test for each of them. ``overrides`` is a table of what a person decided about single pulls
+    A test that cannot be read is set aside with its problems; the other tests are read. A row that names several pulls
+    of its export becomes one test per pull. ``overrides`` is a table of decisions made by hand about single pulls
     (:mod:`tribo.ingestion.overrides`). The result does not depend on ``jobs``.
 
     Raises
     ------
     CampaignError
-        Not one test could be read, or the overrides have faults.
+        No test could be read, or the overrides have errors.
     """
     from tribo.ingestion.ingested import ingest_campaign
     from tribo.ingestion.overrides import apply_overrides
@@ -109,14 +109,14 @@ def fit(ingested: Ingested, *, weights: Weights = "relative") -> tuple[LawFit, .
 def simulate_cells(
     ingested: Ingested, fits: tuple[LawFit, ...], options: StudyOptions, only: str = "", progress: Progress = _silent
 ) -> tuple[Cell, ...]:
-    """Calibrate the model and run what :func:`compare` will need, into ``options.kept``; returns the cells that ran.
+    """Calibrate the model, run the simulations that :func:`compare` needs and keep them; returns their cells.
 
     ``only`` is the name of a cell ("Sx@18180Pa"), a sample, "calibration", or empty for all.
 
     Raises
     ------
     CampaignError
-        No flat sample to calibrate on, or ``only`` names nothing this campaign measured.
+        No flat sample to calibrate on, or ``only`` names nothing that this campaign measured.
     """
     from tribo.comparison.prediction import run_named_cells
 
@@ -127,7 +127,7 @@ def simulate_cells(
 def compare(
     ingested: Ingested, fits: tuple[LawFit, ...], options: StudyOptions = DEFAULTS, *, progress: Progress = _silent
 ) -> Study:
-    """Calibrate the model on the flat sample, predict every sample at its loads, and put both side by side.
+    """Calibrate the model on the flat sample, predict every sample at its loads, and compare.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def compare(
 def study(
     campaign: Campaign, options: StudyOptions = DEFAULTS, *, until: Until = "report", progress: Progress = _silent
 ) -> Study:
-    """Walk the street with one campaign as far as ``until``."""
+    """Run the stages up to ``until`` on one campaign."""
     chosen = with_flat_sample(campaign, options.flat)
     ingested = ingest(chosen, rule=options.rule, jobs=options.jobs, overrides=options.overrides, progress=progress)
     if until == "ingest":
@@ -167,7 +167,7 @@ def study(
 
 
 def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
-    """The fits of a study looked at from other sides: other weights and laws, budget, power, outlying pulls."""
+    """Add to a study: fits with other weights and laws, uncertainty budget, power and outlying pulls."""
     from tribo.fitting.assessment import assessment
 
     made_from = (walked.ingested, walked.fits, options.weights)
@@ -178,10 +178,10 @@ def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
 def diagnosis(
     ingested: Ingested, *, seed: int = 0, jobs: int = 2, kept: Path | None = None, progress: Progress = _silent
 ) -> Diagnosis:
-    """What the calibrated model gets wrong and why, with all it rests on; taken from ``kept`` where it is there.
+    """Where the calibrated model fails and why, with the evidence; taken from ``kept`` if it is there.
 
-    What the model makes of each pattern comes from the campaign's own simulations where ``kept`` holds them, else
-    from the tabulated ones; a named mechanism is then put into the simulator itself.
+    The model's prediction for each pattern comes from the simulations of the campaign if ``kept`` holds them, else from
+    tabulated ones. A mechanism that is named is then simulated as part of the spring-block model.
 
     Raises
     ------
@@ -189,6 +189,7 @@ def diagnosis(
         Fewer than twelve usable tests.
     """
     from tribo.diagnose import examine, with_simulation
+    from tribo.diagnose.statistics import pattern_table
 
     predictor = own_predictor(ingested.campaign, kept)
 
@@ -196,7 +197,7 @@ def diagnosis(
         examined = examine(ingested, seed=seed, predictor=predictor, progress=progress)
         return with_simulation(examined, seed=seed, jobs=jobs, progress=progress)
 
-    return Shelf(kept).take("diagnosis", (ingested, seed, predictor), found, DIAGNOSED_BY)
+    return Shelf(kept).take("diagnosis", (ingested, seed, predictor, pattern_table.record()), found, DIAGNOSED_BY)
 
 
 def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:
@@ -218,16 +219,16 @@ def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:
 
 
 def plan(campaign: Campaign, options: StudyOptions, until: Until) -> dict[str, Any]:
-    """What a walk would do, without doing it: ``steps`` in words, ``set_aside``, and the faults in full."""
+    """The steps of a study without running them: ``steps`` as text, ``set_aside``, and all problems."""
     from tribo.comparison.prediction import loads_to_simulate
 
-    steps = [f"read {len(campaign.tests)} exports of {campaign.root} by rule {options.rule}"]
+    steps = [f"read {len(campaign.tests)} exports of {campaign.root} with rule {options.rule}"]
     campaign = with_flat_sample(campaign, options.flat)
     samples = sorted({t.sample for t in campaign.tests})
     if unknown := sum(np.isnan(t.normal_load_N) for t in campaign.tests):
-        steps.append(f"take the load of {unknown} tests from their exports")
+        steps.append(f"take the normal load of {unknown} tests from their exports")
     if until != "ingest":
-        steps.append(f"fit mu and tau0 of {len(samples)} samples ({', '.join(samples)}), weights {options.weights}")
+        steps.append(f"fit mu and tau0 of {len(samples)} samples ({', '.join(samples)}) with weights {options.weights}")
     if until in ("compare", "report"):
         loads = loads_to_simulate(campaign)
         flat = required_flat_sample(campaign)

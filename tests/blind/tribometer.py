@@ -1,47 +1,37 @@
-"""A virtual sled tribometer that hides an effect: raw exports on disk, laws coded apart from the library."""
+"""A virtual sled tribometer that hides effects in a campaign and writes it as raw exports."""
 
 from __future__ import annotations
 
-import math
 from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from .bench import AREA_MM2, GRAVITY, OTHER, PAPER, PATTERNS, STANDARD, Bench, Design
+from .bench import AREA_MM2, GRAVITY, STANDARD, Bench, Design
 from .effects import EFFECTS, FIRST, LARGEST
+from .patterns import CAVITIES, draw_errors
+from .scatter import add_noise, specimen_gains
 
 __all__ = ["AREA_MM2", "EFFECTS", "LARGEST", "Bench", "Design", "hide", "write"]
 SAMPLES_A_PULL = 700
 
 
 def hide(seed: int, effects: list[tuple[str, float]], design: Design = STANDARD) -> Bench:
-    """A bench with the named effects at work, specimens and repeats drawn from ``seed``."""
-    rng = np.random.default_rng(seed)
-    tests = _table(design, rng)
-    law = (rng.normal(4.8, 0.35), rng.normal(23, 1.8), rng.normal(3.0, 0.2), rng.normal(11.6, 0.5))
-    bench = Bench(tests, law, _shares(rng), engine=design.engine)
+    """A bench with the named effects at work; flat law, patterns, specimens and repeats are drawn from ``seed``.
+
+    The draws do not depend on the effects, so that the same seed without them is the campaign to compare with.
+    """
+    tests, law, errors, chance, scatter = (np.random.default_rng([seed, k]) for k in range(5))
+    flat = (law.uniform(4.07, 5.57), law.uniform(19, 28), law.uniform(2.57, 3.47), law.uniform(10, 13))
+    drawn = draw_errors(design.sizes(), design.pattern_error, design.pattern_draw, errors)
+    bench = Bench(_table(design, tests), flat, drawn)
     for name, size in sorted(effects, key=lambda e: e[0] not in FIRST):
-        EFFECTS[name](bench, size, rng)
-    specimens = {s: np.exp(rng.normal(0, design.specimen_sd, 2)) for s in sorted(set(tests["specimen"]))}
-    gains = np.array([specimens[s] for s in tests["specimen"]])
-    noise = rng.normal(size=(len(tests), 2))
-    if math.isfinite(design.tail):
-        noise *= np.sqrt((design.tail - 2) / design.tail)
-        noise /= np.sqrt(rng.chisquare(design.tail, (len(tests), 1)) / design.tail)
-    gains = gains * np.exp(noise * np.array(design.repeat_sd))
+        EFFECTS[name](bench, size, chance)
+    gains = specimen_gains(bench, design, scatter)
     bench.static, bench.sliding = bench.static * gains[:, 0], bench.sliding * gains[:, 1]
+    add_noise(bench, design, scatter)
     return bench
-
-
-def _shares(rng: np.random.Generator) -> dict[str, tuple[float, float, float, float]]:
-    shares = {"F": (1.0, 1.0, 1.0, 1.0)}
-    for name in OTHER:
-        mix = rng.uniform(0.0, 0.6)
-        row = (1 - mix) * np.array(OTHER[name]) + mix * np.array(PAPER[name])
-        shares[name] = tuple(row * np.exp(rng.normal(0, 0.015, 4)))  # type: ignore[assignment]
-    return shares
 
 
 def _table(design: Design, rng: np.random.Generator) -> pd.DataFrame:
@@ -82,10 +72,9 @@ def write(bench: Bench, folder: Path, seed: int) -> Path:
     """The campaign on disk: campaign.toml, tests.csv and one export a pull, in the style of a tensile machine."""
     rng = np.random.default_rng(seed + 1_000_003)
     (folder / "raw").mkdir(parents=True)
-    patterns = sorted({s[0] for s in bench.tests["sample"]})
     head = f'[campaign]\ntitle = "hidden {seed}"\nnominal_area_mm2 = {AREA_MM2}\n'
     head += "slider_mass_g = 1.5\npull_speed_mm_s = 0.2\n"
-    blocks = [f"[patterns.{name}]\n{PATTERNS[name]}\n" for name in patterns]
+    blocks = [_pattern(name) for name in sorted({s[0] for s in bench.tests["sample"]})]
     (folder / "campaign.toml").write_text("\n".join([head, *blocks]))
     table = bench.tests.drop(columns=["true_sample", "N"])
     table.insert(1, "file", [f"raw/{t}.csv" for t in table["test_id"]])
@@ -99,6 +88,15 @@ def write(bench: Bench, folder: Path, seed: int) -> Path:
     return folder
 
 
+def _pattern(name: str) -> str:
+    """A table of campaign.toml, lengths in micrometres."""
+    if name not in CAVITIES:
+        return f'[patterns.{name}]\ncavity = "none"\n'
+    shape, x, y, pitch_x, pitch_y = CAVITIES[name]
+    size = f"diameter_um = {x}" if shape == "circle" else f"size_um = [{x}, {y}]\nstaggered = true"
+    return f'[patterns.{name}]\ncavity = "{shape}"\n{size}\npitch_um = [{pitch_x}, {pitch_y}]\n'
+
+
 def _trace(bench: Bench, k: int, speed_mm_s: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Rest, linear rise, peak, exponential fall to the sliding force with a little fading stick-slip, noise."""
     static, sliding = float(bench.static[k]), float(bench.sliding[k])
@@ -109,7 +107,7 @@ def _trace(bench: Bench, k: int, speed_mm_s: float, rng: np.random.Generator) ->
     time = np.linspace(0.0, end_s, int(min(SAMPLES_A_PULL, max(end_s * bench.samples_per_s, 60))))
     after = time - rest_s - rise_s
     force = np.where(time < rest_s, 0.0, static * (time - rest_s) / rise_s)
-    swing = 0.01 * sliding * np.sin(2 * np.pi * after * speed_mm_s / 0.15) * np.exp(-np.maximum(after, 0) * speed_mm_s)
+    swing = 0.01 * sliding * np.sin(2 * np.pi * after * speed_mm_s / 0.147) * np.exp(-np.maximum(after, 0) * speed_mm_s)
     settled = sliding + (static - sliding) * np.exp(-np.maximum(after, 0) / fall_s) + swing
     force = np.where(after > 0, settled, force)
     return time, force + bench.zero[k] + rng.normal(0, 0.006, time.size)

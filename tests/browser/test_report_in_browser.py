@@ -122,7 +122,7 @@ def test_a_window_is_moved_by_keys_by_dragging_and_by_number(report: Opened) -> 
     expect(page.locator("#pull-says")).to_contain_text("Moved by hand")
     page.click("#hand-reset")
     assert moved_start(page) == start
-    expect(page.locator("#decision-count")).to_have_text("No decision.")
+    expect(page.locator("#decision-count")).to_have_text("No decisions yet.")
 
 
 def save(page: Page, folder: Path) -> Path:
@@ -141,7 +141,7 @@ def test_an_exclusion_needs_a_reason(report: Opened, tmp_path: Path) -> None:
     page.click("#pull-close")
     page.click("#save-overrides")
     expect(page.locator("#pull")).to_be_visible()
-    expect(page.locator("#pull-says")).to_contain_text("give a reason")
+    expect(page.locator("#pull-says")).to_contain_text("enter a reason")
     page.fill("#hand-reason", 'he said "no", twice')
     page.click("#pull-close")
     table = pd.read_csv(save(page, tmp_path))
@@ -161,7 +161,7 @@ def test_what_the_page_hands_back_is_applied_and_comes_back_on_the_next_page(
     page.keyboard.press("Tab")
     page.fill("#hand-reason", "drift at first")
     page.click("#pull-close")
-    expect(page.locator("#decision-count")).to_have_text("Left out: 1. Moved: 1.")
+    expect(page.locator("#decision-count")).to_have_text("Excluded: 1. Moved: 1.")
     overrides = save(page, tmp_path)
     assert report.messages == []
 
@@ -182,8 +182,8 @@ def test_what_the_page_hands_back_is_applied_and_comes_back_on_the_next_page(
 
     opened = open_report(browser, anew)
     again = opened.page
-    expect(again.locator("#decision-count")).to_have_text("Left out: 1. Moved: 1.")
-    expect(again.locator("[data-id=T003]")).to_contain_text("Left out by hand (sled tipped over).")
+    expect(again.locator("#decision-count")).to_have_text("Excluded: 1. Moved: 1.")
+    expect(again.locator("[data-id=T003]")).to_contain_text("Excluded by hand (sled tipped over).")
     expect(again.locator("#measured")).to_contain_text("drift at first")
     assert save(again, tmp_path / "again").read_bytes() == overrides.read_bytes()
     assert opened.messages == []
@@ -196,7 +196,7 @@ def test_it_prints_to_pdf_with_every_pull_and_no_buttons(report: Opened) -> None
     report.page.emulate_media(media="print")
     expect(report.page.locator("#pull-tools")).to_be_hidden()
     expect(report.page.locator("#pull-list > li").first).to_be_visible()
-    expect(report.page.get_by_text("Roughness and preparation of the surfaces")).to_be_visible()  # folded on screen
+    expect(report.page.get_by_text("Surface roughness and preparation")).to_be_visible()  # folded on screen
 
 
 def test_without_scripts_everything_is_still_there(browser: Browser, out: Path) -> None:

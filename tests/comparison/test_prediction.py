@@ -86,7 +86,7 @@ def test_cells_run_one_by_one_are_what_a_prediction_takes(fitted: Fitted, tmp_pa
     assert computed == set()
     stages.simulate_cells(ingested, fits, replace(options, seed=1), "calibration")
     assert list(tmp_path.glob("*.nc")) == []
-    with pytest.raises(CampaignError, match="nothing of this name"):
+    with pytest.raises(CampaignError, match="no simulation has this name"):
         stages.simulate_cells(ingested, fits, options, "B@1Pa")
 
 

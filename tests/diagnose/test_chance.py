@@ -11,7 +11,11 @@ from tribo.diagnose.search.looks import all_looks
 from tribo.diagnose.search.screen import screen
 from tribo.diagnose.statistics.chance import as_measured, columns_of, drawn_residuals, refit, scores
 from tribo.diagnose.statistics.fit import fit
+from tribo.diagnose.statistics.model import setup
+from tribo.diagnose.statistics.observations import observe
+from tribo.diagnose.statistics.predictor import tabled_predictor
 
+from .synthetic import SMALL, hidden
 from .test_screen import baseline
 
 
@@ -39,6 +43,19 @@ def test_the_null_is_simulated_from_the_fitted_model() -> None:
     chi2 = scores(refit(f, drawn_residuals(f, np.random.default_rng(1), 300)), ready)[0][:, 0]
     assert 0.8 < np.sqrt(np.mean(chi2)) < 1.2
     assert 0.005 < np.mean(chi2 > 3.84) < 0.09
+
+
+def test_repeats_of_a_replicate_scatter_as_those_of_the_campaign_were_made_to() -> None:
+    """Forty-eight groups of eight repeats: their scatter is known to 4 %, and drawn anew with the same size."""
+    repeat_sd = (0.09, 0.07)
+    design = replace(SMALL, repeats=8, repeat_sd=repeat_sd)
+    o = observe(hidden(seed=1, design=design))
+    f = fit(setup(o, tabled_predictor(o.patterns)))
+    drawn = drawn_residuals(f, np.random.default_rng(0), 100)
+    c = o.conditions
+    group = np.array([f"{a} {b} {load:.3f}" for a, b, load in zip(c.sample, c.specimen, c.normal_load_N, strict=True)])
+    within = [drawn[:, :, group == g].var(axis=2, ddof=1).mean(axis=0) for g in np.unique(group)]
+    assert np.sqrt(np.mean(within, axis=0)) == pytest.approx(repeat_sd, rel=0.1)
 
 
 def test_a_column_that_the_law_takes_up_counts_for_nothing() -> None:

@@ -49,7 +49,7 @@ def test_four_times_the_tests_find_a_trend_of_half_the_size() -> None:
 
 @pytest.fixture(scope="module")
 def examined() -> Diagnosis:
-    return examine(hidden(("run_in", 1.5)), replicates=(30, 20))
+    return examine(hidden(("run_in", 3.0)), replicates=(30, 20))
 
 
 def test_the_tables_hold_every_test_and_shrink_under_the_named_cause(examined: Diagnosis) -> None:

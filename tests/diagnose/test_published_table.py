@@ -90,11 +90,17 @@ def test_a_mechanism_put_into_the_table_is_found_again_with_its_size(name: str) 
     assert f.score > fit_table(again).score + 2
 
 
-def test_the_papers_model_fails_unless_mu_and_tau0_were_independent(whole: PublishedDiagnosis) -> None:
+def test_whether_the_papers_model_fails_hangs_on_the_correlation_and_on_what_the_deviations_are_of(
+    whole: PublishedDiagnosis,
+) -> None:
+    """Deviations of three specimens: it fails in every reading. Of the mean: only with a close correlation."""
     possible = [o for o in whole.outlooks if o.reading.correlation <= LEAST_CORRELATION]
-    assert all(o.p_misfit < 0.01 for o in possible)
-    independent = [o for o in whole.outlooks if o.reading.correlation == 0 and o.reading.specimens == 1]
-    assert all(o.outcome == "no_misfit" for o in independent)
+    assert all(o.p_misfit < 0.01 for o in possible if o.reading.specimens == 3)
+    of_mean = {(o.reading.model, o.reading.correlation): o.p_misfit for o in whole.outlooks if o.reading.specimens == 1}
+    for model in ("paper", "tribo"):
+        assert of_mean[model, -0.95] < 0.01
+        assert of_mean[model, LEAST_CORRELATION] > 0.01
+        assert of_mean[model, 0.0] > 0.01
 
 
 def test_suction_is_excluded_in_every_reading_and_deformed_patterns_are_not(whole: PublishedDiagnosis) -> None:
@@ -112,9 +118,8 @@ def test_the_verdict_says_what_holds_of_each_guess_and_accounts_for_every_mechan
     assert all(word in v.text for word in ("Deformed patterns", "contact area", "Suction cups", "covariance"))
     named = {c.mechanism for c in v.causes} | {e.mechanism for e in v.excluded} | {whole.main.weighed[0].name}
     assert named == set(MECHANISMS)
-    assert v.gain is not None
-    assert v.gain.held_out == "samples"
-    assert {m.sample for m in v.misfits} >= {"Sy"}
+    assert whole.main.p_misfit > 0.01
+    assert (v.verdict, v.gain, v.misfits) == ("no_misfit", None, ())
     told = v.as_dict()["model"]["readings"]
     assert [r["outcome"] for r in told] == [o.outcome for o in whole.outlooks]
 

@@ -47,7 +47,7 @@ def test_the_quick_score_is_that_of_the_cleared_columns() -> None:
 
 
 def test_an_effect_is_the_strongest_look_at_its_own_column() -> None:
-    f = baseline(("run_in", 1.0))
+    f = baseline(("run_in", 2.5))
     looks = all_looks(f)
     found = screen(f, looks, replicates=0, rng=np.random.default_rng(0))
     strongest = looks[int(found.strength.argmax())]
@@ -59,7 +59,7 @@ def test_no_more_replicates_are_made_than_the_decision_needs() -> None:
     plain = baseline()
     looks = [look for look in all_looks(plain) if look.kind == "trend"]
     within = screen(plain, looks[1:2], replicates=200, rng=np.random.default_rng(2))
-    f = baseline(("run_in", 1.0))
+    f = baseline(("run_in", 2.5))
     beyond = screen(f, all_looks(f), replicates=200, rng=np.random.default_rng(2))
     assert len(within.chance) < 200
     assert np.sum(within.chance >= within.strength.max()) >= 10
@@ -68,7 +68,7 @@ def test_no_more_replicates_are_made_than_the_decision_needs() -> None:
 
 
 def test_a_p_value_beyond_all_replicates_is_small_and_finite() -> None:
-    f = baseline(("run_in", 1.0))
+    f = baseline(("run_in", 2.5))
     looks = [look for look in all_looks(f) if look.kind == "trend"]
     found = screen(f, looks, replicates=30, rng=np.random.default_rng(2))
     assert 0.0 < found.p_adjusted() < 1e-3

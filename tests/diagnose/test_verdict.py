@@ -31,7 +31,8 @@ def test_the_json_has_every_key_of_the_schema(tied: Diagnosis) -> None:
     assert plain["schema"] == "tribo.verdict/1"
     assert set(plain["misfits"][0]) == {"observable", "sample", "covariate", "effect_percent", "p_adjusted", "text"}
     assert set(plain["causes"][0]) == {"mechanism", "weight", "parameters", "text"}
-    assert set(plain["causes"][0]["parameters"]["dp"]) == {"value", "low", "high", "unit"}
+    suction = next(cause for cause in plain["causes"] if cause["mechanism"] == "suction")
+    assert set(suction["parameters"]["dp"]) == {"value", "low", "high", "unit"}
     assert set(plain["gain"]) == {
         "held_out", "log_score_baseline", "log_score_extended", "difference", "se",
         "rmse_percent_before", "rmse_percent_after",

@@ -24,7 +24,7 @@ NAMES = list(DIAGNOSIS_FIGURES)
 
 @pytest.fixture(scope="module")
 def temperature() -> Diagnosis:
-    return examine(hidden(("temperature", 1.5)), replicates=FEW)
+    return examine(hidden(("temperature", 4.0)), replicates=FEW)
 
 
 @pytest.fixture(scope="module")

@@ -117,14 +117,14 @@ def test_what_dominates_is_named_in_words() -> None:
     assert budget(pulls(between=0.3)).dominant("mu").name == "specimens"
     lone = budget(pulls(specimens=1, within=0.2))
     assert lone.dominant("mu").name == "repeats"
-    assert "for T at 10 kPa repeats" in lone.text()
+    assert "for T at 10 kPa, repeats" in lone.text()
 
 
 def test_alike_specimens_are_put_down_to_their_repeats() -> None:
     tables = [pulls(between=0.0, within=0.1, seed=s) for s in range(20)]
     shares = [budget(t).table().set_index("component")["share_pct_T_N"] for t in tables]
     assert np.median([s["repeats"] + s["reading of the trace"] for s in shares]) > 60
-    assert any("repeats explain" in note for t in tables for note in budget(t).notes)
+    assert any("scatter of their repeats" in note for t in tables for note in budget(t).notes)
 
 
 def test_silence_of_the_campaign_is_filled_with_stated_defaults() -> None:
@@ -139,5 +139,5 @@ def test_silence_of_the_campaign_is_filled_with_stated_defaults() -> None:
 def test_a_law_without_tau0_has_no_budget() -> None:
     table = pulls()
     (fit,) = fit_power_law(table, "static", AREA)
-    with pytest.raises(FitError, match="no budget"):
+    with pytest.raises(FitError, match="a budget needs a fitted law"):
         uncertainty_budget(table, fit, {})

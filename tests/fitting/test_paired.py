@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from made_campaigns import MadeCampaign
 
 from tribo import stages
 from tribo.campaign import load_campaign
@@ -63,16 +63,18 @@ def test_only_samples_that_share_two_specimens_are_compared() -> None:
 
 def test_a_difference_is_said_with_its_interval() -> None:
     found = differences(3, own=0.02, specimens=6)
-    assert found["T_N"].text().startswith("Sx and Sy differ in static T at 10 kPa: +")
+    assert found["T_N"].text().startswith("Sx and Sy differ significantly in static T at 10 kPa: +")
     table = differences_table(found.values())
     assert list(table["number"]) == ["mu", "tau0_kPa", "T_N"]
     assert table["specimens"][0] == "S0;S1;S2;S3;S4;S5"
     assert table["p"].between(0, 1).all()
 
 
-def test_a_fit_of_a_campaign_carries_the_difference_of_its_directions(practice: Callable[[str], Path]) -> None:
+def test_a_fit_of_a_campaign_carries_the_difference_of_its_directions(
+    made: Callable[[str], MadeCampaign],
+) -> None:
     options = stages.StudyOptions()
-    study = stages.study(load_campaign(practice("02")), options, until="fit")
+    study = stages.study(load_campaign(made("testxpert").folder), options, until="fit")
     assert study.differences is not None
     assert set(study.differences["sample"] + study.differences["other"]) == {"SxSy"}
     assert len(study.differences) == 6

@@ -58,7 +58,7 @@ def test_one_sample_alone_keeps_its_own_covariance() -> None:
 def test_a_sample_that_scatters_otherwise_is_noted() -> None:
     assert not any(fit.notes for fit in pool_specimen_scatter(fits(specimens=6)))
     unlike = pool_specimen_scatter(fits({"B": 0.6}, specimens=6))
-    assert all(any("do not trust" in note for note in fit.notes) for fit in unlike)
+    assert all(any("is not reliable" in note for note in fit.notes) for fit in unlike)
 
 
 def test_a_sample_of_one_specimen_gains_an_interval_for_its_pattern() -> None:
@@ -70,7 +70,7 @@ def test_a_sample_of_one_specimen_gains_an_interval_for_its_pattern() -> None:
 
 
 def test_specimens_alone_in_their_samples_have_nothing_to_pool() -> None:
-    with pytest.raises(FitError, match="between specimens is unknown"):
+    with pytest.raises(FitError, match="between specimens cannot be determined"):
         pool_specimen_scatter(fits(specimens=1))
 
 

@@ -64,16 +64,16 @@ def test_repeats_help_where_repeats_scatter_and_not_where_specimens_do() -> None
     assert noisy[2].repeats_needed is not None
     assert noisy[2].repeats_needed > 2
     assert unlike[2].repeats_needed is None
-    assert "more repeats alone would not" in unlike[2].text()
+    assert "more repeats alone are not sufficient" in unlike[2].text()
 
 
 def test_the_sentence_states_level_power_and_what_it_takes() -> None:
     text = power_of_campaign(pulls(0.06, 0.05), "static", AREA)[2].text()
     assert "T at 10 kPa" in text
-    assert "probability 0.8 at level 0.05" in text
-    assert "10 % takes" in text
+    assert "probability 0.8 at significance level 0.05" in text
+    assert "Detecting 10 % requires" in text
 
 
 def test_one_specimen_a_sample_has_no_power_to_speak_of() -> None:
-    with pytest.raises(FitError, match="between specimens is unknown"):
+    with pytest.raises(FitError, match="between specimens cannot be determined"):
         power_of_campaign(pulls(0.05, 0.05, specimens=1), "static", AREA)

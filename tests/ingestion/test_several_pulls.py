@@ -115,7 +115,7 @@ def test_a_log_read_as_one_pull_is_doubted_with_what_to_write(tmp_path: Path) ->
     (tmp_path / "raw" / "F1.csv").write_text(umt_text(table + 0.003 * np.sin(40 * time)[:, None] * [0, 1, 1]))
     (doubt,) = stages.ingest(campaign).doubts()
     (problem,) = (p for p in doubt.problems if p.kind == "several_pulls")
-    assert problem.what.startswith("2 pulls")
+    assert problem.what.startswith("this trace contains 2 pulls")
     assert "raw/F1.csv#1/* for all" in (problem.allowed or "")
 
 

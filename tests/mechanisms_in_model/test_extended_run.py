@@ -20,6 +20,19 @@ LONG = SMALL.with_(sample="Sx", angle_deg=4.0, blocks=(45, 25))
 KNOWN = {"humidity_pct": 58.0, "hold_s": 100.0, "temperature_C": 25.0, "speed_m_s": 8e-4, "specimen_run": 2.0}
 KEYS = [f"{name}(C)" if name == "mislabelled_specimen" else name for name in SIMULATED]
 EVERY = pytest.mark.parametrize("key", KEYS)
+# Friction of a run may differ from that of the law by this share. A thousandth where every block is changed alike:
+# the equations of the model are linear in load and adhesion, and only the samples that the mean over stick-slip takes
+# in may shift. More where the law averages over what the blocks do one by one, for the reason given.
+ALIKE = 1e-3
+BLOCK_BY_BLOCK = {
+    "velocity_dependence": 0.02,  # blocks slide faster and slower than they are pulled
+    "contact_ageing": 0.02,  # a block that has slipped is young again, also while others still stick
+    "edge_adhesion": 0.01,  # blocks at a rim slip before or after their neighbours
+    "pull_angle": 0.01,  # the wire lifts with a force that rises and falls as blocks slip
+    "cavity_collapse": 0.03,  # floors touch down in 25 by 25 blocks, a cavity is ten of them
+    "tilt": 0.2,  # the law is that of a rigid edge; blocks are carried by springs and peel off sooner
+}
+AGAINST_ITS_SIGN = {"tilt": 0.02}  # sliding friction of blocks loaded unevenly is a percent higher
 
 
 def mechanism_of(key: str):
@@ -82,15 +95,17 @@ def test_zero_amplitude_is_the_run_without_to_the_bit(key: str, bases: dict[str,
 
 
 @EVERY
-def test_the_simulated_change_is_that_of_the_law_within_its_stated_error(
+def test_the_simulated_friction_is_that_of_the_law_and_the_stated_error_does_not_promise_more(
     key: str, bases: dict[str, tuple[Base, Run]]
 ) -> None:
     m, config = mechanism_of(key), config_of(key)
     base, before = bases[config.sample]
     run = simulate_with(config, {key: m.start()}, **KNOWN)
     static, sliding = quick(key, config, base, before)
-    assert run.static_friction == pytest.approx(static, rel=m.quick_error)
-    assert run.sliding_friction == pytest.approx(sliding, rel=m.quick_error)
+    within = BLOCK_BY_BLOCK.get(key, ALIKE)
+    assert run.static_friction == pytest.approx(static, rel=within)
+    assert run.sliding_friction == pytest.approx(sliding, rel=within)
+    assert m.quick_error >= within
 
 
 @EVERY
@@ -104,9 +119,9 @@ def test_the_simulated_change_has_the_declared_sign_and_regimes(key: str, bases:
     }
     for regime, change in moved.items():
         if regime in m.regimes and m.sign != 0:
-            assert m.sign * change > -m.quick_error / 3
+            assert m.sign * change > -AGAINST_ITS_SIGN.get(key, ALIKE)
         if regime not in m.regimes:
-            assert abs(change) < m.quick_error
+            assert abs(change) < BLOCK_BY_BLOCK.get(key, ALIKE)
     if m.regimes != ("rise",):
         assert max(abs(change) for change in moved.values()) > 1e-4
 

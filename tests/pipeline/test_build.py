@@ -199,7 +199,7 @@ def test_a_half_copied_export_is_left_for_the_next_round_and_named(story: Story)
     assert story.mixed.status == 3
     assert story.mixed.said["waiting"] == {"b": ["raw/T009.csv.part is being uploaded"]}
     index = story.mixed.after["current/index.html"].decode()
-    assert "left for the next round" in index
+    assert "postponed to the next build" in index
     assert "raw/T009.csv.part is being uploaded" in index
 
 
@@ -225,7 +225,7 @@ def test_a_dry_run_with_nothing_to_do_names_no_step(story: Story) -> None:
 
 
 def test_a_report_that_was_deleted_is_made_again_from_what_is_there(story: Story) -> None:
-    assert story.restored.said["due"] == {"a": "its report.html is gone"}
+    assert story.restored.said["due"] == {"a": "report.html has been deleted"}
     assert [step.split(":")[0] for step in story.restored.said["steps"]] == ["report (a)", "index"]
     assert "current/a/report.html" in story.restored.after
 
@@ -243,7 +243,7 @@ def test_a_dry_run_says_why_each_step_would_run_and_does_nothing(tmp_path: Path)
     assert dry.said["due"] == {"a": "new"}
     steps = {step.split(" (")[0].split(":")[0] for step in dry.said["steps"]}
     assert steps == {"ingest", "fit", "calibrate", "simulate", "diagnose", "report", "index"}
-    assert all(step.endswith(": never finished before") for step in dry.said["steps"])
+    assert all(step.endswith(": not finished before") for step in dry.said["steps"])
     assert dry.after == {}
 
 
@@ -266,5 +266,5 @@ def test_an_unusable_campaign_is_named_and_keeps_no_other_back(tmp_path: Path) -
     assert (first.status, first.said["status"]) == (3, {"broken": "unusable"})
     index = first.after["current/index.html"].decode()
     assert "unusable input" in index
-    assert "no such file" in index
+    assert "this file does not exist" in index
     assert lab.build().said["steps"] == []

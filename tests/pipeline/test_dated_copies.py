@@ -72,5 +72,5 @@ def test_two_builds_within_a_second_have_two_names_in_order(tmp_path: Path) -> N
 
 
 def test_the_newest_build_is_always_kept(tmp_path: Path) -> None:
-    with pytest.raises(TriboError, match="always kept"):
+    with pytest.raises(TriboError, match="must be kept"):
         date_build(tmp_path, keep=0)

@@ -40,11 +40,11 @@ def test_a_change_is_marked_and_said_with_its_campaign() -> None:
 def test_without_a_change_none_is_marked_and_the_page_says_so() -> None:
     text = rendered(campaigns())
     assert '<line class="change"' not in text
-    assert "No change between campaigns beyond chance" in text
+    assert "No statistically significant change between campaigns" in text
 
 
 def test_too_few_campaigns_are_said_to_be_too_few() -> None:
-    assert "series of at least 8 campaigns; there is none yet" in rendered(campaigns(1.0)[5:10])
+    assert "series of at least 8 campaigns; no series is long enough yet" in rendered(campaigns(1.0)[5:10])
 
 
 def test_the_page_needs_nothing_from_anywhere_and_is_well_formed() -> None:
@@ -115,10 +115,10 @@ PROBLEM = {"kind": "k", "what": "no such file", "file": "tests.csv", "row": 2}
         ({}, [], True, "done", ""),
         ({"status": "some_set_aside"}, [], True, "some set aside", ""),
         ({"status": "unusable", "problems": [PROBLEM]}, [], True, "unusable", "tests.csv, row 2: no such file"),
-        ({"digest": "older"}, [], True, "failed", "the next build tries it again"),
-        (None, [], True, "failed", "the next build tries it again"),
+        ({"digest": "older"}, [], True, "failed", "the next build will try it again"),
+        (None, [], True, "failed", "the next build will try it again"),
         ({}, ["raw/x.part is being uploaded"], True, "waiting", "raw/x.part is being uploaded"),
-        ({}, [], False, "gone", "its last report stands"),
+        ({}, [], False, "gone", "the last report is kept"),
     ],
 )
 def test_each_state_of_a_campaign_is_told_with_its_reason(

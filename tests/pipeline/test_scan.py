@@ -75,14 +75,14 @@ def test_a_file_that_grows_while_it_is_read_is_named(drop: Path, monkeypatch: py
 
     monkeypatch.setattr(scanning, "hashlib", SimpleNamespace(sha256=WhileItIsWritten))
     (found,) = scan(drop, 0.0)
-    assert found.waiting == ("raw/T1.csv is still growing",)
+    assert found.waiting == ("raw/T1.csv is still being written",)
 
 
 def test_a_folder_without_a_campaign_yet_waits(tmp_path: Path) -> None:
     (tmp_path / "b" / "raw").mkdir(parents=True)
     (tmp_path / "b" / "raw" / "T1.csv").write_text("1")
     (found,) = scan(tmp_path, 0.0)
-    assert found.waiting == ("campaign.toml is not there yet",)
+    assert found.waiting == ("campaign.toml is missing so far",)
 
 
 def test_a_half_uploaded_archive_waits_and_a_whole_one_is_a_campaign(drop: Path) -> None:

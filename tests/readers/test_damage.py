@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -11,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
+from made_campaigns import DIALECTS as MADE_DIALECTS, MadeCampaign
 
-from tribo.campaign import load_campaign
 from tribo.errors import Problem, ReadError
 from tribo.readers import read_export
 
@@ -350,29 +349,37 @@ def test_a_file_above_the_limit_is_refused_without_reading_it(path: Path, monkey
     assert [p.kind for p in problems_of(path, written(ramp(), NAMES, UNITS))] == ["too_large"]
 
 
-def _first_export(practice: Callable[[str], Path], number: str) -> bytes:
-    return min((practice(number) / "raw").iterdir()).read_bytes()
+SPOILS: dict[str, Callable[[list[bytes]], bytes]] = {
+    "empty": lambda lines: b"",
+    "bom_only": lambda lines: b"\xef\xbb\xbf",
+    "header_only": lambda lines: b"".join(lines[: _header_rows(lines)]),
+    "truncated_mid_row": lambda lines: b"".join(lines[:-40]) + lines[-40][:-9],
+    "text_in_numbers": lambda lines: b"".join([*lines[:90], lines[90].replace(b"0", b"O"), *lines[91:]]),
+    "time_goes_back": lambda lines: b"".join([*lines[:300], *lines[240:]]),
+    "two_decimal_marks": lambda lines: b"".join([*lines[:90], _doubled_mark(lines[90]), *lines[91:]]),
+}
 
 
-@pytest.mark.parametrize("number", ["01", "02", "03", "04"])
-@pytest.mark.parametrize(
-    ("kind", "spoil"),
-    [
-        ("empty", lambda lines: b""),
-        ("bom_only", lambda lines: b"\xef\xbb\xbf"),
-        ("header_only", lambda lines: b"".join(lines[: _header_rows(lines)])),
-        ("truncated_mid_row", lambda lines: b"".join(lines[:-40]) + lines[-40][:-9]),
-        ("text_in_numbers", lambda lines: b"".join([*lines[:90], lines[90].replace(b"0", b"O"), *lines[91:]])),
-        ("time_goes_back", lambda lines: b"".join([*lines[:300], *lines[240:]])),
-        ("two_decimal_marks", lambda lines: b"".join([*lines[:90], _doubled_mark(lines[90]), *lines[91:]])),
-    ],
-)
-def test_the_practice_exports_spoiled_are_named_in_every_dialect(
-    practice: Callable[[str], Path], path: Path, number: str, kind: str, spoil: Callable[[list[bytes]], bytes]
+def _first_export(campaign: Path) -> Path:
+    return min((campaign / "raw").iterdir())
+
+
+@pytest.mark.parametrize("made_in", MADE_DIALECTS)
+@pytest.mark.parametrize("kind", SPOILS)
+def test_a_spoiled_export_of_a_whole_pull_is_named_in_every_dialect(
+    made: Callable[[str], MadeCampaign], path: Path, made_in: str, kind: str
 ) -> None:
-    lines = _first_export(practice, number).splitlines(keepends=True)
-    found = problems_of(path, spoil(lines))
+    lines = _first_export(made(made_in).folder).read_bytes().splitlines(keepends=True)
+    found = problems_of(path, SPOILS[kind](lines))
     assert {p.kind for p in found} == {kind}
+
+
+def test_the_practice_exports_spoiled_are_named_in_every_dialect(practice: Callable[[str], Path], path: Path) -> None:
+    found = {}
+    for number in ("01", "02", "03", "04"):
+        lines = _first_export(practice(number)).read_bytes().splitlines(keepends=True)
+        found |= {(number, kind): {p.kind for p in problems_of(path, spoil(lines))} for kind, spoil in SPOILS.items()}
+    assert found == {(number, kind): {kind} for number, kind in found}
 
 
 def _header_rows(lines: list[bytes]) -> int:
@@ -386,32 +393,14 @@ def _doubled_mark(line: bytes) -> bytes:
     return cut[:-2] + mark + cut[-2:] + line[len(cut) :]
 
 
-def test_the_spoiled_campaign_is_named_fault_by_fault_and_the_rest_reads_as_in_the_clean_one(
-    shared: Path, practice: Callable[[str], Path]
-) -> None:
-    truth = json.loads((shared / "campaigns" / "series-11-spoiled.truth.json").read_text())
-    of_traces = {"stopped_before_peak", "spike", "sign_flipped", "saturated"}
-    spoiled, clean = load_campaign(practice("11-spoiled")), practice("11-clean")
-    named = {s.test_id: {p.kind for p in s.problems} for s in spoiled.set_aside}
-    named |= {p.file: {p.kind} for p in spoiled.problems if p.test_id is None}
-    for test in spoiled.tests:
-        try:
-            trace = read_export(spoiled.root / test.file, name=test.test_id, file=test.file)
-        except ReadError as why:
-            named[test.test_id] = {p.kind for p in why.problems}
-            continue
-        if test.test_id not in truth:
-            unspoiled = read_export(clean / test.file)
-            np.testing.assert_array_equal(trace.force_N, unspoiled.force_N)
-            np.testing.assert_array_equal(trace.time_s, unspoiled.time_s)
-    assert named == {where: {kind} for where, kind in truth.items() if kind not in of_traces}
-
-
 FUZZ = Path(__file__).parents[2] / "benchmarks" / "fuzz_readers.py"
 
 
 def test_a_sample_of_the_mutants_of_the_benchmark_fails_nowhere(
-    practice: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+    made: Callable[[str], MadeCampaign],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
 ) -> None:
     spec = importlib.util.spec_from_file_location("fuzz_readers", FUZZ)
     assert spec is not None
@@ -419,7 +408,7 @@ def test_a_sample_of_the_mutants_of_the_benchmark_fails_nowhere(
     fuzz = importlib.util.module_from_spec(spec)
     monkeypatch.setitem(sys.modules, "fuzz_readers", fuzz)
     spec.loader.exec_module(fuzz)
-    files = [str(min((practice(number) / "raw").iterdir())) for number in ("01", "02", "03", "04")]
+    files = [str(_first_export(made(dialect).folder)) for dialect in MADE_DIALECTS]
     monkeypatch.setattr(sys, "argv", ["fuzz_readers", *files, "--mutants", "124", "--keep", str(tmp_path)])
     assert fuzz.main() == 0, capsys.readouterr().out
 

@@ -381,6 +381,22 @@ def test_the_te67_is_refused_where_its_columns_prove_nothing(tmp_path: Path) -> 
     assert {(p.kind, p.column) for p in caught.value.problems} == {("missing_unit", "Friction Force")}
 
 
+def test_the_te67_gives_no_unit_to_a_force_that_is_not_the_coefficient_times_the_load(tmp_path: Path) -> None:
+    """A friction force in millinewtons beside a load in newtons: only the load has a proven unit."""
+    lines = list(TE67)
+    for row in [row for row, line in enumerate(lines) if line.startswith("\t20:32:")]:
+        cells = lines[row].split("\t")
+        cells[5] = f"{1000 * float(cells[5].replace(',', '.')):.1f}".replace(".", ",")
+        lines[row] = "\t".join(cells)
+    path = saved(tmp_path, lines)
+    with pytest.raises(ReadError) as caught:
+        read_export(path)
+    assert {(p.kind, p.column) for p in caught.value.problems} == {("missing_unit", "Friction Force")}
+    trace = read_export(path, columns={"friction_force": "Friction Force [mN]"})
+    np.testing.assert_allclose(trace.force_N, 0.5 * np.arange(12))
+    np.testing.assert_allclose(trace.columns["normal_force_N"], 9.81)
+
+
 @pytest.mark.parametrize("stamp", ["09:00:{:04.1f}", "2026-03-02 09:00:{:04.1f}", "2026-03-02T09:00:{:04.1f}"])
 def test_times_of_day_are_refused_with_what_to_give(tmp_path: Path, stamp: str) -> None:
     lines = ["No,Timestamp,Force (N)", *(f"{k},{stamp.format(0.1 * k)},{0.02 * k:.3f}" for k in range(12))]
@@ -415,7 +431,7 @@ def test_a_table_without_units_is_refused_with_what_to_give(tmp_path: Path) -> N
 
 def test_a_torque_needs_its_lever(tmp_path: Path) -> None:
     path = saved(tmp_path, NEWPORT)
-    with pytest.raises(ReadError, match="give its lever"):
+    with pytest.raises(ReadError, match="give the lever arm"):
         read_export(path)
     trace = read_export(path, columns={"friction_force": "#4 [N m / 2.5 mm]"})
     np.testing.assert_allclose(trace.force_N, 0.002 * np.arange(8) / 2.5e-3)
@@ -445,7 +461,7 @@ def test_a_sidecar_names_the_columns_of_a_nameless_export(tmp_path: Path, suffix
 def test_a_sidecar_that_does_not_fit_is_not_used(tmp_path: Path, text: str) -> None:
     path = saved(tmp_path, NEWPORT)
     path.with_suffix(".json").write_text(text)
-    with pytest.raises(ReadError, match="give its lever"):
+    with pytest.raises(ReadError, match="give the lever arm"):
         read_export(path)
 
 
@@ -459,6 +475,15 @@ def test_a_time_that_starts_again_cuts_a_table_into_traces(tmp_path: Path) -> No
         read_export(path)
     assert [(p.kind, p.row) for p in caught.value.problems] == [("time_goes_back", 7)]
     assert read_export(f"{path}#2").force_N[-1] == pytest.approx(0.08)
+
+
+def test_samples_behind_a_restart_of_time_keep_their_rows_of_the_file(tmp_path: Path) -> None:
+    """One header line, then two records of five rows each: the second begins in row 7, and an inspection says so."""
+    lines = ["Time (s),Fx (N)", *(f"{0.1 * k:.2f},{0.01 * k * s:.3f}" for s in (1, 2) for k in range(5))]
+    path = saved(tmp_path, lines)
+    assert [trace.first_row for trace in read_blocks(path)] == [2, 7]
+    assert read_export(f"{path}#2").first_row == 7
+    assert [table.first_row for table in inspect_export(path).tables] == [2, 7]
 
 
 @pytest.mark.parametrize("sample", ["bluehill", "testxpert german", "testsuite, two acquisitions", "mts 793"])
@@ -508,7 +533,7 @@ def test_variables_of_a_mat_file_are_taken_by_name(tmp_path: Path) -> None:
 
     time, ratio = 0.01 * np.arange(50), 0.3 + 0.01 * np.sin(np.arange(50))
     savemat(tmp_path / "a.mat", {"t": time[:, None], "Fnorm": ratio[None, :], "k": 168.0, "note": "paper"})
-    with pytest.raises(ReadError, match="carry no units"):
+    with pytest.raises(ReadError, match="have no units"):
         read_export(tmp_path / "a.mat")
     trace = read_export(tmp_path / "a.mat", columns={"time": "t [s]", "force": "Fnorm [30.7 gf]"})
     np.testing.assert_array_equal(trace.time_s, time)

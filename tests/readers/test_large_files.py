@@ -79,4 +79,4 @@ def test_a_table_of_too_many_rows_is_refused_with_its_count(tmp_path: Path, monk
         read_export(long_export(tmp_path / "long.csv", 600))
     (problem,) = caught.value.problems
     assert (problem.kind, problem.found) == ("too_many_rows", "601 rows")
-    assert "cut the export" in (problem.allowed or "")
+    assert "split the export" in (problem.allowed or "")

@@ -48,12 +48,12 @@ def test_a_pull_left_out_keeps_its_trace_on_the_page_so_that_it_can_be_taken_bac
     cards = {card.test_id: card for card in pull_cards(decided)}
     assert (cards["T0001"].state, cards["T0002"].state, cards["T0003"].state) == ("excluded", "moved", "used")
     assert "<path" in cards["T0001"].picture
-    assert "Left out by hand (sled &lt;tipped&gt;)." in page
+    assert "Excluded by hand (sled &lt;tipped&gt;)." in page
 
 
 def test_the_page_lists_moved_pulls_among_what_was_measured(page: str) -> None:
     measured = page[page.index('id="measured"') : page.index('id="table2"')].replace("\u00a0", " ")
-    assert "Read elsewhere by hand" in measured
+    assert "Peaks and windows moved by hand" in measured
     assert "<dt>T0002</dt>" in measured
     assert "excluded by hand in overrides.csv" in measured
 

@@ -49,7 +49,7 @@ def test_the_page_tells_the_verdict_first_and_in_full(study: Study) -> None:
     page = html(study, drawn={}, verdict=NAMED)
     assert page.index("Patterned samples have &lt;more&gt; friction.") < page.index("Fitted friction law")
     for words in (
-        "cannot tell suction and normal load error apart", "3000 (2000 to 4000)", "acts the other way",
+        "cannot distinguish between suction and normal load error", "3000 (2000 to 4000)", "acts the other way",
         "Weigh the sled.", "below 0.001", "predicts better by 0.500",
     ):  # fmt: skip
         assert words in page.replace("\u00a0", " ")
@@ -63,7 +63,7 @@ def test_a_bare_verdict_has_words_too(outcome: str, study: Study) -> None:
 
 def test_a_gain_within_two_standard_errors_may_be_chance() -> None:
     gain = {**NAMED["gain"], "difference": 0.1, "se": 0.1}
-    assert "may be chance" in verdict_in_words({**NAMED, "gain": gain})["gain"]
+    assert "may be due to chance" in verdict_in_words({**NAMED, "gain": gain})["gain"]
 
 
 def test_a_number_that_does_not_exist_is_a_dash() -> None:

@@ -25,8 +25,8 @@ def ratio(value: float, low: float, high: float, load: float = 1.0) -> LoadRatio
         (ratio(1.02, 0.95, 1.09), "agrees"),
         (ratio(0.8, 0.7, 0.9), "model too high"),
         (ratio(1.3, 1.1, 1.5), "model too low"),
-        (ratio(0.9, 0.5, 1.6), "cannot tell"),
-        (ratio(1.0, float("nan"), float("nan")), "cannot tell"),
+        (ratio(0.9, 0.5, 1.6), "inconclusive"),
+        (ratio(1.0, float("nan"), float("nan")), "inconclusive"),
     ],
 )
 def test_an_interval_has_one_verdict(load: LoadRatio, verdict: str) -> None:
@@ -51,14 +51,14 @@ def test_one_load_of_six_outside_is_agreement_with_an_exception() -> None:
     loads = (*(ratio(1.0, 0.9, 1.1, k) for k in range(5)), ratio(0.8, 0.7, 0.9, 6))
     agreement = Agreement("B", "static", loads, False)
     assert agreement.verdict == "agrees"
-    assert "agrees with the measurement for B (but not at 1 of 6 loads)" in wording.in_short([agreement], "F")[0]
+    assert "agrees with the measurement for B (except at 1 of 6 loads)" in wording.in_short([agreement], "F")[0]
 
 
-def test_wide_intervals_cannot_tell() -> None:
+def test_wide_intervals_are_inconclusive() -> None:
     agreement = Agreement("C", "static", (ratio(1.1, 0.5, 2.4), ratio(1, 0.5, 2)), False)
-    assert agreement.verdict == "cannot tell"
-    assert "too wide to tell" in wording.in_short([agreement], "F")[0]
-    assert "cannot tell at any load" in wording.agreement_sentence(agreement)
+    assert agreement.verdict == "inconclusive"
+    assert "too wide" in wording.in_short([agreement], "F")[0]
+    assert "inconclusive at all loads" in wording.agreement_sentence(agreement)
 
 
 def test_the_sentence_counts_loads_and_names_the_worst() -> None:
@@ -66,15 +66,15 @@ def test_the_sentence_counts_loads_and_names_the_worst() -> None:
     sentence = wording.agreement_sentence(Agreement("B", "sliding", loads, False))
     assert "agrees within the 95 % interval at 1 of 3 loads" in sentence
     assert "too high at 2 of 3 loads" in sentence
-    assert "farthest off at 3.00 N, by 100 %" in sentence
+    assert "the largest deviation is 100 %, at 3.00 N" in sentence
 
 
 def test_the_calibrated_sample_is_no_evidence(study: Study) -> None:
     agreements = findings.agreements(study)
     assert {a.sample for a in agreements if a.calibrated} == {"F"}
-    assert all(" F " not in s.split("the model", 1)[1] for s in wording.in_short(agreements, "F"))
+    assert all(" F " not in s.split("on F alone, ", 1)[1] for s in wording.in_short(agreements, "F"))
     flat = next(a for a in agreements if a.calibrated)
-    assert "no test of it" in wording.agreement_sentence(flat)
+    assert "agreement here does not test the model" in wording.agreement_sentence(flat)
 
 
 def test_the_synthetic_model_is_found_where_it_was_put(study: Study) -> None:
@@ -102,12 +102,12 @@ def test_only_pairs_the_measurement_can_part_judge_the_order() -> None:
     found = order(measured, [fit("A", 1, 0.1), fit("B", 2, 0.1), fit("C", 0.5, 0.1)])
     assert found.told_apart == (("A", "B"),)
     assert found.reversed == (("A", "B"),)
-    assert "reverses A over B" in wording.ranking_sentence(found)
+    assert "reverses A > B" in wording.ranking_sentence(found)
 
 
 def test_samples_that_cannot_be_parted_judge_nothing() -> None:
     found = order([fit("A", 3.0, 5.0), fit("B", 2.0, 5.0)], [fit("A", 1, 0.1), fit("B", 2, 0.1)])
-    assert "cannot tell any two samples apart" in wording.ranking_sentence(found)
+    assert "No two samples differ significantly" in wording.ranking_sentence(found)
 
 
 def test_the_direction_ratio_is_that_of_the_fitted_forces(study: Study) -> None:
@@ -119,8 +119,8 @@ def test_the_direction_ratio_is_that_of_the_fitted_forces(study: Study) -> None:
     assert first.measured == pytest.approx(float(x.force_N(first.normal_load_N) / y.force_N(first.normal_load_N)))
     assert first.low < first.measured < first.high
     sentence = wording.direction_sentences(ratios)[0]
-    assert sentence.startswith("Sx over Sy, static")
-    assert "outside its interval at 3 of them" in sentence
+    assert sentence.startswith("Ratio of static friction Sx / Sy")
+    assert "outside the 95 % interval of the measurement at 3 of them" in sentence
 
 
 def test_a_campaign_without_directions_says_nothing_of_them(study: Study) -> None:
@@ -133,7 +133,7 @@ def test_a_campaign_without_directions_says_nothing_of_them(study: Study) -> Non
 def test_the_correlation_of_mu_and_tau0_is_that_of_the_covariance(study: Study) -> None:
     expected = [f.covariance[0, 1] / np.sqrt(f.covariance[0, 0] * f.covariance[1, 1]) for f in study.fits]
     assert findings.parameter_correlations(study.fits) == pytest.approx(expected)
-    assert "not independent" in wording.correlation_note(study)
+    assert "are correlated" in wording.correlation_note(study)
 
 
 def test_what_was_measured_counts_pulls_specimens_samples_and_loads(study: Study) -> None:

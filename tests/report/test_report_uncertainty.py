@@ -37,7 +37,8 @@ def test_the_largest_component_is_named_for_each_sample(budgeted: Study) -> None
     assert table.components == ("specimens", "wire angle")
     assert [row[0] for row in table.rows] == ["F", "A"]
     assert [table.components[k] for k in table.largest] == ["wire angle", "specimens"]
-    assert table.sentence == "What weighs most in the static force: wire angle for F; specimens for A."
+    expected = "Largest contribution to the uncertainty of the static force: wire angle for F; specimens for A."
+    assert table.sentence == expected
 
 
 def test_type_b_components_say_what_they_rest_on(budgeted: Study) -> None:
@@ -68,7 +69,7 @@ def test_samples_on_the_same_specimens_are_compared_by_their_difference(study: S
     }  # fmt: skip
     paired = replace(study, differences=pd.DataFrame([row, {**row, "number": "mu"}]))
     (sentence,) = paired_sentences(paired)
-    assert "of Sx less that of Sy, on the same 3 specimens: −0.250 ± 0.012 N" in sentence
-    assert "Specimens of their own would leave ± 0.046 N" in sentence
+    assert "Sx minus Sy, measured on the same 3 specimens: −0.250 ± 0.012 N" in sentence
+    assert "With different specimens the uncertainty would be ± 0.046 N" in sentence
     assert "on the same 3 specimens" in html(paired, drawn={}).replace("\u00a0", " ")
     assert paired_sentences(study) == []

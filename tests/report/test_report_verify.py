@@ -44,7 +44,7 @@ def test_nothing_changed_is_said_so(placed: tuple[Study, Path, Path]) -> None:
     found = verify(out)
     assert found.unchanged
     assert (found.n_inputs, found.n_outputs) == (4, 2)
-    assert "nothing changed" in found.in_words()
+    assert "no changes" in found.in_words()
     assert list(input_names(root)) == ["campaign.toml", "tests.csv", "raw/T0001.csv", "raw/T0002.csv"]
 
 

@@ -60,7 +60,7 @@ print(run.sliding_friction.hex(), run.static_friction.hex())
 
 LOOP_BY_ITSELF = """
 import numpy as np
-from tribo.simulate import dense
+from tribo.simulate.engines import dense
 block = [np.zeros(8) for _ in range(10)]
 dense.rubbed(*block, 0.0, 1.0, 1.0, None)
 """

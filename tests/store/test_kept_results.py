@@ -126,3 +126,20 @@ def test_the_digest_of_the_package_changes_with_any_of_its_files(
         seen.add(package_sources())
     package_sources.cache_clear()
     assert len(seen) == 3
+
+
+def test_the_digest_of_the_package_changes_with_the_table_of_pattern_shares(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "data" / "pattern_shares"
+    folder.mkdir(parents=True)
+    (tmp_path / "tribo").mkdir()
+    monkeypatch.setattr("tribo.store.kept_results._PACKAGE", tmp_path / "tribo")
+    monkeypatch.setattr("tribo.store.kept_results.data_dir", lambda: tmp_path / "data")
+    seen = set()
+    for number in (1, 2):
+        (folder / "laws.csv").write_text(f"mu\n{number}\n")
+        package_sources.cache_clear()
+        seen.add(package_sources())
+    package_sources.cache_clear()
+    assert len(seen) == 2

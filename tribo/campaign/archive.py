@@ -25,15 +25,15 @@ _NOT_A_ZIP = (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, Runtim
 
 @contextmanager
 def open_campaign(path: Path | str, *, measured: bool = True) -> Iterator[Campaign]:
-    """Open a campaign folder, or a .zip that holds one (unpacked into a temporary folder for the duration).
+    """Open a campaign folder, or a .zip that holds one (unpacked into a temporary folder while it is open).
 
-    ``measured`` is that of :func:`tribo.campaign.load_campaign`.
+    ``measured`` as in :func:`tribo.campaign.load_campaign`.
 
     Raises
     ------
     CampaignError
-        The campaign is unusable; or the archive is no zip, or holds links, paths that leave it, encrypted or
-        oversized entries, no campaign.toml, or several.
+        The campaign is unusable; or the archive is not a .zip, or contains links, paths outside it, encrypted or
+        oversized entries, no campaign.toml, or more than one.
     """
     path = Path(path)
     if path.is_dir():
@@ -43,7 +43,7 @@ def open_campaign(path: Path | str, *, measured: bool = True) -> Iterator[Campai
             _unpack(path, Path(folder))
             yield load_campaign(_campaign_folder(Path(folder), path.name), measured=measured)
     else:
-        raise CampaignError(Problem("missing", "no such folder or .zip", file=str(path)))
+        raise CampaignError(Problem("missing", "this folder or .zip does not exist", file=str(path)))
 
 
 def _campaign_folder(folder: Path, shown: str) -> Path:
@@ -54,9 +54,9 @@ def _campaign_folder(folder: Path, shown: str) -> Path:
     if len(found) == 1:
         return found[0]
     if not found:
-        raise CampaignError(Problem("missing_file", f"no {TOML} in it", file=shown))
+        raise CampaignError(Problem("missing_file", f"no {TOML} in this folder", file=shown))
     names = ", ".join(p.relative_to(folder).as_posix() for p in found)
-    raise CampaignError(Problem("several_campaigns", f"more than one {TOML}", file=shown, found=names))
+    raise CampaignError(Problem("several_campaigns", f"more than one {TOML} in it", file=shown, found=names))
 
 
 def _unpack(archive: Path, folder: Path) -> None:
@@ -81,11 +81,11 @@ def _entry_faults(entries: list[zipfile.ZipInfo], file: str) -> list[Problem]:
     names = [e.filename.rstrip("/").lower() for e in entries]
     if len(set(names)) < len(names):
         twice = next(n for n in names if names.count(n) > 1)
-        problems.append(Problem("duplicate_entry", "an entry stands twice", file=file, found=twice))
+        problems.append(Problem("duplicate_entry", "an entry occurs twice", file=file, found=twice))
     total = sum(e.file_size for e in entries)
     if total > MOST_BYTES or len(entries) > MOST_ENTRIES:
         found = f"{len(entries)} entries, {total} bytes"
-        what, allowed = "too large when unpacked", f"{MOST_ENTRIES} entries, {MOST_BYTES} bytes"
+        what, allowed = "too large when unpacked", f"at most {MOST_ENTRIES} entries, {MOST_BYTES} bytes"
         problems.append(Problem("zip_bomb", what, file=file, found=found, allowed=allowed))
     return problems
 
@@ -94,14 +94,14 @@ def _entry_fault(entry: zipfile.ZipInfo) -> tuple[str, str] | None:
     name = entry.filename.replace("\\", "/")
     path = PurePosixPath(name)
     if path.is_absolute() or ".." in path.parts or re.match(r"[A-Za-z]:", name):
-        return "entry_outside", "an entry leaves the folder"
+        return "entry_outside", "the path of an entry leads outside the folder"
     kind = stat.S_IFMT(entry.external_attr >> 16)
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
         return "link", "an entry is a link or a device"
     if entry.flag_bits & 1:
         return "encrypted", "an entry is encrypted"
     if entry.file_size > _SMALL_BYTES and entry.file_size > MOST_EXPANSION * max(entry.compress_size, 1):
-        return "zip_bomb", "an entry grows out of all proportion"
+        return "zip_bomb", "an entry is compressed to an implausibly small size"
     return None
 
 
@@ -117,6 +117,6 @@ def _unpack_entry(opened: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path,
         while chunk := packed.read(_CHUNK):
             left -= len(chunk)
             if left < 0:
-                what = "an entry is longer than it says"
+                what = "an entry is longer than its declared size"
                 raise CampaignError(Problem("zip_bomb", what, file=file, found=entry.filename))
             out.write(chunk)

@@ -1,4 +1,4 @@
-"""campaign.toml: what may stand in it, and every fault of it at once with its row."""
+"""campaign.toml: its allowed contents, and all errors at once with their rows."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class _Strict(BaseModel):
 
 
 class CampaignTable(_Strict):
-    """[campaign]: what the whole campaign has in common."""
+    """[campaign]: properties of the whole campaign."""
 
     title: str
     material: str = ""
@@ -60,9 +60,9 @@ class PatternTable(_Strict):
         missing = [key for key in wanted if key not in given]
         unused = [key for key in given if key not in wanted]
         if missing:
-            raise ValueError(f"a cavity of kind {self.cavity} needs {' and '.join(missing)}")
+            raise ValueError(f"cavity = {self.cavity} requires {' and '.join(missing)}")
         if unused:
-            raise ValueError(f"a cavity of kind {self.cavity} takes no {' and no '.join(unused)}")
+            raise ValueError(f"cavity = {self.cavity} does not allow {' and '.join(unused)}")
         return self
 
     @model_validator(mode="after")
@@ -70,11 +70,11 @@ class PatternTable(_Strict):
         if self.cavity == "none":
             return self
         if self.size is None or self.pitch is None:
-            raise ValueError("size_um and pitch_um are one number or [x, y]")
+            raise ValueError("size_um and pitch_um must be one number or [x, y]")
         if self.cavity == "square" and self.size[0] != self.size[1]:
-            raise ValueError("a square has one size_um; take cavity = rectangle")
+            raise ValueError("a square has one size_um; for two sizes use cavity = rectangle")
         if self.size[0] >= self.pitch[0] or self.size[1] >= self.pitch[1]:
-            raise ValueError("the pitch must be larger than the cavity, or cavities touch")
+            raise ValueError("the pitch must be larger than the cavity; otherwise cavities touch")
         return self
 
 
@@ -98,8 +98,8 @@ def _only_quantities(columns: dict[str, str]) -> dict[str, str]:
     for key in columns:
         if quantity_named(key) is None:
             near = difflib.get_close_matches(key, names, 1)
-            hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
-            raise ValueError(f"{key} is no quantity; {hint}")
+            hint = f"did you mean {near[0]}?" if near else f"known quantities: {', '.join(names)}"
+            raise ValueError(f"{key} is not a known quantity; {hint}")
     return columns
 
 
@@ -124,14 +124,14 @@ def read_description(path: Path, file: str, problems: list[Problem]) -> Campaign
         text = path.read_bytes().decode("utf-8-sig")
         return CampaignFile.model_validate(tomllib.loads(text))
     except FileNotFoundError:
-        problems.append(Problem("missing_file", f"a campaign needs a {file}", file=file))
+        problems.append(Problem("missing_file", f"a campaign must contain {file}", file=file))
     except UnicodeDecodeError as why:
         row = why.object[: why.start].count(b"\n") + 1
-        problems.append(Problem("not_utf8", "TOML files are UTF-8", file=file, row=row))
+        problems.append(Problem("not_utf8", "TOML files must be encoded in UTF-8", file=file, row=row))
     except tomllib.TOMLDecodeError as why:
         row_said = re.search(r"line (\d+)", str(why))
         row = int(row_said.group(1)) if row_said else text.count("\n") + 1
-        problems.append(Problem("not_toml", f"not TOML: {why}", file=file, row=row))
+        problems.append(Problem("not_toml", f"not valid TOML: {why}", file=file, row=row))
     except ValidationError as why:
         problems.extend(_problem(error, text, file) for error in why.errors())
     return None
@@ -146,9 +146,9 @@ def _problem(error: Any, text: str, file: str) -> Problem:
         allowed = _allowed_keys(path)
         near = difflib.get_close_matches(path[-1], allowed, 1, 0.5)
         hint = f"did you mean {near[0]}?" if near else ", ".join(allowed)
-        return Problem("unknown_key", "no such key", file, row, column, path[-1], hint)
+        return Problem("unknown_key", "unknown key", file, row, column, path[-1], hint)
     if error["type"] == "missing":
-        return Problem("missing_key", "this key is required", file, row, column)
+        return Problem("missing_key", "this required key is missing", file, row, column)
     what = error["msg"].removeprefix("Value error, ")
     return Problem("wrong_value", what[:1].lower() + what[1:], file, row, column, found)
 

@@ -19,7 +19,7 @@ def with_flat_sample(campaign: Campaign, wanted: str = "") -> Campaign:
     if not wanted or wanted == campaign.chosen_flat:
         return campaign
     if wanted not in campaign.flat_samples:
-        raise CampaignError(_problem(campaign, "this is not a flat sample that was measured", wanted))
+        raise CampaignError(_problem(campaign, "not a measured flat sample", wanted))
     return replace(campaign, chosen_flat=wanted)
 
 
@@ -33,11 +33,11 @@ def required_flat_sample(campaign: Campaign) -> str:
     """
     if campaign.flat_sample:
         return campaign.flat_sample
-    found = ", ".join(campaign.flat_samples) or "no sample whose pattern has cavity none"
-    raise CampaignError(_problem(campaign, "the model is calibrated on one flat sample", found))
+    found = ", ".join(campaign.flat_samples) or "no sample whose pattern has cavity = none"
+    raise CampaignError(_problem(campaign, "the model must be calibrated on one flat sample", found))
 
 
 def _problem(campaign: Campaign, what: str, found: str) -> Problem:
     flat = campaign.flat_samples
-    allowed = f"--flat {' or --flat '.join(flat)}" if flat else "at least one sample whose pattern has cavity none"
+    allowed = f"--flat {' or --flat '.join(flat)}" if flat else "at least one sample whose pattern has cavity = none"
     return Problem("no_flat_sample", what, file="tests.csv", column="sample", found=found, allowed=allowed)

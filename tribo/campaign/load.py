@@ -24,20 +24,20 @@ _NUMBER_ROW = re.compile(rb'^\s*"?[-+]?[.,]?\d+[.,\d]*"?\s*[,;\t|]', re.M)
 
 
 def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
-    """Read campaign.toml and tests.csv of a folder; of raw/ only which files there are.
+    """Read campaign.toml and tests.csv of a folder, and the list of files in raw/.
 
     With ``measured=False`` the exports need not exist yet: the campaign is a plan.
 
     Returns
     -------
     Campaign
-        SI units. ``tests`` are the usable rows, ``set_aside`` those with a fault or an ``exclude`` reason,
-        ``problems`` every fault and note.
+        SI units. ``tests`` are the usable rows, ``set_aside`` those with an error or an ``exclude`` reason,
+        ``problems`` all errors and notes.
 
     Raises
     ------
     CampaignError
-        campaign.toml is wrong, a required column is missing, or no test is usable: with the faults of both
+        campaign.toml is wrong, a required column is missing, or no test is usable; with the errors of both
         files.
     """
     root = Path(folder)
@@ -50,7 +50,7 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     usable, set_aside = _sort_rows(root, rows, patterns, measured)
     problems += [p for s in set_aside for p in s.problems]
     if not usable:
-        nothing = Problem("no_usable_test", "no test of this campaign can be used", file=TESTS)
+        nothing = Problem("no_usable_test", "no test of this campaign is usable", file=TESTS)
         raise CampaignError([*problems, nothing])
     problems += _unlisted(root, rows)
     problems += [note for row in usable if (note := _loads_disagree(row, described))]
@@ -128,9 +128,9 @@ def _sort_rows(
         path, choice = _export_of(row)
         others = [other for other, theirs in users[path] if other != test_id and overlap(choice, theirs)]
         if others and path:
-            what = f"this export is given for {', '.join(others)} too; none of them is used"
+            what = f"this export is also given for {', '.join(others)}; none of these tests is used"
             place = (TESTS, row.row, "file", row.cells["file"])
-            problems.append(Problem("duplicate_file", what, *place, "one export a test"))
+            problems.append(Problem("duplicate_file", what, *place, "one export per test"))
         if problems:
             problems = [p.at(test_id=test_id) for p in problems]
             set_aside.append(SetAside(test_id, "; ".join(map(str, problems)), tuple(problems)))
@@ -142,8 +142,8 @@ def _sort_rows(
 
 
 def _duplicate(test_id: str, rows: Sequence[int]) -> Problem:
-    what = f"this test_id stands in rows {', '.join(map(str, rows))}; none of them is used"
-    return Problem("duplicate_row", what, TESTS, rows[1], "test_id", test_id, "one row a test")
+    what = f"this test_id occurs in rows {', '.join(map(str, rows))}; none of them is used"
+    return Problem("duplicate_row", what, TESTS, rows[1], "test_id", test_id, "one row per test")
 
 
 def _export_of(row: TestRow) -> tuple[str, str]:
@@ -157,7 +157,7 @@ def _row_faults(root: Path, row: TestRow, patterns: Mapping[str, Pattern], measu
         return [row.fault]
     problems = []
     if not row.cells["test_id"]:
-        problems.append(Problem("no_test_id", "a test needs a test_id", TESTS, row.row, "test_id"))
+        problems.append(Problem("no_test_id", "test_id is missing", TESTS, row.row, "test_id"))
     problems += _sample_faults(row, patterns)
     problems += _number_faults(row, load_in_export=measured and bool(_export_of(row)[1]))
     problems += [p for p in _file_faults(root, row) if measured or p.kind != "missing"]
@@ -170,8 +170,8 @@ def _sample_faults(row: TestRow, patterns: Mapping[str, Pattern]) -> list[Proble
         return []
     near = difflib.get_close_matches(sample, patterns, 1)
     hint = f"; did you mean {near[0]}?" if near else ""
-    allowed = f"{', '.join(patterns)}, or one of them with x or y{hint}"
-    return [Problem("unknown_sample", "no pattern of this name", TESTS, row.row, "sample", sample, allowed)]
+    allowed = f"{', '.join(patterns)}, or one of these names followed by x or y{hint}"
+    return [Problem("unknown_sample", "no pattern has this name", TESTS, row.row, "sample", sample, allowed)]
 
 
 def _number(row: TestRow, column: str) -> float | None:
@@ -200,9 +200,9 @@ def _number_faults(row: TestRow, load_in_export: bool) -> list[Problem]:
         if column in LOADS and value is not None:
             loads.append((column, value))
         if column in COUNTS and value is not None and value != int(value):
-            problems.append(Problem("not_a_number", "not a count", *at, column, cell, "1, 2, ..."))
+            problems.append(Problem("not_a_number", "not a whole number", *at, column, cell, "1, 2, ..."))
         if column in ("speed_mm_s", "hold_s") and value is not None and value < 0:
-            problems.append(Problem("negative", "cannot be negative", *at, column, cell, "0 or more"))
+            problems.append(Problem("negative", "must not be negative", *at, column, cell, "0 or more"))
     return problems + _load_faults(row, dict(loads), load_in_export)
 
 
@@ -215,12 +215,12 @@ def _load_faults(row: TestRow, loads: Mapping[str, float], load_in_export: bool)
     if not loads and not any(row.cells.get(column) for column in LOADS):
         if load_in_export:
             return []
-        return [Problem("no_load", "no load", *at, " or ".join(LOADS), None, "mass_g or normal_load_N")]
+        return [Problem("no_load", "the load is missing", *at, " or ".join(LOADS), None, "mass_g or normal_load_N")]
     if loads.get("normal_load_N", 1.0) <= 0:
         found, what = row.cells["normal_load_N"], "a load must be positive"
         return [Problem("load_not_positive", what, *at, "normal_load_N", found, "more than 0 N")]
     if "normal_load_N" not in loads and loads.get("mass_g", 1.0) < 0:
-        found, what = row.cells["mass_g"], "a mass cannot be negative"
+        found, what = row.cells["mass_g"], "a mass must not be negative"
         return [Problem("load_not_positive", what, *at, "mass_g", found, "0 g or more")]
     return []
 
@@ -230,16 +230,16 @@ def _file_faults(root: Path, row: TestRow) -> list[Problem]:
     place = (TESTS, row.row, "file", name)
     path = _relative(name)
     if path is None or not (root / path).resolve().is_relative_to(root.resolve()):  # links are followed
-        what = "the path points outside the campaign"
-        return [Problem("path_outside_campaign", what, *place, "a path below the campaign folder")]
+        what = "the path leads outside the campaign"
+        return [Problem("path_outside_campaign", what, *place, "a path inside the campaign folder")]
     if (root / path).is_file():
         return []
     folder = (root / path).parent
     beside = [p.name for p in folder.iterdir()] if folder.is_dir() else []
     near = [n for n in beside if n.lower() == path.name.lower()]
     near = near or difflib.get_close_matches(path.name, beside, 1, 0.9)
-    hint = f"a file of the campaign{f' (there is {near[0]})' if near else ''}"
-    return [Problem("missing", "no such file" if name else "no file given", *place, hint)]
+    hint = f"a file of the campaign{f'; did you mean {near[0]}?' if near else ''}"
+    return [Problem("missing", "this file does not exist" if name else "no file is given", *place, hint)]
 
 
 def _relative(name: str) -> PurePosixPath | None:
@@ -292,7 +292,7 @@ def _loads_disagree(row: TestRow, described: CampaignFile) -> Problem | None:
     weight = (mass + described.campaign.slider_mass_g) * _GRAM * STANDARD_GRAVITY
     if abs(weight / load - 1.0) < _LOADS_AGREE:
         return None
-    what, found = "this load is used, and it is not the weight of mass and slider", f"{load:g} N"
+    what, found = "this load is used, although it differs from the weight of mass_g and slider", f"{load:g} N"
     place = (TESTS, row.row, "normal_load_N", found, f"about {weight:.4g} N")
     return Problem("loads_disagree", what, *place, test_id=row.test_id)
 
@@ -306,9 +306,9 @@ def _unlisted(root: Path, rows: Sequence[TestRow]) -> list[Problem]:
         if not path.is_file() or name in named or path.name.startswith(_NOT_WORTH_A_NOTE):
             continue
         if _holds_numbers(path):
-            notes.append(Problem("not_listed", f"an export that {TESTS} does not name; not read", file=name))
+            notes.append(Problem("not_listed", f"not listed in {TESTS}; this export is not read", file=name))
         else:
-            what = f"no export, and {TESTS} does not name it; not read"
+            what = f"not an export and not listed in {TESTS}; it is not read"
             notes.append(Problem("not_an_export_and_not_listed", what, file=name))
     return notes
 

@@ -1,4 +1,4 @@
-"""tests.csv: rows of cells by column name, whatever its delimiter, and the faults of the table itself."""
+"""tests.csv: rows of cells by column name, for any delimiter, and errors of the table itself."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class TestRow:
 
 @dataclass(frozen=True)
 class Table:
-    """A table as it stands in a file: column names, the line they stand in, and the lines below."""
+    """A table of a file: column names, the line they are in, and the lines below."""
 
     names: tuple[str, ...]
     header_row: int
@@ -49,10 +49,10 @@ def read_tests_table(path: Path, file: str, problems: list[Problem]) -> list[Tes
     try:
         table = read_table(path, file)
     except FileNotFoundError:
-        problems.append(Problem("missing_file", f"a campaign needs a {file}", file=file))
+        problems.append(Problem("missing_file", f"a campaign must contain {file}", file=file))
         return None
     if table is None:
-        problems.append(Problem("empty", "no header and no test", file=file))
+        problems.append(Problem("empty", "the file has neither a header nor tests", file=file))
         return None
     found = _header_faults(list(table.names), file, table.header_row)
     problems.extend(found)
@@ -107,14 +107,14 @@ def _header_faults(names: list[str], file: str, row: int) -> list[Problem]:
     problems = []
     unknown = [n for n in names if n not in KNOWN]
     for name in sorted({n for n in names if n and names.count(n) > 1}):
-        problems.append(Problem("duplicate_column", "this column stands twice", file, row, name))
+        problems.append(Problem("duplicate_column", "this column occurs twice", file, row, name))
     wanted = [*(n for n in REQUIRED if n not in names)]
     if not any(n in names for n in LOADS):
         wanted.append(" or ".join(LOADS))
     for name in wanted:
         near = difflib.get_close_matches(name.split(" or ")[0], unknown, 1)
         found = f"{near[0]} (did you mean {name}?)" if near else ", ".join(names)
-        problems.append(Problem("missing_column", "this column is required", file, row, name, found))
+        problems.append(Problem("missing_column", "this required column is missing", file, row, name, found))
     if not problems:
         problems += [_resembling(n, names, file, row) for n in unknown if _near(n, names)]
     return problems
@@ -125,5 +125,5 @@ def _near(name: str, names: list[str]) -> list[str]:
 
 
 def _resembling(name: str, names: list[str], file: str, row: int) -> Problem:
-    what = f"kept as a covariate; did you mean {_near(name, names)[0]}?"
+    what = f"this column is kept as a covariate; did you mean {_near(name, names)[0]}?"
     return Problem("resembles_a_column", what, file, row, name)

@@ -1,4 +1,4 @@
-"""What `tribo init` writes: a commented campaign to fill in."""
+"""The campaign template that `tribo init` writes."""
 
 from __future__ import annotations
 
@@ -8,20 +8,21 @@ from tribo.campaign.load import RAW, TESTS, TOML
 from tribo.errors import CampaignError, Problem
 
 _TOML_TEXT = """\
-# A campaign: what was pulled over what, and the patterns.
+# Description of a campaign: sample, counterface and patterns. Replace the example values by your own.
 
 [campaign]
 title = "Sled friction of patterned PDMS on polycarbonate"
 material = "PDMS (Sylgard 184)"
 counterface = "polycarbonate"
-nominal_area_mm2 = 55.0   # area of the whole sample face, cavities included
-slider_mass_g = 1.5       # sled with sample, without the mass put on it
-pull_speed_mm_s = 0.2     # used where tests.csv gives no speed_mm_s
+nominal_area_mm2 = 55.0   # area of the sample face, including cavities
+slider_mass_g = 1.5       # mass of sled and sample, without the added mass
+pull_speed_mm_s = 0.2     # used for tests without speed_mm_s in tests.csv
 
-# One table a pattern. cavity: none, circle (diameter_um), square or rectangle (size_um), each with pitch_um;
-# one number, or [x, y]. staggered = true shifts every other row by half a pitch along x.
-# area_fraction = 0.71 replaces the fraction that follows from the geometry by a measured one.
-# A sample Sx or Sy in tests.csv is pattern S pulled along x or y.
+# Patterns, one table each. cavity is "none", "circle" (with diameter_um), "square" or "rectangle" (with size_um);
+# all but "none" also need pitch_um. Sizes and pitches are one number or [x, y], in micrometres.
+# staggered = true shifts every other row of cavities by half a pitch along x.
+# area_fraction = 0.71 gives a measured contact area fraction; it replaces the one computed from the geometry.
+# Samples Sx and Sy in tests.csv mean pattern S pulled along x and along y.
 
 [patterns.F]
 cavity = "none"
@@ -37,19 +38,22 @@ size_um = [200.0, 40.0]
 pitch_um = [220.0, 120.0]
 staggered = true
 
-# Every pull is a row of tests.csv, and its file an export in raw/. Where one export holds several pulls, file says
-# which: raw/log.csv#2 is its second table (step, segment, specimen), raw/log.csv#2/3 the third pull within that
-# table (a stroke, or one of several loads or speeds), raw/log.csv#2/* every pull of it, raw/log.csv#* every pull of the
-# export, each a test of its own. Such a row may leave the load empty: it is then the normal force in the export.
+# tests.csv has one row per pull; its column file names the export in raw/. If an export holds several pulls, file
+# also selects the pull:
+#   raw/log.csv#2     second table of the export (step, segment or specimen)
+#   raw/log.csv#2/3   third pull of that table (a stroke, or one of several loads or speeds)
+#   raw/log.csv#2/*   all pulls of that table, each as a separate test
+#   raw/log.csv#*     all pulls of the export, each as a separate test
+# In such a row the load may be left empty; the normal force recorded in the export is then used.
 
-# Where the exports name their columns in a way that is not understood (tribo inspect FILE tells), say it
-# here: the quantity, then the column's own name with its unit, or its position.
+# If tribo does not recognise the columns of your exports (check with: tribo inspect FILE), name them here: the
+# quantity, then the column by its name and unit, or by its position and unit.
 # [columns]
 # time = "Clock [s]"
 # force = "Channel 2 [N]"
 # displacement = "#3 [mm]"
 
-# Standard uncertainties (k = 1) of the rig; what is left out takes its stated default.
+# Standard uncertainties (k = 1) of the test rig. Defaults are used for values not given here.
 # [instrument]
 # load_cell_u_percent = 0.5
 # mass_u_g = 0.05
@@ -73,13 +77,13 @@ def write_template(folder: Path | str) -> tuple[Path, ...]:
     Raises
     ------
     CampaignError
-        One of them is there already: nothing is ever overwritten, and nothing at all written then.
+        One of them already exists. In this case nothing is written.
     """
     folder = Path(folder)
     texts = {folder / TOML: _TOML_TEXT, folder / TESTS: _TESTS_TEXT}
     there = [path for path in texts if path.exists()]
     if there or (folder.exists() and not folder.is_dir()):
-        what = "there already; nothing is overwritten"
+        what = "this file or folder already exists and is not overwritten"
         raise CampaignError(Problem("exists", what, file=str(path)) for path in there or [folder])
     (folder / RAW).mkdir(parents=True, exist_ok=True)
     for path, text in texts.items():

@@ -1,3 +1,3 @@
-"""The command line: one module a group of commands, each thin."""
+"""The command line: one module per group of commands, each thin."""
 
 from tribo.cli.commands import main as main

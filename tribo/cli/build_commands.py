@@ -1,4 +1,4 @@
-"""The commands of a lab that builds many campaigns: tribo build, tribo schedule print."""
+"""Commands for many campaigns: tribo build, tribo schedule print."""
 
 from __future__ import annotations
 
@@ -15,31 +15,47 @@ if TYPE_CHECKING:
 BUSY = 75  # EX_TEMPFAIL of sysexits.h: nothing is wrong, try again later
 DROP = click.argument("drop", type=click.Path(exists=True, file_okay=False, path_type=Path))
 FOLDER = click.Path(file_okay=False, path_type=Path)
-SITE = click.option("-o", "--site", type=FOLDER, required=True, help="Output site.")
+SITE = click.option("-o", "--site", type=FOLDER, required=True, help="Folder of the site.")
 KEEP = click.option(
-    "--keep", type=click.IntRange(min=1), default=10, show_default=True, help="Dated builds that are kept."
+    "--keep", type=click.IntRange(min=1), default=10, show_default=True, help="Number of dated builds to keep."
 )
 
 
 @click.command()
 @DROP
 @SITE
-@click.option("--dry-run", is_flag=True, help="Say what would run and why, and do nothing.")
-@click.option("--profile", default="local", show_default=True, help="local, slurm, or a folder with a config.yaml.")
-@click.option("--settle", "settle_s", default=60.0, show_default=True, help="Seconds a file must be unchanged.")
-@click.option("--wait", "wait_s", default=0.0, show_default=True, help="Seconds to wait for another build of the site.")
+@click.option("--dry-run", is_flag=True, help="List the steps and their reasons without running them.")
+@click.option(
+    "--profile",
+    default="local",
+    show_default=True,
+    help="Snakemake profile: local, slurm, or a folder with a config.yaml.",
+)
+@click.option(
+    "--settle",
+    "settle_s",
+    default=60.0,
+    show_default=True,
+    help="Read a campaign only after its files have not changed for this many seconds.",
+)
+@click.option(
+    "--wait", "wait_s", default=0.0, show_default=True, help="Seconds to wait if another build of the site is running."
+)
 @KEEP
-@click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off.")
-@click.option("--weights", default="relative", show_default=True, help="As in tribo fit.")
-@click.option("--flat", default="", metavar="SAMPLE", help="Flat sample that calibrates the model, as in tribo report.")
-@click.option("--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulated runs a load.")
-@click.option("--scheduler", help="Address of a dask scheduler whose workers run the simulations.")
+@click.option(
+    "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
+)
+@click.option("--weights", default="relative", show_default=True, help="Weights of the fit, as in tribo fit.")
+@click.option("--flat", default="", metavar="SAMPLE", help="Flat sample for the calibration, as in tribo report.")
+@click.option("--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulations per load.")
+@click.option("--scheduler", help="Address of a dask scheduler; its workers run the simulations.")
 @command_options
 def build(console: Console, drop: Path, site: Path, dry_run: bool, **options: Any) -> int:
-    """Reports of all campaigns in DROP and an index page over them; only what changed is built.
+    """Build the reports of a folder of campaigns.
 
-    Each folder or .zip in DROP is a campaign. NAME.overrides.csv beside campaign NAME is applied to it. Exit status
-    75: another build of the site is running.
+    Each folder or .zip in DROP is a campaign. A campaign is built only if it has changed since the last build; an
+    index page lists all of them. If DROP holds NAME.overrides.csv, it is applied to campaign NAME. Exit status 75:
+    another build of the site is running.
     """
     from tribo.pipeline.build import BuildOptions, build_site
     from tribo.store.lock import SiteBusyError
@@ -55,10 +71,10 @@ def build(console: Console, drop: Path, site: Path, dry_run: bool, **options: An
 
 
 def _words(built: Built, dry_run: bool) -> str:
-    """What was built or would be, and why."""
+    """What was built, or would be built, and why."""
     verb = "would build" if dry_run else "built"
     lines = [f"{verb} {name}: {why}" for name, why in built.due.items()]
-    lines += [f"left for the next round: {name}: {'; '.join(why)}" for name, why in built.waiting.items()]
+    lines += [f"postponed to the next build: {name}: {'; '.join(why)}" for name, why in built.waiting.items()]
     lines += [f"unusable: {name}" for name, status in built.status.items() if status == "unusable"]
     if dry_run:
         lines += [f"  {step}" for step in built.steps]
@@ -71,7 +87,7 @@ def _words(built: Built, dry_run: bool) -> str:
 
 @click.group()
 def schedule() -> None:
-    """Regular builds of a drop folder."""
+    """Schedule daily builds of a folder of campaigns."""
 
 
 @schedule.command("print")
@@ -79,11 +95,18 @@ def schedule() -> None:
 @SITE
 @KEEP
 @click.option("--at", default="06:00", show_default=True, help="Time of day, HH:MM.")
-@click.option("--notify", default="", help="Command told of a failure; it gets the unit's name and the last log lines.")
-@click.option("--mail", default="", help="Address that gets a mail on failure, in place of --notify.")
+@click.option(
+    "--notify",
+    default="",
+    help="Command to run after a failure, with the name of the unit and the last log lines as arguments.",
+)
+@click.option("--mail", default="", help="Address to send a mail to after a failure, instead of --notify.")
 @command_options
 def print_schedule(console: Console, drop: Path, site: Path, **options: Any) -> None:
-    """A systemd service and timer, and a cron line, that build DROP every day."""
+    """Print a systemd timer and a cron line.
+
+    Both build DROP every day.
+    """
     from tribo.pipeline.schedule import Schedule, cron_line, in_words, units
 
     wanted = Schedule.checked(drop, site, **{name: options[name] for name in ("at", "keep", "notify", "mail")})

@@ -1,4 +1,4 @@
-"""The command line. Thin: each command reads options, walks the street, and hands the records to the report."""
+"""The command line. Each command reads its options, runs the stages and passes their records to the report."""
 
 from __future__ import annotations
 
@@ -24,23 +24,26 @@ CAMPAIGN = click.argument("campaign", type=click.Path(exists=True, path_type=Pat
 FOLDER = click.Path(file_okay=False, path_type=Path)
 OUT = click.option("-o", "--out", type=FOLDER, required=True, help="Output folder.")
 KEPT = "kept"  # folder of OUT with finished simulations and the like, for the next start
-SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler whose workers run the simulations.")
-DRY_RUN = click.option("--dry-run", is_flag=True, help="Say what would be done, and do nothing.")
+SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler; its workers run the simulations.")
+DRY_RUN = click.option("--dry-run", is_flag=True, help="List the steps without running them.")
 
 
 COLUMNS = click.option(
-    "--columns", default="", help="QUANTITY=NAME [UNIT],... as in [columns] of campaign.toml; #3 is the third column."
+    "--columns",
+    default="",
+    help="Column of each quantity: QUANTITY=NAME [UNIT],... as in the [columns] table of campaign.toml. "
+    "#3 means the third column.",
 )
 
 FLAT = click.option(
     "--flat", default="", metavar="SAMPLE",
-    help="Flat sample that calibrates the model. [default: F, or the only flat sample]",
+    help="Flat sample on which the model is calibrated. [default: F, or the only flat sample]",
 )  # fmt: skip
 
 OVERRIDES = click.option(
     "--overrides",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="Pulls left out or read elsewhere by hand, as the report page hands them back.",
+    help="overrides.csv as saved from the report page: pulls excluded by hand, static peaks and windows moved by hand.",
 )
 
 
@@ -48,13 +51,16 @@ def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         COLUMNS,
         OVERRIDES,
-        click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off."),
+        click.option(
+            "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
+        ),
         click.option(
             "--weights",
             type=click.Choice(["relative", "ratio", "force", "repeats"]),
             default="relative",
             show_default=True,
-            help="What scatters alike at all loads: T over its own size, T/N = mu + tau0/p, T, or as repeats say.",
+            help="Scatter assumed equal at all loads: of T in percent (relative), of T/N (ratio) or of T (force); or "
+            "estimated from repeated tests (repeats).",
         ),
     ):
         function = option(function)
@@ -64,9 +70,7 @@ def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
 def _model_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         FLAT,
-        click.option(
-            "--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulated runs a load."
-        ),
+        click.option("--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulations per load."),
         SCHEDULER,
     ):
         function = option(function)
@@ -76,7 +80,7 @@ def _model_options(function: Callable[..., Any]) -> Callable[..., Any]:
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="tribo")
 def main() -> None:
-    """From raw friction exports to mu and tau0, beside a calibrated spring-block model.
+    """Analyse sled friction tests: fit mu and tau0, compare with a spring-block model.
 
     \b
     Start with:  tribo demo -o out
@@ -94,11 +98,16 @@ main.add_command(simulate)
 @click.argument("folder", type=click.Path(path_type=Path))
 @command_options
 def init(console: Console, folder: Path, **_: Any) -> None:
-    """Write a commented campaign into FOLDER, to fill in."""
+    """Create a campaign template in FOLDER.
+
+    Fill in campaign.toml and tests.csv, and copy the exports of the testing machine into raw/.
+    """
     from tribo.campaign import write_template
 
     write_template(folder)
-    console.result({"folder": str(folder)}, f"{folder}: fill in campaign.toml and tests.csv, put the exports into raw/")
+    console.result(
+        {"folder": str(folder)}, f"{folder}: fill in campaign.toml and tests.csv, and copy the exports into raw/"
+    )
 
 
 @main.command()
@@ -108,7 +117,10 @@ def init(console: Console, folder: Path, **_: Any) -> None:
 @_fit_options
 @command_options
 def ingest(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
-    """Traces and per-test features of CAMPAIGN: tests.csv and campaign.nc."""
+    """Read the exports of CAMPAIGN.
+
+    Determines the static peak and the mean sliding force of each pull. Writes tests.csv and campaign.nc.
+    """
     return _walk(console, campaign, out, "ingest", dry_run, **options)
 
 
@@ -119,19 +131,31 @@ def ingest(console: Console, campaign: Path, out: Path, dry_run: bool, **options
 @_fit_options
 @command_options
 def fit(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
-    """mu and tau0 of every sample with uncertainties: fits.csv."""
+    """Fit mu and tau0 of every sample.
+
+    Writes fits.csv, with the uncertainties of both parameters, in addition to the files of tribo ingest.
+    """
     return _walk(console, campaign, out, "fit", dry_run, **options)
 
 
 @main.command()
 @CAMPAIGN
 @OUT
-@click.option("--only", default="", help="calibration, a sample, or SAMPLE@PRESSUREPa as in kept/; all by default.")
+@click.option(
+    "--only",
+    default="",
+    help="Run only this part: calibration, the name of a sample, or SAMPLE@PRESSUREPa (named as in OUT/kept). "
+    "Default: all parts.",
+)
 @_fit_options
 @_model_options
 @command_options
 def predict(console: Console, campaign: Path, out: Path, only: str, columns: str, **options: Any) -> int:
-    """Calibrate the model on the flat sample and run it for CAMPAIGN, into OUT/kept; compare and report go on there."""
+    """Run the simulations of CAMPAIGN only.
+
+    Calibrates the model on the flat sample, runs it for every sample and stores the results in OUT/kept, where
+    tribo compare and tribo report find them.
+    """
     from tribo import stages
     from tribo.campaign import open_campaign
 
@@ -140,7 +164,9 @@ def predict(console: Console, campaign: Path, out: Path, only: str, columns: str
         ingested = stages.study(_with_columns(described, columns), chosen, until="ingest", progress=progress).ingested
         cells = stages.simulate_cells(ingested, stages.fit(ingested, weights=chosen.weights), chosen, only, progress)
     names = [cell.name for cell in cells]
-    console.result({"out": str(out), "cells": names}, f"calibrated; simulated {', '.join(names) or 'nothing more'}")
+    console.result(
+        {"out": str(out), "cells": names}, f"model calibrated; simulations run: {', '.join(names) or 'none'}"
+    )
     return status_of(ingested.set_aside)
 
 
@@ -152,15 +178,21 @@ def predict(console: Console, campaign: Path, out: Path, only: str, columns: str
 @_model_options
 @command_options
 def compare(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
-    """Experiment against the model calibrated on the flat sample: comparison.csv and the figures."""
+    """Compare the measurements with the model.
+
+    The model is calibrated on the flat sample alone. Writes comparison.csv and the figures in addition to the files
+    of tribo fit.
+    """
     return _walk(console, campaign, out, "compare", dry_run, **options)
 
 
 @main.command()
 @click.argument("campaign", required=False, type=click.Path(exists=True, path_type=Path))
 @OUT
-@click.option("--published", type=click.Choice(["berardo2019"]), help="The table of a paper in place of CAMPAIGN.")
-@click.option("--rule", default="seed", show_default=True, help="How static and sliding force are read off.")
+@click.option("--published", type=click.Choice(["berardo2019"]), help="Diagnose a published table instead of CAMPAIGN.")
+@click.option(
+    "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
+)
 @FLAT
 @COLUMNS
 @OVERRIDES
@@ -168,9 +200,13 @@ def compare(console: Console, campaign: Path, out: Path, dry_run: bool, **option
 def diagnose(
     console: Console, campaign: Path | None, out: Path, published: str | None, columns: str, **options: Any
 ) -> int:
-    """What the calibrated model gets wrong, and why, or that it cannot be told: verdict.json and its figures."""
+    """Find where the model fails, and the likely cause.
+
+    Writes verdict.json and the figures of the diagnosis. Where the data do not allow a conclusion, the verdict says
+    so.
+    """
     if (campaign is None) == (published is None):
-        raise click.UsageError("give a CAMPAIGN, or --published and the name of a table")
+        raise click.UsageError("give either a CAMPAIGN or --published with the name of a table")
     if campaign is None:
         return _diagnose_published(console, out, options["seed"])
     from tribo import stages
@@ -193,7 +229,7 @@ def diagnose(
 
 
 def _diagnose_published(console: Console, out: Path, seed: int) -> int:
-    """The verdict on Table 2 of Berardo et al. (2019), in every way to read what it leaves open."""
+    """The verdict on Table 2 of Berardo et al. (2019), for every interpretation of what it leaves open."""
     from tribo.diagnose.from_table.table_diagnosis import diagnose_published
     from tribo.published import BERARDO2019, data_dir, load_table2, load_table2_simulated_anew
     from tribo.report.provenance import provenance_of_table
@@ -216,16 +252,26 @@ def _diagnose_published(console: Console, out: Path, seed: int) -> int:
 @_model_options
 @command_options
 def report(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
-    """All of the above, report.html and report.pdf."""
+    """Run every stage and write the report.
+
+    Runs ingest, fit, compare and diagnose on CAMPAIGN. Writes their files, report.html, report.pdf and
+    ro-crate-metadata.json.
+    """
     return _walk(console, campaign, out, "report", dry_run, **options)
 
 
 @main.command()
 @click.argument("out", type=click.Path(exists=True, file_okay=False, path_type=Path))
-@click.option("--campaign", type=click.Path(exists=True, path_type=Path), help="The campaign, if it was moved.")
+@click.option(
+    "--campaign", type=click.Path(exists=True, path_type=Path), help="The campaign, if it has been moved since."
+)
 @command_options
 def verify(console: Console, out: Path, campaign: Path | None, **_: Any) -> int:
-    """Whether the inputs and outputs of OUT are what they were: says what changed, is missing or was added."""
+    """Check the inputs and outputs of a report.
+
+    Lists the files that have changed, are missing or have been added since the files in OUT were written. Exit status
+    1: there is at least one such file.
+    """
     from tribo.report import verify as compared
 
     found = compared(out, campaign)
@@ -237,7 +283,11 @@ def verify(console: Console, out: Path, campaign: Path | None, **_: Any) -> int:
 @CAMPAIGN
 @command_options
 def plan(console: Console, campaign: Path, **_: Any) -> None:
-    """What a design can and cannot tell apart, before measuring; the exports need not exist."""
+    """Assess a test plan before measuring.
+
+    States which effects the tests listed in CAMPAIGN could detect and which they could not distinguish. The exports
+    need not exist yet.
+    """
     from dataclasses import asdict
 
     from tribo.campaign import open_campaign
@@ -256,7 +306,7 @@ def plan(console: Console, campaign: Path, **_: Any) -> None:
 @_model_options
 @command_options
 def demo(console: Console, out: Path, **options: Any) -> int:
-    """The report on the bundled example."""
+    """Write the report on the bundled example."""
     from tribo.published import data_dir
 
     status = _walk(console, data_dir() / "example", out, "report", False, **options)
@@ -269,7 +319,10 @@ def demo(console: Console, out: Path, **options: Any) -> int:
 @COLUMNS
 @command_options
 def inspect(console: Console, files: tuple[Path, ...], columns: str, **_: Any) -> int:
-    """What an export is: format, encoding, columns, units, time base, the pulls in it, doubts."""
+    """Show how an export file is read.
+
+    Lists its format, encoding, columns, units, time base and pulls, and anything doubtful.
+    """
     from tribo.ingestion.exports import inspect_file
     from tribo.readers import columns_from_text
 
@@ -280,11 +333,18 @@ def inspect(console: Console, files: tuple[Path, ...], columns: str, **_: Any) -
 
 
 @main.command()
-@click.option("--campaign", type=click.Path(exists=True, path_type=Path), help="Exports to read (the bundled example).")
-@click.option("--large", is_flag=True, help="Also the 1000 x 1000 lattice, some minutes.")
+@click.option(
+    "--campaign",
+    type=click.Path(exists=True, path_type=Path),
+    help="Campaign whose exports are read.  [default: the bundled example]",
+)
+@click.option("--large", is_flag=True, help="Also time a lattice of 1000 x 1000 blocks; takes several minutes.")
 @command_options
 def bench(console: Console, campaign: Path | None, large: bool, jobs: int, **_: Any) -> None:
-    """Speed, as ratios measured in one run."""
+    """Measure the speed of tribo on this machine.
+
+    Times are compared with those of reference programs, measured alternately in the same run.
+    """
     from tribo.cli.reading_speed import against_pandas, in_words, timing_in_words
     from tribo.published import data_dir
     from tribo.simulate.engine_speed import simulator_benchmarks
@@ -299,7 +359,10 @@ def bench(console: Console, campaign: Path | None, large: bool, jobs: int, **_: 
 @main.command()
 @command_options
 def doctor(console: Console, **_: Any) -> int:
-    """Versions, cores, optional parts found or missing."""
+    """Check this installation.
+
+    Lists versions, processor cores and the optional packages found or missing.
+    """
     from tribo.cli.doctor import examine, in_words
 
     found = examine()
@@ -307,10 +370,8 @@ def doctor(console: Console, **_: Any) -> int:
     return 0 if found["healthy"] else 1
 
 
-def _walk(
-    console: Console, path: Path, out: Path, until: Until, dry_run: bool, columns: str, **options: Any
-) -> int:
-    """Walk the street with one campaign as far as ``until`` and write what that yields."""
+def _walk(console: Console, path: Path, out: Path, until: Until, dry_run: bool, columns: str, **options: Any) -> int:
+    """Run the stages up to ``until`` on one campaign and write their results."""
     from tribo import stages
     from tribo.campaign import open_campaign
     from tribo.report import write_until
@@ -334,7 +395,7 @@ def _walk(
 
 
 def _provenance(study: Study, campaign: Path, chosen: StudyOptions) -> Provenance:
-    """Where a study comes from, as this command was given it."""
+    """Provenance of a study run by this command."""
     from tribo.report import gather_provenance
 
     return gather_provenance(
@@ -349,7 +410,7 @@ def _provenance(study: Study, campaign: Path, chosen: StudyOptions) -> Provenanc
 
 
 def _with_columns(campaign: Campaign, columns: str) -> Campaign:
-    """The campaign with the columns given on the command line on top of its own."""
+    """The campaign with the columns of the command line added to, or replacing, its own."""
     from dataclasses import replace
 
     from tribo.readers import columns_from_text
@@ -376,7 +437,7 @@ def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagno
 
 
 def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None = None) -> int:
-    """Say what came out, what was set aside, and with what status it ends."""
+    """Print the results and the tests set aside; return the exit status."""
     from dataclasses import asdict
 
     from tribo.report import summary_text, table2_text

@@ -1,4 +1,4 @@
-"""What the commands share: common options, progress, faults in words or JSON, exit statuses."""
+"""Shared by all commands: common options, progress, errors as text or JSON, exit statuses."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import json
 import logging
 import math
 import os
+import shutil
 import sys
+import textwrap
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -24,13 +26,13 @@ DONE, UNUSABLE, SOME_SET_ASIDE = 0, 1, 3
 
 @dataclass(frozen=True)
 class Console:
-    """Where results and talk go: results to standard output, everything else to standard error."""
+    """Output of a command: results to standard output, everything else to standard error."""
 
     as_json: bool = False
     verbosity: int = 0
 
     def say(self, text: str, *, level: int = 0) -> None:
-        """A line for people on standard error; level 1 needs -v, level -1 survives -q."""
+        """Print a line to standard error; level 1 is shown only with -v, level -1 even with -q."""
         if self.verbosity >= level:
             click.echo(text, err=True)
 
@@ -42,7 +44,11 @@ class Console:
 
     def result(self, record: dict[str, Any], text: str) -> None:
         """The result itself: JSON where asked for, else ``text``."""
-        click.echo(json.dumps(without_nan(record), indent=1, default=str) if self.as_json else text)
+        if self.as_json:
+            text = json.dumps(without_nan(record), indent=1, default=str)
+        elif sys.stdout.isatty():
+            text = wrapped(text, shutil.get_terminal_size().columns)
+        click.echo(text)
 
     @contextmanager
     def progress(self) -> Iterator[Callable[[str, int, int], None]]:
@@ -56,8 +62,20 @@ class Console:
             yield _PlainLines(self)
 
 
+def wrapped(text: str, width: int) -> str:
+    """The text with long sentences wrapped at ``width`` columns; tables (columns two spaces apart) stay as they are."""
+    lines = []
+    for line in text.splitlines():
+        indent = line[: len(line) - len(line.lstrip())]
+        if len(line) <= width or "  " in line.strip():
+            lines.append(line)
+        else:
+            lines += textwrap.wrap(line, width, subsequent_indent=f"{indent}  " if indent else "")
+    return "\n".join(lines)
+
+
 class _PlainLines:
-    """A line every ten seconds while a stage lasts, and when it ends."""
+    """Print a line every ten seconds while a stage runs, and when it ends."""
 
     def __init__(self, console: Console):
         self._console = console
@@ -108,7 +126,7 @@ def _bars() -> Iterator[Callable[[str, int, int], None]]:
 
 
 def without_nan(value: Any) -> Any:
-    """The same record with null for every number that does not exist, as JSON wants it."""
+    """The same record with null for NaN and infinite numbers, which JSON does not have."""
     if isinstance(value, dict):
         return {key: without_nan(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -123,9 +141,7 @@ def faults_text(problems: Sequence[Problem]) -> str:
 
 def set_aside_record(set_aside: Sequence[SetAside]) -> list[dict[str, Any]]:
     """The same for JSON, with every problem in full."""
-    return [
-        {"test_id": s.test_id, "reason": s.reason, "problems": [asdict(p) for p in s.problems]} for s in set_aside
-    ]
+    return [{"test_id": s.test_id, "reason": s.reason, "problems": [asdict(p) for p in s.problems]} for s in set_aside]
 
 
 def status_of(set_aside: Sequence[SetAside]) -> int:
@@ -134,13 +150,18 @@ def status_of(set_aside: Sequence[SetAside]) -> int:
 
 
 def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
-    """--json, --seed, --jobs, -v, -q; faults become a list and exit status 1, never a traceback."""
+    """Add --json, --seed, --jobs, -v and -q; errors become a list and exit status 1, never a traceback."""
 
-    @click.option("--json", "as_json", is_flag=True, help="Result as JSON on standard output.")
-    @click.option("--seed", type=int, default=0, show_default=True, help="Seed of everything random.")
-    @click.option("--jobs", type=click.IntRange(min=1), default=os.cpu_count() or 1, help="Threads (all cores).")
-    @click.option("-v", "--verbose", count=True, help="Say more.")
-    @click.option("-q", "--quiet", is_flag=True, help="Say nothing but results and faults.")
+    @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+    @click.option("--seed", type=int, default=0, show_default=True, help="Seed of all random numbers.")
+    @click.option(
+        "--jobs",
+        type=click.IntRange(min=1),
+        default=os.cpu_count() or 1,
+        help="Number of parallel jobs.  [default: all cores]",
+    )
+    @click.option("-v", "--verbose", count=True, help="Print more messages.")
+    @click.option("-q", "--quiet", is_flag=True, help="Print only results and errors.")
     @functools.wraps(function)
     def command(as_json: bool, verbose: int, quiet: bool, **options: Any) -> None:
         console = Console(as_json, -1 if quiet else verbose)
@@ -151,7 +172,7 @@ def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
             _report_faults(console, why)
             status = UNUSABLE
         except (KeyboardInterrupt, click.Abort):
-            console.say("interrupted; finished results stand, nothing is half written", level=-1)
+            console.say("interrupted; finished results are kept and no file is incomplete", level=-1)
             status = 130
         sys.exit(status or DONE)
 

@@ -1,4 +1,4 @@
-"""What this installation has: versions, cores, optional parts."""
+"""State of this installation: versions, cores, optional packages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 OPTIONAL = {
     "distributed": "simulations on a dask cluster (--scheduler)",
     "openpyxl": "exports saved as .xlsx",
-    "snakemake": "the pipelines",
+    "snakemake": "building a folder of campaigns (tribo build)",
 }
 
 
@@ -24,13 +24,13 @@ def _version(package: str) -> str | None:
 
 
 def needed() -> list[str]:
-    """The packages that tribo's own metadata ask for, without those of its extras."""
+    """The packages that tribo requires according to its metadata, without those of its extras."""
     asked = [line for line in metadata.requires("tribo") or [] if "extra ==" not in line]
     return [re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in asked]
 
 
 def examine() -> dict[str, Any]:
-    """Versions of everything tribo needs or can use; ``healthy`` is False where something needed is missing."""
+    """Versions of required and optional packages; ``healthy`` is False if something required is missing."""
     from tribo import __version__
     from tribo.published import data_dir
 
@@ -50,11 +50,9 @@ def examine() -> dict[str, Any]:
 
 
 def in_words(found: dict[str, Any]) -> str:
-    """The examination as lines for people."""
+    """The result of :func:`examine` as lines of text."""
     lines = [f"tribo {found['tribo']}, Python {found['python']}, {found['cores']} cores, {found['system']}"]
     lines += [f"  {p:<20} {v or 'MISSING: pip install ' + p}" for p, v in found["needed"].items()]
-    lines += [
-        f"  {p:<20} {v or 'not installed; only needed for ' + OPTIONAL[p]}" for p, v in found["optional"].items()
-    ]
+    lines += [f"  {p:<20} {v or 'not installed; needed only for ' + OPTIONAL[p]}" for p, v in found["optional"].items()]
     lines.append(f"  {'bundled example':<20} {'found' if found['bundled_example'] else 'MISSING'}")
     return "\n".join(lines)

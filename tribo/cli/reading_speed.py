@@ -1,4 +1,4 @@
-"""Speed as ratios measured in one run: each pair is timed in turns, and the median of the ratios is told."""
+"""Speed as ratios measured in one run: each pair is timed alternately; the result is the median of the ratios."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Ratio:
 
 
 def compare_in_turns(name: str, ours: tuple[str, Work], other: tuple[str, Work], wanted: str, rounds: int = 5) -> Ratio:
-    """Time two pieces of work in turns, after one uncounted round of each."""
+    """Time two tasks alternately, after one round of each that is not counted."""
     ours[1](), other[1]()
     seconds = [(_timed(ours[1]), _timed(other[1])) for _ in range(rounds)]
     ratios = [a / b for a, b in seconds]
@@ -57,7 +57,7 @@ def _timed(work: Work) -> float:
 
 
 def against_pandas(path: Path, jobs: int = 1) -> list[Ratio]:
-    """Reading a campaign, and reading it into pulls, against pandas.read_csv told everything about the same files."""
+    """Time of reading a campaign, and of reducing it to pulls, relative to pandas.read_csv with known file layouts."""
     import pandas as pd
 
     from tribo.campaign import open_campaign
@@ -99,13 +99,13 @@ def in_words(ratio: Ratio) -> str:
     return (
         f"{ratio.name}: {ratio.ours} {ratio.ours_s:.3g} s, {ratio.other} {ratio.other_s:.3g} s, "
         f"ratio {ratio.ratio:.2f} ({ratio.lowest:.2f} to {ratio.highest:.2f} in {ratio.rounds} rounds; "
-        f"wanted {ratio.wanted})"
+        f"target {ratio.wanted})"
     )
 
 
 def timing_in_words(timing: Timing) -> str:
     """One figure of the simulator as a line."""
     bound = "at least" if timing.better == "higher" else "at most"
-    aim = "" if timing.aim is None else f", wanted {bound} {timing.aim:g}"
+    aim = "" if timing.aim is None else f", target {bound} {timing.aim:g}"
     note = f" ({timing.note})" if timing.note else ""
     return f"{timing.name}: {timing.value:.4g} {timing.unit}{aim}{note}"

@@ -17,24 +17,30 @@ if TYPE_CHECKING:
     from tribo.simulate import SimConfig
     from tribo.simulate.resume import Work
 
-# what describes the runs, in place of which a design file may stand
+# options that describe the runs; a design file may replace them
 _RUNS = (
-    click.option("--sample", "samples", multiple=True, help="F, A, B, C, Sx or Sy, the paper's samples; repeatable."),
-    click.option("--pressure", "pressures_kPa", multiple=True, type=float, help="Nominal pressure in kPa; repeatable."),
+    click.option("--sample", "samples", multiple=True, help="Sample of the paper: F, A, B, C, Sx or Sy (repeatable)."),
+    click.option(
+        "--pressure", "pressures_kPa", multiple=True, type=float, help="Nominal pressure in kPa (repeatable).",
+    ),
     click.option(
         "--angle", "angles_deg", multiple=True, type=float,
-        help="Pull direction against x in degrees; repeatable. Without it one run takes the direction the sample is "
-        "named after, an ensemble spreads them.",
+        help="Angle between pull direction and x in degrees (repeatable). Default: for a single run, the direction in "
+        "the name of the sample; for an ensemble, angles spread evenly.",
     ),
-    click.option("--repeats", type=int, help="Runs at each sample and pressure, local friction drawn anew (4)."),
+    click.option(
+        "--repeats", type=int, help="Runs per sample and pressure, with new random local friction.  [default: 4]",
+    ),
     click.option(
         "--set", "settings", multiple=True, metavar="NAME=VALUE[,VALUE...]",
-        help="Any parameter of the model in SI units; several values are one more dimension; repeatable.",
+        help="Set a parameter of the model, in SI units (repeatable). Several values: run every combination.",
     ),
-    click.option("--blocks", type=int, help="Blocks a side (85)."),
-    click.option("--dt", "dt_s", type=float, help="Time step in s (5e-8)."),
-    click.option("--duration", "duration_ms", type=float, help="Length of a run in ms (three times the peak time)."),
-    click.option("--engine", help="fast (default), dense or reference."),
+    click.option("--blocks", type=int, help="Number of blocks along each side.  [default: 85]"),
+    click.option("--dt", "dt_s", type=float, help="Time step in s.  [default: 5e-8]"),
+    click.option(
+        "--duration", "duration_ms", type=float, help="Duration of a run in ms.  [default: 3 x time of the peak]",
+    ),
+    click.option("--engine", help="Engine: fast, dense or reference.  [default: fast]"),
 )  # fmt: skip
 
 
@@ -46,22 +52,33 @@ def _described(command: Any) -> Any:
 
 @click.command()
 @_described
-@click.option("--design", type=click.Path(exists=True, dir_okay=False, path_type=Path),
-              help="TOML or JSON: samples, pressures_kPa, angles_deg, repeats, seed, [parameters], [patterns.NAME].")
-@click.option("--table2", is_flag=True, help="The paper's numerical column: 6 samples, 8 pressures, 20 runs each.")
-@click.option("--with", "mechanisms", default="", help="MECHANISM:PARAM=VALUE,... put into the model.")
-@click.option("--given", default="", help="Conditions of the pull for --with: hold_s=100,temperature_C=25,...")
-@click.option("--scheduler", metavar="ADDRESS", help="Run an ensemble on the workers of this dask scheduler.")
-@click.option("-o", "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="FILE.nc to write.")
+@click.option(
+    "--design",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="TOML or JSON file that describes the runs: samples, pressures_kPa, angles_deg, repeats, seed, "
+    "[parameters], [patterns.NAME].",
+)
+@click.option(
+    "--table2",
+    is_flag=True,
+    help="Recompute the simulated column of Table 2 of the paper: 6 samples, 8 pressures, 20 runs each.",
+)
+@click.option("--with", "mechanisms", default="", help="Mechanism to add to the model: MECHANISM:PARAM=VALUE,...")
+@click.option("--given", default="", help="Test conditions for --with, such as hold_s=100,temperature_C=25.")
+@click.option("--scheduler", metavar="ADDRESS", help="Address of a dask scheduler; its workers run the ensemble.")
+@click.option(
+    "-o", "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="File to write, FILE.nc."
+)
 @command_options
 def simulate(
     console: Console, design: Path | None, table2: bool, mechanisms: str, given: str, out: Path, **options: Any
 ) -> None:
-    """One run of the spring-block model with the paper's parameters, or an ensemble of runs.
+    """Run the spring-block model.
 
-    One --sample and one --pressure without --repeats are one run: FILE.nc holds its force over time. Several of
-    them, --repeats, --design or --table2 are an ensemble: FILE.nc holds one entry a run, and a second start of the
-    same command computes only what it lacks.
+    Parameters not given have the values of the paper. One --sample and one --pressure without --repeats give a single
+    run; FILE.nc then holds force against time. Several samples or pressures, --repeats, --design or --table2 give an
+    ensemble; FILE.nc then holds one entry per run. If the same command is started again, it computes only the missing
+    runs.
     """
     from tribo.mechanisms_in_model import parse_given, parse_with
     from tribo.simulate import run_stored
@@ -69,9 +86,11 @@ def simulate(
 
     scheduler, seed, jobs = (options.pop(name) for name in ("scheduler", "seed", "jobs"))
     if design and (table2 or any(value not in (None, ()) for value in options.values())):
-        raise click.UsageError("--design says all of it; give no other option about the runs beside it")
+        raise click.UsageError(
+            "--design describes all runs; it cannot be combined with other options that describe runs"
+        )
     if not (design or table2 or (options["samples"] and options["pressures_kPa"])):
-        raise click.UsageError("give --sample and --pressure, --design or --table2")
+        raise click.UsageError("give --sample and --pressure, or --design, or --table2")
     one, table = (False, {}) if design else described_by_options(options, seed, table2)
     runs, acting, conditions = together(
         lambda: read_design(design, seed) if design else asked_runs(table, seed if one else None),
@@ -90,7 +109,7 @@ def simulate(
 
 
 def pulled(config: SimConfig, acting: Mapping[str, Any], conditions: Mapping[str, float]) -> Run:
-    """One run with mechanisms at work; of this module, so that workers find it."""
+    """One run with mechanisms in the model; at module level so that workers can import it."""
     from tribo.mechanisms_in_model import simulate_with
 
     return simulate_with(config, acting, **conditions)

@@ -1,1 +1,1 @@
-"""The calibrated model beside the measurement: predictions, the runs they need, and the statistics of agreement."""
+"""Comparison of the calibrated model with the measurement: predictions, their runs and statistics of agreement."""

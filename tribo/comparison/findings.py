@@ -1,4 +1,4 @@
-"""What agrees and what does not between experiment and model, as records; the words are in ``wording``."""
+"""Agreement of experiment and model as records; their sentences are in ``wording``."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from tribo.comparison import study_lookup
 from tribo.comparison.agreement import ratios as ratios_of, welch_dof
 from tribo.records import REGIMES, LawFit, Regime, Study
 
-Verdict = Literal["agrees", "model too high", "model too low", "cannot tell"]
-TELLING_FACTOR = 1.2  # an interval wider than a factor 1.2 either way cannot speak for the model
+Verdict = Literal["agrees", "model too high", "model too low", "inconclusive"]
+TELLING_FACTOR = 1.2  # an interval wider than a factor of 1.2 either way is no evidence for the model
 
 
 @dataclass(frozen=True)
@@ -30,15 +30,15 @@ class LoadRatio:
 
     @property
     def verdict(self) -> Verdict:
-        """What the interval says of the model; "cannot tell" where it holds 1 and much else."""
+        """Conclusion from the interval; "inconclusive" where it contains 1 but is too wide."""
         if not (math.isfinite(self.low) and math.isfinite(self.high)):
-            return "cannot tell"
+            return "inconclusive"
         if self.high < 1:
             return "model too high"
         if self.low > 1:
             return "model too low"
         wide = math.log(self.high / self.low) / 2 > math.log(TELLING_FACTOR)
-        return "cannot tell" if wide else "agrees"
+        return "inconclusive" if wide else "agrees"
 
     @property
     def deviation(self) -> float:
@@ -60,7 +60,7 @@ class Agreement:
 
     @property
     def worst(self) -> LoadRatio:
-        """The load where ratio is farthest from 1."""
+        """The load at which the ratio is farthest from 1."""
         return max(self.loads, key=lambda load: abs(math.log(load.ratio)))
 
     @property
@@ -70,14 +70,14 @@ class Agreement:
 
     @property
     def verdict(self) -> Verdict | Literal["mixed"]:
-        """All loads together: what at least half of them say.
+        """Conclusion for all loads together: that of at least half of them.
 
-        One load of twenty lies outside its interval by chance, so a single one does not make a difference.
+        By chance, one load in twenty lies outside its interval; a single one therefore does not decide.
         """
         high, low, half = self.count("model too high"), self.count("model too low"), len(self.loads) / 2
         if high + low >= half:
             return "mixed" if high and low else "model too high" if high else "model too low"
-        return "agrees" if self.count("agrees") >= half else "cannot tell"
+        return "agrees" if self.count("agrees") >= half else "inconclusive"
 
     @property
     def n_outside(self) -> int:
@@ -105,8 +105,8 @@ def _load_ratios(part: pd.DataFrame) -> Iterable[LoadRatio]:
 class Ranking:
     """Samples from most to least friction at one load, measured and simulated.
 
-    ``told_apart`` are the pairs (higher, lower) that the measurement parts with 95 % confidence; ``reversed``
-    those of them which the model has the other way round.
+    ``told_apart`` are the pairs (higher, lower) that the measurement separates with 95 % confidence; ``reversed``
+    those of them that the model predicts in the opposite order.
     """
 
     regime: Regime

@@ -1,4 +1,4 @@
-"""The calibrated model's prediction of every sample of a campaign, with nothing refitted."""
+"""The calibrated model's prediction of every sample of a campaign, without refitting."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def loads_to_simulate(campaign: Campaign) -> FloatArray:
 
 @dataclass(frozen=True)
 class Prediction:
-    """What the model says of a campaign: the runs, the laws fitted to them, and the force at any load."""
+    """Predictions of the model for a campaign: the runs, the laws fitted to them, and the force at any load."""
 
     table: pd.DataFrame
     fits: tuple[LawFit, ...]
@@ -86,7 +86,7 @@ def predict(
     Parameters
     ----------
     fits : laws measured on the samples, the flat one among them
-    model : how often, from which seed and where the model is run
+    model : number of runs, seed, and where the model is run
     weights : of the fits to the simulated forces
 
     Raises
@@ -167,7 +167,7 @@ def run_named_cells(
     chosen = tuple(c for c in cells if only in ("", c.sample, c.name))
     if not chosen and only != "calibration":
         allowed = ", ".join(["calibration", *dict.fromkeys(c.sample for c in cells), *(c.name for c in cells)])
-        raise CampaignError(Problem("no_such_cell", "nothing of this name to simulate", found=only, allowed=allowed))
+        raise CampaignError(Problem("no_such_cell", "no simulation has this name", found=only, allowed=allowed))
     if chosen:
         run_cells(
             chosen, model.kept, model.jobs, model.scheduler,
@@ -192,7 +192,7 @@ def _flat_laws(fits: tuple[LawFit, ...], flat: str) -> dict[Regime, LawFit]:
     if len(laws) < len(REGIMES):
         notes = "; ".join(note for f in fits if f.sample == flat for note in f.notes)
         raise FitError(
-            Problem("no_flat_law", f"the model needs both laws of the flat sample {flat}", found=notes or "none")
+            Problem("no_flat_law", f"calibration needs both laws of the flat sample {flat}", found=notes or "none")
         )
     return laws
 

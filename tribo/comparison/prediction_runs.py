@@ -32,9 +32,9 @@ CELLS_AWAY = 16  # cells given to a scheduler at once
 class ModelRuns:
     """How the model is run for a campaign.
 
-    ``runs`` runs a sample and load, at stratified pull angles with fresh local friction from ``seed``, ``jobs`` at a
-    time or by the workers of a dask ``scheduler`` (its address). The folder ``kept`` holds the calibration and every
-    finished run; what was made otherwise is not taken from it.
+    ``runs`` simulations per sample and load, at stratified pull angles with random local friction from ``seed``,
+    ``jobs`` at a time or on the workers of a dask scheduler at the address ``scheduler``. The folder ``kept`` holds the
+    calibration and every finished run; results made from other inputs are not used.
     """
 
     runs: int = 4
@@ -83,7 +83,7 @@ def run_cells(
     scheduler: str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> pd.DataFrame:
-    """All runs of the cells as one table, a row a run; those that ``kept`` holds are taken from there.
+    """All runs of the cells as one table, one row per run; those that ``kept`` holds are taken from there.
 
     Raises
     ------
@@ -137,7 +137,7 @@ def _run_stored(
 
 
 def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | None:
-    """Finished runs of the baseline in ``kept`` that today's sources would make again, a row a run; None without any.
+    """Finished runs of the baseline in ``kept`` that the current sources would reproduce, one row per run, or None.
 
     A file counts where its name is the one that its own runs would be given.
     """

@@ -16,7 +16,7 @@ import numpy as np
 
 from tribo.diagnose.search.weigh import effect
 from tribo.diagnose.statistics.model import Acting, ModelFit
-from tribo.diagnose.statistics.predictor import FLAT_LAW
+from tribo.diagnose.statistics.pattern_table import flat_law
 from tribo.errors import SimulationError
 from tribo.mechanisms.covariate import score
 from tribo.mechanisms.mislabelled_specimen import moves
@@ -146,7 +146,7 @@ def _pair(model: ModelFit, test: int, seed: int) -> tuple[SimConfig, dict[str, V
 
 def local_friction(law: FloatArray) -> LocalFriction:
     """Local friction whose flat sample follows the law (mu, tau0 in kPa, static and sliding): all scales are linear."""
-    mu_s, static, mu_d, sliding = np.asarray(law) / np.asarray(FLAT_LAW)
+    mu_s, static, mu_d, sliding = np.asarray(law) / np.asarray(flat_law())
     return LocalFriction(
         PAPER.mu_s * mu_s, PAPER.mu_s_sd * mu_s, PAPER.mu_d * mu_d, PAPER.mu_d_sd * mu_d,
         PAPER.static_adhesion_Pa * static, PAPER.sliding_adhesion_Pa * sliding,

@@ -70,8 +70,8 @@ def _area_fraction(study: Study, sample: str, mark: str) -> float:
 def _line(points: pd.DataFrame) -> pd.DataFrame:
     """Straight line through the points, all with the same weight.
 
-    Weights from the uncertainties would let chance decide: with three specimens they are known to a factor
-    of two at best, and the smallest would draw the line to itself.
+    Weights from the uncertainties would make the line arbitrary: with three specimens they are known to a factor
+    of two at best, and the point with the smallest would dominate the fit.
     """
     if points.empty:
         return points
@@ -145,7 +145,7 @@ def _handles(numbers: pd.DataFrame) -> list[Line2D]:
     ]
     return [
         *samples,
-        Line2D([], [], color=style.VERMILLION, marker="o", label="measured, and its line in AF"),
+        Line2D([], [], color=style.VERMILLION, marker="o", label="measured, with straight line in AF"),
         Line2D([], [], color=style.GREEN, marker="o", mfc="white", ls="", label="spring-block model"),
         Line2D([], [], color=style.ORANGE, ls=":", lw=1.4, label="flat value · AF"),
     ]

@@ -1,4 +1,4 @@
-"""The recorded columns of a diagnosis as the figures show them: values, a score to regress on, a label."""
+"""The recorded columns of a diagnosis as shown in figures: values, a score for regression, a label."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BEND = "bend"  # the square of ln N: whether T(N) bends
 LABELS = {
     "normal_load_N": "load", "specimen_run": "pull of specimen", "run_order": "run order", "started_at": "time",
     "time of day": "time of day", "temperature_C": "temperature", "humidity_pct": "humidity",
-    "speed_mm_s": "speed", "hold_s": "hold", BEND: "bend with load",
+    "speed_mm_s": "speed", "hold_s": "hold time", BEND: "bend with load",
 }  # fmt: skip
 AXES = {
     "normal_load_N": "Normal load N (N)", "specimen_run": "Pull of the specimen", "run_order": "Run order",

@@ -1,4 +1,4 @@
-"""What this campaign could have shown: the strongest look against chance, and how large each effect had to be."""
+"""Detectable effects: the strongest deviation compared with chance, and the size at which each effect is detected."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ ROW_MM, FRAME_MM = 4.4, 26.0
 
 
 def numbers(d: Diagnosis, level: float = LEVEL) -> pd.DataFrame:
-    """Chance: the strongest look in each simulated campaign without effect. Observed: the strongest look here.
+    """Chance: the strongest deviation in each simulated campaign without effect. Observed: the strongest in this one.
 
-    Then one row a mechanism: the effect on T, in percent from end to end, that is found one, five and nine times
-    in ten; the strength of a look grows in proportion to the effect and scatters by one standard deviation.
+    Then one row per mechanism: the effect on T, in percent over the range of the variable, that is detected with 10, 50
+    and 90 % probability. The strength of a deviation is proportional to the effect and has a standard deviation of 1.
     """
     chance = [("chance", "", float(z), *[float("nan")] * 3) for z in d.screened.chance]
     best = int(np.argmax(d.screened.strength))
@@ -56,10 +56,10 @@ def draw(numbers: pd.DataFrame) -> Figure:
     style.legend_below(
         figure,
         [
-            Patch(color="0.75", label="simulated campaigns without effect"),
-            Line2D([], [], color="black", ls="--", lw=0.9, label="what counts as a misfit"),
+            Patch(color="0.75", label="simulated campaigns without any effect"),
+            Line2D([], [], color="black", ls="--", lw=0.9, label="threshold of a misfit"),
             Line2D([], [], color=style.VERMILLION, lw=1.6, label="this campaign"),
-            Line2D([], [], color=style.BLUE, lw=3, alpha=0.45, marker="o", ms=4, label="found 1, 5 and 9 times in 10"),
+            Line2D([], [], color=style.BLUE, lw=3, alpha=0.45, marker="o", ms=4, label="detected in 10, 50, 90 %"),
         ],
     )
     return figure
@@ -75,7 +75,7 @@ def _chance(ax: Axes, numbers: pd.DataFrame) -> None:
     ax.axvline(need, color="black", ls="--", lw=0.9)
     ax.axvline(observed, color=style.VERMILLION, lw=1.6)
     style.panel_title(ax, "Is there a misfit?", "yes" if observed > need else "no")
-    ax.set_xlabel("Strongest of all looks (standard deviations)")
+    ax.set_xlabel("Strongest deviation (standard deviations)")
     ax.set_ylabel("Campaigns")
 
 
@@ -90,5 +90,5 @@ def _sizes(ax: Axes, rows: pd.DataFrame) -> None:
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.xaxis.set_minor_locator(NullLocator())
     ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    style.panel_title(ax, "Which effects would have been found?")
-    ax.set_xlabel("Effect on T, from end to end (%)")
+    style.panel_title(ax, "Detectable effects")
+    ax.set_xlabel("Change of T over the range of the variable (%)")

@@ -1,4 +1,4 @@
-"""What speaks for each mechanism: log likelihood gained over the calibrated model, and why the others are out."""
+"""Evidence for each mechanism: increase in log likelihood over the calibrated model, or why it was ruled out."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 COLUMNS = ["mechanism", "choice", "status", "gain", "weight", "estimate", "reason"]
 STATUS = {
     "cause": ("named", style.VERMILLION),
-    "tied": ("cannot be told from it by this design", style.ORANGE),
-    "rival": ("explains about as much", style.SKY),
+    "tied": ("not distinguishable from the best by this design", style.ORANGE),
+    "rival": ("explains the data about as well", style.SKY),
     "lost": ("explains less", "0.7"),
     "out": ("not weighed", "0.5"),
 }
@@ -111,7 +111,7 @@ def _frame(ax: Axes, rows: pd.DataFrame, reach: float) -> None:
     ax.set_xlim(LEAST_SHOWN, reach)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
-    ax.set_xlabel("Log likelihood gained over the calibrated model, net of its freedom")
+    ax.set_xlabel("Increase in log likelihood over the calibrated model, after penalty")
 
 
 def _short(reason: str, most: int = 96) -> str:

@@ -21,7 +21,7 @@ COLUMNS = [
     "sample_number", "sample", "regime", "normal_load_N", "model", "residual_percent", "low_percent", "high_percent",
     "rms_percent", "n_tests",
 ]  # fmt: skip
-MODELS = {"before": "calibrated model", "after": "extended model", "simulated": "extended model, simulated"}
+MODELS = {"before": "calibrated model", "after": "extended model", "simulated": "extended model, simulation"}
 LOOKS: dict[str, dict[str, Any]] = {
     "before": {"marker": "o", "mfc": "white", "color": "0.45", "ls": ":"},
     "after": {"marker": "s", "color": style.BLUE, "ls": "-"},
@@ -75,7 +75,7 @@ def _spread(at_load: np.ndarray, panel: np.ndarray) -> dict[str, Any]:
 
 @style.in_house_style
 def draw(numbers: pd.DataFrame) -> Figure:
-    """A column a sample, static above sliding; on the line at zero the model is right."""
+    """One column per sample, static above sliding; on the line at zero the model is right."""
     samples = style.by_sample(numbers)
     figure, axes = style.panel_grid(2 * len(samples), 44, columns=len(samples), sharex=True, sharey=True)
     for k, (_, part) in enumerate(samples):
@@ -87,13 +87,13 @@ def draw(numbers: pd.DataFrame) -> Figure:
                 ax.set_title(str(part["sample"].iloc[0]), loc="left")
             ax.set_title(_rms(cell), loc="right", fontweight="normal", fontsize=6.5)
             if style.is_leftmost(ax):
-                ax.set_ylabel(f"{regime} friction:\nmeasured over model (%)")
+                ax.set_ylabel(f"{regime} friction:\n100 ln(measured/model)")
     for ax in axes[len(samples) :]:
         style.plain_log_axis(ax.xaxis, numbers["normal_load_N"])
         ax.tick_params(axis="x", labelsize=6, rotation=90)
         ax.set_xlabel("Load N (N)")
     shown = [m for m in MODELS if (numbers["model"] == m).any()]
-    handles: list[Any] = [Line2D([], [], ms=3.2, lw=0.9, label=f"{MODELS[m]}, ± 2 s.e.", **LOOKS[m]) for m in shown]
+    handles: list[Any] = [Line2D([], [], ms=3.2, lw=0.9, label=f"{MODELS[m]}, ± 2 SE", **LOOKS[m]) for m in shown]
     style.legend_below(figure, handles)
     return figure
 

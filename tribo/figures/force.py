@@ -86,7 +86,7 @@ def _fit_line(mark: str, fit: LawFit | None, loads_N: FloatArray, band: bool = F
 
 @style.in_house_style
 def draw(numbers: pd.DataFrame) -> Figure:
-    """One panel a sample, all on the same axes, so that samples can be compared by eye."""
+    """One panel per sample, all on the same axes, so that samples can be compared by eye."""
     groups = style.by_sample(numbers)
     figure, axes = style.panel_grid(len(groups), 52, sharex=True, sharey=True)
     for ax, (_, sample) in zip(axes, groups, strict=True):

@@ -25,7 +25,7 @@ MOST_BAR = 3.0  # an error bar beyond this factor runs off the panel, so that th
 
 @style.in_house_style
 def draw(numbers: pd.DataFrame) -> Figure:
-    """One panel a sample, static beside sliding at each load; the line at 1 is perfect agreement."""
+    """One panel per sample, static beside sliding at each load; the line at 1 is perfect agreement."""
     groups = style.by_sample(numbers)
     figure, axes = style.panel_grid(len(groups), 45, sharex=True, sharey=True)
     for ax, (_, sample) in zip(axes, groups, strict=True):
@@ -44,7 +44,7 @@ def draw(numbers: pd.DataFrame) -> Figure:
         ax.set_xlabel("Normal load N (N)")
         ax.tick_params(labelbottom=True)
         if style.is_leftmost(ax):
-            ax.set_ylabel("T measured / T simulated")
+            ax.set_ylabel("Measured T / simulated T")
     _ratio_axis(axes, numbers)
     style.legend_below(
         figure,

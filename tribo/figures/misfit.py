@@ -1,4 +1,4 @@
-"""Where the calibrated model fails: sample by covariate, signed percent, with what chance does not explain marked."""
+"""Where the calibrated model fails: percent by sample and covariate, with significant deviations marked."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ ALL = "all samples"
 REGIMES = {"both": (0.5, 0.5), "static": (1.0, 0.0), "sliding": (0.0, 1.0), "drop": (1.0, -1.0)}
 PATTERNS = {**REGIMES, "both": (1.0, 1.0)}  # what a look would follow in the two regimes
 TITLES = {
-    "both": "Static and sliding friction alike", "static": "Static friction", "sliding": "Sliding friction",
-    "drop": "Drop from static to sliding", "trace": "What else the traces show",
+    "both": "Static and sliding friction together", "static": "Static friction", "sliding": "Sliding friction",
+    "drop": "Drop from static to sliding", "trace": "Other features of the traces",
 }  # fmt: skip
 MARKS = ((0.01, "**"), (0.05, "*"))  # adjusted p below which a cell is marked
 LEAST_PERCENT, MOST_PERCENT = 10.0, 60.0  # ends of the colour scale
@@ -37,7 +37,7 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     """Change of the residual from end to end of each covariate (percent), for each sample and observable.
 
     The change is that of the measurement over the model calibrated on the flat sample alone. The column "mean" is its
-    mean over a sample; the flat sample has neither that nor one along the load, since the calibration takes both up.
+    mean over a sample; the flat sample has neither a mean nor a change with load, since the calibration absorbs both.
     ``strength`` is the signed score in standard deviations once the flat law, the model's own error of a sample and the
     specimens are taken out; ``p_adjusted`` sets it against the strongest of all looks at simulated campaigns. The
     observable "trace" has the rank correlation of the zero, the slope of the rise and the stick-slip amplitude with the
@@ -168,7 +168,7 @@ def draw(numbers: pd.DataFrame) -> Figure:
         ax.tick_params(labelbottom=False)
     axes[-1].set_xticks(np.arange(len(labels)) + 0.5, list(labels), rotation=25, ha="right", rotation_mode="anchor")
     bar = figure.colorbar(mesh, ax=list(axes), shrink=0.6, pad=0.015, aspect=35, extend="both")
-    bar.set_label("measured over model, from end to end (%)")
+    bar.set_label("change of measured / modelled T (%)")
     bar.outline.set_visible(False)
     return figure
 

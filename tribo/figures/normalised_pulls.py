@@ -17,7 +17,7 @@ COLUMNS = ["sample_number", "sample", "test_id", "normal_load_N", "mark", "time_
 
 
 def example_tests(study: Study) -> dict[str, Test]:
-    """One pull a sample: at the middle load, without flags if there is one, its peak nearest the median."""
+    """One pull per sample: at the middle load, without flags if there is one, its peak nearest the median."""
     ingested = study.ingested
     usable = [
         t
@@ -76,7 +76,7 @@ def _one_pull(number: int, test: Test, trace: Trace, pull: Pull) -> pd.DataFrame
 
 @style.in_house_style
 def draw(numbers: pd.DataFrame) -> Figure:
-    """One panel a sample: trace, static peak, sliding window with its mean."""
+    """One panel per sample: trace, static peak, sliding window with its mean."""
     groups = style.by_sample(numbers)
     figure, axes = style.panel_grid(len(groups), 42, sharey=True)
     for ax, (_, pull) in zip(axes, groups, strict=True):

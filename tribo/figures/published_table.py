@@ -1,4 +1,4 @@
-"""A published table against the model: T at loads, and what each reading of the table says of each mechanism."""
+"""A published table and the model: T at loads, and the evidence for each mechanism under each interpretation."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def _relative_u(outlook: Outlook, correlation: float | None) -> np.ndarray:
 
 @style.in_house_style
 def draw_ratio(numbers: pd.DataFrame) -> Figure:
-    """A column a sample, static above sliding; on the line at 1 the paper's model is right."""
+    """One column per sample, static above sliding; on the line at 1 the paper's model is right."""
     samples = list(dict.fromkeys(numbers["sample"]))
     figure, axes = style.panel_grid(2 * len(samples), 42, columns=len(samples), sharex=True, sharey=True)
     for k, sample in enumerate(samples):
@@ -84,14 +84,14 @@ def draw_ratio(numbers: pd.DataFrame) -> Figure:
             else:
                 ax.set_xlabel("p (kPa)")
             if k == 0:
-                ax.set_ylabel(f"{regime} friction:\nmeasured over model")
+                ax.set_ylabel(f"{regime} friction:\nmeasured / modelled")
     style.plain_log_axis(axes[0].yaxis, [0.25, 0.5, 1.0, 2.0])
     axes[0].set_ylim(0.22, 2.6)
     handles: list[Any] = [
         Line2D([], [], color="black", lw=1.4, label="Table 2, measured"),
-        Patch(color=style.BLUE, alpha=0.25, lw=0, label="90 %, correlation of even loads"),
+        Patch(color=style.BLUE, alpha=0.25, lw=0, label="90 %, mu and tau0 correlated"),
         Line2D([], [], color=style.BLUE, lw=0.7, ls=":", label="90 %, mu and tau0 independent"),
-        Line2D([], [], color="0.45", lw=1.0, ls="--", label="model, flat law refitted"),
+        Line2D([], [], color="0.45", lw=1.0, ls="--", label="model, law of flat sample refitted"),
         Line2D([], [], color=style.VERMILLION, lw=1.3, label="best extended model"),
     ]
     style.legend_below(figure, handles, columns=3)
@@ -112,7 +112,7 @@ def _ratio_panel(ax: Axes, part: pd.DataFrame) -> None:
 
 
 def reading_numbers(d: PublishedDiagnosis) -> pd.DataFrame:
-    """One row a reading and mechanism: log likelihood gained, amplitude with its 90 % interval, the guess it is."""
+    """One row per reading and mechanism: log likelihood gained, amplitude with its 90 % interval, the guess it is."""
     from tribo.diagnose.from_table.table_diagnosis import GUESSES, estimate_of
 
     guess_of = {name: guess for guess, names in GUESSES.items() for name in names}
@@ -146,7 +146,7 @@ def draw_readings(numbers: pd.DataFrame) -> Figure:
                 color="white" if gain > 0.6 * BEST_SHOWN else "0.2")  # fmt: skip
     _readings_axes(ax, readings, mechanisms, int((~order.loc[mechanisms, "other"]).sum()))
     bar = figure.colorbar(mesh, ax=ax, shrink=0.6, aspect=30, pad=0.015, extend="max")
-    bar.set_label("log likelihood gained over the calibrated model")
+    bar.set_label("increase in log likelihood over the calibrated model")
     bar.outline.set_visible(False)
     return figure
 
@@ -154,7 +154,7 @@ def draw_readings(numbers: pd.DataFrame) -> Figure:
 def _readings_axes(ax: Axes, readings: pd.DataFrame, mechanisms: list[str], n_guesses: int) -> None:
     labels = [
         f"{'paper' if r['model'] == 'paper' else 'tribo'}, ρ = {r['correlation']:.2f}".replace("-", "−")
-        + (", s.d. of 3" if r["specimens"] == 3 else "")
+        + (", SD of 3" if r["specimens"] == 3 else "")
         + f"   {str(r['outcome']).replace('_', ' ')}"
         for r in readings.to_dict("records")
     ]

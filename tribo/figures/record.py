@@ -1,4 +1,4 @@
-"""What a figure is: its numbers, and how they are drawn."""
+"""The record of a figure: its numbers and how they are drawn."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ Of = TypeVar("Of")
 class FigureOf(Generic[Of]):
     """One figure of a record of type ``Of``.
 
-    ``numbers(record)`` gives exactly what is plotted, one row a point, units in the column names; an empty
-    frame where the record lacks what the figure needs. ``draw(numbers)`` knows nothing else, so a table
-    written from the numbers is by construction what the figure shows.
+    ``numbers(record)`` gives exactly what is plotted, one row per point, units in the column names; an empty
+    frame where the record lacks what the figure needs. ``draw(numbers)`` has no other input, so a table
+    written from the numbers holds exactly what the figure shows.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The strongest looks: residual against covariate, the band that chance fills, and the curve of the named mechanism."""
+"""The strongest deviations: residual against covariate, the expected scatter and the curve of the named mechanism."""
 
 from __future__ import annotations
 
@@ -259,8 +259,8 @@ def _legend(numbers: pd.DataFrame) -> list[Any]:
     handles: list[Any] = [
         Line2D([], [], color=m.colour, marker=m.marker, lw=0, ms=3.5, label=name) for name, m in marks
     ]
-    handles.append(Line2D([], [], color="black", marker="o", lw=0.9, ms=3.4, label="mean ± 2 s.e."))
-    handles.append(Patch(color="0.75", alpha=0.5, lw=0, label="± 2 s.d. by chance"))
+    handles.append(Line2D([], [], color="black", marker="o", lw=0.9, ms=3.4, label="mean ± 2 SE"))
+    handles.append(Patch(color="0.75", alpha=0.5, lw=0, label="± 2 SD, expected scatter"))
     if (numbers["mark"] == "curve").any():
-        handles.append(Line2D([], [], color=style.VERMILLION, lw=1.6, label="what the named model adds"))
+        handles.append(Line2D([], [], color=style.VERMILLION, lw=1.6, label="contribution of the named mechanism"))
     return handles

@@ -48,7 +48,7 @@ def draw(numbers: pd.DataFrame) -> Figure:
             label=f"{first['sample']} ({_angle(first['angle_deg'])})",
         )  # fmt: skip
     pressures = " and ".join(f"{p:.3g}" for p in sorted(numbers["pressure_kPa"].unique()))
-    style.panel_title(ax, "", f"p = {pressures} kPa, angle of pull in the legend")
+    style.panel_title(ax, "", f"p = {pressures} kPa, pull angle in the legend")
     ax.set_xlabel("Time (ms)")
     ax.set_ylabel("Simulated T / N")
     ax.set_ylim(bottom=0)

@@ -1,4 +1,4 @@
-"""One look for all figures: style sheet, palette, a marker for each sample, sizes for a journal page."""
+"""Common style of all figures: style sheet, palette, a marker for each sample, sizes for a journal page."""
 
 from __future__ import annotations
 

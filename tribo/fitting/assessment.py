@@ -1,4 +1,4 @@
-"""The fits of a campaign looked at from other sides: other weights and laws, budget, power, outlying pulls."""
+"""What is reported beside the fits: other weights and laws, uncertainty budget, power and outlying pulls."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tribo.records import REGIMES, Ingested, LawFit
 
 
 def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> dict[str, Any]:
-    """What is said of the fits of a study beside their numbers, by the name of its field in ``Study``."""
+    """The results that complete the fits of a study, by the name of their field in ``Study``."""
     table, area = ingested.table(), ingested.campaign.nominal_area_m2
     budgets = campaign_budgets(ingested, fits, weights=weights)
     parts = [b.table().assign(sample=b.fit.sample, regime=b.fit.regime) for b in budgets]

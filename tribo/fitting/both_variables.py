@@ -38,8 +38,8 @@ def fit_errors_in_both(
 ) -> tuple[LawFit, ...]:
     """As ``fit_samples``, each specimen by odrpack with N known to sqrt(load_u_N^2 + (load_u_share N)^2).
 
-    The standard uncertainty of N is that of one pull, independent from pull to pull. The scatter of T is what
-    the pulls scatter about their line by ``weights``, less what the stated errors of N explain of it.
+    The standard uncertainty of N is that of one pull, independent from pull to pull. The scatter of T is
+    that of the pulls about their line (with ``weights``), minus the part explained by the stated errors of N.
 
     Raises
     ------
@@ -47,8 +47,8 @@ def fit_errors_in_both(
         As ``fit_samples``; negative uncertainties, or none at all.
     """
     if min(load_u_N, load_u_share) < 0 or load_u_N + load_u_share == 0:
-        found, allowed = f"{load_u_N:g} N and a share of {load_u_share:g}", "one of them above zero"
-        raise FitError(Problem("bad_load_uncertainty", "no error of the normal load", found=found, allowed=allowed))
+        found, allowed = f"{load_u_N:g} N and a share of {load_u_share:g}", "at least one of them above zero"
+        raise FitError(Problem("bad_load_uncertainty", "no uncertainty of the load", found=found, allowed=allowed))
     plain = fit_samples(table, regime, nominal_area_m2, weights=weights)
     rows = {r.sample: r for r in sample_rows(table, regime)}
     return tuple(_refitted(fit, rows[fit.sample], load_u_N, load_u_share, weights) for fit in plain)
@@ -56,7 +56,7 @@ def fit_errors_in_both(
 
 def _refitted(fit: LawFit, rows: Rows, load_u_N: float, load_u_share: float, weights: str) -> LawFit:
     if not fit.specimens:
-        return replace(fit, notes=(*fit.notes, "errors of the normal load are not taken into account"))
+        return replace(fit, notes=(*fit.notes, "the uncertainty of the normal load is not taken into account"))
     load_u = np.hypot(load_u_N, load_u_share * rows.load_N)
     force_variance = _force_variance(rows, fit, load_u, weights)
     own, covariances = {}, []

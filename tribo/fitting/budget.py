@@ -1,8 +1,8 @@
-"""Uncertainty budget of a fitted law (GUM, JCGM 100:2008): every component, combined, and which dominates.
+"""Uncertainty budget of a fitted law (GUM, JCGM 100:2008): components, their combination and the largest.
 
-The interval of :func:`tribo.fitting.fit_samples` holds what differs between specimens and between pulls
-(type A). What all pulls share, the load cell or the height of the wire, no repetition shows: it comes from
-``[instrument]`` of campaign.toml or from the stated defaults (type B), and is added here.
+The interval of :func:`tribo.fitting.fit_samples` contains the differences between specimens and between pulls
+(type A). Errors common to all pulls, such as those of the load cell or the height of the wire, do not show in repeats.
+They are taken from ``[instrument]`` of campaign.toml or from the stated defaults (type B) and are added here.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ PRESSURE_PA = 10e3  # where T/A is judged unless asked otherwise: the middle of 
 
 @dataclass(frozen=True)
 class Default:
-    """A standard uncertainty taken where campaign.toml is silent, and where it comes from."""
+    """A standard uncertainty used where campaign.toml gives none, and its source."""
 
     value: float
     reason: str
 
 
 DEFAULTS: dict[str, Default] = {
-    "load_cell_u_percent": Default(0.58, "class 1 of ISO 7500-1: limits of 1 %, rectangular"),
-    "load_cell_u_N": Default(0.0, "the zero is read before each contact"),
-    "mass_u_g": Default(0.03, "balance with steps of 0.1 g, rectangular"),
+    "load_cell_u_percent": Default(0.58, "class 1 of ISO 7500-1: limits ±1 %, rectangular distribution"),
+    "load_cell_u_N": Default(0.0, "the zero is measured before each contact"),
+    "mass_u_g": Default(0.03, "balance with a resolution of 0.1 g, rectangular distribution"),
     "normal_load_u_percent": Default(0.0, "dead weights"),
-    "area_u_percent": Default(1.0, "sides of about 7 mm by caliper to 0.05 mm each"),
-    "wire_angle_deg": Default(0.0, "wire taken as level"),
+    "area_u_percent": Default(1.0, "sides of about 7 mm, each measured by caliper to 0.05 mm"),
+    "wire_angle_deg": Default(0.0, "wire assumed to be horizontal"),
     "wire_angle_u_deg": Default(0.5, "wire levelled by eye"),
 }
 
@@ -104,7 +104,7 @@ class Budget:
         return max(self.components, key=lambda component: component.u[number])
 
     def table(self) -> pd.DataFrame:
-        """One row a component and a last one "combined": type, dof, origin, u_NUMBER, share_pct_NUMBER."""
+        """One row per component and a last one "combined": type, dof, origin, u_NUMBER, share_pct_NUMBER."""
         import pandas as pd
 
         combined = {number: self.standard_uncertainty(number) for number in NUMBERS}
@@ -122,13 +122,13 @@ class Budget:
         )
 
     def text(self) -> str:
-        """What dominates, in one sentence."""
+        """The largest components, in one sentence."""
         said = []
         for number in NUMBERS:
             top = self.dominant(number)
             share = self.share_pct(top, number)
-            said.append(f"{label(number, self.pressure_Pa)} {top.name} ({share:.0f} % of the variance)")
-        return f"{self.fit.sample}, {self.fit.regime}: largest for {', for '.join(said)}."
+            said.append(f"{label(number, self.pressure_Pa)}, {top.name} ({share:.0f} % of the variance)")
+        return f"{self.fit.sample}, {self.fit.regime}: largest component for {'; for '.join(said)}."
 
 
 def label(number: str, pressure_Pa: float) -> str:
@@ -160,12 +160,12 @@ def uncertainty_budget(
     """
     if fit.law != LAW.name or not np.isfinite(fit.covariance).all():
         found = f"{fit.law}, sample {fit.sample}"
-        raise FitError(Problem("no_budget", "no budget without a fitted law", found=found, allowed=LAW.name))
+        raise FitError(Problem("no_budget", "a budget needs a fitted law", found=found, allowed=LAW.name))
     rows = next(r for r in sample_rows(table, fit.regime) if r.sample == fit.sample)
     random, notes = _type_a(rows, fit, weights, pressure_Pa)
     changes = _type_b(fit, instrument, rise_N_per_s, sampling_rate_Hz)
     if fit.regime == "static" and not np.isfinite(rise_N_per_s * sampling_rate_Hz):
-        notes += ("sampling clip left out: the rise before the peak or the sampling rate is not known",)
+        notes += ("component sampling clip left out: the rise before the peak or the sampling rate is not known",)
     by = sensitivities(fit, pressure_Pa)
     shared = tuple(
         Component(name, "B", {k: abs(float(s @ change)) for k, s in by.items()}, float("inf"), origin)
@@ -229,12 +229,12 @@ def _type_a(rows: Rows, fit: LawFit, weights: str, pressure_Pa: float) -> tuple[
         u["reading"][number] = float(np.sqrt(reading))
     notes: tuple[str, ...] = ()
     if not np.isfinite(rows.u_N).any():
-        notes += ("no reading uncertainty of single traces is known",)
+        notes += ("the reading uncertainty of single traces is not known",)
     if capped and fit.n_specimens > 1:
-        notes += ("specimens differ less than their repeats explain",)
+        notes += ("specimens differ by less than the scatter of their repeats",)
     parts = (
         Component("specimens", "A", u["specimens"], fit.dof, f"{fit.n_specimens} specimens"),
-        Component("repeats", "A", u["repeats"], float(dof), f"{fit.n_tests} pulls about their lines"),
+        Component("repeats", "A", u["repeats"], float(dof), f"scatter of {fit.n_tests} pulls about the fitted lines"),
         Component("reading of the trace", "A", u["reading"], float("inf"), "noise within each trace"),
     )
     return parts, notes
@@ -282,7 +282,7 @@ def _type_b(
     changes = [(name, change, _origin(setting, instrument)) for name, change, setting in effects]
     low_N = rise_N_per_s / (2 * sampling_rate_Hz)
     if fit.regime == "static" and np.isfinite(low_N):
-        origin = f"rise of {rise_N_per_s:.3g} N/s read at {sampling_rate_Hz:.3g} Hz"
+        origin = f"rise of {rise_N_per_s:.3g} N/s sampled at {sampling_rate_Hz:.3g} Hz"
         changes.append(("sampling clip", as_adhesion * low_N / np.sqrt(3), origin))
     return changes
 

@@ -9,7 +9,7 @@ import numpy as np
 from tribo.errors import FitError, Problem
 from tribo.fitting.linear import LinearFit, least_squares
 from tribo.fitting.rows import Rows, sample_rows
-from tribo.fitting.samples import combine
+from tribo.fitting.samples import ONE_SPECIMEN, combine
 from tribo.fitting.weighting import WEIGHTS, weights_of
 from tribo.laws.record import Law
 from tribo.laws.table import LAWS
@@ -37,13 +37,13 @@ def fit_curve(
     Raises
     ------
     FitError
-        No convergence, fewer pulls than parameters, or parameters that the data cannot part.
+        No convergence, fewer pulls than parameters, or parameters that the data cannot separate.
     """
     from scipy.optimize import least_squares as minimise
 
     if len(force_N) < len(law.parameters):
         found, allowed = f"{len(force_N)} pulls", f"{len(law.parameters)} or more"
-        raise FitError(Problem("too_few_tests", f"too few pulls for {law.formula}", found=found, allowed=allowed))
+        raise FitError(Problem("too_few_tests", f"too few pulls to fit {law.formula}", found=found, allowed=allowed))
     root = np.ones(len(force_N)) if weights is None else np.sqrt(weights)
 
     def residuals(values: FloatArray) -> FloatArray:
@@ -54,7 +54,7 @@ def fit_curve(
 
     found = minimise(residuals, start, slopes, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
     if not found.success or not np.isfinite(found.x).all():
-        raise FitError(Problem("no_convergence", f"{law.formula} does not converge", found=found.message))
+        raise FitError(Problem("no_convergence", f"the fit of {law.formula} does not converge", found=found.message))
     tangent = least_squares(law.design_matrix(*conditions, at=found.x), -found.fun / root, weights)
     return LinearFit(found.x, tangent.unscaled, -found.fun, tangent.dof)
 
@@ -70,13 +70,13 @@ def fit_power_law(
 ) -> tuple[LawFit, ...]:
     """A power law of pressure ("pressure_power" or "pressure_power_adhesion") of every sample, specimens first.
 
-    ``dof`` and covariance as in ``fit_samples``. Samples whose specimens cannot fix the law have NaN values
-    and a note. An exponent n whose interval holds zero says that T against N shows no bend.
+    ``dof`` and covariance as in ``fit_samples``. Samples whose specimens do not determine the law have NaN
+    values and a note. If the interval of the exponent n contains zero, T against N shows no significant curvature.
 
     Raises
     ------
     FitError
-        Another law, or faults of the table.
+        Another law, or errors in the table.
     """
     power = LAWS.get(law)
     if power is None or power.linear:
@@ -107,7 +107,7 @@ def _fit_sample(
     values, covariance = np.full(len(law.parameters), np.nan), alone
     if len(own) == 1:
         (values,) = own.values()
-        notes.append("one specimen: the interval holds for it alone, not for the pattern")
+        notes.append(ONE_SPECIMEN)
     elif own:
         values, covariance = combine(np.array(list(own.values())))
         dof = len(own) - 1.0

@@ -39,7 +39,7 @@ def least_squares(design: FloatArray, response: FloatArray, weights: FloatArray 
     Raises
     ------
     FitError
-        Fewer rows than parameters, or columns that the data cannot part.
+        Fewer rows than parameters, or linearly dependent columns.
     """
     root = np.ones(len(response)) if weights is None else np.sqrt(weights)
     weighted = design * root[:, None]
@@ -59,6 +59,6 @@ def least_squares(design: FloatArray, response: FloatArray, weights: FloatArray 
 def _rank_problem(rows: int, columns: int) -> Problem:
     return Problem(
         "too_few_loads",
-        f"{rows} tests cannot fix {columns} parameters",
+        f"{rows} tests cannot determine {columns} parameters",
         allowed=f"at least {columns} different loads",
     )

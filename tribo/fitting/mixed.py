@@ -1,4 +1,4 @@
-"""The same law as a linear mixed model, beside the specimens-first fit."""
+"""The same law as a linear mixed model, for comparison with the fit of each specimen."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def mixed_model(
     """
     samples = sample_rows(table, regime)
     if len(samples) != 1:
-        what = "a mixed model is fitted to one sample at a time"
+        what = "a mixed model can be fitted to one sample only"
         raise FitError(Problem("one_sample", what, found=f"{len(samples)} samples"))
     rows = samples[0]
     if len(rows.specimens) < 2 or len(np.unique(rows.load_N)) < 2:

@@ -1,4 +1,4 @@
-"""Pulls and specimens that stand apart from their siblings, found by robust fits. Shown, never dropped."""
+"""Outlying pulls and specimens, found by robust fits. They are reported and never removed."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _MEDIAN_TO_SD = 1.4826
 
 @dataclass(frozen=True)
 class Outlying:
-    """A pull or a specimen far from the others: by ``deviation_pct`` of T, ``score`` robust deviations.
+    """An outlying pull or specimen: deviation ``deviation_pct`` of T, ``score`` robust standard deviations.
 
-    ``name`` is the test_id of a pull or the specimen; ``limit`` the score that chance passes in 5 % of
-    campaigns, all looks counted.
+    ``name`` is the test_id of a pull or the specimen; ``limit`` the score that chance exceeds in 5 % of
+    campaigns, all comparisons counted.
     """
 
     kind: Literal["pull", "specimen"]
@@ -39,7 +39,7 @@ class Outlying:
     limit: float
 
     def text(self) -> str:
-        """The same in words."""
+        """One sentence."""
         where = "above" if self.deviation_pct > 0 else "below"
         siblings = "the line of its specimen" if self.kind == "pull" else "the other specimens of its sample"
         return (
@@ -51,8 +51,8 @@ class Outlying:
 def outlying_pulls(table: pd.DataFrame, regime: Regime, nominal_area_m2: float) -> tuple[Outlying, ...]:
     """Pulls far from the robust line (Tukey's biweight) of their specimen, furthest first.
 
-    What counts as far follows the force as repeats show it (:mod:`tribo.fitting.repeats`), one scatter for all
-    samples. Specimens with fewer than five pulls have no line to be far from and are passed over.
+    Deviations are judged against the scatter of repeats as a function of force (:mod:`tribo.fitting.repeats`), the
+    same for all samples. Specimens with fewer than five pulls are skipped: they determine no line.
     """
     samples = [rows for rows in sample_rows(table, regime) if len(np.unique(rows.load_N)) > 1]
     scatter = repeat_scatter(tuple(samples)) if samples else None
@@ -79,7 +79,7 @@ def outlying_pulls(table: pd.DataFrame, regime: Regime, nominal_area_m2: float) 
 
 
 def outlying_specimens(table: pd.DataFrame, regime: Regime, nominal_area_m2: float) -> tuple[Outlying, ...]:
-    """Specimens whose force stands apart from that of the others of their sample, furthest first.
+    """Specimens whose force deviates from that of the other specimens of their sample, furthest first.
 
     Judged at the lowest and the highest load of the campaign by a robust fit (Huber) of log T on the sample;
     needs samples of three specimens or more. With three, one that differs is found only if the specimens of

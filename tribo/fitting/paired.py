@@ -1,8 +1,8 @@
-"""Two samples measured on the same specimens, such as one pattern pulled along x and along y: their difference.
+"""Difference between two samples measured on the same specimens, such as one pattern pulled along x and along y.
 
-What a specimen has of its own (its thickness, its cut, how it was glued) is in both of its laws and drops out of their
-difference. The difference of specimens' own values is therefore better known than the two means are apart; the scatter
-of these differences over G specimens gives its interval by t(G-1), as for the means themselves.
+Properties of a specimen (thickness, cut, glue) affect both of its laws and cancel in their difference. The mean of the
+differences is therefore known better than the difference of two independent means. The scatter of the differences over
+G specimens gives its interval by t(G-1).
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ _UNITS = {"mu": "", "tau0_kPa": " kPa", "T_N": " N"}
 
 @dataclass(frozen=True)
 class PairedDifference:
-    """One number ("mu", "tau0_kPa", "T_N" at ``pressure_Pa``) of ``sample`` less that of ``other``, same specimens.
+    """One number ("mu", "tau0_kPa", "T_N" at ``pressure_Pa``) of ``sample`` minus that of ``other``, same specimens.
 
-    ``u`` is its standard uncertainty, ``unpaired_u`` what it would be if the samples had specimens of their own,
-    ``low`` to ``high`` its 95 % interval by t(``dof``), ``p`` the chance of so large a difference where there is none.
+    ``u`` is its standard uncertainty, ``unpaired_u`` what it would be with different specimens for each sample,
+    ``low`` to ``high`` its 95 % interval by t(``dof``), ``p`` the probability of so large a difference by chance.
     """
 
     sample: str
@@ -48,12 +48,12 @@ class PairedDifference:
     specimens: tuple[str, ...]
 
     def text(self) -> str:
-        """The same in one sentence."""
+        """One sentence."""
         unit, name = _UNITS[self.number], label(self.number, self.pressure_Pa)
-        verdict = "differ" if self.p < 1 - _LEVEL else "are not told apart"
+        verdict = "differ significantly" if self.p < 1 - _LEVEL else "do not differ significantly"
         return (
             f"{self.sample} and {self.other} {verdict} in {self.regime} {name}: {self.difference:+.3g}{unit} "
-            f"[{self.low:.3g}, {self.high:.3g}] by {len(self.specimens)} specimens measured both ways"
+            f"[{self.low:.3g}, {self.high:.3g}] ({len(self.specimens)} specimens measured as both samples)"
         )
 
 
@@ -95,7 +95,7 @@ def _difference(one: LawFit, other: LawFit, number: str, pressure_Pa: float) -> 
 
 
 def differences_table(differences: Iterable[PairedDifference]) -> pd.DataFrame:
-    """One row a difference; the specimens in one cell."""
+    """One row per difference; the specimens in one cell."""
     import pandas as pd
 
     columns = [name for name in PairedDifference.__dataclass_fields__ if name != "specimens"]

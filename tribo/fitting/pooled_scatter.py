@@ -1,9 +1,9 @@
 """Narrower intervals from the scatter of specimens pooled over all samples of a campaign.
 
 Three specimens leave two degrees of freedom and t = 4.3. Where specimens of every sample scatter by the same
-share of their force, as they do if it comes from moulding, mounting and cleaning, the samples together know
-that share much better. This is an assumption about the campaign, not a property of one sample, and is therefore
-asked for by name, never the default.
+share of their force, as scatter from moulding, mounting and cleaning does, all samples together determine that share
+much better. This is an assumption about the campaign and not a property of one sample; it is therefore never the
+default.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from tribo.errors import FitError, Problem
-from tribo.fitting.samples import LAW
+from tribo.fitting.samples import LAW, ONE_SPECIMEN
 from tribo.records import FloatArray, LawFit
 
 PRESSURES_PA = (3e3, 25e3)  # where the share of scatter is taken: the paper's range
@@ -43,13 +43,13 @@ def pool_specimen_scatter(
 
 def _pool(fits: tuple[LawFit, ...], pressures_Pa: tuple[float, float]) -> dict[str, LawFit]:
     if wrong := [fit for fit in fits if fit.law != LAW.name]:
-        raise FitError(Problem("unknown_law", "cannot be pooled", found=wrong[0].law, allowed=LAW.name))
+        raise FitError(Problem("unknown_law", "this law cannot be pooled", found=wrong[0].law, allowed=LAW.name))
     used = [fit for fit in fits if fit.specimens]
     shares = {fit.sample: _shares(fit, pressures_Pa) for fit in used}
     several = [fit.sample for fit in used if len(fit.specimens) > 1]
     if not several:
-        what = "the scatter between specimens is unknown"
-        raise FitError(Problem("too_few_specimens", what, allowed="a sample with two specimens or more"))
+        what = "the scatter between specimens cannot be determined"
+        raise FitError(Problem("too_few_specimens", what, allowed="at least one sample with two or more specimens"))
     freedom = np.array([len(shares[s]) - 1.0 for s in several])
     covariances = np.array([np.cov(shares[s], rowvar=False) for s in several])
     common = np.einsum("s,sij->ij", freedom, covariances) / freedom.sum()
@@ -62,7 +62,7 @@ def _pool(fits: tuple[LawFit, ...], pressures_Pa: tuple[float, float]) -> dict[s
             covariance=_back(common, fit, pressures_Pa) / len(fit.specimens),
             dof=dof,
             method=f"{fit.method}; scatter of specimens pooled over {len(several)} samples, t({dof:g})",
-            notes=(*(n for n in fit.notes if not n.startswith("one specimen")), *notes),
+            notes=(*(n for n in fit.notes if n != ONE_SPECIMEN), *notes),
         )
     return found
 
@@ -74,7 +74,7 @@ def _map(fit: LawFit, pressures_Pa: tuple[float, float]) -> FloatArray:
     own = forces @ fit.values
     if (own <= 0).any():
         found = f"sample {fit.sample}: {own.min():.3g} N"
-        raise FitError(Problem("no_force", "no share of a force that is not positive", found=found))
+        raise FitError(Problem("no_force", "a fitted force is not positive", found=found))
     return np.asarray(forces / own[:, None])
 
 
@@ -106,4 +106,4 @@ def _unlike(shares: list[FloatArray]) -> tuple[str, ...]:
     p = float(bartlett(*middle).pvalue)
     if p >= UNLIKE_LEVEL:
         return ()
-    return (f"samples differ in the scatter of their specimens (p = {p:.1g}): do not trust the pooled interval",)
+    return (f"the scatter of specimens differs between samples (p = {p:.1g}): the pooled interval is not reliable",)

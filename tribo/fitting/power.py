@@ -1,8 +1,8 @@
-"""What difference between two samples a campaign could have shown, and what would show a wanted one.
+"""Smallest difference between two samples that a campaign can detect, and the tests needed for a given difference.
 
 Two samples are compared by the two-sided t test of their specimens' means, the power by the noncentral t
 distribution (Cohen, Statistical Power Analysis for the Behavioral Sciences, 1988). The scatter of specimens
-and of repeats is pooled over the samples of the campaign: three specimens say too little about it.
+and of repeats is pooled over the samples of the campaign: three specimens are too few to determine it.
 """
 
 from __future__ import annotations
@@ -71,20 +71,22 @@ class Power:
     pressure_Pa: float
 
     def text(self) -> str:
-        """The same in words."""
+        """One sentence."""
         more = (
-            f"{self.specimens_needed} specimens a sample"
+            f"{self.specimens_needed} specimens per sample"
             if self.specimens_needed
-            else f"more than {MOST_SPECIMENS} specimens a sample"
+            else f"more than {MOST_SPECIMENS} specimens per sample"
         )
         repeats = (
-            f"or {self.repeats_needed} repeats at each load" if self.repeats_needed else "more repeats alone would not"
+            f" or {self.repeats_needed} repeats at each load"
+            if self.repeats_needed
+            else "; more repeats alone are not sufficient"
         )
         what = f"{self.regime} {label(self.number, self.pressure_Pa)}"
         return (
-            f"{what}: two samples {self.smallest_difference_pct:.0f} % apart would have been "
-            f"told apart with probability {self.power:g} at level {self.level:g}; "
-            f"{self.wanted_pct:g} % takes {more}, {repeats}."
+            f"{what}: a difference of {self.smallest_difference_pct:.0f} % between two samples would be "
+            f"detected with probability {self.power:g} at significance level {self.level:g}. Detecting "
+            f"{self.wanted_pct:g} % requires {more}{repeats}."
         )
 
 
@@ -113,8 +115,8 @@ def power_of_campaign(
         if len(fit.specimens) > 1 and np.isfinite(fit.covariance).all()
     ]
     if not fits:
-        what = "the scatter between specimens is unknown"
-        raise FitError(Problem("too_few_specimens", what, allowed="a sample with two specimens or more"))
+        what = "the scatter between specimens cannot be determined"
+        raise FitError(Problem("too_few_specimens", what, allowed="at least one sample with two or more specimens"))
     rows = {r.sample: r for r in sample_rows(table, regime)}
     within = [_one_pull_covariance(rows[fit.sample], fit, weights) for fit in fits]
     repeats = float(np.mean([w.repeats for w in within]))
@@ -158,7 +160,7 @@ def _noncentrality(dof: float, level: float, power: float) -> float:
 
 @dataclass(frozen=True)
 class _WithinSpecimen:
-    """Mean covariance (2, 2) of one specimen's (mu, tau0_Pa) with one pull a load; mean pulls at a load."""
+    """Mean covariance (2, 2) of one specimen's (mu, tau0_Pa) with one pull per load; mean pulls at a load."""
 
     covariance: FloatArray
     repeats: float

@@ -1,4 +1,4 @@
-"""How repeats scatter with the force: the variance function Var T = s0^2 + (c T)^2, estimated from repeats."""
+"""Scatter of repeats as a function of force: the variance function Var T = s0^2 + (c T)^2, estimated from repeats."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def repeat_scatter(samples: tuple[Rows, ...]) -> RepeatScatter | None:
     """Variance function of the repeats (same specimen, same load) of ``samples``; None without scatter.
 
     Weighted least squares of the cell variances on the squared cell means, the weights their own expected
-    scatter 2 sigma^4 / dof, both terms held at zero or above. Cells too scattered for chance are left out.
+    scatter 2 sigma^4 / dof, both terms held at zero or above. Cells with too much scatter are left out.
     """
     mean, variance, dof = (np.concatenate(parts) for parts in zip(*map(_cells, samples), strict=True))
     if not (variance > _ROUNDING * mean**2).any():

@@ -56,7 +56,7 @@ def sample_rows(table: pd.DataFrame, regime: Regime) -> tuple[Rows, ...]:
     needed = ["sample", "specimen", "normal_load_N", f"{regime}_N"]
     if absent := [name for name in needed if name not in table.columns]:
         allowed = ", ".join(needed)
-        what = "the table lacks a column"
+        what = "a required column is missing from the table"
         raise FitError([Problem("missing_column", what, column=c, allowed=allowed) for c in absent])
     load = table["normal_load_N"].to_numpy(float)
     ids = (table["test_id"] if "test_id" in table else table.index.to_series()).astype(str).to_numpy(str)
@@ -78,6 +78,6 @@ def _one_sample(everything: Rows, own: NDArray[np.bool_], name: str) -> Rows:
 
 def _bad_load(test_id: str, found: float) -> Problem:
     return Problem(
-        "bad_load", "a normal load that no test can have", column="normal_load_N",
-        found=f"{found:g}", allowed="zero or more newton", test_id=test_id,
+        "bad_load", "not a possible normal load", column="normal_load_N",
+        found=f"{found:g}", allowed="0 N or more", test_id=test_id,
     )  # fmt: skip

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 LAW = LAWS["coulomb_adhesion"]
+ONE_SPECIMEN = "only one specimen: the interval applies to this specimen, not to the pattern"
 LACK_OF_FIT_LEVEL = 0.01
 
 
@@ -56,8 +57,8 @@ def fit_samples(
     -------
     tuple of LawFit
         ``covariance`` of (mu, tau0_Pa) is that of the mean over specimens, ``dof`` = G - 1. One specimen:
-        its own covariance, dof = n - 2, and a note. tau0 is never clamped. A sample whose tests cannot fix
-        the law has NaN values and a note that says why. ``chi2_red`` is the reduced chi-squared of the load
+        its own covariance, dof = n - 2, and a note. tau0 is never clamped. A sample whose tests do not
+        determine the law has NaN values and a note with the reason. ``chi2_red`` is the reduced chi-squared of the load
         means about each specimen's line, the variance of a mean taken from its repeats (NaN without repeats).
 
     Raises
@@ -66,15 +67,16 @@ def fit_samples(
         Missing columns, impossible loads or area, unknown weights, or no sample that can be fitted.
     """
     if by not in ("specimens", "tests"):
-        raise FitError(Problem("unknown_nesting", "no such way to combine", found=by, allowed="specimens, tests"))
+        what = "unknown way to combine tests"
+        raise FitError(Problem("unknown_nesting", what, found=by, allowed="specimens or tests"))
     if not (np.isfinite(nominal_area_m2) and nominal_area_m2 > 0):
         found = f"{nominal_area_m2:g} m2"
-        raise FitError(Problem("bad_area", "an impossible nominal area", found=found, allowed="above zero"))
+        raise FitError(Problem("bad_area", "not a possible nominal area", found=found, allowed="more than 0 m2"))
     samples = sample_rows(table, regime)
     fits = tuple(_fit_sample(rows, regime, nominal_area_m2, weights, by) for rows in samples)
     if not any(np.isfinite(fit.values).all() for fit in fits):
         reasons = [Problem("too_few_loads", f"sample {fit.sample}: {fit.notes[-1]}") for fit in fits]
-        raise FitError(reasons or Problem("no_tests", "the table holds no test"))
+        raise FitError(reasons or Problem("no_tests", "the table contains no tests"))
     return fits
 
 
@@ -103,11 +105,11 @@ def _fit_sample(rows: Rows, regime: Regime, area: float, weights: str, by: str) 
         0.0, len(rows.specimens), len(rows), "none", float("nan"), area, notes=notes,
     )  # fmt: skip
     if weights == "ratio" and not rows.load_N.all():
-        notes += (f"{int((rows.load_N == 0).sum())} tests at zero load left out: they have no T/N",)
+        notes += (f"{int((rows.load_N == 0).sum())} tests at zero load left out: T/N is not defined at zero load",)
         rows = rows.take(rows.load_N > 0)
         empty = replace(empty, n_tests=len(rows), n_specimens=len(rows.specimens))
     if len(np.unique(rows.load_N)) < 2:
-        return replace(empty, notes=(*notes, "tests at fewer than two loads cannot part mu from tau0"))
+        return replace(empty, notes=(*notes, "tests at fewer than two loads: mu and tau0 cannot be separated"))
     weight = weights_of(rows, area, weights)
     own = {name: _line(rows, weight, rows.specimen == name, area) for name in rows.specimens}
     usable = {name: fit for name, fit in own.items() if fit is not None}
@@ -115,7 +117,7 @@ def _fit_sample(rows: Rows, regime: Regime, area: float, weights: str, by: str) 
     ratio, bend = lack_of_fit(rows, weight, usable)
     left_out = [name for name in own if name not in usable]
     if left_out and usable:
-        notes += (f"left out, pulled at fewer than two loads: {', '.join(left_out)}",)
+        notes += (f"specimens left out because they were pulled at fewer than two loads: {', '.join(left_out)}",)
     return replace(
         empty,
         values=part.values,
@@ -142,9 +144,8 @@ def _specimens(rows: Rows, weight: FloatArray, area: float, own: dict[str, Linea
         return _one_load_each(rows, weight, area)
     if len(own) == 1:
         (fit,) = own.values()
-        note = "one specimen: the interval holds for it alone, not for the pattern"
         method = "one specimen, scatter of its tests"
-        return _Part(fit.values, fit.covariance, float(fit.dof), method, (note,))
+        return _Part(fit.values, fit.covariance, float(fit.dof), method, (ONE_SPECIMEN,))
     values, covariance = combine(np.array([fit.values for fit in own.values()]))
     method = f"each specimen fitted, mean of {len(own)} specimens, t({len(own) - 1})"
     return _Part(values, covariance, float(len(own) - 1), method)
@@ -155,18 +156,18 @@ def _one_load_each(rows: Rows, weight: FloatArray, area: float) -> _Part:
     index = [np.flatnonzero(rows.specimen == name) for name in rows.specimens]
     load, force, w = (np.array([a[k].mean() for k in index]) for a in (rows.load_N, rows.force_N, weight))
     fit = least_squares(LAW.design_matrix(load, area), force, w)
-    note = "each specimen was pulled at one load: its scatter cannot be told from that of its line"
+    note = "each specimen was pulled at one load: scatter between specimens and about the line cannot be separated"
     return _Part(fit.values, fit.covariance, float(fit.dof), "line through the specimens' means", (note,))
 
 
 def _pooled(rows: Rows, weight: FloatArray, area: float) -> _Part:
     fit = least_squares(LAW.design_matrix(rows.load_N, area), rows.force_N, weight)
-    note = "tests pooled as if independent: too narrow where specimens differ"
+    note = "tests pooled as if independent: the interval is too narrow if specimens differ"
     return _Part(fit.values, fit.covariance, float(fit.dof), "all tests pooled", (note,))
 
 
 def lack_of_fit(rows: Rows, weight: FloatArray, lines: dict[str, LinearFit]) -> tuple[float, tuple[str, ...]]:
-    """Reduced chi-squared of load means about the specimens' lines, and a note where they bend away.
+    """Reduced chi-squared of load means about the specimens' lines, and a note where they deviate significantly.
 
     The classical lack-of-fit ratio: weighted mean square of (cell mean - line) over that of the repeats about
     their cell mean; a cell is one specimen at one load. NaN without repeats or with two loads only.
@@ -194,7 +195,7 @@ def lack_of_fit(rows: Rows, weight: FloatArray, lines: dict[str, LinearFit]) -> 
     p = float(f_distribution.sf(ratio, dof_line, dof_repeat))
     if p >= LACK_OF_FIT_LEVEL:
         return ratio, ()
-    note = f"the load means bend away from a straight line: chi2_red {ratio:.2f}, p = {p:.1g}"
+    note = f"the load means deviate from a straight line: chi2_red {ratio:.2f}, p = {p:.1g}"
     return ratio, (note,)
 
 

@@ -32,7 +32,7 @@ def fit_three_term(
 ) -> LawFit:
     """T = mu N + (a AF + b) A, one mu, a and b for all samples; ``sample`` of the result is "all".
 
-    A specimen has one area fraction and cannot part a from b, so all pulls are fitted at once and the
+    A specimen has one area fraction, so that a and b cannot be separated; all pulls are fitted at once and the
     covariance comes from leaving out one specimen after the other (jackknife over specimens, dof = G minus 3
     parameters). A specimen name that occurs in several samples (pattern S pulled along x and along y) is one
     specimen. ``area_fractions`` maps each sample to its AF; samples it lacks take no part, with a note.
@@ -45,9 +45,11 @@ def fit_three_term(
     """
     samples = sample_rows(table, regime)
     used = [rows for rows in samples if rows.sample in area_fractions and len(rows)]
-    notes = tuple(f"sample {rows.sample} has no area fraction" for rows in samples if rows.sample not in area_fractions)
+    unknown = [rows.sample for rows in samples if rows.sample not in area_fractions]
+    notes = tuple(f"sample {sample} left out: area fraction not known" for sample in unknown)
     if len({area_fractions[rows.sample] for rows in used}) < 2:
-        raise FitError(Problem("too_few_samples", "one area fraction cannot part a from b", allowed="two or more"))
+        what = "a and b cannot be separated with one area fraction"
+        raise FitError(Problem("too_few_samples", what, allowed="two or more area fractions"))
     design, force, weight, specimen = _stack(used, nominal_area_m2, area_fractions, weights)
     names = np.unique(specimen)
     if len(names) <= len(LAW.parameters):
@@ -94,7 +96,7 @@ def _without(design: FloatArray, force: FloatArray, weight: FloatArray, out: np.
 
 
 def _misfit_of_samples(used: list[Rows], whole: LinearFit, specimen: np.ndarray) -> float:
-    """F ratio of sample means to specimen means of the weighted residuals; NaN with one specimen a sample."""
+    """F ratio of sample means to specimen means of the weighted residuals; NaN with one specimen per sample."""
     sample = np.concatenate([np.full(len(rows), k) for k, rows in enumerate(used)])
     own = np.array([f"{k}/{name}" for k, name in zip(sample, specimen, strict=True)])
     cells, index = np.unique(own, return_inverse=True)

@@ -1,6 +1,6 @@
-"""What is assumed about the scatter of repeats, as weights of a least-squares fit.
+"""Weights of the least-squares fit, from an assumption about the scatter of repeats.
 
-The law is one, T = mu N + tau0 A; what differs is which scatter is held constant over the loads:
+The law is always T = mu N + tau0 A. The choices differ in the scatter that is assumed constant over the loads:
 
 "relative"  the coefficient of variation of T: weights 1/T^2, with T from the fit itself (the default)
 "ratio"     the scatter of T/N: weights 1/N^2, the fit T/N = mu + tau0/p of the paper's Fig. 4
@@ -23,7 +23,7 @@ WEIGHTS: dict[str, str] = {
     "relative": "constant relative scatter of T",
     "ratio": "constant scatter of T/N",
     "force": "constant scatter of T",
-    "repeats": "scatter of T as its repeats show it",
+    "repeats": "scatter of T estimated from repeats",
 }
 _ROUNDS = 4  # the weights move the fit by less than its error, and the fit moves the weights by far less
 _SMALLEST_SHARE = 0.05  # of the median force: where the fitted force nears zero its weight must not diverge
@@ -41,7 +41,7 @@ def weights_of(rows: Rows, nominal_area_m2: float, weights: str) -> FloatArray:
         return np.ones(len(rows))
     if weights == "ratio":
         if not rows.load_N.all():
-            what, allowed = "T/N has no value at zero load", "weights relative or force"
+            what, allowed = "T/N is not defined at zero load", "weights relative or force"
             raise FitError(Problem("zero_load", what, column="normal_load_N", allowed=allowed))
         return rows.load_N**-2.0
     if weights == "relative":
@@ -51,7 +51,7 @@ def weights_of(rows: Rows, nominal_area_m2: float, weights: str) -> FloatArray:
         scatter = repeat_scatter((rows,))
         return expected**-2.0 if scatter is None else 1 / scatter.variance(expected)
     allowed = ", ".join(WEIGHTS)
-    raise FitError(Problem("unknown_weights", "no such weights", found=weights, allowed=allowed))
+    raise FitError(Problem("unknown_weights", "unknown weights", found=weights, allowed=allowed))
 
 
 def expected_force_N(rows: Rows, nominal_area_m2: float) -> FloatArray:

@@ -1,1 +1,1 @@
-"""From the exports of a campaign to its traces and pulls, with what a person decided about single pulls applied."""
+"""From the exports of a campaign to its traces and pulls, with decisions made by hand applied."""

@@ -31,11 +31,11 @@ Outcome = tuple[Trace, Pull] | SetAside
 
 
 def read_row(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> tuple[tuple[Test, Outcome], ...]:
-    """What a row of tests.csv gives: one test as a rule, one a pull where it names pulls within its export.
+    """The tests of a row of tests.csv: usually one, or one per pull if the row selects pulls of its export.
 
     ``PATH#2/3`` is the third pull of the second table, ``PATH#2/*`` every pull of it, ``PATH#*`` every pull of every
-    table; where a row means many, each is a test of its own called ``ID#2/3``. A row without a load takes that
-    recorded in the export.
+    table; if a row selects several, each becomes a separate test called ``ID#2/3``. A row without a load uses
+    the normal force recorded in the export.
     """
     try:
         if names_pulls(split_choice(test.file)[1]):
@@ -46,7 +46,7 @@ def read_row(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> t
 
 
 def inspect_file(path: Path, columns: Mapping[str, str] | None = None) -> Inspection:
-    """What an export is, with the pulls that its tables hold, each by the choice that names it in tests.csv."""
+    """Description of an export with its pulls, each by the text that selects it in tests.csv."""
     from tribo.readers import inspect_export, read_blocks
 
     seen = inspect_export(path, columns=columns)
@@ -59,7 +59,7 @@ def inspect_file(path: Path, columns: Mapping[str, str] | None = None) -> Inspec
 
 
 def _pulls_in_words(tables: Sequence[Trace]) -> tuple[str, ...]:
-    """One line a pull; nothing where no table holds more than one."""
+    """One line per pull; nothing where no table holds more than one."""
     from tribo.traces import load_of, split_pulls
 
     pieces = {f"#{t}/{p}": piece for t, table in enumerate(tables, 1) for p, piece in enumerate(split_pulls(table), 1)}
@@ -95,7 +95,7 @@ def _whole(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> tup
 
 
 def _several_pulls(trace: Trace) -> Problem | None:
-    """A doubt where a trace that was read as one pull holds several, told by steps of load or speed or reversals."""
+    """A doubt if a trace read as one pull holds several, recognised by steps of load or speed or by reversals."""
     from tribo.traces import split_pulls
 
     pieces = split_pulls(trace)
@@ -104,13 +104,13 @@ def _several_pulls(trace: Trace) -> Problem | None:
         return None
     export, choice = split_choice(trace.file)
     table = choice or "1"
-    what = f"{len(loaded)} pulls in this trace, read as one"
-    allowed = f"{export}#{table}/{loaded[0] + 1} and so on for one of them, {export}#{table}/* for all"
+    what = f"this trace contains {len(loaded)} pulls but was read as one"
+    allowed = f"{export}#{table}/{loaded[0] + 1} (and so on) for a single pull, {export}#{table}/* for all"
     return Problem("several_pulls", what, trace.file, allowed=allowed)
 
 
 def _off_speed(trace: Trace, pull: Pull, test: Test) -> Problem | None:
-    """A doubt where the displacement recorded while sliding does not run at the speed that the campaign gives."""
+    """A doubt if the displacement recorded while sliding does not match the speed given in the campaign."""
     if trace.displacement_m is None or not test.speed_m_s or math.isnan(pull.window_s[0]):
         return None
     start, end = np.searchsorted(trace.time_s, pull.window_s)
@@ -118,7 +118,7 @@ def _off_speed(trace: Trace, pull: Pull, test: Test) -> Problem | None:
     travel_m = abs(float(trace.displacement_m[end] - trace.displacement_m[start]))
     if time_s <= 0 or abs(travel_m / time_s / test.speed_m_s - 1.0) < _OFF_SPEED:
         return None
-    what, found = "the displacement does not run at the speed of the test", f"{travel_m / time_s * 1e3:.4g} mm/s"
+    what, found = "the displacement does not match the speed of the test", f"{travel_m / time_s * 1e3:.4g} mm/s"
     return Problem("off_speed", what, trace.file, None, "displacement", found, f"{test.speed_m_s * 1e3:.4g} mm/s")
 
 
@@ -145,7 +145,7 @@ def _with_load(test: Test, trace: Trace) -> Test:
     load = load_of(trace)[0]
     if not load > 0:
         found = None if math.isnan(load) else f"{load:.4g} N"
-        what, allowed = "no load: neither tests.csv nor the export gives it", "normal_load_N in tests.csv"
+        what, allowed = "neither tests.csv nor the export gives the normal load", "normal_load_N in tests.csv"
         raise TraceError(Problem("no_load", what, found=found, allowed=allowed))
     return replace(test, normal_load_N=load)
 
@@ -163,7 +163,7 @@ def _chosen_pulls(root: Path, columns: Mapping[str, str], rule: str, test: Test)
     loaded = dict(zip(pieces, _carry_load(strokes.traces), strict=True))
     chosen = [address for address in pieces if is_chosen(address, choice) and (loaded[address] or "*" not in choice)]
     if not chosen:
-        what, allowed = f"{len(pieces)} pulls in this export", f"{export}#*, or {', '.join(pieces)} after the #"
+        what, allowed = f"no such pull; the export has {len(pieces)}", f"{export}#*, or {', '.join(pieces)} after the #"
         raise TraceError(Problem("no_such_pull", what, found=choice, allowed=allowed))
     zero = 0.0 if math.isnan(strokes.zero_N) else strokes.zero_N
     found = []
@@ -198,7 +198,7 @@ def _with_note(found: tuple[tuple[Test, Outcome], ...], left_out: Sequence[str])
     test, outcome = found[first]
     assert not isinstance(outcome, SetAside)
     trace, pull = outcome
-    doubt = Problem("unloaded", f"pieces without a load left out of this export: {', '.join(left_out)}", test.file)
+    doubt = Problem("unloaded", f"parts without normal load left out: {', '.join(left_out)}", test.file)
     trace = replace(trace, problems=(*trace.problems, doubt))
     return *found[:first], (test, (trace, pull)), *found[first + 1 :]
 

@@ -18,7 +18,7 @@ def ingest_campaign(campaign: Campaign, rule: str, jobs: int, progress: Progress
     Raises
     ------
     CampaignError
-        Not one test could be read.
+        No test could be read.
     """
     from tribo.traces.copies import under_the_wrong_test
 
@@ -41,6 +41,6 @@ def ingest_campaign(campaign: Campaign, rule: str, jobs: int, progress: Progress
     if not pulls:
         raise CampaignError(
             [p for fault in set_aside for p in fault.problems]
-            or [Problem("no_usable_test", "no test of this campaign can be used", file=str(campaign.root))]
+            or [Problem("no_usable_test", "no test of this campaign is usable", file=str(campaign.root))]
         )
     return Ingested(replace(campaign, tests=tuple(tests)), traces, pulls, tuple(set_aside))

@@ -1,4 +1,4 @@
-"""overrides.csv: what a person decided about single pulls, checked against the campaign and applied to its readings."""
+"""overrides.csv: decisions made by hand about single pulls, checked against the campaign and applied."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ FEWEST_IN_WINDOW = 10
 
 
 def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
-    """The campaign with what stands in overrides.csv applied: pulls left out, static peaks and windows moved.
+    """The campaign with overrides.csv applied: pulls excluded, static peaks and windows moved.
 
     Columns: test_id, action (``exclude`` or ``move``), reason, window_start_s, window_end_s, peak_s; times on the
-    clock of the trace. A pull excluded is set aside with its reason; one moved is read anew by the same rule with
-    the given peak or window. Both keep their automatic reading in ``by_hand``.
+    clock of the trace. A pull excluded is set aside with its reason; a moved one is evaluated again by the same rule,
+    with the given peak or window. The automatic results of both are kept in ``by_hand``.
 
     Raises
     ------
     CampaignError
-        Every fault of the table at once, with its row and column; or nothing is left.
+        All errors of the table at once, with row and column; or no test is left.
     """
     overrides = read_overrides(path, ingested)
     known = [o for o in overrides if o.test_id in ingested.pulls]  # what is set aside already stays so
@@ -39,7 +39,7 @@ def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
     gone = {s.test_id for s in left_out}
     pulls = {i: p for i, p in ingested.pulls.items() if i not in gone}
     if not pulls:
-        raise CampaignError(Problem("no_usable_test", "every test is excluded", file=path.name))
+        raise CampaignError(Problem("no_usable_test", "all tests are excluded", file=path.name))
     pulls |= _moved(ingested, [o for o in known if o.action == "move"], rule)
     traces = {i: t for i, t in ingested.traces.items() if i not in gone}
     return replace(
@@ -82,9 +82,9 @@ def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
     try:
         table = read_table(path, file)
     except OSError:
-        raise CampaignError(Problem("missing_file", "no such file", file=str(path))) from None
+        raise CampaignError(Problem("missing_file", "this file does not exist", file=str(path))) from None
     if table is None:
-        raise CampaignError(Problem("empty", "no header", file=file, allowed=",".join(COLUMNS)))
+        raise CampaignError(Problem("empty", "the file has no header", file=file, allowed=",".join(COLUMNS)))
     if faults := list(_header_faults(table, file)):
         raise CampaignError(faults)
     known = _known_tests(ingested)
@@ -110,21 +110,21 @@ def _known_tests(ingested: Ingested) -> dict[str, Trace | None]:
 def _header_faults(table: Table, file: str) -> Iterator[Problem]:
     for name in COLUMNS[:2]:
         if name not in table.names:
-            yield Problem("missing_column", "this column is required", file, table.header_row, name,
+            yield Problem("missing_column", "this required column is missing", file, table.header_row, name,
                           ", ".join(table.names))  # fmt: skip
     for name in dict.fromkeys(table.names):
         if name not in COLUMNS:
-            yield Problem("unknown_column", "no such column", file, table.header_row, name, name, ", ".join(COLUMNS))
+            yield Problem("unknown_column", "unknown column", file, table.header_row, name, name, ", ".join(COLUMNS))
         elif table.names.count(name) > 1:
-            yield Problem("duplicate_column", "this column stands twice", file, table.header_row, name)
+            yield Problem("duplicate_column", "this column occurs twice", file, table.header_row, name)
 
 
 def _repeated(table: Table, file: str) -> Iterator[Problem]:
     first: dict[str, int] = {}
     for row in table.rows:
         if row.test_id in first:
-            what = f"this test stands in row {first[row.test_id]} already"
-            yield Problem("duplicate_row", what, file, row.row, "test_id", row.test_id, "one row a test")
+            what = f"this test already occurs in row {first[row.test_id]}"
+            yield Problem("duplicate_row", what, file, row.row, "test_id", row.test_id, "one row per test")
         first.setdefault(row.test_id, row.row)
 
 
@@ -133,9 +133,9 @@ def _row_faults(row: TestRow, file: str, known: Mapping[str, Trace | None]) -> I
     if test_id not in known:
         near = difflib.get_close_matches(test_id, known, 1, 0.5)
         hint = f"a test of this campaign{f'; did you mean {near[0]}?' if near else ''}"
-        yield Problem("unknown_test", "no such test", file, row.row, "test_id", test_id, hint)
+        yield Problem("unknown_test", "no test has this test_id", file, row.row, "test_id", test_id, hint)
     if action not in ACTIONS:
-        yield Problem("unknown_action", "no such action", file, row.row, "action", action, " or ".join(ACTIONS))
+        yield Problem("unknown_action", "unknown action", file, row.row, "action", action, " or ".join(ACTIONS))
     times, faults = _times(row, file)
     yield from faults
     if action == "exclude":
@@ -146,10 +146,10 @@ def _row_faults(row: TestRow, file: str, known: Mapping[str, Trace | None]) -> I
 
 def _exclude_faults(row: TestRow, file: str) -> Iterator[Problem]:
     if not row.cells.get("reason"):
-        yield Problem("no_reason", "a test is left out for a reason", file, row.row, "reason", "", "a few words")
+        yield Problem("no_reason", "an excluded test needs a reason", file, row.row, "reason", "", "a short text")
     for column in TIMES:
         if cell := row.cells.get(column):
-            what = "a test that is left out has nothing to move"
+            what = "an excluded test cannot have a peak or window"
             yield Problem("unused_cell", what, file, row.row, column, cell, "an empty cell")
 
 
@@ -163,7 +163,7 @@ def _times(row: TestRow, file: str) -> tuple[dict[str, float], list[Problem]]:
             if cell and ("_" in cell or not math.isfinite(value)):
                 raise ValueError(cell)
         except ValueError:
-            problems.append(Problem("not_a_number", "not a time", file, row.row, column, cell, "seconds"))
+            problems.append(Problem("not_a_number", "not a time", file, row.row, column, cell, "a number of seconds"))
             continue
         if cell:
             found[column] = value
@@ -173,14 +173,14 @@ def _times(row: TestRow, file: str) -> tuple[dict[str, float], list[Problem]]:
 def _move_faults(row: TestRow, file: str, times: Mapping[str, float], trace: Trace | None) -> Iterator[Problem]:
     start, end = times.get("window_start_s"), times.get("window_end_s")
     if not times:
-        what = "nothing is moved"
+        what = "neither a peak nor a window is given"
         yield Problem("nothing_moved", what, file, row.row, None, None, "window_start_s and window_end_s, or peak_s")
     if (start is None) != (end is None):
         column = "window_start_s" if start is None else "window_end_s"
-        yield Problem("half_a_window", "a window has a start and an end", file, row.row, column, "", "seconds")
+        yield Problem("half_a_window", "a window needs start and end", file, row.row, column, "", "seconds")
     if start is not None and end is not None and not start < end:
         found = row.cells["window_end_s"]
-        yield Problem("window_reversed", "a window ends after its start", file, row.row, "window_end_s", found,
+        yield Problem("window_reversed", "the window must end after its start", file, row.row, "window_end_s", found,
                       f"more than {start:g}")  # fmt: skip
         return
     if trace is not None:
@@ -191,13 +191,13 @@ def _outside(row: TestRow, file: str, times: Mapping[str, float], trace: Trace) 
     first, last = float(trace.time_s[0]), float(trace.time_s[-1])
     for column, value in times.items():
         if not first <= value <= last:
-            what = "outside the record of this test"
+            what = "this time is outside the recorded trace"
             yield Problem("outside_trace", what, file, row.row, column, row.cells[column], f"{first:g} to {last:g}")
     if len(times) > 1 and "window_start_s" in times:
         inside = (trace.time_s >= times["window_start_s"]) & (trace.time_s <= times["window_end_s"])
         if np.count_nonzero(inside) < FEWEST_IN_WINDOW:
-            yield Problem("window_short", "too few samples in this window", file, row.row, "window_end_s",
-                          f"{np.count_nonzero(inside)} samples", f"at least {FEWEST_IN_WINDOW}")  # fmt: skip
+            yield Problem("window_short", "too few data points in this window", file, row.row, "window_end_s",
+                          f"{np.count_nonzero(inside)} data points", f"at least {FEWEST_IN_WINDOW}")  # fmt: skip
 
 
 def _override(row: TestRow) -> Override:

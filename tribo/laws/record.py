@@ -1,4 +1,4 @@
-"""What a friction law is made of."""
+"""The record of a friction law."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a law. ``low`` and ``high`` are where physics allows it, not where a fit is stopped."""
+    """A parameter of a law. ``low`` and ``high`` are the physical limits, not bounds of a fit."""
 
     name: str
     symbol: str

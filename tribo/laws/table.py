@@ -42,7 +42,7 @@ def three_term(
 ) -> Any:
     """T = mu N + (a AF + b) A. N in newton, A in m2, AF contact area fraction, a and b in pascal.
 
-    At one area fraction only a AF + b can be told, not a and b. Regular everywhere.
+    With one area fraction only a AF + b can be determined, not a and b. Regular everywhere.
     Source: Berardo et al. 2019, end of the discussion; Vernes et al., Faraday Discuss. 156 (2012) 173.
     """
     return mu * normal_load_N + (a_Pa * area_fraction + b_Pa) * nominal_area_m2
@@ -85,7 +85,7 @@ def pressure_power_adhesion(
     """T = mu_ref (p/p_ref)^-n N + tau0 A: the power law with the adhesion term of Coulomb's.
 
     Units as in :func:`pressure_power`, tau0 in pascal. Singular case: N = 0, where T = tau0 A for n < 1; at
-    n = 1 the two terms have one shape and only their sum can be told.
+    n = 1 the two terms have the same form and only their sum can be determined.
     """
     pressed = pressure_power(normal_load_N, nominal_area_m2, reference_pressure_Pa, mu_ref, n)
     return pressed + tau0_Pa * nominal_area_m2

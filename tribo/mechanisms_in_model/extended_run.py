@@ -73,16 +73,16 @@ def _choice_problems(key: str) -> list[Problem]:
     name, choice = name_of(key), choice_of(key)
     if name in NEEDS_CHOICE and pattern_of(choice) is None:
         return [
-            Problem("unknown_sample", f"{name} needs the sample that the specimen is, in brackets", found=key,
-                    allowed=f"{name}(F), and so for A, B, C, Sx, Sy")
+            Problem("unknown_sample", f"{name} requires the true sample of the specimen in brackets", found=key,
+                    allowed=f"{name}(F), or A, B, C, Sx or Sy in the brackets")
         ]  # fmt: skip
     if name not in NEEDS_CHOICE and choice:
-        return [Problem("unknown_choice", f"{name} takes nothing in brackets", found=key, allowed=name)]
+        return [Problem("unknown_choice", f"{name} does not allow brackets", found=key, allowed=name)]
     return []
 
 
 def _unknown(name: str) -> Problem:
-    what = "no mechanism of the simulator"
+    what = "not a mechanism of the simulator"
     return Problem("unknown_mechanism", what, found=name, allowed=", ".join(SIMULATED))
 
 
@@ -91,7 +91,7 @@ def _set(values: Values, mechanism: Mechanism, item: str, problems: list[Problem
     names = [p.name for p in mechanism.parameters]
     if key not in names:
         problems.append(
-            Problem("unknown_parameter", f"no parameter of {mechanism.name}", found=key, allowed=", ".join(names))
+            Problem("unknown_parameter", f"not a parameter of {mechanism.name}", found=key, allowed=", ".join(names))
         )
         return
     p = mechanism.parameters[names.index(key)]
@@ -101,7 +101,7 @@ def _set(values: Values, mechanism: Mechanism, item: str, problems: list[Problem
         value = float("nan")
     if not p.low <= value <= p.high:
         allowed = f"{p.low:g} to {p.high:g} {p.unit}".rstrip()
-        problems.append(Problem("bad_value", f"{mechanism.name}:{key} cannot be this", found=number, allowed=allowed))
+        problems.append(Problem("bad_value", f"{mechanism.name}:{key} is out of range", found=number, allowed=allowed))
         return
     values[names.index(key)] = value
 
@@ -120,19 +120,19 @@ def parse_given(text: str) -> dict[str, float]:
         key, _, number = item.partition("=")
         if key not in RECORDED:
             allowed = ", ".join(f"{name} ({value:g})" for name, value in RECORDED.items())
-            problems.append(Problem("unknown_condition", "no condition of a pull", found=key, allowed=allowed))
+            problems.append(Problem("unknown_condition", "not a condition of a pull", found=key, allowed=allowed))
             continue
         try:
             found[key] = float(number)
         except ValueError:
-            problems.append(Problem("bad_value", f"{key} is a number", found=number, allowed="a number"))
+            problems.append(Problem("bad_value", f"{key} must be a number", found=number, allowed="a number"))
     if problems:
         raise SimulationError(problems)
     return found
 
 
 def simulate_with(config: SimConfig, mechanisms: Mapping[str, Values], **recorded: float) -> Run:
-    """One run with mechanisms at work; with none, or all at zero, the run of ``config`` to the bit.
+    """One run with mechanisms in the model; with none, or with all at zero, bit for bit the run of ``config``.
 
     Parameters
     ----------

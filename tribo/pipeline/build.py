@@ -1,4 +1,4 @@
-"""`tribo build`: a drop folder of campaigns into a site of reports, by the Snakemake workflow in pipelines/.
+"""`tribo build`: from a folder of campaigns to a site of reports, by the Snakemake workflow in pipelines/.
 
 A site holds ``current`` (the outputs of each campaign and the index page), ``builds`` (dated copies), ``latest`` (a
 link to the newest) and ``.tribo`` (records of steps, logs, the lock).
@@ -30,7 +30,7 @@ from tribo.store.whole_files import write_text
 
 STATE = ".tribo"
 CURRENT = "current"
-GONE = "its report.html is gone"
+GONE = "report.html has been deleted"
 PROFILES = ("local", "slurm")
 _BLOCKS = re.compile(r"(?m)^(?=\[|\s*$)")  # Snakemake says one thing after a blank line or a date in brackets
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -91,11 +91,11 @@ def workflow_dir() -> Path:
     for folder in (_PACKAGE / "_pipelines", _PACKAGE.parent / "pipelines"):
         if (folder / "Snakefile").is_file():
             return folder
-    raise BuildError(Problem("missing_workflow", "this installation has no pipelines/Snakefile"))
+    raise BuildError(Problem("missing_workflow", "this installation lacks pipelines/Snakefile; install tribo again"))
 
 
 def build_site(drop: Path, site: Path, options: BuildOptions, *, dry_run: bool = False) -> Built:
-    """Bring the site up to the campaigns of a drop folder; with ``dry_run`` only say what would run and why.
+    """Bring the site up to date with a folder of campaigns; with ``dry_run`` only list the steps and reasons.
 
     Raises
     ------
@@ -107,7 +107,7 @@ def build_site(drop: Path, site: Path, options: BuildOptions, *, dry_run: bool =
         Snakemake is missing, or a step failed other than by unusable input; everything else is built.
     """
     if find_spec("snakemake") is None:
-        what, allowed = "the pipelines need snakemake", "pip install 'tribo[pipelines]'"
+        what, allowed = "tribo build requires snakemake", "pip install 'tribo[pipelines]'"
         raise BuildError(Problem("missing_package", what, allowed=allowed))
     state = site.resolve() / STATE
     if dry_run:
@@ -147,7 +147,7 @@ def _why_due(campaign: Dropped, state: Path, options: BuildOptions) -> str:
     if _report_is_gone(campaign.name, record, state):
         return GONE
     same = record["digest"] == step_digest(campaign.digest, options)
-    return "" if same else "other options, or the code of tribo changed"
+    return "" if same else "options or code of tribo changed"
 
 
 def _forced(due: Mapping[str, str], state: Path) -> tuple[str, ...]:
@@ -256,13 +256,13 @@ def planned_steps(said: str) -> list[str]:
 def _plain_reason(reason: str) -> str:
     """Snakemake's reason in fewer words."""
     if reason.startswith("Params have changed"):
-        return "its inputs, by content, or its options changed"
+        return "contents of its inputs or its options changed"
     if reason.startswith("Forced execution"):
-        return "its report is not there"
+        return "its report is missing"
     if reason.startswith("Missing output files"):
-        return "never finished before"
+        return "not finished before"
     if reason.startswith("Input files updated by another job"):
-        return "a step before it runs"
+        return "an earlier step runs again"
     return reason
 
 
@@ -275,9 +275,9 @@ def _failures(state: Path, said: str) -> list[Problem]:
     """The steps that failed, each with the end of its log; what Snakemake said last where it was no step."""
     errors = "\n".join(block for block in _BLOCKS.split(said) if "Error in rule" in block)
     logs = sorted({state / "log" / log for log in re.findall(r"log: log/(.+?\.log)", errors)})
-    what = "a step failed; the next build tries it again, everything else is built"
+    what = "a step failed; all other steps are complete, and the next build will try this one again"
     if not logs:
-        return [Problem("workflow_failed", "the workflow could not run", found=_last_lines(said))]
+        return [Problem("workflow_failed", "the workflow could not be run", found=_last_lines(said))]
     return [Problem("step_failed", what, file=str(log), found=_tail(log)) for log in logs]
 
 

@@ -29,7 +29,7 @@ def date_build(site: Path, keep: int, now: float | None = None) -> Path | None:
         ``keep`` is below 1.
     """
     if keep < 1:
-        what = "the newest build is always kept"
+        what = "at least the newest build must be kept"
         raise TriboError(Problem("keep_nothing", what, found=str(keep), allowed="1 or more"))
     current, builds = site / CURRENT, site / BUILDS
     builds.mkdir(parents=True, exist_ok=True)

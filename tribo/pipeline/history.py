@@ -1,4 +1,4 @@
-"""What the outputs of all campaigns of a site say together: a row a campaign, and the laws of each sample over time."""
+"""Summary of all campaigns of a site: one row per campaign, and the laws of each sample over time."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class Law:
 class CampaignRow:
     """One campaign as the index page shows it.
 
-    ``state`` is done, some set aside, unusable, failed, waiting or gone (no longer in the drop folder); ``why`` what
-    stands behind it. ``measured`` is when the first pull started, ``built`` when the report was made.
+    ``state`` is done, some set aside, unusable, failed, waiting or gone (no longer in the folder of campaigns); ``why``
+    the reason. ``measured`` is when the first pull started, ``built`` when the report was made.
     """
 
     name: str
@@ -83,15 +83,15 @@ def _row(name: str, site: Path, config: Mapping[str, Any]) -> CampaignRow:
 
 
 def _state(name: str, record: Mapping[str, Any] | None, config: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
-    """How a campaign stands after a build, and why."""
+    """State of a campaign after a build, and why."""
     if name not in config["campaigns"]:
-        return "gone", ("no longer in the drop folder; its last report stands",)
+        return "gone", ("no longer in the folder of campaigns; the last report is kept",)
     waiting = config["campaigns"][name]["waiting"]
     if waiting:
         return "waiting", tuple(waiting)
     expected = f"{config['ready'][name]['digest']} {config['version']} {config['options']['words']}"
     if record is None or record["digest"] != expected:
-        return "failed", ("a step failed; its log is in .tribo/log, and the next build tries it again",)
+        return "failed", ("a step failed; see its log in .tribo/log; the next build will try it again",)
     if record["status"] == "unusable":
         return "unusable", tuple(_problem(p) for p in record["problems"])
     return record["status"].replace("_", " "), ()

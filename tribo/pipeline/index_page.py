@@ -19,11 +19,11 @@ from tribo.pipeline.history import CampaignRow, Law, history
 from tribo.pipeline.trend import FEWEST, LEVEL, SHORTEST, Change, change_points
 
 STATES = {
-    "done": "done", "some set aside": "done, some tests set aside", "unusable": "unusable input",
-    "failed": "failed", "waiting": "left for the next round", "gone": "no longer in the folder",
+    "done": "done", "some set aside": "done, some tests set aside", "unusable": "input not usable",
+    "failed": "failed", "waiting": "postponed to the next build", "gone": "no longer in the folder",
 }  # fmt: skip
 VERDICTS = {
-    "no_misfit": "no misfit", "named": "cause named", "undetermined": "several causes possible",
+    "no_misfit": "no misfit", "named": "cause identified", "undetermined": "several possible causes",
     "unknown": "misfit of unknown cause", "": "–",
 }  # fmt: skip
 SYMBOLS = {"mu": ("μ", ""), "tau0": ("τ₀", "kPa")}
@@ -79,7 +79,7 @@ def series(rows: Sequence[CampaignRow]) -> dict[Key, list[float]]:
 
 
 def trend_csv(rows: Sequence[CampaignRow]) -> str:
-    """The plotted numbers: a row a campaign, sample, regime and parameter."""
+    """The plotted numbers: one row per campaign, sample, regime and parameter."""
     lines = ["campaign,measured,sample,regime,parameter,value,low,high"]
     for row in rows:
         for law in row.laws:

@@ -1,4 +1,4 @@
-"""What lies in a drop folder: campaigns by the content of their files, and those still on their way."""
+"""The campaigns in a folder, by the contents of their files, and those still being copied."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Dropped:
     """A campaign folder or .zip of a drop folder.
 
     ``files`` maps each file (relative to the campaign) to its SHA-256, ``waiting`` says which files are not whole
-    yet and why; a campaign with such files is left for the next round. ``overrides`` is NAME.overrides.csv beside the
-    campaign: what a person decided about single pulls.
+    yet and why; a campaign with such files is postponed. ``overrides`` is NAME.overrides.csv beside the
+    campaign: decisions made by hand about single pulls.
     """
 
     name: str
@@ -52,14 +52,14 @@ def scan(drop: Path, settle_s: float = 60.0) -> tuple[Dropped, ...]:
         Two campaigns of one name ("a" and "a.zip"), or no such folder.
     """
     if not drop.is_dir():
-        raise CampaignError(Problem("missing", "no such folder", file=str(drop)))
+        raise CampaignError(Problem("missing", "this folder does not exist", file=str(drop)))
     found = [
         _with_overrides(_look(path, settle_s), settle_s) for path in sorted(drop.iterdir()) if _is_campaign(path)
     ]
     names = [campaign.name for campaign in found]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        what = "a folder and a .zip of one name; rename one of them"
+        what = "a folder and a .zip have the same name; rename one of them"
         raise CampaignError(Problem("duplicate_campaign", what, file=str(drop), found=name) for name in twice)
     return tuple(found)
 
@@ -81,18 +81,18 @@ def _look(path: Path, settle_s: float) -> Dropped:
         if why:
             return Dropped(name, path, waiting=(f"{path.name} {why}",))
         digest, changed = _hashed(path)
-        return Dropped(name, path, {path.name: digest}, (f"{path.name} is still growing",) if changed else ())
+        return Dropped(name, path, {path.name: digest}, (f"{path.name} is still being written",) if changed else ())
     files, waiting = {}, []
     for file in _files(path):
         shown = file.relative_to(path).as_posix()
         why = _not_whole(file, settle_s)
         if not why:
             files[shown], changed = _hashed(file)
-            why = "is still growing" if changed else ""
+            why = "is still being written" if changed else ""
         if why:
             waiting.append(f"{shown} {why}")
     if not any(name.rsplit("/", 1)[-1] == "campaign.toml" for name in files) and not waiting:
-        waiting.append("campaign.toml is not there yet")
+        waiting.append("campaign.toml is missing so far")
     return Dropped(path.name, path, files, tuple(waiting))
 
 
@@ -137,7 +137,7 @@ def _hashed(file: Path) -> tuple[str, bool]:
 
 
 def difference(old: Mapping[str, str] | None, new: Mapping[str, str]) -> str:
-    """What changed between two sets of files, in words; empty where nothing did."""
+    """Changes between two sets of files as text; empty if there are none."""
     if old is None:
         return "new"
     kinds = {

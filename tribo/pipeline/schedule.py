@@ -1,4 +1,4 @@
-"""Texts that make a machine build a drop folder every day: systemd units and a cron line. Nothing is installed."""
+"""systemd units and a cron line that build a folder of campaigns every day. Nothing is installed."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pathlib import Path
 
 from tribo.errors import Problem, TriboError
 
-LEFT_OR_SET_ASIDE = "3 75"  # some campaigns left or unusable, or another build running: nothing to wake anyone for
+LEFT_OR_SET_ASIDE = "3 75"  # some campaigns postponed or unusable, or another build running: no failure
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """What is built when: absolute folders, hour and minute, dated builds kept, and a shell command on failure."""
+    """A daily build: absolute folders, hour and minute, number of dated builds, and a shell command on failure."""
 
     drop: Path
     site: Path
@@ -30,7 +30,7 @@ class Schedule:
     def checked(
         cls, drop: Path, site: Path, *, at: str = "06:00", keep: int = 10, notify: str = "", mail: str = ""
     ) -> Schedule:
-        """A schedule from what a user gives.
+        """A schedule from the options of the user.
 
         Raises
         ------
@@ -45,7 +45,7 @@ class Schedule:
         if mail and not re.fullmatch(r"[\w.+-]+@[\w.-]+", mail):
             problems.append(Problem("not_an_address", "not a mail address", column="--mail", found=mail))
         if mail and notify:
-            problems.append(Problem("two_notices", "one way to tell of a failure", allowed="--notify or --mail"))
+            problems.append(Problem("two_notices", "give only one of these options", allowed="--notify or --mail"))
         if problems or time is None:
             raise TriboError(problems)
         told = f'mail -s "tribo: $1 failed" {mail}' if mail else notify
@@ -59,7 +59,7 @@ class Schedule:
 
     @property
     def command(self) -> list[str]:
-        """The build itself, with this very installation of tribo. The site's lock keeps two builds apart."""
+        """The build command, with this installation of tribo. The lock of the site prevents simultaneous builds."""
         tribo = [sys.executable, "-m", "tribo"]
         return [*tribo, "build", str(self.drop), "-o", str(self.site), "--keep", str(self.keep), "--quiet"]
 
@@ -115,7 +115,7 @@ def _shell(path: Path) -> str:
 
 
 def in_words(texts: Mapping[str, str]) -> str:
-    """The texts one after the other, with what to do with them."""
+    """The texts one after the other, with instructions."""
     names = [name for name in texts if name != "crontab"]
     timer = next(name for name in names if name.endswith(".timer"))
     parts = [f"# --- ~/.config/systemd/user/{name}\n{texts[name]}" for name in names]

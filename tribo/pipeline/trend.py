@@ -1,10 +1,10 @@
 """mu and tau0 of each sample from campaign to campaign, and where they changed.
 
 A change point splits the campaigns of a series, in the order in which they were measured, in two runs of different
-mean. Each split is weighed by the two-sample t test; the smallest p over all splits and all series stands for the
-looks that were taken. It is compared with the smallest p under random orders of the campaigns (the same order for
+mean. Each split is judged by the two-sample t test. The smallest p over all splits and all series accounts for the
+number of comparisons. It is compared with the smallest p under random orders of the campaigns (the same order for
 all series, since a campaign moves all of them at once): the single-step method of Westfall and Young (1993) with
-permutations, which needs neither normal scatter nor independent series. A run found this way is looked at again for
+permutations, which needs neither normal scatter nor independent series. Each part found this way is searched for
 further changes.
 """
 
@@ -41,13 +41,13 @@ def change_points(
 
     Parameters
     ----------
-    series : name -> one value a campaign, NaN where the campaign has none
+    series : name -> one value per campaign, NaN where the campaign has none
     level : chance of a false alarm in the first round, over all series together
 
     Returns
     -------
     tuple of Change
-        By series and place. ``p`` is adjusted for all splits and series that were looked at.
+        By series and place. ``p`` is adjusted for all splits and series examined.
     """
     values = {name: np.asarray(v, float) for name, v in series.items()}
     if not values:

@@ -24,7 +24,7 @@ from tribo.readers.formats.umt import UMT
 from tribo.readers.formats.walterbai import WALTERBAI
 from tribo.readers.formats.workbook import is_workbook, open_workbook
 
-# Tried in this order; the last one takes what nobody else recognised.
+# Tried in this order; the last one accepts everything the others do not recognise.
 READERS: dict[str, Family] = {
     f.name: f
     for f in (

@@ -27,7 +27,7 @@ UNIT_ENDINGS = {
     "_u_N": "N", "_s": "s", "_m": "m", "_kg": "kg", "_deg": "degree", "_C": "degC", "_pct": "percent",
     "_percent": "percent",
 }  # fmt: skip
-OF_DIAGNOSIS = ("/residuals", "/extended_runs")  # groups that a diagnosis writes anew, or leaves out, as a whole
+OF_DIAGNOSIS = ("/residuals", "/extended_runs")  # groups that a diagnosis rewrites or leaves out as a whole
 UNITLESS = {"mu": "1", "mu_u": "1", "ratio": "1", "ratio_low": "1", "ratio_high": "1", "cov": "kPa"}
 
 
@@ -53,11 +53,11 @@ def write_store(
 ) -> Path:
     """Write out/campaign.nc, a DataTree with the groups tests, fits, comparison, simulated and traces.
 
-    With a ``diagnosis`` also residuals, a row a test and regime under the calibrated and the extended model, and
-    extended_runs, the pairs of runs of the simulator without and with the named mechanisms.
+    With a ``diagnosis`` also residuals, one row per test and regime under the calibrated and the extended model, and
+    extended_runs, pairs of simulated runs without and with the named mechanisms.
 
-    ``provenance`` stands in the attributes of the file, as JSON. With ``keep_earlier``, groups that a longer walk over
-    the same inputs left in the file, and this study has not, stay.
+    ``provenance`` is stored in the attributes of the file, as JSON. With ``keep_earlier``, groups stay that an earlier
+    run of more stages on the same inputs wrote and that this study does not have.
 
     ``traces`` is a contiguous ragged array (CF conventions 9.3.3): the samples of all traces end to end, with
     ``row_size`` samples and the first at ``row_start`` for each test. Times in s, forces in N as recorded

@@ -1,4 +1,4 @@
-"""What a report says, in the order it says it: made once, set as a page (page.py) and as a PDF (pdf.py)."""
+"""The content of a report in its order: made once, then laid out as a page (page.py) and as a PDF (pdf.py)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,18 @@ from tribo.report.words.terminal_text import fit_cells
 LEAD_FIGURE = "agreement"
 MISFIT_FIGURES = ("misfit", "residuals")
 CAUSE_FIGURES = ("extended", "evidence")
-VERDICT_MARKS = {"agrees": "=", "model too high": "▲", "model too low": "▼", "cannot tell": "?"}
+CALIBRATED = {
+    "mu_s": "Static friction coefficient of a block, mean",
+    "mu_s_sd": "Static friction coefficient of a block, standard deviation",
+    "mu_d": "Sliding friction coefficient of a block, mean",
+    "mu_d_sd": "Sliding friction coefficient of a block, standard deviation",
+    "static_adhesion_Pa": "Static adhesion of a block per area (Pa)",
+    "sliding_adhesion_Pa": "Sliding adhesion of a block per area (Pa)",
+    "blocks_x": "Blocks along x",
+    "blocks_y": "Blocks along y",
+    "dt_s": "Time step (s)",
+}
+VERDICT_MARKS = {"agrees": "=", "model too high": "▲", "model too low": "▼", "inconclusive": "?"}
 
 
 def content(study: Study, provenance: Provenance | None, verdict: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -50,7 +61,7 @@ def content(study: Study, provenance: Provenance | None, verdict: Mapping[str, A
 
 
 def figure_places(names: list[str]) -> dict[str, list[str]]:
-    """Where each figure stands: beside the verdict, among Figs. 3 to 8, at the misfits, at the cause, at the end."""
+    """Place of each figure: beside the verdict, among Figs. 3 to 8, at the misfits, at the cause, at the end."""
     places: dict[str, list[str]] = {"lead": [], "figures": [], "misfit": [], "cause": [], "rest": []}
     for name in names:
         if name == LEAD_FIGURE:
@@ -65,7 +76,7 @@ def figure_places(names: list[str]) -> dict[str, list[str]]:
 
 
 def by_hand(study: Study) -> list[tuple[str, str]]:
-    """Every pull that was read elsewhere by hand, with what that changed; those left out are among the set aside."""
+    """Every pull with a peak or window moved by hand, with the change; excluded ones are among those set aside."""
     ingested = study.ingested
     return [
         (test_id, wording.by_hand_sentence(decided, ingested.pulls[test_id]))
@@ -113,7 +124,7 @@ def _agreement_tables(study: Study) -> list[dict[str, Any]]:
 
 
 def _agreement_table(agreements: list[findings.Agreement], regime: Regime) -> dict[str, Any]:
-    """Ratios of one regime: a row a sample, a column a load level, and the sentence of each sample."""
+    """Ratios of one regime: one row per sample, one column per load level, and the sentence of each sample."""
     part = [a for a in agreements if a.regime == regime]
     if not part:
         return {}
@@ -131,7 +142,8 @@ def _agreement_table(agreements: list[findings.Agreement], regime: Regime) -> di
 def _calibration(study: Study) -> list[tuple[str, str]]:
     if study.comparison is None:
         return []
-    return [(name, f"{float(value):.5g}".replace("-", "−")) for name, value in study.comparison.calibration.items()]
+    found = study.comparison.calibration
+    return [(CALIBRATED.get(name, name), f"{float(value):.5g}".replace("-", "−")) for name, value in found.items()]
 
 
 def _flag_counts(study: Study) -> list[tuple[str, int, list[str]]]:
@@ -140,4 +152,5 @@ def _flag_counts(study: Study) -> list[tuple[str, int, list[str]]]:
     for test_id, pull in study.ingested.pulls.items():
         for flag in pull.flags:
             found.setdefault(flag, []).append(test_id)
-    return sorted(((f.replace("_", " "), len(tests), tests) for f, tests in found.items()), key=lambda x: (-x[1], x[0]))
+    counts = ((wording.flags_in_words([flag]), len(tests), tests) for flag, tests in found.items())
+    return sorted(counts, key=lambda x: (-x[1], x[0]))

@@ -22,9 +22,9 @@ UNDATED = "1970-01-01"
 
 
 def write_crate(study: Study, out: Path, provenance: Provenance, written: Iterable[Path]) -> Path:
-    """Write out/ro-crate-metadata.json over the files ``written``: what they are, their hashes, what made them of what.
+    """Write out/ro-crate-metadata.json over the files ``written``: their types and hashes, and how they were made.
 
-    The tribosystem stands in it as ASTM G115 asks, with terms of the TriboDataFAIR ontology where there are any.
+    It includes the tribosystem as required by ASTM G115, with terms of the TriboDataFAIR ontology where they exist.
     """
     record = crate_record(study, out, provenance, written)
     return write_text(out / FILE, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
@@ -67,7 +67,7 @@ def crate_record(study: Study, out: Path, provenance: Provenance, written: Itera
     crate.root_dataset["mentions"] = run
     told = [entity(f"#condition-{k}", _condition_properties(c)) for k, c in enumerate(conditions(study), start=1)]
     system = entity("#tribosystem", {"@type": "Thing", "name": "tribosystem", "description":
-                                     "Conditions of the tests, as ASTM G115 asks for them"})  # fmt: skip
+                                     "Test conditions required by ASTM G115"})  # fmt: skip
     system["additionalProperty"] = told
     crate.root_dataset["about"] = system
     source["about"] = system
@@ -90,8 +90,8 @@ def _campaign_properties(study: Study, provenance: Provenance) -> dict[str, Any]
     return {
         "@type": "Dataset",
         "name": study.ingested.campaign.title,
-        "description": f"Campaign of {len(tests)} tests, {len(provenance.inputs)} files; the hash of each stands in "
-        "provenance.json.",
+        "description": f"Campaign of {len(tests)} tests, {len(provenance.inputs)} files; provenance.json holds the "
+        "hash of each.",
         "identifier": f"sha256:{provenance.inputs_digest}",
     }
 

@@ -47,9 +47,9 @@ def make_anew(name: str, made_from: object, make: Callable[[], Any], rooms: Iter
 
 @dataclass(frozen=True)
 class Drawing:
-    """How figures are drawn: who is told of the progress, by how many processes, and what spares drawing anew.
+    """How figures are drawn: where the progress is reported, and in how many processes they are drawn.
 
-    ``keep`` (:meth:`tribo.store.kept_results.Shelf.take`) hands back a figure whose numbers are what they were.
+    ``keep`` (:meth:`tribo.store.kept_results.Shelf.take`) avoids redrawing a figure whose numbers have not changed.
     """
 
     progress: Progress | None = None
@@ -62,7 +62,7 @@ DRAWING = Drawing()
 
 @dataclass(frozen=True)
 class Drawn:
-    """A figure as drawn: its words, its files by ending, and where its points lie for who hovers over them."""
+    """A figure as drawn: its words, its files by ending, and the positions of its points for hovering."""
 
     name: str
     title: str
@@ -84,7 +84,7 @@ def write_figures(
 ) -> dict[str, Drawn]:
     """Write out/figures/NAME.svg, .pdf, .png and .csv of every figure there are numbers for, and return them.
 
-    ``origin`` says in the metadata of every file what it was made from.
+    ``origin`` is written to the metadata of every file and states its source.
     """
     drawn = draw_all(study, diagnosis, origin, drawing)
     for figure in drawn.values():

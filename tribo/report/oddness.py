@@ -1,4 +1,4 @@
-"""Pulls that stand far from their siblings: same sample, same load. They are shown, never dropped."""
+"""Outlying pulls compared with the other pulls of the same sample and load. They are shown and never removed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FEWEST_SIBLINGS = 2
 
 @dataclass(frozen=True)
 class OddPull:
-    """Where a pull stands: how far its force lies from the median of its siblings, and how many robust SDs that is."""
+    """Deviation of a pull from the median of the other pulls of its sample and load, and in robust SDs."""
 
     test_id: str
     regime: Regime
@@ -28,11 +28,11 @@ class OddPull:
 
 
 def standings(study: Study) -> dict[str, OddPull]:
-    """Where every pull stands among its siblings, in the regime in which it stands farther out.
+    """Deviation of every pull, in the regime in which it is larger.
 
     Deviations are taken in ln T from the median of the other pulls of the sample at the load, and scaled by the
-    median absolute deviation over the whole campaign: one cell has too few pulls for a scale of its own. A pull
-    that was excluded by hand is judged like any other; one with fewer than two siblings is not judged.
+    median absolute deviation over the whole campaign: one cell has too few pulls to determine a scale. A pull
+    excluded by hand is judged like any other; a pull with fewer than two others to compare with is not judged.
     """
     ingested = study.ingested
     left_out = {i: b.automatic for i, b in ingested.by_hand.items() if b.override.action == "exclude"}
@@ -46,13 +46,13 @@ def standings(study: Study) -> dict[str, OddPull]:
 
 
 def odd_pulls(study: Study) -> list[OddPull]:
-    """Used pulls with a modified z-score beyond 3.5, the oddest first; a pull odd in both regimes stands once."""
+    """Used pulls with a modified z-score beyond 3.5, largest deviation first; each pull is listed once."""
     odd = [p for i, p in standings(study).items() if i in study.ingested.pulls and abs(p.score) > ODD_SCORE]
     return sorted(odd, key=lambda pull: (-abs(pull.score), pull.test_id))
 
 
 def oddness(standing: OddPull | None, flags: Collection[str]) -> float:
-    """By what pulls are sorted: robust standard deviations from the siblings, and one for every flag."""
+    """The outlier score by which pulls are sorted: robust standard deviations, plus one for every flag."""
     return (abs(standing.score) if standing is not None else 0.0) + len(flags)
 
 

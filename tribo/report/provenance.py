@@ -22,13 +22,14 @@ PACKAGES = (
 )  # fmt: skip
 DESCRIBED_IN = ("campaign.toml", "tests.csv")
 RAW = "raw"
+OPTIONS = {"rule": "Rule", "weights": "Weights", "flat": "Flat sample", "runs": "Simulations per load"}
 
 
 @dataclass(frozen=True)
 class Provenance:
     """How a report was made. ``inputs`` maps each file of the campaign, by its path in it, to its SHA-256.
 
-    ``campaign`` is where the campaign was, ``overrides`` the path and SHA-256 of the table of decisions by hand, if
+    ``campaign`` is where the campaign was, ``overrides`` the path and SHA-256 of the table of manual decisions, if
     one was given.
     """
 
@@ -50,7 +51,7 @@ class Provenance:
 
     @property
     def origin(self) -> str:
-        """What decides the numbers, in one line: the same for the same inputs, whenever and wherever they are read."""
+        """Everything that determines the numbers, in one line: the same for the same inputs at any time and place."""
         chosen = {"seed": self.seed, **self.options}
         return "; ".join(
             [
@@ -62,7 +63,7 @@ class Provenance:
 
     def in_words(self) -> list[tuple[str, str]]:
         """Names and values as a report shows them."""
-        chosen = {name.replace("_", " "): str(value) for name, value in self.options.items()}
+        chosen = {OPTIONS.get(name, name.replace("_", " ")): str(value) for name, value in self.options.items()}
         overrides = f"{self.overrides['file']}, SHA-256 {self.overrides['sha256']}" if self.overrides else ""
         known = {
             "Command": self.command,
@@ -70,7 +71,7 @@ class Provenance:
             "Seed": "" if self.seed is None else str(self.seed),
             **chosen,
             "Versions": ", ".join(f"{name} {number}" for name, number in self.versions.items()),
-            "Inputs": f"{len(self.inputs)} files, SHA-256 of their names and hashes together {self.inputs_digest}",
+            "Inputs": f"{len(self.inputs)} files, combined SHA-256 of their names and hashes {self.inputs_digest}",
             "Overrides": overrides,
         }
         return [(name, value) for name, value in known.items() if value]
@@ -89,9 +90,9 @@ def gather_provenance(
     campaign: Path | None = None,
     overrides: Path | None = None,
 ) -> Provenance:
-    """Versions of what computes, and hashes of everything in the campaign.
+    """Versions of the software, and hashes of all files of the campaign.
 
-    ``campaign`` is the folder or .zip as the user gave it, ``overrides`` the table of decisions by hand.
+    ``campaign`` is the folder or .zip as the user gave it, ``overrides`` the table of manual decisions.
     """
     root = study.ingested.campaign.root
     named = {test.file.partition("#")[0] for test in study.ingested.campaign.tests}
@@ -156,7 +157,7 @@ def _from(out: Path, place: str) -> str:
 
 
 def read_record(out: Path) -> dict[str, Any] | None:
-    """What provenance.json of a folder says; None where there is none, or none of this kind."""
+    """The contents of provenance.json of a folder; None if there is none, or none of this kind."""
     try:
         record = json.loads((out / FILE).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -167,7 +168,7 @@ def read_record(out: Path) -> dict[str, Any] | None:
 def settle_outputs(
     out: Path, before: Mapping[str, Any] | None, provenance: Provenance, written: Iterable[Path], complete: bool
 ) -> dict[str, str]:
-    """The files that stand for this record, with their hashes; those of an earlier record that do not are removed.
+    """The files that belong to this record, with their hashes; those of an earlier record that do not are removed.
 
     An earlier file stays where its run had the same inputs and choices and this run did not write everything itself
     (``complete``). A file that someone changed since is never removed.

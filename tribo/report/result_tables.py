@@ -48,7 +48,7 @@ def all_set_aside(study: Study) -> dict[str, SetAside]:
 
 
 def tests_table(study: Study) -> pd.DataFrame:
-    """One row a test in the order of the campaign, used or set aside; its own covariates come last."""
+    """One row per test in the order of the campaign, used or set aside; its own covariates come last."""
     ingested = study.ingested
     aside = all_set_aside(study)
     doubts = {doubted.test_id: doubted.reason for doubted in ingested.doubts()}
@@ -116,7 +116,7 @@ def _fit_row(fit: LawFit) -> dict[str, object]:
 
 
 def other_fits_table(study: Study) -> pd.DataFrame:
-    """The data under other weights or laws, and the model's own fits: a row a parameter, SI units."""
+    """The data under other weights or laws, and the model's own fits: one row per parameter, SI units."""
     simulated = study.comparison.simulated if study.comparison is not None else ()
     labelled = [("measured", f) for f in study.other_fits] + [("simulated", f) for f in simulated]
     rows = [

@@ -1,4 +1,4 @@
-"""What a diagnosis of a published table leaves in OUT: verdict.json, and its figures with their numbers."""
+"""Output of the diagnosis of a published table: verdict.json, and its figures with their numbers."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The tribosystem of a campaign: what ASTM G115 asks to be said beside a friction coefficient.
+"""The tribosystem of a campaign: the conditions that ASTM G115 requires with a friction coefficient.
 
-Where the TriboDataFAIR ontology (Garabedian et al. 2022, Scientific Data 9, 315) has a term, it stands beside the
-condition. What a campaign does not record is said to be not recorded, never guessed.
+Where the TriboDataFAIR ontology (Garabedian et al. 2022, Scientific Data 9, 315) has a term, it is given with the
+condition. A condition that the campaign does not record is stated as not recorded and never guessed.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def _bodies(study: Study, tests: list[Test]) -> Iterator[Condition]:
     yield Condition("Moving body, material", campaign.material or NOT_RECORDED, term="MaterialName")
     yield Condition("Counterface, material", campaign.counterface or NOT_RECORDED, term="MaterialName")
     yield Condition("Surface geometry", "; ".join(f"{s}: {_geometry(campaign.samples[s])}" for s in samples))
-    yield Condition("Roughness and preparation of the surfaces", NOT_RECORDED)
+    yield Condition("Surface roughness and preparation", NOT_RECORDED)
     specimens = len({(t.sample, t.specimen) for t in tests})
     yield Condition("Specimens", counted(specimens, "specimen"), term="BlockSpecimen")
 
@@ -70,7 +70,7 @@ def _geometry(pattern: Pattern) -> str:
 def _contact(campaign: Campaign, tests: list[Test]) -> Iterator[Condition]:
     loads = np.array([t.normal_load_N for t in tests])
     area = campaign.nominal_area_m2
-    yield Condition("Test geometry", "flat on flat, a sled pulled over the counterface")
+    yield Condition("Test geometry", "flat on flat, sled pulled over the counterface")
     yield Condition("Nominal contact area", f"{area * 1e6:g}", "mm²")
     yield Condition("Normal load", _range(loads), "N", "NormalLoadSetpoint")
     yield Condition("Nominal pressure", _range(loads / area / PA_PER_KPA), "kPa")
@@ -84,10 +84,10 @@ def _motion(campaign: Campaign, tests: list[Test]) -> Iterator[Condition]:
     directions = sorted({t.direction for t in tests if t.direction})
     yield Condition("Motion", "linear, one way", term="UnidirectionalLinearMotion")
     yield Condition("Speed", _range(_known(speeds) * 1e3), "mm/s", "SlidingSpeedSetpoint")
-    yield Condition("Hold before the pull", _range(_known(t.hold_s for t in tests)), "s", "LoadRelaxationSetpoint")
-    yield Condition("Direction of pull", joined(directions) or NOT_RECORDED)
+    yield Condition("Hold time before the pull", _range(_known(t.hold_s for t in tests)), "s", "LoadRelaxationSetpoint")
+    yield Condition("Pull direction", joined(directions) or NOT_RECORDED)
     yield Condition("Number of tests", str(len(tests)))
-    yield Condition("Tests of each sample at each load", _repeats(tests))
+    yield Condition("Tests per sample and load", _repeats(tests))
 
 
 def _surroundings(tests: list[Test]) -> Iterator[Condition]:
@@ -96,9 +96,9 @@ def _surroundings(tests: list[Test]) -> Iterator[Condition]:
     days = sorted(t.started_at for t in tests if t.started_at)
     yield Condition("Temperature", temperature, "°C", "UncontrolledEnvironmentTemperature")
     yield Condition("Relative humidity", humidity, "%", "UncontrolledEnvironmentRelativeHumidity")
-    yield Condition("Measured", f"{days[0]} to {days[-1]}" if days else NOT_RECORDED, term="ProcessStartTime")
+    yield Condition("Measured on", f"{days[0]} to {days[-1]}" if days else NOT_RECORDED, term="ProcessStartTime")
     operators = sorted({t.operator for t in tests if t.operator})
-    yield Condition("Operators", joined(operators) or NOT_RECORDED)
+    yield Condition("Operator", joined(operators) or NOT_RECORDED)
 
 
 def _known(values: Iterable[float | None]) -> np.ndarray:

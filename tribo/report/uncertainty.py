@@ -1,4 +1,4 @@
-"""Where the uncertainty of the fitted forces comes from, and what the campaign could have shown."""
+"""Sources of the uncertainty of the fitted forces, and differences between samples on the same specimens."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SUM = "combined"
 
 @dataclass(frozen=True)
 class BudgetTable:
-    """Shares (percent of the variance of T) of one regime: a row a sample, a column a component."""
+    """Shares (percent of the variance of T) of one regime: one row per sample, one column per component."""
 
     regime: Regime
     components: tuple[str, ...]
@@ -50,12 +50,12 @@ def _budget_table(regime: Regime, part: pd.DataFrame, order: list[str]) -> Budge
 
 
 def _dominant(regime: Regime, samples: pd.Index, components: list[str], largest: list[int]) -> str:
-    """Which component weighs most for which samples, in one sentence."""
+    """The largest component of each sample, in one sentence."""
     groups: dict[str, list[str]] = {}
     for sample, k in zip(samples, largest, strict=bool(components)):
         groups.setdefault(components[k], []).append(str(sample))
     clauses = [f"{component} for {joined(names)}" for component, names in groups.items()]
-    return f"What weighs most in the {regime} force: {'; '.join(clauses)}." if clauses else ""
+    return f"Largest contribution to the uncertainty of the {regime} force: {'; '.join(clauses)}." if clauses else ""
 
 
 def budget_origins(study: Study) -> list[tuple[str, str]]:
@@ -64,20 +64,21 @@ def budget_origins(study: Study) -> list[tuple[str, str]]:
         return []
     type_b = study.budget[study.budget["type"] == "B"]
     origins = type_b.groupby("component", sort=False)["origin"].unique()
-    return [(str(c), str(found[0]) if len(found) == 1 else "own to each sample") for c, found in origins.items()]
+    return [(str(c), str(found[0]) if len(found) == 1 else "differs between samples") for c, found in origins.items()]
 
 
 def paired_sentences(study: Study) -> list[str]:
-    """How far the forces of samples that were measured on the same specimens are apart, one sentence a pair."""
+    """Difference in force between samples measured on the same specimens, one sentence per pair."""
     if study.differences is None:
         return []
     return [_paired_sentence(row) for _, row in study.differences.iterrows() if row["number"] == "T_N"]
 
 
 def _paired_sentence(row: pd.Series) -> str:
-    pair = f"of {row['sample']} less that of {row['other']}, on the same {len(row['specimens'].split(';'))} specimens"
+    pair = f"{row['sample']} minus {row['other']}, measured on the same {len(row['specimens'].split(';'))} specimens"
     return (
-        f"{row['regime'].capitalize()} friction at {significant(row['pressure_Pa'] / PA_PER_KPA)} kPa {pair}: "
+        f"{row['regime'].capitalize()} friction at {significant(row['pressure_Pa'] / PA_PER_KPA)} kPa, {pair}: "
         f"{significant(row['difference'])} ± {significant(row['u'], 2)} N (95 %: {significant(row['low'])} to "
-        f"{significant(row['high'])} N). Specimens of their own would leave ± {significant(row['unpaired_u'], 2)} N."
+        f"{significant(row['high'])} N). With different specimens the uncertainty "
+        f"would be ± {significant(row['unpaired_u'], 2)} N."
     )

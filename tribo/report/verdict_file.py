@@ -1,4 +1,4 @@
-"""A diagnosis on paper: verdict.json, and the same verdict as a section of the page (schema tribo.verdict/1)."""
+"""verdict.json (schema tribo.verdict/1), and the same verdict as a section of the report."""
 
 from __future__ import annotations
 
@@ -8,14 +8,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from tribo.figures.covariates import LABELS
 from tribo.report.words.numerals import joined, significant
 from tribo.store.whole_files import write_text
 
+OBSERVABLES = {
+    "static": "static friction", "sliding": "sliding friction", "both": "static and sliding friction",
+    "drop": "drop from static to sliding friction",
+}  # fmt: skip
 OUTCOMES = {
     "no_misfit": "No misfit found.",
-    "named": "The cause is named.",
-    "undetermined": "Something is wrong, and several causes explain it about equally.",
-    "unknown": "Something is wrong, and no known mechanism explains it.",
+    "named": "The cause was identified.",
+    "undetermined": "The model does not fit the data, and several causes explain the misfit about equally well.",
+    "unknown": "The model does not fit the data, and no known mechanism explains the misfit.",
 }
 
 
@@ -25,7 +30,7 @@ def write_verdict(verdict: Mapping[str, Any], out: Path) -> Path:
 
 
 def verdict_in_words(verdict: Mapping[str, Any]) -> dict[str, Any]:
-    """What the page shows of a verdict: every part in words, empty where the verdict has none."""
+    """The parts of a verdict as text for the report; empty where the verdict has none."""
     return {
         "outcome": OUTCOMES.get(str(verdict["verdict"]), str(verdict["verdict"])),
         "text": str(verdict.get("text") or ""),
@@ -43,7 +48,7 @@ def _plain(mechanism: str) -> str:
 
 
 def _tie(names: list[str]) -> str:
-    return f"This campaign cannot tell {joined([_plain(n) for n in names])} apart."
+    return f"This campaign cannot distinguish between {joined([_plain(n) for n in names])}."
 
 
 def _cause(cause: Mapping[str, Any]) -> dict[str, Any]:
@@ -59,26 +64,26 @@ def _cause(cause: Mapping[str, Any]) -> dict[str, Any]:
 def _misfit(misfit: Mapping[str, Any]) -> dict[str, str]:
     p = _number(misfit["p_adjusted"])
     return {
-        "observable": _plain(misfit["observable"]),
+        "observable": OBSERVABLES.get(misfit["observable"], _plain(misfit["observable"])),
         "sample": str(misfit.get("sample") or "all"),
-        "covariate": _plain(str(misfit.get("covariate") or "–")),
+        "covariate": LABELS.get(str(misfit.get("covariate")), _plain(str(misfit.get("covariate") or "–"))),
         "p": "below 0.001" if p < 0.001 else f"{p:.3f}",
         "text": str(misfit.get("text") or ""),
     }
 
 
 def _gain(gain: Mapping[str, Any] | None) -> str:
-    """What the extended model gains on tests left out, in one sentence."""
+    """Improvement by the extended model on tests not used in the fit, in one sentence."""
     if not gain:
         return ""
     difference, se = _number(gain["difference"]), _number(gain["se"])
     before, after = _number(gain["rmse_percent_before"]), _number(gain["rmse_percent_after"])
     clear = abs(difference) > 2 * se
     return (
-        f"On data left out ({_plain(str(gain['held_out']))}), the extended model predicts "
-        f"{'better' if difference > 0 else 'worse'} by {significant(abs(difference))} ± {significant(se, 2)} in log "
-        f"score a test{'' if clear else ', which may be chance'}; its RMSE goes from {significant(before, 2)} to "
-        f"{significant(after, 2)} %."
+        f"For tests left out of the fit ({_plain(str(gain['held_out']))}), the extended model predicts "
+        f"{'better' if difference > 0 else 'worse'} by a log score of {significant(abs(difference))} ± "
+        f"{significant(se, 2)} per test{'' if clear else ', which may be due to chance'}; the RMSE changes from "
+        f"{significant(before, 2)} % to {significant(after, 2)} %."
     )
 
 

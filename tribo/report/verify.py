@@ -1,4 +1,4 @@
-"""Whether a study is still what it was: every input and output against the hash recorded when it was made."""
+"""Check every input and output file of a report against the hash recorded in provenance.json."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ KEPT = "kept"  # intermediate results, each checked against its own hash wheneve
 
 @dataclass(frozen=True)
 class Difference:
-    """One file that is not as it was recorded."""
+    """One file that differs from its record."""
 
     kind: Literal["input", "output"]
     status: Literal["changed", "missing", "added"]
@@ -26,7 +26,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Verification:
-    """What was compared, and every difference found."""
+    """What was compared, and all differences."""
 
     campaign: str
     n_inputs: int
@@ -43,9 +43,9 @@ class Verification:
     def in_words(self) -> str:
         compared = f"{self.n_inputs} inputs and {self.n_outputs} outputs compared with {FILE}"
         if self.unchanged:
-            return f"{compared}: nothing changed"
+            return f"{compared}: no changes"
         lines = [f"{d.status} {d.kind}: {d.file}" for d in self.differences]
-        return "\n".join([f"{compared}: {len(lines)} differ", *lines])
+        return "\n".join([f"{compared}: {len(lines)} difference{'s' if len(lines) > 1 else ''}", *lines])
 
 
 def verify(out: Path, campaign: Path | None = None) -> Verification:
@@ -54,7 +54,7 @@ def verify(out: Path, campaign: Path | None = None) -> Verification:
     Parameters
     ----------
     out : folder that a command wrote
-    campaign : folder or .zip of the campaign, where it is not where it was
+    campaign : folder or .zip of the campaign, if it has been moved
 
     Raises
     ------
@@ -63,8 +63,8 @@ def verify(out: Path, campaign: Path | None = None) -> Verification:
     """
     record = read_record(out)
     if record is None:
-        what = "no record of inputs and outputs"
-        raise CampaignError(Problem("no_provenance", what, file=str(out / FILE), allowed="a folder that tribo wrote"))
+        what = "this folder holds no record of inputs and outputs"
+        raise CampaignError(Problem("no_provenance", what, file=str(out / FILE), allowed="an output folder of tribo"))
     place = campaign or out / record["campaign"]
     recorded = dict(record["inputs"])
     found = dict(_input_hashes(place, recorded))

@@ -1,4 +1,4 @@
-"""Everything a study yields, written into one folder."""
+"""Write all results of a study into one folder."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ def write_until(
     provenance: Provenance | None = None,
     diagnosis: Diagnosis | None = None,
 ) -> None:
-    """Write what a walk as far as ``until`` (ingest, fit, compare or report) yields.
+    """Write the results of all stages up to ``until`` (ingest, fit, compare or report).
 
     Tables and campaign.nc always, as far as the study went; verdict.json and its figures where there is a
     ``diagnosis``; the figures of the study from ``compare`` on; then page, PDF and crate. Every file is whole or
     absent: it is written under a temporary name and renamed. Last comes provenance.json with the hash of each; files of
-    an earlier run that no longer hold are removed.
+    an earlier run that are no longer valid are removed.
     """
     before = read_record(out)
     made_by = provenance if provenance is not None else gather_provenance(study)

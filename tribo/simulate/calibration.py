@@ -16,7 +16,7 @@ Law = tuple[float, float]
 """mu and tau0 (Pa) of T = mu N + tau0 A."""
 
 WEIGHTS = ("ratio", "force", "relative")
-"""What scatters alike at all loads: T/N, T, or T over its own size."""
+"""Scatter assumed equal at all loads: that of T/N, of T, or of T in percent."""
 
 
 @lru_cache(maxsize=32)
@@ -34,7 +34,7 @@ def expected_minimum(n: int) -> float:
 def static_calibration(law: Law, blocks: int, spread: float = PAPER.mu_s_sd / PAPER.mu_s) -> tuple[float, float, float]:
     """Mean and standard deviation of mu_s, and the adhesion (Pa), for a flat sample of ``blocks`` blocks.
 
-    The flat sample lets go at its weakest block: mu = mean + sd E[min of n normals], tau0 = F_as / l2.
+    The flat sample starts to slide at its weakest block: mu = mean + sd E[min of n normals], tau0 = F_as / l2.
     """
     mu, tau0_Pa = law
     mean = mu / (1.0 + spread * expected_minimum(blocks))
@@ -55,8 +55,8 @@ def calibrate(
     """Local friction that gives the flat sample the laws ``static`` and ``sliding``, both (mu, tau0 in Pa).
 
     Static friction follows from the weakest block. Sliding friction is not that of the blocks, since they slip one
-    by one, so mu_d and F_ad are corrected by what the simulated flat sample misses, over the same random numbers
-    each time. Standard deviations scale with the means as in the paper (0.195 / 5.5 and 0.15 / 2.9).
+    by one; mu_d and F_ad are therefore corrected by the deviation of the simulated flat sample, with the same random
+    numbers each time. Standard deviations scale with the means as in the paper (0.195 / 5.5 and 0.15 / 2.9).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What one run of the spring-block model is made of, checked before anything is computed."""
+"""The configuration of one run of the spring-block model, checked before the run."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ PAPER = LocalFriction()
 
 @dataclass(frozen=True)
 class FrictionTerms:
-    """Local friction that changes during a run; amplitudes of zero, the default, leave the baseline as it is.
+    """Local friction that changes during a run; amplitudes of zero, the default, leave the baseline unchanged.
 
-    The laws stand in :mod:`tribo.simulate.friction`.
+    The laws are in :mod:`tribo.simulate.friction`.
 
     Parameters
     ----------
@@ -208,8 +208,8 @@ class SimConfig:
 
 def _unknown_sample(sample: str) -> Problem:
     return Problem(
-        "unknown_sample", "no such sample in the paper, and no pattern given", column="sample", found=sample,
-        allowed="F, A, B, C, Sx, Sy, or a pattern",
+        "unknown_sample", "not a sample of the paper, and no pattern is given", column="sample", found=sample,
+        allowed="F, A, B, C, Sx, Sy, or any name with a pattern",
     )  # fmt: skip
 
 
@@ -248,7 +248,7 @@ def _problems(config: SimConfig) -> Iterator[Problem]:
         yield from _geometry_problems(config)
     if not faulty & _OF_THE_STEP and config.dt_s > config.largest_dt_s:
         yield Problem(
-            "unstable_step", "the time step is beyond the stability limit", column="dt_s",
+            "unstable_step", "the time step exceeds the stability limit", column="dt_s",
             found=f"{config.dt_s:g}", allowed=f"at most {config.largest_dt_s:.3g} s for these springs and masses",
         )  # fmt: skip
     end = config.window_end_peaks
@@ -259,8 +259,8 @@ def _problems(config: SimConfig) -> Iterator[Problem]:
         )  # fmt: skip
     if config.rotation == "finite" and config.engine == "fast":
         yield Problem(
-            "unsupported", "forces that are not linear leave nothing to jump over", column="rotation",
-            found="finite", allowed="small, or engine dense or reference",
+            "unsupported", "the fast engine requires linear forces", column="rotation",
+            found="finite", allowed="rotation small, or engine dense or reference",
         )  # fmt: skip
 
 
@@ -276,7 +276,7 @@ def _term_problems(config: SimConfig) -> Iterator[Problem]:
             yield Problem("not_positive", "must be positive", column=field.name, found=f"{value:g}", allowed="> 0")
     if terms.active and config.engine == "reference":
         yield Problem(
-            "unsupported", "the reference engine knows the paper's friction only", column="engine",
+            "unsupported", "the reference engine supports only the friction law of the paper", column="engine",
             found="reference", allowed="fast or dense",
         )  # fmt: skip
 
@@ -295,13 +295,13 @@ def _number_problems(config: SimConfig) -> Iterator[Problem]:
             yield Problem("negative", "must not be negative", column=field.name, found=f"{value:g}", allowed=">= 0")
         if field.name in _ABOVE and not value > _ABOVE[field.name]:
             yield Problem(
-                "too_short", "must reach beyond the peak", column=field.name, found=f"{value:g}",
+                "too_short", "must extend beyond the peak", column=field.name, found=f"{value:g}",
                 allowed=f"> {_ABOVE[field.name]:g}",
             )  # fmt: skip
     if not (isinstance(config.seed, int) and config.seed >= 0):
         yield Problem("seed", "not a seed", column="seed", found=str(config.seed), allowed="a whole number >= 0")
     if not 0 < config.peak_drop < 1:
-        yield Problem("share", "not a share", column="peak_drop", found=f"{config.peak_drop:g}", allowed="0 to 1")
+        yield Problem("share", "not a fraction", column="peak_drop", found=f"{config.peak_drop:g}", allowed="0 to 1")
 
 
 def _choice_problems(config: SimConfig) -> Iterator[Problem]:
@@ -309,7 +309,7 @@ def _choice_problems(config: SimConfig) -> Iterator[Problem]:
         value = getattr(config, name)
         if value not in allowed:
             yield Problem(
-                "unknown_choice", f"no such {name}", column=name, found=str(value), allowed=" or ".join(allowed)
+                "unknown_choice", f"unknown {name}", column=name, found=str(value), allowed=" or ".join(allowed)
             )
 
 
@@ -326,7 +326,7 @@ def _geometry_problems(config: SimConfig) -> Iterator[Problem]:
     nx, ny = config.blocks
     if not (isinstance(nx, int) and isinstance(ny, int) and min(nx, ny) >= 3):
         yield Problem(
-            "too_small", "too few blocks for a lattice", column="blocks", found=f"{nx} x {ny}", allowed="3 x 3 or more"
+            "too_small", "too few blocks", column="blocks", found=f"{nx} x {ny}", allowed="3 x 3 or more"
         )
         return
     pattern = config.pattern or pattern_of(config.sample)
@@ -336,23 +336,23 @@ def _geometry_problems(config: SimConfig) -> Iterator[Problem]:
     if pattern.cavity == "none":
         return
     if pattern.size_m is None or pattern.pitch_m is None:
-        yield Problem("no_geometry", "cavities without size or pitch", column="pattern", found=pattern.name)
+        yield Problem("no_geometry", "size or pitch of the cavities is missing", column="pattern", found=pattern.name)
         return
     domain = (nx * config.spacing_m, ny * config.spacing_m)
     for axis, size, pitch, width in zip("xy", pattern.size_m, pattern.pitch_m, domain, strict=True):
         if not (0 < size < pitch):
             yield Problem(
-                "impossible_geometry", f"cavities do not fit their pitch along {axis}", column="pattern",
+                "impossible_geometry", f"the cavities are too large for their pitch along {axis}", column="pattern",
                 found=f"{size * 1e6:g} um in {pitch * 1e6:g} um", allowed="0 < size < pitch",
             )  # fmt: skip
         elif size < 0.5 * config.spacing_m:
             yield Problem(
-                "too_coarse", f"cavities are smaller than half a block along {axis}", column="spacing_m",
+                "too_coarse", f"the cavities are smaller than half a block along {axis}", column="spacing_m",
                 found=f"{config.spacing_m * 1e6:g} um", allowed=f"at most {size * 1e6:g} um",
             )  # fmt: skip
         elif size >= width:
             yield Problem(
-                "too_small", f"no whole cavity fits the domain along {axis}", column="blocks",
+                "too_small", f"the domain is smaller than one cavity along {axis}", column="blocks",
                 found=f"{width * 1e6:g} um", allowed=f"more than {size * 1e6:g} um",
             )  # fmt: skip
     if config.edges == "periodic":

@@ -44,7 +44,7 @@ PAIRS = {"blocks", "pattern_first"}  # two numbers are one value
 
 
 class DesignTable(BaseModel):
-    """The keys of a design; what they allow stands in their descriptions."""
+    """The keys of a design; their descriptions state the allowed values."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -62,7 +62,7 @@ class DesignTable(BaseModel):
     @classmethod
     def _known_rule(cls, angles: list[float] | str) -> list[float] | str:
         if angles not in ("midpoints", "random") and (isinstance(angles, str) or not angles):
-            raise ValueError("no such rule")
+            raise ValueError("unknown rule for the angles")
         return angles
 
 
@@ -82,7 +82,7 @@ def read_design(path: str | Path, seed: int = 0) -> list[SimConfig]:
         kind = "JSON" if path.suffix.lower() == ".json" else "TOML"
         raise SimulationError(Problem("unreadable", f"cannot be read as {kind}: {why}", file=str(path))) from why
     if not isinstance(table, dict):
-        raise SimulationError(Problem("wrong_value", "a design is a table", file=str(path), found=type(table).__name__))
+        raise SimulationError(Problem("wrong_value", "must be a table", file=str(path), found=type(table).__name__))
     return runs_of_design({"seed": seed, **table}, file=str(path))
 
 
@@ -200,9 +200,9 @@ def _problem(error: Any) -> Problem:
     key, keys = str(error["loc"][0]), list(DesignTable.model_fields)
     column = ".".join(str(part) for part in error["loc"] if not str(part).startswith(("list[", "str")))
     if error["type"] == "missing":
-        return Problem("missing_key", "this key is required", column=column)
+        return Problem("missing_key", "this required key is missing", column=column)
     if error["type"] == "extra_forbidden" and key not in keys:
-        return Problem("unknown_key", "no such key", column=key, found=key, allowed=_nearest(key, keys))
+        return Problem("unknown_key", "unknown key", column=key, found=key, allowed=_nearest(key, keys))
     allowed = DesignTable.model_fields[key].description
     what = error["msg"].removeprefix("Value error, ")
     what = what[:1].lower() + what[1:]
@@ -228,7 +228,7 @@ def _axes(parameters: Mapping[str, Any], problems: list[Problem]) -> dict[str, l
     for name, given in parameters.items():
         if name not in types:
             problems.append(
-                Problem("unknown_key", "no such parameter", column=f"parameters.{name}", found=name,
+                Problem("unknown_key", "unknown parameter", column=f"parameters.{name}", found=name,
                         allowed=_nearest(name, list(types)))
             )  # fmt: skip
             continue
@@ -245,7 +245,7 @@ def _values(name: str, given: Any, hint: Any, problems: list[Problem]) -> Iterat
             yield TypeAdapter(hint).validate_python(value)
         except ValidationError as why:
             expected = why.errors()[0]["msg"].removeprefix("Input should be ")
-            problems.append(Problem("wrong_value", "wrong kind of value", column=f"parameters.{name}",
+            problems.append(Problem("wrong_value", "wrong type of value", column=f"parameters.{name}",
                                     found=str(value), allowed=expected))  # fmt: skip
 
 

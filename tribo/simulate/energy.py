@@ -1,4 +1,4 @@
-"""Where the work of the slider goes: springs, motion, friction and viscous damping."""
+"""Energy balance: work of the slider, elastic and kinetic energy, friction and viscous damping."""
 
 from __future__ import annotations
 

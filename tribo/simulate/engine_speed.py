@@ -1,4 +1,4 @@
-"""How fast the engines are, as ratios measured within one process: nothing here depends on the machine's clock rate."""
+"""Speed of the engines as ratios measured within one process, independent of the clock rate of the machine."""
 
 from __future__ import annotations
 

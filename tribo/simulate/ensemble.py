@@ -1,4 +1,4 @@
-"""Many runs: a design of samples, pressures and stratified angles, and threads that work it off."""
+"""Ensembles: a design of samples, pressures and stratified angles, run on several threads."""
 
 from __future__ import annotations
 
@@ -55,9 +55,9 @@ def stratified_design(
 ) -> list[SimConfig]:
     """Configurations of an ensemble: every sample at every pressure, ``repeats`` times.
 
-    The angle range of a sample is cut into as many strata as there are repeats. One angle stands in each: its
-    middle, which averages the uniform law of the paper best, or a random one. Angles given in degrees are each
-    pulled ``repeats`` times instead.
+    The angle range of a sample is cut into as many strata as there are repeats. Each stratum has one angle: its
+    midpoint, which gives the best average over the uniform distribution of the paper, or a random one. If angles are
+    given in degrees, each is simulated ``repeats`` times instead.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def _angles_deg(
 
 
 def run_row(run: Run) -> dict[str, Any]:
-    """What the table of an ensemble keeps of a run."""
+    """The row of a run in the table of an ensemble."""
     return {
         "sample": run.sample,
         "pressure_Pa": run.pressure_Pa,
@@ -125,7 +125,7 @@ def check_all(configs: Iterable[SimConfig]) -> None:
 def run_ensemble(
     design: Sequence[SimConfig], jobs: int = 2, progress: Progress | None = None
 ) -> pd.DataFrame:
-    """Run a list of configurations on ``jobs`` threads; one row a run, in the order of the list.
+    """Run a list of configurations on ``jobs`` threads; one row per run, in the order of the list.
 
     The rows do not depend on the number of threads. ``progress(done, total)`` is called after each run.
 

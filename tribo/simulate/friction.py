@@ -1,10 +1,10 @@
 """Terms of the local friction law that act while a run goes on, each a function of its own.
 
-A term takes the threshold so far and gives it back changed; with its amplitude at zero it gives back the same bits.
-:func:`static_threshold` and :func:`sliding_threshold` chain them and are all the loops know of friction. A new term
+A term takes a threshold and returns the changed one; with an amplitude of zero it returns the identical number.
+:func:`static_threshold` and :func:`sliding_threshold` combine the terms; the loops call only these two. A new term
 is its function, its parameters in :class:`tribo.simulate.config.FrictionTerms` and in :func:`packed`, and its place in
-a chain. What only depends on where a block is (its pressure, the cavities beside it) needs no term: it goes into
-the thresholds of the blocks.
+a chain. What depends only on the position of a block (its pressure, neighbouring cavities) needs no term: it is part
+of the thresholds of the blocks.
 """
 
 from __future__ import annotations

@@ -93,7 +93,7 @@ def write_run(run: Run, path: str | Path) -> Path:
 
 
 def write_ensemble(table: pd.DataFrame, path: str | Path, parameters: Mapping[str, Any] | None = None) -> Path:
-    """Write the table of an ensemble: one variable a column, one entry a run."""
+    """Write the table of an ensemble: one variable per column, one entry per run."""
     import xarray as xr
 
     dataset = xr.Dataset(

@@ -1,4 +1,4 @@
-"""An ensemble that lands run by run in one HDF5 file and goes on where it was stopped.
+"""An ensemble stored run by run in one HDF5 file, continued where it was stopped.
 
 The file is made whole before the first run: the design, and for every result a column without values yet.
 A finished run then overwrites its own numbers at their known place in the file, its mark last. HDF5 itself never
@@ -67,7 +67,7 @@ def run_stored(
     progress: Progress | None = None,
     work: Work = FRICTION,
 ) -> pd.DataFrame:
-    """Run what ``path`` does not hold yet of a design, and return all of it.
+    """Compute the runs of a design that ``path`` does not hold yet, and return all of them.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def _create(design: Sequence[SimConfig], path: Path, work: Work) -> None:
 
     def write(target: Path) -> None:
         with h5py.File(target, "w") as file:
-            file.attrs["title"] = "an ensemble of the spring-block model, one entry a run"
+            file.attrs["title"] = "an ensemble of the spring-block model, one entry per run"
             file.attrs["design"] = fingerprint(design, work)
             file.attrs["columns"] = list(columns)
             for name, value in (attributes(_shared_parameters(design)) | versions()).items():
@@ -189,7 +189,7 @@ def _refuse_other_design(design: Sequence[SimConfig], path: Path, work: Work) ->
     if known != fingerprint(design, work):
         raise SimulationError(
             Problem(
-                "other_design", "holds an ensemble of another design", file=str(path), allowed="a new file, or the same"
+                "other_design", "it holds runs of a different design", file=str(path), allowed="a new file, or the same"
             )
         )
 
@@ -259,7 +259,7 @@ def _client(scheduler: str) -> Iterator[tuple[Any, Any]]:
     except ImportError as why:
         raise SimulationError(
             Problem(
-                "missing_package", "a scheduler needs dask.distributed", column="scheduler", found=scheduler,
+                "missing_package", "a scheduler requires dask.distributed", column="scheduler", found=scheduler,
                 allowed="pip install distributed, or no scheduler",
             )
         ) from why
@@ -268,8 +268,8 @@ def _client(scheduler: str) -> Iterator[tuple[Any, Any]]:
     except (OSError, ValueError) as why:
         raise SimulationError(
             Problem(
-                "no_scheduler", f"no dask scheduler answers: {why}", column="scheduler", found=scheduler,
-                allowed="the address a running dask scheduler prints, such as tcp://HOST:8786",
+                "no_scheduler", f"no dask scheduler answers here: {why}", column="scheduler", found=scheduler,
+                allowed="the address printed by a running dask scheduler, such as tcp://HOST:8786",
             )
         ) from why
     with client:

@@ -12,7 +12,7 @@ from tribo.simulate.engines.reference import run_reference
 
 
 def simulate(config: SimConfig) -> Run:
-    """Pull one sample at one load and read static and sliding friction off the slider force.
+    """Simulate one pull of one sample at one load; static and sliding friction follow from the slider force.
 
     Static friction is T/N at the peak, sliding friction the mean of T/N over the window of the configuration,
     by default from 1.05 times the peak time to the end. N is the nominal load p l2 Nx Ny.

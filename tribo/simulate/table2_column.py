@@ -1,4 +1,4 @@
-"""The numerical column of the paper's Table 2, computed anew and set beside the printed one."""
+"""The simulated column of Table 2 of the paper, recomputed and compared with the printed one."""
 
 from __future__ import annotations
 
@@ -108,9 +108,9 @@ def resampled_laws(
 
 
 def beside(table: pd.DataFrame, published: pd.DataFrame) -> pd.DataFrame:
-    """A fitted table with the published simulation beside it and the deviation of each number in percent.
+    """A fitted table with the published simulation and the deviation of each number in percent.
 
-    ``friction_deviation_percent`` compares T/N at 10 kPa, since mu and tau0 trade off.
+    ``friction_deviation_percent`` compares T/N at 10 kPa, since mu and tau0 are correlated.
     """
     paper = published.loc[published["source"] == "simulation", ["sample", "regime", "mu", "tau0_kPa"]]
     both = table.merge(paper, on=["sample", "regime"], how="left", suffixes=("", "_paper"))
@@ -129,7 +129,7 @@ def distance(table: pd.DataFrame) -> dict[str, float]:
 
 
 def table2_text(table: pd.DataFrame) -> str:
-    """The computed column beside the printed one, a line a sample and regime, each number with its deviation."""
+    """The computed and the printed column, one line per sample and regime, with deviations."""
     head = f"{'':<12}{'mu':>17}{'paper':>8}{'dev. %':>8}{'tau0 / kPa':>17}{'paper':>8}{'dev. %':>8}{'at 10 kPa %':>13}"
     lines = [
         f"{r.sample:<3}{r.regime:<9}{r.mu:>8.3f} +- {r.mu_se:.3f}{r.mu_paper:>8.3f}{r.mu_deviation_percent:>+8.1f}"
@@ -146,7 +146,7 @@ def table2_text(table: pd.DataFrame) -> str:
 
 
 def described(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame, str]:
-    """Means at every pressure, laws where a sample has several pressures, and both in words."""
+    """Means at every pressure, laws of samples with several pressures, and both as text."""
     import pandas as pd
 
     by = ["sample", *varied_columns(runs)]

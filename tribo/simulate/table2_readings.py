@@ -1,4 +1,4 @@
-"""What the choices that the paper's text leaves open do to its Table 2.
+"""Effect on Table 2 of the choices that the text of the paper leaves open.
 
 Some choices change the runs; each is a :class:`Variant`. Others only change what is read off a run and how it is
 fitted: which peak is static friction, which stretch is sliding, how the loads are weighted. Those are read off every
@@ -125,7 +125,7 @@ def run_study(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> dict[str, pd.DataFrame]:
-    """The runs of every variant with all their readings, one store a variant in ``folder``; a stopped study goes on."""
+    """The runs of every variant with all readings, one store per variant in ``folder``; a stopped study continues."""
     total, before, tables = sum(map(len, designs.values())), 0, {}
     for k, (name, design) in enumerate(designs.items()):
 

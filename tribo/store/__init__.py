@@ -1,1 +1,1 @@
-"""Results kept between starts, files written whole, and locks."""
+"""Results kept between starts, files written as a whole, and locks."""

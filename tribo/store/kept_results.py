@@ -1,9 +1,9 @@
 """Results of costly steps, kept beside the outputs with a hash of everything they were made from.
 
-A step asks for its result by name and says what it is made from; where the file holds exactly that, it is read,
-else the result is made and written. The hash covers the values that went in, the sources of the packages that
-compute, and the versions of the libraries under them, so that an edit or an upgrade never answers with an old
-result. The files are JSON: deleting one, or the folder, costs time and nothing else.
+A step asks for its result by name and gives everything the result is made from. If the file was made from exactly
+that, it is read; otherwise the result is computed and written. The hash covers the input values, the sources of the
+packages that compute and the versions of the libraries they use, so that no outdated result is returned after an edit
+or an upgrade. The files are JSON: deleting one, or the folder, costs time and nothing else.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from types import FunctionType
 from typing import Any, TypeVar, cast
 
 import numpy as np
+
+from tribo.published import PATTERN_SHARES, data_dir
 
 T = TypeVar("T")
 LIBRARIES = ("numpy", "scipy", "pandas", "statsmodels", "numba", "odrpack")
@@ -63,7 +65,7 @@ class Shelf:
 
 
 def _read(path: Path) -> dict[str, Any] | None:
-    """What a kept file says; None where there is none or it is damaged."""
+    """The contents of a kept file; None if there is none or it is damaged."""
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -86,10 +88,13 @@ def sources(*rooms: str) -> str:
 
 @lru_cache(maxsize=1)
 def package_sources() -> str:
-    """SHA-256 over every file of the package, templates and style sheets included, and the library versions."""
+    """SHA-256 over every file of the package, templates and style sheets included, the bundled table of pattern shares,
+    and the library versions."""
     digest = hashlib.sha256(sources().encode())
     for file in sorted(p for p in _PACKAGE.rglob("*") if p.is_file() and "__pycache__" not in p.parts):
         digest.update(f"{file.relative_to(_PACKAGE)}\0".encode() + file.read_bytes())
+    for file in sorted((data_dir() / PATTERN_SHARES).glob("*.csv")):
+        digest.update(f"{file.name}\0".encode() + file.read_bytes())
     return digest.hexdigest()
 
 

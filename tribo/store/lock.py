@@ -51,5 +51,5 @@ def only_build(state: Path, wait_s: float = 0.0) -> Iterator[int]:
 
 def _busy(path: Path) -> Problem:
     holder = path.read_text(encoding="utf-8") or "unknown"
-    what = "another build of this site is running; this one leaves (--wait SECONDS waits for it)"
+    what = "another build of this site is running; this one stops (use --wait SECONDS to wait for the other one)"
     return Problem("busy", what, file=str(path.parent.parent), found=holder)

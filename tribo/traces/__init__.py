@@ -1,4 +1,4 @@
-"""Traces to pulls: zero, onset, static peak, sliding window, by named rules.
+"""From traces to pulls: zero, onset, static peak and sliding window, by named rules.
 
 The stub beside this file lists the public names; each is imported on first use.
 """

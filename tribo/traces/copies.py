@@ -17,10 +17,10 @@ _WORD = re.compile(r"[\w.+-]+")
 
 
 def under_the_wrong_test(traces: Mapping[str, Trace], test_ids: Collection[str]) -> dict[str, Problem]:
-    """What is wrong with each test whose trace is that of another one; ``test_ids`` are all of the campaign.
+    """The problem of each test whose trace belongs to another one; ``test_ids`` are all tests of the campaign.
 
     ``other_test``: its header names another test, where the headers of a campaign name their own. ``same_numbers``: its
-    samples are those of another test, and no header tells whose they are: then none of them can be trusted.
+    data are those of another test, and no header states to which test they belong; then none of them is used.
     """
     named = {test_id: _words(trace) & set(test_ids) for test_id, trace in traces.items()}
     own = [test_id for test_id, words in named.items() if test_id in words]
@@ -51,11 +51,11 @@ def _same_samples(traces: Mapping[str, Trace]) -> list[list[str]]:
 
 
 def _other_test(test_id: str, trace: Trace, words: Collection[str]) -> Problem:
-    what = "the header of this export names another test"
+    what = "the header of this export names a different test"
     return Problem("other_test", what, trace.file, found=", ".join(sorted(words)), allowed=test_id, test_id=test_id)
 
 
 def _same_numbers(test_id: str, trace: Trace, group: Collection[str]) -> Problem:
     others = ", ".join(other for other in group if other != test_id)
-    what = f"the same numbers as {others}, sample by sample; whose they are cannot be told, and none is used"
-    return Problem("same_numbers", what, trace.file, allowed="one measurement a test", test_id=test_id)
+    what = f"the data are identical to those of {others}; the correct test is not known, so none of them is used"
+    return Problem("same_numbers", what, trace.file, allowed="one measurement per test", test_id=test_id)

@@ -1,4 +1,4 @@
-"""Stick-slip followed cycle by cycle: what each stick reached, what each slip left, how fast the spring loaded."""
+"""Stick-slip cycle by cycle: force at the end of each stick and each slip, and the loading rate."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def stick_slip_cycles(trace: Trace, *, smallest_drop: float = 0.05) -> StickSlip
     """Find every stick and slip of a trace.
 
     A peak is a stick if the force falls after it by at least ``smallest_drop`` times the range of the force (from its
-    1st to its 99th percentile). Impulses are taken out by a median filter; a first search gives the length of a cycle,
+    1st to its 99th percentile). Spikes are removed by a median filter; a first search gives the length of a cycle,
     the second works on averages over a fiftieth of it.
 
     Raises
@@ -70,7 +70,7 @@ def stick_slip_cycles(trace: Trace, *, smallest_drop: float = 0.05) -> StickSlip
         time, force = condense(time, average), _without_impulses(condense(trace.force_N, average))
         peaks = _peaks(force, drop)
     if peaks.size < _FEWEST:
-        what = f"the force shows fewer than {_FEWEST} sticks with a slip of {drop:.3g} N or more"
+        what = f"the force shows fewer than {_FEWEST} stick-slip cycles with a force drop of {drop:.3g} N or more"
         raise TraceError(Problem("no_stick_slip", what, trace.file or None, found=str(peaks.size)))
     troughs = np.array([a + int(np.argmin(force[a:b])) for a, b in pairwise(peaks)])
     slopes = [_loading_slope(time, force, a, b) for a, b in zip(troughs, peaks[1:], strict=True)]

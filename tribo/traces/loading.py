@@ -124,10 +124,10 @@ def _no_pull(signal: Signal, start: float, rise: Rise | None) -> list[Problem]:
     smooth, file = signal.smooth_N, signal.file or None
     down, up = start - float(smooth.min()), float(smooth.max()) - start
     if down > 3.0 * up and down > _DETECTABLE * signal.noise_N:
-        what = "the force runs against the pull"
+        what = "the force acts against the pull direction; its sign may be reversed"
         return [Problem("sign_flipped", what, file, None, "force", f"{smooth.min():.6g} N")]
     if rise is None:
-        what = "the record ends before the force has risen to a peak"
+        what = "the record ends before the static peak"
         end = f"{signal.time_s[-1]:.6g} s, {smooth[-1]:.6g} N"
         return [Problem("stopped_before_peak", what, file, None, "force", end)]
     return []

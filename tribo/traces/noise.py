@@ -32,7 +32,7 @@ def sample_noise(values: FloatArray) -> float:
 
 
 def noise_of(force: FloatArray) -> float:
-    """Sample noise, or a sliver of the range where the trace has none, so that it can stand in a denominator."""
+    """Sample noise, or a small fraction of the range if the trace has none, so that it can be a denominator."""
     return max(sample_noise(force), 1e-6 * float(np.ptp(force)))
 
 
@@ -80,7 +80,7 @@ def running_mean(values: FloatArray, width: int) -> FloatArray:
 
 @dataclass(frozen=True)
 class Wander:
-    """How a steady signal departs from its mean.
+    """Deviations of a steady signal from its mean.
 
     ``mean_u`` is the standard uncertainty of the mean from correlated but stationary noise, ``rate`` the
     variance a random walk gathers per second (unit of the signal squared, per second), ``noise`` that of
@@ -97,9 +97,9 @@ def wander(values: FloatArray, duration_s: float) -> Wander:
 
     The mean squared difference of block means h blocks apart is 2 s^2 + q (h - 1/3) t_block for noise of
     block variance s^2 on top of a random walk of variance rate q (the 1/3 is what averaging within blocks
-    takes off). A straight line through the variogram at lags of 1 to a quarter of the blocks gives both. So
-    few blocks leave the slope uncertain: the rate returned lies half-way between the slope's expectation and
-    a walk that explains all the variance that white noise leaves, never a lucky zero.
+    takes off). A straight line through the variogram at lags of 1 to a quarter of the blocks gives both. With
+    so few blocks the slope is uncertain: the rate returned is half-way between the expectation of the slope and a walk
+    that explains all the variance not due to white noise, so that it is never zero by chance.
     """
     noise = sample_noise(values)
     means = block_means(values)

@@ -30,18 +30,18 @@ def read_pull(
     peak_s: float | None = None,
     window_s: tuple[float, float] | None = None,
 ) -> Pull:
-    """Read static and sliding friction off one trace.
+    """Determine static and sliding friction from one trace.
 
     ``rule`` names an entry of ``RULES``; ``parameters`` replace its own (``length_m``, ``skip_m``,
     ``share``, ``start_s``). ``test`` gives the pull its id and, where the trace has no displacement, its speed.
     ``zero`` is the zero of the force with its standard uncertainty (N) where it is known otherwise than from the
     force before contact, such as from the asymmetry of strokes. ``peak_s`` and ``window_s``, on the clock of the
-    trace, are a static peak and a sliding window that a person chose: the peak is then looked for within two samples
-    of ``peak_s``, and the flags say what was chosen by hand.
+    trace, are a static peak and a sliding window chosen by hand: the peak is then searched for within two data points
+    of ``peak_s``, and the flags state what was chosen by hand.
 
-    The standard uncertainties hold the scatter of the reading (correlation counted), that of the zero, how far
-    a slow wander of the size seen while sliding may have carried the signal since the zero was last seen, and
-    for the static peak how much lower a rounded top would lie that the samples cannot tell from a sharp one.
+    The standard uncertainties include the scatter of the signal (with its correlation), that of the zero, and the drift
+    of the signal since the zero was measured, estimated from the drift while sliding. That of the static peak also
+    includes the difference between a sharp peak and a rounded one that the data do not exclude.
 
     Raises
     ------
@@ -73,13 +73,13 @@ def read_pull(
 
 def _rule(name: str, parameters: Mapping[str, float] | None) -> Rule:
     if name not in RULES:
-        raise TraceError(Problem("unknown_rule", "no such rule", found=name, allowed=", ".join(RULES)))
+        raise TraceError(Problem("unknown_rule", "unknown rule", found=name, allowed=", ".join(RULES)))
     rule = RULES[name]
     if not parameters:
         return rule
     if unknown := sorted(set(parameters) - set(rule.parameters)):
         allowed = ", ".join(rule.parameters) or "none"
-        raise TraceError(Problem("unknown_parameter", f"not of rule {name}", found=", ".join(unknown), allowed=allowed))
+        raise TraceError(Problem("unknown_parameter", f"not in rule {name}", found=", ".join(unknown), allowed=allowed))
     return replace(rule, parameters={**rule.parameters, **parameters})
 
 

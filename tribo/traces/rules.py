@@ -1,4 +1,4 @@
-"""Named rules by which static and sliding friction are read off a pull, as a plain table."""
+"""Named rules that determine static and sliding friction of a pull, as a plain table."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Parameters = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Rule:
-    """A rule: what it takes as static and as sliding friction, in words and as functions, and where it stands.
+    """A rule: how it defines static and sliding friction, as text and as functions, and its source.
 
     ``static(motion, parameters)`` returns the peak, ``sliding(motion, parameters)`` the range of samples to
     average. Lengths are in metres, shares dimensionless.
@@ -90,7 +90,7 @@ def last_share(motion: Motion, parameters: Parameters) -> Window:
 def _after(motion: Motion, length_m: float, since_s: float) -> int:
     """Index of the first sample ``length_m`` of travel after the time ``since_s``."""
     if motion.travel_m is None:
-        what = "this rule counts travel, and neither a displacement nor a speed is known"
+        what = "this rule needs the travel, but neither displacement nor speed is known"
         raise TraceError(Problem("no_displacement", what, allowed="a displacement column, or speed_mm_s in tests.csv"))
     start = float(np.interp(since_s, motion.time_s, motion.travel_m))
     beyond = motion.travel_m >= start + length_m
@@ -103,7 +103,7 @@ RULES: dict[str, Rule] = {
         Rule(
             "seed",
             "first maximum of the force",
-            "mean from when the force has stabilised (MSER-5) to the end of sliding",
+            "mean from the time the force has stabilised (MSER-5) to the end of sliding",
             "Berardo et al. 2019, Materials & Design 107930; stabilised: White 1997, Simulation 69, 323",
             first_peak,
             once_stabilised,
@@ -112,7 +112,7 @@ RULES: dict[str, Rule] = {
             "astm_d1894",
             "initial maximum of the force",
             "mean during uniform sliding, up to 130 mm of travel",
-            "ASTM D1894 (the travel recalled, not checked against the standard)",
+            "ASTM D1894 (travel cited from memory, not checked against the standard)",
             first_peak,
             stabilised_length,
             {"length_m": 0.130},
@@ -120,8 +120,8 @@ RULES: dict[str, Rule] = {
         Rule(
             "iso_8295",
             "maximum at the start of motion",
-            "mean over the first 60 mm, the static peak and what follows until it has stabilised left out",
-            "ISO 8295 (the travel recalled, not checked against the standard)",
+            "mean over the first 60 mm, without the static peak and the transient after it",
+            "ISO 8295 (travel cited from memory, not checked against the standard)",
             first_peak,
             stabilised_length,
             {"length_m": 0.060},
@@ -148,7 +148,7 @@ RULES: dict[str, Rule] = {
             "last_share",
             "highest force in the first minute",
             "mean over the last share of the record",
-            "common practice on rotary rigs, where the force runs in for long",
+            "common practice on rotary rigs with a long run-in",
             highest_early,
             last_share,
             {"start_s": 60.0, "share": 0.5},

@@ -1,4 +1,4 @@
-"""One record of many pulls: strokes in both directions, steps of load or speed, cut and brought to one sign."""
+"""Records of several pulls: strokes in both directions, steps of load or speed; split and brought to one sign."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ _MIDDLE = (0.3, 0.7)  # share of a stroke in which its force is taken to tell it
 
 @dataclass(frozen=True)
 class Strokes:
-    """Strokes of one zero: each trace turned so that friction is positive and the zero is taken out.
+    """Strokes with a common zero: each trace has positive friction and its zero subtracted.
 
-    ``zero_N`` is the offset their asymmetry gives: half the sum of the force in the two directions (with standard
-    uncertainty); NaN where all strokes run one way, and nothing is taken out. ``directions`` are +1 and -1 by the
-    sign the force had.
+    ``zero_N`` is the offset determined from their asymmetry: half the sum of the force in the two directions, with its
+    standard uncertainty; NaN where all strokes have the same direction; then nothing is subtracted.
+    ``directions`` are +1 and -1, the sign of the recorded force.
     """
 
     traces: tuple[Trace, ...]
@@ -38,11 +38,11 @@ class Strokes:
 
 
 def split_pulls(trace: Trace) -> tuple[Trace, ...]:
-    """Cut a record where a new pull begins: at a reversal of the force, a step of the load, a step of the speed.
+    """Split a record where a new pull begins: at a reversal of the force, a step of the load, a step of the speed.
 
-    Load and speed are looked up in ``columns`` ("normal_force_N", "speed_m_s"). The passage from one steady load or
-    speed to the next belongs to no pull. A start from rest is no step: what stands before it is the pull's zero. A
-    record without any of these comes back alone. Pieces are named ``name/1``, ``name/2``; those under twenty samples or
+    Load and speed are taken from ``columns`` ("normal_force_N", "speed_m_s"). The transition from one steady load or
+    speed to the next belongs to no pull. A start from rest is not a step: the data before it give the zero. A record
+    without any of these is returned unchanged. Pieces are named ``name/1``, ``name/2``; those under twenty samples or
     a fifth of the median are left out.
     """
     cuts = [(k, k) for k in reversals(trace.force_N)]
@@ -149,10 +149,10 @@ def _cut(jump: FloatArray, start: int, end: int) -> tuple[int, int]:
 
 
 def orient_strokes(strokes: Sequence[Trace]) -> Strokes:
-    """Turn strokes of both directions into pulls of one sign, their common zero taken out.
+    """Convert strokes in both directions to pulls of one sign and subtract their common zero.
 
-    The force of a stroke is its mean over the middle (30 to 70 %); a direction is which side of the middle between
-    the extremes it lies on. Friction is alike both ways, so the zero is half the sum of the two directions.
+    The force of a stroke is its mean over the middle (30 to 70 %); its direction is the side of the midpoint
+    of all strokes on which it lies. Friction is assumed equal in both directions, so the zero is half the sum.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def orient_strokes(strokes: Sequence[Trace]) -> Strokes:
         ``no_strokes``: nothing is given.
     """
     if not strokes:
-        raise TraceError(Problem("no_strokes", "no stroke is given"))
+        raise TraceError(Problem("no_strokes", "no strokes are given"))
     middles = [_middle(stroke) for stroke in strokes]
     forces = np.array([float(f.mean()) for f in middles])
     u = np.array([wander(f, 1.0).mean_u for f in middles])

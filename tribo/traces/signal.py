@@ -1,4 +1,4 @@
-"""The signal of a trace: what cannot be read refused, impulses taken out, its noise known."""
+"""The signal of a trace, checked before friction is determined: faults, spikes, noise."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def signal_of(trace: Trace) -> Signal:
 
 
 def file_row(trace: Trace, index: int) -> int:
-    """Line of the export (from 1) that sample ``index`` stands on, as far as the reader said."""
+    """Line of the export (from 1) that sample ``index`` stands on, if the reader recorded it."""
     return trace.first_row + index
 
 
@@ -81,8 +81,8 @@ def unreadable(trace: Trace) -> list[Problem]:
     """Faults that leave no signal to read: too few samples, gaps, numbers that are none, time running back."""
     n = trace.force_N.size
     if n < MINIMUM_SAMPLES:
-        what = f"a pull of {n} samples cannot be read"
-        return [Problem("too_short", what, trace.file, found=str(n), allowed=f"{MINIMUM_SAMPLES} or more")]
+        what = f"a pull of {n} data points is too short"
+        return [Problem("too_short", what, trace.file, found=str(n), allowed=f"{MINIMUM_SAMPLES} data points or more")]
     problems = []
     for name, values in (("time", trace.time_s), ("force", trace.force_N)):
         if not np.isfinite(values).all():
@@ -94,7 +94,7 @@ def unreadable(trace: Trace) -> list[Problem]:
     if back.any():
         at = int(np.argmax(back)) + 1
         found = f"{trace.time_s[at]:g} s after {trace.time_s[at - 1]:g} s"
-        problems.append(Problem("time_goes_back", "the time runs back", trace.file, file_row(trace, at), "time", found))
+        problems.append(Problem("time_goes_back", "the time decreases", trace.file, file_row(trace, at), "time", found))
     if not problems and trace.time_s[0] == trace.time_s[-1]:
         problems.append(Problem("time_stands_still", "all times are the same", trace.file or None, column="time"))
     return problems
@@ -154,7 +154,7 @@ def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ..
     problems = [
         Problem(
             "spike",
-            f"an impulse at {trace.time_s[k]:.6g} s; the sample is left out",
+            f"a spike at {trace.time_s[k]:.6g} s; this data point is left out",
             trace.file or None,
             file_row(trace, int(k)),
             "force",
@@ -163,7 +163,7 @@ def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ..
         for k in at[:_MOST_LISTED]
     ]
     if at.size > _MOST_LISTED:
-        what = f"{at.size - _MOST_LISTED} more impulses; the samples are left out"
+        what = f"{at.size - _MOST_LISTED} more spikes; these data points are left out"
         problems.append(Problem("spike", what, trace.file or None, file_row(trace, int(at[_MOST_LISTED])), "force"))
     return tuple(problems)
 
@@ -183,10 +183,11 @@ def recorder_fault(trace: Trace, force: FloatArray) -> Problem | None:
     """
     if clipped := flat_top(force):
         kind, (first, run) = "saturated", clipped
-        what = f"the force stands at its largest value for {run} samples: the load cell or the recorder was saturated"
+        stays = f"the force stays at its largest value for {run} data points"
+        what = f"{stays}: the load cell or the recorder was saturated"
     elif still := standstill(np.asarray(trace.force_N, float)):
         kind, (first, run) = "stuck", still
-        what = f"the force repeats one value for {run} samples: the sensor or the recorder was stuck"
+        what = f"the force keeps the same value for {run} data points: the sensor or the recorder stopped working"
     else:
         return None
     found = f"{trace.force_N[first]:.6g} N"

@@ -1,4 +1,4 @@
-"""Every pull of a record that holds many: reciprocating strokes, steps of load or speed."""
+"""All pulls of a record that contains several: reciprocating strokes, steps of load or speed."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def read_pulls(
     test: Test | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> tuple[Pull, ...]:
-    """Read every pull of one record, or of several blocks of one (each cut by :func:`split_pulls` in turn).
+    """Read every pull of one record, or of several blocks of one (each split by :func:`split_pulls`).
 
-    Strokes of both directions share the zero that their asymmetry gives. A piece that slides from its first sample,
+    Strokes in both directions share a zero, determined from their asymmetry. A piece that slides from its first sample,
     after a step of load or speed, has no static peak: its ``static_N`` is NaN and it is flagged ``no_static``.
     ``test_id`` of a pull is the name of its piece. With :func:`load_of` the pieces give friction against load.
 
@@ -133,10 +133,10 @@ def load_of(trace: Trace) -> tuple[float, float]:
 
 
 def sampling_clip_N(rise_N_per_s: float, rate_Hz: float) -> float:
-    """Most by which a bare maximum of samples reads a sharp peak low on average: k v / (2 f_s), a GUM type B limit.
+    """Limit (GUM type B) of how far the largest data point lies below a sharp peak on average: k v / (2 f_s).
 
-    ``rise_N_per_s`` is k v, the pace of the loading line, ``rate_Hz`` the sampling rate f_s. The apex fitted by
-    :func:`read_pull` lies between the samples; this is what a fit that fails would leave.
+    ``rise_N_per_s`` is k v, the slope of the loading line, ``rate_Hz`` the sampling rate f_s. The apex fitted by
+    :func:`read_pull` lies between the data points; this limit applies if the fit fails.
     """
     return rise_N_per_s / (2.0 * rate_Hz)
 

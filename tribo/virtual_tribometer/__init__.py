@@ -1,1 +1,1 @@
-"""A machine that measures a known world: pulls of given friction, exported as a machine would export them."""
+"""A simulated tribometer: pulls with known friction, in the export formats of real machines."""

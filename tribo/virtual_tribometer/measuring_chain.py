@@ -1,8 +1,8 @@
 """The measuring chain of the virtual tribometer: a run of the model as a machine would show it.
 
 A run pulls a square of a fraction of a millimetre; offsets, drifts and compliances belong to the whole sled. They are
-scaled by the nominal area, so that T/N of the run is that of the sled. With nothing wrong in the chain a run passes to
-the bit.
+scaled by the nominal area, so that T/N of the run is that of the sled. An ideal chain leaves a run unchanged, bit
+for bit.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ SLED_AREA_M2 = 55e-6
 
 @dataclass(frozen=True)
 class MeasuringChain:
-    """What stands between the slider and the numbers, in the order of the signal.
+    """The measuring chain between slider and recorded data, in the order of the signal.
 
     Parameters
     ----------
     wire_angle_rad
-        Upward angle of the wire: its tension is the pull over the cosine (what it lifts is the normal load's affair).
+        Upward angle of the wire: its tension is the pull over the cosine (without its effect on the normal load).
     roller_friction
         Coefficient of the roller under the wire, wrapped over a right angle: gain exp(mu pi / 2).
     compliance_m_per_N
         Machine and wire as a spring in series with the sled: the crosshead moves on by the force times this.
     offset_N
-        What the load cell shows at zero force on the sled.
+        Reading of the load cell at zero force on the sled.
     interval_peaks
         Time between two samples of the recorder in units of the peak time; the peak falls midway between two. Zero
         keeps the samples of the run.
@@ -46,7 +46,7 @@ class MeasuringChain:
 
 
 def measured(run: Run, chain: MeasuringChain, speed_m_s: float) -> Run:
-    """The run as the chain shows it; ``speed_m_s`` is that of the crosshead on the model's own clock."""
+    """The run as recorded by the chain; ``speed_m_s`` is the crosshead speed in the time of the model."""
     if chain.wire_angle_rad or chain.roller_friction:
         run = amplified(run, float(np.exp(chain.roller_friction * np.pi / 2) / np.cos(chain.wire_angle_rad)))
     if chain.compliance_m_per_N:
@@ -96,7 +96,7 @@ def with_compliance(run: Run, compliance_m_per_N: float, speed_m_s: float) -> Ru
 
 
 def sampled(run: Run, interval_s: float) -> Run:
-    """What a recorder of this interval keeps; its samples lie half an interval to either side of the peak."""
+    """The data points of a recorder with this interval, half an interval to either side of the peak."""
     first = np.mod(run.peak_s - interval_s / 2, interval_s)
     time: FloatArray = np.arange(first, run.time_s[-1], interval_s)
     force = np.interp(time, run.time_s, run.force_N)

@@ -146,7 +146,7 @@ def write_campaign(
 ) -> None:
     """Write a whole campaign (campaign.toml, tests.csv, raw/) of the virtual tribometer into ``folder``.
 
-    Specimens differ by a gain of relative spread ``specimen_scatter`` (one gain a specimen, static and
+    Specimens differ by a gain of relative spread ``specimen_scatter`` (one gain per specimen, static and
     sliding alike), repeats by ``repeat_scatter``. The same seed gives the same bytes.
 
     Raises

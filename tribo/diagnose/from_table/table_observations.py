@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.diagnose.statistics.model import Acting
-from tribo.diagnose.statistics.predictor import OFFSET, SLOPE
+from tribo.diagnose.statistics.pattern_table import error_sizes
 from tribo.mechanisms.record import Base, Conditions
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import REGIMES, FloatArray, Pattern
@@ -195,10 +195,11 @@ def model_covariance(table: Table, friction: FloatArray, acting_change: FloatArr
 
     log_p = np.log(table.pressures_Pa / np.sqrt(np.prod(RANGE_PA)))
     size = len(table.values)
+    error = error_sizes()["total"]
     total = np.zeros((size, size))
     for i, sample in enumerate(table.samples):
         for r in range(len(REGIMES)):
-            shapes = [] if sample == "F" else [np.full_like(log_p, OFFSET[r]), SLOPE[r] * log_p]
+            shapes = [] if sample == "F" else [np.full_like(log_p, error.offset[r]), error.slope[r] * log_p]
             if acting_change is not None:
                 shapes += [FORM * acting_change[i, r], FORM * acting_change[i, r] * log_p]
             at = slice(2 * (2 * i + r), 2 * (2 * i + r) + 2)

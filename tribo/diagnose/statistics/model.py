@@ -20,7 +20,6 @@ from tribo.mechanisms.record import Base, Forces, Mechanism
 from tribo.records import FloatArray
 
 N_LAW = 4  # mu static, tau0 static (kPa), mu sliding, tau0 sliding (kPa)
-CURVE_SD = 0.008  # model error of a pattern per squared e-fold of pressure
 FLOOR_N = 1e-6
 
 
@@ -90,8 +89,9 @@ def setup(observations: Observations, predictor: Predictor) -> Setup:
             groups.append(regime)
     for sample in np.unique(c.sample):
         for regime in (0, 1):
-            offset, slope = predictor.offset[sample][regime], predictor.slope[sample][regime]
-            shapes = ((offset, np.ones(o.n)), (slope, log_p), (CURVE_SD, log_p**2 - np.mean(log_p**2)))
+            known = (predictor.offset, predictor.slope, predictor.curve)
+            offset, slope, curve = (error[sample][regime] for error in known)
+            shapes = ((offset, np.ones(o.n)), (slope, log_p), (curve, log_p**2 - np.mean(log_p**2)))
             for size, shape in shapes if offset > 0 else ():
                 columns.append(_column((c.sample == sample) * shape, regime))
                 sizes.append(size)

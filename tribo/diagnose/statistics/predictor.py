@@ -1,53 +1,62 @@
 """The quick predictor: what the spring-block model makes of a pattern, as shares of the flat law.
 
 The thresholds of all blocks scale together, so the model's law of a pattern is that of the flat sample times
-four numbers: T = (m mu) N + (a tau0) A in each regime. They are tabulated from calibrated simulations
-(85 x 85 blocks, 10 stratified angles, 3 to 25 kPa, local law 5.5 / 23.45 kPa static, 2.9 / 11.6 kPa sliding).
+four numbers: T = (m mu) N + (a tau0) A in each regime. They come from the bundled table of simulated patterns
+(:mod:`tribo.diagnose.statistics.pattern_table`) or from an ensemble of the campaign's own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tribo.diagnose.statistics.pattern_table import (
+    NO_ERROR,
+    ErrorSize,
+    Law,
+    TabledPattern,
+    error_sizes,
+    simulated_patterns,
+)
 from tribo.records import FloatArray, Pattern
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Shares = tuple[float, float, float, float]  # static mu, static tau0, sliding mu, sliding tau0
-
-# (cavity size x, y, pitch x, y in um, pulled along) -> mu, tau0 in kPa, static and sliding
-FLAT_LAW = (4.79, 23.44, 2.93, 11.2)
-_SIMULATED: dict[tuple[float, float, float, float, str], Shares] = {
-    (5, 5, 20, 20, ""): (4.40, 18.8, 2.97, 11.0),
-    (10, 10, 15, 15, ""): (4.18, 10.7, 3.09, 7.0),
-    (15, 15, 20, 20, ""): (4.04, 7.9, 3.08, 5.4),
-    (200, 40, 220, 120, "x"): (3.73, 12.5, 2.99, 8.5),
-    (200, 40, 220, 120, "y"): (3.63, 10.1, 3.00, 8.6),
-}
-# Standard deviation of ln T by which two codes of the same model differ: K_s halved, cavities that touch the
-# edge, window and angle law move a pattern's static force by 3 to 13 % and its sliding force by 2 to 8 %.
-OFFSET = (0.055, 0.045)
-SLOPE = (0.02, 0.02)  # per e-fold of pressure
 LEAST_SPREAD = 2.0  # largest over smallest load from which mu and tau0 part
-UNTABLED = 1.6  # a pattern that was never simulated is predicted that much worse
+ALIKE = 0.02  # by which the lengths of a pattern may differ from those of a simulated one
 
 
 @dataclass(frozen=True)
 class Predictor:
     """Shares of the flat law per sample and the model's own error, as standard deviations of ln T.
 
-    ``offset`` and ``slope`` (per e-fold of pressure) hold (static, sliding) per sample; a flat sample has none.
+    ``offset``, ``slope`` (per e-fold of pressure) and ``curve`` (per squared e-fold) hold (static, sliding) per
+    sample; a flat sample has none.
     """
 
-    shares: Mapping[str, Shares]
+    shares: Mapping[str, Law]
     offset: Mapping[str, tuple[float, float]]
     slope: Mapping[str, tuple[float, float]]
+    curve: Mapping[str, tuple[float, float]]
     source: str
+
+    def scaled(self, factor: float) -> Predictor:
+        """The same shares with the model's own error ``factor`` times as large.
+
+        Raises
+        ------
+        ValueError
+            The factor is negative or not a number.
+        """
+        if not factor >= 0.0:
+            raise ValueError(f"the error of the model is scaled by {factor}, allowed is a factor of 0 or more")
+        sizes = (self.offset, self.slope, self.curve)
+        offset, slope, curve = ({s: (factor * v[0], factor * v[1]) for s, v in size.items()} for size in sizes)
+        return replace(self, offset=offset, slope=slope, curve=curve)
 
     def table(self, samples: FloatArray | np.ndarray) -> FloatArray:
         """Shares of every test, shape (n, 4)."""
@@ -55,7 +64,7 @@ class Predictor:
 
 
 def tabled_predictor(patterns: Mapping[str, Pattern]) -> Predictor:
-    """The predictor of a campaign's samples from the tabulated simulations."""
+    """The predictor of a campaign's samples from the bundled table of simulated patterns."""
     shares = {name: _shares(name, pattern) for name, pattern in patterns.items()}
     return _with_error(patterns, shares, "tabulated simulations")
 
@@ -98,56 +107,60 @@ def _law_of_runs(rows: pd.DataFrame, area_m2: float) -> FloatArray:
 
 
 def _with_error(
-    patterns: Mapping[str, Pattern], shares: Mapping[str, Shares], source: str, simulated: Collection[str] = ()
+    patterns: Mapping[str, Pattern], shares: Mapping[str, Law], source: str, simulated: Collection[str] = ()
 ) -> Predictor:
-    wide = {name: _width(name, pattern, name in simulated) for name, pattern in patterns.items()}
+    error = {name: _error(name, pattern, name in simulated) for name, pattern in patterns.items()}
     return Predictor(
         shares={**shares, "flat": (1.0, 1.0, 1.0, 1.0)},
-        offset={name: (OFFSET[0] * w, OFFSET[1] * w) for name, w in wide.items()},
-        slope={name: (SLOPE[0] * w, SLOPE[1] * w) for name, w in wide.items()},
+        offset={name: e.offset for name, e in error.items()},
+        slope={name: e.slope for name, e in error.items()},
+        curve={name: e.curve for name, e in error.items()},
         source=source,
     )
 
 
-def _width(name: str, pattern: Pattern, simulated: bool) -> float:
-    """0 for a flat sample, 1 for a pattern that was simulated, more for one that is interpolated."""
+def _error(name: str, pattern: Pattern, simulated: bool) -> ErrorSize:
+    """None for a flat sample, that of the model for a pattern that was simulated, more for one that is interpolated."""
     if pattern.area_fraction == 1.0:
-        return 0.0
-    return 1.0 if simulated or _key(name, pattern) is not None else UNTABLED
+        return NO_ERROR
+    known = error_sizes()
+    if simulated or _simulated_as(name, pattern) is not None:
+        return known["total"]
+    return known["total"].with_(known["interpolation"])
 
 
-def _shares(name: str, pattern: Pattern) -> Shares:
+def _shares(name: str, pattern: Pattern) -> Law:
     if pattern.area_fraction == 1.0:
         return (1.0, 1.0, 1.0, 1.0)
-    key = _key(name, pattern)
-    if key is not None:
-        row = np.array(_SIMULATED[key]) / np.array(FLAT_LAW)
-        return (float(row[0]), float(row[1]), float(row[2]), float(row[3]))
-    return _interpolated(pattern.area_fraction)
+    same = _simulated_as(name, pattern)
+    return interpolated_shares(pattern.area_fraction, simulated_patterns()) if same is None else same.shares
 
 
-def _interpolated(area_fraction: float) -> Shares:
-    """Between the tabulated patterns by area fraction: the efficiency of a pattern falls with its cavities."""
-    keys = sorted(_SIMULATED, key=_area_fraction)
-    known = np.array([*(_area_fraction(key) for key in keys), 1.0])
-    rows = [np.array(_SIMULATED[key]) / FLAT_LAW / [1.0, a, 1.0, a] for key, a in zip(keys, known[:-1], strict=True)]
-    at = [float(np.interp(area_fraction, known, column)) for column in np.array([*rows, np.ones(4)]).T]
-    return (at[0], at[1] * area_fraction, at[2], at[3] * area_fraction)
+def interpolated_shares(area_fraction: float, known: Sequence[TabledPattern]) -> Law:
+    """Shares of a pattern that was not simulated, between those of the known ones and of the flat sample.
+
+    By area fraction, in which mu's share and tau0's share per contact area are piecewise linear. Patterns of equal area
+    fraction are averaged; below the smallest one both are held.
+    """
+    at = np.array([k.pattern.area_fraction for k in known])
+    levels = np.unique(at.round(9))
+    per_area = np.array([k.shares for k in known]) / np.array([np.ones_like(at), at, np.ones_like(at), at]).T
+    rows = [per_area[np.isclose(at, level)].mean(axis=0) for level in levels]
+    x, y = np.append(levels, 1.0), np.array([*rows, np.ones(4)])
+    m_static, a_static, m_sliding, a_sliding = (float(np.interp(area_fraction, x, column)) for column in y.T)
+    return m_static, a_static * area_fraction, m_sliding, a_sliding * area_fraction
 
 
-def _area_fraction(key: tuple[float, float, float, float, str]) -> float:
-    """Nominal area fraction: cavities as wide as long are round."""
-    share = np.pi / 4 if key[0] == key[1] else 1.0
-    return float(1.0 - share * key[0] * key[1] / (key[2] * key[3]))
-
-
-def _key(name: str, pattern: Pattern) -> tuple[float, float, float, float, str] | None:
-    """The tabulated pattern with this cavity and pitch, within 2 %."""
-    if pattern.size_m is None or pattern.pitch_m is None:
-        return None
-    wanted = np.array([*pattern.size_m, *pattern.pitch_m]) * 1e6
-    for key in _SIMULATED:
-        alike = np.allclose(np.array(key[:4], float), wanted, rtol=0.02)
-        if alike and (key[4] == "" or name[-1:].lower() == key[4]):
-            return key
+def _simulated_as(name: str, pattern: Pattern) -> TabledPattern | None:
+    """The simulated pattern with this cavity and pitch, pulled along the direction that ends the sample's name."""
+    wanted = _lengths_m(pattern)
+    for row in simulated_patterns() if wanted else ():
+        same = np.allclose(_lengths_m(row.pattern), wanted, rtol=ALIKE, atol=0.0)
+        if same and row.direction in ("", name[-1:].lower()):
+            return row
     return None
+
+
+def _lengths_m(pattern: Pattern) -> tuple[float, ...]:
+    """Size and pitch of the cavities, nothing for a pattern that does not say them."""
+    return (*pattern.size_m, *pattern.pitch_m) if pattern.size_m and pattern.pitch_m else ()

@@ -1,1 +1,1 @@
-"""What all readers share: sources, layout, columns, numbers, and the doubts about them."""
+"""Shared by all readers: sources, layout, columns, numbers and doubts."""

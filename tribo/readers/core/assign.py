@@ -1,4 +1,4 @@
-"""Which column is which quantity, in what unit. Nothing is guessed: a doubt is an error."""
+"""Quantity and unit of each column. Nothing is guessed: doubtful cases are errors."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MEANS_NORMAL_BESIDE_FRICTION = {"load", "last", "applied load", "charge"}
 
 @dataclass(frozen=True)
 class Hint:
-    """A column for a quantity, by name and unit ("Fx [gf]") or position ("#3 [N]"), and who says so."""
+    """A column for a quantity, by name and unit ("Fx [gf]") or position ("#3 [N]"), and its source."""
 
     quantity: str
     wanted: str
@@ -62,7 +62,7 @@ def parse_columns(columns: Mapping[str, str] | None) -> tuple[Hint, ...]:
             names = [name.replace(" ", "_") for name in QUANTITIES]
             near = difflib.get_close_matches(key, names, 1)
             allowed = f"{', '.join(names)}{f' (did you mean {near[0]}?)' if near else ''}"
-            problems.append(Problem("unknown_quantity", "columns names no quantity", found=key, allowed=allowed))
+            problems.append(Problem("unknown_quantity", "not a known quantity", found=key, allowed=allowed))
         else:
             found.append(Hint(quantity, value.strip()))
     if problems:
@@ -169,7 +169,7 @@ def _wanted_column(hint: Hint, names: Sequence[str]) -> tuple[int, str | None, s
             return have.index(name), unit, f"{hint.reason} by name" if hint.reason == ASKED else hint.reason
     near = difflib.get_close_matches(name, [n for n in names if n], 1)
     allowed = f"{_listed(names)}{f' (did you mean {near[0]}?)' if near else ''}"
-    what = f"no such column for the {hint.quantity}"
+    what = f"no column has the name or position given for the {hint.quantity}"
     raise ReadError(Problem("missing_column", what, found=wanted, allowed=allowed))
 
 
@@ -225,11 +225,10 @@ def _is_unit(text: str, quantity: str) -> bool:
 def _missing(quantity: str, names: Sequence[str]) -> Problem:
     here = f"columns here: {_listed(names)}" if any(names) else f"{len(names)} columns without names"
     if quantity == "time":
-        here = f"a counting column takes the sampling step as its unit, [0.01 s]; {here}"
+        here = f"a counter takes the sampling interval as its unit, [0.01 s]; {here}"
     example = '"NAME [unit]"' if any(names) else '"#2 [unit]"'
-    return Problem(
-        "missing_column", f"no column for the {quantity}", allowed=f"{_key(quantity)} = {example} in columns; {here}"
-    )
+    allowed = f"{_key(quantity)} = {example} in columns; {here}"
+    return Problem("missing_column", f"no column was recognised as the {quantity}", allowed=allowed)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""The numbers of a table, parsed by one call in C a piece; damage is looked for only where that fails."""
+"""The numbers of a table, parsed by one call in C per piece; damage is looked for only where that fails."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def parse_block(source: Source, block: Block, used: Sequence[int]) -> FloatArray
             found = find_damage(text, block.layout, used, source.file, row, ends_file, breaks_off)
             values = None if found else _parse_slowly(text, block.layout, used)
             if values is None and not found:
-                found = [Problem("unreadable", "the table cannot be read as numbers", source.file, row)]
+                found = [Problem("unreadable", "the table does not consist of numbers", source.file, row)]
             problems += found
         if len(problems) > MOST_PROBLEMS:
             break
@@ -64,7 +64,7 @@ def _room_for(source: Source, block: Block, columns: int) -> FloatArray:
     if rows > LARGEST_TABLE_ROWS:
         what, allowed = (
             "too many rows for one table",
-            f"at most {LARGEST_TABLE_ROWS}: cut the export, or record at a lower rate",
+            f"at most {LARGEST_TABLE_ROWS} rows: split the export, or record at a lower rate",
         )
         raise ReadError(Problem("too_many_rows", what, source.file, found=f"{rows} rows", allowed=allowed))
     return np.empty((columns, rows))

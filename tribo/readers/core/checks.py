@@ -1,4 +1,4 @@
-"""What a column of numbers tells about damage: a time that runs back, a gap, a stretch ten times off."""
+"""Damage that shows in a column of numbers: time that decreases, gaps, values off by a factor of ten."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RowOf = Callable[[int], int]
 
 @dataclass(frozen=True)
 class Finding:
-    """A doubt: the flag it sets on the trace, and the problem that says where; ``fatal`` sets the trace aside."""
+    """A doubt: the flag it sets on the trace, and the problem with its place; ``fatal`` sets the trace aside."""
 
     flag: str
     problem: Problem
@@ -35,7 +35,7 @@ class Finding:
 
 
 def check_time(time: FloatArray, file: str, column: str, row_of: RowOf) -> list[Finding]:
-    """Faults of a time base: it runs back (fatal), repeats, or leaves a gap. ``row_of(k)`` is the line of sample k."""
+    """Faults of a time base: decreasing (fatal), repeated or missing times. ``row_of(k)`` is the line of sample k."""
     if time.size < 2:
         return []
     step = np.diff(time)
@@ -43,18 +43,18 @@ def check_time(time: FloatArray, file: str, column: str, row_of: RowOf) -> list[
     found = []
     if least < 0:
         k = int(np.argmax(step < 0)) + 1
-        what = f"time runs back from {time[k - 1]:.6g} s"
+        what = f"the time decreases from {time[k - 1]:.6g} s"
         place = (file, row_of(k), column, f"{time[k]:.6g} s", "a time that never decreases")
         found.append(Finding("time_goes_back", Problem("time_goes_back", what, *place), fatal=True))
     elif least == 0:
         k = int(np.argmax(step == 0)) + 1
-        what = f"{int((step == 0).sum())} times stand twice, the first here"
+        what = f"{int((step == 0).sum())} times occur twice; this is the first"
         found.append(Finding("time_repeats", Problem("time_repeats", what, file, row_of(k), column)))
     if largest > _WORTH_A_LOOK * float(time[-1] - time[0]) / step.size:
         median = float(np.median(step))
         if median > 0 and largest > GAP_STEPS * median:
             k = int(np.argmax(step)) + 1
-            what = f"{int((step > GAP_STEPS * median).sum())} gaps in time, the longest ends here"
+            what = f"{int((step > GAP_STEPS * median).sum())} gaps in time; the longest ends here"
             place = (file, row_of(k), column, f"{largest:.4g} s", f"steps of about {median:.4g} s")
             found.append(Finding("time_gap", Problem("time_gap", what, *place)))
     return found
@@ -80,7 +80,7 @@ def check_scale(values: FloatArray, file: str, column: str, row_of: RowOf) -> li
     first, n, times = found
     beside = "the rows before" if first + n == values.size else "their neighbours"
     way = "above" if times > 1 else "below"
-    what = f"{n} rows {_TIMES_IN_WORDS[round(abs(math.log10(times)))]} times {way} {beside}, the first here"
+    what = f"{n} rows {_TIMES_IN_WORDS[round(abs(math.log10(times)))]} times {way} {beside}; this is the first"
     place = (file, row_of(first), column, f"{values[first]:.6g}", f"about {values[first - 1]:.6g}")
     return [Finding("scale_jump", Problem("scale_jump", what, *place), fatal=True)]
 

@@ -1,4 +1,4 @@
-"""What is wrong with rows that would not parse: every cell and row of them, said so that it can be mended."""
+"""Errors in rows that cannot be parsed, for every row and cell."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MOST_PROBLEMS = 50
 _TAIL_BYTES = 4000
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _MARKS_AND_DIGITS = re.compile(r"[-+\d.,'\s]+")
-_OTHER_MARK = "another decimal mark, or more than one"
+_OTHER_MARK = "a different decimal mark, or more than one"
 _NOTHING = frozenset({"", "nan", "n/a", "na", "#n/a", "--", "---", "-", "null", "none", "inf", "infinity"})
 
 
@@ -52,7 +52,7 @@ def find_damage(
         if not lines[k].strip():
             continue
         if len(problems) >= MOST_PROBLEMS:
-            problems.append(Problem("more", "further faults in the rows below", file=file, row=first_row + k))
+            problems.append(Problem("more", "there are further errors in the rows below", file=file, row=first_row + k))
             break
         row_fault = _row_fault(lines[k], layout, file, first_row + k, ends_file and k == last, breaks_off)
         if row_fault:
@@ -74,10 +74,10 @@ def _row_fault(line: str, layout: Layout, file: str, row: int, is_last: bool, br
     allowed = f"{layout.n_cells} cells"
     if is_last and (len(cells) < layout.n_cells or line.count('"') % 2 or breaks_off):
         column = layout.name(len(cells) - 1)
-        what = "the last row breaks off"
+        what = "the last row is incomplete"
         return Problem("truncated_mid_row", what, column=column, allowed=allowed, **place)
     if len(cells) != layout.n_cells:
-        what = f"{len(cells)} cells in a row of {layout.n_cells}"
+        what = f"this row has {len(cells)} cells instead of {layout.n_cells}"
         return Problem("wrong_number_of_cells", what, allowed=allowed, **place)
     return None
 
@@ -106,13 +106,13 @@ def _not_a_number(cell: str, decimal: str) -> tuple[str, str] | None:
         return None
     if _MARKS_AND_DIGITS.fullmatch(cell):
         return "two_decimal_marks", _OTHER_MARK
-    return "text_in_numbers", "letters where a number should be"
+    return "text_in_numbers", "text instead of a number"
 
 
 def _gap_problems(layout: Layout, gaps: dict[int, list[int]], file: str) -> list[Problem]:
     allowed = "a finite number in every row"
     problems = []
     for index, rows in gaps.items():
-        what = f"{len(rows)} row{'s' if len(rows) > 1 else ''} without a number, the first here"
+        what = f"{len(rows)} row{'s' if len(rows) > 1 else ''} without a number; this is the first"
         problems.append(Problem("nan_gap", what, file, rows[0], layout.name(index), None, allowed))
     return problems

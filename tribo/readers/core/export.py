@@ -1,4 +1,4 @@
-"""From an export to traces in SI units, with everything doubtful named."""
+"""From an export to traces in SI units, with all doubts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def read_export(
     name: str | None = None,
     file: str | None = None,
 ) -> Trace:
-    """Read an export that holds one pull into SI units; the samples stay as recorded.
+    """Read an export with one pull and convert it to SI units; the data points stay as recorded.
 
     Parameters
     ----------
@@ -58,8 +58,8 @@ def read_export(
     if choice is not None and 1 <= choice <= len(traces):
         return traces[choice - 1]
     shown = path.name
-    what = f"{len(traces)} tables that each are a trace"
-    allowed = f"one of them: {shown}#1 to {shown}#{len(traces)}; in a campaign also {shown}#*, every pull of all"
+    what = f"this export contains {len(traces)} traces"
+    allowed = f"one of {shown}#1 to {shown}#{len(traces)}; in a campaign also {shown}#* for all pulls"
     raise ReadError(Problem("several_tables", what, file=file or str(path), allowed=allowed))
 
 
@@ -72,8 +72,8 @@ def read_blocks(
 ) -> tuple[Trace, ...]:
     """Every table of an export that is a trace: steps, segments, strokes or specimens, in the order of the file.
 
-    Takes and raises what :func:`read_export` does, but for several_tables. A table whose time starts again from
-    the beginning is cut there. The traces are named ``name#1``, ``name#2`` and so on if there are several.
+    Arguments and errors are those of :func:`read_export`, except several_tables. A table whose time starts again
+    is split there. The traces are named ``name#1``, ``name#2`` and so on if there are several.
     """
     return _read(Path(path), columns, name, file, split=True)
 

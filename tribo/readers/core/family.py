@@ -1,4 +1,4 @@
-"""What a format family is."""
+"""The record of a format family."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tribo.readers.core.source import Source
 
 
 def no_hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
-    """Names and units of the file say it all."""
+    """No hints: the names and units of the file are sufficient."""
     return ()
 
 
@@ -19,9 +19,8 @@ def no_hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
 class Family:
     """A family of exports.
 
-    ``recognises(source)`` looks at the content; ``hints(source, layout)`` names columns or units that the
-    format is known to mean and does not write, each with its reason;
-    ``advice`` is what a user must give who has such a file.
+    ``recognises(source)`` checks the content; ``hints(source, layout)`` gives columns or units that the format
+    implies but does not write, each with its reason; ``advice`` states what the user must give for such a file.
     """
 
     name: str

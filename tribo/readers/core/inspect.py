@@ -1,4 +1,4 @@
-"""Everything that can be said about an export before using it."""
+"""Description of an export before it is used."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class ColumnSeen:
 
 @dataclass(frozen=True)
 class TableSeen:
-    """A table that is a trace: where it stands, its time base in seconds, its forces in newton."""
+    """A table that is a trace: its position, its time base in seconds, its forces in newton."""
 
     label: str
     first_row: int
@@ -56,11 +56,10 @@ class TableSeen:
 
 @dataclass(frozen=True)
 class Inspection:
-    """What an export is.
+    """Description of an export.
 
-    ``problems`` say why it cannot be read as it stands, ``advice`` in one sentence what to give so that it can;
-    ``doubts`` what to look at. ``pulls`` are the pulls within its tables, where there are several, by the choice that
-    names them in tests.csv.
+    ``problems`` state why it cannot be read, ``advice`` what to give so that it can, ``doubts`` what to check.
+    ``pulls`` lists the pulls within its tables, if there are several, by the text that selects them in tests.csv.
     """
 
     file: str
@@ -83,7 +82,7 @@ class Inspection:
 
     @property
     def refused(self) -> bool:
-        """Whether the export cannot be read as it stands."""
+        """Whether the export cannot be read."""
         return bool(self.problems)
 
     def record(self) -> dict[str, Any]:
@@ -91,12 +90,12 @@ class Inspection:
         return {"refused": self.refused, **asdict(self)}
 
     def in_words(self) -> str:
-        """All of it for a person."""
+        """All of it as text."""
         lines = [self.file]
         if self.family:
             marks = f"{_MARKS.get(self.delimiter, self.delimiter)!s} between cells, decimal {_mark(self.decimal)}"
             lines.append(f"  format    {self.family_text} ({self.family})")
-            lines.append(f"  written   {self.encoding}, {marks}, {self.header_rows} header rows")
+            lines.append(f"  encoding  {self.encoding}, {marks}, {self.header_rows} header rows")
         lines += [f"  column    {_column_in_words(c)}" for c in self.columns]
         lines += [f"  table     {_table_in_words(t)}" for t in self.tables[:12]]
         if len(self.tables) > 12:
@@ -111,15 +110,15 @@ class Inspection:
         lines += [f"  doubt     {problem}" for problem in self.doubts]
         lines += [f"  refused   {problem}" for problem in self.problems]
         if self.advice:
-            lines.append(f"  give      {self.advice}")
+            lines.append(f"  advice    {self.advice}")
         return "\n".join(lines)
 
 
 def inspect_export(path: Path | str, *, columns: Mapping[str, str] | None = None) -> Inspection:
-    """What an export is: family, encoding, columns and why, units, tables, time base, doubts.
+    """Description of an export: family, encoding, columns and why, units, tables, time base, doubts.
 
-    Never raises for what is in the file: an export that cannot be read has its ``problems`` here.
-    Of a large file only the beginning is looked at, and a doubt says so. ``columns`` as in
+    Never raises because of the contents of the file: for an export that cannot be read, ``problems`` states why.
+    Only the beginning of a large file is checked; a doubt then says so. ``columns`` as in
     :func:`tribo.readers.read_export`.
     """
     path = Path(path)
@@ -133,12 +132,12 @@ def inspect_export(path: Path | str, *, columns: Mapping[str, str] | None = None
 
 
 def _unseen(path: Path, file: str) -> tuple[Problem, ...]:
-    """The doubt about a large file, of which only the beginning was looked at; with its last line."""
+    """The doubt about a large file of which only the beginning was checked; with its last line."""
     source = open_sources(path, file)[0] if path.stat().st_size > MAPPED_BYTES else None
     if source is None or not source.is_large:
         return ()
     seen, everything = len(source.beginning_only().data), len(source.data)
-    what = f"the first {seen / 1e6:.0f} of {everything / 1e6:.0f} MB were looked at; the last line stands beside this"
+    what = f"only the first {seen / 1e6:.0f} of {everything / 1e6:.0f} MB were checked; found: the last line"
     return (Problem("only_beginning", what, file, found=source.last_line()[:60]),)
 
 
@@ -148,7 +147,7 @@ def parse_hints(columns: Mapping[str, str] | None) -> tuple[Hint, ...]:
 
 
 def _refused(path: Path, file: str, problems: tuple[Problem, ...], asked: tuple[Hint, ...]) -> Inspection:
-    """As much as can be said about an export that cannot be read."""
+    """What is known about an export that cannot be read."""
     try:
         source = open_sources(path, file)[0]
     except ReadError:
@@ -197,10 +196,10 @@ def _read(file: str, contents: Contents) -> Inspection:
     doubts = [f.problem for f in findings if not f.fatal]
     doubts += [doubt for part in parts[:1] for doubt in _doubts(part, file)]
     if len(parts) > 1:
-        what, allowed = f"{len(parts)} tables that each are a trace", f"{file}#1 to {file}#{len(parts)}"
+        what, allowed = f"this export contains {len(parts)} traces", f"{file}#1 to {file}#{len(parts)}"
         doubts.append(Problem("several_tables", what, file=file, allowed=allowed))
     if contents.footer:
-        what = f"{len(contents.footer)} closing lines without data"
+        what = f"{len(contents.footer)} lines without data at the end of the file"
         doubts.append(Problem("footer", what, file=file, found=contents.footer[0]))
     return Inspection(
         file=file,
@@ -260,7 +259,7 @@ def _signs(parts: list[Reading]) -> tuple[str, ...]:
         found.append("the normal force is negative under load")
     means = [float(np.mean(part.arrays["friction force"][part.arrays["time"].size // 2 :])) for part in parts]
     if max(means) > 0 > min(means):
-        found.append("the friction force takes both signs from table to table: strokes in opposite directions")
+        found.append("the friction force changes sign between tables: strokes in opposite directions")
     elif max(means) < 0:
         found.append("the friction force is negative")
     return tuple(found)
@@ -269,7 +268,7 @@ def _signs(parts: list[Reading]) -> tuple[str, ...]:
 def _missing(reading: Reading) -> tuple[str, ...]:
     found = []
     if "normal force" not in reading.arrays:
-        found.append("no normal load in the file: it comes from tests.csv")
+        found.append("no normal load in the file: give it in tests.csv")
     if "displacement" not in reading.arrays:
         found.append("no displacement")
     return tuple(found)
@@ -282,20 +281,20 @@ def _doubts(reading: Reading, file: str) -> list[Problem]:
     step = np.diff(time)
     if step.size and np.percentile(step, 95) - np.percentile(step, 5) > _UNEVEN * max(np.median(step), 1e-12):
         found = f"{step.min():.4g} to {step.max():.4g} s"
-        doubts.append(Problem("uneven_time", "the time steps are uneven", file, None, label["time"], found))
+        doubts.append(Problem("uneven_time", "the time steps are not equal", file, None, label["time"], found))
     start = float(np.median(force[:5]))
     if abs(start) > _BASELINE_SHARE * float(np.abs(force).max()):
-        what = "the force does not start near zero: no zero phase to subtract"
+        what = "the force does not start near zero, so the zero cannot be determined"
         place = (file, reading.row_of(0), label["friction force"], f"{start:.4g} N")
         doubts.append(Problem("no_zero_phase", what, *place))
     top = _flat_top(force)
     if top is not None:
-        what = f"{top[1]} equal samples at the largest force: clipped?"
+        what = f"{top[1]} equal data points at the largest force: possibly clipped"
         place = (file, reading.row_of(top[0]), label["friction force"], f"{force[top[0]]:.5g} N")
         doubts.append(Problem("flat_top", what, *place))
     for quantity, values in reading.arrays.items():
         if quantity not in NEEDED and values.size > 1 and not np.ptp(values) and not values[0]:
-            doubts.append(Problem("all_zero", f"the {quantity} is zero throughout", file, None, label[quantity]))
+            doubts.append(Problem("all_zero", f"the {quantity} is always zero", file, None, label[quantity]))
     return doubts
 
 
@@ -314,7 +313,7 @@ def _other_candidates(reading: Reading) -> list[Problem]:
             and hit[0] == column.quantity
         ]
         if others:
-            what = f"the {column.quantity} could be {' or '.join(others)} as well"
+            what = f"the {column.quantity} could also be {' or '.join(others)}"
             place = (reading.source.file, layout.names_row, column.label)
             doubts.append(Problem("other_candidate", what, *place))
     return doubts

@@ -27,11 +27,11 @@ _BLANK = ' \t;,"|'
 
 @dataclass(frozen=True)
 class Layout:
-    """How a table stands in a file. ``names``, ``units`` and ``filled`` have ``n_cells`` entries.
+    """The layout of a table in a file. ``names``, ``units`` and ``filled`` have ``n_cells`` entries.
 
     ``header_rows`` counts the lines of the file above the first data row; ``names_row`` and ``units_row`` count
-    from 1. ``filled`` is False for a column that is empty in the first rows; ``misfit`` says that the
-    names of the file cannot be told apart, and are left out.
+    from 1. ``filled`` is False for a column that is empty in the first rows; ``misfit`` states that the
+    names of the file cannot be matched to columns and are ignored.
     """
 
     delimiter: str
@@ -150,8 +150,8 @@ def _no_numbers(lines: Sequence[str], named: Named, file: str, rows_above: int) 
     for k, line in enumerate(lines[:_HEADER_LINES_LOOKED_AT]):
         for delimiter in "\t;,|":
             if sum(_known(cell, named) for cell in cut(line, delimiter)) >= 2:
-                return Problem("header_only", "a header and no data row", file=file, row=rows_above + k + 1)
-    what, allowed = "no table of numbers in it", "an export of a test"
+                return Problem("header_only", "a header without data rows", file=file, row=rows_above + k + 1)
+    what, allowed = "the file contains no table of numbers", "an export of a test"
     return Problem("not_an_export", what, file=file, allowed=allowed)
 
 
@@ -169,7 +169,7 @@ def _delimiter(rows: Sequence[str], file: str) -> str:
         return ","
     if len(words) > 1:
         return " "
-    what = "one column only: a trace needs time and force"
+    what = "only one column was found; a trace needs time and force"
     raise ReadError(Problem("one_column", what, file=file, found=row[:60]))
 
 
@@ -214,7 +214,7 @@ def _with_header(lines: Sequence[str], layout: Layout, named: Named) -> Layout:
         header["names_row"] = names_row + 1
     else:
         given = sum(bool(cell) for cell in cells[names_row])
-        header["misfit"] = f"{given} names over {layout.n_cells} cells: which is whose cannot be told"
+        header["misfit"] = f"{given} column names for {layout.n_cells} columns: they cannot be matched"
         header["names_row"] = names_row + 1
     return replace(layout, **header)
 
@@ -253,7 +253,7 @@ def _refuse_decimal_comma_as_delimiter(lines: Sequence[str], layout: Layout, fil
     above = [line for line in lines[: layout.header_rows] if line.strip(_BLANK)]
     given = max((sum(bool(c) for c in cut(line, ",")) for line in above[-2:]), default=0)
     if 1 < given < layout.n_cells - 1:
-        what = "the comma is both delimiter and decimal mark: the columns cannot be told apart"
+        what = "the comma is both delimiter and decimal mark, so the columns cannot be separated"
         place = (file, rows_above + layout.header_rows + 1)
         raise ReadError(Problem("decimal_is_delimiter", what, *place, found=row[:60]))
 

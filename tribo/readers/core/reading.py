@@ -26,7 +26,7 @@ _CLOCK = re.compile(r"(?<!\d)\d{1,2}:\d\d:\d\d(?!\d)")
 
 @dataclass(frozen=True)
 class Reading:
-    """One table: where it stands, which column is what, the numbers by quantity in SI units, the doubts."""
+    """One table: its position, the meaning of its columns, the numbers by quantity in SI units, the doubts."""
 
     source: Source
     family: Family
@@ -144,7 +144,7 @@ def _read_block(source: Source, family: Family, block: Block, asked: tuple[Hint,
 
 
 def _of_a_clock(problem: Problem, source: Source, block: Block) -> Problem:
-    """A time without a unit said better where it is a time of day."""
+    """A clearer problem where a time without a unit is a time of day."""
     if problem.kind != "missing_unit" or source.arrays or problem.column not in block.layout.names:
         return problem
     cells = cut(source.lines(block.start, HEAD_BYTES)[0][0], block.layout.delimiter)
@@ -152,7 +152,7 @@ def _of_a_clock(problem: Problem, source: Source, block: Block) -> Problem:
     if index >= len(cells) or not _CLOCK.search(cells[index]):
         return problem
     what = "a time of day, not a time in seconds"
-    allowed = 'a column of seconds, or one that counts rows with the sampling step as its unit: time = "NAME [0.01 s]"'
+    allowed = 'a column in seconds, or a row counter with the sampling interval as its unit: time = "NAME [0.01 s]"'
     return replace(problem, kind="time_of_day", what=what, found=cells[index], allowed=f"{allowed} in columns")
 
 

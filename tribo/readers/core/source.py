@@ -131,7 +131,7 @@ def open_text(path: Path, file: str, raw: bytes | mmap.mmap) -> Source:
     """
     bom = next((b for b in (*_WIDE_BOMS, codecs.BOM_UTF8) if raw[:4].startswith(b)), b"")
     if not raw[len(bom) : HEAD_BYTES].strip() and not raw[len(bom) : LARGEST_HEAD_BYTES].strip():
-        kind, what = ("bom_only", "nothing but a byte order mark") if bom else ("empty", "the file is empty")
+        kind, what = ("bom_only", "the file contains only a byte order mark") if bom else ("empty", "the file is empty")
         raise ReadError(Problem(kind, what, file=file, allowed="an export with data rows"))
     if bom in _WIDE_BOMS:
         if isinstance(raw, mmap.mmap):
@@ -141,7 +141,7 @@ def open_text(path: Path, file: str, raw: bytes | mmap.mmap) -> Source:
     elif b"\0" in raw[:HEAD_BYTES]:
         encoding = _wide_without_bom(raw[:HEAD_BYTES])
         if not encoding or isinstance(raw, mmap.mmap):
-            raise ReadError(Problem("binary", "not a text export", file=file, allowed="a text export"))
+            raise ReadError(Problem("binary", "this is not a text file", file=file, allowed="a text export"))
         data = raw.decode(encoding, errors="replace").encode("utf-8")
     else:
         encoding, data = ("utf-8-sig" if bom else _narrow_encoding(raw)), raw
@@ -183,14 +183,14 @@ def read_bytes(path: Path, file: str) -> bytes | mmap.mmap:
                 return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
         return path.read_bytes()
     except FileNotFoundError as why:
-        raise ReadError(Problem("missing", "no such file", file=file)) from why
+        raise ReadError(Problem("missing", "this file does not exist", file=file)) from why
     except OSError as why:
         raise ReadError(Problem("unreadable", f"cannot be opened ({why.strerror})", file=file)) from why
 
 
 def _too_large(size: int, limit: int, file: str) -> ReadError:
     found, allowed = f"{size} bytes", f"at most {limit} bytes of this encoding"
-    return ReadError(Problem("too_large", "too large to read", file=file, found=found, allowed=allowed))
+    return ReadError(Problem("too_large", "the file is too large", file=file, found=found, allowed=allowed))
 
 
 def _narrow_encoding(raw: bytes | mmap.mmap) -> str:

@@ -1,6 +1,6 @@
 """Instron Bluehill 3 and Universal: quoted cells, units in brackets in a row of their own.
 
-One specimen a file, or results tables and several specimens one below the other.
+One specimen per file, or results tables and several specimens one below the other.
 """
 
 from __future__ import annotations

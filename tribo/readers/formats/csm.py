@@ -14,5 +14,5 @@ def recognises(source: Source) -> bool:
     return bool(_NAMES.search(source.head_text))
 
 
-ADVICE = 'this table carries no units; give them: time = "Time [s]", friction_force = "FrictionForce [N]" in columns'
+ADVICE = 'this table has no units; give them: time = "Time [s]", friction_force = "FrictionForce [N]" in columns'
 CSM = Family("csm", "CSM and Anton Paar tribometer, tab-separated", recognises, advice=ADVICE)

@@ -10,4 +10,4 @@ def recognises(source: Source) -> bool:
     return True
 
 
-DELIMITED = Family("delimited", "plain delimited table under names with units", recognises)
+DELIMITED = Family("delimited", "plain delimited table with column names and units", recognises)

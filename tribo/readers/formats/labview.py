@@ -1,4 +1,4 @@
-"""LabVIEW measurement files (.lvm): a header a segment, units in the names or in Y_Unit_Label.
+"""LabVIEW measurement files (.lvm): one header per segment, units in the names or in Y_Unit_Label.
 
 With "X_Columns No" the rows hold no time: it follows from X0 and Delta_X of the header of their segment.
 """
@@ -53,7 +53,7 @@ def hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
     found = []
     dimension = layout.metadata.get("X_Dimension", "Time")
     if "X_Value" in layout.names and dimension.startswith("Time"):
-        found.append(Hint("time", "X_Value [s]", "X_Value of a LabVIEW file is seconds"))
+        found.append(Hint("time", "X_Value [s]", "X_Value of a LabVIEW file is in seconds"))
     labels = layout.metadata.get("Y_Unit_Label", "").split()
     channels = [name for name in layout.names[1:] if name and name != "Comment"]
     for name, unit in zip(channels, labels, strict=False):

@@ -1,4 +1,4 @@
-"""MATLAB .mat files with named variables; they carry no units, so these are given in columns."""
+"""MATLAB .mat files with named variables; they have no units, which must be given in columns."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def recognises(source: Source) -> bool:
 
 
 ADVICE = (
-    "variables carry no units; give them in columns "
-    '(a force divided by a weight takes that weight as its unit: friction_force = "Fnorm [30.7 gf]")'
+    "the variables have no units; give them in columns "
+    '(for a force divided by a weight, give that weight as the unit: friction_force = "Fnorm [30.7 gf]")'
 )
 MATLAB = Family("matlab", "MATLAB .mat, named variables", recognises, advice=ADVICE)

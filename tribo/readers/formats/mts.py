@@ -15,4 +15,4 @@ def is_mts793(source: Source) -> bool:
 
 
 TESTSUITE = Family("testsuite", "MTS TestSuite, text export of timed data", is_testsuite)
-MTS793 = Family("mts793", "MTS 793 (MPT), data file with its acquisitions", is_mts793)
+MTS793 = Family("mts793", "MTS 793 (MPT), data file with acquisition blocks", is_mts793)

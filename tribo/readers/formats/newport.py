@@ -23,7 +23,7 @@ def recognises(source: Source) -> bool:
 
 
 def hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
-    reason = "order of columns of this rig"
+    reason = "fixed column order of this rig"
     return (
         Hint("time", "#2 [s]", reason),
         Hint("normal force", "#3 [N]", reason),
@@ -31,5 +31,5 @@ def hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
     )
 
 
-ADVICE = 'the friction is a torque in column 4; give its lever: friction_force = "#4 [N m / LEVER mm]" in columns'
-NEWPORT = Family("newport", "Newport rotary rig, settings line and nameless columns", recognises, hints, ADVICE)
+ADVICE = 'column 4 is the friction torque; give the lever arm: friction_force = "#4 [N m / LEVER mm]" in columns'
+NEWPORT = Family("newport", "Newport rotary rig, settings line and columns without names", recognises, hints, ADVICE)

@@ -14,4 +14,4 @@ def recognises(source: Source) -> bool:
     return bool(_NAMES_FOLLOW.search(source.head_text))
 
 
-RHEOCOMPASS = Family("rheocompass", "Anton Paar RheoCompass, a table an interval", recognises)
+RHEOCOMPASS = Family("rheocompass", "Anton Paar RheoCompass, one table per interval", recognises)

@@ -1,4 +1,4 @@
-"""Rtec and alike: a table a step, each with its own header, or one log whose time starts again with each step.
+"""Rtec and alike: one table per step, each with its own header, or one log whose time starts again with each step.
 
 The log writes its timestamp without a unit; it is in seconds.
 """
@@ -24,11 +24,11 @@ def recognises(source: Source) -> bool:
 def hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
     """The log of an Rtec counts its timestamp in seconds."""
     is_log = any(name.startswith("DAQ.F") for name in layout.names)
-    return (Hint("time", "Timestamp [s]", "timestamp of an Rtec log"),) if is_log and _bare_timestamp(layout) else ()
+    return (Hint("time", "Timestamp [s]", "Rtec logs count in seconds"),) if is_log and _bare_timestamp(layout) else ()
 
 
 def _bare_timestamp(layout: Layout) -> bool:
     return "Timestamp" in layout.names and not layout.units[layout.names.index("Timestamp")]
 
 
-RTEC = Family("rtec", "Rtec-like, a table a step, columns in any order", recognises, hints)
+RTEC = Family("rtec", "Rtec and similar, one table per step, columns in any order", recognises, hints)

@@ -33,12 +33,12 @@ def hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
     columns = {name: [row[k] for row in rows] for k, name in reversed(list(enumerate(layout.names)))}
     found = []
     if _runs_with_the_clock(columns):
-        found.append(Hint("time", "Test Time [s]", "no unit in the file; it runs with the clock column"))
+        found.append(Hint("time", "Test Time [s]", "no unit in the file; it agrees with the clock column"))
     if _load_is_mass_times_g(columns):
-        reason = "no unit in the file; the load column is mass (g) times 9.81 m/s2"
+        reason = "no unit in the file; the load column equals mass (g) times 9.81 m/s2"
         found.append(Hint("normal force", "Load [N]", reason))
         if _coefficient_is_force_over_load(columns):
-            reason += ", and friction coefficient times load gives this"
+            reason += ", and the friction force equals friction coefficient times load"
             found.append(Hint("friction force", "Friction Force [N]", reason))
     return tuple(found)
 

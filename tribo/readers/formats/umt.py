@@ -1,4 +1,4 @@
-"""CETR and Bruker UMT: a table a step, forces in gram-force written as g, the normal force negative."""
+"""CETR and Bruker UMT: one table per step, forces in gram-force written as g, the normal force negative."""
 
 from __future__ import annotations
 
@@ -11,4 +11,4 @@ def recognises(source: Source) -> bool:
     return first.startswith(("Created by CETR", "Created by Bruker UMT", "Created by UMT"))
 
 
-UMT = Family("umt", "CETR and Bruker UMT, CSV of the data viewer, a table a step", recognises)
+UMT = Family("umt", "CETR and Bruker UMT, CSV of the data viewer, one table per step", recognises)

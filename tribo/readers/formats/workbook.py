@@ -17,7 +17,7 @@ def is_workbook(head: bytes) -> bool:
 
 
 def open_workbook(path: Path, file: str) -> tuple[Source, ...]:
-    """One source a sheet that holds anything.
+    """One source per sheet that holds anything.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def open_workbook(path: Path, file: str) -> tuple[Source, ...]:
             raise ReadError(
                 Problem(
                     "old_excel",
-                    "the old .xls format cannot be read",
+                    "the old .xls format is not supported",
                     file=file,
                     allowed="the sheet saved as .xlsx or as CSV",
                 )
@@ -39,7 +39,7 @@ def open_workbook(path: Path, file: str) -> tuple[Source, ...]:
             unpacked = sum(entry.file_size for entry in packed.infolist())
         if unpacked > _MOST_UNPACKED_BYTES:
             found, allowed = f"{unpacked} bytes unpacked", f"at most {_MOST_UNPACKED_BYTES}"
-            raise ReadError(Problem("too_large", "too large to read", file=file, found=found, allowed=allowed))
+            raise ReadError(Problem("too_large", "the file is too large", file=file, found=found, allowed=allowed))
         sheets = _sheets(path)
     except ReadError:
         raise
@@ -50,7 +50,7 @@ def open_workbook(path: Path, file: str) -> tuple[Source, ...]:
         raise ReadError(Problem("bad_xlsx", f"not a readable .xlsx ({why})", file=file)) from why
     texts = {name: text for name, text in sheets.items() if text.strip()}
     if not texts:
-        raise ReadError(Problem("empty", "a workbook without a filled cell", file=file))
+        raise ReadError(Problem("empty", "the workbook contains no filled cells", file=file))
     return tuple(
         Source(path, f"{file} [{name}]" if len(texts) > 1 else file, text.encode(), "utf-8", part=name)
         for name, text in texts.items()

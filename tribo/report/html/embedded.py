@@ -1,4 +1,4 @@
-"""What the script of the page reads: thinned traces with what was read off them, and the points of the figures."""
+"""Data for the script of the page: thinned traces with their results, and the points of the figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the points of a drawn figure lie on its page, so that whoever hovers over them can read their numbers."""
+"""Positions of the points of a drawn figure, so that the page can show their values on hovering."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def _csp_hash(text: str) -> str:
 
 
 def _filters(cards: list[PullCard]) -> list[tuple[str, str, list[tuple[str, str]]]]:
-    """What pulls can be filtered by: attribute of a card, label, and values with their words."""
+    """What pulls can be filtered by: attribute of a card, label, and values with their texts."""
     flags = sorted({flag for card in cards for flag in card.flags})
     specimens = sorted({card.specimen for card in cards})
     samples = sorted({card.sample for card in cards})
@@ -77,7 +77,7 @@ def _filters(cards: list[PullCard]) -> list[tuple[str, str, list[tuple[str, str]
         ("load", "Load", [(load, f"{load} N") for load in loads]),
         ("specimen", "Specimen", [(s, s) for s in specimens]),
         ("flags", "Flag", [(flag, flags_in_words([flag])) for flag in flags]),
-        ("state", "State", [("used", "used"), ("moved", "moved by hand"), ("excluded", "left out by hand")]),
+        ("state", "State", [("used", "used"), ("moved", "moved by hand"), ("excluded", "excluded by hand")]),
     ]
 
 

@@ -1,4 +1,4 @@
-"""Every pull of a campaign as a card of the page: a small picture of its trace and what was read off it."""
+"""Every pull of a campaign as a card of the page: a small picture of its trace and its results."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BY_HAND = ("peak_by_hand", "window_by_hand")
 
 @dataclass(frozen=True)
 class PullCard:
-    """One pull as the page shows it. ``state`` is used, moved or excluded; ``oddness`` what cards are sorted by."""
+    """One pull as shown on the page. ``state`` is used, moved or excluded; cards are sorted by ``oddness``."""
 
     test_id: str
     sample: str
@@ -46,7 +46,7 @@ class PullCard:
 
 
 def pull_cards(study: Study) -> list[PullCard]:
-    """Every pull that was read, the oddest first, those left out by hand among them."""
+    """Every pull that was read, highest outlier score first, including those excluded by hand."""
     ingested = study.ingested
     standing = standings(study)
     levels = load_labels(study)
@@ -57,7 +57,7 @@ def pull_cards(study: Study) -> list[PullCard]:
 
 
 def doubted_s(trace: Trace, pull: Pull) -> dict[float, tuple[str, ...]]:
-    """Times of the samples that somebody should look at, in s, each with what was found there."""
+    """Times (s) of doubtful data points, each with the doubts."""
     found: dict[float, tuple[str, ...]] = {}
     for problem in dict.fromkeys((*trace.problems, *pull.problems)):
         sample = -1 if problem.row is None else problem.row - trace.first_row
@@ -75,7 +75,7 @@ def load_labels(study: Study) -> dict[str, str]:
 
 
 def reading(study: Study, test_id: str) -> tuple[Pull, Trace, ByHand | None]:
-    """The pull of a test as it is used, or as it would be were it not left out; its trace; what was decided."""
+    """The pull of a test (also if it is excluded), its trace and the decision made by hand."""
     ingested = study.ingested
     decided = ingested.by_hand.get(test_id)
     if test_id in ingested.pulls:

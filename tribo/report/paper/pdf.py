@@ -26,7 +26,7 @@ def pdf(
     drawn: Mapping[str, Drawn] | None = None,
     verdict: Mapping[str, Any] | None = None,
 ) -> bytes:
-    """The document. Its date is that of the last test, and none where no test says when it was made.
+    """The document. Its date is that of the last test, or none if no test has a time.
 
     The command and the time of the run are left to provenance.json, so that two runs over the same inputs with the
     same choices give the same bytes.
@@ -42,7 +42,7 @@ def pdf(
 
 
 def _last_day(study: Study) -> datetime:
-    """When the newest test was made; without any, the beginning of time as computers count it."""
+    """Time of the newest test; without any, 1970-01-01."""
     days = []
     for test in study.ingested.campaign.tests:
         try:
@@ -123,7 +123,7 @@ def _diagnosis_tables(verdict: Mapping[str, Any] | None) -> dict[str, list[Any]]
 
 
 def _pull_row(card: PullCard) -> list[str]:
-    said = [card.flags_in_words, {"used": "", "moved": "moved by hand", "excluded": "left out by hand"}[card.state]]
+    said = [card.flags_in_words, {"used": "", "moved": "moved by hand", "excluded": "excluded by hand"}[card.state]]
     return [
         card.test_id, card.sample, card.specimen, card.load, card.static, card.sliding, card.window,
         significant(card.oddness, 2), "; ".join(part for part in said if part),

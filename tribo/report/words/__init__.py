@@ -1,1 +1,1 @@
-"""What a report says, in words: findings, sentences, numbers, the terminal."""
+"""The text of a report: findings, sentences, number formats, terminal output."""

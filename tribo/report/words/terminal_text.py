@@ -1,4 +1,4 @@
-"""The study on a terminal: the Table-2-like table, what was set aside, what agrees."""
+"""Terminal output of a study: the table of fitted laws, tests set aside, agreement with the model."""
 
 from __future__ import annotations
 
@@ -14,10 +14,13 @@ HEAD = ("sample", "mu", "tau0 (kPa)", "T (N)", "mu", "tau0 (kPa)", "T (N)", "spe
 def table2_text(study: Study) -> str:
     """Table 2 of the paper for this campaign: mu, tau0 and T at the middle load, measured and simulated."""
     if not study.fits:
-        return "nothing was fitted"
+        return "No friction law was fitted."
     load = findings.common_loads(study)[1]
     blocks = [_regime_block(study, regime, load) for regime in REGIMES]
-    foot = f"T at N = {load:.3g} N. Standard uncertainties (k = 1). mu and tau0 of one fit trade off: compare T."
+    foot = (
+        f"T at N = {load:.3g} N. Values after ± are standard uncertainties (k = 1).\n"
+        "mu and tau0 of a fit are correlated: compare T rather than mu or tau0 alone."
+    )
     return "\n\n".join([*(b for b in blocks if b), foot])
 
 
@@ -67,7 +70,7 @@ def fit_cells(fit: LawFit | None, load_N: float) -> tuple[str, str, str]:
 
 
 def summary_text(study: Study) -> str:
-    """What was measured and what agrees, as the report says it, one sentence a line."""
+    """The measurements and the agreement with the model, in the words of the report, one sentence per line."""
     agreements = findings.agreements(study)
     lines = [wording.what_was_measured(study), *wording.in_short(agreements, study_lookup.flat_sample(study))]
     lines += [wording.ranking_sentence(r) for r in findings.rankings(study)]

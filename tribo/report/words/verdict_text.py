@@ -1,8 +1,8 @@
-"""A verdict, and what a planned design can tell, in words for a terminal."""
+"""Terminal output of a verdict and of the assessment of a planned design."""
 
 from __future__ import annotations
 
-from tribo.diagnose.plan import Plan
+from tribo.diagnose.plan import Finding, Plan
 from tribo.diagnose.verdict import Verdict
 from tribo.report.verdict_file import verdict_in_words
 
@@ -20,12 +20,17 @@ def verdict_text(verdict: Verdict) -> str:
 
 
 def plan_text(plan: Plan) -> str:
-    """What a design finds nine times in ten, mechanism by mechanism, and what it cannot part or show."""
+    """The effect of each mechanism that a design detects with 90 % probability, and what it cannot distinguish."""
     shown = [f for f in plan.findings if not f.why]
-    lines = [f"{plan.n_tests} planned tests. Found nine times in ten, the easiest first:"]
+    lines = [f"{plan.n_tests} planned tests. Smallest effects detected with 90 % probability, easiest first:"]
     for f in shown:
         size = f"{f.amplitude:.3g} {f.unit}".rstrip()
-        tie = f"; looks like {', '.join(f.confused_with)} here: {f.separates}" if f.confused_with else ""
-        lines.append(f"  {f.mechanism}: from {size}, {f.effect_percent:.0f} % of T from end to end{tie}")
-    lines += [f"  {f.mechanism}: cannot be told from this design ({f.why})" for f in plan.findings if f.why]
+        names = ", ".join(name.replace("_", " ") for name in f.confused_with)
+        tie = f"; not distinguishable from {names}; to separate them: {f.separates}" if names else ""
+        lines.append(f"  {_name(f)}: {size} or more (changes T by {f.effect_percent:.0f} % over the design){tie}")
+    lines += [f"  {_name(f)}: not detectable with this design ({f.why})" for f in plan.findings if f.why]
     return "\n".join(lines)
+
+
+def _name(finding: Finding) -> str:
+    return finding.mechanism.replace("_", " ")

@@ -1,4 +1,4 @@
-"""Findings in plain English. Every sentence is computed; none says more than its interval allows."""
+"""Findings as sentences. Every sentence is computed from the results and claims no more than the intervals support."""
 
 from __future__ import annotations
 
@@ -13,18 +13,23 @@ from tribo.report.oddness import OddPull
 from tribo.report.result_tables import PA_PER_KPA, all_set_aside
 from tribo.report.words.numerals import counted, joined, percent, significant, span, with_uncertainty
 
+FLAGS = {
+    "gap_at_peak": "gap in the data at the peak", "no_drop": "no drop after the peak", "no_static": "no static peak",
+    "no_sliding": "no sliding phase", "no_zero_phase": "no zero phase", "peak_by_hand": "peak moved by hand",
+    "stick_slip": "stick-slip", "window_by_hand": "window moved by hand", "window_short": "window too short",
+}  # fmt: skip
 SIDE: dict[Verdict, str] = {"model too high": "too high", "model too low": "too low"}
 HOW_TO_READ = (
-    "The ratio is measured over simulated friction force, with its 95 % interval. The model agrees at a load "
-    "where the interval holds 1 and reaches no further than a factor of 1.2 to either side of the ratio; where "
-    "it holds 1 but is wider than that, the measurement cannot tell. A sample as a whole is given the verdict "
-    "of at least half of its loads. The loads of one sample share their specimens, so their verdicts are not "
-    "independent of each other; and of twenty intervals, one misses by chance."
+    "The ratio is the measured friction force divided by the simulated one, with its 95 % interval. The model "
+    "agrees at a load if the interval contains 1 and its limits are within a factor of 1.2 of the ratio. If the "
+    "interval contains 1 but is wider, the result at this load is inconclusive. The overall result for a sample "
+    "is the result found at half or more of its loads. The loads of a sample share the same specimens, so their "
+    "results are not independent. By chance, one interval in twenty does not contain the true ratio."
 )
 
 
 def what_was_measured(study: Study) -> str:
-    """How many pulls of what, under which loads."""
+    """Number of pulls, specimens, samples and loads."""
     campaign, used = study.ingested.campaign, study.ingested.pulls
     aside = len(all_set_aside(study))
     tests = [t for t in campaign.tests if t.test_id in used]
@@ -36,8 +41,8 @@ def what_was_measured(study: Study) -> str:
     return (
         f"{counted(len(tests), 'pull')} of {counted(len(specimens), 'specimen')} of "
         f"{counted(len(samples), 'sample')} ({joined(samples)}) at {counted(len(levels), 'load')} from "
-        f"{significant(levels[0])} to {significant(levels[-1])} N, a nominal pressure of {lowest} to "
-        f"{highest} kPa. {_set_aside_clause(aside)}"
+        f"{significant(levels[0])} to {significant(levels[-1])} N (nominal pressure {lowest} to "
+        f"{highest} kPa). {_set_aside_clause(aside)}"
     )
 
 
@@ -48,12 +53,12 @@ def _set_aside_clause(aside: int) -> str:
 
 
 def flat_law(study: Study) -> list[str]:
-    """The measured law of the flat sample, one sentence a regime."""
+    """The measured law of the flat sample, one sentence per regime."""
     flat = study_lookup.flat_sample(study)
     fits = [(regime, study_lookup.fit_of(study.fits, flat, regime)) for regime in REGIMES]
     return [
         f"The {regime} friction of the flat sample {flat} follows T = μN + τ₀A with {_law_values(fit)} "
-        "(standard uncertainties)."
+        "(± standard uncertainty)."
         for regime, fit in fits
         if fit is not None
     ]
@@ -66,10 +71,10 @@ def _law_values(fit: LawFit) -> str:
 
 
 def in_short(agreements: Iterable[Agreement], flat: str) -> list[str]:
-    """One sentence a regime: where the model agrees, where not, where the data cannot tell."""
+    """One sentence per regime: where the model agrees, where it does not, where the data are inconclusive."""
     predicted = [a for a in agreements if not a.calibrated]
     return [
-        f"{regime.capitalize()} friction: calibrated on {flat} alone, the model {_verdicts(part)}."
+        f"{regime.capitalize()} friction: the model, calibrated on {flat} alone, {_verdicts(part)}."
         for regime in REGIMES
         if (part := [a for a in predicted if a.regime == regime])
     ]
@@ -85,10 +90,10 @@ def _verdicts(agreements: list[Agreement]) -> str:
             clauses.append(f"is {side} for {joined([_off_by(a) for a in off])}")
     if mixed := by_verdict.get("mixed"):
         clauses.append(f"is too high at some loads and too low at others for {joined([a.sample for a in mixed])}")
-    if unclear := by_verdict.get("cannot tell"):
+    if unclear := by_verdict.get("inconclusive"):
         clauses.append(
-            f"may or may not be right for {joined([a.sample for a in unclear])}, where the intervals are "
-            "too wide to tell"
+            f"can be neither confirmed nor rejected for {joined([a.sample for a in unclear])}, where the intervals are "
+            "too wide"
         )
     return "; it ".join(clauses)
 
@@ -96,7 +101,7 @@ def _verdicts(agreements: list[Agreement]) -> str:
 def _inside(agreement: Agreement) -> str:
     if not agreement.n_outside:
         return agreement.sample
-    return f"{agreement.sample} (but not at {_at(agreement.n_outside, len(agreement.loads))})"
+    return f"{agreement.sample} (except at {_at(agreement.n_outside, len(agreement.loads))})"
 
 
 def _off_by(agreement: Agreement) -> str:
@@ -106,53 +111,52 @@ def _off_by(agreement: Agreement) -> str:
 
 
 def agreement_sentence(agreement: Agreement) -> str:
-    """One sample in one regime: the ratio, where the model agrees, by how much it is off, where worst."""
+    """One sample in one regime: the ratio, where the model agrees, and how far off it is."""
     loads, n = agreement.loads, len(agreement.loads)
-    parts = [f"T measured over T simulated is {span([load.ratio for load in loads])}."]
+    parts = [f"The ratio of measured to simulated T is {span([load.ratio for load in loads])}."]
     if inside := agreement.count("agrees"):
         parts.append(f"The model agrees within the 95 % interval at {_at(inside, n)}.")
     for verdict, side in SIDE.items():
         if count := agreement.count(verdict):
             parts.append(f"The model is {side} at {_at(count, n)}.")
-    if unclear := agreement.count("cannot tell"):
-        where = "any load" if unclear == n else _at(unclear, n)
-        parts.append(f"The measurement cannot tell at {where}.")
+    if unclear := agreement.count("inconclusive"):
+        parts.append(f"The measurement is inconclusive at {_at(unclear, n)}.")
     if agreement.verdict in ("model too high", "model too low", "mixed"):
         worst = agreement.worst
         parts.append(
-            f"On average over the loads the model is {percent(abs(agreement.mean_deviation))} too "
-            f"{'high' if agreement.mean_deviation > 0 else 'low'}; it is farthest off at "
-            f"{significant(worst.normal_load_N)} N, by {percent(worst.deviation)}."
+            f"Averaged over the loads, the model is {percent(abs(agreement.mean_deviation))} too "
+            f"{'high' if agreement.mean_deviation > 0 else 'low'}; the largest "
+            f"deviation is {percent(worst.deviation)}, at {significant(worst.normal_load_N)} N."
         )
     if agreement.calibrated:
-        parts.append("The model was calibrated on this sample: agreement here is no test of it.")
+        parts.append("The model was calibrated on this sample, so agreement here does not test the model.")
     return " ".join(parts)
 
 
 def _at(count: int, n: int) -> str:
     if count == n:
-        return "every load" if n > 1 else "the one load"
+        return "all loads" if n > 1 else "the only load"
     return f"{count or 'none'} of {counted(n, 'load')}"
 
 
 def ranking_sentence(ranking: Ranking) -> str:
-    """Whether the model puts the samples in the measured order, by pairs the measurement can part."""
+    """Whether the model ranks the samples as measured, judged by pairs that differ significantly."""
     n = len(ranking.told_apart)
     start = (
-        f"{ranking.regime.capitalize()} friction at {significant(ranking.normal_load_N)} N, from most to "
-        f"least: measured {' > '.join(ranking.measured)}; simulated {' > '.join(ranking.simulated)}. "
+        f"{ranking.regime.capitalize()} friction at {significant(ranking.normal_load_N)} N, from highest "
+        f"to lowest: measured {' > '.join(ranking.measured)}; simulated {' > '.join(ranking.simulated)}. "
     )
     if not n:
-        return start + "The measurement cannot tell any two samples apart, so it cannot judge the order."
-    start += f"The measurement tells {n} of {counted(ranking.n_pairs, 'pair')} apart; "
+        return start + "No two samples differ significantly in the measurement, so it does not test the order."
+    start += f"The measurement distinguishes {n} of {counted(ranking.n_pairs, 'pair')} of samples; "
     if not ranking.reversed:
-        return start + "the model has every one of them in the right order."
-    wrong = joined([f"{a} over {b}" for a, b in ranking.reversed])
-    return start + f"the model has {n - len(ranking.reversed)} of them in the right order and reverses {wrong}."
+        return start + "the model ranks all of them in the measured order."
+    wrong = joined([f"{a} > {b}" for a, b in ranking.reversed])
+    return start + f"the model ranks {n - len(ranking.reversed)} of them in the measured order and reverses {wrong}."
 
 
 def direction_sentences(ratios: Iterable[DirectionRatio]) -> list[str]:
-    """How much more friction a pattern has along x than along y, measured and simulated."""
+    """Ratio of the friction along x to that along y of each pattern, measured and simulated."""
     groups: dict[tuple[str, Regime], list[DirectionRatio]] = {}
     for ratio in ratios:
         groups.setdefault((ratio.pattern, ratio.regime), []).append(ratio)
@@ -162,51 +166,51 @@ def direction_sentences(ratios: Iterable[DirectionRatio]) -> list[str]:
 def _direction_sentence(group: list[DirectionRatio]) -> str:
     x, y = group[0].pair
     values = ", ".join(
-        f"{r.measured:.2f} ({r.low:.2f} to {r.high:.2f}) against {r.simulated:.2f} at {significant(r.normal_load_N)} N"
+        f"{r.measured:.2f} ({r.low:.2f} to {r.high:.2f}) and {r.simulated:.2f} at {significant(r.normal_load_N)} N"
         for r in group
     )
     outside = [r for r in group if not r.low <= r.simulated <= r.high]
     anisotropic = [r for r in group if not r.low <= 1 <= r.high]
     seen = (
-        f"The measurement shows that the directions differ at {len(anisotropic)} of these {counted(len(group), 'load')}"
+        f"In the measurement, the directions differ significantly at {_at(len(anisotropic), len(group))}"
         if anisotropic
-        else "The measurement cannot tell the directions apart at these loads"
+        else "In the measurement, the directions do not differ significantly at these loads"
     )
     verdict = (
-        "the model lies within its interval at all of them"
+        "the simulated ratio lies within the 95 % interval of the measurement at all of them"
         if not outside
-        else f"the model lies outside its interval at {len(outside)} of them"
+        else f"the simulated ratio lies outside the 95 % interval of the measurement at {len(outside)} of them"
     )
-    return f"{x} over {y}, {group[0].regime}, measured against simulated: {values}. {seen}; {verdict}."
+    return f"Ratio of {group[0].regime} friction {x} / {y}, measured and simulated: {values}. {seen}; {verdict}."
 
 
 def correlation_note(study: Study) -> str:
-    """Why mu and tau0 must not be compared one by one."""
+    """Why mu and tau0 must not be compared separately."""
     values = findings.parameter_correlations(study.fits)
     if not values:
         return ""
     return (
-        f"The μ and τ₀ of one fit are not independent: their correlation coefficient is {span(values)} over the "
-        "fits above (from few specimens it is itself poorly known). Two fits can differ in both and still give the "
-        "same forces, so a difference in μ alone or in τ₀ alone says little. Compare the friction "
-        "force at each load, with the covariance taken into account."
+        f"The μ and τ₀ of a fit are correlated: in the fits above, their correlation coefficient is {span(values)} "
+        "(with few specimens, this coefficient is itself uncertain). Two fits may differ in both parameters and still "
+        "give the same forces. A difference in μ alone or in τ₀ alone is therefore weak evidence: compare the "
+        "friction force at each load, including the covariance."
     )
 
 
 def odd_sentence(pull: OddPull) -> str:
-    """How far a pull stands from its siblings."""
+    """How far a pull is from the other pulls of its sample at its load."""
     side = "above" if pull.deviation > 0 else "below"
     return (
         f"{pull.regime.capitalize()} force {percent(abs(pull.deviation))} {side} the median of the {pull.siblings} "
-        f"other pulls of this sample at this load, {abs(pull.score):.1f} robust standard deviations."
+        f"other pulls of this sample at this load ({abs(pull.score):.1f} robust standard deviations)."
     )
 
 
 def by_hand_sentence(decided: ByHand, pull: Pull | None) -> str:
-    """What a person decided about a pull, and what it changed against the automatic reading."""
+    """A decision made by hand about a pull, and how it changed the automatic values."""
     reason = f" ({decided.override.reason})" if decided.override.reason else ""
     if pull is None:
-        return f"Left out by hand{reason}."
+        return f"Excluded by hand{reason}."
     automatic = decided.automatic
     moved = []
     if decided.override.peak_s is not None:
@@ -215,16 +219,16 @@ def by_hand_sentence(decided: ByHand, pull: Pull | None) -> str:
         before, after = (" to ".join(map(significant, p.window_s)) for p in (automatic, pull))
         moved.append(f"sliding window from {before} s to {after} s")
     return (
-        f"Read elsewhere by hand{reason}: {joined(moved)}. Static force {_changed(automatic.static_N, pull.static_N)}, "
+        f"Moved by hand{reason}: {joined(moved)}. Static force {_changed(automatic.static_N, pull.static_N)}, "
         f"sliding force {_changed(automatic.sliding_N, pull.sliding_N)}."
     )
 
 
 def _changed(before: float, after: float) -> str:
     change = percent(after / before - 1) if before else "–"
-    return f"{significant(after)} N where the rule reads {significant(before)} N ({change})"
+    return f"{significant(after)} N, automatic value {significant(before)} N ({change})"
 
 
 def flags_in_words(flags: Iterable[str]) -> str:
-    """Quality flags as readers see them: underscores become spaces."""
-    return ", ".join(flag.replace("_", " ") for flag in flags)
+    """Quality flags as text."""
+    return ", ".join(FLAGS.get(flag, flag.replace("_", " ")) for flag in flags)

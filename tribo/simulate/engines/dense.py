@@ -101,7 +101,7 @@ def _places(layout: Layout, lattice: Lattice) -> NDArray[np.int64]:
 def advance_dense(
     state: State, out: Samples, numerics: Numerics, until_step: int, lattice: Lattice, follow: FloatArray
 ) -> None:
-    """Integrate all blocks until few enough move, then hand them back to the active set."""
+    """Integrate all blocks until few enough move, then return them to the active set."""
     field = field_of(state, numerics, lattice, follow)
     state.counts[CODE] = RUNNING
     swapped = integrate(field, state, out, numerics, until_step)

@@ -1,4 +1,4 @@
-"""Compiled functions whose cache can never answer for older sources.
+"""Compiled functions with a cache that is never used for changed sources.
 
 numba's ``cache=True`` looks only at the file a function stands in, so an edit of something it calls is missed.
 Here the cache directory carries a hash of every source file of this package: a changed file means a new

@@ -46,7 +46,7 @@ class State(NamedTuple):
     links: IntArray  # (n + 1, LINKS)
     neighbours: IntArray  # (n + 1, 8): E, W, N, S, NE, SW, NW, SE
     lists: IntArray  # (2, n + 1): active blocks, rim blocks
-    head: IntArray  # failure queue: first block of each bucket, one bucket a step, used as a ring
+    head: IntArray  # failure queue: first block of each bucket, one bucket per step, used as a ring
     failed: IntArray  # (2, m): the first m failures, block and step
     counts: NDArray[np.int64]
     totals: FloatArray

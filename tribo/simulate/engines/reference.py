@@ -1,7 +1,7 @@
-"""The model as Berardo et al. 2019 print it, on all blocks at every step: slow, short, the judge of the rest.
+"""The model as printed by Berardo et al. (2019), on all blocks at every step: the reference for the other engines.
 
 Springs of the full r_ij (or linearised, for comparison), fourth-order Runge-Kutta, 1e-8 s in the paper. Where
-the text is silent, this was chosen:
+the text gives no details, these choices were made:
 
 - The shear force is K_s (v t + r0 - r); the paper prints it without K_s.
 - Stick or slip is decided at the start of a step and holds for its four stages. A block at rest starts to slide

@@ -96,13 +96,13 @@
     if (!note) card.append(note = make("span", { class: "small decision" }));
     const decision = decisions.get(id), before = traces[id].decided;
     const same = JSON.stringify(decision || null) === JSON.stringify(before || null);
-    const words = { used: "used as the rule reads it", moved: "moved by hand", excluded: "left out" };
-    note.textContent = same ? "" : `Decided: ${words[now]}${decision && decision.reason ? ` (${decision.reason})` : ""}`;
+    const words = { used: "automatic values used", moved: "moved by hand", excluded: "excluded" };
+    note.textContent = same ? "" : `Decision: ${words[now]}${decision && decision.reason ? ` (${decision.reason})` : ""}`;
     count();
   }
   function count() {
     const out = [...decisions.values()].filter((d) => d.action === "exclude").length, moved = decisions.size - out;
-    byId("decision-count").textContent = decisions.size ? `Left out: ${out}. Moved: ${moved}.` : "No decision.";
+    byId("decision-count").textContent = decisions.size ? `Excluded: ${out}. Moved: ${moved}.` : "No decisions yet.";
   }
   count();
 
@@ -125,10 +125,10 @@
     byId("pull-h").textContent = id;
     byId("pull-about").textContent =
       `${card.dataset.sample}, specimen ${card.dataset.specimen}, ${card.dataset.load} N. ` +
-      `Read by the rule: static ${number(automatic(record).peak[1])} N at ${number(automatic(record).peak[0])} s, ` +
+      `Automatic values: static ${number(automatic(record).peak[1])} N at ${number(automatic(record).peak[0])} s, ` +
       `sliding ${number(automatic(record).sliding)} N from ${number(automatic(record).window[0])} to ` +
       `${number(automatic(record).window[1])} s; zero ${number(automatic(record).zero, 3)} N.` +
-      (card.dataset.flags ? ` Flags: ${card.dataset.flags.split(" ").join(", ").replaceAll("_", " ")}.` : "") +
+      (card.querySelector(".flag") ? ` Flags: ${card.querySelector(".flag").textContent}.` : "") +
       (record.doubts || []).map(([time, what]) => ` At ${number(time)} s: ${what}.`).join("");
     if (!dialog.open) dialog.showModal();
     fill();
@@ -172,11 +172,11 @@
     const decision = decisions.get(current.id), now = marks();
     const lacking = decision && decision.action === "exclude" && !decision.reason.trim();
     byId("hand-reason").setAttribute("aria-invalid", lacking ? "true" : "false");
-    const parts = { used: "Used as the rule reads it.", excluded: lacking ? "Left out: give a reason." : "Left out.", moved: "" };
+    const parts = { used: "Automatic values used.", excluded: lacking ? "Excluded: enter a reason." : "Excluded.", moved: "" };
     let text = parts[state(current.id)];
     if (!text) {
-      text = `Moved by hand: about ${number(meanOver(now.start, now.end), 3)} N over this window, ` +
-        `about ${number(current.f[nearest(now.peak)], 3)} N at this peak. tribo reads both anew from the whole trace.`;
+      text = `Moved by hand: about ${number(meanOver(now.start, now.end), 3)} N in this window, ` +
+        `about ${number(current.f[nearest(now.peak)], 3)} N at this peak. The new report computes both from the full trace.`;
     }
     byId("pull-says").textContent = text;
   }
@@ -358,7 +358,7 @@
   byId("zoom-all").addEventListener("click", () => look(current.t[0], current.t[current.t.length - 1]));
   addEventListener("resize", () => { if (dialog.open) draw(); });
 
-  // What is handed back.
+  // The file of decisions.
   const cell = (value) => /[",;\n\r]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value;
   byId("save-overrides").addEventListener("click", () => {
     const lacking = [...decisions].find(([, d]) => d.action === "exclude" && !d.reason.trim());

@@ -1,0 +1,46 @@
+"""Campaigns that follow the model of the diagnosis exactly, but for a change of ln T that a test chooses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from blind.tribometer import Design, hide
+
+from tribo.diagnose.statistics.fit import fit
+from tribo.diagnose.statistics.model import Acting, ModelFit, Setup, predict, setup
+from tribo.diagnose.statistics.observations import observe
+from tribo.diagnose.statistics.predictor import tabled_predictor
+from tribo.mechanisms.table import MECHANISMS
+from tribo.records import Ingested
+
+from .synthetic import SMALL, ingested
+
+LAW = np.array([4.8, 23.0, 3.0, 11.6])  # mu and tau0 in kPa, static then sliding
+Change = Callable[[Setup], np.ndarray]
+
+
+def made(
+    change: Change, seed: int, design: Design = SMALL, repeat_sd: tuple[float, float] = (0.09, 0.07)
+) -> Ingested:
+    """A campaign of ``design``: the model's own prediction, plus ``change`` (n, 2), plus the noise of repeats."""
+    bench = hide(3, [], design)
+    s = _setup(ingested(bench))
+    noise = np.random.default_rng(seed).normal(size=(s.observations.n, 2)) * repeat_sd
+    bench.static, bench.sliding = np.exp(predict(s, LAW, (), ()) + change(s) + noise).T
+    return ingested(bench)
+
+
+def baseline(campaign: Ingested) -> ModelFit:
+    """The model without mechanisms, fitted."""
+    return fit(_setup(campaign))
+
+
+def acting(name: str, *values: float) -> Change:
+    """What a mechanism changes in ln T."""
+    return lambda s: predict(s, LAW, (Acting(MECHANISMS[name]),), (np.array(values),)) - predict(s, LAW, (), ())
+
+
+def _setup(campaign: Ingested) -> Setup:
+    o = observe(campaign)
+    return setup(o, tabled_predictor(o.patterns))

@@ -1,0 +1,70 @@
+"""What a cause gains on tests that the fit has not seen: scores that are densities, and an error that is one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from blind.tribometer import Design
+from scipy.stats import norm
+
+from tribo.diagnose.statistics.fit import fit
+from tribo.diagnose.statistics.gain import gain, gain_of_zero
+from tribo.diagnose.statistics.model import Acting, Setup
+from tribo.diagnose.statistics.observations import observe
+from tribo.mechanisms.table import MECHANISMS
+
+from .known import acting, baseline, made
+
+FLAT = Design(samples=("F",), specimens=10, masses_g=(5.0, 25.0, 90.0, 138.5))
+SPECIMEN_SD, REPEAT_SD = 0.25, 0.03
+
+
+def test_specimens_left_out_score_as_the_density_they_were_drawn_from() -> None:
+    """A new specimen differs by 25 % from the last, its repeats by 3 %; the density has to allow for both."""
+
+    def specimens_apart(s: Setup) -> np.ndarray:
+        names, code = np.unique(s.observations.conditions.specimen, return_inverse=True)
+        return np.random.default_rng(seed).normal(size=(len(names), 2))[code] * SPECIMEN_SD
+
+    scores = []
+    for seed in range(4):
+        f = baseline(made(specimens_apart, seed, FLAT, (REPEAT_SD, REPEAT_SD)))
+        found = gain(f, f, np.random.default_rng(0))
+        assert found is not None
+        assert found.held_out == "specimens"
+        scores.append(found.log_score_baseline)
+    variance = SPECIMEN_SD**2 + REPEAT_SD**2
+    expected = -np.log(2 * np.pi * variance) - 1.0  # two regimes, mean log density of a normal distribution in each
+    assert np.mean(scores) == pytest.approx(expected, abs=0.5)
+
+
+def test_the_error_of_the_gain_is_its_spread_from_campaign_to_campaign() -> None:
+    differences, errors = [], []
+    for seed in range(10):
+        before = baseline(made(acting("temperature", 0.05), seed, FLAT))
+        after = fit(before.setup, (Acting(MECHANISMS["temperature"]),), start=before)
+        found = gain(before, after, np.random.default_rng(seed))
+        assert found is not None
+        differences.append(found.difference)
+        errors.append(found.se)
+    assert min(differences) > 0
+    assert 0.5 < np.sqrt(np.mean(np.square(errors))) / np.std(differences, ddof=1) < 2.0
+
+
+def test_the_error_of_the_gain_of_a_zero_is_that_of_a_mean_over_specimens() -> None:
+    """Every specimen has a gain of its own; the error of their mean is their standard deviation over root k."""
+    o = observe(made(lambda s: np.zeros((s.observations.n, 2)), 0, FLAT))
+    names, specimen = np.unique(o.conditions.specimen, return_inverse=True)
+    rng = np.random.default_rng(1)
+    zero = 0.01 + 0.002 * rng.normal(size=len(names))[specimen] + 0.002 * rng.normal(size=o.n)
+    each = []
+    for k in range(len(names)):
+        here, rest = zero[specimen == k], zero[specimen != k]
+        off, none = (norm(centre, np.sqrt(np.mean((rest - centre) ** 2))) for centre in (np.median(rest), 0.0))
+        each.append(np.mean(off.logpdf(here) - none.logpdf(here)))
+    found = gain_of_zero(replace(o, zero_N=zero), False, rng)
+    assert found is not None
+    assert found.difference == pytest.approx(np.mean(each), rel=1e-6)
+    assert found.se == pytest.approx(np.std(each) / np.sqrt(len(each)), rel=0.15)

@@ -1,0 +1,60 @@
+"""Stick-slip followed cycle by cycle, on a slider whose spring, drive and friction are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tribo.errors import TraceError
+from tribo.records import Trace
+from tribo.traces.cycles import stick_slip_cycles
+
+STIFFNESS_N_PER_M, SPEED_M_S, LOW_N, MEAN_PEAK_N, CYCLES = 168.0, 42e-6, 0.085, 0.097, 60
+LOADING_N_PER_S = STIFFNESS_N_PER_M * SPEED_M_S
+
+
+def slider(seed: int, speed_m_s: float = SPEED_M_S, rate_Hz: float = 200.0) -> tuple[Trace, np.ndarray]:
+    """A spring loads the slider at k v up to peaks that scatter by 2 mN; every slip falls to one level."""
+    rng = np.random.default_rng(seed)
+    peaks = rng.normal(MEAN_PEAK_N, 0.002, CYCLES)
+    rise_s = (peaks - LOW_N) / (STIFFNESS_N_PER_M * speed_m_s)
+    ends = np.cumsum(rise_s)
+    time = np.arange(0.0, ends[-1] + rise_s.mean() / 2, 1 / rate_Hz)
+    begins = np.concatenate([[0.0], ends])
+    force = LOW_N + STIFFNESS_N_PER_M * speed_m_s * (time - begins[np.searchsorted(ends, time, side="right")])
+    return Trace("slider", time, force + rng.normal(0, 1e-4, time.size)), peaks
+
+
+def test_every_stick_is_found_with_its_peak_and_every_slip_with_its_trough() -> None:
+    """Peaks are medians over a tenth of a cycle, so that a sharp one may be read low by a twelfth of its height."""
+    trace, peaks = slider(1)
+    cycles = stick_slip_cycles(trace)
+    assert cycles.peak_N.size == CYCLES
+    assert cycles.peak_N == pytest.approx(peaks, abs=(MEAN_PEAK_N - LOW_N) / 12)
+    assert cycles.trough_N == pytest.approx(np.full(CYCLES - 1, LOW_N), abs=(MEAN_PEAK_N - LOW_N) / 12)
+
+
+def test_a_stick_loads_with_the_stiffness_of_the_spring_times_the_speed_of_the_drive() -> None:
+    assert stick_slip_cycles(slider(2)[0]).mean_loading_N_per_s == pytest.approx(LOADING_N_PER_S, rel=0.02)
+    faster = slider(2, speed_m_s=10 * SPEED_M_S, rate_Hz=2000.0)[0]
+    assert stick_slip_cycles(faster).mean_loading_N_per_s == pytest.approx(10 * LOADING_N_PER_S, rel=0.02)
+
+
+def test_the_period_is_the_time_from_peak_to_peak() -> None:
+    trace, peaks = slider(3)
+    assert stick_slip_cycles(trace).period_s == pytest.approx(np.median(peaks[1:] - LOW_N) / LOADING_N_PER_S, rel=0.05)
+
+
+def test_impulses_of_a_sample_are_no_sticks() -> None:
+    trace, peaks = slider(4)
+    force = trace.force_N.copy()
+    force[::997] += 0.05
+    assert stick_slip_cycles(replace(trace, force_N=force)).peak_N == pytest.approx(peaks, abs=1e-3)
+
+
+def test_a_trace_without_cycles_is_refused() -> None:
+    time = np.arange(0.0, 20.0, 0.01)
+    with pytest.raises(TraceError):
+        stick_slip_cycles(Trace("ramp", time, 0.1 * time))
