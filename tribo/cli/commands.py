@@ -230,7 +230,7 @@ def diagnose(
 
 def _diagnose_published(console: Console, out: Path, seed: int) -> int:
     """The verdict on Table 2 of Berardo et al. (2019), for every interpretation of what it leaves open."""
-    from tribo.diagnose.from_table.table_diagnosis import diagnose_published
+    from tribo.diagnose.from_table.published_diagnosis import diagnose_published
     from tribo.published import BERARDO2019, data_dir, load_table2, load_table2_simulated_anew
     from tribo.report.provenance import provenance_of_table
     from tribo.report.table_report import write_published

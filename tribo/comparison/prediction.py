@@ -127,7 +127,7 @@ def calibrated_cells(
 
     Parameters and exceptions are those of :func:`predict`.
     """
-    from tribo.simulate import SimConfig, calibrate, stratified_design
+    from tribo.simulate import CalibrationRuns, SimConfig, calibrate, stratified_design
 
     laws = _flat_laws(fits, flat)
     loads = loads_to_simulate(campaign)
@@ -136,7 +136,7 @@ def calibrated_cells(
 
     def calibration() -> LocalFriction:
         return calibrate(
-            *wanted, pressures_Pa=pressures, seed=model.seed, jobs=model.jobs,
+            *wanted, runs=CalibrationRuns(pressures, seed=model.seed), jobs=model.jobs,
             progress=lambda done, total: progress("calibrating on the flat sample", done, total),
         )  # fmt: skip
 

@@ -22,7 +22,7 @@ from tribo.figures import (
 from tribo.figures.record import FigureOf, StudyFigure
 
 if TYPE_CHECKING:
-    from tribo.diagnose.from_table.table_diagnosis import PublishedDiagnosis
+    from tribo.diagnose.from_table.published_diagnosis import PublishedDiagnosis
     from tribo.figures.record import DiagnosisFigure
 
 FIGURES: dict[str, StudyFigure] = {

@@ -16,7 +16,8 @@ from tribo.figures import style
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
-    from tribo.diagnose.from_table.table_diagnosis import Outlook, PublishedDiagnosis
+    from tribo.diagnose.from_table.published_diagnosis import PublishedDiagnosis
+    from tribo.diagnose.from_table.table_diagnosis import Outlook
 
 RATIO_COLUMNS = [
     "sample", "regime", "pressure_kPa", "measured_over_model", "low", "high", "low_independent", "high_independent",

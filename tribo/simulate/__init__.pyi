@@ -1,4 +1,4 @@
-from .calibration import calibrate as calibrate
+from .calibration import CalibrationRuns as CalibrationRuns, calibrate as calibrate
 from .config import (
     PAPER as PAPER,
     FrictionTerms as FrictionTerms,

@@ -24,16 +24,15 @@ from tribo.diagnose.from_table.table_observations import (
     friction_at,
     model_covariance,
     predict_table,
-    read_table,
     root_of,
 )
 from tribo.diagnose.statistics.model import Acting
-from tribo.diagnose.verdict import Estimate, Gain, Outcome, Verdict
+from tribo.diagnose.verdict import Estimate, Gain, Outcome
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 GUESSES = {
     "deformed patterns": ("cavity_shear_deformation", "cavity_collapse"),
@@ -113,19 +112,6 @@ class Outlook:
         return tuple(w for w in self.weighed if w.gain > self.weighed[0].gain - CLOSE)
 
 
-@dataclass(frozen=True)
-class PublishedDiagnosis:
-    """The verdict on a printed table, with every reading of it; the first is the one the verdict speaks of."""
-
-    source: str
-    verdict: Verdict
-    outlooks: tuple[Outlook, ...]
-
-    @property
-    def main(self) -> Outlook:
-        return self.outlooks[0]
-
-
 def readings() -> list[Reading]:
     """The paper's own column under even loads first; then the other correlations, means of three, our simulation."""
     even = design_correlation(even_loads())
@@ -141,36 +127,6 @@ def readings() -> list[Reading]:
         for specimens in (1, 3)
         for correlation, why in correlations.items()
     ]
-
-
-def diagnose_published(
-    table2: pd.DataFrame,
-    own: pd.DataFrame,
-    *,
-    seed: int = 0,
-    progress: Progress | None = None,
-) -> PublishedDiagnosis:
-    """The diagnosis of Table 2 of Berardo et al. (2019) in every reading.
-
-    Parameters
-    ----------
-    table2 : as :func:`tribo.published.load_table2` gives it
-    own : the same table simulated anew: sample, regime, mu, tau0_kPa
-    seed : of the simulated tables that stand for chance
-    """
-    measured = table2[table2["source"] == "experiment"]
-    models = {"paper": table2[table2["source"] == "simulation"], "tribo": own}
-    found = []
-    for k, reading in enumerate(readings()):
-        if progress is not None:
-            progress("reading the table", k, len(readings()))
-        table = read_table(measured, models[reading.model], reading.correlation, reading.specimens)
-        found.append(look_at(table, reading, np.random.default_rng(seed)))
-    from tribo.diagnose.from_table.table_sentences import verdict_of
-
-    rng = np.random.default_rng(seed)
-    gain = gain_on_samples(found[0].baseline, found[0].weighed[0], rng)
-    return PublishedDiagnosis("berardo2019", verdict_of(found, gain), tuple(found))
 
 
 def look_at(table: Table, reading: Reading, rng: np.random.Generator) -> Outlook:
