@@ -165,6 +165,15 @@ def test_no_two_modules_share_a_name() -> None:
     assert {stem for stem in stems if stems.count(stem) > 1} <= SHARED_NAMES
 
 
+def test_the_tree_in_contributing_names_every_package_and_top_module() -> None:
+    tree = (PACKAGE.parent / "CONTRIBUTING.md").read_text("utf-8").split("    tribo/\n")[1].split("\n\n")[0]
+    words = set(tree.split())
+    packages = {f"{p.parent.name}/" for p in PACKAGE.glob("*/**/__init__.py")}
+    modules = {p.name for p in PACKAGE.glob("[!_]*.py")}
+    assert packages | modules <= words
+    assert {w for w in words if w.endswith(("/", ".py"))} <= packages | modules
+
+
 def test_a_forbidden_import_is_seen() -> None:
     assert imported_rooms("from tribo.report import tables\nimport tribo.cli\nfrom tribo import stages") == {
         "report",
