@@ -51,12 +51,14 @@ def write_until(
         drawn = write_figures(shown, out, diagnosis, made_by.origin, drawing)
         written += [out / "figures" / f"{f.name}.{ending}" for f in drawn.values() for ending in f.files]
     if until == "report":
+        from tribo.report.content import content
         from tribo.report.crate import write_crate
-        from tribo.report.html.page import html
-        from tribo.report.paper.pdf import pdf
+        from tribo.report.html.page import page_of
+        from tribo.report.paper.pdf import pdf_of
 
-        written.append(write_text(out / "report.html", html(study, made_by, drawn, verdict)))
-        written.append(write_bytes(out / "report.pdf", pdf(study, made_by, drawn, verdict)))
+        said = content(study, made_by, verdict)
+        written.append(write_text(out / "report.html", page_of(said, drawn)))
+        written.append(write_bytes(out / "report.pdf", pdf_of(said, drawn, made_by.origin)))
         written.append(write_crate(study, out, made_by, written))
     write_provenance(made_by, out, settle_outputs(out, before, made_by, written, complete=until == "report"))
 
