@@ -1,4 +1,4 @@
-"""The diagnosis in words: misfits, causes, exclusions, and what a campaign could have shown."""
+"""The diagnosis in words: misfits, causes, exclusions, and the smallest effects that a campaign could show."""
 
 from __future__ import annotations
 
