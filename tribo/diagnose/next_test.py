@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from tribo.diagnose.search.weigh import Candidate, effect
-from tribo.diagnose.statistics.model import ModelFit, log_forces
+from tribo.diagnose.search.naming import Candidate
+from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.model import effect_of, log_forces
 from tribo.diagnose.terms import in_words
 from tribo.diagnose.verdict import NextTest
 from tribo.mechanisms.record import Conditions
@@ -82,7 +83,8 @@ def _without(first: Candidate, second: Candidate) -> list[NextTest]:
     """Repeating the most affected sample with the cause of one of the two removed (vented, controlled, fresh)."""
     found = []
     for candidate in (first, second):
-        f, change = candidate.fit, effect(candidate.fit)
+        f = candidate.fit
+        change = effect_of(f.setup, f.law, candidate.acting, candidate.values)
         conditions = f.setup.observations.conditions
         strongest = max(set(conditions.sample.tolist()), key=lambda n: np.abs(change[conditions.sample == n]).mean())
         rows = np.flatnonzero(conditions.sample == strongest)

@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tribo.diagnose.search.looks import candidates
-from tribo.diagnose.search.screen import beyond_law, cleared
-from tribo.diagnose.search.weigh import ALIKE, unseen
-from tribo.diagnose.statistics.model import Acting, ModelFit, Noise, Setup, predict, setup
+from tribo.diagnose.search.naming import ALIKE
+from tribo.diagnose.search.start_effects import StartEffects, start_effects
+from tribo.diagnose.statistics.linear import Linear, ModelFit
+from tribo.diagnose.statistics.model import Acting, Setup, Target, predict, setup
 from tribo.diagnose.statistics.observations import NO_FLAT, Observations, conditions_of
 from tribo.diagnose.statistics.predictor import Predictor, tabled_predictor
+from tribo.diagnose.statistics.scatter import Noise, begin, scored
 from tribo.diagnose.terms import ABSORBED, not_varied
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray
@@ -69,17 +70,16 @@ def plan_design(
         Expected flat law: mu and tau0 in kPa, static then sliding.
     """
     f = _expected(campaign, noise, law, predictor)
-    s = f.setup
-    acting = _one_each(s, f.law)
-    columns = _changes(s, f.law, acting)
-    left = cleared(f, columns)[0]
+    effects = start_effects(f)
+    first = _one_each(effects)
+    acting, columns = [effects.acting[k] for k in first], effects.changes.columns[:, :, first]
+    left = f.linear.cleared(columns)[0]
     size = np.sqrt(np.sum(left**2, axis=0))
     cosine = (left.T @ left) / np.maximum(size[:, None] * size[None, :], 1e-12)
-    hidden = unseen(f)
-    shown = beyond_law(f, columns)
+    shown = f.linear.beyond_law(columns)
     order = np.argsort(-size / np.maximum(np.ptp(shown, axis=(0, 1)), 1e-12))
-    found = [_finding(k, acting, shown, size, cosine, hidden) for k in order]
-    return Plan(s.observations.n, (*found, *_not_applying(s)))
+    found = [_finding(k, acting, shown, size, cosine, effects.absorbed) for k in order]
+    return Plan(f.setup.observations.n, (*found, *_not_applying(f.setup)))
 
 
 def _expected(campaign: Campaign, noise: Noise, law: FloatArray, predictor: Predictor | None) -> ModelFit:
@@ -98,26 +98,28 @@ def _expected(campaign: Campaign, noise: Noise, law: FloatArray, predictor: Pred
     s = setup(o, predictor or tabled_predictor(patterns))
     q = s.random.shape[2]
     s = replace(s, observations=replace(o, log_force=predict(s, law, (), ())))
-    return ModelFit(
-        s, (), law, (), noise, np.zeros(q), np.zeros((n, 2)), np.ones(n), 0.0, np.zeros((4 + q, 4 + q))
-    )  # fmt: skip
+    state = begin(s, law, np.zeros((n, 2)), noise)
+    jacobian = Target(s, ()).jacobian(law, s.observations.log_force - state.residual)
+    score, weight = scored(s, state)
+    linear = Linear(jacobian, s.random, state.residual, state.factor, state.precision, weight)
+    return ModelFit(s, (), law, (), noise, state.effects, state.residual, score, np.zeros((4 + q, 4 + q)), linear)
 
 
-def _one_each(s: Setup, law: FloatArray) -> list[Acting]:
+def _one_each(effects: StartEffects) -> list[int]:
     """The first choice of every mechanism, and every column."""
-    seen: dict[str, Acting] = {}
-    for a in candidates(s, law):
-        seen.setdefault(a.name, a)
+    seen: dict[str, int] = {}
+    for k, a in enumerate(effects.acting):
+        seen.setdefault(a.name, k)
     return list(seen.values())
 
 
-def _changes(s: Setup, law: FloatArray, acting: list[Acting]) -> FloatArray:
-    before = predict(s, law, (), ())
-    return np.stack([predict(s, law, (a,), (a.mechanism.start(),)) - before for a in acting], axis=2)
-
-
 def _finding(
-    k: int, acting: list[Acting], columns: FloatArray, size: FloatArray, cosine: FloatArray, hidden: dict[str, float]
+    k: int,
+    acting: list[Acting],
+    columns: FloatArray,
+    size: FloatArray,
+    cosine: FloatArray,
+    hidden: frozenset[str],
 ) -> Finding:
     a = acting[k]
     m = a.mechanism

@@ -1,4 +1,4 @@
-"""The diagnosis in words: misfits, causes, exclusions, and the smallest effects that a campaign could show."""
+"""The diagnosis in words: misfits, causes, exclusions and the summary."""
 
 from __future__ import annotations
 
@@ -6,17 +6,19 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from tribo.diagnose.search.looks import Look, candidates
-from tribo.diagnose.search.screen import Screen, beyond_law, cleared
-from tribo.diagnose.search.weigh import Candidate
-from tribo.diagnose.statistics.direct_evidence import Evidence, certain_evidence, stated_evidence
-from tribo.diagnose.statistics.interval import recovered
-from tribo.diagnose.statistics.model import Acting, ModelFit, predict
+from tribo.diagnose.search.looks import Look
+from tribo.diagnose.search.naming import Candidate
+from tribo.diagnose.search.screen import Screen
+from tribo.diagnose.statistics.direct_evidence import Evidence, stated_evidence
+from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.model import Acting
 from tribo.diagnose.terms import ABSORBED, in_words, not_varied
 from tribo.diagnose.verdict import Cause, Estimate, Excluded, Misfit, Outcome
-from tribo.mechanisms.record import Mechanism
+from tribo.mechanisms.direct_estimates import TraceEvidence
+from tribo.mechanisms.record import Conditions, Mechanism
 from tribo.mechanisms.table import MECHANISMS, mechanism
 
+Weighed = tuple[Candidate, float, Mapping[str, Estimate]]  # with its share and its parameters
 SHOWN = 8
 WHAT = {
     "static": "static friction", "sliding": "sliding friction", "both": "friction (static and sliding)",
@@ -36,17 +38,16 @@ def misfits_of(screened: Screen, level: float, flat: str = "") -> list[Misfit]:
     seen: set[tuple[str, str]] = set()
     for k in order:
         look = screened.looks[k]
-        p = screened.p_adjusted(float(screened.strength[k]))
+        p = float(screened.p[k])
         key = (_covariate(look), look.sample)
         if p >= level or len(found) >= SHOWN:
             break
         if look.kind != "mechanism" and not look.is_taken_up(flat) and key not in seen:
             seen.add(key)
             found.append(_misfit(look, float(screened.size[k]), screened.coefficients[k], p))
-    if not found and len(order) and screened.p_adjusted() < level:
+    if not found and len(order) and screened.p[order[0]] < level:
         k = order[0]
-        look = screened.looks[k]
-        found.append(_misfit(look, float(screened.size[k]), screened.coefficients[k], screened.p_adjusted()))
+        found.append(_misfit(screened.looks[k], float(screened.size[k]), screened.coefficients[k], float(screened.p[k])))
     return found
 
 
@@ -141,18 +142,19 @@ def p_text(p: float) -> str:
     return "below 0.001" if p < 1e-3 else f"{p:.3f}"
 
 
-def cause_of(candidate: Candidate, weight: float, baseline: ModelFit) -> Cause:
-    """A weighed mechanism with its parameters and 90 % intervals, its effect beyond what ``baseline`` fits."""
-    parameters = estimates(candidate.fit, len(candidate.fit.acting) - 1)
-    m = candidate.acting.mechanism
-    moved = candidate.fit.predicted - baseline.predicted
-    size = 100.0 * float(np.expm1(np.clip(np.ptp(moved), 0.0, 5.0)))
-    name, first = next(iter(parameters.items()))
-    text = (
-        f"{sentence_case(acting_in_words(candidate.acting))}: {_estimate(name, first)}. It changes T by {size:.0f} %, "
-        f"peak to peak. {signs_of(m)}"
-    )
-    return Cause(candidate.name, weight, parameters, text)
+def causes_weighed(shown: Sequence[Weighed], baseline: ModelFit) -> list[Cause]:
+    """Weighed mechanisms with their parameters, the effect of each beyond what ``baseline`` fits."""
+    found = []
+    for candidate, weight, parameters in shown:
+        moved = candidate.fit.predicted - baseline.predicted
+        size = 100.0 * float(np.expm1(np.clip(np.ptp(moved), 0.0, 5.0)))
+        name, first = next(iter(parameters.items()))
+        text = (
+            f"{sentence_case(acting_in_words(candidate.acting))}: {_estimate(name, first)}. It changes T by "
+            f"{size:.0f} %, peak to peak. {signs_of(candidate.acting.mechanism)}"
+        )
+        found.append(Cause(candidate.name, weight, parameters, text))
+    return found
 
 
 def signs_of(m: Mechanism) -> str:
@@ -164,23 +166,13 @@ def _estimate(name: str, e: Estimate) -> str:
     return f"{name} = {e.value:.3g} {e.unit}".rstrip() + f" (90 % interval {e.low:.3g} to {e.high:.3g})"
 
 
-def estimates(f: ModelFit, index: int) -> dict[str, Estimate]:
-    """Parameters of one mechanism of a fit with their 90 % intervals."""
-    parameters = f.acting[index].mechanism.parameters
-    return {
-        p.name: Estimate(value, low, high, p.unit)
-        for p, (value, low, high) in zip(parameters, recovered(f, index), strict=True)
-    }
+def causes_from_evidence(certain: Mapping[str, tuple[Evidence, float]]) -> list[tuple[Cause, Misfit]]:
+    """Mechanisms that direct evidence shows with certainty, each estimate with its adjusted p value."""
+    return [_cause_from(name, stated, *certain[name]) for name, stated in stated_evidence().items() if name in certain]
 
 
-def causes_from_evidence(evidence: Mapping[str, Evidence]) -> list[tuple[Cause, Misfit]]:
-    """Mechanisms that direct evidence shows with certainty; p values are adjusted for every estimate that was made."""
-    looks = sum(e.looks for e in evidence.values())
-    return [_cause_from(name, e, e.p_adjusted(looks)) for name, e in certain_evidence(evidence).items()]
-
-
-def _cause_from(name: str, e: Evidence, p: float) -> tuple[Cause, Misfit]:
-    m, stated = MECHANISMS[name], stated_evidence()[name]
+def _cause_from(name: str, stated: TraceEvidence, e: Evidence, p: float) -> tuple[Cause, Misfit]:
+    m = MECHANISMS[name]
     value = Estimate(e.value, *e.interval, e.unit)
     text = f"{sentence_case(m.in_words)}: {_estimate(m.amplitude.name, value)}, {stated.source}."
     observable, percent = ("rise", 100.0 * e.change) if stated.quantity == "rise" else ("zero", float("nan"))
@@ -189,12 +181,11 @@ def _cause_from(name: str, e: Evidence, p: float) -> tuple[Cause, Misfit]:
 
 
 def exclusions(
-    baseline: ModelFit, evidence: Mapping[str, Evidence], unseen: Collection[str]
+    conditions: Conditions, evidence: Mapping[str, Evidence], absorbed: Collection[str]
 ) -> list[Excluded]:
     """What is not weighed: mechanisms that the design cannot show, and those that direct evidence decides."""
-    conditions = baseline.setup.observations.conditions
     reasons = {
-        name: _why_not_weighed(m, evidence.get(name), name in unseen, m.applies(conditions))
+        name: _why_not_weighed(m, evidence.get(name), name in absorbed, m.applies(conditions))
         for name, m in MECHANISMS.items()
     }
     return [Excluded(name, reason) for name, reason in reasons.items() if reason]
@@ -220,27 +211,6 @@ def _zero_reason(quantity: str, e: Evidence) -> str:
         f"the force before contact {what} {e.value:.2g} +- {e.standard_error:.1g} {e.unit}; the zero of each pull was "
         "subtracted, so it cannot explain the friction forces"
     )
-
-
-def smallest_effects(
-    baseline: ModelFit, screened: Screen, level: float, unseen: Collection[str]
-) -> dict[str, float]:
-    """Peak-to-peak effect in percent that each mechanism would need to be found half the time."""
-    need = float(np.quantile(screened.chance, 1.0 - level)) if len(screened.chance) else 3.7
-    found: dict[str, float] = {}
-    s = baseline.setup
-    before = predict(s, baseline.law, (), ())
-    acting = candidates(s, baseline.law)
-    columns = np.stack(
-        [predict(s, baseline.law, (a,), (a.mechanism.start(),)) - before for a in acting], axis=2
-    )
-    left = np.sqrt(np.sum(cleared(baseline, columns)[0] ** 2, axis=0))
-    size = np.ptp(beyond_law(baseline, columns), axis=(0, 1))
-    for k, a in enumerate(acting):
-        if left[k] > 1e-6 and a.name not in unseen:
-            percent = 100.0 * float(np.expm1(min(size[k] * need / left[k], 5.0)))
-            found[a.name] = min(percent, found.get(a.name, np.inf))
-    return {n: round(float(v), 2) for n, v in found.items() if v < 300.0}
 
 
 def summary(

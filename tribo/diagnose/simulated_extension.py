@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.diagnose.diagnosis_record import Diagnosis, NotSimulated, SimulatedExtension
-from tribo.diagnose.search.weigh import effect
 from tribo.diagnose.sentences import name_in_words
-from tribo.diagnose.statistics.model import ModelFit
+from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.model import effect_of
 from tribo.diagnose.statistics.pattern_table import flat_law
 from tribo.errors import SimulationError
 from tribo.mechanisms.record import Conditions, Values
@@ -51,7 +51,8 @@ def simulate_extension(
     jobs : threads
     """
     names = tuple(a.name for a in model.acting)
-    quick = sum((effect(model, k) for k in range(len(model.acting))), np.zeros_like(model.residual))
+    each = zip(model.acting, model.values, strict=True)
+    quick = sum((effect_of(model.setup, model.law, a, v) for a, v in each), np.zeros_like(model.residual))
     picked = representatives(model, quick)
     if not picked:
         bounds = f"{100 * np.expm1(LEAST_CHANGE):.0f} and {100 * np.expm1(MOST_CHANGE):.0f} %"

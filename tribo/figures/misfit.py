@@ -16,7 +16,7 @@ from tribo.records import FloatArray
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
-    from tribo.diagnose.statistics.model import ModelFit
+    from tribo.diagnose.statistics.linear import ModelFit
 
 COLUMNS = ["observable", "row", "covariate", "label", "effect_percent", "strength", "p_adjusted", "mark"]
 ALL = "all samples"
@@ -103,10 +103,8 @@ def _end_to_end(column: Covariate, residual: FloatArray, here: np.ndarray) -> fl
 
 def _strengths(f: ModelFit, shapes: FloatArray, observable: str) -> FloatArray:
     """Signed score of every shape (n, k) in one observable, as the diagnosis itself judges its looks."""
-    from tribo.diagnose.search.screen import cleared
-
     stacked = shapes[:, None, :] * np.array(PATTERNS[observable])[None, :, None]
-    left, target = cleared(f, stacked)
+    left, target = f.linear.cleared(stacked)
     length = np.sqrt(np.sum(left**2, axis=0))
     return np.asarray(left.T @ target / np.maximum(length, 1e-9))
 

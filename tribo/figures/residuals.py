@@ -152,12 +152,10 @@ def _summaries(
 
 def _variance(d: Diagnosis, weight: FloatArray) -> FloatArray:
     """Variance of one test's residual by the fitted noise: repeats, reading, specimens, error of the sample."""
-    from tribo.diagnose.statistics.scatter import prior_precision
-
     f = d.baseline
     repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup), weight)
     repeats += f.setup.observations.reading**2 @ weight**2
-    effects = np.einsum("nrq,r->nq", f.setup.random, weight) ** 2 @ (1.0 / prior_precision(f.setup, f.noise))
+    effects = np.einsum("nrq,r->nq", f.setup.random, weight) ** 2 @ (1.0 / f.linear.precision)
     return np.asarray(repeats + effects)
 
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribo.diagnose.statistics.model import Acting, ModelFit, Setup, log_forces, predict
-from tribo.mechanisms.table import MECHANISMS
+from tribo.diagnose.statistics.model import Acting, Setup, StartChanges
 from tribo.records import FloatArray
 
 OBSERVABLES = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (1.0, 1.0), "drop": (1.0, -1.0)}
@@ -38,33 +37,16 @@ class Look:
         return int(self.columns.shape[2])
 
 
-def all_looks(f: ModelFit) -> list[Look]:
-    """Every look that this design allows, given the fitted model (its own mechanisms left out)."""
-    s = f.setup
-    looks = [*_mechanisms(f), *_covariates(s), *_levels(s), *_samples(s), *_specimens(s), *_periods(s), *_blocks(s)]
+def all_looks(s: Setup, changes: StartChanges) -> list[Look]:
+    """Every look that this design allows, ``changes`` being those of the candidates."""
+    looks = [*_mechanisms(changes), *_covariates(s), *_levels(s), *_samples(s), *_specimens(s), *_periods(s), *_blocks(s)]
     return [look for look in looks if np.isfinite(look.columns).all() and np.ptp(look.columns) > 0]
 
 
-def candidates(s: Setup, law: FloatArray) -> list[Acting]:
-    """Every mechanism and choice that could show in the friction forces of this design."""
-    base, conditions = s.base(law), s.observations.conditions
-    found = []
-    for mechanism in MECHANISMS.values():
-        if not mechanism.changes_forces or not mechanism.applies(conditions):
-            continue
-        found += [Acting(mechanism, str(choice)) for choice in mechanism.choices(base, conditions)]
-    return found
-
-
-def _mechanisms(f: ModelFit) -> Iterator[Look]:
-    s = f.setup
-    before = predict(s, f.law, (), ())
-    for acting in candidates(s, f.law):
-        change = predict(s, f.law, (acting,), (acting.mechanism.start(),)) - before
-        yield Look("mechanism", "both", acting.name, "", change[:, :, None], acting)
-    law = s.base(f.law)
-    adhesion = log_forces(law.forces(np.zeros(s.observations.n)))
-    yield Look("trend", "both", "tau0", "", np.exp(adhesion - before)[:, :, None])
+def _mechanisms(changes: StartChanges) -> Iterator[Look]:
+    for k, acting in enumerate(changes.acting):
+        yield Look("mechanism", "both", acting.name, "", changes.columns[:, :, k : k + 1], acting)
+    yield Look("trend", "both", "tau0", "", changes.adhesion[:, :, None])
 
 
 def numeric_covariates(s: Setup) -> dict[str, FloatArray]:

@@ -1,4 +1,7 @@
-"""From a screened campaign to the mechanisms that explain it, one after the other."""
+"""Weighing the mechanisms and naming those that explain a screened campaign, one after the other.
+
+Each mechanism is fitted and its freedom penalised; then follows which of them cannot be distinguished.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +10,42 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tribo.diagnose.search.looks import all_looks
-from tribo.diagnose.search.screen import Progress, Screen, screen
-from tribo.diagnose.search.weigh import TIED, Candidate, effect, likeness, weigh
+from tribo.diagnose.search.screen import Progress, Screen, screen_left
+from tribo.diagnose.search.start_effects import StartEffects, start_effects
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.model import FIXED, ModelFit, Setup
+from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.model import Acting, Target
 from tribo.records import FloatArray
 
+PER_PARAMETER = 1.0  # log likelihood that a further parameter has to earn
+CHOICES_FITTED = 4  # of a mechanism with many choices, how many are fitted in full
+IN_REACH, CLOSE_BY = 0.5, 3.0  # share of the best first gain, less so much, from which a mechanism is fitted to the end
+# Log likelihood, at least and as a share of what the best gains, by which two mechanisms must differ to be told apart:
+# if the one is at work, the difference has the expected value gain (1 - cosine^2) and twice that as its variance.
+TIED = (5.0, 0.08)
+ALIKE = float(np.sqrt(1.0 - 2.0 * TIED[1]))  # cosine above which not even a strong effect tells two mechanisms apart
 CLOSE = 3.0  # log likelihood within which a mechanism that can be told apart explains about equally
 IN_COMMON = 0.5  # share of its effect that a mechanism must have in common with one it is tied to
-FORM = 0.12  # by how much of its own effect a law may be wrong in form, sample by sample
 MAX_CAUSES = 2
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A mechanism fitted on top of a model; ``gain`` is the log likelihood it earns net of its freedom, ``raw``
+    the same before the choices it had are paid for."""
+
+    acting: Acting
+    fit: ModelFit
+    gain: float
+    raw: float
+
+    @property
+    def name(self) -> str:
+        return self.acting.name
+
+    @property
+    def values(self) -> FloatArray:
+        return self.fit.values[-1]
 
 
 @dataclass(frozen=True)
@@ -37,7 +65,7 @@ class Named:
 
 
 def name_causes(
-    baseline: ModelFit,
+    start: StartEffects,
     first: Screen,
     excluded: Sequence[str],
     *,
@@ -47,23 +75,24 @@ def name_causes(
     progress: Progress | None = None,
 ) -> Named:
     """Add mechanisms while each is beyond chance and a misfit remains."""
-    model, seen = baseline, first
+    model, seen = start.model, first
     causes: list[tuple[Candidate, ...]] = []
     weighed: tuple[Candidate, ...] = ()
     rivals: tuple[Candidate, ...] = ()
-    while len(causes) < MAX_CAUSES and seen.p_adjusted() < level:
-        ranked = weigh(model, excluded)
+    while len(causes) < MAX_CAUSES and seen.p.min() < level:
+        ranked = weigh(start, excluded)
         weighed = weighed or tuple(ranked)
-        if not ranked or not _is_real(ranked[0], seen, level):
+        if not ranked or seen.p_library(float(np.sqrt(2.0 * max(ranked[0].raw, 0.0)))) >= level:
             break
         alike, rivals = _sort_rivals(model, ranked)
         causes.append(alike)
         model = alike[0].fit
-        seen = _screen_left(model, replicates, rng, progress)
+        seen = screen_left(model, replicates=replicates, rng=rng, progress=progress)
+        start = start_effects(model)
     if len(causes) == MAX_CAUSES:
         model, causes, rivals = _revisit(model, causes, rivals, excluded)
-        seen = _screen_left(model, replicates, rng, progress)
-    return Named(model, tuple(causes), rivals, tuple(weighed), seen, seen.p_adjusted())
+        seen = screen_left(model, replicates=replicates, rng=rng, progress=progress)
+    return Named(model, tuple(causes), rivals, tuple(weighed), seen, float(seen.p.min()))
 
 
 def _revisit(
@@ -73,17 +102,71 @@ def _revisit(
     excluded: Sequence[str],
 ) -> tuple[ModelFit, list[tuple[Candidate, ...]], tuple[Candidate, ...]]:
     """The first cause was picked before the second was known: pick it again beside the second."""
-    alone = fit(model.setup, (causes[-1][0].acting,), start=model)
-    ranked = weigh(alone, excluded)
+    alone = _refitted(model, (causes[-1][0].acting,))
+    ranked = weigh(start_effects(alone), excluded)
     if not ranked:
         return model, causes, rivals
     alike, others = _sort_rivals(alone, ranked)
     return ranked[0].fit, [alike, causes[-1]], (*rivals, *others)
 
 
-def _is_real(candidate: Candidate, seen: Screen, level: float) -> bool:
-    """Whether chance would make some mechanism earn as much in fewer than ``level`` of the campaigns."""
-    return seen.p_library(float(np.sqrt(2.0 * max(candidate.raw, 0.0)))) < level
+def weigh(start: StartEffects, excluded: Sequence[str] = ()) -> list[Candidate]:
+    """Every mechanism that is not excluded, added to a model; the best choice of each, best first.
+
+    All are tried, and those within reach of the best are fitted to the end.
+    """
+    groups: dict[str, list[int]] = {}
+    for k, acting in enumerate(start.acting):
+        if acting.name not in excluded and acting not in start.model.acting:
+            groups.setdefault(acting.mechanism.name, []).append(k)
+    tried: dict[str, Candidate] = {}
+    for group in groups.values():
+        short = [_candidate(start.model, acting, len(group)) for acting in _most_promising(start, group)]
+        tried |= {c.name: c for c in sorted(short, key=lambda c: c.gain)}
+    best = max((c.gain for c in tried.values()), default=0.0)
+    hopeful = IN_REACH * best - CLOSE_BY
+    found = [_to_the_end(start.model, c) if c.gain > hopeful else c for c in tried.values()]
+    return sorted(found, key=lambda c: -c.gain)
+
+
+def _most_promising(start: StartEffects, group: list[int]) -> list[Acting]:
+    """All of a small group; of a large one those whose score test is strongest in the right direction."""
+    acting = [start.acting[k] for k in group]
+    if len(group) <= CHOICES_FITTED:
+        return acting
+    left = start.left[:, group]
+    pull = left.T @ start.target
+    # log likelihood of the whole effect, for what is present as a whole or absent
+    whole = pull - 0.5 * np.sum(left**2, axis=0)
+    small = 0.5 * pull * np.abs(pull) / (np.sum(left**2, axis=0) + 1e-12)
+    whole_or_absent = acting[0].mechanism.choosing.all_or_nothing_sd is not None
+    rank = whole if whole_or_absent else np.abs(small)
+    return [acting[i] for i in np.argsort(-rank)[:CHOICES_FITTED]]
+
+
+def _candidate(start: ModelFit, acting: Acting, choices: int) -> Candidate:
+    fitted = _refitted(start, (*start.acting, acting), to_the_end=False)
+    return _judged(start, fitted, float(np.log(choices)))
+
+
+def _to_the_end(start: ModelFit, c: Candidate) -> Candidate:
+    """A candidate that was only tried, fitted until nothing changes any more."""
+    return _judged(start, _refitted(c.fit, c.fit.acting), c.raw - c.gain)
+
+
+def _refitted(f: ModelFit, acting: Sequence[Acting], to_the_end: bool = True) -> ModelFit:
+    """The same campaign with these mechanisms, from where a fit has got to."""
+    return fit(f.setup, acting, start=f, to_the_end=to_the_end)
+
+
+def _judged(start: ModelFit, fitted: ModelFit, choosing: float) -> Candidate:
+    """What a fit earns beyond ``start``: its parameters and the choosing, in log likelihood, are paid for."""
+    acting = fitted.acting[-1]
+    raw = fitted.score - start.score - PER_PARAMETER * (len(acting.mechanism.parameters) - 1)
+    sd = acting.mechanism.choosing.all_or_nothing_sd
+    if sd is not None:
+        raw -= 0.5 * ((fitted.values[-1][0] - acting.mechanism.amplitude.start) / sd) ** 2
+    return Candidate(acting, fitted, float(raw - choosing), float(raw))
 
 
 def _sort_rivals(
@@ -95,45 +178,25 @@ def _sort_rivals(
     near = [c for c in ranked[1:] if c.gain > best.gain - max(CLOSE, tied)]
     if not near:
         return (best,), ()
-    cosine = np.maximum(likeness(start, best, near), 0.0)
+    cosine = np.maximum(_likeness(start, best, near), 0.0)
     told = (best.gain * (1.0 - cosine**2) > 2.0 * tied) | (cosine**2 < IN_COMMON)
     alike = [c for c, apart in zip(near, told, strict=True) if not apart and c.gain > best.gain - tied]
     rivals = [c for c, apart in zip(near, told, strict=True) if apart and c.gain > best.gain - CLOSE]
     return (best, *alike), tuple(rivals)
 
 
-def _screen_left(
-    model: ModelFit, replicates: int, rng: np.random.Generator, progress: Progress | None
-) -> Screen:
-    """What is left after a model, its laws allowed to be wrong in form by a share of their own effect."""
-    widened = fit(with_form_error(model), model.acting, start=model, iterations=10)
-    return screen(widened, all_looks(widened), replicates=replicates, rng=rng, progress=progress)
+def _likeness(start: ModelFit, best: Candidate, others: Sequence[Candidate]) -> FloatArray:
+    """Cosine between what ``best`` changes in the fitted ln T and what each other changes, (others,).
 
-
-def with_form_error(model: ModelFit) -> Setup:
-    """Random effects that let each mechanism's effect be off per sample and regime, in size and slope."""
-    s = model.setup
-    c = s.observations.conditions
-    columns, sizes = [], []
-    for k in range(len(model.acting)):
-        change = effect(model, k)
-        for shape in (np.ones(s.observations.n), s.log_pressure):
-            for sample in np.unique(c.sample):
-                here = (c.sample == sample) * shape
-                for regime in (0, 1):
-                    column = np.zeros_like(change)
-                    column[:, regime] = change[:, regime] * here
-                    if np.abs(column).max() > 1e-6:
-                        columns.append(column)
-                        sizes.append(FORM)
-    if not columns:
-        return s
-    return replace(
-        s,
-        random=np.concatenate([s.random, np.stack(columns, axis=2)], axis=2),
-        unit=np.concatenate([s.unit, np.array(sizes)]),
-        group=np.concatenate([s.group, np.full(len(sizes), FIXED)]),
-    )
+    Every model has its own flat law fitted, so what the flat law can absorb is already removed; the sample error
+    and the specimens are taken out here.
+    """
+    f, ground = best.fit, Target(best.fit.setup, best.fit.acting[:-1])
+    jacobian = ground.jacobian(np.concatenate([f.law, *f.values[:-1]]), f.predicted)
+    changes = [c.fit.predicted - start.predicted for c in (best, *others)]
+    left = replace(f.linear, jacobian=jacobian).cleared(np.stack(changes, axis=2))[0]
+    length = np.sqrt(np.sum(left**2, axis=0)) + 1e-12
+    return np.asarray((left[:, 1:].T @ left[:, 0]) / (length[1:] * length[0]))
 
 
 def weights_of(candidates: Sequence[Candidate]) -> FloatArray:

@@ -1,4 +1,4 @@
-"""What chance gives: campaigns that a fitted model makes itself, many at a time, fitted and looked at again.
+"""What chance gives: campaigns that a fitted model makes itself, many at a time, and fitted again.
 
 Replicates keep the design and draw specimens, pattern errors and repeats anew. The law is linear over the little it
 moves from replicate to replicate, so that derivatives are those of the fit; robust weights, noise sizes and random
@@ -7,22 +7,20 @@ effects are estimated for every replicate by the steps of :mod:`tribo.diagnose.s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.diagnose.statistics.fit import jacobian_at
-from tribo.diagnose.statistics.model import FIXED, ModelFit
+from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.model import FIXED
 from tribo.diagnose.statistics.scatter import (
-    inverse_noise,
-    log_size_prior,
-    prior_precision,
-    prior_sd,
-    updated_repeats,
-    updated_sizes,
-    whitener,
+    Sizes,
+    fitted_sizes,
+    log_priors,
+    products_of,
+    replicate_weights,
+    sizes_updated,
 )
 from tribo.records import FloatArray
 
@@ -30,112 +28,66 @@ STEPS = 4
 # Of the logarithms of the sizes (GAIN, SLOPE: two each; PATTERN): what a look explains of the patterns makes their
 # error smaller, and what it explains of a specimen makes the spread of the specimens smaller.
 SIZE_STEPS = np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, -0.7], [-0.7, -0.7, -0.7, -0.7, 0.0]])
-AS_FITTED = SIZE_STEPS[:1]
 ROUNDING = 1e-9
-TAKEN_UP = 1e-6  # share of a column's information below which nothing of it is left to see
-
-
-@dataclass(frozen=True)
-class Columns:
-    """The columns of all looks, (2, n, k) regime by regime, and the products that their informations need.
-
-    Each look spans ``spans`` of the k; ``products`` (3, n, m) are the static, mixed and sliding products of every
-    pair of columns of one look, those of each look at ``pairs`` of the m.
-    """
-
-    columns: FloatArray
-    spans: tuple[slice, ...]
-    products: FloatArray
-    pairs: tuple[slice, ...]
-
-
-def columns_of(stacked: FloatArray, spans: Sequence[slice]) -> Columns:
-    """Columns (n, 2, k) of all looks, made ready for many replicates."""
-    columns = np.ascontiguousarray(stacked.transpose(1, 0, 2))
-    index = [np.arange(span.start, span.stop) for span in spans]
-    first = np.concatenate([np.repeat(i, len(i)) for i in index])
-    second = np.concatenate([np.tile(i, len(i)) for i in index])
-    ends = np.cumsum([len(i) ** 2 for i in index])
-    pairs = [slice(int(end) - len(i) ** 2, int(end)) for end, i in zip(ends, index, strict=True)]
-    return Columns(columns, tuple(spans), _products(columns, first, second), tuple(pairs))
-
-
-def _products(columns: FloatArray, first: NDArray[np.int64], second: NDArray[np.int64]) -> FloatArray:
-    static, sliding = columns
-    mixed = static[:, first] * sliding[:, second] + sliding[:, first] * static[:, second]
-    return np.stack([static[:, first] * static[:, second], mixed, sliding[:, first] * sliding[:, second]])
 
 
 @dataclass(frozen=True)
 class Replicates:
     """Fitted replicates: ``precision`` (r, 3, n) of every test, robust weight included, as static, mixed, sliding;
-    ``residual`` (r, 2, n) of ln T; ``prior`` (r, p + q), the precision of the model's columns ``along`` (2, n, p + q);
-    ``group`` (p + q,) is that of the size of each, FIXED where there is none, and ``sizes`` (r, 5) are the sizes.
+    ``residual`` (r, 2, n) of ln T. ``weighted`` (r, p + q, 2n) are the model's columns times that precision, and
+    ``normal`` (r, p + q, p + q) their products without the prior. ``prior`` (r, p + q) is the precision of these
+    columns, ``group`` (p + q,) that of the size of each, FIXED where there is none, and ``log_priors`` (steps, r)
+    the log density of the sizes after each of SIZE_STEPS.
     """
 
     precision: FloatArray
     residual: FloatArray
+    weighted: FloatArray
+    normal: FloatArray
     prior: FloatArray
-    along: FloatArray
     group: NDArray[np.int64]
-    sizes: FloatArray
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """The noise of every replicate: ``repeat`` (r, 2, 2), what the repeats depend on, ``scatter`` (r, k), and sizes of
-    the random ``effects`` (r, 5).
-    """
-
-    repeat: FloatArray
-    scatter: FloatArray
-    effects: FloatArray
+    log_priors: FloatArray
 
 
 def as_measured(f: ModelFit) -> Replicates:
     """The fitted campaign itself, as if it were one replicate."""
-    left = (f.residual - f.setup.random @ f.effects).T[None]
-    sizes = _fitted_sizes(f, 1)
-    inverse = inverse_noise(f.setup, sizes.repeat, sizes.scatter)
-    return _replicates(f, sizes, inverse * _weights(f, inverse, left)[:, None], f.residual.T[None])
+    s, left = f.setup, (f.residual - f.setup.random @ f.effects).T[None]
+    sizes = fitted_sizes(s, f.noise, 1)
+    precision = sizes.inverse * replicate_weights(sizes, left, f.noise.tail)[:, None]
+    return _replicates(f, sizes, precision, f.residual.T[None], log_priors(s, sizes, SIZE_STEPS))
 
 
-def _replicates(f: ModelFit, sizes: Sizes, precision: FloatArray, residual: FloatArray) -> Replicates:
-    p = len(np.concatenate([f.law, *f.values]))
+def _replicates(
+    f: ModelFit, sizes: Sizes, precision: FloatArray, residual: FloatArray, log_prior: FloatArray
+) -> Replicates:
+    p = f.linear.jacobian.shape[2]
     group = np.concatenate([np.full(p, FIXED), f.setup.group])
-    return Replicates(precision, residual, _prior(f, sizes), _along_of(f), group, sizes.effects)
+    weighted, normal = _normal(_along_of(f), precision)
+    return Replicates(precision, residual, weighted, normal, _prior(p, sizes), group, log_prior)
 
 
 def _along_of(f: ModelFit) -> FloatArray:
     """The model's columns, (2, n, p + q)."""
-    return np.ascontiguousarray(np.concatenate([jacobian_at(f), f.setup.random], axis=2).transpose(1, 0, 2))
-
-
-def _fitted_sizes(f: ModelFit, replicates: int) -> Sizes:
-    scatter = np.zeros(f.setup.scatter.shape[1]) if f.noise.scatter is None else f.noise.scatter
-    parts = (f.noise.repeat, scatter, f.noise.sizes)
-    return Sizes(*(np.repeat(part[None], replicates, axis=0) for part in parts))
+    return np.ascontiguousarray(np.concatenate([f.linear.jacobian, f.linear.random], axis=2).transpose(1, 0, 2))
 
 
 def drawn_residuals(f: ModelFit, rng: np.random.Generator, replicates: int) -> FloatArray:
     """ln T less what the fit predicts, (replicates, 2, n): new specimens and pattern errors, repeats resampled."""
     s = f.setup
     n = s.observations.n
-    effects = rng.normal(size=(replicates, s.random.shape[2])) / np.sqrt(prior_precision(s, f.noise))
-    factor = whitener(s, f.noise)
-    left = standardised(f, factor)
-    noise = np.linalg.solve(factor, left[rng.integers(0, n, (replicates, n))][..., None])[..., 0]
+    effects = rng.normal(size=(replicates, s.random.shape[2])) / np.sqrt(f.linear.precision)
+    left = standardised(f)
+    noise = np.linalg.solve(f.linear.factor, left[rng.integers(0, n, (replicates, n))][..., None])[..., 0]
     return np.asarray(noise.transpose(0, 2, 1) + np.tensordot(effects, s.random, axes=(1, 2)).transpose(0, 2, 1))
 
 
-def standardised(f: ModelFit, factor: FloatArray) -> FloatArray:
+def standardised(f: ModelFit) -> FloatArray:
     """What is left of every test in units of the fitted noise, (n, 2).
 
     The random effects follow the tests, so that what is left is smaller than the noise: it is scaled to the noise that
     the fit states, to a weighted covariance of one.
     """
-    s = f.setup
-    left = np.einsum("nij,nj->ni", factor, f.residual - s.random @ f.effects)
+    left = np.einsum("nij,nj->ni", f.linear.factor, f.residual - f.setup.random @ f.effects)
     left = left - left.mean(axis=0)
     for _ in range(3):
         weight = (f.noise.tail + 2.0) / (f.noise.tail + np.sum(left**2, axis=1))
@@ -155,31 +107,25 @@ def refit_sizes(f: ModelFit, residual: FloatArray) -> Sizes:
 
 
 def _refitted(f: ModelFit, residual: FloatArray) -> tuple[Replicates, Sizes]:
-    s, along = f.setup, _along_of(f)
-    p = along.shape[2] - s.random.shape[2]
-    sizes, left = _fitted_sizes(f, len(residual)), residual
+    s, along, tail = f.setup, _along_of(f), f.noise.tail
+    p = f.linear.jacobian.shape[2]
+    sizes, left = fitted_sizes(s, f.noise, len(residual)), residual
     solution = np.zeros((len(residual), along.shape[2]))
     for _ in range(STEPS):
-        inverse = inverse_noise(s, sizes.repeat, sizes.scatter)
-        weight = _weights(f, inverse, left)
-        spread, solution = _solve(along, inverse * weight[:, None], residual, _prior(f, sizes))
+        weight = replicate_weights(sizes, left, tail)
+        spread, solution = _solve(along, sizes.inverse * weight[:, None], residual, _prior(p, sizes))
         left = residual - _along(along, solution)
-        effects = updated_sizes(s, sizes.effects, solution[:, p:], np.diagonal(spread, axis1=1, axis2=2)[:, p:])
-        squares = weight[:, None] * (_squares(left) + _blurred(along, spread))
-        sizes = Sizes(*updated_repeats(s, (sizes.repeat, sizes.scatter), squares, f.noise.tail), effects)
-    inverse = inverse_noise(s, sizes.repeat, sizes.scatter)
-    precision = inverse * _weights(f, inverse, left)[:, None]
-    return _replicates(f, sizes, precision, left + _along(along[:, :, p:], solution[:, p:])), sizes
+        squares = weight[:, None] * (products_of(left) + _blurred(along, spread))
+        found = solution[:, p:], np.diagonal(spread, axis1=1, axis2=2)[:, p:]
+        sizes = sizes_updated(s, sizes, found, squares, tail)
+    precision = sizes.inverse * replicate_weights(sizes, left, tail)[:, None]
+    without = left + _along(along[:, :, p:], solution[:, p:])
+    return _replicates(f, sizes, precision, without, log_priors(s, sizes, SIZE_STEPS)), sizes
 
 
 def _along(along: FloatArray, solution: FloatArray) -> FloatArray:
     """Sums of columns (2, n, k) with coefficients (r, k), shape (r, 2, n)."""
     return np.asarray(np.tensordot(solution, along, axes=(1, 2)))
-
-
-def _squares(left: FloatArray) -> FloatArray:
-    """Static, mixed and sliding products of what is left, (r, 3, n)."""
-    return np.stack([left[:, 0] ** 2, left[:, 0] * left[:, 1], left[:, 1] ** 2], axis=1)
 
 
 def _blurred(along: FloatArray, spread: FloatArray) -> FloatArray:
@@ -190,16 +136,9 @@ def _blurred(along: FloatArray, spread: FloatArray) -> FloatArray:
     return np.stack([np.einsum("rnk,nk->rn", moved[:, a], along[b]) for a, b in pairs], axis=1)
 
 
-def _weights(f: ModelFit, inverse: FloatArray, left: FloatArray) -> FloatArray:
-    """Weight of every test under the bivariate t, (r, n), for the inverse of its noise (r, 3, n)."""
-    distance = np.einsum("ran,ran,a->rn", inverse, _squares(left), [1.0, 2.0, 1.0])
-    return np.asarray((f.noise.tail + 2.0) / (f.noise.tail + distance))
-
-
-def _prior(f: ModelFit, sizes: Sizes) -> FloatArray:
+def _prior(p: int, sizes: Sizes) -> FloatArray:
     """Precision of the columns of the model, (r, p + q): next to none for law and mechanisms."""
-    p = len(np.concatenate([f.law, *f.values]))
-    return np.concatenate([np.full((len(sizes.effects), p), 1e-12), prior_sd(f.setup, sizes.effects) ** -2], axis=1)
+    return np.concatenate([np.full((len(sizes.effects), p), 1e-12), sizes.precision], axis=1)
 
 
 def _weighted(precision: FloatArray, columns: FloatArray) -> FloatArray:
@@ -227,97 +166,3 @@ def _solve(
     inverse = np.linalg.inv(normal * both + ROUNDING * np.eye(along.shape[2])) * both
     right = np.einsum("rpm,rm->rp", weighted, residual.reshape(len(residual), -1))
     return inverse, np.einsum("rpq,rq->rp", inverse, right)
-
-
-@dataclass(frozen=True)
-class Products:
-    """Products of the model's columns, the looks and the residual of every replicate, whatever the random sizes are."""
-
-    normal: FloatArray  # (r, p, p)
-    right: FloatArray  # (r, p)
-    crossed: FloatArray  # (r, p, k)
-    pull: FloatArray  # (r, k)
-    whole: FloatArray  # (r, m)
-
-
-def scores(
-    fitted: Replicates, looks: Columns, steps: FloatArray = SIZE_STEPS
-) -> tuple[FloatArray, list[FloatArray]]:
-    """Score test of every look beyond the model's own columns.
-
-    The scores are taken at several sizes of the random effects, ``steps`` (steps, 5) of their logarithms from the
-    fitted ones; each pays what it loses of the likelihood of the model without the look. Returns the largest
-    chi-squared values (r, looks) and the coefficients of each look, (r, d) each, at the first sizes.
-    """
-    found = _products_of(fitted, looks)
-    each = [_scores_at(fitted, looks, found, step) for step in steps]
-    evidence = np.stack([e for _, _, e in each])
-    chi2 = np.stack([c for c, _, _ in each]) + 2.0 * (evidence - evidence.max(axis=0))[:, :, None]
-    return np.maximum(chi2.max(axis=0), 0.0), each[0][1]
-
-
-def _products_of(fitted: Replicates, looks: Columns) -> Products:
-    r, columns = len(fitted.precision), looks.columns.reshape(-1, looks.columns.shape[2])
-    weighted, normal = _normal(fitted.along, fitted.precision)
-    k = weighted.shape[1]
-    return Products(
-        normal=normal,
-        right=np.einsum("rpm,rm->rp", weighted, fitted.residual.reshape(r, -1)),
-        crossed=(weighted.reshape(r * k, -1) @ columns).reshape(r, k, -1),
-        pull=_weighted_residual(fitted) @ columns,
-        whole=fitted.precision.reshape(r, -1) @ looks.products.reshape(-1, looks.products.shape[2]),
-    )
-
-
-def _scores_at(
-    fitted: Replicates, looks: Columns, found: Products, step: FloatArray
-) -> tuple[FloatArray, list[FloatArray], FloatArray]:
-    """Chi-squared values, coefficients, and the log likelihood (r,) of the model without the looks, at one step."""
-    k = found.right.shape[1]
-    prior = fitted.prior * np.exp(-2.0 * np.append(step, 0.0))[fitted.group]
-    normal = found.normal.copy()
-    normal[:, np.arange(k), np.arange(k)] += prior
-    scale = 1.0 / np.sqrt(np.diagonal(normal, axis1=1, axis2=2) + 1e-300)
-    root = np.linalg.cholesky(normal * scale[:, :, None] * scale[:, None, :] + ROUNDING * np.eye(k))
-    clear = np.linalg.inv(root) * scale[:, None, :]
-    crossed = clear @ found.crossed
-    own = (clear @ found.right[:, :, None])[:, :, 0]
-    pull = found.pull - np.einsum("rpk,rp->rk", crossed, own)
-    chi2, coefficients = _solved(looks, pull, found.whole, crossed)
-    curvature = np.log(np.diagonal(root, axis1=1, axis2=2) / scale).sum(axis=1)
-    sizes = sum(log_size_prior(g, fitted.sizes[:, g] * np.exp(step[g])) for g in range(len(step)) if g in fitted.group)
-    evidence = 0.5 * np.log(prior).sum(axis=1) - curvature + 0.5 * np.sum(own**2, axis=1) + sizes
-    return chi2, coefficients, evidence
-
-
-def _weighted_residual(fitted: Replicates) -> FloatArray:
-    static, mixed, sliding = (fitted.precision[:, i] for i in range(3))
-    first, second = fitted.residual[:, 0], fitted.residual[:, 1]
-    both = np.stack([static * first + mixed * second, mixed * first + sliding * second], axis=1)
-    return np.asarray(both.reshape(len(both), -1))
-
-
-def _solved(
-    looks: Columns, pull: FloatArray, whole: FloatArray, crossed: FloatArray
-) -> tuple[FloatArray, list[FloatArray]]:
-    """Chi-squared values (r, looks) and coefficients of each look, (r, d): those of one column all at once."""
-    first = [span.start for span in looks.spans]
-    left = whole[:, [pair.start for pair in looks.pairs]] - np.sum(crossed**2, axis=1)[:, first]
-    seen = left > TAKEN_UP * whole[:, [pair.start for pair in looks.pairs]]
-    alone = np.where(seen, pull[:, first] / np.maximum(left, 1e-300), 0.0)
-    chi2, coefficients = alone * pull[:, first], list(alone.T[:, :, None])
-    for i, (span, pair) in enumerate(zip(looks.spans, looks.pairs, strict=True)):
-        if span.stop > span.start + 1:
-            coefficients[i] = _solution(pull[:, span], whole[:, pair], crossed[:, :, span])
-            chi2[:, i] = np.sum(pull[:, span] * coefficients[i], axis=1)
-    return chi2, coefficients
-
-
-def _solution(pull: FloatArray, whole: FloatArray, crossed: FloatArray) -> FloatArray:
-    """Coefficients of one look (r, d) from its scores (r, d), its raw information (r, d d) and its share (r, p, d) of
-    the model's columns."""
-    r, d = pull.shape
-    whole = whole.reshape(r, d, d)
-    floor = ROUNDING * (np.diagonal(whole, axis1=1, axis2=2) + 1e-12)
-    information = whole - crossed.transpose(0, 2, 1) @ crossed + floor[:, :, None] * np.eye(d)
-    return np.asarray(np.linalg.solve(information, pull[:, :, None])[:, :, 0])

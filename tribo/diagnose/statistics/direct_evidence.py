@@ -45,6 +45,21 @@ class Evidence:
         return min(max(looks * p, LEAST_P), 1.0)
 
 
+@dataclass(frozen=True)
+class TraceFindings:
+    """All estimates from the traces by mechanism, and those that are certain, each with its adjusted p value."""
+
+    found: Mapping[str, Evidence]
+    certain: Mapping[str, tuple[Evidence, float]]
+
+
+def trace_findings(o: Observations) -> TraceFindings:
+    """What the traces show by themselves; p values are adjusted for every estimate that was made."""
+    found = direct_evidence(o)
+    looks = sum(e.looks for e in found.values())
+    return TraceFindings(found, {name: (e, e.p_adjusted(looks)) for name, e in certain_evidence(found).items()})
+
+
 def direct_evidence(o: Observations) -> dict[str, Evidence]:
     """What the traces show of every mechanism that states an evidence in them, by name."""
     found = {name: ESTIMATES[stated.quantity](o) for name, stated in stated_evidence().items()}

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.special import gammaln
 
-from tribo.diagnose.statistics.fit import fit_without, jacobian_at
-from tribo.diagnose.statistics.model import Acting, ModelFit, Setup, predict
+from tribo.diagnose.statistics.fit import fit_without
+from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.model import Acting, Setup, Target
 from tribo.diagnose.statistics.observations import Observations
 from tribo.diagnose.verdict import Gain
 from tribo.records import FloatArray
@@ -60,9 +60,10 @@ def _held_out(model: ModelFit, out: np.ndarray) -> tuple[FloatArray, FloatArray]
     """Log density per held-out test and its error in ln T (m, 2), the model fitted to all other tests."""
     trained = fit_without(model, out)
     s = model.setup
-    residual = s.observations.log_force - predict(s, trained.law, trained.acting, trained.values)
+    target, x = Target(s, trained.acting), np.concatenate([trained.law, *trained.values])
+    residual = target.residual(x)
     error = (residual - s.random @ trained.effects)[out]
-    jacobian = jacobian_at(replace(trained, setup=s, residual=residual))
+    jacobian = target.jacobian(x, s.observations.log_force - residual)
     columns = np.concatenate([jacobian, s.random], axis=2)[out]
     spread = np.einsum("nip,pq,njq->nij", columns, trained.covariance, columns, optimize=True)
     reading = s.observations.reading[out][:, :, None] ** 2 * np.eye(2)

@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.model import FIXED, N_LAW, PATTERN, ModelFit
+from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.model import FIXED, N_LAW, PATTERN
 from tribo.diagnose.statistics.scatter import log_size_prior
 from tribo.mechanisms.record import Mechanism
 from tribo.records import FloatArray
@@ -57,7 +58,7 @@ def with_pattern_error(f: ModelFit, factor: float) -> ModelFit:
     s = f.setup
     here = s.group == PATTERN
     held = replace(s, unit=np.where(here, factor * s.unit, s.unit), group=np.where(here, FIXED, s.group))
-    return fit(held, f.acting, start=replace(f, setup=held), iterations=15)
+    return fit(held, f.acting, start=f, iterations=15)
 
 
 def _averaged(

@@ -7,8 +7,9 @@ factor on the error that the predictor states for its patterns, and repeats that
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +17,13 @@ from numpy.typing import NDArray
 from tribo.diagnose.statistics.observations import Observations
 from tribo.diagnose.statistics.predictor import Predictor
 from tribo.mechanisms.record import Base, Forces, Mechanism
+from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray
 
 N_LAW = 4  # mu static, tau0 static (kPa), mu sliding, tau0 sliding (kPa)
 FLOOR_N = 1e-6
+LAW_SCALE = np.array([1.0, 5.0, 1.0, 5.0])
+LAW_BOUNDS = (np.array([0.01, -200.0, 0.01, -200.0]), np.array([100.0, 1000.0, 100.0, 1000.0]))
 # Groups of random effects that share one size: gain and slope of the specimens, each in the mean of both regimes and
 # in their difference, which a specimen shares to an unknown degree; the patterns.
 GAIN, SLOPE, PATTERN = 0, 2, 4
@@ -47,6 +51,7 @@ class Setup:
     ``random`` has shape (n, 2, q). The standard deviation of effect j is ``unit[j]`` times the size of its ``group[j]``
     (GAIN and SLOPE, plus one for the difference of the regimes; PATTERN), or ``unit[j]`` itself where the group is
     FIXED. ``scatter`` (n, k) holds what the repeats may depend on: the sample, and the logarithm of the force.
+    ``first_law`` (4,) is a first guess of the flat law.
     """
 
     observations: Observations
@@ -57,6 +62,7 @@ class Setup:
     group: NDArray[np.int64]
     log_pressure: FloatArray
     scatter: FloatArray
+    first_law: FloatArray
 
     def take(self, keep: NDArray[np.bool_]) -> Setup:
         """The same for the tests that ``keep`` (n,) marks."""
@@ -103,19 +109,20 @@ def setup(observations: Observations, predictor: Predictor) -> Setup:
                 groups.append(PATTERN)
     bare = Setup(
         o, predictor, predictor.table(c.sample),
-        np.stack(columns, axis=2), np.array(units), np.array(groups), log_p, np.zeros((o.n, 0)),
+        np.stack(columns, axis=2), np.array(units), np.array(groups), log_p, np.zeros((o.n, 0)), np.zeros(N_LAW),
     )  # fmt: skip
-    return replace(bare, scatter=_scatter(bare))
+    law = _first_law(bare)
+    return replace(bare, first_law=law, scatter=_scatter(bare, law))
 
 
-def _scatter(s: Setup) -> FloatArray:
+def _scatter(s: Setup, law: FloatArray) -> FloatArray:
     """One column per sample, and the logarithm of the expected force about its mean."""
     c = s.observations.conditions
-    log_force = predict(s, first_law(s), (), ()).mean(axis=1)
+    log_force = predict(s, law, (), ()).mean(axis=1)
     return np.column_stack([*((c.sample == name) * 1.0 for name in np.unique(c.sample)), log_force - log_force.mean()])
 
 
-def first_law(s: Setup) -> FloatArray:
+def _first_law(s: Setup) -> FloatArray:
     """A robust first guess of the flat law, one regime after the other."""
     c, law = s.observations.conditions, []
     for regime in (0, 1):
@@ -154,60 +161,119 @@ def predict(s: Setup, law: FloatArray, acting: Sequence[Acting], values: Sequenc
     return total
 
 
-@dataclass(frozen=True)
-class Noise:
-    """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance; specimen gains (2,) and
-    slopes (2,) per e-fold of load, along the mean of static and sliding friction and along their difference.
+def effect_of(s: Setup, law: FloatArray, acting: Acting, values: FloatArray) -> FloatArray:
+    """Change of ln T by one mechanism on top of the flat law, (n, 2)."""
+    base, conditions = s.base(law), s.observations.conditions
+    after = acting.mechanism.law(values, base, conditions, acting.choice)
+    return log_forces(after) - log_forces(base.forces(conditions.normal_load_N))
 
-    ``pattern`` is the factor on the error that the predictor states for its patterns. The standard deviation of the
-    repeats of a test is multiplied by exp(``scatter`` @ setup.scatter). ``tail`` is the number of degrees of freedom of
-    the t distribution of the repeats.
+
+def with_form_error(
+    s: Setup, law: FloatArray, acting: Sequence[Acting], values: Sequence[FloatArray], share: float
+) -> Setup:
+    """Further random effects that let each mechanism's effect be off by a ``share`` of itself, per sample and regime,
+    in size and slope."""
+    c = s.observations.conditions
+    columns, sizes = [], []
+    for a, v in zip(acting, values, strict=True):
+        change = effect_of(s, law, a, v)
+        for shape in (np.ones(s.observations.n), s.log_pressure):
+            for sample in np.unique(c.sample):
+                here = (c.sample == sample) * shape
+                for regime in (0, 1):
+                    column = np.zeros_like(change)
+                    column[:, regime] = change[:, regime] * here
+                    if np.abs(column).max() > 1e-6:
+                        columns.append(column)
+                        sizes.append(share)
+    if not columns:
+        return s
+    return replace(
+        s,
+        random=np.concatenate([s.random, np.stack(columns, axis=2)], axis=2),
+        unit=np.concatenate([s.unit, np.array(sizes)]),
+        group=np.concatenate([s.group, np.full(len(sizes), FIXED)]),
+    )
+
+
+def candidates(s: Setup, law: FloatArray) -> list[Acting]:
+    """Every mechanism and choice that could show in the friction forces of this design."""
+    base, conditions = s.base(law), s.observations.conditions
+    found = []
+    for mechanism in MECHANISMS.values():
+        if not mechanism.changes_forces or not mechanism.applies(conditions):
+            continue
+        found += [Acting(mechanism, str(choice)) for choice in mechanism.choices(base, conditions)]
+    return found
+
+
+@dataclass(frozen=True)
+class StartChanges:
+    """What every candidate changes before it is fitted.
+
+    ``columns`` (n, 2, k) are the changes of ln T at the start values of ``acting`` (k,); ``every_start`` holds the
+    changes at all sizes that a fit would start from, (n, 2, sizes), of the mechanisms without a choice, by name.
+    ``adhesion`` (n, 2) is the share of adhesion in T by the law alone.
     """
 
-    repeat: FloatArray
-    specimen: FloatArray
-    slope: FloatArray = field(default_factory=lambda: np.array([0.02, 0.02]))
-    pattern: float = 1.0
-    scatter: FloatArray | None = None
-    tail: float = 8.0
+    acting: tuple[Acting, ...]
+    columns: FloatArray
+    every_start: Mapping[str, FloatArray]
+    adhesion: FloatArray
 
-    @property
-    def sizes(self) -> FloatArray:
-        """Of every group of random effects, (5,)."""
-        return np.array([*self.specimen, *self.slope, self.pattern])
 
-    def with_sizes(self, sizes: FloatArray) -> Noise:
-        return replace(
-            self, specimen=sizes[GAIN:SLOPE], slope=sizes[SLOPE:PATTERN], pattern=float(sizes[PATTERN])
-        )
-
-    def per_test(self, s: Setup) -> FloatArray:
-        """Covariance of the repeats of every test, (n, 2, 2)."""
-        if self.scatter is None:
-            return np.repeat(self.repeat[None], s.observations.n, axis=0)
-        return np.asarray(self.repeat * np.exp(2.0 * s.scatter @ self.scatter)[:, None, None])
+def start_changes(s: Setup, law: FloatArray) -> StartChanges:
+    """The changes of all candidates on top of the flat law ``law``, mechanisms of a model left out."""
+    acting = candidates(s, law)
+    before = predict(s, law, (), ())
+    columns, every = [], {}
+    for a in acting:
+        start = a.mechanism.start()
+        columns.append(predict(s, law, (a,), (start,)) - before)
+        if not a.choice:
+            further = [np.array([size, *start[1:]]) for size in a.mechanism.amplitude.tries]
+            changes = [columns[-1], *(predict(s, law, (a,), (v,)) - before for v in further)]
+            every[a.name] = np.stack(changes, axis=2)
+    adhesion = np.exp(log_forces(s.base(law).forces(np.zeros(s.observations.n))) - before)
+    return StartChanges(tuple(acting), np.stack(columns, axis=2), every, adhesion)
 
 
 @dataclass(frozen=True)
-class ModelFit:
-    """A fitted model. ``residual`` (n, 2) is ln T measured minus the law without random effects.
-
-    ``score`` is the log of the marginal likelihood (Laplace), ``covariance`` that of law, mechanism
-    parameters and random effects together, ``effects`` (q,) the predicted random effects, ``weight`` (n,) how
-    much each test counts.
-    """
+class Target:
+    """What is being fitted: a campaign, the mechanisms on top of the flat law, and their bounds."""
 
     setup: Setup
     acting: tuple[Acting, ...]
-    law: FloatArray
-    values: tuple[FloatArray, ...]
-    noise: Noise
-    effects: FloatArray
-    residual: FloatArray
-    weight: FloatArray
-    score: float
-    covariance: FloatArray = field(repr=False)
 
-    @property
-    def predicted(self) -> FloatArray:
-        return self.setup.observations.log_force - self.residual
+    @cached_property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        lows = [LAW_BOUNDS[0], *(a.mechanism.bounds()[0] for a in self.acting)]
+        highs = [LAW_BOUNDS[1], *(a.mechanism.bounds()[1] for a in self.acting)]
+        return np.concatenate(lows), np.concatenate(highs)
+
+    @cached_property
+    def scales(self) -> FloatArray:
+        return np.concatenate([LAW_SCALE, *(np.abs(a.mechanism.start()) for a in self.acting)])
+
+    def values(self, x: FloatArray) -> tuple[FloatArray, ...]:
+        """The parameters of each mechanism, out of those of all."""
+        ends = N_LAW + np.cumsum([len(a.mechanism.parameters) for a in self.acting])
+        return tuple(np.split(x[N_LAW:], ends[:-1] - N_LAW)) if self.acting else ()
+
+    def predict(self, x: FloatArray) -> FloatArray:
+        """ln T of every test, (n, 2)."""
+        return predict(self.setup, x[:N_LAW], self.acting, self.values(x))
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        return self.setup.observations.log_force - self.predict(x)
+
+    def jacobian(self, x: FloatArray, now: FloatArray) -> FloatArray:
+        """Forward differences, (n, 2, p); at an upper bound the step goes down."""
+        columns = []
+        for k, scale in enumerate(self.scales):
+            step = 1e-4 * max(scale, 1e-3 * abs(x[k]))
+            step = -step if x[k] + step > self.bounds[1][k] else step
+            moved = x.copy()
+            moved[k] += step
+            columns.append((self.predict(moved) - now) / step)
+        return np.stack(columns, axis=2)

@@ -8,10 +8,12 @@ from datetime import datetime
 
 import numpy as np
 
+from tribo.errors import FitError, Problem
 from tribo.mechanisms.record import Conditions, StringArray
 from tribo.records import Campaign, FloatArray, Ingested, Pattern, Pull, SetAside, Test, Trace
 
 STATIC, SLIDING = 0, 1
+FEWEST_TESTS = 12
 NO_FLAT = "flat"  # stands for the flat law where no flat sample was measured or chosen
 
 
@@ -93,6 +95,19 @@ def observe(ingested: Ingested) -> Observations:
         flat=campaign.flat_sample or NO_FLAT,
         set_aside=(*ingested.set_aside, *left_out),
     )
+
+
+def enough(o: Observations) -> Observations:
+    """The same observations. Raises FitError below twelve tests or two loads."""
+    loads = len(np.unique(o.conditions.normal_load_N))
+    if o.n < FEWEST_TESTS or loads < 2:
+        raise FitError(
+            Problem(
+                "too_few_tests", "too few usable tests to diagnose anything", found=f"{o.n} tests at {loads} loads",
+                allowed=f"at least {FEWEST_TESTS} tests at two loads",
+            )
+        )  # fmt: skip
+    return o
 
 
 def conditions_of(

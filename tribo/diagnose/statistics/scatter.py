@@ -7,9 +7,11 @@ Functions with ``...`` in a shape take one campaign or a batch of replicates.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
+
 import numpy as np
 
-from tribo.diagnose.statistics.model import Noise, Setup
+from tribo.diagnose.statistics.model import GAIN, PATTERN, SLOPE, Setup
 from tribo.records import FloatArray
 
 # Expected size, and how many effects that is worth: specimen gains and slopes, pattern factor
@@ -20,10 +22,43 @@ SCATTER_SD = 0.5  # of ln of the ratio of repeats between samples, and of the po
 SMALLEST_SD = 0.003  # of ln T: no reading repeats better
 
 
-def first_noise(s: Setup) -> Noise:
+@dataclass(frozen=True)
+class Noise:
+    """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance; specimen gains (2,) and
+    slopes (2,) per e-fold of load, along the mean of static and sliding friction and along their difference.
+
+    ``pattern`` is the factor on the error that the predictor states for its patterns. The standard deviation of the
+    repeats of a test is multiplied by exp(``scatter`` @ setup.scatter). ``tail`` is the number of degrees of freedom of
+    the t distribution of the repeats.
+    """
+
+    repeat: FloatArray
+    specimen: FloatArray
+    slope: FloatArray = field(default_factory=lambda: np.array([0.02, 0.02]))
+    pattern: float = 1.0
+    scatter: FloatArray | None = None
+    tail: float = 8.0
+
+    @property
+    def sizes(self) -> FloatArray:
+        """Of every group of random effects, (5,)."""
+        return np.array([*self.specimen, *self.slope, self.pattern])
+
+    def with_sizes(self, sizes: FloatArray) -> Noise:
+        return replace(
+            self, specimen=sizes[GAIN:SLOPE], slope=sizes[SLOPE:PATTERN], pattern=float(sizes[PATTERN])
+        )
+
+    def per_test(self, s: Setup) -> FloatArray:
+        """Covariance of the repeats of every test, (n, 2, 2)."""
+        if self.scatter is None:
+            return np.repeat(self.repeat[None], s.observations.n, axis=0)
+        return np.asarray(self.repeat * np.exp(2.0 * s.scatter @ self.scatter)[:, None, None])
+
+
+def first_noise() -> Noise:
     """Where the estimation of the noise starts."""
-    start = Noise(np.diag([REPEAT_PRIOR[0] ** 2] * 2), np.zeros(2), scatter=np.zeros(s.scatter.shape[1]))
-    return start.with_sizes(SIZE_PRIORS[:, 0])
+    return Noise(np.diag([REPEAT_PRIOR[0] ** 2] * 2), np.zeros(2)).with_sizes(SIZE_PRIORS[:, 0])
 
 
 def whitener(s: Setup, noise: Noise) -> FloatArray:
@@ -37,9 +72,9 @@ def whitener(s: Setup, noise: Noise) -> FloatArray:
     return factor
 
 
-def weights(s: Setup, noise: Noise, left: FloatArray, factor: FloatArray | None = None) -> FloatArray:
+def weights(noise: Noise, factor: FloatArray, left: FloatArray) -> FloatArray:
     """Weight of every test under the bivariate t, one on average for normal noise, shape (n,)."""
-    return (noise.tail + 2.0) / (noise.tail + distance(whitener(s, noise) if factor is None else factor, left))
+    return (noise.tail + 2.0) / (noise.tail + distance(factor, left))
 
 
 def distance(factor: FloatArray, left: FloatArray) -> FloatArray:
@@ -137,3 +172,169 @@ def log_prior(s: Setup, noise: Noise) -> float:
     return float(found - 0.5 * worth * (determinant + size**2 * np.trace(np.linalg.inv(noise.repeat))))
 
 
+
+
+@dataclass(frozen=True)
+class State:
+    """Where a fit has got to: parameters, random effects (q,), residual (n, 2) without them, and the noise.
+
+    ``factor`` (n, 2, 2) whitens the tests and ``precision`` (q,) is that of the random effects, both at this noise.
+    """
+
+    x: FloatArray
+    effects: FloatArray
+    residual: FloatArray
+    noise: Noise
+    factor: FloatArray
+    precision: FloatArray
+
+
+@dataclass(frozen=True)
+class System:
+    """The normal equations of one iteration solved: the inverse of their matrix (p + q, p + q) and the step.
+
+    ``weight`` (n,) is that of the tests, ``columns`` (n, 2, p + q) are those of the model.
+    """
+
+    inverse: FloatArray
+    solution: FloatArray
+    weight: FloatArray
+    columns: FloatArray
+
+
+def begin(s: Setup, x: FloatArray, residual: FloatArray, noise: Noise) -> State:
+    """The state of a fit before its first step, all random effects zero."""
+    return State(x, np.zeros(s.random.shape[2]), residual, noise, whitener(s, noise), prior_precision(s, noise))
+
+
+def solved(s: Setup, state: State, jacobian: FloatArray, bounds: tuple[FloatArray, FloatArray]) -> System:
+    """One step under the weighted noise; a parameter at a bound that would leave it is held there."""
+    x, p = state.x, len(state.x)
+    weight = weights(state.noise, state.factor, _left(s, state))
+    model = np.concatenate([jacobian, s.random], axis=2)
+    both = np.concatenate([model, state.residual[:, :, None]], axis=2)
+    white = whitened(state.factor * np.sqrt(weight)[:, None, None], both)
+    columns, right = white[:, :-1], white[:, :-1].T @ white[:, -1]
+    normal = columns.T @ columns + np.diag(np.concatenate([np.full(p, 1e-12), state.precision]))
+    low, high = bounds
+    held = np.zeros(len(right), bool)
+    for _ in range(3):
+        free = ~held
+        if held.any():
+            inverse = np.zeros_like(normal)
+            inverse[np.ix_(free, free)] = _inverse(normal[np.ix_(free, free)])
+        else:
+            inverse = _inverse(normal)
+        solution = inverse @ right
+        outward = ((x <= low) & (solution[:p] < 0)) | ((x >= high) & (solution[:p] > 0))
+        if not (outward & ~held[:p]).any():
+            break
+        held[:p] |= outward
+    return System(inverse, solution, weight, model)
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    """Inverse with unit diagonal scaling and a ridge that matters only where columns coincide."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    scaled = matrix * scale[:, None] * scale[None, :]
+    return np.linalg.inv(scaled + 1e-9 * np.eye(len(matrix))) * scale[:, None] * scale[None, :]
+
+
+def whitened(factor: FloatArray, columns: FloatArray) -> FloatArray:
+    """Columns (n, 2, k) times the lower triangles ``factor`` (n, 2, 2), shape (2n, k), static rows first."""
+    n = len(columns)
+    white = np.empty((2 * n, columns.shape[2]))
+    np.multiply(columns[:, 0], factor[:, 0, :1], out=white[:n])
+    np.multiply(columns[:, 1], factor[:, 1, 1:], out=white[n:])
+    white[n:] += columns[:, 0] * factor[:, 1, :1]
+    return white
+
+
+def _left(s: Setup, state: State) -> FloatArray:
+    """What is left of every test, (n, 2), random effects taken out."""
+    return np.asarray(state.residual - s.random @ state.effects)
+
+
+def penalised(s: Setup, state: State) -> float:
+    """Log density of the tests given the effects, plus that of the effects, without constants of the noise."""
+    tail = state.noise.tail
+    tests = -0.5 * (tail + 2.0) * np.sum(np.log1p(distance(state.factor, _left(s, state)) / tail))
+    return float(tests - 0.5 * np.sum(state.effects**2 * state.precision))
+
+
+def with_noise_estimated(s: Setup, state: State, system: System) -> State:
+    """The same state, the noise estimated anew; the system says how uncertain each prediction is."""
+    noise, left, q = state.noise, _left(s, state), s.random.shape[2]
+    columns, inverse = system.columns, system.inverse
+    sizes = updated_sizes(s, noise.sizes, state.effects, np.diag(inverse)[-q:])
+    flat = columns.reshape(-1, columns.shape[2])
+    blurred = np.einsum("nrk,nsk->nrs", (flat @ inverse).reshape(columns.shape), columns, optimize=True)
+    squares = system.weight[:, None, None] * (left[:, :, None] * left[:, None, :] + blurred)
+    scatter = np.zeros(s.scatter.shape[1]) if noise.scatter is None else noise.scatter
+    packed = squares[:, [0, 0, 1], [0, 1, 1]].T
+    repeat, scatter = updated_repeats(s, (noise.repeat, scatter), packed, noise.tail)
+    found = replace(noise, repeat=repeat, scatter=scatter).with_sizes(sizes)
+    return replace(state, noise=found, factor=whitener(s, found), precision=prior_precision(s, found))
+
+
+def scored(s: Setup, state: State) -> tuple[float, FloatArray]:
+    """Log marginal likelihood by Laplace's method, with the priors of the noise sizes; and the weights of the tests."""
+    weight = weights(state.noise, state.factor, _left(s, state))
+    white = whitened(state.factor * np.sqrt(weight)[:, None, None], s.random)
+    root = np.linalg.cholesky(white.T @ white + np.diag(state.precision))
+    curvature = 2.0 * np.sum(np.log(np.diag(root)))
+    scale = float(np.sum(np.log(state.factor[:, 0, 0] * state.factor[:, 1, 1])))
+    prior = 0.5 * np.sum(np.log(state.precision)) + log_prior(s, state.noise)
+    return float(penalised(s, state) + scale + prior - 0.5 * curvature), weight
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """The noise of every replicate: ``repeat`` (r, 2, 2), what the repeats depend on, ``scatter`` (r, k), and sizes of
+    the random ``effects`` (r, 5); with the ``inverse`` (r, 3, n) of the noise of every test and the ``precision``
+    (r, q) of the random effects at these sizes.
+    """
+
+    repeat: FloatArray
+    scatter: FloatArray
+    effects: FloatArray
+    inverse: FloatArray
+    precision: FloatArray
+
+
+def sizes_at(s: Setup, repeat: FloatArray, scatter: FloatArray, effects: FloatArray) -> Sizes:
+    return Sizes(repeat, scatter, effects, inverse_noise(s, repeat, scatter), prior_sd(s, effects) ** -2)
+
+
+def fitted_sizes(s: Setup, noise: Noise, replicates: int) -> Sizes:
+    """The noise of a fit, once per replicate."""
+    scatter = np.zeros(s.scatter.shape[1]) if noise.scatter is None else noise.scatter
+    parts = (noise.repeat, scatter, noise.sizes)
+    return sizes_at(s, *(np.repeat(part[None], replicates, axis=0) for part in parts))
+
+
+def products_of(left: FloatArray) -> FloatArray:
+    """Static, mixed and sliding products of what is left, (r, 3, n)."""
+    return np.stack([left[:, 0] ** 2, left[:, 0] * left[:, 1], left[:, 1] ** 2], axis=1)
+
+
+def replicate_weights(sizes: Sizes, left: FloatArray, tail: float) -> FloatArray:
+    """Weight of every test of every replicate under the bivariate t, (r, n)."""
+    distance = np.einsum("ran,ran,a->rn", sizes.inverse, products_of(left), [1.0, 2.0, 1.0])
+    return np.asarray((tail + 2.0) / (tail + distance))
+
+
+def sizes_updated(
+    s: Setup, sizes: Sizes, found: tuple[FloatArray, FloatArray], squares: FloatArray, tail: float
+) -> Sizes:
+    """The noise estimated anew from the random effects with their variances ``found``, (r, q) each, and from the
+    weighted products ``squares`` (r, 3, n) expected of what is left."""
+    effects = updated_sizes(s, sizes.effects, *found)
+    return sizes_at(s, *updated_repeats(s, (sizes.repeat, sizes.scatter), squares, tail), effects)
+
+
+def log_priors(s: Setup, sizes: Sizes, steps: FloatArray) -> FloatArray:
+    """Log density of the sizes of every replicate after each of ``steps`` (steps, 5) of their logarithms."""
+    there = [group for group in range(len(SIZE_PRIORS)) if group in s.group]
+    each = [sum(log_size_prior(g, sizes.effects[:, g] * np.exp(step[g])) for g in there) for step in steps]
+    return np.array(each).reshape(len(steps), -1)

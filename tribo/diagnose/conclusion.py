@@ -1,0 +1,175 @@
+"""The verdict of a diagnosis, put together from its finished pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tribo.diagnose.next_test import first_test_of, next_test, widening_test
+from tribo.diagnose.search.naming import Candidate, Named, weights_of
+from tribo.diagnose.search.screen import Screen
+from tribo.diagnose.search.start_effects import StartEffects
+from tribo.diagnose.sentences import (
+    Weighed,
+    causes_from_evidence,
+    causes_weighed,
+    misfits_of,
+    patterns_apart,
+    summary,
+)
+from tribo.diagnose.statistics.direct_evidence import TraceFindings, stated_evidence
+from tribo.diagnose.statistics.gain import gain, gain_of_zero
+from tribo.diagnose.statistics.interval import recovered
+from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.verdict import Cause, Estimate, Excluded, Gain, Misfit, NextTest, Outcome, Verdict
+
+NEEDED = 3.7  # strength that chance reaches in one campaign of a hundred, where none was simulated
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What the stages of a diagnosis found, and the ``level`` at which it decides."""
+
+    effects: StartEffects
+    screened: Screen
+    evidence: TraceFindings
+    barred: Sequence[Excluded]
+    named: Named | None
+    level: float
+
+    @property
+    def baseline(self) -> ModelFit:
+        return self.effects.model
+
+
+def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
+    """The verdict; ``rng`` draws the resamples behind the error of the gain."""
+    baseline, named, level = found.baseline, found.named, found.level
+    outcome = _outcome(named, bool(found.evidence.certain), level)
+    smallest = _smallest_effects(found)
+    shown = _shown(named) if outcome in ("named", "undetermined") else []
+    gained = _gain(found, outcome, rng)
+    flat = baseline.setup.observations.flat
+    direct = causes_from_evidence(found.evidence.certain)
+    weighed = causes_weighed(shown, baseline)
+    misfits = [m for _, m in direct] + misfits_of(found.screened, level, flat)
+    causes = [c for c, _ in direct] + sorted(weighed, key=lambda c: -c.weight)
+    if named is not None and named.causes and outcome == "unknown" and not patterns_apart(misfits):
+        misfits = [*misfits_of(named.left, level, flat), *misfits]
+    return Verdict(
+        verdict=outcome,
+        misfits=_once(misfits),
+        causes=tuple(causes),
+        equivalent=_equivalent(named) if outcome == "named" else (),
+        excluded=tuple(_excluded(named, found.barred, causes)),
+        gain=gained,
+        set_aside=baseline.setup.observations.set_aside,
+        next_test=_next_test(baseline, named, outcome, misfits),
+        text=summary(outcome, causes, _equivalent(named), misfits, smallest),
+        smallest_effects=smallest,
+    )
+
+
+def _outcome(named: Named | None, direct: bool, level: float) -> Outcome:
+    if named is None:
+        return "named" if direct else "no_misfit"
+    if not named.causes or named.p_left < level:
+        return "unknown"
+    return "undetermined" if named.rivals else "named"
+
+
+def _shown(named: Named | None) -> list[Weighed]:
+    """Every mechanism of every cause, and the rivals of the last, with their shares and parameters."""
+    if named is None:
+        return []
+    found = []
+    for k, alike in enumerate(named.causes):
+        shown = [*alike, *(named.rivals if k == len(named.causes) - 1 else ())]
+        found += [(c, float(w), _estimates(c)) for c, w in zip(shown, weights_of(shown), strict=True)]
+    return found
+
+
+def _estimates(candidate: Candidate) -> dict[str, Estimate]:
+    """Parameters of a weighed mechanism with their 90 % intervals."""
+    parameters = candidate.acting.mechanism.parameters
+    values = recovered(candidate.fit, len(candidate.fit.acting) - 1)
+    return {
+        p.name: Estimate(value, low, high, p.unit) for p, (value, low, high) in zip(parameters, values, strict=True)
+    }
+
+
+def _smallest_effects(found: Findings) -> dict[str, float]:
+    """Peak-to-peak effect in percent that each mechanism would need to be found half the time."""
+    chance, effects = found.screened.chance, found.effects
+    need = float(np.quantile(chance, 1.0 - found.level)) if len(chance) else NEEDED
+    barred = {e.mechanism for e in found.barred}
+    smallest: dict[str, float] = {}
+    for a, left, size in zip(effects.acting, effects.length, effects.size, strict=True):
+        if left > 1e-6 and a.name not in barred:
+            percent = 100.0 * float(np.expm1(min(size * need / left, 5.0)))
+            smallest[a.name] = min(percent, smallest.get(a.name, np.inf))
+    return {n: round(float(v), 2) for n, v in smallest.items() if v < 300.0}
+
+
+def _gain(found: Findings, outcome: Outcome, rng: np.random.Generator) -> Gain | None:
+    """Of the extended model where a mechanism was weighed, else of what direct evidence shows."""
+    named = found.named
+    if named is not None and named.causes and outcome != "unknown":
+        return gain(found.baseline, named.model, rng)
+    quantities = [stated_evidence()[name].quantity for name in found.evidence.certain]
+    zeros = [quantity for quantity in quantities if quantity != "rise"]
+    if outcome == "named" and zeros:
+        return gain_of_zero(found.baseline.setup.observations, zeros[0] == "zero drift", rng)
+    return None
+
+
+def _once(misfits: Sequence[Misfit]) -> tuple[Misfit, ...]:
+    """Each column of each observable and sample once: the first of its misfits."""
+    first = {(m.observable, m.sample, m.covariate): m for m in reversed(misfits)}
+    return tuple(m for m in misfits if first[m.observable, m.sample, m.covariate] is m)
+
+
+def _equivalent(named: Named | None) -> tuple[tuple[str, ...], ...]:
+    if named is None:
+        return ()
+    return tuple(tuple(c.name for c in alike) for alike in named.causes if len(alike) > 1)
+
+
+def _next_test(
+    baseline: ModelFit, named: Named | None, outcome: Outcome, misfits: Sequence[Misfit]
+) -> NextTest | None:
+    """A test that distinguishes tied mechanisms, confirms a cause against the next best, or narrows or widens the
+    search."""
+    if outcome == "unknown":
+        return first_test_of(misfits[0].covariate) if misfits else None
+    if named is None or not named.causes:
+        return widening_test(baseline.setup.observations.conditions) if outcome == "no_misfit" else None
+    for alike in named.causes:
+        if len(alike) > 1:
+            return next_test(alike)
+    best = named.causes[-1][0]
+    others = [*named.rivals, *(c for c in named.weighed if c.name != best.name and len(named.causes) == 1)]
+    return next_test([best, *others])
+
+
+def _excluded(named: Named | None, barred: Sequence[Excluded], causes: list[Cause]) -> list[Excluded]:
+    """What was not weighed, and what explains the campaign less well than the causes."""
+    shown = {c.mechanism for c in causes}
+    found = [e for e in barred if e.mechanism not in shown]
+    if named is None or not named.weighed or not causes:
+        return found
+    best = named.weighed[0].gain
+    for c in named.weighed:
+        if c.name not in shown and c.name not in {e.mechanism for e in found}:
+            found.append(Excluded(c.name, _lost(c, best)))
+    return found
+
+
+def _lost(c: Candidate, best: float) -> str:
+    """Why a weighed mechanism is not among the causes."""
+    m = c.acting.mechanism
+    if c.values[0] == m.amplitude.zero and m.amplitude.zero in (m.amplitude.low, m.amplitude.high):
+        return "wrong sign: it can change friction in one direction only, and the misfit has the opposite sign"
+    return f"explains the campaign less well: log likelihood lower by {best - c.gain:.1f}"
