@@ -51,6 +51,7 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
     smallest = _smallest_effects(found)
     shown = _shown(named) if outcome in ("named", "undetermined") else []
     gained = _gain(found, outcome, rng)
+    equivalent = _equivalent(named) if outcome == "named" else ()
     flat = baseline.setup.observations.flat
     direct = causes_from_evidence(found.evidence.certain)
     weighed = causes_weighed(shown, baseline)
@@ -58,16 +59,17 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
     causes = [c for c, _ in direct] + sorted(weighed, key=lambda c: -c.weight)
     if named is not None and named.causes and outcome == "unknown" and not patterns_apart(misfits):
         misfits = [*misfits_of(named.left, level, flat), *misfits]
+    text = summary(outcome, causes, equivalent, misfits, smallest)
     return Verdict(
         verdict=outcome,
         misfits=_once(misfits),
         causes=tuple(causes),
-        equivalent=_equivalent(named) if outcome == "named" else (),
+        equivalent=equivalent,
         excluded=tuple(_excluded(named, found.barred, causes)),
         gain=gained,
         set_aside=baseline.setup.observations.set_aside,
         next_test=_next_test(baseline, named, outcome, misfits),
-        text=summary(outcome, causes, _equivalent(named), misfits, smallest),
+        text=text,
         smallest_effects=smallest,
     )
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from tribo.diagnose.search.naming import ALIKE
 from tribo.diagnose.search.start_effects import StartEffects, start_effects
-from tribo.diagnose.statistics.linear import Linear, ModelFit
+from tribo.diagnose.statistics.linear import Linear, ModelFit, begin, scored
 from tribo.diagnose.statistics.model import Acting, Setup, Target, predict, setup
 from tribo.diagnose.statistics.observations import NO_FLAT, Observations, conditions_of
 from tribo.diagnose.statistics.predictor import Predictor, tabled_predictor
-from tribo.diagnose.statistics.scatter import Noise, begin, scored
+from tribo.diagnose.statistics.scatter import Noise
 from tribo.diagnose.terms import ABSORBED, not_varied
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray

@@ -80,7 +80,7 @@ def name_causes(
     weighed: tuple[Candidate, ...] = ()
     rivals: tuple[Candidate, ...] = ()
     while len(causes) < MAX_CAUSES and seen.p.min() < level:
-        ranked = weigh(start, excluded)
+        ranked = weigh(start, excluded) if not causes else _weighed(model, excluded)
         weighed = weighed or tuple(ranked)
         if not ranked or seen.p_library(float(np.sqrt(2.0 * max(ranked[0].raw, 0.0)))) >= level:
             break
@@ -88,7 +88,6 @@ def name_causes(
         causes.append(alike)
         model = alike[0].fit
         seen = screen_left(model, replicates=replicates, rng=rng, progress=progress)
-        start = start_effects(model)
     if len(causes) == MAX_CAUSES:
         model, causes, rivals = _revisit(model, causes, rivals, excluded)
         seen = screen_left(model, replicates=replicates, rng=rng, progress=progress)
@@ -103,11 +102,15 @@ def _revisit(
 ) -> tuple[ModelFit, list[tuple[Candidate, ...]], tuple[Candidate, ...]]:
     """The first cause was picked before the second was known: pick it again beside the second."""
     alone = _refitted(model, (causes[-1][0].acting,))
-    ranked = weigh(start_effects(alone), excluded)
+    ranked = _weighed(alone, excluded)
     if not ranked:
         return model, causes, rivals
     alike, others = _sort_rivals(alone, ranked)
     return ranked[0].fit, [alike, causes[-1]], (*rivals, *others)
+
+
+def _weighed(model: ModelFit, excluded: Sequence[str]) -> list[Candidate]:
+    return weigh(start_effects(model), excluded)
 
 
 def weigh(start: StartEffects, excluded: Sequence[str] = ()) -> list[Candidate]:

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, ndtri
 
 from tribo.diagnose.search.looks import Look, all_looks
-from tribo.diagnose.statistics.chance import ROUNDING, SIZE_STEPS, Replicates, as_measured, drawn_residuals, refit
+from tribo.diagnose.statistics.chance import SIZE_STEPS, Replicates, as_measured, drawn_residuals, refit
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.linear import ModelFit
 from tribo.diagnose.statistics.model import start_changes, with_form_error
+from tribo.diagnose.statistics.scatter import ROUNDING
 from tribo.records import FloatArray
 
 Progress = Callable[[str, int, int], None]
@@ -76,16 +77,17 @@ def screen(
 
     Replicates end once the strongest look is clearly within chance, or clearly beyond it.
     """
-    ready, freedom = columns_of(looks), np.array([look.freedom for look in looks])
-    chi2, found = scores(as_measured(f), ready)
-    strength, coefficients = deviate(chi2[0], freedom), [c[0] for c in found]
+    ready = columns_of(looks)
+    strengths, found = strengths_of(as_measured(f), ready)
+    strength, coefficients = strengths[0], [c[0] for c in found]
     shapes = [look.columns @ c for look, c in zip(looks, coefficients, strict=True)]
     size = np.ptp(f.linear.beyond_law(np.stack(shapes, axis=2)), axis=(0, 1))
     library = np.array([look.kind == "mechanism" for look in looks])
     chance = np.zeros((0, 2))
     while len(chance) < replicates:
-        made = refit(f, drawn_residuals(f, rng, min(AT_ONCE, replicates - len(chance))))
-        chance = np.concatenate([chance, _strongest(deviate(scores(made, ready)[0], freedom), library)])
+        drawn = drawn_residuals(f, rng, min(AT_ONCE, replicates - len(chance)))
+        strengths, _ = strengths_of(refit(f, drawn), ready)
+        chance = np.concatenate([chance, _strongest(strengths, library)])
         if progress is not None:
             progress("diagnose", len(chance), replicates)
         if _decided(chance[:, 0], float(strength.max())):
@@ -120,6 +122,12 @@ def _decided(chance: FloatArray, strongest: float) -> bool:
         return False
     beyond = strongest > float(np.mean(chance) + 10.0 * np.std(chance))
     return bool(np.sum(chance >= strongest) >= 10 or beyond)
+
+
+def strengths_of(fitted: Replicates, looks: Columns) -> tuple[FloatArray, list[FloatArray]]:
+    """Strength of every look as a standard normal deviate, (r, looks), and the coefficients of each, (r, d)."""
+    chi2, coefficients = scores(fitted, looks)
+    return deviate(chi2, np.array([span.stop - span.start for span in looks.spans])), coefficients
 
 
 def deviate(chi2: FloatArray, freedom: FloatArray) -> FloatArray:

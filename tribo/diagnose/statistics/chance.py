@@ -16,11 +16,14 @@ from tribo.diagnose.statistics.linear import ModelFit
 from tribo.diagnose.statistics.model import FIXED
 from tribo.diagnose.statistics.scatter import (
     Sizes,
+    blurred,
     fitted_sizes,
     log_priors,
+    normal_equations,
     products_of,
     replicate_weights,
     sizes_updated,
+    solved_at_once,
 )
 from tribo.records import FloatArray
 
@@ -28,7 +31,6 @@ STEPS = 4
 # Of the logarithms of the sizes (GAIN, SLOPE: two each; PATTERN): what a look explains of the patterns makes their
 # error smaller, and what it explains of a specimen makes the spread of the specimens smaller.
 SIZE_STEPS = np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, -0.7], [-0.7, -0.7, -0.7, -0.7, 0.0]])
-ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -51,18 +53,16 @@ class Replicates:
 
 def as_measured(f: ModelFit) -> Replicates:
     """The fitted campaign itself, as if it were one replicate."""
-    s, left = f.setup, (f.residual - f.setup.random @ f.effects).T[None]
-    sizes = fitted_sizes(s, f.noise, 1)
-    precision = sizes.inverse * replicate_weights(sizes, left, f.noise.tail)[:, None]
-    return _replicates(f, sizes, precision, f.residual.T[None], log_priors(s, sizes, SIZE_STEPS))
+    left = (f.residual - f.setup.random @ f.effects).T[None]
+    return _replicates(f, fitted_sizes(f.setup, f.noise, 1), left, f.residual.T[None])
 
 
-def _replicates(
-    f: ModelFit, sizes: Sizes, precision: FloatArray, residual: FloatArray, log_prior: FloatArray
-) -> Replicates:
+def _replicates(f: ModelFit, sizes: Sizes, left: FloatArray, residual: FloatArray) -> Replicates:
     p = f.linear.jacobian.shape[2]
     group = np.concatenate([np.full(p, FIXED), f.setup.group])
-    weighted, normal = _normal(_along_of(f), precision)
+    precision = sizes.inverse * replicate_weights(sizes, left, f.noise.tail)[:, None]
+    weighted, normal = normal_equations(_along_of(f), precision)
+    log_prior = log_priors(f.setup, sizes, SIZE_STEPS)
     return Replicates(precision, residual, weighted, normal, _prior(p, sizes), group, log_prior)
 
 
@@ -113,56 +113,15 @@ def _refitted(f: ModelFit, residual: FloatArray) -> tuple[Replicates, Sizes]:
     solution = np.zeros((len(residual), along.shape[2]))
     for _ in range(STEPS):
         weight = replicate_weights(sizes, left, tail)
-        spread, solution = _solve(along, sizes.inverse * weight[:, None], residual, _prior(p, sizes))
-        left = residual - _along(along, solution)
-        squares = weight[:, None] * (products_of(left) + _blurred(along, spread))
+        spread, solution = solved_at_once(along, sizes.inverse * weight[:, None], residual, _prior(p, sizes))
+        left = residual - np.tensordot(solution, along, axes=(1, 2))
+        squares = weight[:, None] * (products_of(left) + blurred(along, spread))
         found = solution[:, p:], np.diagonal(spread, axis1=1, axis2=2)[:, p:]
         sizes = sizes_updated(s, sizes, found, squares, tail)
-    precision = sizes.inverse * replicate_weights(sizes, left, tail)[:, None]
-    without = left + _along(along[:, :, p:], solution[:, p:])
-    return _replicates(f, sizes, precision, without, log_priors(s, sizes, SIZE_STEPS)), sizes
-
-
-def _along(along: FloatArray, solution: FloatArray) -> FloatArray:
-    """Sums of columns (2, n, k) with coefficients (r, k), shape (r, 2, n)."""
-    return np.asarray(np.tensordot(solution, along, axes=(1, 2)))
-
-
-def _blurred(along: FloatArray, spread: FloatArray) -> FloatArray:
-    """The same products expected from the uncertainty ``spread`` (r, k, k) of the coefficients, (r, 3, n)."""
-    n, k = along.shape[1:]
-    moved = (along.reshape(-1, k) @ spread).reshape(len(spread), 2, n, k)
-    pairs = ((0, 0), (0, 1), (1, 1))
-    return np.stack([np.einsum("rnk,nk->rn", moved[:, a], along[b]) for a, b in pairs], axis=1)
+    without = left + np.tensordot(solution[:, p:], along[:, :, p:], axes=(1, 2))
+    return _replicates(f, sizes, left, without), sizes
 
 
 def _prior(p: int, sizes: Sizes) -> FloatArray:
     """Precision of the columns of the model, (r, p + q): next to none for law and mechanisms."""
     return np.concatenate([np.full((len(sizes.effects), p), 1e-12), sizes.precision], axis=1)
-
-
-def _weighted(precision: FloatArray, columns: FloatArray) -> FloatArray:
-    """Columns (2, n, k) times the precision of every replicate, (r, 2, n, k)."""
-    static, mixed, sliding = (precision[:, i, :, None] for i in range(3))
-    return np.stack([static * columns[0] + mixed * columns[1], mixed * columns[0] + sliding * columns[1]], axis=1)
-
-
-def _normal(along: FloatArray, precision: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Weighted columns (r, p, 2n) and the normal matrices (r, p, p) without the prior."""
-    r, k = len(precision), along.shape[2]
-    weighted = np.ascontiguousarray(_weighted(precision, along).reshape(r, -1, k).transpose(0, 2, 1))
-    normal = (weighted.reshape(r * k, -1) @ along.reshape(-1, k)).reshape(r, k, k)
-    return weighted, normal
-
-
-def _solve(
-    along: FloatArray, precision: FloatArray, residual: FloatArray, prior: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Inverse normal matrices (r, p, p) and solutions (r, p), the diagonal scaled to one."""
-    weighted, normal = _normal(along, precision)
-    normal[:, np.arange(along.shape[2]), np.arange(along.shape[2])] += prior
-    scale = 1.0 / np.sqrt(np.diagonal(normal, axis1=1, axis2=2))
-    both = scale[:, :, None] * scale[:, None, :]
-    inverse = np.linalg.inv(normal * both + ROUNDING * np.eye(along.shape[2])) * both
-    right = np.einsum("rpm,rm->rp", weighted, residual.reshape(len(residual), -1))
-    return inverse, np.einsum("rpq,rq->rp", inverse, right)

@@ -9,17 +9,17 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.diagnose.statistics.linear import Linear, ModelFit
-from tribo.diagnose.statistics.model import N_LAW, Acting, Setup, Target, predict
-from tribo.diagnose.statistics.scatter import (
-    Noise,
+from tribo.diagnose.statistics.linear import (
+    Linear,
+    ModelFit,
     begin,
-    first_noise,
     penalised,
     scored,
     solved,
     with_noise_estimated,
 )
+from tribo.diagnose.statistics.model import N_LAW, Acting, Setup, Target, predict
+from tribo.diagnose.statistics.scatter import Noise, first_noise
 from tribo.records import FloatArray
 
 TRIAL_GAIN, END_GAIN = 0.5, 2e-3  # log likelihood that a step has to earn for another one to be made
@@ -92,7 +92,8 @@ def _fitted(target: Target, x: FloatArray, noise: Noise, estimate: bool, until: 
     along with them."""
     s, (iterations, least_gain) = target.setup, until
     log_force = s.observations.log_force
-    state = begin(s, x, target.residual(x), noise)
+    residual = target.residual(x)
+    state = begin(s, x, residual, noise)
     score, weight, jacobian, moved = -np.inf, np.zeros(0), np.zeros((0, 2, 0)), np.inf
     for _ in range(iterations):
         if moved > STILL:

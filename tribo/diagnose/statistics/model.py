@@ -43,6 +43,11 @@ class Acting:
         """The name in a verdict: ``covariate:operator``."""
         return self.mechanism.called(self.choice)
 
+    @property
+    def start(self) -> FloatArray:
+        """The parameters from which a fit starts, at the mechanism's full amplitude."""
+        return self.mechanism.start()
+
 
 @dataclass(frozen=True)
 class Setup:
@@ -228,7 +233,7 @@ def start_changes(s: Setup, law: FloatArray) -> StartChanges:
     before = predict(s, law, (), ())
     columns, every = [], {}
     for a in acting:
-        start = a.mechanism.start()
+        start = a.start
         columns.append(predict(s, law, (a,), (start,)) - before)
         if not a.choice:
             further = [np.array([size, *start[1:]]) for size in a.mechanism.amplitude.tries]
@@ -253,7 +258,7 @@ class Target:
 
     @cached_property
     def scales(self) -> FloatArray:
-        return np.concatenate([LAW_SCALE, *(np.abs(a.mechanism.start()) for a in self.acting)])
+        return np.concatenate([LAW_SCALE, *(np.abs(a.start) for a in self.acting)])
 
     def values(self, x: FloatArray) -> tuple[FloatArray, ...]:
         """The parameters of each mechanism, out of those of all."""

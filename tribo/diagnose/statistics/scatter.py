@@ -19,6 +19,7 @@ SPECIMEN_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR = (0.05, 4.0), (0.03, 2.0), (1.0, 1.0
 SIZE_PRIORS = np.array([SPECIMEN_PRIOR, SPECIMEN_PRIOR, SLOPE_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR])
 REPEAT_PRIOR = (0.08, 4.0)
 SCATTER_SD = 0.5  # of ln of the ratio of repeats between samples, and of the power of the force they follow
+ROUNDING = 1e-9  # of a diagonal of one: the ridge of normal matrices
 SMALLEST_SD = 0.003  # of ln T: no reading repeats better
 
 
@@ -59,28 +60,6 @@ class Noise:
 def first_noise() -> Noise:
     """Where the estimation of the noise starts."""
     return Noise(np.diag([REPEAT_PRIOR[0] ** 2] * 2), np.zeros(2)).with_sizes(SIZE_PRIORS[:, 0])
-
-
-def whitener(s: Setup, noise: Noise) -> FloatArray:
-    """Inverse Cholesky factor of the noise of every test, repeats plus reading, shape (n, 2, 2)."""
-    cov = noise.per_test(s) + s.observations.reading[:, :, None] ** 2 * np.eye(2)
-    a = np.sqrt(cov[:, 0, 0])
-    b = cov[:, 1, 0] / a
-    c = np.sqrt(cov[:, 1, 1] - b**2)
-    factor = np.zeros_like(cov)
-    factor[:, 0, 0], factor[:, 1, 0], factor[:, 1, 1] = 1 / a, -b / (a * c), 1 / c
-    return factor
-
-
-def weights(noise: Noise, factor: FloatArray, left: FloatArray) -> FloatArray:
-    """Weight of every test under the bivariate t, one on average for normal noise, shape (n,)."""
-    return (noise.tail + 2.0) / (noise.tail + distance(factor, left))
-
-
-def distance(factor: FloatArray, left: FloatArray) -> FloatArray:
-    """Squared length of what is left of every test, whitened, shape (n,)."""
-    static = factor[:, 0, 0] * left[:, 0]
-    return static**2 + (factor[:, 1, 0] * left[:, 0] + factor[:, 1, 1] * left[:, 1]) ** 2
 
 
 def prior_sd(s: Setup, sizes: FloatArray) -> FloatArray:
@@ -175,120 +154,6 @@ def log_prior(s: Setup, noise: Noise) -> float:
 
 
 @dataclass(frozen=True)
-class State:
-    """Where a fit has got to: parameters, random effects (q,), residual (n, 2) without them, and the noise.
-
-    ``factor`` (n, 2, 2) whitens the tests and ``precision`` (q,) is that of the random effects, both at this noise.
-    """
-
-    x: FloatArray
-    effects: FloatArray
-    residual: FloatArray
-    noise: Noise
-    factor: FloatArray
-    precision: FloatArray
-
-
-@dataclass(frozen=True)
-class System:
-    """The normal equations of one iteration solved: the inverse of their matrix (p + q, p + q) and the step.
-
-    ``weight`` (n,) is that of the tests, ``columns`` (n, 2, p + q) are those of the model.
-    """
-
-    inverse: FloatArray
-    solution: FloatArray
-    weight: FloatArray
-    columns: FloatArray
-
-
-def begin(s: Setup, x: FloatArray, residual: FloatArray, noise: Noise) -> State:
-    """The state of a fit before its first step, all random effects zero."""
-    return State(x, np.zeros(s.random.shape[2]), residual, noise, whitener(s, noise), prior_precision(s, noise))
-
-
-def solved(s: Setup, state: State, jacobian: FloatArray, bounds: tuple[FloatArray, FloatArray]) -> System:
-    """One step under the weighted noise; a parameter at a bound that would leave it is held there."""
-    x, p = state.x, len(state.x)
-    weight = weights(state.noise, state.factor, _left(s, state))
-    model = np.concatenate([jacobian, s.random], axis=2)
-    both = np.concatenate([model, state.residual[:, :, None]], axis=2)
-    white = whitened(state.factor * np.sqrt(weight)[:, None, None], both)
-    columns, right = white[:, :-1], white[:, :-1].T @ white[:, -1]
-    normal = columns.T @ columns + np.diag(np.concatenate([np.full(p, 1e-12), state.precision]))
-    low, high = bounds
-    held = np.zeros(len(right), bool)
-    for _ in range(3):
-        free = ~held
-        if held.any():
-            inverse = np.zeros_like(normal)
-            inverse[np.ix_(free, free)] = _inverse(normal[np.ix_(free, free)])
-        else:
-            inverse = _inverse(normal)
-        solution = inverse @ right
-        outward = ((x <= low) & (solution[:p] < 0)) | ((x >= high) & (solution[:p] > 0))
-        if not (outward & ~held[:p]).any():
-            break
-        held[:p] |= outward
-    return System(inverse, solution, weight, model)
-
-
-def _inverse(matrix: FloatArray) -> FloatArray:
-    """Inverse with unit diagonal scaling and a ridge that matters only where columns coincide."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = matrix * scale[:, None] * scale[None, :]
-    return np.linalg.inv(scaled + 1e-9 * np.eye(len(matrix))) * scale[:, None] * scale[None, :]
-
-
-def whitened(factor: FloatArray, columns: FloatArray) -> FloatArray:
-    """Columns (n, 2, k) times the lower triangles ``factor`` (n, 2, 2), shape (2n, k), static rows first."""
-    n = len(columns)
-    white = np.empty((2 * n, columns.shape[2]))
-    np.multiply(columns[:, 0], factor[:, 0, :1], out=white[:n])
-    np.multiply(columns[:, 1], factor[:, 1, 1:], out=white[n:])
-    white[n:] += columns[:, 0] * factor[:, 1, :1]
-    return white
-
-
-def _left(s: Setup, state: State) -> FloatArray:
-    """What is left of every test, (n, 2), random effects taken out."""
-    return np.asarray(state.residual - s.random @ state.effects)
-
-
-def penalised(s: Setup, state: State) -> float:
-    """Log density of the tests given the effects, plus that of the effects, without constants of the noise."""
-    tail = state.noise.tail
-    tests = -0.5 * (tail + 2.0) * np.sum(np.log1p(distance(state.factor, _left(s, state)) / tail))
-    return float(tests - 0.5 * np.sum(state.effects**2 * state.precision))
-
-
-def with_noise_estimated(s: Setup, state: State, system: System) -> State:
-    """The same state, the noise estimated anew; the system says how uncertain each prediction is."""
-    noise, left, q = state.noise, _left(s, state), s.random.shape[2]
-    columns, inverse = system.columns, system.inverse
-    sizes = updated_sizes(s, noise.sizes, state.effects, np.diag(inverse)[-q:])
-    flat = columns.reshape(-1, columns.shape[2])
-    blurred = np.einsum("nrk,nsk->nrs", (flat @ inverse).reshape(columns.shape), columns, optimize=True)
-    squares = system.weight[:, None, None] * (left[:, :, None] * left[:, None, :] + blurred)
-    scatter = np.zeros(s.scatter.shape[1]) if noise.scatter is None else noise.scatter
-    packed = squares[:, [0, 0, 1], [0, 1, 1]].T
-    repeat, scatter = updated_repeats(s, (noise.repeat, scatter), packed, noise.tail)
-    found = replace(noise, repeat=repeat, scatter=scatter).with_sizes(sizes)
-    return replace(state, noise=found, factor=whitener(s, found), precision=prior_precision(s, found))
-
-
-def scored(s: Setup, state: State) -> tuple[float, FloatArray]:
-    """Log marginal likelihood by Laplace's method, with the priors of the noise sizes; and the weights of the tests."""
-    weight = weights(state.noise, state.factor, _left(s, state))
-    white = whitened(state.factor * np.sqrt(weight)[:, None, None], s.random)
-    root = np.linalg.cholesky(white.T @ white + np.diag(state.precision))
-    curvature = 2.0 * np.sum(np.log(np.diag(root)))
-    scale = float(np.sum(np.log(state.factor[:, 0, 0] * state.factor[:, 1, 1])))
-    prior = 0.5 * np.sum(np.log(state.precision)) + log_prior(s, state.noise)
-    return float(penalised(s, state) + scale + prior - 0.5 * curvature), weight
-
-
-@dataclass(frozen=True)
 class Sizes:
     """The noise of every replicate: ``repeat`` (r, 2, 2), what the repeats depend on, ``scatter`` (r, k), and sizes of
     the random ``effects`` (r, 5); with the ``inverse`` (r, 3, n) of the noise of every test and the ``precision``
@@ -303,6 +168,7 @@ class Sizes:
 
 
 def sizes_at(s: Setup, repeat: FloatArray, scatter: FloatArray, effects: FloatArray) -> Sizes:
+    """The noise of every replicate at these sizes."""
     return Sizes(repeat, scatter, effects, inverse_noise(s, repeat, scatter), prior_sd(s, effects) ** -2)
 
 
@@ -338,3 +204,38 @@ def log_priors(s: Setup, sizes: Sizes, steps: FloatArray) -> FloatArray:
     there = [group for group in range(len(SIZE_PRIORS)) if group in s.group]
     each = [sum(log_size_prior(g, sizes.effects[:, g] * np.exp(step[g])) for g in there) for step in steps]
     return np.array(each).reshape(len(steps), -1)
+
+
+def weighted_columns(precision: FloatArray, columns: FloatArray) -> FloatArray:
+    """Columns (2, n, k) times the precision of every replicate, (r, 2, n, k)."""
+    static, mixed, sliding = (precision[:, i, :, None] for i in range(3))
+    return np.stack([static * columns[0] + mixed * columns[1], mixed * columns[0] + sliding * columns[1]], axis=1)
+
+
+def normal_equations(along: FloatArray, precision: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Weighted columns (r, p, 2n) and the normal matrices (r, p, p) without the prior."""
+    r, k = len(precision), along.shape[2]
+    weighted = np.ascontiguousarray(weighted_columns(precision, along).reshape(r, -1, k).transpose(0, 2, 1))
+    normal = (weighted.reshape(r * k, -1) @ along.reshape(-1, k)).reshape(r, k, k)
+    return weighted, normal
+
+
+def solved_at_once(
+    along: FloatArray, precision: FloatArray, residual: FloatArray, prior: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Inverse normal matrices (r, p, p) and solutions (r, p), the diagonal scaled to one."""
+    weighted, normal = normal_equations(along, precision)
+    normal[:, np.arange(along.shape[2]), np.arange(along.shape[2])] += prior
+    scale = 1.0 / np.sqrt(np.diagonal(normal, axis1=1, axis2=2))
+    both = scale[:, :, None] * scale[:, None, :]
+    inverse = np.linalg.inv(normal * both + ROUNDING * np.eye(along.shape[2])) * both
+    right = np.einsum("rpm,rm->rp", weighted, residual.reshape(len(residual), -1))
+    return inverse, np.einsum("rpq,rq->rp", inverse, right)
+
+
+def blurred(along: FloatArray, spread: FloatArray) -> FloatArray:
+    """The same products expected from the uncertainty ``spread`` (r, k, k) of the coefficients, (r, 3, n)."""
+    n, k = along.shape[1:]
+    moved = (along.reshape(-1, k) @ spread).reshape(len(spread), 2, n, k)
+    pairs = ((0, 0), (0, 1), (1, 1))
+    return np.stack([np.einsum("rnk,nk->rn", moved[:, a], along[b]) for a, b in pairs], axis=1)
