@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribo.diagnose.next_test import first_test_of, next_test, widening_test
+from tribo.diagnose.next_test import next_test_of
 from tribo.diagnose.search.naming import Candidate, Named, weights_of
 from tribo.diagnose.search.screen import Screen
-from tribo.diagnose.search.start_effects import StartEffects
 from tribo.diagnose.sentences import (
     Weighed,
     causes_from_evidence,
     causes_weighed,
+    each_once,
+    exclusions_beside,
     misfits_of,
     patterns_apart,
     summary,
@@ -22,8 +23,8 @@ from tribo.diagnose.sentences import (
 from tribo.diagnose.statistics.direct_evidence import TraceFindings, stated_evidence
 from tribo.diagnose.statistics.gain import gain, gain_of_zero
 from tribo.diagnose.statistics.interval import recovered
-from tribo.diagnose.statistics.linear import ModelFit
-from tribo.diagnose.verdict import Cause, Estimate, Excluded, Gain, Misfit, NextTest, Outcome, Verdict
+from tribo.diagnose.statistics.linear import ModelFit, StartEffects
+from tribo.diagnose.verdict import Estimate, Excluded, Gain, Outcome, Verdict
 
 NEEDED = 3.7  # strength that chance reaches in one campaign of a hundred, where none was simulated
 
@@ -59,16 +60,18 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
     causes = [c for c, _ in direct] + sorted(weighed, key=lambda c: -c.weight)
     if named is not None and named.causes and outcome == "unknown" and not patterns_apart(misfits):
         misfits = [*misfits_of(named.left, level, flat), *misfits]
+    excluded = exclusions_beside(causes, found.barred, named.weighed if named is not None else ())
+    shown_misfits = each_once(misfits)
     text = summary(outcome, causes, equivalent, misfits, smallest)
     return Verdict(
         verdict=outcome,
-        misfits=_once(misfits),
+        misfits=shown_misfits,
         causes=tuple(causes),
         equivalent=equivalent,
-        excluded=tuple(_excluded(named, found.barred, causes)),
+        excluded=tuple(excluded),
         gain=gained,
         set_aside=baseline.setup.observations.set_aside,
-        next_test=_next_test(baseline, named, outcome, misfits),
+        next_test=next_test_of(named, outcome, misfits, baseline.setup.observations.conditions),
         text=text,
         smallest_effects=smallest,
     )
@@ -80,6 +83,12 @@ def _outcome(named: Named | None, direct: bool, level: float) -> Outcome:
     if not named.causes or named.p_left < level:
         return "unknown"
     return "undetermined" if named.rivals else "named"
+
+
+def _equivalent(named: Named | None) -> tuple[tuple[str, ...], ...]:
+    if named is None:
+        return ()
+    return tuple(tuple(c.name for c in alike) for alike in named.causes if len(alike) > 1)
 
 
 def _shown(named: Named | None) -> list[Weighed]:
@@ -125,53 +134,3 @@ def _gain(found: Findings, outcome: Outcome, rng: np.random.Generator) -> Gain |
     if outcome == "named" and zeros:
         return gain_of_zero(found.baseline.setup.observations, zeros[0] == "zero drift", rng)
     return None
-
-
-def _once(misfits: Sequence[Misfit]) -> tuple[Misfit, ...]:
-    """Each column of each observable and sample once: the first of its misfits."""
-    first = {(m.observable, m.sample, m.covariate): m for m in reversed(misfits)}
-    return tuple(m for m in misfits if first[m.observable, m.sample, m.covariate] is m)
-
-
-def _equivalent(named: Named | None) -> tuple[tuple[str, ...], ...]:
-    if named is None:
-        return ()
-    return tuple(tuple(c.name for c in alike) for alike in named.causes if len(alike) > 1)
-
-
-def _next_test(
-    baseline: ModelFit, named: Named | None, outcome: Outcome, misfits: Sequence[Misfit]
-) -> NextTest | None:
-    """A test that distinguishes tied mechanisms, confirms a cause against the next best, or narrows or widens the
-    search."""
-    if outcome == "unknown":
-        return first_test_of(misfits[0].covariate) if misfits else None
-    if named is None or not named.causes:
-        return widening_test(baseline.setup.observations.conditions) if outcome == "no_misfit" else None
-    for alike in named.causes:
-        if len(alike) > 1:
-            return next_test(alike)
-    best = named.causes[-1][0]
-    others = [*named.rivals, *(c for c in named.weighed if c.name != best.name and len(named.causes) == 1)]
-    return next_test([best, *others])
-
-
-def _excluded(named: Named | None, barred: Sequence[Excluded], causes: list[Cause]) -> list[Excluded]:
-    """What was not weighed, and what explains the campaign less well than the causes."""
-    shown = {c.mechanism for c in causes}
-    found = [e for e in barred if e.mechanism not in shown]
-    if named is None or not named.weighed or not causes:
-        return found
-    best = named.weighed[0].gain
-    for c in named.weighed:
-        if c.name not in shown and c.name not in {e.mechanism for e in found}:
-            found.append(Excluded(c.name, _lost(c, best)))
-    return found
-
-
-def _lost(c: Candidate, best: float) -> str:
-    """Why a weighed mechanism is not among the causes."""
-    m = c.acting.mechanism
-    if c.values[0] == m.amplitude.zero and m.amplitude.zero in (m.amplitude.low, m.amplitude.high):
-        return "wrong sign: it can change friction in one direction only, and the misfit has the opposite sign"
-    return f"explains the campaign less well: log likelihood lower by {best - c.gain:.1f}"

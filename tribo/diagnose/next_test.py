@@ -8,17 +8,34 @@ from typing import Any
 
 import numpy as np
 
-from tribo.diagnose.search.naming import Candidate
+from tribo.diagnose.search.naming import Candidate, Named
 from tribo.diagnose.statistics.linear import ModelFit
 from tribo.diagnose.statistics.model import effect_of, log_forces
 from tribo.diagnose.terms import in_words
-from tribo.diagnose.verdict import NextTest
+from tribo.diagnose.verdict import Misfit, NextTest, Outcome
 from tribo.mechanisms.record import Conditions
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray
 
 HOURS_PER_PULL = 7.0 / 60.0
 PULLS = 18
+
+
+def next_test_of(
+    named: Named | None, outcome: Outcome, misfits: Sequence[Misfit], conditions: Conditions
+) -> NextTest | None:
+    """A test that distinguishes tied mechanisms, confirms a cause against the next best, or narrows or widens the
+    search."""
+    if outcome == "unknown":
+        return first_test_of(misfits[0].covariate) if misfits else None
+    if named is None or not named.causes:
+        return widening_test(conditions) if outcome == "no_misfit" else None
+    for alike in named.causes:
+        if len(alike) > 1:
+            return next_test(alike)
+    best = named.causes[-1][0]
+    others = [*named.rivals, *(c for c in named.weighed if c.name != best.name and len(named.causes) == 1)]
+    return next_test([best, *others])
 
 
 def next_test(tied: Sequence[Candidate]) -> NextTest | None:

@@ -51,6 +51,12 @@ def misfits_of(screened: Screen, level: float, flat: str = "") -> list[Misfit]:
     return found
 
 
+def each_once(misfits: Sequence[Misfit]) -> tuple[Misfit, ...]:
+    """Each column of each observable and sample once: the first of its misfits."""
+    first = {(m.observable, m.sample, m.covariate): m for m in reversed(misfits)}
+    return tuple(m for m in misfits if first[m.observable, m.sample, m.covariate] is m)
+
+
 def _covariate(look: Look) -> str:
     """The column that a look follows; for a mechanism the columns it needs."""
     if look.acting is None:
@@ -189,6 +195,28 @@ def exclusions(
         for name, m in MECHANISMS.items()
     }
     return [Excluded(name, reason) for name, reason in reasons.items() if reason]
+
+
+def exclusions_beside(
+    causes: Sequence[Cause], barred: Sequence[Excluded], weighed: Sequence[Candidate]
+) -> list[Excluded]:
+    """What was not weighed, and what explains the campaign less well than the causes."""
+    shown = {c.mechanism for c in causes}
+    found = [e for e in barred if e.mechanism not in shown]
+    if not causes:
+        return found
+    for c in weighed:
+        if c.name not in shown and c.name not in {e.mechanism for e in found}:
+            found.append(Excluded(c.name, _lost(c, weighed[0].gain)))
+    return found
+
+
+def _lost(c: Candidate, best: float) -> str:
+    """Why a weighed mechanism is not among the causes."""
+    m = c.acting.mechanism
+    if c.values[0] == m.amplitude.zero and m.amplitude.zero in (m.amplitude.low, m.amplitude.high):
+        return "wrong sign: it can change friction in one direction only, and the misfit has the opposite sign"
+    return f"explains the campaign less well: log likelihood lower by {best - c.gain:.1f}"
 
 
 def _why_not_weighed(m: Mechanism, e: Evidence | None, absorbed: bool, applies: bool) -> str:

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, ndtri
 
 from tribo.diagnose.search.looks import Look, all_looks
-from tribo.diagnose.statistics.chance import SIZE_STEPS, Replicates, as_measured, drawn_residuals, refit
+from tribo.diagnose.statistics.chance import as_measured, drawn_residuals, refit
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.linear import ModelFit
 from tribo.diagnose.statistics.model import start_changes, with_form_error
-from tribo.diagnose.statistics.scatter import ROUNDING
+from tribo.diagnose.statistics.scatter import ROUNDING, SIZE_STEPS, Replicates
 from tribo.records import FloatArray
 
 Progress = Callable[[str, int, int], None]
@@ -86,7 +86,8 @@ def screen(
     chance = np.zeros((0, 2))
     while len(chance) < replicates:
         drawn = drawn_residuals(f, rng, min(AT_ONCE, replicates - len(chance)))
-        strengths, _ = strengths_of(refit(f, drawn), ready)
+        made = refit(f, drawn)
+        strengths, _ = strengths_of(made, ready)
         chance = np.concatenate([chance, _strongest(strengths, library)])
         if progress is not None:
             progress("diagnose", len(chance), replicates)

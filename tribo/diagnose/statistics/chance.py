@@ -7,63 +7,31 @@ effects are estimated for every replicate by the steps of :mod:`tribo.diagnose.s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
 from tribo.diagnose.statistics.linear import ModelFit
-from tribo.diagnose.statistics.model import FIXED
 from tribo.diagnose.statistics.scatter import (
+    Replicates,
     Sizes,
     blurred,
     fitted_sizes,
-    log_priors,
-    normal_equations,
+    prior_of_columns,
     products_of,
     replicate_weights,
+    replicates_at,
     sizes_updated,
     solved_at_once,
 )
 from tribo.records import FloatArray
 
 STEPS = 4
-# Of the logarithms of the sizes (GAIN, SLOPE: two each; PATTERN): what a look explains of the patterns makes their
-# error smaller, and what it explains of a specimen makes the spread of the specimens smaller.
-SIZE_STEPS = np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, -0.7], [-0.7, -0.7, -0.7, -0.7, 0.0]])
-
-
-@dataclass(frozen=True)
-class Replicates:
-    """Fitted replicates: ``precision`` (r, 3, n) of every test, robust weight included, as static, mixed, sliding;
-    ``residual`` (r, 2, n) of ln T. ``weighted`` (r, p + q, 2n) are the model's columns times that precision, and
-    ``normal`` (r, p + q, p + q) their products without the prior. ``prior`` (r, p + q) is the precision of these
-    columns, ``group`` (p + q,) that of the size of each, FIXED where there is none, and ``log_priors`` (steps, r)
-    the log density of the sizes after each of SIZE_STEPS.
-    """
-
-    precision: FloatArray
-    residual: FloatArray
-    weighted: FloatArray
-    normal: FloatArray
-    prior: FloatArray
-    group: NDArray[np.int64]
-    log_priors: FloatArray
 
 
 def as_measured(f: ModelFit) -> Replicates:
     """The fitted campaign itself, as if it were one replicate."""
     left = (f.residual - f.setup.random @ f.effects).T[None]
-    return _replicates(f, fitted_sizes(f.setup, f.noise, 1), left, f.residual.T[None])
-
-
-def _replicates(f: ModelFit, sizes: Sizes, left: FloatArray, residual: FloatArray) -> Replicates:
-    p = f.linear.jacobian.shape[2]
-    group = np.concatenate([np.full(p, FIXED), f.setup.group])
-    precision = sizes.inverse * replicate_weights(sizes, left, f.noise.tail)[:, None]
-    weighted, normal = normal_equations(_along_of(f), precision)
-    log_prior = log_priors(f.setup, sizes, SIZE_STEPS)
-    return Replicates(precision, residual, weighted, normal, _prior(p, sizes), group, log_prior)
+    sizes = fitted_sizes(f.setup, f.noise, 1)
+    return replicates_at(f.setup, _along_of(f), sizes, left, f.residual.T[None], f.noise.tail)
 
 
 def _along_of(f: ModelFit) -> FloatArray:
@@ -113,15 +81,10 @@ def _refitted(f: ModelFit, residual: FloatArray) -> tuple[Replicates, Sizes]:
     solution = np.zeros((len(residual), along.shape[2]))
     for _ in range(STEPS):
         weight = replicate_weights(sizes, left, tail)
-        spread, solution = solved_at_once(along, sizes.inverse * weight[:, None], residual, _prior(p, sizes))
+        spread, solution = solved_at_once(along, sizes.inverse * weight[:, None], residual, prior_of_columns(p, sizes))
         left = residual - np.tensordot(solution, along, axes=(1, 2))
         squares = weight[:, None] * (products_of(left) + blurred(along, spread))
         found = solution[:, p:], np.diagonal(spread, axis1=1, axis2=2)[:, p:]
         sizes = sizes_updated(s, sizes, found, squares, tail)
     without = left + np.tensordot(solution[:, p:], along[:, :, p:], axes=(1, 2))
-    return _replicates(f, sizes, left, without), sizes
-
-
-def _prior(p: int, sizes: Sizes) -> FloatArray:
-    """Precision of the columns of the model, (r, p + q): next to none for law and mechanisms."""
-    return np.concatenate([np.full((len(sizes.effects), p), 1e-12), sizes.precision], axis=1)
+    return replicates_at(s, along, sizes, left, without, tail), sizes

@@ -10,8 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tribo.diagnose.statistics.model import GAIN, PATTERN, SLOPE, Setup
+from tribo.diagnose.statistics.model import FIXED, GAIN, PATTERN, SLOPE, Setup
 from tribo.records import FloatArray
 
 # Expected size, and how many effects that is worth: specimen gains and slopes, pattern factor
@@ -21,6 +22,9 @@ REPEAT_PRIOR = (0.08, 4.0)
 SCATTER_SD = 0.5  # of ln of the ratio of repeats between samples, and of the power of the force they follow
 ROUNDING = 1e-9  # of a diagonal of one: the ridge of normal matrices
 SMALLEST_SD = 0.003  # of ln T: no reading repeats better
+# Of the logarithms of the sizes (GAIN, SLOPE: two each; PATTERN): what a look explains of the patterns makes their
+# error smaller, and what it explains of a specimen makes the spread of the specimens smaller.
+SIZE_STEPS = np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, -0.7], [-0.7, -0.7, -0.7, -0.7, 0.0]])
 
 
 @dataclass(frozen=True)
@@ -239,3 +243,39 @@ def blurred(along: FloatArray, spread: FloatArray) -> FloatArray:
     moved = (along.reshape(-1, k) @ spread).reshape(len(spread), 2, n, k)
     pairs = ((0, 0), (0, 1), (1, 1))
     return np.stack([np.einsum("rnk,nk->rn", moved[:, a], along[b]) for a, b in pairs], axis=1)
+
+
+@dataclass(frozen=True)
+class Replicates:
+    """Fitted replicates: ``precision`` (r, 3, n) of every test, robust weight included, as static, mixed, sliding;
+    ``residual`` (r, 2, n) of ln T. ``weighted`` (r, p + q, 2n) are the model's columns times that precision, and
+    ``normal`` (r, p + q, p + q) their products without the prior. ``prior`` (r, p + q) is the precision of these
+    columns, ``group`` (p + q,) that of the size of each, FIXED where there is none, and ``log_priors`` (steps, r)
+    the log density of the sizes after each of SIZE_STEPS.
+    """
+
+    precision: FloatArray
+    residual: FloatArray
+    weighted: FloatArray
+    normal: FloatArray
+    prior: FloatArray
+    group: NDArray[np.int64]
+    log_priors: FloatArray
+
+
+def replicates_at(
+    s: Setup, along: FloatArray, sizes: Sizes, left: FloatArray, residual: FloatArray, tail: float
+) -> Replicates:
+    """Replicates fitted with the columns ``along`` (2, n, p + q) at given sizes; ``left`` (r, 2, n) is what is left of
+    every test and ``residual`` the same with the random effects."""
+    p = along.shape[2] - len(s.group)
+    precision = sizes.inverse * replicate_weights(sizes, left, tail)[:, None]
+    weighted, normal = normal_equations(along, precision)
+    group = np.concatenate([np.full(p, FIXED), s.group])
+    priors = log_priors(s, sizes, SIZE_STEPS)
+    return Replicates(precision, residual, weighted, normal, prior_of_columns(p, sizes), group, priors)
+
+
+def prior_of_columns(p: int, sizes: Sizes) -> FloatArray:
+    """Precision of the columns of the model, (r, p + q): next to none for the ``p`` of law and mechanisms."""
+    return np.concatenate([np.full((len(sizes.effects), p), 1e-12), sizes.precision], axis=1)
