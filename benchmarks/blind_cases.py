@@ -240,10 +240,11 @@ def true_parameter(name: str, size: float) -> dict[str, float]:
 
 def gain_of_the_best(d: Diagnosis, seed: int) -> list[float]:
     """What the mechanism that fits best by chance gains on samples left out: mean log score, standard error."""
-    from tribo.diagnose.search.weigh import weigh
+    from tribo.diagnose.search.naming import weigh
     from tribo.diagnose.statistics.gain import gain
+    from tribo.diagnose.statistics.linear import start_effects
 
-    found = gain(d.baseline, weigh(d.baseline)[0].fit, np.random.default_rng(seed))
+    found = gain(d.baseline, weigh(start_effects(d.baseline))[0].fit, np.random.default_rng(seed))
     return [round(found.difference, 5), round(found.se, 5)] if found is not None else []
 
 
@@ -253,7 +254,7 @@ def is_seen(case: Case) -> bool:
     from tribo.diagnose.search.screen import screen
     from tribo.diagnose.statistics.direct_evidence import rise_stiffening, zero_drift, zero_offset
     from tribo.diagnose.statistics.fit import fit
-    from tribo.diagnose.statistics.model import setup
+    from tribo.diagnose.statistics.model import setup, start_changes
     from tribo.diagnose.statistics.observations import observe
     from tribo.diagnose.statistics.predictor import tabled_predictor
 
@@ -262,4 +263,4 @@ def is_seen(case: Case) -> bool:
         return True
     f = fit(setup(o, tabled_predictor(o.patterns)))
     rng = np.random.default_rng(case.seed)
-    return screen(f, all_looks(f), replicates=120, rng=rng).p_adjusted() < 0.01
+    return screen(f, all_looks(f.setup, start_changes(f.setup, f.law)), replicates=120, rng=rng).p_adjusted() < 0.01

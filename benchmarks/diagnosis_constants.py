@@ -73,16 +73,16 @@ class Constant:
     on_clean: bool = False
 
 
-NAMING, WEIGH = f"{SEARCH}.naming", f"{SEARCH}.weigh"
-NOISE, EVIDENCE = f"{STATISTICS}.noise", f"{STATISTICS}.direct_evidence"
+NAMING, SCREEN = f"{SEARCH}.naming", f"{SEARCH}.screen"
+NOISE, EVIDENCE = f"{STATISTICS}.scatter", f"{STATISTICS}.direct_evidence"
 CONSTANTS = {
     "TIED (log likelihood)": Constant((NAMING,), "TIED", _first),
     "TIED (share of the gain)": Constant((NAMING,), "TIED", _second),
     "CLOSE": Constant((NAMING,), "CLOSE"),
     "IN_COMMON": Constant((NAMING,), "IN_COMMON"),
-    "FORM": Constant((NAMING,), "FORM"),
-    "PER_PARAMETER": Constant((WEIGH,), "PER_PARAMETER"),
-    "LABEL_SD": Constant((WEIGH,), "LABEL_SD"),
+    "FORM": Constant((SCREEN,), "FORM"),
+    "PER_PARAMETER": Constant((NAMING,), "PER_PARAMETER"),
+    "LABEL_SD": Constant((NAMING,), "LABEL_SD"),
     "CERTAIN": Constant((EVIDENCE,), "CERTAIN", on_clean=True),
     "specimen gain, expected": Constant((NOISE,), "SIZE_PRIORS", _row(0, 0), on_clean=True),
     "specimen slope, expected": Constant((NOISE,), "SIZE_PRIORS", _row(2, 0), on_clean=True),

@@ -7,8 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from blind.tribometer import Design, hide
 
+from tribo.diagnose.search.looks import Look, all_looks
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.model import Acting, ModelFit, Setup, predict, setup
+from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.model import Acting, Setup, predict, setup, start_changes
 from tribo.diagnose.statistics.observations import observe
 from tribo.diagnose.statistics.predictor import tabled_predictor
 from tribo.mechanisms.table import MECHANISMS
@@ -44,3 +46,8 @@ def acting(name: str, *values: float) -> Change:
 def _setup(campaign: Ingested) -> Setup:
     o = observe(campaign)
     return setup(o, tabled_predictor(o.patterns))
+
+
+def looks_at(f: ModelFit) -> list[Look]:
+    """Every look at a fitted model."""
+    return all_looks(f.setup, start_changes(f.setup, f.law))

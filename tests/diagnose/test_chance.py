@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose.search.looks import all_looks
-from tribo.diagnose.search.screen import screen
-from tribo.diagnose.statistics.chance import as_measured, columns_of, drawn_residuals, refit, scores
+from tribo.diagnose.search.screen import columns_in, scores, screen
+from tribo.diagnose.statistics.chance import as_measured, drawn_residuals, refit
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.model import setup
 from tribo.diagnose.statistics.observations import observe
 from tribo.diagnose.statistics.predictor import tabled_predictor
 
+from .known import looks_at
 from .synthetic import SMALL, hidden
 from .test_screen import baseline
 
@@ -22,10 +22,10 @@ from .test_screen import baseline
 def test_a_batch_of_replicates_looks_like_each_fitted_by_itself() -> None:
     """The strongest look of a replicate is within 5 % of that of the full fit of the same campaign."""
     f = baseline()
-    looks = all_looks(f)
+    looks = looks_at(f)
     ends = np.cumsum([look.freedom for look in looks])
     spans = [slice(int(e - look.freedom), int(e)) for e, look in zip(ends, looks, strict=True)]
-    ready = columns_of(np.concatenate([look.columns for look in looks], axis=2), spans)
+    ready = columns_in(np.concatenate([look.columns for look in looks], axis=2), spans)
     drawn = drawn_residuals(f, np.random.default_rng(5), 6)
     alone = np.array([look.freedom == 1 for look in looks])
     batch = np.sqrt(scores(refit(f, drawn), ready)[0][:, alone].max(axis=1))
@@ -38,8 +38,8 @@ def test_a_batch_of_replicates_looks_like_each_fitted_by_itself() -> None:
 def test_the_null_is_simulated_from_the_fitted_model() -> None:
     """Scores of a trend are close to standard normal, robust weights making them a little smaller."""
     f = baseline()
-    trend = next(look for look in all_looks(f) if look.covariate == "run_order" and look.kind == "trend")
-    ready = columns_of(trend.columns, [slice(0, 1)])
+    trend = next(look for look in looks_at(f) if look.covariate == "run_order" and look.kind == "trend")
+    ready = columns_in(trend.columns, [slice(0, 1)])
     chi2 = scores(refit(f, drawn_residuals(f, np.random.default_rng(1), 300)), ready)[0][:, 0]
     assert 0.8 < np.sqrt(np.mean(chi2)) < 1.2
     assert 0.005 < np.mean(chi2 > 3.84) < 0.09
@@ -59,10 +59,9 @@ def test_repeats_of_a_replicate_scatter_as_those_of_the_campaign_were_made_to() 
 
 
 def test_a_column_that_the_law_takes_up_counts_for_nothing() -> None:
-    from tribo.diagnose.statistics.fit import jacobian_at
 
     f = baseline()
-    law = columns_of(jacobian_at(f), [slice(k, k + 1) for k in range(4)])
+    law = columns_in(f.linear.jacobian, [slice(k, k + 1) for k in range(4)])
     chi2, coefficients = scores(as_measured(f), law)
     assert chi2.max() == 0.0
     assert all((c == 0.0).all() for c in coefficients)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tribo.diagnose import examine
-from tribo.diagnose.search.weigh import weigh
+from tribo.diagnose.search.naming import weigh
+from tribo.diagnose.statistics.linear import start_effects
 from tribo.diagnose.statistics.model import Setup
 
 from .known import acting, baseline, made
@@ -60,7 +61,8 @@ def test_a_law_that_is_an_eighth_off_from_sample_to_sample_needs_no_second_cause
 def test_a_further_parameter_has_to_earn_one_unit_of_log_likelihood() -> None:
     """Akaike 1974: what a parameter without any meaning earns on average is one unit."""
     start = baseline(made(lambda s: np.zeros((s.observations.n, 2)), seed=0))
-    weighed = {c.name: c for c in weigh(start) if c.name in ("run_in", "edge_adhesion", "suction", "humidity")}
+    names = ("run_in", "edge_adhesion", "suction", "humidity")
+    weighed = {c.name: c for c in weigh(start_effects(start)) if c.name in names}
     paid = {name: c.fit.score - start.score - c.raw for name, c in weighed.items()}
     further = {name: len(c.acting.mechanism.parameters) - 1 for name, c in weighed.items()}
     assert max(further.values()) >= 1

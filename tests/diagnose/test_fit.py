@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from blind.tribometer import Design, hide
 
-from tribo.diagnose.statistics.fit import fit, jacobian_at
-from tribo.diagnose.statistics.model import Acting, ModelFit, predict, setup
+from tribo.diagnose.statistics.fit import fit
+from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.model import Acting, predict, setup
 from tribo.diagnose.statistics.observations import observe
 from tribo.diagnose.statistics.predictor import tabled_predictor
 from tribo.mechanisms.table import MECHANISMS
@@ -57,7 +58,7 @@ def test_a_hidden_pressure_under_the_cavities_is_recovered() -> None:
 
 def test_derivatives_of_the_fit_are_those_of_the_prediction() -> None:
     f = fitted((("suction", 1.0),), (Acting(MECHANISMS["suction"]),))
-    analytic = jacobian_at(f)[:, :, 4]
+    analytic = f.linear.jacobian[:, :, 4]
     up = predict(f.setup, f.law, f.acting, (f.values[0] + 5.0,))
     down = predict(f.setup, f.law, f.acting, (f.values[0] - 5.0,))
     assert analytic == pytest.approx((up - down) / 10.0, rel=1e-3, abs=1e-9)

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose.search.looks import candidates
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.interval import (
     DROP_90,
@@ -17,7 +16,8 @@ from tribo.diagnose.statistics.interval import (
     standard_errors,
     with_pattern_error,
 )
-from tribo.diagnose.statistics.model import ModelFit
+from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.model import candidates
 
 from .test_screen import baseline
 

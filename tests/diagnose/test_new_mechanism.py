@@ -9,7 +9,8 @@ import pytest
 
 from tribo.diagnose import examine, plan_design
 from tribo.diagnose.diagnosis_record import Diagnosis
-from tribo.diagnose.search.weigh import weigh
+from tribo.diagnose.search.naming import weigh
+from tribo.diagnose.statistics.linear import start_effects
 from tribo.mechanisms.record import (
     Base,
     Conditions,
@@ -79,7 +80,7 @@ def examined() -> Diagnosis:
 
 
 def test_it_is_weighed_and_recovered(toy: Mechanism, examined: Diagnosis) -> None:
-    best = weigh(examined.baseline)[0]
+    best = weigh(start_effects(examined.baseline))[0]
     assert best.name == NAME
     assert best.values[0] == pytest.approx(SIZE, abs=0.05)
 

@@ -10,14 +10,15 @@ from blind.patterns import ErrorSize
 from blind.tribometer import Design
 
 from tribo.diagnose import examine
-from tribo.diagnose.search.looks import all_looks
 from tribo.diagnose.search.screen import screen
 from tribo.diagnose.statistics.chance import drawn_residuals, refit_sizes
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.model import ModelFit, setup
+from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.model import setup
 from tribo.diagnose.statistics.observations import observe
 from tribo.diagnose.statistics.predictor import tabled_predictor
 
+from .known import looks_at
 from .synthetic import PATTERNS, SMALL, hidden
 
 LARGE = Design(samples=("F", "A", "B", "C"), specimens=6)
@@ -51,7 +52,7 @@ def test_specimens_with_slopes_of_5_percent_are_no_misfit(seed: int) -> None:
 def test_the_slope_of_a_specimen_is_judged_against_those_of_the_others() -> None:
     """Slopes of 10 % per e-fold: no look at one specimen by load is beyond four standard deviations."""
     f = baseline(5, replace(LARGE, specimen_slope=0.10))
-    looks = [look for look in all_looks(f) if look.covariate.endswith(" by load")]
+    looks = [look for look in looks_at(f) if look.covariate.endswith(" by load")]
     assert screen(f, looks, replicates=0, rng=np.random.default_rng(0)).strength.max() < 4.0
 
 
@@ -103,9 +104,7 @@ def test_simulated_campaigns_scatter_as_much_as_the_fit_says() -> None:
 
 
 def precision(f: ModelFit) -> np.ndarray:
-    from tribo.diagnose.statistics.scatter import prior_precision
-
-    return prior_precision(f.setup, f.noise)
+    return f.linear.precision
 
 
 def test_sizes_are_estimated_anew_in_every_simulated_campaign() -> None:

@@ -9,13 +9,13 @@ import pytest
 
 from tribo.diagnose import examine, residual_table, with_simulation
 from tribo.diagnose.diagnosis_record import Diagnosis, SimulatedExtension
-from tribo.diagnose.search.weigh import effect
 from tribo.diagnose.simulated_extension import (
     MOST_LOADS,
     local_friction,
     representatives,
     residual_percent,
 )
+from tribo.diagnose.statistics.model import effect_of
 from tribo.diagnose.statistics.pattern_table import flat_law
 from tribo.simulate import SimConfig, simulate
 
@@ -50,7 +50,7 @@ def test_a_gain_on_every_block_is_the_gain_of_the_sample(hot: Diagnosis) -> None
 def test_few_tests_are_simulated_and_the_most_moved_is_among_them(hot: Diagnosis) -> None:
     assert hot.named is not None
     model = hot.named.model
-    quick = effect(model)
+    quick = effect_of(model.setup, model.law, model.acting[-1], model.values[-1])
     picked = representatives(model, quick)
     assert len(picked) <= len(set(model.setup.observations.conditions.sample)) * MOST_LOADS
     assert np.abs(quick[picked]).max() == pytest.approx(np.abs(quick).max(), rel=0.05)

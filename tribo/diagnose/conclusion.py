@@ -95,7 +95,7 @@ def _shown(named: Named | None) -> list[Weighed]:
     """Every mechanism of every cause, and the rivals of the last, with their shares and parameters."""
     if named is None:
         return []
-    found = []
+    found: list[Weighed] = []
     for k, alike in enumerate(named.causes):
         shown = [*alike, *(named.rivals if k == len(named.causes) - 1 else ())]
         found += [(c, float(w), _estimates(c)) for c, w in zip(shown, weights_of(shown), strict=True)]

@@ -47,7 +47,8 @@ def misfits_of(screened: Screen, level: float, flat: str = "") -> list[Misfit]:
             found.append(_misfit(look, float(screened.size[k]), screened.coefficients[k], p))
     if not found and len(order) and screened.p[order[0]] < level:
         k = order[0]
-        found.append(_misfit(screened.looks[k], float(screened.size[k]), screened.coefficients[k], float(screened.p[k])))
+        p = float(screened.p[k])
+        found.append(_misfit(screened.looks[k], float(screened.size[k]), screened.coefficients[k], p))
     return found
 
 

@@ -191,7 +191,7 @@ def model_covariance(table: Table, friction: FloatArray, acting_change: FloatArr
 
     ``acting_change`` (samples, regimes, loads), the change of ln T by mechanisms, adds their error of form.
     """
-    from tribo.diagnose.search.naming import FORM
+    from tribo.diagnose.search.screen import FORM
 
     log_p = np.log(table.pressures_Pa / np.sqrt(np.prod(RANGE_PA)))
     size = len(table.values)

@@ -39,7 +39,8 @@ class Look:
 
 def all_looks(s: Setup, changes: StartChanges) -> list[Look]:
     """Every look that this design allows, ``changes`` being those of the candidates."""
-    looks = [*_mechanisms(changes), *_covariates(s), *_levels(s), *_samples(s), *_specimens(s), *_periods(s), *_blocks(s)]
+    recorded = [*_covariates(s), *_levels(s), *_samples(s), *_specimens(s), *_periods(s), *_blocks(s)]
+    looks = [*_mechanisms(changes), *recorded]
     return [look for look in looks if np.isfinite(look.columns).all() and np.ptp(look.columns) > 0]
 
 

@@ -29,9 +29,9 @@ TAKEN_UP = 1e-6  # share of a column's information below which nothing of it is 
 class Screen:
     """Strength of every look as a standard normal deviate, and what chance gives.
 
-    ``p`` (looks,) is the adjusted p value of each. ``chance`` (replicates,) is the strongest look in each simulated campaign of the fitted model,
-    ``chance_library`` the strongest of the mechanisms alone. ``size`` (looks,) is the peak-to-peak effect
-    in ln T that the calibration does not absorb, ``coefficients`` those of each look's columns.
+    ``p`` (looks,) is the adjusted p value of each. ``chance`` (replicates,) is the strongest look in each simulated
+    campaign of the fitted model, ``chance_library`` the strongest of the mechanisms alone. ``size`` (looks,) is the
+    peak-to-peak effect in ln T that the calibration does not absorb, ``coefficients`` those of each look's columns.
     """
 
     looks: tuple[Look, ...]
