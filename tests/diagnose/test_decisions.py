@@ -7,7 +7,7 @@ import pytest
 
 from tribo.diagnose import examine
 from tribo.diagnose.search.naming import weigh
-from tribo.diagnose.statistics.linear import start_effects
+from tribo.diagnose.statistics.linearisation import start_effects
 from tribo.diagnose.statistics.model import Setup
 
 from .known import acting, baseline, made

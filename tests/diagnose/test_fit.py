@@ -9,7 +9,7 @@ import pytest
 from blind.tribometer import Design, hide
 
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting, predict, setup
 from tribo.diagnose.statistics.observations import observe
 from tribo.diagnose.statistics.predictor import tabled_predictor

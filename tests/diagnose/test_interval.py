@@ -16,7 +16,7 @@ from tribo.diagnose.statistics.interval import (
     standard_errors,
     with_pattern_error,
 )
-from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import candidates
 
 from .test_screen import baseline

@@ -13,7 +13,7 @@ from tribo.diagnose import examine
 from tribo.diagnose.search.screen import screen
 from tribo.diagnose.statistics.chance import drawn_residuals, refit_sizes
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import setup
 from tribo.diagnose.statistics.observations import observe
 from tribo.diagnose.statistics.predictor import tabled_predictor

@@ -23,7 +23,7 @@ from tribo.diagnose.sentences import (
 from tribo.diagnose.statistics.direct_evidence import TraceFindings, stated_evidence
 from tribo.diagnose.statistics.gain import gain, gain_of_zero
 from tribo.diagnose.statistics.interval import recovered
-from tribo.diagnose.statistics.linear import ModelFit, StartEffects
+from tribo.diagnose.statistics.linearisation import ModelFit, StartEffects
 from tribo.diagnose.verdict import Estimate, Excluded, Gain, Outcome, Verdict
 
 NEEDED = 3.7  # strength that chance reaches in one campaign of a hundred, where none was simulated

@@ -9,7 +9,7 @@ import numpy as np
 
 from tribo.diagnose.search.naming import Named
 from tribo.diagnose.search.screen import Screen
-from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.verdict import Verdict
 from tribo.records import FloatArray
 

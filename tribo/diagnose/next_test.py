@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tribo.diagnose.search.naming import Candidate, Named
-from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import effect_of, log_forces
 from tribo.diagnose.terms import in_words
 from tribo.diagnose.verdict import Misfit, NextTest, Outcome

@@ -10,7 +10,7 @@ from tribo.diagnose.search.looks import Look
 from tribo.diagnose.search.naming import Candidate
 from tribo.diagnose.search.screen import Screen
 from tribo.diagnose.statistics.direct_evidence import Evidence, stated_evidence
-from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting
 from tribo.diagnose.terms import ABSORBED, in_words, not_varied
 from tribo.diagnose.verdict import Cause, Estimate, Excluded, Misfit, Outcome

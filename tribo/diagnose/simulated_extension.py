@@ -17,7 +17,7 @@ import numpy as np
 
 from tribo.diagnose.diagnosis_record import Diagnosis, NotSimulated, SimulatedExtension
 from tribo.diagnose.sentences import name_in_words
-from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import effect_of
 from tribo.diagnose.statistics.pattern_table import flat_law
 from tribo.errors import SimulationError

@@ -16,7 +16,7 @@ from tribo.records import FloatArray
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
-    from tribo.diagnose.statistics.linear import ModelFit
+    from tribo.diagnose.statistics.linearisation import ModelFit
 
 COLUMNS = ["observable", "row", "covariate", "label", "effect_percent", "strength", "p_adjusted", "mark"]
 ALL = "all samples"

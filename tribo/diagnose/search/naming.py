@@ -12,7 +12,7 @@ import numpy as np
 
 from tribo.diagnose.search.screen import Progress, Screen, screen_left
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linear import ModelFit, StartEffects, start_effects
+from tribo.diagnose.statistics.linearisation import ModelFit, StartEffects, start_effects
 from tribo.diagnose.statistics.model import Acting, Target
 from tribo.records import FloatArray
 

@@ -12,7 +12,7 @@ from scipy.special import chdtrc, ndtri
 from tribo.diagnose.search.looks import Look, all_looks
 from tribo.diagnose.statistics.chance import as_measured, drawn_residuals, refit
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import start_changes, with_form_error
 from tribo.diagnose.statistics.scatter import ROUNDING, SIZE_STEPS, Replicates
 from tribo.records import FloatArray

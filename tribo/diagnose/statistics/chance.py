@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.scatter import (
     Replicates,
     Sizes,

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.diagnose.statistics.linear import (
+from tribo.diagnose.statistics.linearisation import (
     Linear,
     ModelFit,
     begin,

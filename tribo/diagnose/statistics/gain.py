@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import gammaln
 
 from tribo.diagnose.statistics.fit import fit_without
-from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting, Setup, Target
 from tribo.diagnose.statistics.observations import Observations
 from tribo.diagnose.verdict import Gain

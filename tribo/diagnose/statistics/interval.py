@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linear import ModelFit
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import FIXED, N_LAW, PATTERN
 from tribo.diagnose.statistics.scatter import log_size_prior
 from tribo.mechanisms.record import Mechanism
