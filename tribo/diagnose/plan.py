@@ -100,7 +100,7 @@ def _expected(campaign: Campaign, noise: Noise, law: FloatArray, predictor: Pred
     state = begin(s, law, np.zeros((n, 2)), noise)
     jacobian = Target(s, ()).jacobian(law, s.observations.log_force - state.residual)
     score, weight = scored(s, state)
-    linear = Linear(jacobian, s.random, state.residual, state.factor, state.precision, weight)
+    linear = Linear(jacobian, s.random, state.residual, state.at.factor, state.at.precision, weight)
     return ModelFit(s, (), law, (), noise, state.effects, state.residual, score, np.zeros((4 + q, 4 + q)), linear)
 
 

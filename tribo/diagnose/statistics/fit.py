@@ -90,14 +90,13 @@ def _starts(acting: Sequence[Acting], start: ModelFit | None) -> list[list[Float
 def _fitted(target: Target, x: FloatArray, noise: Noise, estimate: bool, until: tuple[int, float]) -> ModelFit:
     """Steps from ``x`` until one earns less than a gain, both in ``until``; with ``estimate`` the noise is estimated
     along with them."""
-    s, (iterations, least_gain) = target.setup, until
-    log_force = s.observations.log_force
+    s, log_force = target.setup, target.setup.observations.log_force
+    iterations, least_gain = until
     residual = target.residual(x)
+    jacobian = target.jacobian(x, log_force - residual)
     state = begin(s, x, residual, noise)
-    score, weight, jacobian, moved = -np.inf, np.zeros(0), np.zeros((0, 2, 0)), np.inf
+    score, weight = -np.inf, np.zeros(0)
     for _ in range(iterations):
-        if moved > STILL:
-            jacobian = target.jacobian(state.x, log_force - state.residual)
         system = solved(s, state, jacobian, target.bounds)
         before, p = state, len(state.x)
         least = penalised(s, before) - 1e-9
@@ -113,8 +112,10 @@ def _fitted(target: Target, x: FloatArray, noise: Noise, estimate: bool, until: 
         last, (score, weight) = score, scored(s, state)
         if abs(score - last) < least_gain:
             break
+        if moved > STILL:
+            jacobian = target.jacobian(state.x, log_force - state.residual)
     jacobian = target.jacobian(state.x, log_force - state.residual)
     return ModelFit(
-        s, target.acting, state.x[:N_LAW], target.values(state.x), state.noise, state.effects, state.residual, score,
-        system.inverse, Linear(jacobian, s.random, state.residual, state.factor, state.precision, weight),
+        s, target.acting, state.x[:N_LAW], target.values(state.x), state.at.noise, state.effects, state.residual, score,
+        system.inverse, Linear(jacobian, s.random, state.residual, state.at.factor, state.at.precision, weight),
     )  # fmt: skip

@@ -9,13 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tribo.diagnose.statistics.model import Acting, Setup, StartChanges, start_changes
-from tribo.diagnose.statistics.scatter import (
-    Noise,
-    log_prior,
-    prior_precision,
-    updated_repeats,
-    updated_sizes,
-)
+from tribo.diagnose.statistics.scatter import AtNoise, Noise, at_estimated_noise, at_noise
 from tribo.records import FloatArray
 
 SEEN = 1e-3  # share of a mechanism's effect that must be left once the flat law is free
@@ -23,17 +17,12 @@ SEEN = 1e-3  # share of a mechanism's effect that must be left once the flat law
 
 @dataclass(frozen=True)
 class State:
-    """Where a fit has got to: parameters, random effects (q,), residual (n, 2) without them, and the noise.
-
-    ``factor`` (n, 2, 2) whitens the tests and ``precision`` (q,) is that of the random effects, both at this noise.
-    """
+    """Where a fit has got to: parameters, random effects (q,), residual (n, 2) without them, and the noise."""
 
     x: FloatArray
     effects: FloatArray
     residual: FloatArray
-    noise: Noise
-    factor: FloatArray
-    precision: FloatArray
+    at: AtNoise
 
 
 @dataclass(frozen=True)
@@ -51,18 +40,7 @@ class System:
 
 def begin(s: Setup, x: FloatArray, residual: FloatArray, noise: Noise) -> State:
     """The state of a fit before its first step, all random effects zero."""
-    return State(x, np.zeros(s.random.shape[2]), residual, noise, whitener(s, noise), prior_precision(s, noise))
-
-
-def whitener(s: Setup, noise: Noise) -> FloatArray:
-    """Inverse Cholesky factor of the noise of every test, repeats plus reading, shape (n, 2, 2)."""
-    cov = noise.per_test(s) + s.observations.reading[:, :, None] ** 2 * np.eye(2)
-    a = np.sqrt(cov[:, 0, 0])
-    b = cov[:, 1, 0] / a
-    c = np.sqrt(cov[:, 1, 1] - b**2)
-    factor = np.zeros_like(cov)
-    factor[:, 0, 0], factor[:, 1, 0], factor[:, 1, 1] = 1 / a, -b / (a * c), 1 / c
-    return factor
+    return State(x, np.zeros(s.random.shape[2]), residual, at_noise(s, noise))
 
 
 def weights(noise: Noise, factor: FloatArray, left: FloatArray) -> FloatArray:
@@ -89,12 +67,12 @@ def whitened(factor: FloatArray, columns: FloatArray) -> FloatArray:
 def solved(s: Setup, state: State, jacobian: FloatArray, bounds: tuple[FloatArray, FloatArray]) -> System:
     """One step under the weighted noise; a parameter at a bound that would leave it is held there."""
     x, p = state.x, len(state.x)
-    weight = weights(state.noise, state.factor, _left(s, state))
+    weight = weights(state.at.noise, state.at.factor, _left(s, state))
     model = np.concatenate([jacobian, s.random], axis=2)
     both = np.concatenate([model, state.residual[:, :, None]], axis=2)
-    white = whitened(state.factor * np.sqrt(weight)[:, None, None], both)
+    white = whitened(state.at.factor * np.sqrt(weight)[:, None, None], both)
     columns, right = white[:, :-1], white[:, :-1].T @ white[:, -1]
-    normal = columns.T @ columns + np.diag(np.concatenate([np.full(p, 1e-12), state.precision]))
+    normal = columns.T @ columns + np.diag(np.concatenate([np.full(p, 1e-12), state.at.precision]))
     low, high = bounds
     held = np.zeros(len(right), bool)
     for _ in range(3):
@@ -126,34 +104,30 @@ def _left(s: Setup, state: State) -> FloatArray:
 
 def penalised(s: Setup, state: State) -> float:
     """Log density of the tests given the effects, plus that of the effects, without constants of the noise."""
-    tail = state.noise.tail
-    tests = -0.5 * (tail + 2.0) * np.sum(np.log1p(distance(state.factor, _left(s, state)) / tail))
-    return float(tests - 0.5 * np.sum(state.effects**2 * state.precision))
+    tail = state.at.noise.tail
+    tests = -0.5 * (tail + 2.0) * np.sum(np.log1p(distance(state.at.factor, _left(s, state)) / tail))
+    return float(tests - 0.5 * np.sum(state.effects**2 * state.at.precision))
 
 
 def with_noise_estimated(s: Setup, state: State, system: System) -> State:
     """The same state, the noise estimated anew; the system says how uncertain each prediction is."""
-    noise, left, q = state.noise, _left(s, state), s.random.shape[2]
+    left, q = _left(s, state), s.random.shape[2]
     columns, inverse = system.columns, system.inverse
-    sizes = updated_sizes(s, noise.sizes, state.effects, np.diag(inverse)[-q:])
     flat = columns.reshape(-1, columns.shape[2])
     blurred = np.einsum("nrk,nsk->nrs", (flat @ inverse).reshape(columns.shape), columns, optimize=True)
     squares = system.weight[:, None, None] * (left[:, :, None] * left[:, None, :] + blurred)
-    scatter = np.zeros(s.scatter.shape[1]) if noise.scatter is None else noise.scatter
-    packed = squares[:, [0, 0, 1], [0, 1, 1]].T
-    repeat, scatter = updated_repeats(s, (noise.repeat, scatter), packed, noise.tail)
-    found = replace(noise, repeat=repeat, scatter=scatter).with_sizes(sizes)
-    return replace(state, noise=found, factor=whitener(s, found), precision=prior_precision(s, found))
+    effects = state.effects, np.diag(inverse)[-q:]
+    return replace(state, at=at_estimated_noise(s, state.at, effects, squares[:, [0, 0, 1], [0, 1, 1]].T))
 
 
 def scored(s: Setup, state: State) -> tuple[float, FloatArray]:
     """Log marginal likelihood by Laplace's method, with the priors of the noise sizes; and the weights of the tests."""
-    weight = weights(state.noise, state.factor, _left(s, state))
-    white = whitened(state.factor * np.sqrt(weight)[:, None, None], s.random)
-    root = np.linalg.cholesky(white.T @ white + np.diag(state.precision))
+    weight = weights(state.at.noise, state.at.factor, _left(s, state))
+    white = whitened(state.at.factor * np.sqrt(weight)[:, None, None], s.random)
+    root = np.linalg.cholesky(white.T @ white + np.diag(state.at.precision))
     curvature = 2.0 * np.sum(np.log(np.diag(root)))
-    scale = float(np.sum(np.log(state.factor[:, 0, 0] * state.factor[:, 1, 1])))
-    prior = 0.5 * np.sum(np.log(state.precision)) + log_prior(s, state.noise)
+    scale = float(np.sum(np.log(state.at.factor[:, 0, 0] * state.at.factor[:, 1, 1])))
+    prior = 0.5 * np.sum(np.log(state.at.precision)) + state.at.log_prior
     return float(penalised(s, state) + scale + prior - 0.5 * curvature), weight
 
 

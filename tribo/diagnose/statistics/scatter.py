@@ -66,6 +66,59 @@ def first_noise() -> Noise:
     return Noise(np.diag([REPEAT_PRIOR[0] ** 2] * 2), np.zeros(2)).with_sizes(SIZE_PRIORS[:, 0])
 
 
+@dataclass(frozen=True)
+class AtNoise:
+    """What the tests and random effects of a campaign are weighed with at one noise.
+
+    ``factor`` (n, 2, 2) whitens the tests, ``precision`` (q,) is that of the random effects, and ``log_prior`` the log
+    density of the sizes.
+    """
+
+    noise: Noise
+    factor: FloatArray
+    precision: FloatArray
+    log_prior: float
+
+
+def at_noise(s: Setup, noise: Noise) -> AtNoise:
+    """The weighing of a campaign at this noise."""
+    return AtNoise(noise, whitener(s, noise), prior_precision(s, noise), log_prior(s, noise))
+
+
+def at_estimated_noise(
+    s: Setup, at: AtNoise, effects: tuple[FloatArray, FloatArray], squares: FloatArray
+) -> AtNoise:
+    """The same at the noise estimated anew from the random effects with their variances, (q,) each, and from the
+    weighted products ``squares`` (3, n) expected of what is left."""
+    noise = at.noise
+    sizes = updated_sizes(s, noise.sizes, *effects)
+    scatter = np.zeros(s.scatter.shape[1]) if noise.scatter is None else noise.scatter
+    repeat, scatter = updated_repeats(s, (noise.repeat, scatter), squares, noise.tail)
+    return at_noise(s, replace(noise, repeat=repeat, scatter=scatter).with_sizes(sizes))
+
+
+def whitener(s: Setup, noise: Noise) -> FloatArray:
+    """Inverse Cholesky factor of the noise of every test, repeats plus reading, shape (n, 2, 2)."""
+    cov = noise.per_test(s) + s.observations.reading[:, :, None] ** 2 * np.eye(2)
+    a = np.sqrt(cov[:, 0, 0])
+    b = cov[:, 1, 0] / a
+    c = np.sqrt(cov[:, 1, 1] - b**2)
+    factor = np.zeros_like(cov)
+    factor[:, 0, 0], factor[:, 1, 0], factor[:, 1, 1] = 1 / a, -b / (a * c), 1 / c
+    return factor
+
+
+def log_prior(s: Setup, noise: Noise) -> float:
+    """Log density of the sizes, without constants; of those alone that some random effect has."""
+    found = -0.5 * float(np.sum(noise.scatter**2)) / SCATTER_SD**2 if noise.scatter is not None else 0.0
+    for group, size in enumerate(noise.sizes):
+        if (s.group == group).any():
+            found += float(log_size_prior(group, size))
+    size, worth = REPEAT_PRIOR
+    determinant = float(np.linalg.slogdet(noise.repeat)[1])
+    return float(found - 0.5 * worth * (determinant + size**2 * np.trace(np.linalg.inv(noise.repeat))))
+
+
 def prior_sd(s: Setup, sizes: FloatArray) -> FloatArray:
     """Standard deviation of every random effect for sizes (..., 5), shape (..., q)."""
     known = np.ones((*sizes.shape[:-1], 1))
@@ -142,19 +195,6 @@ def log_size_prior(group: int, size: FloatArray) -> FloatArray:
     """Log density of the logarithm of a size, without constants: a scaled inverse chi."""
     expected, worth = SIZE_PRIORS[group]
     return np.asarray(-worth * (np.log(size) + 0.5 * (expected / size) ** 2))
-
-
-def log_prior(s: Setup, noise: Noise) -> float:
-    """Log density of the sizes, without constants; of those alone that some random effect has."""
-    found = -0.5 * float(np.sum(noise.scatter**2)) / SCATTER_SD**2 if noise.scatter is not None else 0.0
-    for group, size in enumerate(noise.sizes):
-        if (s.group == group).any():
-            found += float(log_size_prior(group, size))
-    size, worth = REPEAT_PRIOR
-    determinant = float(np.linalg.slogdet(noise.repeat)[1])
-    return float(found - 0.5 * worth * (determinant + size**2 * np.trace(np.linalg.inv(noise.repeat))))
-
-
 
 
 @dataclass(frozen=True)
