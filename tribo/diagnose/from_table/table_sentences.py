@@ -102,7 +102,8 @@ def misfit_sentence(outlooks: Sequence[Outlook]) -> str:
     verb = "differs" if main.p_misfit < LEVEL else "does not differ"
     text = (
         f"The model calibrated on the flat sample {verb} from Table 2 beyond chance: adjusted p "
-        f"{p_text(main.p_misfit)} for a correlation of mu and tau0 of {main.reading.correlation:.2f}, which loads spread evenly over 3 to 25 "
+        f"{p_text(main.p_misfit)} for a correlation of mu and tau0 of {main.reading.correlation:.2f}, "
+        "which loads spread evenly over 3 to 25 "
         f"kPa would give. It differs beyond chance in {failing} of {len(possible)} readings with a correlation that is "
         "possible for a line fit over these loads."
     )
