@@ -23,6 +23,7 @@ import shutil
 import subprocess
 import sys
 import time
+import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -39,7 +40,7 @@ ROOMS = {
 }
 TESTS = ("traces", "fitting", "diagnose", "mechanisms", "mechanisms_in_model", "readers", "ingestion")
 LIMIT_S = 90.0  # of processor time for the tests of one mutant, as they take without it
-LIBRARIES = ("h5py", "hypothesis", "numba", "numpy", "pandas", "pint", "pytest", "scipy.optimize", "scipy.special",
+LIBRARIES = ("h5py", "numba", "numpy", "pandas", "pint", "pytest", "scipy.optimize", "scipy.special",
              "scipy.stats", "statsmodels.api", "xarray")  # fmt: skip
 
 
@@ -69,7 +70,11 @@ def in_a_child(folder: Path, work: Callable[[], int], cpu_s: float, output: Path
             os.dup2(out.fileno(), 1)
             os.dup2(out.fileno(), 2)
             status = int(work())
+    except BaseException:
+        traceback.print_exc()
     finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
         os._exit(status)
 
 
