@@ -72,12 +72,11 @@ def assumed_errors() -> Mapping[str, ErrorSize]:
 
     Read from the diagnosis here, where campaigns are counted; the generator is only told the numbers.
     """
-    from tribo.diagnose.statistics.model import CURVE_SD
     from tribo.diagnose.statistics.predictor import tabled_predictor
 
     samples = [s for s in Design.samples if s != "F"]
     p = tabled_predictor({s: pattern_of(s) for s in Design.samples})
-    return {s: ErrorSize(p.offset[s], p.slope[s], (CURVE_SD, CURVE_SD)) for s in samples}
+    return {s: ErrorSize(p.offset[s], p.slope[s], p.curve[s]) for s in samples}
 
 
 def design_for(*names: str, **changes: Any) -> Design:

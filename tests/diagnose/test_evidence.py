@@ -7,7 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose.statistics.direct_evidence import rise_stiffening, zero_drift, zero_offset
+from tribo.diagnose.statistics.direct_evidence import (
+    Evidence,
+    certain_evidence,
+    direct_evidence,
+    rise_stiffening,
+    zero_drift,
+    zero_offset,
+)
 from tribo.diagnose.statistics.observations import observe
 from tribo.records import Trace
 
@@ -81,3 +88,29 @@ def test_a_drift_that_rests_overnight_is_still_a_drift() -> None:
     assert drift is not None
     assert drift.certain
     assert drift.change == pytest.approx(0.15 * 0.12, rel=0.2)
+
+
+def test_the_p_value_of_an_estimate_is_two_sided_normal_times_the_looks() -> None:
+    """1.96 standard errors have p = 0.05 (any table of the normal distribution)."""
+    e = Evidence(value=-1.959964, standard_error=1.0, certain=False, unit="N")
+    assert e.p_adjusted(1) == pytest.approx(0.05, rel=1e-5)
+    assert e.p_adjusted(4) == pytest.approx(0.20, rel=1e-5)
+    assert e.p_adjusted(40) == 1.0
+
+
+def test_every_estimate_that_was_made_is_counted() -> None:
+    """One offset, and drifts over the clock, over the hours at the bench and within the pulls."""
+    o = observe(hidden(("load_cell_drift", 1.0)))
+    rng = np.random.default_rng(1)
+    evidence = direct_evidence(replace(o, zero_slope_N_per_s=rng.normal(0.0, 0.0005, o.n)))
+    assert evidence["load_cell_offset"].looks == 1
+    assert evidence["load_cell_drift"].looks == 3
+
+
+def test_a_drift_includes_the_offset_that_it_leaves() -> None:
+    found = {
+        "load_cell_offset": Evidence(0.2, 0.01, True, "N"),
+        "load_cell_drift": Evidence(0.1, 0.01, True, "N/h"),
+    }
+    assert list(certain_evidence(found)) == ["load_cell_drift"]
+    assert list(certain_evidence(found | {"load_cell_drift": Evidence(0.1, 0.1, False, "N/h")})) == ["load_cell_offset"]

@@ -9,7 +9,14 @@ import pytest
 
 from tribo.diagnose.search.looks import candidates
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.interval import DROP_90, _score_at, intervals, recovered, standard_errors
+from tribo.diagnose.statistics.interval import (
+    DROP_90,
+    _score_at,
+    intervals,
+    recovered,
+    standard_errors,
+    with_pattern_error,
+)
 from tribo.diagnose.statistics.model import ModelFit
 
 from .test_screen import baseline
@@ -44,20 +51,30 @@ def test_the_ends_of_a_profile_interval_lose_what_they_should() -> None:
 
 @pytest.mark.parametrize("factor", [0.5, 4.0])
 def test_the_patterns_of_the_campaign_tell_how_wrong_the_model_is_about_them(factor: float) -> None:
-    """Where the patterns differ from the model by half its assumed error the interval is narrower, by four times wider.
+    """Where the patterns are off by half their stated error the interval is narrower than at that error, by four times
+    wider.
 
     Each of A, B and C is off by so many standard deviations of that error, alternately up and down.
     """
+    moved = off_by(factor)
+    (_, low, high), (at_least, at_most) = recovered(moved, 0)[0], intervals(with_pattern_error(moved, 1.0), 0)[0]
+    assert (high - low < at_most - at_least) == (factor < 1)
+
+
+def test_the_scale_of_the_pattern_error_is_recovered() -> None:
+    """Three patterns, both regimes, off by four times the stated error: the factor is within a third of four."""
+    assert off_by(4.0).noise.pattern == pytest.approx(4.0, rel=0.34)
+    assert off_by(0.5).noise.pattern < 1.0
+
+
+def off_by(factor: float) -> ModelFit:
     f = fitted("edge_adhesion", ("edge_adhesion", 1.0))
     o = f.setup.observations
     off = sum(
         sign * factor * np.array(f.setup.predictor.offset[sample]) * (o.conditions.sample == sample)[:, None]
         for sample, sign in (("A", 1), ("B", -1), ("C", 1))
     )
-    s = replace(f.setup, observations=replace(o, log_force=o.log_force + off))
-    moved = fit(s, f.acting)
-    (_, low, high), (at_least, at_most) = recovered(moved, 0)[0], intervals(moved, 0)[0]
-    assert (high - low < at_most - at_least) == (factor < 1)
+    return fit(replace(f.setup, observations=replace(o, log_force=o.log_force + off)), f.acting)
 
 
 def test_an_averaged_interval_keeps_to_the_bounds() -> None:

@@ -12,7 +12,6 @@ from tribo.diagnose.from_table.table_diagnosis import (
     diagnose_published,
     look_at,
     readings,
-    upper_limit,
 )
 from tribo.diagnose.from_table.table_observations import (
     design_correlation,
@@ -21,6 +20,7 @@ from tribo.diagnose.from_table.table_observations import (
     predict_table,
     read_table,
 )
+from tribo.diagnose.from_table.table_outlook import upper_limit
 from tribo.figures.catalogue import PUBLISHED_FIGURES
 from tribo.mechanisms.table import MECHANISMS
 from tribo.published import load_table2, load_table2_simulated_anew

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tribo.diagnose import examine, residual_table, with_simulation
-from tribo.diagnose.diagnosis import Diagnosis
+from tribo.diagnose.diagnosis_record import Diagnosis, SimulatedExtension
 from tribo.diagnose.search.weigh import effect
 from tribo.diagnose.simulated_extension import (
     MOST_LOADS,
-    SimulatedExtension,
     local_friction,
     representatives,
     residual_percent,
@@ -102,3 +103,20 @@ def test_a_diagnosis_with_its_simulation_can_be_kept_and_read_back(hot: Diagnosi
     again = decoded(json.loads(json.dumps(encoded(hot))))
     assert again.verdict.to_json() == hot.verdict.to_json()
     assert simulated(again).table.equals(simulated(hot).table)
+
+
+def test_a_simulation_that_fails_is_reported_with_its_reason(hot: Diagnosis, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tribo.diagnose import simulated_extension
+    from tribo.errors import Problem, SimulationError
+
+    def fails(*args: object) -> None:
+        raise SimulationError(Problem("not_finite", "the force is not finite"))
+
+    monkeypatch.setattr(simulated_extension, "simulate_pair", fails)
+    d = with_simulation(replace(hot, simulated=None))
+    assert d.simulated is None
+    assert d.verdict.as_dict()["model"]["not_simulated"] == {
+        "mechanisms": ["temperature"],
+        "reason": "the force is not finite",
+    }
+    assert "was not simulated: the force is not finite." in d.verdict.text

@@ -74,8 +74,8 @@ def test_every_mechanism_is_either_a_cause_or_excluded_with_a_reason(tied: Diagn
     assert spoken_of == set(NAMES)
     reasons = {e.mechanism: e.reason for e in v.excluded}
     assert "before contact" in reasons["load_cell_offset"]
-    assert "cannot be told" in reasons["velocity_dependence"]
-    assert "cannot be told" in reasons["pulley_friction"]
+    assert "the pull speed does not vary" in reasons["velocity_dependence"]
+    assert "the calibration on the flat sample absorbs" in reasons["pulley_friction"]
 
 
 def test_the_same_seed_gives_the_same_verdict_to_the_bit() -> None:
@@ -117,6 +117,7 @@ def test_an_offset_gains_on_the_zeros_of_specimens_it_has_not_seen() -> None:
     assert v.verdict == "named"
     assert [c.mechanism for c in v.causes] == ["load_cell_offset"]
     assert v.misfits[0].observable == "zero"
+    assert 0.0 < v.misfits[0].p_adjusted < 1e-3
     assert v.gain is not None
     assert v.gain.difference > 10 * v.gain.se
 
@@ -132,4 +133,5 @@ def test_a_misfit_is_said_in_words_of_the_field_and_not_of_the_flat_sample(tied:
     found = tied.verdict.misfits
     assert any("of C falls with the normal load" in m.text for m in found)
     assert not any("normal_load_N" in m.text for m in found)
+    assert not any("_" in text for text in (tied.verdict.text, *(c.text for c in tied.verdict.causes)))
     assert not any(m.sample == "F" and m.covariate in ("sample", "normal_load_N") for m in found)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tribo.mechanisms.record import Base, Conditions, Mechanism, Values
+from tribo.mechanisms.record import Base, Conditions, Contact, Mechanism, Readings, Values
 from tribo.mechanisms.table import MECHANISMS, NAMES, mechanism
 
 LAWS = {"F": (4.8, 1.29, 2.9, 0.62), "B": (4.2, 0.59, 3.0, 0.38), "Sx": (3.7, 0.69, 2.95, 0.47)}
@@ -121,3 +121,128 @@ def test_what_does_not_vary_does_not_apply() -> None:
     assert not MECHANISMS["velocity_dependence"].applies(one_speed)
     unrecorded = replace(conditions(), humidity_pct=np.full(48, np.nan))
     assert not MECHANISMS["humidity"].applies(unrecorded)
+
+
+@ALL
+def test_it_has_a_plain_name_of_its_own_and_no_identifier_in_its_words(m: Mechanism) -> None:
+    assert m.plain
+    assert [other.name for other in MECHANISMS.values() if other.plain == m.plain] == [m.name]
+    words = (m.plain, m.shows, m.confused_with, m.separates, m.enters, m.untested, m.in_table.missing)
+    assert not any("_" in text for text in (*words, m.in_table.barred, *m.silenced_by))
+
+
+@ALL
+def test_a_choice_concerns_some_test_and_is_called_by_the_name_of_the_mechanism(m: Mechanism) -> None:
+    c = conditions()
+    choice = first_choice(m, base(c), c)
+    acting = [m.on_test(m.start(), choice, c, test) for test in range(48)]
+    assert any(here is not None for here in acting)
+    assert all(here is None or len(here.values) == len(m.parameters) for here in acting)
+    assert m.called(choice).split(":")[0] == m.name
+    assert m.choosing.held_out in ("samples", "loads")
+
+
+@ALL
+def test_on_one_test_it_changes_the_force_as_its_law_does_over_the_campaign(m: Mechanism) -> None:
+    """The values of one test, with the choice of a single run, give the change that the law gives that test."""
+    from dataclasses import fields, replace
+
+    c = conditions()
+    b = base(c)
+    choice = first_choice(m, b, c)
+    whole = m.law(m.start(), b, c, choice).static_N
+    plain = b.forces(c.normal_load_N).static_N
+    for test in range(48):
+        here = m.on_test(m.start(), choice, c, test)
+        if here is None:
+            assert whole[test] == pytest.approx(plain[test])
+            continue
+        arrays = {f.name for f in fields(c)} - {"nominal_area_m2", "columns"}
+        one = replace(c, **{name: getattr(c, name)[[test]] for name in arrays}, columns={"column": np.array(["this"])})
+        alone = np.array([[v[test] for v in (b.static_mu, b.static_adhesion_N, b.sliding_mu, b.sliding_adhesion_N)]])
+        single = Base(*alone.T, by_sample=LAWS, flat="F")
+        if here.other_sample:
+            other = single.as_sample(here.other_sample).forces(one.normal_load_N)
+            assert whole[test] == pytest.approx(other.static_N[0])
+        else:
+            after = m.law(here.values, single, one, m.choosing.in_one_run(one))
+            assert whole[test] == pytest.approx(after.static_N[0])
+
+
+@ALL
+def test_its_placement_is_neutral_at_zero_amplitude_and_acts_at_the_start(m: Mechanism) -> None:
+    p, contact, one = m.placement, Contact(8e3, 0.65, 4.0, 2.5), one_run()
+    place = np.linspace(-0.5, 0.5, 11)
+    neutral: list[tuple[object, list[float], float]] = [
+        (p.thresholds, [v for values in both(m) for v in (p.thresholds(values, contact) if p.thresholds else ())], 1.0),
+        (p.load, [v for values in both(m) for v in (p.load(values, contact) if p.load else ())], 1.0),
+        (p.springs, [p.springs(values, one) for values in both(m)] if p.springs else [], 1.0),
+        (p.floors, [p.floors(values, one) for values in both(m)] if p.floors else [], 0.0),
+        (p.rims, [p.rims(values)[0] for values in both(m)] if p.rims else [], 0.0),
+        (p.along, [v for values in both(m) for v in (p.along(values, 4.0, place)[0] if p.along else ())], 1.0),
+        (p.chain, [v for values in both(m) for v in (p.chain(values, RECORDED).values() if p.chain else ())], 0.0),
+    ]
+    assert p.by_law or p.other_sample or any(part is not None for part, *_ in neutral)
+    for part, values, nothing in neutral:
+        if part is not None:
+            half = len(values) // 2
+            assert values[:half] == [nothing] * half
+            assert values[half:] != [nothing] * half
+
+
+def both(m: Mechanism) -> tuple[Values, Values]:
+    """Values at which a mechanism is absent, and a clear effect."""
+    return m.zero(), m.start()
+
+
+def one_run() -> Conditions:
+    """A pull of a pattern at four times the reference speed, at a pressure at which cavities collapse."""
+    from dataclasses import fields, replace
+
+    c = conditions()
+    arrays = {f.name for f in fields(c)} - {"nominal_area_m2", "columns"}
+    return replace(c, **{name: getattr(c, name)[[23]] for name in arrays})
+
+
+RECORDED = {"elapsed_s": 3600.0, "samples_in_rise": 100.0}
+
+
+@ALL
+def test_what_depends_on_the_friction_it_changes_says_so(m: Mechanism) -> None:
+    p, place = m.placement, np.linspace(-0.5, 0.5, 11)
+    low, high = Contact(8e3, 0.65, 1.0, 1.0), Contact(8e3, 0.65, 5.0, 5.0)
+    moved = [gains(m.start(), low) != gains(m.start(), high) for gains in (p.thresholds, p.load) if gains is not None]
+    if p.along is not None:
+        moved.append(not np.array_equal(p.along(m.start(), 1.0, place)[0], p.along(m.start(), 5.0, place)[0]))
+    assert p.own_friction == any(moved)
+
+
+@ALL
+def test_what_it_states_of_evidence_tests_and_tables_is_complete(m: Mechanism) -> None:
+    if m.evidence is not None:
+        assert set(m.evidence.contains) <= set(NAMES)
+        assert m.evidence.corrected or m.evidence.absent.format(value=1.0, percent=100.0)
+    if m.measurement is not None:
+        assert m.measurement.uncertainty > 0
+        assert m.measurement.hours > 0
+        assert m.measurement.text.endswith(".")
+    if m.variation is not None:
+        assert len(set(m.variation.values)) >= 3
+    t = m.in_table
+    assert not (t.missing and (t.barred or t.finding))
+    assert bool(t.finding) <= bool(t.guess)
+    assert t.next_test is None or set(t.next_test.separates) <= set(NAMES)
+    if t.finding is not None:
+        text = t.finding(Readings((0.0, 4.0), (0.0, 0.1), lambda: 0.2, 6e4))
+        assert text.endswith(".")
+        assert "nan" not in text
+
+
+@ALL
+def test_its_record_can_be_kept_and_read_back(m: Mechanism) -> None:
+    """Every function in it is one of its module, not a lambda."""
+    import json
+
+    from tribo.store.kept_results import decoded, encoded
+
+    assert decoded(json.loads(json.dumps(encoded(m)))) == m

@@ -18,7 +18,7 @@ from tribo.simulate import SimConfig, simulate
 SMALL = SimConfig(sample="B", pressure_Pa=8e3, angle_deg=20.0, blocks=(25, 25), seed=3, dt_s=1e-7)
 LONG = SMALL.with_(sample="Sx", angle_deg=4.0, blocks=(45, 25))
 KNOWN = {"humidity_pct": 58.0, "hold_s": 100.0, "temperature_C": 25.0, "speed_m_s": 8e-4, "specimen_run": 2.0}
-KEYS = [f"{name}(C)" if name == "mislabelled_specimen" else name for name in SIMULATED]
+KEYS = [f"{name}(C)" if MECHANISMS[name].placement.other_sample else name for name in SIMULATED]
 EVERY = pytest.mark.parametrize("key", KEYS)
 # Friction of a run may differ from that of the law by this share. A thousandth where every block is changed alike:
 # the equations of the model are linear in load and adhesion, and only the samples that the mean over stick-slip takes
@@ -152,14 +152,17 @@ def test_floors_that_all_touch_down_make_the_sample_flat() -> None:
 
 
 def test_a_tilted_sample_has_its_load_off_the_middle_by_what_was_asked() -> None:
-    from tribo.mechanisms_in_model.on_blocks import even, on_tilted
+    from functools import partial
+
+    from tribo.mechanisms.tilt import uneven
+    from tribo.mechanisms_in_model.on_blocks import even, with_profile
     from tribo.simulate.engines.fast import lattice_of
 
     flat = SMALL.with_(sample="F", angle_deg=0.0, blocks=(60, 60))
     lattice = lattice_of(flat)
     place = np.arange(3600) % 60 / 59 - 0.5
     for eccentricity in (0.05, 0.16, 0.25):
-        carried = on_tilted(flat, lattice, eccentricity, even(lattice))
+        carried = with_profile(flat, lattice, partial(uneven, eccentricity), even(lattice))
         assert carried.load.mean() == pytest.approx(1.0)
         assert np.mean(carried.load * place) == pytest.approx(eccentricity, rel=0.05)
     assert carried.grip.mean() == pytest.approx(3 * (0.5 - 0.25), abs=0.02)

@@ -95,7 +95,7 @@ def test_a_half_uploaded_archive_waits_and_a_whole_one_is_a_campaign(drop: Path)
 
 def test_two_campaigns_of_one_name_are_refused(drop: Path) -> None:
     (drop / "a.zip").write_bytes(b"PK")
-    with pytest.raises(CampaignError, match="of one name"):
+    with pytest.raises(CampaignError, match="have the same name"):
         scan(drop, 0.0)
 
 

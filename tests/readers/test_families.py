@@ -340,7 +340,7 @@ def test_a_counting_column_with_the_sampling_step_as_its_unit_is_a_time(tmp_path
 
 def test_several_traces_are_refused_until_one_is_chosen(tmp_path: Path) -> None:
     path = saved(tmp_path, UMT)
-    with pytest.raises(ReadError, match="2 tables") as caught:
+    with pytest.raises(ReadError, match="contains 2 traces") as caught:
         read_export(path)
     assert [p.kind for p in caught.value.problems] == ["several_tables"]
     second = read_export(f"{path}#2")

@@ -63,7 +63,7 @@ def test_a_second_start_computes_nothing(tmp_path: Path, monkeypatch: pytest.Mon
 def test_another_design_is_refused(tmp_path: Path):
     """A store does not mix two designs; a file that is no store is named."""
     run_stored(design(1), tmp_path / "e.h5")
-    with pytest.raises(SimulationError, match="another design"):
+    with pytest.raises(SimulationError, match="a different design"):
         run_stored(design(2), tmp_path / "e.h5")
     (tmp_path / "text.h5").write_text("not HDF5")
     with pytest.raises(SimulationError, match="cannot be read as HDF5"):
@@ -165,7 +165,7 @@ def test_a_store_keeps_what_it_is_asked_to_read_off_a_run(tmp_path: Path):
     table = run_stored(design(1), tmp_path / "e.h5", work=Work(read=samples_of, units={"samples": "1"}))
     assert (table["samples"] > 100).all()
     assert "static_friction" not in table
-    with pytest.raises(SimulationError, match="another design"):
+    with pytest.raises(SimulationError, match="a different design"):
         run_stored(design(1), tmp_path / "e.h5")
 
 

@@ -1,4 +1,5 @@
-from .diagnosis import Diagnosis as Diagnosis, diagnose as diagnose, examine as examine
+from .diagnosis import diagnose as diagnose, examine as examine
+from .diagnosis_record import Diagnosis as Diagnosis
 from .diagnosis_tables import (
     look_table as look_table,
     misfit_map as misfit_map,

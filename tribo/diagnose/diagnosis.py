@@ -1,28 +1,32 @@
-"""The diagnosis of a campaign: does the model fail beyond chance, and what is behind it."""
+"""The diagnosis of a campaign: whether the model fails beyond chance, and which mechanism explains it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from tribo.diagnose.diagnosis_record import Diagnosis
 from tribo.diagnose.next_test import first_test_of, next_test, widening_test
 from tribo.diagnose.search.looks import all_looks
 from tribo.diagnose.search.naming import Named, name_causes, weights_of
 from tribo.diagnose.search.screen import Progress, Screen, screen
 from tribo.diagnose.search.weigh import Candidate, unseen
 from tribo.diagnose.sentences import (
-    cause_from_evidence,
     cause_of,
+    causes_from_evidence,
     exclusions,
     misfits_of,
     patterns_apart,
     smallest_effects,
     summary,
 )
-from tribo.diagnose.simulated_extension import SimulatedExtension
-from tribo.diagnose.statistics.direct_evidence import Evidence, rise_stiffening, zero_drift, zero_offset
+from tribo.diagnose.statistics.direct_evidence import (
+    Evidence,
+    certain_evidence,
+    direct_evidence,
+    stated_evidence,
+)
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.gain import gain, gain_of_zero
 from tribo.diagnose.statistics.model import ModelFit, setup
@@ -36,20 +40,6 @@ REPLICATES_LEFT = 60
 FEWEST_TESTS = 12
 
 
-@dataclass(frozen=True)
-class Diagnosis:
-    """A verdict with what it rests on, for figures and tables.
-
-    ``simulated`` is the extended model run in the simulator itself, where that was asked for.
-    """
-
-    verdict: Verdict
-    baseline: ModelFit
-    screened: Screen
-    named: Named | None
-    simulated: SimulatedExtension | None = None
-
-
 def diagnose(
     ingested: Ingested,
     *,
@@ -58,7 +48,7 @@ def diagnose(
     predictor: Predictor | None = None,
     progress: Progress | None = None,
 ) -> Verdict:
-    """Name what the calibrated model gets wrong in a campaign, or say that nothing is, or that it cannot be told.
+    """Find out whether the calibrated model fails on a campaign beyond chance, and which mechanism explains it.
 
     Parameters
     ----------
@@ -97,7 +87,7 @@ def examine(
     s = setup(observations, predictor or tabled_predictor(observations.patterns))
     baseline = fit(s)
     screened = screen(baseline, all_looks(baseline), replicates=replicates[0], rng=rng, progress=progress)
-    evidence = _evidence(observations)
+    evidence = direct_evidence(observations)
     barred = _barred(baseline, evidence)
     named = None
     if screened.p_adjusted() < level:
@@ -122,17 +112,8 @@ def _enough(o: Observations) -> None:
         )  # fmt: skip
 
 
-def _evidence(o: Observations) -> dict[str, Evidence]:
-    found = {
-        "load_cell_offset": zero_offset(o),
-        "load_cell_drift": zero_drift(o),
-        "bulk_viscoelasticity": rise_stiffening(o),
-    }
-    return {name: e for name, e in found.items() if e is not None}
-
-
 def _barred(baseline: ModelFit, evidence: dict[str, Evidence]) -> list[Excluded]:
-    """What direct evidence or the design keeps out of the weighing."""
+    """Mechanisms that are not weighed, because direct evidence decides them or the design cannot show them."""
     return exclusions(baseline, evidence, unseen(baseline))
 
 
@@ -146,7 +127,7 @@ def _verdict(
     rng: np.random.Generator,
 ) -> Verdict:
     flat = baseline.setup.observations.flat
-    direct = [cause_from_evidence(n, e, evidence) for n, e in _certain(evidence).items()]
+    direct = causes_from_evidence(evidence)
     misfits = [m for _, m in direct] + misfits_of(screened, level, flat)
     outcome = _outcome(named, bool(direct), level)
     causes = [c for c, _ in direct] + (_causes(named, baseline) if outcome in ("named", "undetermined") else [])
@@ -168,17 +149,9 @@ def _verdict(
 
 
 def _once(misfits: Sequence[Misfit]) -> tuple[Misfit, ...]:
-    """Each column of each observable and sample once, as it was said first."""
+    """Each column of each observable and sample once: the first of its misfits."""
     first = {(m.observable, m.sample, m.covariate): m for m in reversed(misfits)}
     return tuple(m for m in misfits if first[m.observable, m.sample, m.covariate] is m)
-
-
-def _certain(evidence: dict[str, Evidence]) -> dict[str, Evidence]:
-    """Direct evidence that stands by itself; a wandering zero is a drift, not an offset as well."""
-    certain = {n: e for n, e in evidence.items() if e.certain}
-    if "load_cell_drift" in certain:
-        certain.pop("load_cell_offset", None)
-    return certain
 
 
 def _outcome(named: Named | None, direct: bool, level: float) -> Outcome:
@@ -211,16 +184,18 @@ def _gain(
     """Of the extended model where a mechanism was weighed, else of what direct evidence shows."""
     if named is not None and named.causes and outcome != "unknown":
         return gain(baseline, named.model, rng)
-    zeros = [n for n in _certain(evidence) if n.startswith("load_cell")]
+    quantities = [stated_evidence()[name].quantity for name in certain_evidence(evidence)]
+    zeros = [quantity for quantity in quantities if quantity != "rise"]
     if outcome == "named" and zeros:
-        return gain_of_zero(baseline.setup.observations, zeros[0] == "load_cell_drift", rng)
+        return gain_of_zero(baseline.setup.observations, zeros[0] == "zero drift", rng)
     return None
 
 
 def _next_test(
     baseline: ModelFit, named: Named | None, outcome: Outcome, misfits: Sequence[Misfit]
 ) -> NextTest | None:
-    """What parts the tied; what confirms a name against its runner-up; what narrows or widens the search."""
+    """A test that distinguishes tied mechanisms, confirms a cause against the next best, or narrows or widens the
+    search."""
     if outcome == "unknown":
         return first_test_of(misfits[0].covariate) if misfits else None
     if named is None or not named.causes:
@@ -234,7 +209,7 @@ def _next_test(
 
 
 def _excluded(named: Named | None, barred: list[Excluded], causes: list[Cause]) -> list[Excluded]:
-    """What was barred, and what lost the weighing by more than the rest."""
+    """What was not weighed, and what explains the campaign less well than the causes."""
     shown = {c.mechanism for c in causes}
     found = [e for e in barred if e.mechanism not in shown]
     if named is None or not named.weighed or not causes:
@@ -250,8 +225,8 @@ def _lost(c: Candidate, best: float) -> str:
     """Why a weighed mechanism is not among the causes."""
     m = c.acting.mechanism
     if c.values[0] == m.amplitude.zero and m.amplitude.zero in (m.amplitude.low, m.amplitude.high):
-        return "by its sign: it can only act one way, and the campaign goes the other"
-    return f"explains less: its log likelihood is {best - c.gain:.1f} lower"
+        return "wrong sign: it can change friction in one direction only, and the misfit has the opposite sign"
+    return f"explains the campaign less well: log likelihood lower by {best - c.gain:.1f}"
 
 
 __all__ = ["Diagnosis", "Misfit", "diagnose", "examine"]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribo.diagnose.diagnosis import Diagnosis
+from tribo.diagnose.diagnosis_record import Diagnosis
 from tribo.diagnose.search.naming import weights_of
 from tribo.records import REGIMES
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def residual_table(d: Diagnosis) -> pd.DataFrame:
-    """One row a test and regime: what was measured, what the models say, and what parts them.
+    """One row a test and regime: the measurement, the models, and their differences.
 
     Columns: test_id, sample, specimen, regime, normal_load_N, run_order, specimen_run, temperature_C,
     humidity_pct, speed_m_s, hold_s, measured_N, baseline_N, extended_N, residual_percent and

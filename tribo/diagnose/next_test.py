@@ -1,15 +1,16 @@
-"""Which further test best parts what is still tied, per hour at the bench."""
+"""Which further test best distinguishes mechanisms that explain a campaign about equally, per hour at the bench."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from tribo.diagnose.search.weigh import Candidate, effect
 from tribo.diagnose.statistics.model import ModelFit, log_forces
+from tribo.diagnose.terms import in_words
 from tribo.diagnose.verdict import NextTest
 from tribo.mechanisms.record import Conditions
 from tribo.mechanisms.table import MECHANISMS
@@ -17,28 +18,6 @@ from tribo.records import FloatArray
 
 HOURS_PER_PULL = 7.0 / 60.0
 PULLS = 18
-
-
-@dataclass(frozen=True)
-class Direct:
-    """A measurement that reads the amplitude of a mechanism itself, with a standard uncertainty in its unit."""
-
-    mechanism: str
-    text: str
-    uncertainty: float
-    hours: float
-
-
-DIRECT = (
-    Direct("normal_load_error", "Weigh the sled with everything that rests on it, the wire attached.", 0.005, 0.25),
-    Direct("load_cell_offset", "Record two seconds of force before contact and after lift-off.", 0.003, 0.5),
-    Direct("load_cell_drift", "Record the unloaded cell every hour for a day.", 2e-4, 1.0),
-    Direct("pattern_geometry", "Measure the area fraction of the pattern under a microscope.", 0.02, 1.0),
-    Direct("mislabelled_specimen", "Look at the specimens under a microscope.", 0.1, 0.5),
-    Direct("tilt", "Measure the height of the wire over the interface.", 0.002, 0.25),
-    Direct("sampling_clip", "Repeat twelve pulls at ten times the sampling rate.", 0.2, 1.5),
-    Direct("cavity_collapse", "Image a weak pattern through the counterface at the highest load.", 0.1, 2.0),
-)
 
 
 def next_test(tied: Sequence[Candidate]) -> NextTest | None:
@@ -52,31 +31,29 @@ def next_test(tied: Sequence[Candidate]) -> NextTest | None:
 
 
 ALONE = {
-    "normal_load_N": "Pull one specimen at nine loads over the range, up and down again",
+    "normal_load_N": "Pull one specimen at nine loads over the range, first upwards, then downwards",
     "sample": "Pull one fresh specimen of every sample in turn, at one load and within one day",
 }
 
 
 def first_test_of(covariate: str) -> NextTest:
-    """What to do about a misfit that follows a column but no law: vary that column alone."""
-    how = ALONE.get(covariate, f"Vary {covariate} alone, in random order, on one sample at one load")
+    """For a misfit that follows a column but no law: vary that column alone."""
+    how = ALONE.get(covariate, f"Vary {in_words(covariate)} alone, in random order, on one sample at one load")
     text = f"{how}: {PULLS} pulls."
     design = {"covariate": covariate, "pulls": PULLS, "hours": PULLS * HOURS_PER_PULL}
     return NextTest(text, (covariate,), design, float("nan"))
 
 
 def widening_test(conditions: Conditions) -> NextTest | None:
-    """For a campaign without misfit: vary what it held fixed, so that more mechanisms could show."""
+    """For a campaign without misfit: vary what was held fixed, so that further mechanisms can be tested."""
     fixed = {
-        "velocity_dependence": ("the pull speed over 0.05, 0.2 and 0.8 mm/s", "speed_mm_s", [0.05, 0.2, 0.8]),
-        "contact_ageing": ("the hold over 1, 10 and 300 s", "hold_s", [1.0, 10.0, 300.0]),
+        name: m.variation for name, m in MECHANISMS.items() if m.variation is not None and not m.applies(conditions)
     }
-    open_ = {name: how for name, how in fixed.items() if not MECHANISMS[name].applies(conditions)}
-    if not open_:
+    if not fixed:
         return None
-    text = f"Vary {' and '.join(how[0] for how in open_.values())} in random order: {PULLS} pulls of the flat sample."
-    design: dict[str, Any] = {how[1]: how[2] for how in open_.values()}
-    return NextTest(text, tuple(open_), design | {"pulls": PULLS, "hours": 3 * PULLS * HOURS_PER_PULL}, float("nan"))
+    text = f"Vary {' and '.join(v.text for v in fixed.values())} in random order: {PULLS} pulls of the flat sample."
+    design: dict[str, Any] = {v.column: list(v.values) for v in fixed.values()}
+    return NextTest(text, tuple(fixed), design | {"pulls": PULLS, "hours": 3 * PULLS * HOURS_PER_PULL}, float("nan"))
 
 
 def bits(distance2: float) -> float:
@@ -91,18 +68,18 @@ def bits(distance2: float) -> float:
 
 
 def _direct(first: Candidate, second: Candidate) -> list[NextTest]:
-    """Reading the amplitude of one of the two by itself: it is there, or it is not."""
+    """Measuring the amplitude of one of the two: it is there, or it is not."""
     found = []
-    for d in DIRECT:
-        for candidate in (first, second):
-            if candidate.acting.mechanism.name == d.mechanism:
-                information = bits(float((candidate.values[0] / d.uncertainty) ** 2))
-                found.append(_named(first, second, d.text, {"hours": d.hours}, information))
+    for candidate in (first, second):
+        m = candidate.acting.mechanism.measurement
+        if m is not None:
+            information = bits(float((candidate.values[0] / m.uncertainty) ** 2))
+            found.append(_named(first, second, m.text, {"hours": m.hours}, information))
     return found
 
 
 def _without(first: Candidate, second: Candidate) -> list[NextTest]:
-    """Repeating the strongest sample with the cause of one of the two taken away (vented, controlled, fresh)."""
+    """Repeating the most affected sample with the cause of one of the two removed (vented, controlled, fresh)."""
     found = []
     for candidate in (first, second):
         f, change = candidate.fit, effect(candidate.fit)
@@ -152,8 +129,10 @@ def _predicted_at(f: ModelFit, rows: np.ndarray, load_N: float) -> FloatArray:
 
 def _distance2(f: ModelFit, difference: FloatArray, rows: np.ndarray) -> float:
     """Squared difference of two predictions in units of the noise of further pulls on the same specimens."""
+    from scipy.linalg import block_diag
+
     s = f.setup
-    noise = np.kron(np.eye(len(rows)), f.noise.repeat)
+    noise = block_diag(*f.noise.per_test(s)[rows])
     flat = s.random[rows].reshape(-1, s.random.shape[2])
     q = s.random.shape[2]
     total = noise + flat @ f.covariance[-q:, -q:] @ flat.T

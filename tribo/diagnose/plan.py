@@ -1,4 +1,4 @@
-"""Before anything is measured: which mechanisms a design would find, of which size, and which it confuses."""
+"""Before anything is measured: which mechanisms a design would find, from which size, and which it confuses."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from tribo.diagnose.search.weigh import ALIKE, unseen
 from tribo.diagnose.statistics.model import Acting, ModelFit, Noise, Setup, predict, setup
 from tribo.diagnose.statistics.observations import NO_FLAT, Observations, conditions_of
 from tribo.diagnose.statistics.predictor import Predictor, tabled_predictor
+from tribo.diagnose.terms import ABSORBED, not_varied
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray
 
@@ -25,9 +26,9 @@ NINE_IN_TEN = FOUND + 1.28
 class Finding:
     """What a design would show of one mechanism.
 
-    ``amplitude`` (in ``unit``) and ``effect_percent`` (peak to peak of T beyond what the flat law takes up) are
-    found nine times in ten; both are NaN where the design cannot show it, and ``why`` says so.
-    ``confused_with`` looks the same in this design.
+    ``amplitude`` (in ``unit``) and ``effect_percent`` (change of T, peak to peak, that the calibration on the flat
+    sample does not absorb) are found nine times in ten; both are NaN where the design cannot show it, and ``why``
+    says so. ``confused_with`` lists mechanisms with the same effect in this design.
     """
 
     mechanism: str
@@ -41,14 +42,14 @@ class Finding:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a design can tell, mechanism by mechanism, the easiest first."""
+    """What a design can show of each mechanism, the easiest first."""
 
     n_tests: int
     findings: tuple[Finding, ...]
 
     @property
     def tied(self) -> tuple[tuple[str, ...], ...]:
-        """Sets that this design cannot tell apart."""
+        """Sets of mechanisms that this design cannot distinguish."""
         sets = {tuple(sorted((f.mechanism, *f.confused_with))) for f in self.findings if f.confused_with}
         return tuple(sorted(sets))
 
@@ -63,7 +64,7 @@ def plan_design(
     campaign : Campaign
         The planned tests with the conditions under which they will be made.
     noise : Noise
-        Expected standard deviations of ln T: repeats (2, 2) and specimens (2,).
+        Expected standard deviations of ln T: repeats (2, 2), gains and slopes of specimens (2,).
     law : array (4,)
         Expected flat law: mu and tau0 in kPa, static then sliding.
     """
@@ -103,7 +104,7 @@ def _expected(campaign: Campaign, noise: Noise, law: FloatArray, predictor: Pred
 
 
 def _one_each(s: Setup, law: FloatArray) -> list[Acting]:
-    """The first choice of every mechanism; every covariate by itself."""
+    """The first choice of every mechanism, and every column."""
     seen: dict[str, Acting] = {}
     for a in candidates(s, law):
         seen.setdefault(a.name, a)
@@ -121,7 +122,7 @@ def _finding(
     a = acting[k]
     m = a.mechanism
     if a.name in hidden:
-        why = "the free flat law takes it up"
+        why = ABSORBED
         return Finding(a.name, float("nan"), m.amplitude.unit, float("nan"), (), why, m.separates)
     times = NINE_IN_TEN / max(float(size[k]), 1e-12)
     alike = [
@@ -135,10 +136,10 @@ def _not_applying(s: Setup) -> list[Finding]:
     """Mechanisms whose columns this design does not vary, or that do not show in the friction forces."""
     found = []
     for m in MECHANISMS.values():
-        if m.name == "covariate" or (m.applies(s.observations.conditions) and m.regimes != ("rise",)):
-            continue
         varied = m.applies(s.observations.conditions)
-        in_shape = "it shows in the shape of the trace, not in its forces"
-        why = in_shape if varied or not m.needs else f"{', '.join(m.needs)} does not vary"
+        if varied and m.changes_forces:
+            continue
+        in_shape = "it changes the shape of the trace, not the friction forces"
+        why = in_shape if varied else not_varied(m)
         found.append(Finding(m.name, float("nan"), m.amplitude.unit, float("nan"), (), why, m.separates))
     return found

@@ -1,37 +1,35 @@
-"""The diagnosis in words: misfits, causes, exclusions, and what a campaign could have shown."""
+"""The diagnosis in words: misfits, causes, exclusions, and the smallest effects that a campaign could show."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from tribo.diagnose.search.looks import OBSERVABLES, Look, candidates
+from tribo.diagnose.search.looks import Look, candidates
 from tribo.diagnose.search.screen import Screen, beyond_law, cleared
 from tribo.diagnose.search.weigh import Candidate
-from tribo.diagnose.statistics.direct_evidence import Evidence
+from tribo.diagnose.statistics.direct_evidence import Evidence, certain_evidence, stated_evidence
 from tribo.diagnose.statistics.interval import recovered
-from tribo.diagnose.statistics.model import ModelFit, predict
+from tribo.diagnose.statistics.model import Acting, ModelFit, predict
+from tribo.diagnose.terms import ABSORBED, in_words, not_varied
 from tribo.diagnose.verdict import Cause, Estimate, Excluded, Misfit, Outcome
-from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms.record import Mechanism
+from tribo.mechanisms.table import MECHANISMS, mechanism
 
 SHOWN = 8
 WHAT = {
-    "static": "static friction", "sliding": "sliding friction",
-    "both": "static and sliding friction alike", "drop": "the drop from static to sliding",
+    "static": "static friction", "sliding": "sliding friction", "both": "friction (static and sliding)",
+    "drop": "the drop from static to sliding friction",
 }  # fmt: skip
-COLUMN = {
-    "normal_load_N": "the normal load", "speed_mm_s": "the speed", "hold_s": "the hold", "run_order": "the run order",
-    "specimen_run": "how often the specimen was pulled", "started_at": "the time since the first pull",
-    "temperature_C": "the temperature", "humidity_pct": "the humidity", "time of day": "the time of day",
-    "tau0": "the share that adhesion has in it",
-}  # fmt: skip
+NOT_TESTABLE = "cannot be tested with this design"
 
 
 def misfits_of(screened: Screen, level: float, flat: str = "") -> list[Misfit]:
-    """The looks that chance does not explain, the strongest first; mechanisms speak for themselves elsewhere.
+    """The looks that chance does not explain, the strongest first. Mechanisms are reported as causes instead.
 
-    What parts the sample ``flat`` from all others is said of the others: the model is calibrated on it.
+    A difference between the sample ``flat`` and the other samples is reported as a misfit of the other samples, because
+    the model is calibrated on the flat one.
     """
     found: list[Misfit] = []
     order = np.argsort(-screened.strength)
@@ -53,47 +51,71 @@ def misfits_of(screened: Screen, level: float, flat: str = "") -> list[Misfit]:
 
 
 def _covariate(look: Look) -> str:
-    """The column a look follows; a mechanism is said by what it needs."""
+    """The column that a look follows; for a mechanism the columns it needs."""
     if look.acting is None:
         return look.covariate.split(",")[0]
-    if look.acting.mechanism.name == "mislabelled_specimen":
-        return "specimen"
-    return look.acting.choice or ", ".join(look.acting.mechanism.needs)
+    return look.acting.mechanism.column(look.acting.choice)
 
 
 def _misfit(look: Look, size: float, coefficients: np.ndarray, p: float) -> Misfit:
     percent = 100.0 * float(np.expm1(min(size, 5.0)))
     of = f" of {look.sample}" if look.sample and look.kind != "specimen" else ""
-    text = f"{WHAT[look.observable][0].upper()}{WHAT[look.observable][1:]}{of} {_predicate(look, coefficients)}"
-    text += f": {percent:.0f} % from end to end (adjusted p {_p(p)})."
+    text = f"{sentence_case(WHAT[look.observable])}{of} {_predicate(look, coefficients)}"
+    text += f": {percent:.0f} %, peak to peak (adjusted p {p_text(p)})."
     return Misfit(look.observable, look.sample, _covariate(look), percent, p, text)
 
 
 def _predicate(look: Look, coefficients: np.ndarray) -> str:
-    """What the observable does, in words."""
+    """What the observable does relative to the model, in words."""
     column, _, detail = look.covariate.partition(", ")
-    words = COLUMN.get(column, column)
+    words = in_words(column)
     up = coefficients[0] > 0
     if look.acting is not None:
-        named = f"{look.acting.mechanism.name} {look.acting.choice}".rstrip()
-        return f"has the shape that {named} would give"
+        return f"varies as expected from {acting_in_words(look.acting)}"
     if look.kind == "sample":
-        if column == "sample":
-            return f"is {'higher' if up else 'lower'} as a whole than the other samples lead one to expect"
-        bent = "upwards" if up else "downwards"
-        return f"bends {bent} with {words}" if detail else f"{_goes(up)} with {words} beyond the model"
+        return _of_sample(column, detail, up)
     if look.kind == "specimen":
-        by_load = f"{_goes(up)} more with the normal load" if column.endswith(" by load") else ""
-        return f"of {column.removesuffix(' by load')} ({look.sample}) {by_load or _lies(up)} than of its siblings"
+        return _of_specimen(column, look.sample, up)
     if look.kind == "trend":
-        return f"{_goes(up)} with {words}"
+        return f"{_goes(up)} with {words} relative to the model"
     if look.kind == "period":
-        return f"follows {words} as a wave" + (f" of {detail}" if detail else "")
+        return f"varies periodically with {words}" + (f" ({detail} pulls)" if detail else "")
     if look.kind == "block":
-        return f"{_lies(up)} in the stretch of {words} {detail} than elsewhere"
+        return f"{_lies(up)} for {words} {detail} than in the rest of the series"
     if look.kind == "level":
-        return f"differs with {words}"
+        return f"differs between values of {words}"
     return f"follows {words}, {_course(coefficients)}"
+
+
+def _of_sample(column: str, detail: str, up: bool) -> str:
+    if column == "sample":
+        return f"{_lies(up)} at all loads than the model predicts"
+    if detail:
+        return f"bends {'upwards' if up else 'downwards'} with {in_words(column)} relative to the model"
+    return f"{_goes(up)} with {in_words(column)} relative to the model"
+
+
+def _of_specimen(column: str, sample: str, up: bool) -> str:
+    name = f"of {column.removesuffix(' by load')} ({sample})"
+    if column.endswith(" by load"):
+        return f"{name} {_goes(up)} with the normal load relative to the other specimens"
+    return f"{name} {_lies(up)} than that of the other specimens"
+
+
+def acting_in_words(acting: Acting) -> str:
+    """The plain name of a mechanism, with its choice in brackets."""
+    return acting.mechanism.in_words + (f" ({acting.choice})" if acting.choice else "")
+
+
+def name_in_words(name: str) -> str:
+    """The plain name of a mechanism that a verdict names, with the column it may name."""
+    _, _, label = name.partition(":")
+    return mechanism(name).in_words + (f" ({label})" if label else "")
+
+
+def sentence_case(text: str) -> str:
+    """With a capital first letter."""
+    return text[:1].upper() + text[1:]
 
 
 def _goes(up: bool) -> str:
@@ -115,24 +137,31 @@ def _course(coefficients: np.ndarray) -> str:
     return "highest in the middle" if middle > 0.5 * coefficients[-1] else "lowest in the middle"
 
 
-def _p(p: float) -> str:
+def p_text(p: float) -> str:
     return "below 0.001" if p < 1e-3 else f"{p:.3f}"
 
 
 def cause_of(candidate: Candidate, weight: float, baseline: ModelFit) -> Cause:
     """A weighed mechanism with its parameters and 90 % intervals, its effect beyond what ``baseline`` fits."""
     parameters = estimates(candidate.fit, len(candidate.fit.acting) - 1)
-    mechanism = candidate.acting.mechanism
+    m = candidate.acting.mechanism
     moved = candidate.fit.predicted - baseline.predicted
     size = 100.0 * float(np.expm1(np.clip(np.ptp(moved), 0.0, 5.0)))
-    first = next(iter(parameters.items()))
-    choice = f" ({candidate.acting.choice})" if candidate.acting.choice else ""
+    name, first = next(iter(parameters.items()))
     text = (
-        f"{candidate.name}{choice}: {first[0]} = {first[1].value:.3g} {first[1].unit}".rstrip()
-        + f" (90 % {first[1].low:.3g} to {first[1].high:.3g}), moving T by {size:.0f} % from end to end."
-        + f" Sign: {mechanism.shows}. What separates it: {mechanism.separates}."
+        f"{sentence_case(acting_in_words(candidate.acting))}: {_estimate(name, first)}. It changes T by {size:.0f} %, "
+        f"peak to peak. {signs_of(m)}"
     )
     return Cause(candidate.name, weight, parameters, text)
+
+
+def signs_of(m: Mechanism) -> str:
+    """The signs of a mechanism, and how to distinguish it from what has similar ones."""
+    return f"Expected signs: {m.shows}. To distinguish it from {m.confused_with}: {m.separates}."
+
+
+def _estimate(name: str, e: Estimate) -> str:
+    return f"{name} = {e.value:.3g} {e.unit}".rstrip() + f" (90 % interval {e.low:.3g} to {e.high:.3g})"
 
 
 def estimates(f: ModelFit, index: int) -> dict[str, Estimate]:
@@ -144,51 +173,52 @@ def estimates(f: ModelFit, index: int) -> dict[str, Estimate]:
     }
 
 
-def cause_from_evidence(name: str, e: Evidence, others: dict[str, Evidence]) -> tuple[Cause, Misfit]:
-    """A mechanism that direct evidence shows by itself."""
-    low, high = e.interval
-    mechanism = MECHANISMS[name]
-    parameter = mechanism.amplitude
-    observable = "rise" if name == "bulk_viscoelasticity" else "zero"
-    covariate = {"load_cell_offset": "", "load_cell_drift": "started_at"}.get(name, "speed_mm_s")
-    text = f"{name}: {parameter.name} = {e.value:.3g} {e.unit}".rstrip() + f" (90 % {low:.3g} to {high:.3g})"
-    text += {
-        "load_cell_offset": ", read off the force before contact; it was subtracted from every force.",
-        "load_cell_drift": ", read off the force before contact; the zero of each pull was subtracted.",
-    }.get(name, ", read off the slope of the rise.")
-    cause = Cause(name, 1.0, {parameter.name: Estimate(e.value, low, high, e.unit)}, text)
-    percent = 100.0 * e.change if observable == "rise" else float("nan")
-    return cause, Misfit(observable, "", covariate, percent, 1e-6, text)
+def causes_from_evidence(evidence: Mapping[str, Evidence]) -> list[tuple[Cause, Misfit]]:
+    """Mechanisms that direct evidence shows with certainty; p values are adjusted for every estimate that was made."""
+    looks = sum(e.looks for e in evidence.values())
+    return [_cause_from(name, e, e.p_adjusted(looks)) for name, e in certain_evidence(evidence).items()]
+
+
+def _cause_from(name: str, e: Evidence, p: float) -> tuple[Cause, Misfit]:
+    m, stated = MECHANISMS[name], stated_evidence()[name]
+    value = Estimate(e.value, *e.interval, e.unit)
+    text = f"{sentence_case(m.in_words)}: {_estimate(m.amplitude.name, value)}, {stated.source}."
+    observable, percent = ("rise", 100.0 * e.change) if stated.quantity == "rise" else ("zero", float("nan"))
+    cause = Cause(name, 1.0, {m.amplitude.name: value}, text)
+    return cause, Misfit(observable, "", stated.covariate, percent, p, text)
 
 
 def exclusions(
-    baseline: ModelFit, evidence: dict[str, Evidence], unseen: dict[str, float]
+    baseline: ModelFit, evidence: Mapping[str, Evidence], unseen: Collection[str]
 ) -> list[Excluded]:
-    """What the design cannot show, and what direct evidence rules out or takes over."""
+    """What is not weighed: mechanisms that the design cannot show, and those that direct evidence decides."""
     conditions = baseline.setup.observations.conditions
-    found = []
-    for name, mechanism in MECHANISMS.items():
-        if name in evidence and name != "bulk_viscoelasticity":
-            found.append(Excluded(name, _zero_reason(evidence[name])))
-        elif name in unseen:
-            taken = "cannot be told from this design: the free flat law takes it up"
-            found.append(Excluded(name, f"{taken}; {mechanism.separates}"))
-        elif not mechanism.applies(conditions):
-            what = ", ".join(mechanism.needs)
-            found.append(Excluded(name, f"cannot be told from this design: {what} does not vary or is not recorded"))
-        elif name == "bulk_viscoelasticity" and name in evidence and not evidence[name].certain:
-            e = evidence[name]
-            found.append(Excluded(name, f"the rise stiffens by {100 * e.value:.1f} % per e-fold of speed at most"))
-        elif name == "machine_compliance":
-            found.append(Excluded(name, "cannot be told from this design: no pull of a rigid dummy to compare with"))
-    return found
+    reasons = {
+        name: _why_not_weighed(m, evidence.get(name), name in unseen, m.applies(conditions))
+        for name, m in MECHANISMS.items()
+    }
+    return [Excluded(name, reason) for name, reason in reasons.items() if reason]
 
 
-def _zero_reason(e: Evidence) -> str:
-    state = "is" if e.certain else "is no more than"
+def _why_not_weighed(m: Mechanism, e: Evidence | None, absorbed: bool, applies: bool) -> str:
+    """The reason, empty where a mechanism is weighed."""
+    stated = m.evidence
+    if stated is not None and e is not None and stated.corrected:
+        return _zero_reason(stated.quantity, e)
+    if absorbed:
+        return f"{NOT_TESTABLE}: {ABSORBED}; to test it, {m.separates}"
+    if not applies:
+        return f"{NOT_TESTABLE}: {not_varied(m)}"
+    if stated is not None and e is not None and not e.certain:
+        return stated.absent.format(value=e.value, percent=100.0 * e.value)
+    return f"{NOT_TESTABLE}: {m.untested}" if m.untested else ""
+
+
+def _zero_reason(quantity: str, e: Evidence) -> str:
+    what = "changes by" if quantity == "zero drift" else "is"
     return (
-        f"the force before contact {state} {e.value:.2g} +- {e.standard_error:.1g} {e.unit}, "
-        "and each pull's own zero was subtracted, so it cannot be behind the friction forces"
+        f"the force before contact {what} {e.value:.2g} +- {e.standard_error:.1g} {e.unit}; the zero of each pull was "
+        "subtracted, so it cannot explain the friction forces"
     )
 
 
@@ -223,35 +253,41 @@ def summary(
     """The verdict in two or three sentences."""
     if outcome == "no_misfit":
         weak = sorted(smallest.items(), key=lambda kv: kv[1])
-        shown = ", ".join(f"{n} {v:.0f} %" for n, v in weak[:6])
+        shown = ", ".join(f"{name_in_words(n)} {v:.0f} %" for n, v in weak[:6])
         return (
-            "Nothing beyond chance: the model calibrated on the flat sample describes this campaign within its "
-            f"own error. Effects this campaign would have shown half the time (peak to peak): {shown}."
+            "No misfit beyond chance: the model calibrated on the flat sample describes this campaign within its "
+            f"own error. This campaign would have shown these effects with a probability of one half (peak to peak): "
+            f"{shown}."
         )
     if outcome == "named":
-        tied = [" or ".join(names) for names in equivalent]
-        alone = [c.mechanism for c in causes if not any(c.mechanism in names for names in equivalent)]
-        told = " Which of those joined by or, this design cannot tell." if tied else ""
-        reason = " and ".join(dict.fromkeys([*tied, *alone]))
-        return f"Beyond chance something is at work: {reason}. What is left is within chance.{told}"
+        return _named(causes, equivalent)
     if outcome == "undetermined":
-        names = ", ".join(dict.fromkeys(c.mechanism for c in causes))
-        return f"The model fails beyond chance, but several mechanisms explain it about equally: {names}."
-    where = misfits[0].text if misfits else "No single column stands out."
+        names = ", ".join(dict.fromkeys(name_in_words(c.mechanism) for c in causes))
+        return f"The model fails beyond chance. Several mechanisms explain the misfit about equally well: {names}."
+    where = misfits[0].text if misfits else "No single column explains the misfit."
     own = patterns_apart(misfits)
     if own:
         return (
-            "The model fails beyond chance and no one mechanism of the library explains it: "
-            f"{', '.join(own)} part from it each in its own way, and no recorded column accounts for that. {where}"
+            f"The model fails beyond chance, and no mechanism of the library explains it: {', '.join(own)} differ "
+            f"from the model independently of each other, and no recorded column explains the differences. {where}"
         )
-    return f"The model fails beyond chance and nothing in the library explains it. {where}"
+    return f"The model fails beyond chance, and no mechanism of the library explains it. {where}"
+
+
+def _named(causes: Sequence[Cause], equivalent: Sequence[Sequence[str]]) -> str:
+    tied = [" or ".join(name_in_words(n) for n in names) for names in equivalent]
+    alone = [name_in_words(c.mechanism) for c in causes if not any(c.mechanism in names for names in equivalent)]
+    reasons = list(dict.fromkeys([*tied, *alone]))
+    told = " This design cannot distinguish the mechanisms joined by \"or\"." if tied else ""
+    cause, these = ("Cause", "this mechanism") if len(reasons) == 1 else ("Causes", "these mechanisms")
+    return (
+        f"The model fails beyond chance. {cause}: {'; '.join(reasons)}. With {these} included, the remaining "
+        f"differences are within chance.{told}"
+    )
 
 
 def patterns_apart(misfits: Sequence[Misfit]) -> tuple[str, ...]:
-    """The samples that misfit each by itself, where there are three or more and no further column takes part."""
+    """The samples that each have a misfit of their own, where there are three or more and no other column has one."""
     samples = tuple(dict.fromkeys(m.sample for m in misfits if m.sample))
     alone = all(m.covariate in ("sample", "normal_load_N") for m in misfits)
     return samples if alone and len(samples) >= 3 else ()
-
-
-__all__ = ["OBSERVABLES", "cause_of", "exclusions", "misfits_of", "summary"]

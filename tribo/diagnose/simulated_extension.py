@@ -1,26 +1,26 @@
 """The extended model simulated for a campaign: runs with and without the named mechanisms, test by test.
 
-The quick law finds a mechanism; here it acts on the blocks. Pairs of runs share local friction, angle and load, so that
-their ratio is the effect of the mechanism alone. The local friction is that of the extended fit's flat law. Every
-sample is pulled at a low, a middle and a high load, under the conditions of the test there that the law moves most.
+The diagnosis finds a mechanism by its law; here the mechanism acts on the blocks. Pairs of runs share local friction,
+angle and load, so that their ratio is the effect of the mechanism alone. The local friction is that of the flat law of
+the extended fit. Every sample is pulled at a low, a middle and a high load, under the conditions of the test at that
+load that the law changes most.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tribo.diagnose.diagnosis_record import Diagnosis, NotSimulated, SimulatedExtension
 from tribo.diagnose.search.weigh import effect
-from tribo.diagnose.statistics.model import Acting, ModelFit
+from tribo.diagnose.sentences import name_in_words
+from tribo.diagnose.statistics.model import ModelFit
 from tribo.diagnose.statistics.pattern_table import flat_law
 from tribo.errors import SimulationError
-from tribo.mechanisms.covariate import score
-from tribo.mechanisms.mislabelled_specimen import moves
-from tribo.mechanisms.pattern_geometry import pattern_of
 from tribo.mechanisms.record import Conditions, Values
 from tribo.mechanisms_in_model.extended_run import simulate_pair
 from tribo.records import FloatArray, Run
@@ -29,8 +29,6 @@ from tribo.simulate.ensemble import angle_range_deg, run_seed
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from tribo.diagnose.diagnosis import Diagnosis
 
 DT_S = 1e-7  # pairs of runs share their step, so that its error cancels
 LEAST_CHANGE = 0.01  # of ln T; the ratio of simulated to quick change would be noise below
@@ -41,35 +39,10 @@ Progress = Callable[[str, int, int], None]
 STAGE = "simulating the extended model"
 
 
-@dataclass(frozen=True)
-class SimulatedExtension:
-    """What the spring-block model itself makes of the named mechanisms.
-
-    ``log_force`` (n, 2) is ln T of every test by the extended model with the simulated effect, ``change`` (n, 2) that
-    effect and ``quick`` (n, 2) the one of the laws. ``table`` has one row a pair of runs. ``ratio`` is the simulated
-    over the quick effect, least squares over the pairs, with its standard error.
-    """
-
-    mechanisms: tuple[str, ...]
-    log_force: FloatArray
-    change: FloatArray
-    quick: FloatArray
-    table: pd.DataFrame
-    ratio: float
-    ratio_u: float
-
-    @property
-    def off_percent(self) -> float:
-        """Root mean square of simulated less quick effect over the pairs, percent of T."""
-        left = self.table[["simulated_static", "simulated_sliding"]].to_numpy()
-        right = self.table[["quick_static", "quick_sliding"]].to_numpy()
-        return float(100 * np.sqrt(np.mean((left - right) ** 2)))
-
-
 def simulate_extension(
     model: ModelFit, *, seed: int = 0, jobs: int = 2, progress: Progress | None = None
-) -> SimulatedExtension | None:
-    """The model of a campaign with its mechanisms in the simulator; None where nothing acts or a pattern cannot be run.
+) -> SimulatedExtension | NotSimulated:
+    """The model of a campaign with its mechanisms in the simulator, or the reason why it was not simulated.
 
     Parameters
     ----------
@@ -77,20 +50,19 @@ def simulate_extension(
     seed : draws the local friction, equal in both runs of a pair
     jobs : threads
     """
-    if not model.acting:
-        return None
+    names = tuple(a.name for a in model.acting)
     quick = sum((effect(model, k) for k in range(len(model.acting))), np.zeros_like(model.residual))
     picked = representatives(model, quick)
     if not picked:
-        return None
+        bounds = f"{100 * np.expm1(LEAST_CHANGE):.0f} and {100 * np.expm1(MOST_CHANGE):.0f} %"
+        return NotSimulated(names, f"no test has a change of T between {bounds}")
     pairs = [_pair(model, test, seed) for test in picked]
     try:
         runs = _run_pairs(pairs, jobs, progress)
-    except SimulationError:
-        return None
+    except SimulationError as why:
+        return NotSimulated(names, "; ".join(str(problem) for problem in why.problems))
     table = _table(model, picked, quick, runs)
     change = interpolated(model, table, quick)
-    names = tuple(a.name for a in model.acting)
     return SimulatedExtension(names, model.predicted - quick + change, change, quick, table, *_ratio(table))
 
 
@@ -154,27 +126,15 @@ def local_friction(law: FloatArray) -> LocalFriction:
 
 
 def _acting_on(model: ModelFit, test: int) -> dict[str, Values]:
-    """Values by mechanism for one test: a choice that does not concern it leaves the mechanism out."""
+    """Values by mechanism for one test; a mechanism whose choice does not concern the test is left out."""
     c = model.setup.observations.conditions
     found: dict[str, Values] = {}
     for acting, values in zip(model.acting, model.values, strict=True):
-        key, own = _key_and_values(acting, values, c, test)
-        if key:
-            found[key] = own
+        here = acting.mechanism.on_test(values, acting.choice, c, test)
+        if here is not None:
+            name = acting.mechanism.name
+            found[f"{name}({here.other_sample})" if here.other_sample else name] = here.values
     return found
-
-
-def _key_and_values(acting: Acting, values: Values, c: Conditions, test: int) -> tuple[str, Values]:
-    name = acting.mechanism.name
-    if name == "mislabelled_specimen":
-        here = (str(c.specimen[test]), str(c.sample[test]))
-        other = next((o for specimen, label, o in moves(acting.choice) if (specimen, label) == here), None)
-        return ("", values) if other is None else (f"{name}({other})", values)
-    if name == "pattern_geometry":
-        return (name if str(pattern_of(c.sample[[test]])[0]) == acting.choice else "", values)
-    if name == "covariate":
-        return name, np.array([values[0] * score(c, acting.choice)[test]])
-    return name, values
 
 
 def recorded_of(c: Conditions, test: int) -> dict[str, float]:
@@ -269,25 +229,41 @@ def _ratio(table: pd.DataFrame) -> tuple[float, float]:
 def with_simulation(
     d: Diagnosis, *, seed: int = 0, jobs: int = 2, progress: Progress | None = None
 ) -> Diagnosis:
-    """The same diagnosis with its named mechanisms simulated, and a verdict that says so and whose shares it used."""
-    passes = d.named is not None and d.named.causes and d.verdict.verdict in ("named", "undetermined")
-    found = simulate_extension(d.named.model, seed=seed, jobs=jobs, progress=progress) if d.named and passes else None
-    source = d.baseline.setup.predictor.source
-    model: dict[str, object] = {"shares_from": source}
-    words = [d.verdict.text, f"What the model makes of each pattern comes from {source}."]
-    if found is not None:
-        before, quick, after = residual_percent(d, found)
-        model["simulated"] = {
-            "mechanisms": list(found.mechanisms), "pairs_of_runs": len(found.table), "effect_over_law": found.ratio,
-            "effect_over_law_u": found.ratio_u, "rms_percent_before": before, "rms_percent_law": quick,
-            "rms_percent_simulated": after,
-        }  # fmt: skip
-        words.append(
-            f"With {' and '.join(found.mechanisms)} in the simulator itself ({len(found.table)} pairs of runs) the "
-            f"effect is {found.ratio:.3f} +- {found.ratio_u:.3f} times that of the law, and the residuals fall from "
-            f"{before:.1f} to {after:.1f} % (by the law {quick:.1f} %)."
-        )
-    return replace(d, simulated=found, verdict=replace(d.verdict, text=" ".join(words), model=model))
+    """The same diagnosis with its named mechanisms simulated.
+
+    The text and the ``model`` record of its verdict say where the predictions come from and what the simulation gave,
+    or why there is none.
+    """
+    model: dict[str, object] = {"shares_from": d.baseline.setup.predictor.source}
+    words = [d.verdict.text, f"The predictions for the patterned samples are based on {model['shares_from']}."]
+    found = None
+    if d.named is not None and d.named.causes and d.verdict.verdict in ("named", "undetermined"):
+        found = simulate_extension(d.named.model, seed=seed, jobs=jobs, progress=progress)
+        key, record, sentence = _reported(d, found)
+        model[key] = record
+        words.append(sentence)
+    simulated = found if isinstance(found, SimulatedExtension) else None
+    return replace(d, simulated=simulated, verdict=replace(d.verdict, text=" ".join(words), model=model))
+
+
+def _reported(d: Diagnosis, found: SimulatedExtension | NotSimulated) -> tuple[str, dict[str, object], str]:
+    """The key and the record of a simulation in ``model`` of the verdict, and a sentence about it."""
+    names = " and ".join(name_in_words(name) for name in found.mechanisms)
+    if isinstance(found, NotSimulated):
+        record: dict[str, object] = {"mechanisms": list(found.mechanisms), "reason": found.reason}
+        return "not_simulated", record, f"The model with {names} was not simulated: {found.reason}."
+    before, quick, after = residual_percent(d, found)
+    record = {
+        "mechanisms": list(found.mechanisms), "pairs_of_runs": len(found.table), "effect_over_law": found.ratio,
+        "effect_over_law_u": found.ratio_u, "rms_percent_before": before, "rms_percent_law": quick,
+        "rms_percent_simulated": after,
+    }  # fmt: skip
+    sentence = (
+        f"With {names} in the simulator itself ({len(found.table)} pairs of runs), the effect is {found.ratio:.3f} +- "
+        f"{found.ratio_u:.3f} times that of its law. The RMS of the residuals is {before:.1f} % for the calibrated "
+        f"model, {after:.1f} % with the simulated effect and {quick:.1f} % with the law."
+    )
+    return "simulated", record, sentence
 
 
 def residual_percent(d: Diagnosis, found: SimulatedExtension) -> tuple[float, float, float]:

@@ -16,7 +16,7 @@ Outcome = Literal["no_misfit", "named", "undetermined", "unknown"]
 
 @dataclass(frozen=True)
 class Misfit:
-    """Where the model fails: which observable follows which covariate, by how much, and how surely."""
+    """Where the model fails: which observable follows which covariate, the size, and the adjusted p value."""
 
     observable: str
     sample: str
@@ -69,7 +69,7 @@ class Gain:
 
 @dataclass(frozen=True)
 class NextTest:
-    """The test that best parts what is still tied."""
+    """The test that best distinguishes mechanisms that explain a campaign about equally."""
 
     text: str
     separates: tuple[str, ...]
@@ -91,7 +91,7 @@ class Verdict:
     next_test: NextTest | None = None
     text: str = ""
     smallest_effects: Mapping[str, float] = field(default_factory=dict)
-    model: Mapping[str, Any] = field(default_factory=dict)  # where the shares come from, what the simulation says
+    model: Mapping[str, Any] = field(default_factory=dict)  # source of the predictions, and the simulation
 
     def as_dict(self) -> dict[str, Any]:
         """The verdict as plain types, in the order of the schema; numbers that do not exist are null."""

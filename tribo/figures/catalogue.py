@@ -98,8 +98,8 @@ DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
             "misfit",
             "Where the calibrated model fails",
             "Ratio of measured to modelled friction for each sample: change, in percent, between the low and the "
-            "high end of each recorded variable. First column: mean of the sample. “Bend with load”: height of the "
-            "ends of the load range above its middle. Strong colours and asterisks (** p < 0.01, * p < 0.05) mark "
+            "high end of each recorded variable. Column “mean”: mean of the sample. “Bend with load”: height of "
+            "the ends of the load range above its middle. Strong colours and asterisks (** p < 0.01, * p < 0.05) mark "
             "statistically significant deviations. The p values are adjusted for all comparisons: each is compared "
             "with the strongest deviation in simulated campaigns of the calibrated model. Pale cells are not "
             "significant. Last rows: rank correlations within samples and loads, adjusted for their number.",
@@ -143,7 +143,7 @@ DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
             "Left: the strongest deviation in this campaign, and in simulated campaigns of the calibrated model "
             "with the same design and noise. Right: change of T over the whole range of a variable, after the part "
             "that calibration on the flat sample absorbs, that would be detected in 10 %, 50 % and 90 % of such "
-            "campaigns.",
+            "campaigns (bar: 10 to 90 %, dot: 50 %).",
             detectable.numbers,
             detectable.draw,
         ),

@@ -16,7 +16,8 @@ from tribo.figures import style
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
-    from tribo.diagnose.from_table.table_diagnosis import Outlook, PublishedDiagnosis
+    from tribo.diagnose.from_table.table_diagnosis import PublishedDiagnosis
+    from tribo.diagnose.from_table.table_outlook import Outlook
 
 RATIO_COLUMNS = [
     "sample", "regime", "pressure_kPa", "measured_over_model", "low", "high", "low_independent", "high_independent",
@@ -113,16 +114,16 @@ def _ratio_panel(ax: Axes, part: pd.DataFrame) -> None:
 
 def reading_numbers(d: PublishedDiagnosis) -> pd.DataFrame:
     """One row per reading and mechanism: log likelihood gained, amplitude with its 90 % interval, the guess it is."""
-    from tribo.diagnose.from_table.table_diagnosis import GUESSES, estimate_of
+    from tribo.diagnose.from_table.table_outlook import estimate_of
 
-    guess_of = {name: guess for guess, names in GUESSES.items() for name in names}
     rows = []
     for k, o in enumerate(d.outlooks):
         r = o.reading
         for w in o.weighed:
             name, e = next(iter(estimate_of(w).items()))
             known = (k, r.model, r.correlation, r.specimens, o.outcome, o.p_misfit, o.p_left)
-            rows.append((*known, w.name, guess_of.get(w.name, ""), w.gain, name, e.value, e.low, e.high, e.unit))
+            guess = w.acting.mechanism.in_table.guess
+            rows.append((*known, w.name, guess, w.gain, name, e.value, e.low, e.high, e.unit))
     return pd.DataFrame(rows, columns=READING_COLUMNS)
 
 

@@ -152,10 +152,11 @@ def _summaries(
 
 def _variance(d: Diagnosis, weight: FloatArray) -> FloatArray:
     """Variance of one test's residual by the fitted noise: repeats, reading, specimens, error of the sample."""
-    from tribo.diagnose.statistics.fit import prior_precision
+    from tribo.diagnose.statistics.noise import prior_precision
 
     f = d.baseline
-    repeats = float(weight @ f.noise.repeat @ weight) + (f.setup.observations.reading**2) @ weight**2
+    repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup), weight)
+    repeats += f.setup.observations.reading**2 @ weight**2
     effects = np.einsum("nrq,r->nq", f.setup.random, weight) ** 2 @ (1.0 / prior_precision(f.setup, f.noise))
     return np.asarray(repeats + effects)
 

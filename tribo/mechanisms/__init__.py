@@ -1,1 +1,1 @@
-"""What can part a measured campaign from the baseline model: one module a mechanism, and their table."""
+"""Why a measured campaign may differ from the baseline model: one module a mechanism, and their table."""

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribo.mechanisms.record import REFERENCE_SPEED_M_S, Base, Conditions, Forces, Mechanism, Values, amplitude
+from tribo.mechanisms.record import (
+    REFERENCE_SPEED_M_S,
+    Base,
+    Conditions,
+    Forces,
+    InTable,
+    Mechanism,
+    Placement,
+    TraceEvidence,
+    Values,
+    amplitude,
+)
 from tribo.records import FloatArray
 
 
@@ -14,8 +25,13 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
 
 
 def rise(values: Values, stiffness_N_per_m: FloatArray, conditions: Conditions) -> FloatArray:
-    """Slope of the rise, k (1 + g ln(v / v_0)): a broad Prony spectrum seen at the rate of the pull."""
+    """Slope of the rise, k (1 + g ln(v / v_0)): a broad Prony spectrum at the rate of the pull, N/m."""
     return stiffness_N_per_m * (1.0 + values[0] * np.log(conditions.speed_m_s / REFERENCE_SPEED_M_S))
+
+
+def stiffening(values: Values, conditions: Conditions) -> float:
+    """Gain of the elastic modulus at the speed of the pull."""
+    return float(1.0 + values[0] * np.log(conditions.speed_m_s[0] / REFERENCE_SPEED_M_S))
 
 
 MECHANISM = Mechanism(
@@ -27,10 +43,19 @@ MECHANISM = Mechanism(
     rise=rise,
     sign=1,
     regimes=("rise",),
-    enters="the springs between the blocks and to the slider",
-    shows="a rounded rise that is steeper at higher speed, relaxation on stopping",
-    confused_with="machine_compliance",
-    separates="stop and hold in mid-rise",
+    enters="springs between the blocks and to the slider",
+    shows="a rounded rise that is steeper at higher speed, and relaxation after stopping",
+    confused_with="compliance of the machine",
+    separates="stop in mid-rise and hold",
     silenced_by=("stop and hold in mid-rise",),
     needs=("speed_m_s",),
+    plain="bulk viscoelasticity",
+    placement=Placement(springs=stiffening),
+    evidence=TraceEvidence(
+        quantity="rise",
+        covariate="speed_mm_s",
+        source="read from the slope of the rise",
+        absent="the slope of the rise changes by {percent:.1f} % per e-fold of speed, which is no clear effect",
+    ),
+    in_table=InTable(missing="no trace is printed in numbers"),
 )

@@ -1,10 +1,22 @@
-"""Above a pressure the floors of the cavities touch down."""
+"""Above a pressure the floors of the cavities touch the counterface."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Parameter, Values, amplitude
+from tribo.mechanisms.record import (
+    Base,
+    Conditions,
+    DirectMeasurement,
+    Forces,
+    InTable,
+    Mechanism,
+    Parameter,
+    Placement,
+    Readings,
+    Values,
+    amplitude,
+)
 from tribo.records import FloatArray
 
 REFERENCE_WIDTH_M = 15e-6
@@ -33,6 +45,18 @@ def share_down(values: Values, conditions: Conditions) -> FloatArray:
     return np.asarray(values[0] * np.where(conditions.cavity_width_m > 0, down, 0.0))
 
 
+def floors(values: Values, conditions: Conditions) -> float:
+    """Share of the floors that touch down in one run."""
+    return float(share_down(values, conditions)[0])
+
+
+def finding(readings: Readings) -> str:
+    """What the table says about cavities whose floors touch down."""
+    most = max(readings.gains)
+    worth = f"earn at most {most:.1f} units of log likelihood" if most > 0 else "do not improve the fit"
+    return f"Cavity floors that touch the counterface would raise friction, and {worth}."
+
+
 MECHANISM = Mechanism(
     name="cavity_collapse",
     kind="pattern",
@@ -45,11 +69,15 @@ MECHANISM = Mechanism(
     law=law,
     sign=0,
     regimes=("static", "sliding"),
-    enters="the mask: cavity blocks become contact blocks",
+    enters="mask: cavity blocks become contact blocks",
     quick_error=0.15,  # a floor that carries little slips early: static friction rises later than the law says
-    shows="T rises towards the flat sample above a load, weak patterns first",
-    confused_with="pressure_dependent_friction",
-    separates="a series of depths, or unloading after loading",
+    shows="T rises towards that of the flat sample above a load, in weak patterns first",
+    confused_with="pressure-dependent friction",
+    separates="test a series of cavity depths, or unload after loading",
     silenced_by=("the same pattern with deeper cavities",),
     needs=("area_fraction", "normal_load_N"),
+    plain="collapse of the cavities",
+    placement=Placement(floors=floors),
+    measurement=DirectMeasurement("Image a weak pattern through the counterface at the highest load.", 0.1, 2.0),
+    in_table=InTable(guess="deformed patterns", finding=finding),
 )

@@ -1,10 +1,20 @@
-"""Long cavities close or open under shear, so that the two directions part."""
+"""Long cavities close or open under shear, so that friction depends on the pull direction."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+from tribo.mechanisms.record import (
+    Base,
+    BenchTest,
+    Conditions,
+    Forces,
+    InTable,
+    Mechanism,
+    Readings,
+    Values,
+    amplitude,
+)
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -12,6 +22,15 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
     before = base.forces(conditions.normal_load_N)
     gain = np.exp(values[0] * conditions.elongation)
     return Forces(before.static_N * gain, before.sliding_N * gain)
+
+
+def finding(readings: Readings) -> str:
+    """What the table says about a difference between the pull directions."""
+    low, high = min(readings.gains), max(readings.gains)
+    return (
+        f"Deformed patterns are {'supported' if low > 3.0 else 'possible'}: friction that differs along and across the "
+        f"long cavities of S earns {low:.1f} to {high:.1f} units of log likelihood over these readings."
+    )
 
 
 MECHANISM = Mechanism(
@@ -22,10 +41,20 @@ MECHANISM = Mechanism(
     law=law,
     sign=0,
     regimes=("static", "sliding"),
-    enters="the mask: cavity width, by the traction and its direction",
-    shows="Sx against Sy, both regimes",
-    confused_with="pattern_geometry, a misaligned pull",
+    enters="mask: cavity width, by the traction and its direction",
+    shows="static and sliding friction differ between Sx and Sy",
+    confused_with="a wrong area fraction, or a misaligned pull",
     separates="reverse the pull, and pull at 45 degrees",
     silenced_by=("pull the long cavities at 45 degrees and in reverse",),
     needs=("elongation",),
+    plain="deformation of the cavities under shear",
+    in_table=InTable(
+        guess="deformed patterns",
+        finding=finding,
+        next_test=BenchTest(
+            "Pull S along x, along y, in reverse and at 45 degrees, each at three loads: 72 pulls.",
+            ("cavity_shear_deformation", "pull_angle", "load_cell_offset"),
+            {"sample": "S", "direction_deg": [0, 45, 90, 180], "pressure_kPa": [3, 9, 25], "pulls": 72, "hours": 8.4},
+        ),
+    ),
 )

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribo.mechanisms.record import REFERENCE_HOLD_S, Base, Conditions, Forces, Mechanism, Values, amplitude
+from tribo.mechanisms.record import (
+    REFERENCE_HOLD_S,
+    Base,
+    Conditions,
+    Forces,
+    InTable,
+    Mechanism,
+    Values,
+    Variation,
+    amplitude,
+)
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -22,11 +32,14 @@ MECHANISM = Mechanism(
     law=law,
     sign=1,
     regimes=("static",),
-    enters="block static thresholds, by the time of rest",
+    enters="static thresholds of the blocks, by the time of rest",
     quick_error=0.05,  # a higher peak widens the swing that follows it
-    shows="static only, against ln of the hold",
+    shows="static friction only, linear in the logarithm of the hold time",
     confused_with="humidity",
-    separates="holds of 0.1 to 1000 s in random order",
-    silenced_by=("holds of 0.1 to 1000 s in random order",),
+    separates="hold for 0.1 to 1000 s in random order",
+    silenced_by=("hold for 0.1 to 1000 s in random order",),
     needs=("hold_s",),
+    plain="contact ageing",
+    variation=Variation("the hold time over 1, 10 and 300 s", "hold_s", (1.0, 10.0, 300.0)),
+    in_table=InTable(missing="the hold time is not printed"),
 )

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+from tribo.mechanisms.record import (
+    Base,
+    Conditions,
+    Contact,
+    Forces,
+    InTable,
+    Mechanism,
+    Placement,
+    Readings,
+    Values,
+    amplitude,
+)
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -19,6 +30,23 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
     return Forces(before.static_N * kept, before.sliding_N * kept)
 
 
+def area_left(values: Values, contact: Contact) -> tuple[float, float]:
+    """Share of the contact left at the traction of the peak, 1 - c (T / (AF A))^2, in both regimes."""
+    traction_Pa = contact.static * contact.pressure_Pa / contact.area_fraction
+    left = float(np.clip(1.0 - values[0] * traction_Pa**2, 0.05, 1.0))
+    return left, left
+
+
+def finding(readings: Readings) -> str:
+    """What the table says about a loss of contact area."""
+    lost = 100 * readings.limit() * readings.flat_traction_Pa**2
+    return (
+        f"A contact area that shrinks with traction is {'not supported' if max(readings.gains) < 3.0 else 'possible'}: "
+        f"it would lower the flat sample too, earns at most {max(readings.gains):.1f} units of log likelihood and "
+        f"takes at most {lost:.0f} % of the flat contact at 10 kPa (95 %)."
+    )
+
+
 MECHANISM = Mechanism(
     name="contact_area_loss",
     kind="interface",
@@ -27,10 +55,13 @@ MECHANISM = Mechanism(
     law=law,
     sign=-1,
     regimes=("static", "sliding"),
-    enters="block thresholds, scaled by the contact left at the traction of the peak",
-    shows="lower T at high traction: more on patterns and at high load; bends T(N)",
-    confused_with="pressure_dependent_friction",
-    separates="more loads at the low end, or images of the contact",
+    enters="block thresholds, scaled by the contact that is left at the traction of the peak",
+    shows="lower T at high traction, so more on patterns and at high load; T(N) bends",
+    confused_with="pressure-dependent friction",
+    separates="measure at more low loads, or image the contact",
     silenced_by=("image the contact area under load and shear",),
     needs=("normal_load_N",),
+    plain="loss of contact area under shear",
+    placement=Placement(thresholds=area_left, own_friction=True),
+    in_table=InTable(guess="changed contact area", finding=finding),
 )

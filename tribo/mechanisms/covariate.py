@@ -1,10 +1,21 @@
-"""T follows a recorded column that no other mechanism owns: operator, date, batch."""
+"""T follows a recorded column that no other mechanism uses: operator, date, batch."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, StringArray, Values, amplitude
+from tribo.mechanisms.record import (
+    Base,
+    Choosing,
+    Conditions,
+    Forces,
+    InTable,
+    Mechanism,
+    OnTest,
+    StringArray,
+    Values,
+    amplitude,
+)
 from tribo.records import FloatArray
 
 MOST_NAMES = 12
@@ -45,7 +56,7 @@ def choices(base: Base, conditions: Conditions) -> tuple[str, ...]:
 
 
 def column_of(choice: str) -> str:
-    """The column a choice speaks of."""
+    """The column of a choice."""
     return choice.split(IS, 1)[0]
 
 
@@ -57,6 +68,17 @@ def _numbers(column: StringArray) -> FloatArray | None:
     return numbers if np.isfinite(numbers).all() else None
 
 
+def on_test(values: Values, choice: str, conditions: Conditions, test: int) -> OnTest:
+    """The score of the test times the amplitude."""
+    return OnTest(np.array([values[0] * score(conditions, choice)[test]]))
+
+
+def in_one_run(conditions: Conditions) -> str:
+    """The one column that a run of the simulator has."""
+    name, column = next(iter(conditions.columns.items()))
+    return f"{name}{IS}{column[0]}"
+
+
 MECHANISM = Mechanism(
     name="covariate",
     kind="any",
@@ -65,10 +87,13 @@ MECHANISM = Mechanism(
     law=law,
     sign=0,
     regimes=("static", "sliding"),
-    enters="a gain on block thresholds, by the column",
-    shows="that column, both regimes",
-    confused_with="whatever moved together with that column",
+    enters="gain of the block thresholds, by the column",
+    shows="static and sliding friction follow that column",
+    confused_with="anything else that changed together with that column",
     separates="vary that column alone, in random order",
     silenced_by=("vary that column alone, in random order",),
     choices=choices,
+    plain="a recorded column",
+    choosing=Choosing(label=column_of, on_test=on_test, in_one_run=in_one_run),
+    in_table=InTable(missing="no further column is printed"),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Parameter, Values, amplitude
+from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Parameter, Placement, Values, amplitude
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -10,6 +10,11 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
     before = base.forces(conditions.normal_load_N)
     extra_N = values[0] * conditions.rim_per_m * conditions.nominal_area_m2
     return Forces(before.static_N + extra_N, before.sliding_N + values[1] * extra_N)
+
+
+def rims(values: Values) -> tuple[float, float]:
+    """Static force per rim length, N/m, and the share of it left while sliding."""
+    return values[0], values[1]
 
 
 MECHANISM = Mechanism(
@@ -25,9 +30,11 @@ MECHANISM = Mechanism(
     regimes=("static", "sliding"),
     enters="static adhesion of the contact blocks beside a cavity",
     quick_error=0.08,  # it strengthens the blocks that are stressed most
-    shows="rank B > C >> A > S, mostly static",
+    shows="mostly static friction, in the order B > C >> A > S",
     confused_with="suction",
-    separates="equal area fraction at another pitch",
-    silenced_by=("a pattern of the same area fraction at twice the pitch",),
+    separates="test a pattern of the same area fraction at another pitch",
+    silenced_by=("use a pattern of the same area fraction at twice the pitch",),
     needs=("rim_per_m",),
+    plain="adhesion along the cavity edges",
+    placement=Placement(rims=rims),
 )

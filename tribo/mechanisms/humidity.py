@@ -1,10 +1,10 @@
-"""Adhesion follows the humidity of the room."""
+"""Adhesion depends on the humidity of the room."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+from tribo.mechanisms.record import Base, Conditions, Forces, InTable, Mechanism, Values, amplitude
 
 REFERENCE_PCT = 50.0
 
@@ -28,9 +28,11 @@ MECHANISM = Mechanism(
     sign=0,
     regimes=("static", "sliding"),
     enters="adhesion of the contact blocks, by the recorded humidity",
-    shows="the recorded humidity, tau0 only and so mostly at low load",
-    confused_with="load_cell_offset by session",
-    separates="a controlled step of humidity",
-    silenced_by=("a controlled step of humidity at constant temperature",),
+    shows="tau0 follows the recorded humidity, so that low loads show it most",
+    confused_with="an offset of the load cell that changes between sessions",
+    separates="change the humidity in a controlled step",
+    silenced_by=("change the humidity in a controlled step at constant temperature",),
     needs=("humidity_pct",),
+    plain="humidity",
+    in_table=InTable(missing="no humidity is printed"),
 )

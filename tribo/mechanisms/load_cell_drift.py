@@ -1,8 +1,21 @@
-"""The zero of the load cell wanders with time."""
+"""The zero of the load cell drifts with time."""
 
 from __future__ import annotations
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+from collections.abc import Mapping
+
+from tribo.mechanisms.record import (
+    Base,
+    Conditions,
+    DirectMeasurement,
+    Forces,
+    InTable,
+    Mechanism,
+    Placement,
+    TraceEvidence,
+    Values,
+    amplitude,
+)
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -10,6 +23,11 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
     before = base.forces(conditions.normal_load_N)
     extra_N = values[0] * conditions.elapsed_s / 3600.0
     return Forces(before.static_N + extra_N, before.sliding_N + extra_N)
+
+
+def in_chain(values: Values, recorded: Mapping[str, float]) -> dict[str, float]:
+    """An offset that counts from when the zero was taken."""
+    return {"offset_N": float(values[0]) * recorded["elapsed_s"] / 3600.0}
 
 
 MECHANISM = Mechanism(
@@ -20,10 +38,21 @@ MECHANISM = Mechanism(
     law=law,
     sign=1,
     regimes=("static", "sliding"),
-    enters="the virtual instrument, after the slider force",
-    shows="the run order, and the force before contact",
-    confused_with="run_in",
-    separates="the force before contact, or a fresh specimen in the middle of the series",
+    enters="measuring chain, after the slider force",
+    shows="T follows the run order, and so does the force before contact",
+    confused_with="run-in",
+    separates="read the force before contact, or use a fresh specimen in the middle of the series",
     silenced_by=("read the zero before and after each pull",),
     needs=("elapsed_s",),
+    plain="a drift of the load cell",
+    placement=Placement(chain=in_chain),
+    evidence=TraceEvidence(
+        quantity="zero drift",
+        covariate="started_at",
+        source="read from the force before contact; the zero of each pull was subtracted",
+        corrected=True,
+        contains=("load_cell_offset",),
+    ),
+    measurement=DirectMeasurement("Record the unloaded cell every hour for a day.", 2e-4, 1.0),
+    in_table=InTable(missing="no times are printed"),
 )

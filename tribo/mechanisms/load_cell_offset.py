@@ -2,13 +2,30 @@
 
 from __future__ import annotations
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+from collections.abc import Mapping
+
+from tribo.mechanisms.record import (
+    Base,
+    Conditions,
+    DirectMeasurement,
+    Forces,
+    Mechanism,
+    Placement,
+    TraceEvidence,
+    Values,
+    amplitude,
+)
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
     """T -> T + F_0 in both regimes; ``values`` = [F_0] in N."""
     before = base.forces(conditions.normal_load_N)
     return Forces(before.static_N + values[0], before.sliding_N + values[0])
+
+
+def in_chain(values: Values, recorded: Mapping[str, float]) -> dict[str, float]:
+    """The same force at every time."""
+    return {"offset_N": float(values[0])}
 
 
 MECHANISM = Mechanism(
@@ -19,9 +36,18 @@ MECHANISM = Mechanism(
     law=law,
     sign=1,
     regimes=("static", "sliding"),
-    enters="the virtual instrument, after the slider force",
-    shows="the force before contact; T whatever the area fraction",
+    enters="measuring chain, after the slider force",
+    shows="a force before contact; the change of T does not depend on the area fraction",
     confused_with="suction",
     separates="read the zero before and after each pull",
     silenced_by=("read the zero before and after each pull",),
+    plain="an offset of the load cell",
+    placement=Placement(chain=in_chain),
+    evidence=TraceEvidence(
+        quantity="zero",
+        covariate="",
+        source="read from the force before contact; it was subtracted from every force",
+        corrected=True,
+    ),
+    measurement=DirectMeasurement("Record two seconds of force before contact and after lift-off.", 0.003, 0.5),
 )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+from collections.abc import Mapping
+
+from tribo.mechanisms.record import Base, Conditions, Forces, InTable, Mechanism, Placement, Values, amplitude
 from tribo.records import FloatArray
 
 
@@ -16,6 +18,11 @@ def rise(values: Values, stiffness_N_per_m: FloatArray, conditions: Conditions) 
     return stiffness_N_per_m / (1.0 + values[0] * stiffness_N_per_m)
 
 
+def in_chain(values: Values, recorded: Mapping[str, float]) -> dict[str, float]:
+    """A spring in series with the sled."""
+    return {"compliance_m_per_N": float(values[0])}
+
+
 MECHANISM = Mechanism(
     name="machine_compliance",
     kind="instrument",
@@ -25,9 +32,13 @@ MECHANISM = Mechanism(
     rise=rise,
     sign=-1,
     regimes=("rise",),
-    enters="the virtual instrument, a spring in series with the slider",
-    shows="the slope of the rise and the stick-slip amplitude, not the means",
-    confused_with="bulk_viscoelasticity",
-    separates="pull a rigid dummy",
-    silenced_by=("pull a rigid dummy",),
+    enters="measuring chain, as a spring in series with the slider",
+    shows="the slope of the rise and the stick-slip amplitude change, the mean forces do not",
+    confused_with="bulk viscoelasticity",
+    separates="pull a rigid dummy sample",
+    silenced_by=("pull a rigid dummy sample",),
+    plain="compliance of the machine",
+    placement=Placement(chain=in_chain),
+    untested="no rigid dummy sample was pulled for comparison",
+    in_table=InTable(missing="no trace is printed in numbers"),
 )

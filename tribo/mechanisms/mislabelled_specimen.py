@@ -6,7 +6,19 @@ from itertools import combinations
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+from tribo.mechanisms.record import (
+    Base,
+    Choosing,
+    Conditions,
+    DirectMeasurement,
+    Forces,
+    InTable,
+    Mechanism,
+    OnTest,
+    Placement,
+    Values,
+    amplitude,
+)
 from tribo.records import FloatArray
 
 BEHAVES = " behaves as "
@@ -36,7 +48,7 @@ def _ratio(after_N: FloatArray, before_N: FloatArray) -> FloatArray:
 
 
 def moves(choice: str) -> tuple[tuple[str, str, str], ...]:
-    """(specimen, its label, what it behaves as) for each specimen and label a choice speaks of.
+    """(specimen, its label, what it behaves as) for each specimen and label in a choice.
 
     Of a specimen with two labels that was swapped, the other one takes the first.
     """
@@ -80,6 +92,13 @@ def _whole(made: list[tuple[str, str]]) -> list[tuple[str, list[str]]]:
     return sorted(labels.items(), key=lambda item: (-len(item[1]), item[0]))
 
 
+def on_test(values: Values, choice: str, conditions: Conditions, test: int) -> OnTest | None:
+    """The sample that the specimen of a test really is; None where its label is right."""
+    here = (str(conditions.specimen[test]), str(conditions.sample[test]))
+    other = next((other for specimen, label, other in moves(choice) if (specimen, label) == here), None)
+    return None if other is None else OnTest(values, other)
+
+
 MECHANISM = Mechanism(
     name="mislabelled_specimen",
     kind="bookkeeping",
@@ -88,10 +107,15 @@ MECHANISM = Mechanism(
     law=law,
     sign=0,
     regimes=("static", "sliding"),
-    enters="the mask of one specimen",
-    shows="one specimen against its siblings, fits another label",
-    confused_with="a batch of specimens",
+    enters="mask of one specimen",
+    shows="one specimen differs from the others of its sample and agrees with another label",
+    confused_with="a specimen from a different batch",
     separates="look at the specimen under a microscope",
     silenced_by=("look at the specimen under a microscope",),
     choices=choices,
+    plain="a mislabelled specimen",
+    choosing=Choosing(column="specimen", on_test=on_test, held_out="loads", all_or_nothing_sd=0.15),
+    placement=Placement(other_sample=True),
+    measurement=DirectMeasurement("Look at the specimens under a microscope.", 0.1, 0.5),
+    in_table=InTable(missing="no specimens are printed"),
 )

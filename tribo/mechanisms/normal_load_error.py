@@ -1,10 +1,10 @@
-"""The true normal load differs by a constant: an unweighed holder, a wire that lifts."""
+"""The true normal load differs from the stated one by a constant: an unweighed holder, a wire that lifts."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+from tribo.mechanisms.record import Base, Conditions, DirectMeasurement, Forces, Mechanism, Values, amplitude
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -20,10 +20,12 @@ MECHANISM = Mechanism(
     law=law,
     sign=1,
     regimes=("static", "sliding"),
-    enters="block normal force",
-    shows="as suction once the flat law is free; either sign",
+    enters="normal force of the blocks",
+    shows="as suction, but of either sign, because the calibration on the flat sample absorbs its part",
     confused_with="suction",
-    separates="weigh the sled, read the vertical force",
+    separates="weigh the sled and read the vertical force",
     silenced_by=("weigh the sled with everything on it",),
     needs=("area_fraction",),
+    plain="an error of the normal load",
+    measurement=DirectMeasurement("Weigh the sled with everything that rests on it, the wire attached.", 0.005, 0.25),
 )

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+from tribo.mechanisms.record import (
+    Base,
+    Choosing,
+    Conditions,
+    DirectMeasurement,
+    Forces,
+    InTable,
+    Mechanism,
+    OnTest,
+    Values,
+    amplitude,
+)
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str) -> Forces:
@@ -28,6 +39,16 @@ def patterns(base: Base, conditions: Conditions) -> tuple[str, ...]:
     return tuple(sorted(set(pattern_of(conditions.sample[conditions.area_fraction < 1.0]))))
 
 
+def on_test(values: Values, choice: str, conditions: Conditions, test: int) -> OnTest | None:
+    """None on other patterns."""
+    return OnTest(values) if str(pattern_of(conditions.sample[[test]])[0]) == choice else None
+
+
+def in_one_run(conditions: Conditions) -> str:
+    """The pattern of the sample."""
+    return str(pattern_of(conditions.sample)[0])
+
+
 MECHANISM = Mechanism(
     name="pattern_geometry",
     kind="pattern",
@@ -36,11 +57,17 @@ MECHANISM = Mechanism(
     law=law,
     sign=0,
     regimes=("static", "sliding"),
-    enters="the mask of one pattern",
-    shows="one pattern at all loads, most at low load",
+    enters="mask of one pattern",
+    shows="one pattern differs at all loads, most at low load",
     confused_with="a batch of specimens",
     separates="measure the area fraction under a microscope",
     silenced_by=("measure the area fraction under a microscope",),
     needs=("area_fraction",),
     choices=patterns,
+    plain="a wrong area fraction",
+    choosing=Choosing(on_test=on_test, in_one_run=in_one_run, held_out="loads"),
+    measurement=DirectMeasurement("Measure the area fraction of the pattern under a microscope.", 0.02, 1.0),
+    in_table=InTable(
+        barred="Fig. 1 of the paper shows the cavities as designed, and S would need an area fraction lower by 0.5"
+    ),
 )

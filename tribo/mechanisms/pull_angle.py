@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+from tribo.mechanisms.record import Base, Conditions, Contact, Forces, Mechanism, Placement, Values, amplitude
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -12,6 +14,17 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
     before = base.forces(conditions.normal_load_N)
     cos, sin = np.cos(values[0]), np.sin(values[0])
     return Forces(before.static_N / (cos + base.static_mu * sin), before.sliding_N / (cos + base.sliding_mu * sin))
+
+
+def lifted(values: Values, contact: Contact) -> tuple[float, float]:
+    """Share of the normal force that the wire leaves, while the sled sticks and while it slides."""
+    lift = np.tan(values[0])
+    return 1.0 - contact.static * lift, 1.0 - contact.sliding * lift
+
+
+def in_chain(values: Values, recorded: Mapping[str, float]) -> dict[str, float]:
+    """The angle of the wire."""
+    return {"wire_angle_rad": float(values[0])}
 
 
 MECHANISM = Mechanism(
@@ -22,9 +35,11 @@ MECHANISM = Mechanism(
     law=law,
     sign=-1,
     regimes=("static", "sliding"),
-    enters="the virtual instrument and the normal force, as the wire lifts the sled",
-    shows="one gain per regime on every sample",
-    confused_with="mu itself",
+    enters="measuring chain, and the normal force, because the wire lifts the sled",
+    shows="one gain per regime, the same on every sample",
+    confused_with="the friction coefficient itself",
     separates="change the height of the wire",
     silenced_by=("change the height of the wire",),
+    plain="an inclined wire",
+    placement=Placement(load=lifted, chain=in_chain, own_friction=True),
 )

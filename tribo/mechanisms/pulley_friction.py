@@ -1,10 +1,12 @@
-"""The roller under the wire takes its share."""
+"""The roller under the wire has friction of its own."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+from tribo.mechanisms.record import Base, Conditions, Forces, InTable, Mechanism, Placement, Values, amplitude
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -12,6 +14,11 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
     before = base.forces(conditions.normal_load_N)
     gain = np.exp(values[0] * np.pi / 2)
     return Forces(before.static_N * gain, before.sliding_N * gain)
+
+
+def in_chain(values: Values, recorded: Mapping[str, float]) -> dict[str, float]:
+    """The friction coefficient of the roller."""
+    return {"roller_friction": float(values[0])}
 
 
 MECHANISM = Mechanism(
@@ -22,9 +29,12 @@ MECHANISM = Mechanism(
     law=law,
     sign=1,
     regimes=("static", "sliding"),
-    enters="the virtual instrument, after the slider force",
-    shows="the same gain everywhere, which the free flat law takes up",
-    confused_with="mu itself",
-    separates="a dead weight over the roller",
+    enters="measuring chain, after the slider force",
+    shows="the same gain on every sample, which the calibration on the flat sample absorbs",
+    confused_with="the friction coefficient itself",
+    separates="hang a dead weight over the roller",
     silenced_by=("hang a dead weight over the roller",),
+    plain="friction of the roller",
+    placement=Placement(chain=in_chain),
+    in_table=InTable(barred="not testable with this table: the calibration on the flat sample absorbs its effect"),
 )

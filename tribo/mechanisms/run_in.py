@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Parameter, Values, amplitude
+from tribo.mechanisms.record import Base, Conditions, Forces, InTable, Mechanism, Parameter, Values, amplitude
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -26,9 +26,11 @@ MECHANISM = Mechanism(
     sign=0,
     regimes=("static", "sliding"),
     enters="block thresholds, by the number of the pull on this specimen",
-    shows="the order of the pulls of one specimen, all samples alike",
-    confused_with="load_cell_drift",
-    separates="a fresh specimen in the middle of the series",
-    silenced_by=("a fresh specimen in the middle of the series",),
+    shows="T follows the order of the pulls of a specimen, the same on all samples",
+    confused_with="drift of the load cell",
+    separates="use a fresh specimen in the middle of the series",
+    silenced_by=("use a fresh specimen in the middle of the series",),
     needs=("specimen_run",),
+    plain="run-in",
+    in_table=InTable(missing="the order of the pulls is not printed"),
 )

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+from tribo.mechanisms.record import Base, Conditions, Forces, InTable, Mechanism, Readings, Values, amplitude
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
     """N -> N + dp (1 - AF) A in both regimes; ``values`` = [dp] in Pa, at most one atmosphere."""
     pull_down_N = values[0] * (1.0 - conditions.area_fraction) * conditions.nominal_area_m2
     return base.forces(conditions.normal_load_N + pull_down_N)
+
+
+def finding(readings: Readings) -> str:
+    """What the table says about suction."""
+    none = sum(size < 1.0 for size in readings.sizes)
+    return (
+        f"Suction cups are {'excluded' if none == len(readings.sizes) else 'not excluded'}: suction can only increase "
+        f"friction, and its best-fitting size is zero in {none} of {len(readings.sizes)} readings "
+        f"(at most {readings.limit() / 1e3:.1f} kPa, 95 %)."
+    )
 
 
 MECHANISM = Mechanism(
@@ -19,10 +29,12 @@ MECHANISM = Mechanism(
     law=law,
     sign=1,
     regimes=("static", "sliding"),
-    enters="block normal force, shared over the contact blocks",
-    shows="rank C > B, S >> A, strongest at low load; static to sliding as mu_s to mu_d; never lowers T",
-    confused_with="normal_load_error, load_cell_offset",
-    separates="vent holes, the hold time, the force before contact, the weight of the sled",
+    enters="normal force of the blocks, shared by the contact blocks",
+    shows="higher T on samples with more cavity area (C > B, S >> A), most at low load; it never lowers T",
+    confused_with="an error of the normal load, or an offset of the load cell",
+    separates="vent the cavities, vary the hold time, read the force before contact, weigh the sled",
     silenced_by=("repeat with vented cavities",),
     needs=("area_fraction",),
+    plain="suction under the cavities",
+    in_table=InTable(guess="suction cups", finding=finding),
 )

@@ -1,4 +1,4 @@
-"""The library: every mechanism under the name that a verdict uses."""
+"""The library: every mechanism under its name in a verdict."""
 
 from __future__ import annotations
 

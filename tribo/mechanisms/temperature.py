@@ -1,10 +1,10 @@
-"""Friction falls with the temperature of the room."""
+"""Friction depends on the temperature of the room."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values, amplitude
+from tribo.mechanisms.record import Base, Conditions, Forces, InTable, Mechanism, Values, amplitude
 
 REFERENCE_C = 23.0
 
@@ -25,9 +25,11 @@ MECHANISM = Mechanism(
     sign=0,
     regimes=("static", "sliding"),
     enters="block thresholds, by the recorded temperature",
-    shows="the recorded temperature, both regimes",
-    confused_with="humidity, drift",
-    separates="a controlled step of temperature",
-    silenced_by=("a controlled step of temperature at constant humidity",),
+    shows="static and sliding friction follow the recorded temperature",
+    confused_with="humidity, or drift",
+    separates="change the temperature in a controlled step",
+    silenced_by=("change the temperature in a controlled step at constant humidity",),
     needs=("temperature_C",),
+    plain="temperature",
+    in_table=InTable(missing="no temperature is printed"),
 )

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribo.mechanisms.record import REFERENCE_SPEED_M_S, Base, Conditions, Forces, Mechanism, Values, amplitude
+from tribo.mechanisms.record import (
+    REFERENCE_SPEED_M_S,
+    Base,
+    Conditions,
+    Forces,
+    InTable,
+    Mechanism,
+    Values,
+    Variation,
+    amplitude,
+)
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -22,11 +32,14 @@ MECHANISM = Mechanism(
     law=law,
     sign=0,
     regimes=("sliding",),
-    enters="block sliding thresholds, by the pull speed",
+    enters="sliding thresholds of the blocks, by the pull speed",
     quick_error=0.05,  # blocks that slid already carry their share of the peak
-    shows="sliding force against ln v, all samples alike",
+    shows="sliding friction is linear in the logarithm of the speed, the same on all samples",
     confused_with="temperature",
-    separates="a speed ladder at one temperature",
-    silenced_by=("a ladder of five speeds at one temperature",),
+    separates="measure at a series of speeds at one temperature",
+    silenced_by=("measure at five speeds at one temperature",),
     needs=("speed_m_s",),
+    plain="velocity-dependent friction",
+    variation=Variation("the pull speed over 0.05, 0.2 and 0.8 mm/s", "speed_mm_s", (0.05, 0.2, 0.8)),
+    in_table=InTable(missing="all pulls are at one speed"),
 )

@@ -1,9 +1,8 @@
 """Putting a mechanism into the spring-block model itself: ``tribo simulate --with suction:dp=3000``.
 
-Every mechanism of the library can be simulated. Those of interface, pattern, bulk and room act on the blocks
-(:mod:`tribo.mechanisms_in_model.on_blocks`), those of the instrument in the measuring chain
-(:mod:`tribo.virtual_tribometer.measuring_chain`), and a wrong label swaps the sample. At zero amplitude a run is that
-of the baseline to the bit.
+Every mechanism of the library can be simulated. Its placement says whether it acts on the blocks
+(:mod:`tribo.mechanisms_in_model.on_blocks`), in the measuring chain (:mod:`tribo.virtual_tribometer.measuring_chain`)
+or replaces the sample by another one. At zero amplitude a run is that of the baseline to the bit.
 """
 
 from __future__ import annotations
@@ -24,17 +23,15 @@ from tribo.simulate.masks import pattern_of
 from tribo.virtual_tribometer.measuring_chain import MeasuringChain, measured
 
 SIMULATED = tuple(MECHANISMS)
-ON_ITSELF = ("contact_area_loss", "pull_angle", "tilt")  # they depend on the friction they change
-SETTLED = 2e-3  # relative change of T/N at which such a run has found itself
+SETTLED = 2e-3  # relative change of T/N below which a run agrees with the friction it was given
 MOST_ROUNDS = 12
-NEEDS_CHOICE = ("mislabelled_specimen",)
 
 
 def parse_with(text: str) -> dict[str, Values]:
     """"suction:dp=3000,run_in:c=0.2,n0=5" -> values by mechanism; parameters not given keep their start.
 
-    A wrong label names the sample that the specimen really is: "mislabelled_specimen(C):share=1"; the key of the
-    result is then "mislabelled_specimen(C)".
+    A mechanism that replaces the sample names the other one in brackets, as a wrong label does with the sample that
+    the specimen really is: ``NAME(C):share=1`` has the key ``NAME(C)``.
 
     Raises
     ------
@@ -59,7 +56,7 @@ def parse_with(text: str) -> dict[str, Values]:
 
 
 def name_of(key: str) -> str:
-    """The mechanism of "mislabelled_specimen(C)", or of a covariate "covariate:operator"."""
+    """The mechanism of a key ``NAME``, ``NAME(SAMPLE)`` or ``NAME:COLUMN``."""
     return key.split("(")[0].split(":")[0]
 
 
@@ -71,19 +68,20 @@ def choice_of(key: str) -> str:
 
 def _choice_problems(key: str) -> list[Problem]:
     name, choice = name_of(key), choice_of(key)
-    if name in NEEDS_CHOICE and pattern_of(choice) is None:
+    swaps = name in MECHANISMS and MECHANISMS[name].placement.other_sample
+    if swaps and pattern_of(choice) is None:
         return [
             Problem("unknown_sample", f"{name} requires the true sample of the specimen in brackets", found=key,
                     allowed=f"{name}(F), or A, B, C, Sx or Sy in the brackets")
         ]  # fmt: skip
-    if name not in NEEDS_CHOICE and choice:
+    if choice and not swaps:
         return [Problem("unknown_choice", f"{name} does not allow brackets", found=key, allowed=name)]
     return []
 
 
 def _unknown(name: str) -> Problem:
     what = "not a mechanism of the simulator"
-    return Problem("unknown_mechanism", what, found=name, allowed=", ".join(SIMULATED))
+    return Problem("unknown_mechanism", what, found=name, allowed=", ".join(MECHANISMS))
 
 
 def _set(values: Values, mechanism: Mechanism, item: str, problems: list[Problem]) -> None:
@@ -147,7 +145,7 @@ def simulate_with(config: SimConfig, mechanisms: Mapping[str, Values], **recorde
         A mechanism that does not exist, or an impossible configuration.
     """
     acting = _acting(mechanisms)
-    label = next((key for key in acting if name_of(key) in NEEDS_CHOICE), None)
+    label = next((key for key in acting if MECHANISMS[name_of(key)].placement.other_sample), None)
     if label is None:
         return _simulate(config, acting, recorded)
     share = float(acting.pop(label)[0])
@@ -164,7 +162,7 @@ def simulate_pair(
     acting = _acting(mechanisms)
     if not acting:
         return before, before
-    if set(acting) <= set(ON_ITSELF):
+    if set(acting) <= set(_on_itself(acting)):
         return before, _simulate(config, acting, recorded, before)
     return before, simulate_with(config, acting, **recorded)
 
@@ -192,11 +190,11 @@ def _simulate(
 def settled(
     config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[str, float], before: Run | None = None
 ) -> Run:
-    """The run whose own friction is the one that tilt, wire and contact area were given.
+    """The run whose own friction is the one that was given to the mechanisms that depend on it.
 
     The first guess is the quick law on the run without them (``before``); then as many rounds as it takes.
     """
-    on_itself = [name for name in ON_ITSELF if name in acting]
+    on_itself = _on_itself(acting)
     if not on_itself:
         return run_with(config, acting, recorded, Pulled())
     others = {name: values for name, values in acting.items() if name not in on_itself}
@@ -211,6 +209,11 @@ def settled(
             0.5 * (pulled.static + run.static_friction), 0.5 * (pulled.sliding + run.sliding_friction)
         )
     return run
+
+
+def _on_itself(acting: Mapping[str, Values]) -> list[str]:
+    """Those that depend on the friction they change, in the order of the library."""
+    return [name for name, m in MECHANISMS.items() if name in acting and m.placement.own_friction]
 
 
 def guessed(config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[str, float], before: Run) -> Pulled:
@@ -238,20 +241,14 @@ def guessed(config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[s
 
 
 def chain_of(acting: Mapping[str, Values], recorded: Mapping[str, float]) -> MeasuringChain:
-    """The measuring chain with the instrument mechanisms in it; a drift counts from when the zero was taken."""
+    """The measuring chain with the mechanisms that act in it; what several set in the same place adds up."""
     known = {**RECORDED, **recorded}
-
-    def size(name: str) -> float:
-        return float(acting[name][0]) if name in acting else 0.0
-
-    return MeasuringChain(
-        wire_angle_rad=size("pull_angle"),
-        roller_friction=size("pulley_friction"),
-        compliance_m_per_N=size("machine_compliance"),
-        offset_N=size("load_cell_offset") + size("load_cell_drift") * known["elapsed_s"] / 3600.0,
-        interval_peaks=size("sampling_clip") / known["samples_in_rise"],
-        nominal_area_m2=known["nominal_area_m2"],
-    )
+    fields: dict[str, float] = {}
+    for name, values in acting.items():
+        in_chain = MECHANISMS[name].placement.chain
+        for field, value in in_chain(values, known).items() if in_chain is not None else ():
+            fields[field] = fields.get(field, 0.0) + value
+    return MeasuringChain(**fields, nominal_area_m2=known["nominal_area_m2"])
 
 
 def mixed(own: Run, other: Run, share: float) -> Run:

@@ -1,18 +1,21 @@
 """What mechanisms do to the blocks of the spring-block model: coefficients, adhesion, load, contact, springs.
 
-Most act on every block in contact alike: the law of the mechanism, applied to the law of one contact block, says by
-how much its coefficients, its adhesion and what rests on it change. Some act by where a block lies (rims, floors, the
-trailing edge); these change the thresholds of single blocks.
+Each mechanism states its placement (:class:`tribo.mechanisms.placement.Placement`). Most act on every block in contact
+alike: the law of the mechanism, applied to the law of one contact block, gives the change of its coefficients, its
+adhesion and its normal force. Some depend on where a block lies (rims, floors, the trailing edge); these change the
+thresholds of single blocks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from tribo.mechanisms.record import REFERENCE_SPEED_M_S, Base, Conditions, Forces, Mechanism, Values
+from tribo.mechanisms.placement import Contact, Placement
+from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray, Pattern, Run
 from tribo.simulate.config import LocalFriction, SimConfig
@@ -26,15 +29,15 @@ RECORDED = {
     "hold_s": 10.0, "specimen_run": 1.0, "temperature_C": 23.0, "humidity_pct": 50.0, "speed_m_s": 2e-4,
     "elapsed_s": 3600.0, "samples_in_rise": 100.0, "nominal_area_m2": SLED_AREA_M2,
 }  # fmt: skip
-PLACED = ("edge_adhesion", "cavity_collapse", "tilt")
-LIFTED_SHARE = 1e-6  # left on a block that the tilt has lifted, so that it keeps a threshold
-MOST_ECCENTRIC = 0.49  # lengths; at half a length the sample stands on its edge
 CARDINAL = 4  # neighbours E, W, N, S come first in the lattice
+
+
+Placed = tuple[Placement, Values]
 
 
 @dataclass(frozen=True)
 class Pulled:
-    """Static and sliding T/N of the whole sample, on which tilt, a slanted wire and area loss depend."""
+    """Static and sliding T/N of the whole sample, on which some mechanisms depend."""
 
     static: float = 0.0
     sliding: float = 0.0
@@ -45,21 +48,21 @@ def run_with(
 ) -> Run:
     """One run whose blocks obey the mechanisms, given the friction of the whole sample so far."""
     changed = on_every_block(config, acting, recorded, pulled)
-    placed = {name: values for name, values in acting.items() if name in PLACED}
-    if not placed:
+    placed = [(MECHANISMS[name].placement, values) for name, values in acting.items()]
+    if not any(placement.on_single_blocks for placement, _ in placed):
         return simulate(changed)
     changed.check()
-    floors = floors_down(changed, placed.get("cavity_collapse"), recorded)
+    conditions = conditions_of_run(changed, recorded)
+    floors = min(sum(p.floors(values, conditions) for p, values in placed if p.floors is not None), 1.0)
     bare = changed.with_(pattern=Pattern("F")) if floors else changed
     lattice = lattice_of(bare)
-    static, sliding = (on_floors(changed, floors) if floors else even(lattice) for _ in range(2))
-    if "tilt" in placed:
-        height = float(placed["tilt"][0])
-        static = on_tilted(changed, lattice, height * pulled.static, static)
-        sliding = on_tilted(changed, lattice, height * pulled.sliding, sliding)
+    start = on_floors(changed, floors) if floors else even(lattice)
+    ratios = (pulled.static, pulled.sliding)
+    static, sliding = (carried_along(changed, lattice, placed, ratio, start) for ratio in ratios)
     thresholds = weighted(bare, lattice, static, sliding)
-    if "edge_adhesion" in placed:
-        thresholds = on_rims(changed, thresholds, placed["edge_adhesion"], recorded)
+    for placement, values in placed:
+        if placement.rims is not None:
+            thresholds = on_rims(changed, thresholds, placement.rims(values), conditions)
     run = run_reference if changed.engine == "reference" else run_fast
     return run_of(changed, run(changed, lattice, thresholds), float(lattice_of(changed).area_fraction))
 
@@ -68,34 +71,20 @@ def on_every_block(
     config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[str, float], pulled: Pulled
 ) -> SimConfig:
     """The configuration with the local friction and the springs that the mechanisms give every block alike."""
-    friction = config.friction
+    contact = Contact(config.pressure_Pa, config.cavities.area_fraction, pulled.static, pulled.sliding)
+    friction, stiffening = config.friction, 1.0
     for name, values in acting.items():
-        if name == "contact_area_loss":
-            friction = scaled(friction, *(_area_kept(config, values, pulled),) * 2)
-        elif name == "pull_angle":
-            lift = np.tan(values[0])
-            friction = lighter(friction, 1.0 - pulled.static * lift, 1.0 - pulled.sliding * lift)
-        elif name not in (*PLACED, *BEYOND_BLOCKS):
+        placement = MECHANISMS[name].placement
+        if placement.thresholds is not None:
+            friction = scaled(friction, *placement.thresholds(values, contact))
+        if placement.load is not None:
+            friction = lighter(friction, *placement.load(values, contact))
+        if placement.by_law:
             friction = by_law(config, friction, MECHANISMS[name], values, recorded)
+        if placement.springs is not None:
+            stiffening *= placement.springs(values, conditions_of_run(config, recorded))
     changed = config if friction == config.friction else config.with_(friction=friction)
-    if "bulk_viscoelasticity" in acting:
-        speed = {**RECORDED, **recorded}["speed_m_s"]
-        gain = 1.0 + acting["bulk_viscoelasticity"][0] * np.log(speed / REFERENCE_SPEED_M_S)
-        changed = changed if gain == 1.0 else changed.with_(modulus_Pa=float(config.modulus_Pa * gain))
-    return changed
-
-
-BEYOND_BLOCKS = (
-    "bulk_viscoelasticity", "load_cell_offset", "load_cell_drift", "pulley_friction", "machine_compliance",
-    "sampling_clip", "mislabelled_specimen",
-)  # fmt: skip
-"""Mechanisms that act on the springs, in the measuring chain, or on which sample lies there at all."""
-
-
-def _area_kept(config: SimConfig, values: Values, pulled: Pulled) -> float:
-    """Share of the contact left at the traction of the peak, 1 - c (T / (AF A))^2."""
-    traction_Pa = pulled.static * config.pressure_Pa / config.cavities.area_fraction
-    return float(np.clip(1.0 - values[0] * traction_Pa**2, 0.05, 1.0))
+    return changed if stiffening == 1.0 else changed.with_(modulus_Pa=float(config.modulus_Pa * stiffening))
 
 
 def scaled(friction: LocalFriction, static: float, sliding: float) -> LocalFriction:
@@ -121,7 +110,7 @@ def by_law(
 ) -> LocalFriction:
     """Local friction changed by the mechanism's own law. The load of the contact blocks is p / AF, their area AF A."""
     conditions = conditions_of_run(config, recorded)
-    choice = _choice(mechanism, conditions)
+    choice = mechanism.choosing.in_one_run(conditions)
     load = conditions.contact_pressure_Pa[0]
     area = conditions.nominal_area_m2
 
@@ -143,15 +132,6 @@ def by_law(
         lighter(friction, float(gain[0]), float(gain[1])),
         static_adhesion_Pa=float(stuck[0] + nothing[0]), sliding_adhesion_Pa=float(stuck[1] + nothing[1]),
     )  # fmt: skip
-
-
-def _choice(mechanism: Mechanism, conditions: Conditions) -> str:
-    """What a mechanism with a choice is about in a single run: the pattern of the sample, the one column there is."""
-    if mechanism.name == "pattern_geometry":
-        from tribo.mechanisms.pattern_geometry import pattern_of
-
-        return str(pattern_of(conditions.sample)[0])
-    return "column is this" if mechanism.name == "covariate" else ""
 
 
 def _tractions(
@@ -190,15 +170,6 @@ def conditions_of_run(config: SimConfig, recorded: Mapping[str, float]) -> Condi
     )  # fmt: skip
 
 
-def floors_down(config: SimConfig, values: Values | None, recorded: Mapping[str, float]) -> float:
-    """Share of the cavity floors that touch down at this pressure."""
-    if values is None:
-        return 0.0
-    from tribo.mechanisms.cavity_collapse import share_down
-
-    return float(share_down(values, conditions_of_run(config, recorded))[0])
-
-
 @dataclass(frozen=True)
 class Carried:
     """Normal load and adhesion of every block over those of an even contact, (n,)."""
@@ -235,18 +206,19 @@ def on_floors(config: SimConfig, share: float) -> Carried:
 
 
 def on_rims(
-    config: SimConfig, thresholds: Thresholds, values: Values, recorded: Mapping[str, float]
+    config: SimConfig, thresholds: Thresholds, adhesion: tuple[float, float], conditions: Conditions
 ) -> Thresholds:
     """Extra adhesion on the blocks beside a cavity, by the number of their sides that face one.
 
-    The rim length per area is that of the pattern, so that square cavities get what the round ones have.
+    ``adhesion`` is static force per rim length, N/m, and the share of it left while sliding. The rim length per area
+    is that of the pattern, so that square cavities have that of the round ones.
     """
     sides = _sides_at_cavities(config)
     if sides.sum() == 0:
         return thresholds
-    whole_N = float(conditions_of_run(config, recorded).rim_per_m[0]) * len(sides) * config.spacing_m**2
-    extra = values[0] * whole_N * sides / sides.sum()
-    return Thresholds(thresholds.static_N + extra, thresholds.sliding_N + values[1] * extra)
+    whole_m = float(conditions.rim_per_m[0]) * len(sides) * config.spacing_m**2
+    extra = adhesion[0] * whole_m * sides / sides.sum()
+    return Thresholds(thresholds.static_N + extra, thresholds.sliding_N + adhesion[1] * extra)
 
 
 def _sides_at_cavities(config: SimConfig) -> FloatArray:
@@ -257,20 +229,30 @@ def _sides_at_cavities(config: SimConfig) -> FloatArray:
     return np.where(lattice.contact, near, 0).astype(float)
 
 
-def on_tilted(config: SimConfig, lattice: Lattice, eccentricity: float, carried: Carried) -> Carried:
-    """Load linear along the pull, its resultant off the middle by so many lengths of the sample.
+def carried_along(
+    config: SimConfig, lattice: Lattice, placed: Sequence[Placed], ratio: float, carried: Carried
+) -> Carried:
+    """``carried`` with the profiles along the pull of all mechanisms, the sample being pulled with T/N = ``ratio``."""
+    for placement, values in placed:
+        if placement.along is not None:
+            carried = with_profile(config, lattice, partial(placement.along, values, ratio), carried)
+    return carried
 
-    Beyond a sixth the trailing edge lifts: it carries nothing and no longer adheres.
+
+def with_profile(
+    config: SimConfig,
+    lattice: Lattice,
+    profile: Callable[[FloatArray], tuple[FloatArray, FloatArray]],
+    carried: Carried,
+) -> Carried:
+    """``carried`` times load and adhesion that depend on the place along the pull; the total load stays.
+
+    ``profile`` is given places from -1/2 (trailing edge) to 1/2, (n,), and returns load and adhesion, (n,) each.
     """
     angle = np.deg2rad(config.angle_deg)
     y, x = np.divmod(np.arange(lattice.contact.size), lattice.nx)
     along = x * np.cos(angle) + y * np.sin(angle)
     place = (along - along.min()) / max(float(np.ptp(along)), 1.0) - 0.5
-    if eccentricity <= 1.0 / 6.0:
-        load, grip = 1.0 + 12.0 * eccentricity * place, np.ones_like(place)
-    else:
-        start = 0.5 - 3.0 * (0.5 - min(eccentricity, MOST_ECCENTRIC))
-        load = np.maximum(place - start, LIFTED_SHARE)
-        grip = (place > start).astype(float)
+    load, grip = profile(place)
     load = load * carried.load
     return Carried(load * carried.load[lattice.contact].mean() / load[lattice.contact].mean(), grip * carried.grip)

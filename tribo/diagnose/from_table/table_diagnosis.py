@@ -1,13 +1,13 @@
-"""``tribo diagnose --published berardo2019``: what a printed table says about the model, and what it cannot say.
+"""``tribo diagnose --published berardo2019``: what a printed table says about the model, and what it leaves open.
 
-The three guesses with which the authors end are mechanisms of the library. They are weighed like all others, under
-every way to read what the table leaves open: the correlation of mu and tau0, whether the standard deviations are
-those of a mean, and whose simulation stands for the model.
+The three explanations that the authors propose are mechanisms of the library. They are weighed like all others, in
+every reading of what the table leaves open: the correlation of mu and tau0, whether the standard deviations are
+those of a mean, and which simulation is the model.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -27,27 +27,16 @@ from tribo.diagnose.from_table.table_observations import (
     read_table,
     root_of,
 )
-from tribo.diagnose.statistics.model import Acting
-from tribo.diagnose.verdict import Estimate, Gain, Outcome, Verdict
+from tribo.diagnose.from_table.table_outlook import PATTERNS, Outlook, Reading, Weighed
+from tribo.diagnose.from_table.table_sentences import verdict_of
+from tribo.diagnose.verdict import Gain, Verdict
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
 
-GUESSES = {
-    "deformed patterns": ("cavity_shear_deformation", "cavity_collapse"),
-    "changed contact area": ("contact_area_loss",),
-    "suction cups": ("suction",),
-}
-BARRED = {
-    "pattern_geometry": "Fig. 1 of the paper shows the cavities as designed, and S would need an AF lower by 0.5",
-    "pulley_friction": "cannot be told from this design: the free flat law takes it up",
-}
 LEAST_CORRELATION = -2.0 * np.sqrt(RANGE_PA[0] * RANGE_PA[1]) / (RANGE_PA[0] + RANGE_PA[1])
-LEVEL = 0.01
-CLOSE = 3.0
-PATTERNS = "patterns"  # the flat law is free: when F is off, it is the patterned samples together that are
 REPLICATES = 4000
 TAKEN_UP = 0.02  # share of a look that must be left once the flat law is free
 RESAMPLES = 400
@@ -55,67 +44,8 @@ Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
-class Reading:
-    """One way to read the table: whose simulation is the model, the correlation of mu and tau0, the meaning of sd."""
-
-    model: str
-    correlation: float
-    specimens: int
-    why: str = ""
-
-
-@dataclass(frozen=True)
-class Weighed:
-    """A mechanism fitted to the table; ``gain`` is the log likelihood it earns net of its freedom."""
-
-    acting: Acting
-    fit: TableFit
-    gain: float
-
-    @property
-    def name(self) -> str:
-        return self.acting.mechanism.name
-
-
-@dataclass(frozen=True)
-class Outlook:
-    """What one reading gives: the adjusted p value of every look at the table, before and after the best mechanism."""
-
-    reading: Reading
-    table: Table
-    baseline: TableFit
-    looks: Mapping[str, float]
-    weighed: tuple[Weighed, ...]
-    p_library: float
-    looks_left: Mapping[str, float]
-
-    @property
-    def p_misfit(self) -> float:
-        """Adjusted p value of the strongest look."""
-        return min(self.looks.values())
-
-    @property
-    def p_left(self) -> float:
-        """The same for what the best mechanism leaves over."""
-        return min(self.looks_left.values())
-
-    @property
-    def outcome(self) -> Outcome:
-        if self.p_misfit >= LEVEL:
-            return "no_misfit"
-        if self.p_library >= LEVEL or self.p_left < LEVEL:
-            return "unknown"
-        return "undetermined" if len(self.near) > 1 else "named"
-
-    @property
-    def near(self) -> tuple[Weighed, ...]:
-        """The best and those that explain about as much."""
-        return tuple(w for w in self.weighed if w.gain > self.weighed[0].gain - CLOSE)
-
-
-@dataclass(frozen=True)
 class PublishedDiagnosis:
-    """The verdict on a printed table, with every reading of it; the first is the one the verdict speaks of."""
+    """The verdict on a printed table, with every reading of it; the verdict is that of the first."""
 
     source: str
     verdict: Verdict
@@ -166,15 +96,13 @@ def diagnose_published(
             progress("reading the table", k, len(readings()))
         table = read_table(measured, models[reading.model], reading.correlation, reading.specimens)
         found.append(look_at(table, reading, np.random.default_rng(seed)))
-    from tribo.diagnose.from_table.table_sentences import verdict_of
-
     rng = np.random.default_rng(seed)
     gain = gain_on_samples(found[0].baseline, found[0].weighed[0], rng)
     return PublishedDiagnosis("berardo2019", verdict_of(found, gain), tuple(found))
 
 
 def look_at(table: Table, reading: Reading, rng: np.random.Generator) -> Outlook:
-    """Fit the baseline, judge its strongest look against chance, weigh every mechanism, look at what is left."""
+    """Fit the baseline, compare its strongest look with chance, weigh every mechanism, examine what remains."""
     baseline = fit_table(table)
     looks = _screen(baseline, rng)
     weighed = weigh_table(baseline)
@@ -187,11 +115,9 @@ def look_at(table: Table, reading: Reading, rng: np.random.Generator) -> Outlook
 
 
 def weigh_table(baseline: TableFit) -> list[Weighed]:
-    """Every mechanism that is not barred on top of the baseline, the best choice of each, best first."""
+    """Every mechanism that the table can show on top of the baseline, the best choice of each, best first."""
     found: dict[str, Weighed] = {}
     for acting in candidates_of(baseline.table):
-        if acting.mechanism.name in BARRED:
-            continue
         fitted = fit_table(baseline.table, (acting,), baseline.root)
         gain = fitted.score - baseline.score - (len(acting.mechanism.parameters) - 1)
         known = found.get(acting.mechanism.name)
@@ -256,7 +182,7 @@ def _looks(f: TableFit) -> tuple[list[str], FloatArray, np.ndarray]:
                 names.append(f"{what} of {PATTERNS if sample == 'F' else sample}{how}")
                 columns.append((change @ table.line.T).ravel())
     for acting in candidates_of(table):
-        if acting.mechanism.name not in BARRED and acting not in f.acting:
+        if acting not in f.acting:
             small = acting.mechanism.start() * np.array([0.1, *np.ones(len(acting.mechanism.parameters) - 1)])
             names.append(acting.mechanism.name)
             moved = predict_table(table, f.law, (*f.acting, acting), (*f.parameters, small))
@@ -278,33 +204,6 @@ def _jacobian(f: TableFit) -> FloatArray:
         )
         columns.append((up - down) / (2e-4 * scale))
     return np.column_stack(columns)
-
-
-def estimate_of(w: Weighed) -> dict[str, Estimate]:
-    """Parameters with 90 % intervals, kept inside their bounds."""
-    found = {}
-    for k, p in enumerate(w.acting.mechanism.parameters):
-        half = 1.645 * float(np.sqrt(max(w.fit.covariance[4 + k, 4 + k], 0.0)))
-        value = float(w.fit.parameters[0][k])
-        found[p.name] = Estimate(value, max(value - half, p.low), min(value + half, p.high), p.unit)
-    return found
-
-
-def upper_limit(baseline: TableFit, name: str, drop: float = 1.353) -> float:
-    """Largest amplitude within ``drop`` of the best log likelihood (95 % one-sided), the flat law fitted anew."""
-    from scipy.optimize import brentq
-
-    from tribo.diagnose.from_table.table_observations import fit_fixed
-
-    acting = Acting(MECHANISMS[name])
-    p = acting.mechanism.amplitude
-    best = fit_table(baseline.table, (acting,), baseline.root)
-
-    def excess(value: float) -> float:
-        return best.score - fit_fixed(baseline, acting, value).score - drop
-
-    start = float(best.parameters[0][0])
-    return p.high if excess(p.high) < 0 else float(brentq(excess, start, p.high, xtol=1e-4 * p.start))
 
 
 def gain_on_samples(baseline: TableFit, w: Weighed, rng: np.random.Generator) -> Gain:

@@ -38,7 +38,7 @@ WORDS = {"static": "static friction", "sliding": "sliding friction"}
 
 @dataclass(frozen=True)
 class Table:
-    """A published table as the diagnosis takes it: rows are samples, then regimes; (mu, tau0 in kPa) of each.
+    """A published table as the diagnosis uses it: rows are samples, then regimes; (mu, tau0 in kPa) of each.
 
     ``values`` and the covariance have 2 x regimes x samples entries in the order sample, regime, (mu, tau0);
     ``shares`` (samples, 4) are those of a simulated table over its own flat sample; ``conditions`` holds every
@@ -129,7 +129,7 @@ def read_table(
 
 
 def _conditions(samples: Sequence[str], loads_Pa: FloatArray) -> Conditions:
-    """Every sample at every load, samples first; speed, hold and the room are one and the same."""
+    """Every sample at every load, samples first; speed, hold and environment are the same."""
     patterns = [_pattern(s) for s in samples]
     n, m = len(samples), len(loads_Pa)
 
@@ -260,11 +260,11 @@ def _split(x: FloatArray, sizes: Sequence[int]) -> list[FloatArray]:
 
 
 def candidates_of(table: Table) -> list[Acting]:
-    """Every mechanism and choice that could show in a table of means: a wrong label and columns cannot."""
+    """Every mechanism and choice that could show in a table of means."""
     base = _base(table, table.values.reshape(-1, 4)[table.samples.index("F")])
     found = []
-    for name, m in MECHANISMS.items():
-        if name in ("mislabelled_specimen", "covariate") or m.regimes == ("rise",) or not m.applies(table.conditions):
+    for m in MECHANISMS.values():
+        if m.in_table.missing or m.in_table.barred or not m.changes_forces or not m.applies(table.conditions):
             continue
         found += [Acting(m, str(choice)) for choice in m.choices(base, table.conditions)]
     return found

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tribo.diagnose.from_table.table_diagnosis import (
-    BARRED,
-    GUESSES,
+from tribo.diagnose.from_table.table_observations import friction_at
+from tribo.diagnose.from_table.table_outlook import (
     LEVEL,
     PATTERNS,
     Outlook,
@@ -16,23 +15,19 @@ from tribo.diagnose.from_table.table_diagnosis import (
     estimate_of,
     upper_limit,
 )
-from tribo.diagnose.from_table.table_observations import friction_at
+from tribo.diagnose.sentences import p_text, sentence_case, signs_of
+from tribo.diagnose.terms import not_varied
 from tribo.diagnose.verdict import Cause, Excluded, Gain, Misfit, NextTest, Verdict
+from tribo.mechanisms.record import Readings
 from tribo.mechanisms.table import MECHANISMS
 
 LEAST_ALIKE = 0.6  # correlations above this (less negative) no line over the range of the paper can have
-ONE_PULL = {
-    "velocity_dependence": "one speed", "contact_ageing": "the hold is not printed",
-    "run_in": "the order of the pulls is not printed", "temperature": "no temperature is printed",
-    "humidity": "no humidity is printed", "load_cell_drift": "no times are printed",
-    "mislabelled_specimen": "no specimens are printed", "covariate": "no further column is printed",
-    "machine_compliance": "no trace is printed in numbers", "bulk_viscoelasticity": "no trace is printed in numbers",
-    "sampling_clip": "no sampling rate is printed",
-}  # fmt: skip
+NOT_TESTABLE = "cannot be tested with this table"
+PRINT_FIRST = "Print T at every load, or the covariance of mu and tau0, which decides what is beyond chance."
 
 
 def verdict_of(outlooks: Sequence[Outlook], gain: Gain) -> Verdict:
-    """The verdict on the first reading, with what holds in all the others in its text."""
+    """The verdict on the first reading; its text says what holds in the other readings."""
     main = outlooks[0]
     best = main.weighed[0]
     named = main.outcome in ("named", "undetermined")
@@ -60,7 +55,7 @@ def reading_record(o: Outlook) -> dict[str, object]:
 
 
 def misfits(outlook: Outlook) -> list[Misfit]:
-    """Samples whose friction is off beyond chance, the surest first; the strongest look where none is alone."""
+    """Samples whose friction differs from the model beyond chance, the most certain first."""
     found: list[Misfit] = []
     table = outlook.table
     for look, p in sorted(outlook.looks.items(), key=lambda item: item[1]):
@@ -71,7 +66,7 @@ def misfits(outlook: Outlook) -> list[Misfit]:
         low, high = _ratio_percent(outlook, sample, what)
         whose = "the patterned samples together" if sample == PATTERNS else sample
         text = f"{what[0].upper()}{what[1:]} of {whose} is {_off(low, high)} of the calibrated model"
-        text += f" at {table.pressures_kPa[0]:g} to {table.pressures_kPa[-1]:g} kPa (adjusted p {_p(p)})."
+        text += f" at {table.pressures_kPa[0]:g} to {table.pressures_kPa[-1]:g} kPa (adjusted p {p_text(p)})."
         observable = {"static friction": "static", "sliding friction": "sliding"}.get(what, "both")
         named = "" if sample == PATTERNS else sample
         found.append(Misfit(observable, named, "normal_load_N" if slope else "sample", (low + high) / 2, p, text))
@@ -98,83 +93,67 @@ def _off(low: float, high: float) -> str:
     return f"from {-low:.0f} % below to {high:.0f} % above that"
 
 
-def _p(p: float) -> str:
-    return "below 0.001" if p < 1e-3 else f"{p:.3f}"
-
-
 def misfit_sentence(outlooks: Sequence[Outlook]) -> str:
-    """Whether the paper's own model fails, and on what that depends."""
+    """Whether the model of the paper fails, and on what that depends."""
     possible = [o for o in outlooks if o.reading.correlation < -LEAST_ALIKE]
     free = [o for o in outlooks if o.reading.correlation == 0.0 and o.reading.specimens == 1]
     failing = sum(o.p_misfit < LEVEL for o in possible)
     main = outlooks[0]
     text = (
-        f"The model calibrated on the flat sample fails on Table 2 beyond chance (adjusted p {_p(main.p_misfit)} with "
-        f"a correlation of mu and tau0 of {main.reading.correlation:.2f}, that of loads spread evenly over 3 to 25 kPa)"
-        f", and in {failing} of {len(possible)} readings with a correlation that a line over these loads can have."
+        f"The model calibrated on the flat sample fails on Table 2 beyond chance: adjusted p {p_text(main.p_misfit)} "
+        f"for a correlation of mu and tau0 of {main.reading.correlation:.2f}, which loads spread evenly over 3 to 25 "
+        f"kPa would give. It fails in {failing} of {len(possible)} readings with a correlation that is possible for a "
+        "line fit over these loads."
     )
     if free and all(o.p_misfit >= LEVEL for o in free):
         text += (
-            " If the printed standard deviations of mu and tau0 were independent, nothing would be beyond chance: "
-            "the unpublished covariance decides."
+            " If mu and tau0 were uncorrelated, nothing would be beyond chance: the result depends on their "
+            "covariance, which the paper does not print."
         )
     return text
 
 
 def guess_sentences(outlooks: Sequence[Outlook]) -> list[str]:
-    """What the numbers say of each of the authors' three guesses."""
+    """What the numbers say of each explanation that the authors propose, and of errors of the instrument instead."""
     possible = [o for o in outlooks if o.reading.correlation < -LEAST_ALIKE]
-    main = outlooks[0]
-    found = []
-    for guess, names in GUESSES.items():
-        gains = [max(w.gain for w in o.weighed if w.name in names) for o in possible]
-        if guess == "suction cups":
-            limit = upper_limit(main.baseline, "suction")
-            found.append(
-                "Suction cups are excluded: they only add friction, and their best size is zero in "
-                f"{sum(_size(o, 'suction') < 1.0 for o in possible)} of {len(possible)} readings "
-                f"(at most {limit / 1e3:.1f} kPa, 95 %)."
-            )
-        elif guess == "changed contact area":
-            limit = upper_limit(main.baseline, "contact_area_loss")
-            lost = 100 * limit * _flat_traction_Pa(main) ** 2
-            found.append(
-                "A contact area that shrinks with traction is not supported: it would lower the flat sample too, earns "
-                f"at most {max(gains):.1f} units of log likelihood and may take at most {lost:.0f} % of the flat "
-                "contact at 10 kPa (95 %)."
-            )
-        else:
-            found.append(
-                f"Deformed patterns are supported: friction that parts along and across the long cavities of S earns "
-                f"{min(gains):.1f} to {max(gains):.1f} units of log likelihood over these readings. Floors of cavities "
-                f"that touch down would raise friction and are not behind it. {_adhesion_along_y(main)}"
-                f"{_instrument_instead(possible)}"
-            )
-    return found
+    found = [
+        m.in_table.finding(_readings_of(name, outlooks[0], possible))
+        for name, m in MECHANISMS.items()
+        if m.in_table.finding is not None
+    ]
+    return [*found, _adhesion_along_y(outlooks[0]), *_instrument_instead(possible)]
 
 
-def _instrument_instead(outlooks: Sequence[Outlook]) -> str:
-    """In how many readings an error of the instrument would explain more than any guess."""
-    guesses = {name for names in GUESSES.values() for name in names}
-    ahead = [o.weighed[0].name for o in outlooks if o.weighed[0].name not in guesses]
-    if not ahead:
-        return ""
-    names = " or ".join(sorted(set(ahead)))
-    return (
-        f" In {len(ahead)} of these readings {names} would explain more; the paper prints nothing that rules it out."
+def _readings_of(name: str, main: Outlook, outlooks: Sequence[Outlook]) -> Readings:
+    weighed = [next(w for w in o.weighed if w.name == name) for o in outlooks]
+    return Readings(
+        gains=tuple(w.gain for w in weighed),
+        sizes=tuple(float(w.fit.parameters[0][0]) for w in weighed),
+        limit=lambda: upper_limit(main.baseline, name),
+        flat_traction_Pa=_flat_traction_Pa(main),
     )
 
 
+def _instrument_instead(outlooks: Sequence[Outlook]) -> list[str]:
+    """In how many readings another mechanism explains more than the authors' explanations."""
+    best = [o.weighed[0].acting.mechanism for o in outlooks]
+    ahead = [m.in_words for m in best if not m.in_table.guess]
+    if not ahead:
+        return []
+    names = " or ".join(sorted(set(ahead)))
+    return [f"In {len(ahead)} of these readings {names} explains more; nothing printed in the paper rules it out."]
+
+
 def _adhesion_along_y(outlook: Outlook) -> str:
-    """What is left of the adhesion of S across its long cavities, from the table itself."""
+    """The adhesion of S across its long cavities, from the table itself."""
     table = outlook.table
     i = table.samples.index("Sy")
     measured = table.values.reshape(-1, 2, 2)[i, :, 1]
     sd = np.sqrt(np.diag(table.data_covariance)).reshape(-1, 2, 2)[i, :, 1]
     model = table.shares[i, [1, 3]] * table.values.reshape(-1, 4)[table.samples.index("F"), [1, 3]]
     return (
-        f"Across them the adhesion of S is gone: tau0 {measured[0]:.1f} +- {sd[0]:.1f} and {measured[1]:.1f} +- "
-        f"{sd[1]:.1f} kPa, where the model has {model[0]:.1f} and {model[1]:.1f}."
+        f"Across its long cavities S shows hardly any adhesion: tau0 is {measured[0]:.1f} +- {sd[0]:.1f} kPa (static) "
+        f"and {measured[1]:.1f} +- {sd[1]:.1f} kPa (sliding); the model gives {model[0]:.1f} and {model[1]:.1f} kPa."
     )
 
 
@@ -189,22 +168,25 @@ def _flat_traction_Pa(outlook: Outlook) -> float:
 
 
 def extension_sentence(main: Outlook, best: Weighed, gain: Gain) -> str:
-    """What the best extended model is worth, on the table and on samples left out, and what it leaves."""
+    """How much the best extended model explains, in the table and on samples left out, and what remains."""
     name, e = next(iter(estimate_of(best).items()))
     before, after = -2 * main.baseline.score, -2 * best.fit.score
     clear = gain.difference > 2 * gain.se
     text = (
-        f"The best extension is {best.name}, {name} = {e.value:.2g} {e.unit}".rstrip()
-        + f" (90 % {e.low:.2g} to {e.high:.2g}): chi-squared of the {len(main.table.values)} numbers falls from "
-        f"{before:.0f} to {after:.0f}. On whole samples left out its gain is {gain.difference:+.2f} +- {gain.se:.2f} "
-        f"in log score a number, {'which is clear' if clear else 'which may be chance'}."
+        f"The best extension is {best.acting.mechanism.in_words}, {name} = {e.value:.2g} {e.unit}".rstrip()
+        + f" (90 % interval {e.low:.2g} to {e.high:.2g}): chi-squared of the {len(main.table.values)} numbers falls "
+        f"from {before:.0f} to {after:.0f}. On whole samples left out of the fit its gain is {gain.difference:+.2f} +- "
+        f"{gain.se:.2f} in log score per number, which {'is clear' if clear else 'may be chance'}."
     )
     strongest = min(main.looks_left, key=lambda look: main.looks_left[look])
     if main.p_left < LEVEL:
-        text += f" Something is left ({strongest}, adjusted p {_p(main.p_left)}): no single law of the library does."
-    rivals = [w.name for w in main.near if w is not best]
+        text += (
+            f" A misfit remains ({strongest}, adjusted p {p_text(main.p_left)}): no single law of the library is "
+            "sufficient."
+        )
+    rivals = [w.acting.mechanism.in_words for w in main.near if w is not best]
     if rivals:
-        text += f" {', '.join(rivals)} would explain about as much."
+        text += f" About as well explained by: {', '.join(rivals)}."
     return text
 
 
@@ -212,7 +194,7 @@ def _cause(w: Weighed, main: Outlook) -> Cause:
     gains = np.array([n.gain for n in main.near])
     share = float(np.exp(w.gain - gains.max()) / np.exp(gains - gains.max()).sum())
     m = w.acting.mechanism
-    return Cause(w.name, share, estimate_of(w), f"{w.name}: {m.shows}. What separates it: {m.separates}.")
+    return Cause(w.name, share, estimate_of(w), f"{sentence_case(m.in_words)}. {signs_of(m)}")
 
 
 def exclusions(outlooks: Sequence[Outlook], shown: set[str]) -> list[Excluded]:
@@ -224,27 +206,27 @@ def exclusions(outlooks: Sequence[Outlook], shown: set[str]) -> list[Excluded]:
         weighed = next((w for w in main.weighed if w.name == name), None)
         if name in shown or (not shown and weighed is best):
             continue
-        if name in ONE_PULL:
-            found.append(Excluded(name, f"cannot be told from this table: {ONE_PULL[name]}"))
-        elif name in BARRED:
-            found.append(Excluded(name, BARRED[name]))
+        if m.in_table.missing:
+            found.append(Excluded(name, f"{NOT_TESTABLE}: {m.in_table.missing}"))
+        elif m.in_table.barred:
+            found.append(Excluded(name, m.in_table.barred))
         elif weighed is not None and m.amplitude.low == 0.0 and _size(main, name) < 1e-3 * m.amplitude.start:
             limit = upper_limit(main.baseline, name)
             most = f"at most {m.amplitude.name} = {limit:.2g} {m.amplitude.unit}".rstrip()
-            reason = f"by its sign: it can only act one way, and the table goes the other; {most} (95 %)"
+            reason = f"wrong sign: it can change friction in one direction only; {most} (95 %)"
             found.append(Excluded(name, reason))
         elif weighed is not None:
             lost = best.gain - weighed.gain
-            found.append(Excluded(name, f"explains less: its log likelihood is {lost:.1f} lower"))
+            found.append(Excluded(name, f"explains the table less well: log likelihood lower by {lost:.1f}"))
         else:
-            found.append(Excluded(name, "cannot be told from this table: what it needs does not vary"))
+            found.append(Excluded(name, f"{NOT_TESTABLE}: {not_varied(m)}"))
     return found
 
 
-def _next_test() -> NextTest:
-    text = (
-        "Print T at every load, or the covariance of mu and tau0: it decides what is beyond chance. At the bench, pull "
-        "S along x, along y, reversed and at 45 degrees at three loads: 72 pulls."
-    )
-    design = {"sample": "S", "direction_deg": [0, 45, 90, 180], "pressure_kPa": [3, 9, 25], "pulls": 72, "hours": 8.4}
-    return NextTest(text, ("cavity_shear_deformation", "pull_angle", "load_cell_offset"), design, float("nan"))
+def _next_test() -> NextTest | None:
+    """The bench test that a mechanism of the library proposes, after the numbers that the paper could still print."""
+    test = next((m.in_table.next_test for m in MECHANISMS.values() if m.in_table.next_test is not None), None)
+    if test is None:
+        return None
+    text = f"{PRINT_FIRST} At the bench: {test.text}"
+    return NextTest(text, test.separates, test.design, float("nan"))

@@ -50,7 +50,7 @@ def candidates(s: Setup, law: FloatArray) -> list[Acting]:
     base, conditions = s.base(law), s.observations.conditions
     found = []
     for mechanism in MECHANISMS.values():
-        if mechanism.regimes == ("rise",) or not mechanism.applies(conditions):
+        if not mechanism.changes_forces or not mechanism.applies(conditions):
             continue
         found += [Acting(mechanism, str(choice)) for choice in mechanism.choices(base, conditions)]
     return found

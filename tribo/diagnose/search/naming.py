@@ -9,15 +9,14 @@ import numpy as np
 
 from tribo.diagnose.search.looks import all_looks
 from tribo.diagnose.search.screen import Progress, Screen, screen
-from tribo.diagnose.search.weigh import ALIKE, Candidate, effect, likeness, weigh
+from tribo.diagnose.search.weigh import TIED, Candidate, effect, likeness, weigh
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.model import ModelFit, Setup
+from tribo.diagnose.statistics.model import FIXED, ModelFit, Setup
 from tribo.records import FloatArray
 
-CLOSE = 3.0  # log likelihood within which a distinct mechanism explains about equally
-TIED = (5.0, 0.08)  # the same for one that the design cannot tell apart: at least, and as a share of the gain
+CLOSE = 3.0  # log likelihood within which a mechanism that can be told apart explains about equally
+IN_COMMON = 0.5  # share of its effect that a mechanism must have in common with one it is tied to
 FORM = 0.12  # by how much of its own effect a law may be wrong in form, sample by sample
-FIRST = 0.05  # chance at which a mechanism may explain a misfit that is certain already, if nothing is left then
 MAX_CAUSES = 2
 
 
@@ -47,7 +46,7 @@ def name_causes(
     rng: np.random.Generator,
     progress: Progress | None = None,
 ) -> Named:
-    """Add mechanisms while each is real by itself and something is left to explain."""
+    """Add mechanisms while each is beyond chance and a misfit remains."""
     model, seen = baseline, first
     causes: list[tuple[Candidate, ...]] = []
     weighed: tuple[Candidate, ...] = ()
@@ -55,7 +54,7 @@ def name_causes(
     while len(causes) < MAX_CAUSES and seen.p_adjusted() < level:
         ranked = weigh(model, excluded)
         weighed = weighed or tuple(ranked)
-        if not ranked or not _is_real(ranked[0], seen, level if causes else max(level, FIRST)):
+        if not ranked or not _is_real(ranked[0], seen, level):
             break
         alike, rivals = _sort_rivals(model, ranked)
         causes.append(alike)
@@ -90,15 +89,16 @@ def _is_real(candidate: Candidate, seen: Screen, level: float) -> bool:
 def _sort_rivals(
     start: ModelFit, ranked: Sequence[Candidate]
 ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
-    """Those the design cannot tell from the best, and distinct ones that explain about as much."""
+    """Those that the design cannot distinguish from the best, and distinct ones that explain about as much."""
     best = ranked[0]
     tied = max(TIED[0], TIED[1] * best.gain)
     near = [c for c in ranked[1:] if c.gain > best.gain - max(CLOSE, tied)]
     if not near:
         return (best,), ()
-    cosine = likeness(start, best, near)
-    alike = [c for c, k in zip(near, cosine, strict=True) if k >= ALIKE and c.gain > best.gain - tied]
-    rivals = [c for c, k in zip(near, cosine, strict=True) if k < ALIKE and c.gain > best.gain - CLOSE]
+    cosine = np.maximum(likeness(start, best, near), 0.0)
+    told = (best.gain * (1.0 - cosine**2) > 2.0 * tied) | (cosine**2 < IN_COMMON)
+    alike = [c for c, apart in zip(near, told, strict=True) if not apart and c.gain > best.gain - tied]
+    rivals = [c for c, apart in zip(near, told, strict=True) if apart and c.gain > best.gain - CLOSE]
     return (best, *alike), tuple(rivals)
 
 
@@ -131,8 +131,8 @@ def with_form_error(model: ModelFit) -> Setup:
     return replace(
         s,
         random=np.concatenate([s.random, np.stack(columns, axis=2)], axis=2),
-        fixed_sd=np.concatenate([s.fixed_sd, np.array(sizes)]),
-        group=np.concatenate([s.group, np.full(len(sizes), -1)]),
+        unit=np.concatenate([s.unit, np.array(sizes)]),
+        group=np.concatenate([s.group, np.full(len(sizes), FIXED)]),
     )
 
 

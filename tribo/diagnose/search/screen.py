@@ -11,8 +11,9 @@ from scipy.special import chdtrc, ndtri
 
 from tribo.diagnose.search.looks import Look
 from tribo.diagnose.statistics.chance import as_measured, columns_of, drawn_residuals, refit, scores
-from tribo.diagnose.statistics.fit import jacobian_at, prior_precision, weights, whitened
+from tribo.diagnose.statistics.fit import jacobian_at, whitened
 from tribo.diagnose.statistics.model import ModelFit
+from tribo.diagnose.statistics.noise import prior_precision, weights, whitener
 from tribo.records import FloatArray
 
 Progress = Callable[[str, int, int], None]
@@ -26,7 +27,7 @@ class Screen:
 
     ``chance`` (replicates,) is the strongest look in each simulated campaign of the fitted model,
     ``chance_library`` the strongest of the mechanisms alone. ``size`` (looks,) is the peak-to-peak effect
-    in ln T beyond what the law takes up, ``coefficients`` those of each look's columns.
+    in ln T that the calibration does not absorb, ``coefficients`` those of each look's columns.
     """
 
     looks: tuple[Look, ...]
@@ -69,7 +70,7 @@ def screen(
 ) -> Screen:
     """Look at a fitted model in every way, then do the same with up to ``replicates`` campaigns it makes itself.
 
-    No more replicates are made once the strongest look is plainly within chance, or plainly beyond it.
+    Replicates end once the strongest look is clearly within chance, or clearly beyond it.
     """
     stacked = np.concatenate([look.columns for look in looks], axis=2)
     ends = np.cumsum([look.freedom for look in looks])
@@ -114,9 +115,11 @@ def cleared(f: ModelFit, stacked: FloatArray) -> tuple[FloatArray, FloatArray]:
     an ordinary projection once the penalty is written as further rows.
     """
     s = f.setup
-    weight = weights(s, f.noise, f.residual - s.random @ f.effects)
+    factor = whitener(s, f.noise)
+    weight = weights(s, f.noise, f.residual - s.random @ f.effects, factor)
     model = np.concatenate([jacobian_at(f), s.random], axis=2)
-    white = whitened(s, f.noise, weight, np.concatenate([model, stacked, f.residual[:, :, None]], axis=2))
+    factor = factor * np.sqrt(weight)[:, None, None]
+    white = whitened(factor, np.concatenate([model, stacked, f.residual[:, :, None]], axis=2))
     q, n_random = model.shape[2], s.random.shape[2]
     penalty = np.sqrt(np.concatenate([np.full(q - n_random, 1e-9), prior_precision(s, f.noise)]))
     rows = np.zeros((q, white.shape[1]))
@@ -139,7 +142,7 @@ def deviate(chi2: FloatArray, freedom: FloatArray) -> FloatArray:
 
 
 def beyond_law(f: ModelFit, columns: FloatArray) -> FloatArray:
-    """Columns (n, 2, k) less what law and mechanisms of the fit can take up."""
+    """Columns (n, 2, k) less what the law and the mechanisms of the fit can absorb."""
     flat = jacobian_at(f).reshape(-1, len(np.concatenate([f.law, *f.values])))
     q = np.linalg.qr(flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300))[0]
     rows = columns.reshape(-1, columns.shape[2])

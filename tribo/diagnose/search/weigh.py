@@ -1,4 +1,4 @@
-"""Weighing the mechanisms: fitting each, penalising freedom, and finding which cannot be told apart."""
+"""Weighing the mechanisms: fitting each, penalising freedom, and finding which cannot be distinguished."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ from tribo.records import FloatArray
 PER_PARAMETER = 1.0  # log likelihood that a further parameter has to earn
 CHOICES_FITTED = 4  # of a mechanism with many choices, how many are fitted in full
 IN_REACH, CLOSE_BY = 0.5, 3.0  # share of the best first gain, less so much, from which a mechanism is fitted to the end
-LABEL_SD = 0.15  # a wrong label is all or nothing
-ALIKE = 0.95  # cosine from which two mechanisms cannot be told apart
+# Log likelihood, at least and as a share of what the best gains, by which two mechanisms must differ to be told apart:
+# if the one is at work, the difference has the expected value gain (1 - cosine^2) and twice that as its variance.
+TIED = (5.0, 0.08)
+ALIKE = float(np.sqrt(1.0 - 2.0 * TIED[1]))  # cosine above which not even a strong effect tells two mechanisms apart
 SEEN = 1e-3  # share of a mechanism's effect that must be left once the flat law is free
 
 
@@ -67,10 +69,11 @@ def _most_promising(start: ModelFit, group: list[Acting]) -> list[Acting]:
     columns = [predict(start.setup, start.law, (a,), (a.mechanism.start(),)) - before for a in group]
     left, target = cleared(start, np.stack(columns, axis=2))
     pull = left.T @ target
-    # log likelihood of the whole effect: a wrong label is not half wrong
+    # log likelihood of the whole effect, for what is present as a whole or absent
     whole = pull - 0.5 * np.sum(left**2, axis=0)
     small = 0.5 * pull * np.abs(pull) / (np.sum(left**2, axis=0) + 1e-12)
-    rank = whole if group[0].mechanism.name == "mislabelled_specimen" else np.abs(small)
+    whole_or_absent = group[0].mechanism.choosing.all_or_nothing_sd is not None
+    rank = whole if whole_or_absent else np.abs(small)
     return [group[i] for i in np.argsort(-rank)[:CHOICES_FITTED]]
 
 
@@ -88,8 +91,9 @@ def _judged(start: ModelFit, fitted: ModelFit, choosing: float) -> Candidate:
     """What a fit earns beyond ``start``: its parameters and the choosing, in log likelihood, are paid for."""
     acting = fitted.acting[-1]
     raw = fitted.score - start.score - PER_PARAMETER * (len(acting.mechanism.parameters) - 1)
-    if acting.mechanism.name == "mislabelled_specimen":
-        raw -= 0.5 * ((fitted.values[-1][0] - 1.0) / LABEL_SD) ** 2
+    sd = acting.mechanism.choosing.all_or_nothing_sd
+    if sd is not None:
+        raw -= 0.5 * ((fitted.values[-1][0] - acting.mechanism.amplitude.start) / sd) ** 2
     return Candidate(acting, fitted, float(raw - choosing), float(raw))
 
 
@@ -105,7 +109,7 @@ def effect(f: ModelFit, index: int = -1) -> FloatArray:
 def likeness(start: ModelFit, best: Candidate, others: Sequence[Candidate]) -> FloatArray:
     """Cosine between what ``best`` changes in the fitted ln T and what each other changes, (others,).
 
-    Every model has its own flat law fitted, so what the flat law can take up is already out; the sample error
+    Every model has its own flat law fitted, so what the flat law can absorb is already removed; the sample error
     and the specimens are taken out here.
     """
     ground = replace(best.fit, acting=best.fit.acting[:-1], values=best.fit.values[:-1])
@@ -116,8 +120,8 @@ def likeness(start: ModelFit, best: Candidate, others: Sequence[Candidate]) -> F
 
 
 def unseen(start: ModelFit) -> dict[str, float]:
-    """Mechanisms that the free flat law takes up almost wholly at every size that a fit would start from, and the
-    largest share of their effect that is left."""
+    """Mechanisms whose effect the calibration on the flat sample absorbs almost wholly, at every size that a fit would
+    start from, with the largest share of the effect that is left."""
     found = {}
     before = predict(start.setup, start.law, (), ())
     for acting in candidates(start.setup, start.law):

@@ -1,34 +1,66 @@
-"""Direct evidence: what the force before contact and the slope of the rise say by themselves."""
+"""Direct evidence: mechanisms that the force before contact or the slope of the rise shows by itself."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import erfc
 
 from tribo.diagnose.statistics.observations import Observations
+from tribo.mechanisms.evidence import Quantity, TraceEvidence
+from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray
 
 CERTAIN = 5.0  # standard errors
 NOISE_SHARE = 0.5  # an offset below half the noise of one reading does not matter to any result
 RISE_PER_FOLD = 0.02
+LEAST_P = 1e-12  # no estimate has a tail that is known further out
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """An estimate with its standard error, and whether it is certain and large enough to matter."""
+    """An estimate with its standard error, and whether it is certain and large enough to matter.
+
+    ``looks`` is the number of estimates from which this one was chosen.
+    """
 
     value: float
     standard_error: float
     certain: bool
     unit: str
     change: float = 0.0  # over the whole series, N or relative
+    looks: int = 1
 
     @property
     def interval(self) -> tuple[float, float]:
         """Ninety percent."""
         half = 1.645 * self.standard_error
         return self.value - half, self.value + half
+
+    def p_adjusted(self, looks: int) -> float:
+        """Two-sided p value of the estimate over its standard error (normal), Bonferroni over ``looks``."""
+        p = float(erfc(abs(self.value) / max(self.standard_error, 1e-300) / np.sqrt(2.0)))
+        return min(max(looks * p, LEAST_P), 1.0)
+
+
+def direct_evidence(o: Observations) -> dict[str, Evidence]:
+    """What the traces show of every mechanism that states an evidence in them, by name."""
+    found = {name: ESTIMATES[stated.quantity](o) for name, stated in stated_evidence().items()}
+    return {name: e for name, e in found.items() if e is not None}
+
+
+def stated_evidence() -> dict[str, TraceEvidence]:
+    """The evidence that mechanisms state, by name."""
+    return {name: m.evidence for name, m in MECHANISMS.items() if m.evidence is not None}
+
+
+def certain_evidence(evidence: Mapping[str, Evidence]) -> dict[str, Evidence]:
+    """What is certain, without evidence that another one includes (a drift includes the offset that it leaves)."""
+    certain = {name: e for name, e in evidence.items() if e.certain}
+    included = {other for name in certain for other in stated_evidence()[name].contains}
+    return {name: e for name, e in certain.items() if name not in included}
 
 
 def zero_offset(o: Observations) -> Evidence | None:
@@ -42,16 +74,17 @@ def zero_offset(o: Observations) -> Evidence | None:
 
 def zero_drift(o: Observations) -> Evidence | None:
     """Slope of the force before contact over the series, N/h; within the traces where the series has no clock."""
-    across, within = _drift_across(o), _drift_within(o)
-    certain = [e for e in (across, within) if e is not None and e.certain]
-    return certain[0] if certain else across or within
+    across, within = _drifts_across(o), _drift_within(o)
+    best = max(across, key=lambda e: abs(e.value) / e.standard_error, default=None)
+    found = [e for e in (best, within) if e is not None]
+    chosen = next((e for e in found if e.certain), found[0] if found else None)
+    return chosen and replace(chosen, looks=len(across) + (within is not None))
 
 
-def _drift_across(o: Observations) -> Evidence | None:
-    """Over the hours of the clock, or those at the bench (nights left out), whichever the zero follows more surely."""
+def _drifts_across(o: Observations) -> list[Evidence]:
+    """Over the hours of the clock, and over those at the bench (nights left out)."""
     clocks = (o.conditions.elapsed_s / 3600.0, _bench_hours(o.conditions.elapsed_s))
-    found = [e for e in (_drift_along(o, hours) for hours in clocks) if e is not None]
-    return max(found, key=lambda e: abs(e.value) / e.standard_error, default=None)
+    return [e for e in (_drift_along(o, hours) for hours in clocks) if e is not None]
 
 
 def _bench_hours(elapsed_s: FloatArray) -> FloatArray:
@@ -113,3 +146,10 @@ def _matters_N(o: Observations) -> float:
     if len(noise):
         return NOISE_SHARE * float(np.median(noise))
     return 0.005 * float(np.exp(np.quantile(o.log_force, 0.05)))
+
+
+ESTIMATES: dict[Quantity, Callable[[Observations], Evidence | None]] = {
+    "zero": zero_offset,
+    "zero drift": zero_drift,
+    "rise": rise_stiffening,
+}

@@ -1,4 +1,4 @@
-"""What a named mechanism gains on tests the fit has not seen."""
+"""How much better a named mechanism predicts tests that were left out of the fit."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ RESAMPLES = 400
 def gain(before: ModelFit, after: ModelFit, rng: np.random.Generator) -> Gain | None:
     """Log score and RMSE of ``after`` against ``before`` on whole samples, specimens or loads left out.
 
-    Both are fitted anew without the held-out tests, noise and all. What is held out is chosen by what the
-    mechanism is: a wrong label or a wrong pattern cannot be learned from other specimens, so loads are left
-    out there; samples where at least four remain; specimens otherwise.
+    Both are fitted anew without the held-out tests, noise included. A mechanism whose choice cannot be learned
+    from other specimens (a wrong label, a wrong pattern) has whole loads left out; otherwise whole samples are
+    left out where there are at least four, else whole specimens.
     """
     s = after.setup
     kind, labels = _folds(s, after.acting)
@@ -49,7 +49,7 @@ def gain(before: ModelFit, after: ModelFit, rng: np.random.Generator) -> Gain | 
 
 def _folds(s: Setup, acting: Sequence[Acting]) -> tuple[str, np.ndarray]:
     c = s.observations.conditions
-    if any(a.choice and a.mechanism.name != "covariate" for a in acting):
+    if any(a.mechanism.choosing.held_out == "loads" for a in acting):
         return "loads", np.round(c.normal_load_N, 4).astype(str)
     if len(np.unique(c.sample)) >= 4:
         return "samples", c.sample
@@ -66,7 +66,7 @@ def _held_out(model: ModelFit, out: np.ndarray) -> tuple[FloatArray, FloatArray]
     columns = np.concatenate([jacobian, s.random], axis=2)[out]
     spread = np.einsum("nip,pq,njq->nij", columns, trained.covariance, columns, optimize=True)
     reading = s.observations.reading[out][:, :, None] ** 2 * np.eye(2)
-    scale = spread + trained.noise.repeat + reading
+    scale = spread + trained.noise.per_test(s)[out] + reading
     distance = np.einsum("ni,nij,nj->n", error, np.linalg.inv(scale), error)
     tail = trained.noise.tail
     constant = gammaln(tail / 2 + 1) - gammaln(tail / 2) - np.log(np.pi * tail)
@@ -75,7 +75,7 @@ def _held_out(model: ModelFit, out: np.ndarray) -> tuple[FloatArray, FloatArray]
 
 
 def gain_of_zero(o: Observations, drifting: bool, rng: np.random.Generator) -> Gain | None:
-    """The same for the force before contact: a zero load cell against one that is off, or that wanders in time.
+    """The same for the force before contact: a load cell at zero against one with an offset, or with a drift.
 
     Whole specimens are left out; RMSE is in percent of the median sliding force.
     """

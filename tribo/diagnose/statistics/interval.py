@@ -1,7 +1,7 @@
 """Values and intervals of a mechanism's parameters.
 
 From the curvature, or by profile likelihood near a bound, and averaged over how wrong the model's patterns may be:
-their error is known from codes that disagree, and a campaign of several patterns tells whether it is that large here.
+the predictor states a size for their error, and a campaign of several patterns tells whether it is that large here.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.model import N_LAW, ModelFit
+from tribo.diagnose.statistics.model import FIXED, N_LAW, PATTERN, ModelFit
+from tribo.diagnose.statistics.noise import log_size_prior
 from tribo.mechanisms.record import Mechanism
 from tribo.records import FloatArray
 
@@ -19,19 +20,19 @@ NORMAL_90 = 1.645
 DROP_90 = 0.5 * NORMAL_90**2  # of the log likelihood at the ends of a 90 % interval
 NEAR = 2.0 * NORMAL_90  # standard errors from a bound within which the curvature is not trusted
 SMALLEST_SHARE = 1e-6  # of the way to a bound
-PATTERN_ERRORS = np.array([0.25, 0.35, 0.5, 0.7, 1.0, 1.4])  # of the assumed error of the model's patterns
-PATTERN_ERROR_SD = 0.7  # of the logarithm of that factor: it may well be half or twice as large
+PATTERN_STEPS = np.linspace(-0.8, 1.2, 6)  # of the logarithm of the pattern error about its estimate, to average over
 
 
 def recovered(f: ModelFit, index: int) -> list[tuple[float, float, float]]:
     """Value and 90 % interval (value, low, high) of every parameter of the mechanism ``index`` of a fit.
 
-    The average over PATTERN_ERRORS, each weighed by how likely it makes the campaign.
+    The average over the error of the model's patterns, each size weighed by how likely it makes the campaign.
     """
-    if not np.isfinite(f.setup.fixed_sd).any():
+    if not (f.setup.group == PATTERN).any():
         return [(float(v), *ends) for v, ends in zip(f.values[index], intervals(f, index), strict=True)]
-    fits = [_with_pattern_error(f, factor) for factor in PATTERN_ERRORS]
-    log_weight = np.array([g.score for g in fits]) - 0.5 * (np.log(PATTERN_ERRORS) / PATTERN_ERROR_SD) ** 2
+    factors = f.noise.pattern * np.exp(PATTERN_STEPS)
+    fits = [with_pattern_error(f, factor) for factor in factors]
+    log_weight = np.array([g.score + _log_freedom(g) for g in fits]) + log_size_prior(PATTERN, factors)
     weight = np.exp(log_weight - log_weight.max())
     weight /= weight.sum()
     ends = np.array([intervals(g, index) for g in fits])  # (errors, parameters, 2)
@@ -42,9 +43,21 @@ def recovered(f: ModelFit, index: int) -> list[tuple[float, float, float]]:
     ]
 
 
-def _with_pattern_error(f: ModelFit, factor: float) -> ModelFit:
-    s = replace(f.setup, fixed_sd=f.setup.fixed_sd * factor)
-    return fit(s, f.acting, start=replace(f, setup=s), iterations=15)
+def _log_freedom(f: ModelFit) -> float:
+    """What integrating over law and mechanisms adds to the log likelihood (restricted likelihood), up to a constant."""
+    p = N_LAW + sum(len(v) for v in f.values)
+    free = np.diag(f.covariance)[:p] > 0.0
+    scale = np.sqrt(np.diag(f.covariance)[:p][free])
+    correlation = f.covariance[:p, :p][np.ix_(free, free)] / np.outer(scale, scale)
+    return float(np.sum(np.log(scale)) + 0.5 * np.linalg.slogdet(correlation)[1])
+
+
+def with_pattern_error(f: ModelFit, factor: float) -> ModelFit:
+    """The fit with the error of the patterns held at ``factor`` times what the predictor states."""
+    s = f.setup
+    here = s.group == PATTERN
+    held = replace(s, unit=np.where(here, factor * s.unit, s.unit), group=np.where(here, FIXED, s.group))
+    return fit(held, f.acting, start=replace(f, setup=held), iterations=15)
 
 
 def _averaged(

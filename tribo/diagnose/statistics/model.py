@@ -1,8 +1,8 @@
 """The model of a campaign: the flat law, the shares of each pattern, mechanisms on top, and the noise.
 
-ln T of test i in regime r = ln law + sample error + specimen gain + repeat noise (bivariate t over the two
-regimes of one pull). Samples err by a known size (the simulation's own error), specimens and repeats by sizes
-estimated from the campaign.
+ln T of test i in regime r = ln law + pattern error + specimen gain + specimen slope x ln p + repeat noise (bivariate
+t over the two regimes of one pull). All sizes are estimated from the campaign: gains and slopes of the specimens, one
+factor on the error that the predictor states for its patterns, and repeats that may differ by sample and by force.
 """
 
 from __future__ import annotations
@@ -15,12 +15,16 @@ from numpy.typing import NDArray
 
 from tribo.diagnose.statistics.observations import Observations
 from tribo.diagnose.statistics.predictor import Predictor
-from tribo.mechanisms.covariate import column_of
 from tribo.mechanisms.record import Base, Forces, Mechanism
 from tribo.records import FloatArray
 
 N_LAW = 4  # mu static, tau0 static (kPa), mu sliding, tau0 sliding (kPa)
 FLOOR_N = 1e-6
+# Groups of random effects that share one size: gain and slope of the specimens, each in the mean of both regimes and
+# in their difference, which a specimen shares to an unknown degree; the patterns.
+GAIN, SLOPE, PATTERN = 0, 2, 4
+ALIKE_IN_BOTH, APART = np.array([1.0, 1.0]) / np.sqrt(2.0), np.array([1.0, -1.0]) / np.sqrt(2.0)
+FIXED = -1  # the group of effects whose size is not estimated
 
 
 @dataclass(frozen=True)
@@ -32,33 +36,33 @@ class Acting:
 
     @property
     def name(self) -> str:
-        """The name a verdict uses: ``covariate:operator`` for a covariate."""
-        if self.mechanism.name == "covariate":
-            return f"covariate:{column_of(self.choice)}"
-        return self.mechanism.name
+        """The name in a verdict: ``covariate:operator``."""
+        return self.mechanism.called(self.choice)
 
 
 @dataclass(frozen=True)
 class Setup:
     """What every model of one campaign shares: shares, random-effect design, groups.
 
-    ``random`` has shape (n, 2, q); ``fixed_sd`` (q,) is NaN where the size is estimated, ``group`` (q,) is 0
-    and 1 for specimen gains in the static and sliding regime, -1 otherwise.
+    ``random`` has shape (n, 2, q). The standard deviation of effect j is ``unit[j]`` times the size of its ``group[j]``
+    (GAIN and SLOPE, plus one for the difference of the regimes; PATTERN), or ``unit[j]`` itself where the group is
+    FIXED. ``scatter`` (n, k) holds what the repeats may depend on: the sample, and the logarithm of the force.
     """
 
     observations: Observations
     predictor: Predictor
     shares: FloatArray
     random: FloatArray
-    fixed_sd: FloatArray
+    unit: FloatArray
     group: NDArray[np.int64]
     log_pressure: FloatArray
+    scatter: FloatArray
 
     def take(self, keep: NDArray[np.bool_]) -> Setup:
         """The same for the tests that ``keep`` (n,) marks."""
         return replace(
             self, observations=self.observations.take(keep), shares=self.shares[keep], random=self.random[keep],
-            log_pressure=self.log_pressure[keep],
+            log_pressure=self.log_pressure[keep], scatter=self.scatter[keep],
         )  # fmt: skip
 
     def base(self, law: FloatArray) -> Base:
@@ -77,16 +81,17 @@ class Setup:
 
 
 def setup(observations: Observations, predictor: Predictor) -> Setup:
-    """Random effects: per specimen and regime a gain; per pattern and regime an offset, a slope, a curve."""
+    """Random effects in both regimes: gain and slope of a specimen; offset, slope and curve of a pattern."""
     o, c = observations, observations.conditions
     log_p = np.log(c.pressure_Pa)
     log_p = log_p - log_p.mean()
-    columns, sizes, groups = [], [], []
+    columns, units, groups = [], [], []
     for specimen in np.unique(c.specimen):
-        for regime in (0, 1):
-            columns.append(_column(c.specimen == specimen, regime))
-            sizes.append(np.nan)
-            groups.append(regime)
+        for k, regimes in enumerate((ALIKE_IN_BOTH, APART)):
+            for group, shape in ((GAIN, np.ones(o.n)), (SLOPE, log_p)):
+                columns.append(((c.specimen == specimen) * shape)[:, None] * regimes)
+                units.append(1.0)
+                groups.append(group + k)
     for sample in np.unique(c.sample):
         for regime in (0, 1):
             known = (predictor.offset, predictor.slope, predictor.curve)
@@ -94,12 +99,36 @@ def setup(observations: Observations, predictor: Predictor) -> Setup:
             shapes = ((offset, np.ones(o.n)), (slope, log_p), (curve, log_p**2 - np.mean(log_p**2)))
             for size, shape in shapes if offset > 0 else ():
                 columns.append(_column((c.sample == sample) * shape, regime))
-                sizes.append(size)
-                groups.append(-1)
-    return Setup(
+                units.append(size)
+                groups.append(PATTERN)
+    bare = Setup(
         o, predictor, predictor.table(c.sample),
-        np.stack(columns, axis=2), np.array(sizes), np.array(groups), log_p,
+        np.stack(columns, axis=2), np.array(units), np.array(groups), log_p, np.zeros((o.n, 0)),
     )  # fmt: skip
+    return replace(bare, scatter=_scatter(bare))
+
+
+def _scatter(s: Setup) -> FloatArray:
+    """One column per sample, and the logarithm of the expected force about its mean."""
+    c = s.observations.conditions
+    log_force = predict(s, first_law(s), (), ()).mean(axis=1)
+    return np.column_stack([*((c.sample == name) * 1.0 for name in np.unique(c.sample)), log_force - log_force.mean()])
+
+
+def first_law(s: Setup) -> FloatArray:
+    """A robust first guess of the flat law, one regime after the other."""
+    c, law = s.observations.conditions, []
+    for regime in (0, 1):
+        force = np.exp(s.observations.log_force[:, regime])
+        columns = [s.shares[:, 2 * regime] * c.normal_load_N, s.shares[:, 2 * regime + 1] * c.nominal_area_m2 * 1e3]
+        design = np.column_stack(columns) / force[:, None]
+        weight = np.ones(len(force))
+        for _ in range(8):
+            root = np.sqrt(weight)
+            found = np.linalg.lstsq(design * root[:, None], root, rcond=None)[0]
+            weight = 1.0 / (1.0 + ((design @ found - 1.0) / 0.15) ** 2)
+        law += [max(float(found[0]), 0.05), float(found[1])]
+    return np.array(law)
 
 
 def _column(values: FloatArray | NDArray[np.bool_], regime: int) -> FloatArray:
@@ -127,14 +156,36 @@ def predict(s: Setup, law: FloatArray, acting: Sequence[Acting], values: Sequenc
 
 @dataclass(frozen=True)
 class Noise:
-    """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance, specimen gains (2,).
+    """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance; specimen gains (2,) and
+    slopes (2,) per e-fold of load, along the mean of static and sliding friction and along their difference.
 
-    ``tail`` is the number of degrees of freedom of the t distribution of the repeats.
+    ``pattern`` is the factor on the error that the predictor states for its patterns. The standard deviation of the
+    repeats of a test is multiplied by exp(``scatter`` @ setup.scatter). ``tail`` is the number of degrees of freedom of
+    the t distribution of the repeats.
     """
 
     repeat: FloatArray
     specimen: FloatArray
+    slope: FloatArray = field(default_factory=lambda: np.array([0.02, 0.02]))
+    pattern: float = 1.0
+    scatter: FloatArray | None = None
     tail: float = 8.0
+
+    @property
+    def sizes(self) -> FloatArray:
+        """Of every group of random effects, (5,)."""
+        return np.array([*self.specimen, *self.slope, self.pattern])
+
+    def with_sizes(self, sizes: FloatArray) -> Noise:
+        return replace(
+            self, specimen=sizes[GAIN:SLOPE], slope=sizes[SLOPE:PATTERN], pattern=float(sizes[PATTERN])
+        )
+
+    def per_test(self, s: Setup) -> FloatArray:
+        """Covariance of the repeats of every test, (n, 2, 2)."""
+        if self.scatter is None:
+            return np.repeat(self.repeat[None], s.observations.n, axis=0)
+        return np.asarray(self.repeat * np.exp(2.0 * s.scatter @ self.scatter)[:, None, None])
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,139 @@
+"""Sizes of the noise: how tests and random effects are weighed by them, and how they are estimated.
+
+Sizes of random effects are updated by the fixed point of expectation-maximisation that counts the effects a campaign
+determines (MacKay 1992), the repeats by expectation-maximisation, and what the repeats depend on by Fisher scoring.
+Functions with ``...`` in a shape take one campaign or a batch of replicates.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tribo.diagnose.statistics.model import Noise, Setup
+from tribo.records import FloatArray
+
+# Expected size, and how many effects that is worth: specimen gains and slopes, pattern factor
+SPECIMEN_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR = (0.05, 4.0), (0.03, 2.0), (1.0, 1.0)
+SIZE_PRIORS = np.array([SPECIMEN_PRIOR, SPECIMEN_PRIOR, SLOPE_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR])
+REPEAT_PRIOR = (0.08, 4.0)
+SCATTER_SD = 0.5  # of ln of the ratio of repeats between samples, and of the power of the force they follow
+SMALLEST_SD = 0.003  # of ln T: no reading repeats better
+
+
+def first_noise(s: Setup) -> Noise:
+    """Where the estimation of the noise starts."""
+    start = Noise(np.diag([REPEAT_PRIOR[0] ** 2] * 2), np.zeros(2), scatter=np.zeros(s.scatter.shape[1]))
+    return start.with_sizes(SIZE_PRIORS[:, 0])
+
+
+def whitener(s: Setup, noise: Noise) -> FloatArray:
+    """Inverse Cholesky factor of the noise of every test, repeats plus reading, shape (n, 2, 2)."""
+    cov = noise.per_test(s) + s.observations.reading[:, :, None] ** 2 * np.eye(2)
+    a = np.sqrt(cov[:, 0, 0])
+    b = cov[:, 1, 0] / a
+    c = np.sqrt(cov[:, 1, 1] - b**2)
+    factor = np.zeros_like(cov)
+    factor[:, 0, 0], factor[:, 1, 0], factor[:, 1, 1] = 1 / a, -b / (a * c), 1 / c
+    return factor
+
+
+def weights(s: Setup, noise: Noise, left: FloatArray, factor: FloatArray | None = None) -> FloatArray:
+    """Weight of every test under the bivariate t, one on average for normal noise, shape (n,)."""
+    return (noise.tail + 2.0) / (noise.tail + distance(whitener(s, noise) if factor is None else factor, left))
+
+
+def distance(factor: FloatArray, left: FloatArray) -> FloatArray:
+    """Squared length of what is left of every test, whitened, shape (n,)."""
+    static = factor[:, 0, 0] * left[:, 0]
+    return static**2 + (factor[:, 1, 0] * left[:, 0] + factor[:, 1, 1] * left[:, 1]) ** 2
+
+
+def prior_sd(s: Setup, sizes: FloatArray) -> FloatArray:
+    """Standard deviation of every random effect for sizes (..., 5), shape (..., q)."""
+    known = np.ones((*sizes.shape[:-1], 1))
+    return np.asarray(s.unit * np.concatenate([sizes, known], axis=-1)[..., s.group])
+
+
+def prior_precision(s: Setup, noise: Noise) -> FloatArray:
+    """One over the variance of every random effect, shape (q,)."""
+    return prior_sd(s, noise.sizes) ** -2
+
+
+def updated_sizes(s: Setup, sizes: FloatArray, effects: FloatArray, variance: FloatArray) -> FloatArray:
+    """Sizes (..., 5) from predicted effects (..., q) and their variances (..., q)."""
+    known = 1.0 - variance / prior_sd(s, sizes) ** 2
+    squares = (effects / s.unit) ** 2
+    found = sizes.copy()
+    for group, (expected, worth) in enumerate(SIZE_PRIORS):
+        here = s.group == group
+        if here.any():
+            total = squares[..., here].sum(axis=-1) + worth * expected**2
+            found[..., group] = np.sqrt(total / (np.maximum(known[..., here].sum(axis=-1), 0.0) + worth))
+    return found
+
+
+def updated_repeats(
+    s: Setup, noise: tuple[FloatArray, FloatArray], squares: FloatArray, tail: float
+) -> tuple[FloatArray, FloatArray]:
+    """One step for the covariance of the repeats (..., 2, 2) and what it depends on, (..., k).
+
+    ``squares`` (..., 3, n) are the weighted static, mixed and sliding products expected of what is left of every test.
+    """
+    repeat, scatter = noise
+    times = np.exp(2.0 * scatter @ s.scatter.T)[..., None, :]
+    own = repeat[..., [0, 0, 1], [0, 1, 1]][..., None] * times
+    inverse = inverse_noise(s, repeat, scatter)
+    share = own[..., ::2, :] / (own[..., ::2, :] + (s.observations.reading**2).T)
+    both = np.stack([share[..., 0, :] ** 2, share[..., 0, :] * share[..., 1, :], share[..., 1, :] ** 2], axis=-2)
+    rest = 1.0 - np.stack([share[..., 0, :], both[..., 1, :], share[..., 1, :]], axis=-2)
+    total = np.sum((both * squares + rest * own) / times, axis=-1)
+    size, worth = REPEAT_PRIOR
+    found = (total[..., [[0, 1], [1, 2]]] + worth * size**2 * np.eye(2)) / (s.observations.n + worth)
+    distances = np.einsum("...an,...an,a->...n", inverse, squares, [1.0, 2.0, 1.0])
+    scatter = _updated_scatter(s, scatter, (distances - 2.0) * share.mean(axis=-2), tail)
+    common = scatter[..., :-1].mean(axis=-1, keepdims=True)  # of all samples: that is the covariance itself
+    scatter = np.concatenate([scatter[..., :-1] - common, scatter[..., -1:]], axis=-1)
+    return _floored(found * np.exp(2.0 * common)[..., None]), scatter
+
+
+def inverse_noise(s: Setup, repeat: FloatArray, scatter: FloatArray) -> FloatArray:
+    """Inverse of the noise of every test, repeats plus reading: static, mixed and sliding entries, (..., 3, n)."""
+    times, reading = np.exp(2.0 * scatter @ s.scatter.T), s.observations.reading**2
+    static = repeat[..., 0, 0, None] * times + reading[:, 0]
+    sliding = repeat[..., 1, 1, None] * times + reading[:, 1]
+    mixed = repeat[..., 0, 1, None] * times
+    return np.stack([sliding, -mixed, static], axis=-2) / (static * sliding - mixed**2)[..., None, :]
+
+
+def _updated_scatter(s: Setup, scatter: FloatArray, excess: FloatArray, tail: float) -> FloatArray:
+    """One scoring step; ``excess`` (..., n) is the weighted squared distance of every test above its expectation."""
+    information = 4.0 * tail / (tail + 4.0)
+    precision = np.eye(s.scatter.shape[1]) / SCATTER_SD**2
+    normal = information * s.scatter.T @ s.scatter + precision
+    step = np.linalg.solve(normal, (excess @ s.scatter - scatter @ precision)[..., None])[..., 0]
+    return np.asarray(scatter + np.clip(step, -0.5, 0.5))
+
+
+def _floored(repeat: FloatArray) -> FloatArray:
+    """The nearest covariance (..., 2, 2) with no standard deviation below SMALLEST_SD."""
+    values, vectors = np.linalg.eigh(repeat)
+    return np.asarray((vectors * np.maximum(values, SMALLEST_SD**2)[..., None, :]) @ np.swapaxes(vectors, -1, -2))
+
+
+def log_size_prior(group: int, size: FloatArray) -> FloatArray:
+    """Log density of the logarithm of a size, without constants: a scaled inverse chi."""
+    expected, worth = SIZE_PRIORS[group]
+    return np.asarray(-worth * (np.log(size) + 0.5 * (expected / size) ** 2))
+
+
+def log_prior(s: Setup, noise: Noise) -> float:
+    """Log density of the sizes, without constants; of those alone that some random effect has."""
+    found = -0.5 * float(np.sum(noise.scatter**2)) / SCATTER_SD**2 if noise.scatter is not None else 0.0
+    for group, size in enumerate(noise.sizes):
+        if (s.group == group).any():
+            found += float(log_size_prior(group, size))
+    size, worth = REPEAT_PRIOR
+    determinant = float(np.linalg.slogdet(noise.repeat)[1])
+    return float(found - 0.5 * worth * (determinant + size**2 * np.trace(np.linalg.inv(noise.repeat))))
+
+

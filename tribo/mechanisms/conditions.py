@@ -1,0 +1,100 @@
+"""What the law of a mechanism is given: the baseline and the conditions of every test."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tribo.records import FloatArray
+
+StringArray = NDArray[np.str_]
+Values = FloatArray  # the parameters of one mechanism, in the order of its record
+REFERENCE_SPEED_M_S = 2e-4  # the pull speed of the paper
+REFERENCE_HOLD_S = 1.0
+REFERENCE_PRESSURE_PA = 1e4
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Static and sliding friction force of every test, N, shape (n,)."""
+
+    static_N: FloatArray
+    sliding_N: FloatArray
+
+
+@dataclass(frozen=True)
+class Base:
+    """The baseline law of every test, T = mu N + tau0 A, as arrays of shape (n,).
+
+    ``by_sample`` holds the same four numbers (static mu, static tau0 A, sliding mu, sliding tau0 A) for each
+    sample of the campaign: what a test would follow if its specimen were another sample; ``flat`` names the
+    flat sample among them.
+    """
+
+    static_mu: FloatArray
+    static_adhesion_N: FloatArray
+    sliding_mu: FloatArray
+    sliding_adhesion_N: FloatArray
+    by_sample: Mapping[str, tuple[float, float, float, float]] = field(default_factory=dict)
+    flat: str = "F"
+
+    def forces(self, normal_load_N: FloatArray) -> Forces:
+        """Both forces under a normal load of shape (n,)."""
+        return Forces(
+            self.static_mu * normal_load_N + self.static_adhesion_N,
+            self.sliding_mu * normal_load_N + self.sliding_adhesion_N,
+        )
+
+    def as_sample(self, sample: str) -> Base:
+        """The same tests, had they all been made on ``sample``."""
+        filled = [np.full_like(self.static_mu, value) for value in self.by_sample[sample]]
+        return replace(
+            self,
+            static_mu=filled[0],
+            static_adhesion_N=filled[1],
+            sliding_mu=filled[2],
+            sliding_adhesion_N=filled[3],
+        )
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What is recorded about every test, arrays of shape (n,); NaN where a column is not recorded.
+
+    ``rim_per_m`` is rim length per nominal area, ``cavity_width_m`` the smaller cavity size (0 on a flat
+    sample), ``elongation`` ln(long/short) of the cavity, positive when pulled along its long side and
+    negative across it, ``specimen_run`` counts the pulls of a specimen from 1, ``elapsed_s`` the time since
+    the first pull, ``clip_N`` = k v / (2 f_s), the mean loss of a peak between two samples of the recorder.
+    ``columns`` holds every further recorded column as text.
+    """
+
+    normal_load_N: FloatArray
+    nominal_area_m2: float
+    area_fraction: FloatArray
+    rim_per_m: FloatArray
+    cavity_width_m: FloatArray
+    elongation: FloatArray
+    sample: StringArray
+    specimen: StringArray
+    speed_m_s: FloatArray
+    hold_s: FloatArray
+    specimen_run: FloatArray
+    run_order: FloatArray
+    elapsed_s: FloatArray
+    temperature_C: FloatArray
+    humidity_pct: FloatArray
+    clip_N: FloatArray
+    columns: Mapping[str, StringArray] = field(default_factory=dict)
+
+    @property
+    def pressure_Pa(self) -> FloatArray:
+        """Nominal pressure p = N / A."""
+        return self.normal_load_N / self.nominal_area_m2
+
+    @property
+    def contact_pressure_Pa(self) -> FloatArray:
+        """Pressure on the contact area, p / AF."""
+        return self.pressure_Pa / self.area_fraction
