@@ -9,6 +9,10 @@ constant that acts only once a misfit is seen is varied on the campaigns with an
 
 from __future__ import annotations
 
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the processes share the cores, not each product
+
 import argparse
 import csv
 import json

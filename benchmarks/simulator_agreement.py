@@ -200,14 +200,15 @@ def reference_failures(config: SimConfig, count: int = 6) -> list[tuple[int, int
     model = r.reference_model(config, lattice, thresholds_of(config, lattice))
     drive = drive_of(config, lattice)
     start = 0.99 * first_failure_s(lattice, thresholds_of(config, lattice), drive, config.stiffness_N_m)
-    u, v, resting = drive.follow * start + drive.lag, drive.follow.copy(), lattice.contact.copy()
+    state = r.State(drive.follow * start + drive.lag, drive.follow.copy(), lattice.contact.copy())
     record = r.Record(np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1, np.int64), np.full(64, -1, np.int64),
                       np.zeros(r.N_SUMS))  # fmt: skip
-    work = np.zeros((10, *u.shape))
+    work = np.zeros((10, *state.u.shape))
     found: dict[int, int] = {}
     step = 0
     while len(found) < count:
-        r.integrate_all(u, v, resting, start + step * config.dt_s, config.dt_s, 1, 1, np.inf, model, work, record)
+        one = r.Steps(start + step * config.dt_s, config.dt_s, 1, 1, np.inf)
+        r.integrate_all(state, one, model, work, record)
         for block in record.failed[: int(record.sums[r.N_FAILED])]:
             found.setdefault(int(block), step)
         step += 1

@@ -19,7 +19,7 @@ from pathlib import Path
 from tribo.published import load_table2
 from tribo.simulate import SimConfig, read_stored
 from tribo.simulate.table2_column import beside, distance, fitted
-from tribo.simulate.table2_readings import combinations, run_study
+from tribo.simulate.table2_readings import combinations, run_study, study_designs
 
 BASE = SimConfig(dt_s=1e-7, rest_tolerance=1e-2)
 
@@ -31,7 +31,7 @@ def said(done: int, total: int) -> None:
 
 def study(folder: str, out: str, jobs: str = "2") -> None:
     Path(folder).mkdir(parents=True, exist_ok=True)
-    fits, distances = combinations(run_study(folder, BASE, jobs=int(jobs), progress=said), load_table2())
+    fits, distances = combinations(run_study(folder, study_designs(BASE), jobs=int(jobs), progress=said), load_table2())
     for name, table in (("table2-study", fits), ("table2-distances", distances)):
         table.to_csv(Path(out) / f"{name}.csv", index=False, float_format="%.5g")
     for regime, table in distances.groupby("regime", sort=False):

@@ -69,6 +69,111 @@ def test_a_room_imports_only_what_lies_before_it(module: Path) -> None:
     assert imported_rooms(module.read_text(encoding="utf-8")) <= MAY_IMPORT[room] | {room}
 
 
+MOST_ARGUMENTS = 7
+MOST_WITH_MORE = 5  # functions that may take more arguments
+SHARED_NAMES = {"__init__", "record", "table"}  # module names that several rooms may use
+
+
+def arguments(function: ast.FunctionDef) -> int:
+    """Number of positional and keyword-only arguments, self and cls excluded."""
+    given = [*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs]
+    return len([a for a in given if a.arg not in ("self", "cls")])
+
+
+def long_signatures(source: str) -> list[str]:
+    """Functions and methods with more than seven arguments."""
+    functions = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef)]
+    return [f.name for f in functions if arguments(f) > MOST_ARGUMENTS]
+
+
+def test_at_most_five_functions_take_eight_arguments_or_more() -> None:
+    found = [f"{m.relative_to(PACKAGE)}:{name}" for m in ROOMS for name in long_signatures(m.read_text("utf-8"))]
+    assert len(found) <= MOST_WITH_MORE, found
+
+
+def test_a_long_signature_is_seen() -> None:
+    source = "def f(a, b, /, c, d, *, e, g, h): ...\nclass C:\n  def m(self, a, b, c, d, e, g, h, i): ..."
+    assert long_signatures(source) == ["m"]
+
+
+def module_name(module: Path) -> str:
+    return ".".join(module.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
+
+
+def at_run_time(tree: ast.AST) -> list[ast.AST]:
+    """Every node but those under ``if TYPE_CHECKING``."""
+    nodes: list[ast.AST] = []
+    for child in ast.iter_child_nodes(tree):
+        if not (isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)):
+            nodes += [child, *at_run_time(child)]
+    return nodes
+
+
+def imported_modules(source: str, package: str, known: set[str], faces: dict[str, dict[str, str]]) -> set[str]:
+    """Modules of tribo that a source imports at run time, at its top or late; through the face of a package as well."""
+    found = set()
+    for node in at_run_time(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom):
+            base = ".".join(filter(None, (package if node.level else "", node.module)))
+            for name in (a.name for a in node.names):
+                found.add(f"{base}.{name}" if f"{base}.{name}" in known else faces.get(base, {}).get(name, base))
+        elif isinstance(node, ast.Import):
+            found |= {a.name for a in node.names}
+    return found & known
+
+
+def circles(imports: dict[str, set[str]]) -> list[str]:
+    """Modules that reach themselves through their imports."""
+
+    def reached(start: str) -> set[str]:
+        seen: set[str] = set()
+        waiting = [start]
+        while waiting:
+            new = imports[waiting.pop()] - seen
+            seen |= new
+            waiting += new
+        return seen
+
+    return sorted(module for module in imports if module in reached(module))
+
+
+def test_no_files_import_each_other_in_a_circle() -> None:
+    names = {module_name(m): m for m in ROOMS}
+    faces = {}
+    for name, module in names.items():
+        stub = module.with_suffix(".pyi")
+        if stub.exists():
+            lines = [n for n in ast.parse(stub.read_text("utf-8")).body if isinstance(n, ast.ImportFrom)]
+            faces[name] = {a.asname or a.name: f"{name}.{line.module}" for line in lines for a in line.names}
+    known = set(names)
+    imports = {
+        name: imported_modules(module.read_text("utf-8"), name.rpartition(".")[0], known, faces) - {name}
+        for name, module in names.items()
+    }
+    assert imports["tribo.comparison.prediction"] >= {"tribo.comparison.prediction_runs", "tribo.simulate.calibration"}
+    assert circles(imports) == []
+
+
+def test_a_circle_is_seen() -> None:
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == ["a", "b", "c"]
+    late = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n  import tribo.a\ndef f():\n  import tribo.b"
+    assert imported_modules(late, "tribo", {"tribo.a", "tribo.b"}, {}) == {"tribo.b"}
+
+
+def test_no_two_modules_share_a_name() -> None:
+    stems = [module.stem for module in ROOMS]
+    assert {stem for stem in stems if stems.count(stem) > 1} <= SHARED_NAMES
+
+
+def test_the_tree_in_contributing_names_every_package_and_top_module() -> None:
+    tree = (PACKAGE.parent / "CONTRIBUTING.md").read_text("utf-8").split("    tribo/\n")[1].split("\n\n")[0]
+    words = set(tree.split())
+    packages = {f"{p.parent.name}/" for p in PACKAGE.glob("*/**/__init__.py")}
+    modules = {p.name for p in PACKAGE.glob("[!_]*.py")}
+    assert packages | modules <= words
+    assert {w for w in words if w.endswith(("/", ".py"))} <= packages | modules
+
+
 def test_a_forbidden_import_is_seen() -> None:
     assert imported_rooms("from tribo.report import tables\nimport tribo.cli\nfrom tribo import stages") == {
         "report",

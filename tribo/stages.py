@@ -3,33 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from tribo.campaign.flat_sample import required_flat_sample, with_flat_sample
-from tribo.errors import CampaignError, FitError, Problem
 from tribo.records import (
-    REGIMES,
     Campaign,
-    Comparison,
-    ComparisonRow,
     Ingested,
     LawFit,
-    Pull,
-    Regime,
-    SetAside,
     Study,
-    Test,
-    Trace,
 )
 from tribo.store.kept_results import Shelf
 
 if TYPE_CHECKING:
-    from tribo.comparison.prediction_runs import Cell
+    from tribo.comparison.prediction_runs import Cell, ModelRuns
     from tribo.diagnose import Diagnosis
     from tribo.diagnose.statistics.predictor import Predictor
 
@@ -39,7 +29,7 @@ Until = Literal["ingest", "fit", "compare", "report"]
 DIAGNOSED_BY = (
     "diagnose", "mechanisms", "mechanisms_in_model", "virtual_tribometer", "fitting", "laws", "simulate", "records",
 )  # fmt: skip
-ASSESSED_BY = ("stages", "fitting", "laws", "records")
+ASSESSED_BY = ("fitting", "laws", "records")
 
 
 def _silent(stage: str, done: int, total: int) -> None:
@@ -59,6 +49,13 @@ class StudyOptions:
     overrides: Path | None = None  # table of decisions made by hand about single pulls
     kept: Path | None = None  # folder of finished simulations and diagnosis, used again by the next start
     scheduler: str | None = None  # address of a dask scheduler that runs the simulations
+
+    @property
+    def model_runs(self) -> ModelRuns:
+        """How the model is run."""
+        from tribo.comparison.prediction_runs import ModelRuns
+
+        return ModelRuns(self.runs, self.seed, self.jobs, self.kept, self.scheduler)
 
     def as_words(self) -> dict[str, str]:
         """The options as text, for the provenance."""
@@ -87,36 +84,11 @@ def ingest(
     CampaignError
         No test could be read, or the overrides have errors.
     """
-    from tribo.ingestion.exports import read_all
-    from tribo.traces.copies import under_the_wrong_test
-
-    traces: dict[str, Trace] = {}
-    pulls: dict[str, Pull] = {}
-    set_aside = list(campaign.set_aside)
-    tests: list[Test] = []
-    for done, outcomes in enumerate(read_all(campaign, rule, jobs), start=1):
-        for test, outcome in outcomes:
-            tests.append(test)
-            if isinstance(outcome, SetAside):
-                set_aside.append(outcome)
-            else:
-                traces[test.test_id], pulls[test.test_id] = outcome
-        progress("reading exports", done, len(campaign.tests))
-    ids = {test.test_id for test in tests} | {fault.test_id for fault in set_aside}
-    for test_id, problem in under_the_wrong_test(traces, ids).items():
-        del traces[test_id], pulls[test_id]
-        set_aside.append(SetAside(test_id, str(problem), (problem,)))
-    if not pulls:
-        raise CampaignError(
-            [p for fault in set_aside for p in fault.problems]
-            or [Problem("no_usable_test", "no test of this campaign is usable", file=str(campaign.root))]
-        )
-    ingested = Ingested(replace(campaign, tests=tuple(tests)), traces, pulls, tuple(set_aside))
-    if overrides is None:
-        return ingested
+    from tribo.ingestion.ingested import ingest_campaign
     from tribo.ingestion.overrides import apply_overrides
 
-    return apply_overrides(ingested, overrides, rule)
+    ingested = ingest_campaign(campaign, rule, jobs, progress)
+    return ingested if overrides is None else apply_overrides(ingested, overrides, rule)
 
 
 def fit(ingested: Ingested, *, weights: Weights = "relative") -> tuple[LawFit, ...]:
@@ -129,40 +101,9 @@ def fit(ingested: Ingested, *, weights: Weights = "relative") -> tuple[LawFit, .
     FitError
         No sample has enough loads for the law.
     """
-    from tribo.fitting import fit_samples
+    from tribo.fitting.samples import fit_regimes
 
-    table = ingested.table()
-    area = ingested.campaign.nominal_area_m2
-    found: list[LawFit] = []
-    problems: list[Problem] = []
-    for regime in REGIMES:
-        try:
-            found += fit_samples(table, regime, area, weights=weights)
-        except FitError as why:
-            if np.isfinite(table[f"{regime}_N"]).any():
-                raise
-            problems += why.problems  # a log of steps while sliding has no static peaks, and a law all the same
-    if not found:
-        raise FitError(problems)
-    return tuple(found)
-
-
-def load_means(ingested: Ingested, sample: str, regime: Regime) -> list[tuple[float, float, float]]:
-    """(normal load, mean force, its standard uncertainty) of a sample at each load, in newton.
-
-    Specimens are averaged first, so that the uncertainty is that of the mean over specimens; with one
-    specimen at a load it is that of the mean over its repeats, with one pull that of the reading.
-    """
-    table = ingested.table()
-    rows = table[(table["sample"] == sample) & np.isfinite(table[f"{regime}_N"])]
-    means = []
-    for load, cell in rows.groupby("normal_load_N", sort=True):
-        by_specimen = cell.groupby("specimen")[f"{regime}_N"].mean().to_numpy()
-        values = by_specimen if by_specimen.size > 1 else cell[f"{regime}_N"].to_numpy()
-        spread = float(values.std(ddof=1) / np.sqrt(values.size)) if values.size > 1 else float("nan")
-        alone = float(cell[f"{regime}_u_N"].iloc[0])
-        means.append((float(load), float(by_specimen.mean()), spread if values.size > 1 else alone))
-    return means
+    return fit_regimes(ingested.table(), ingested.campaign.nominal_area_m2, weights=weights)
 
 
 def simulate_cells(
@@ -177,31 +118,10 @@ def simulate_cells(
     CampaignError
         No flat sample to calibrate on, or ``only`` names nothing that this campaign measured.
     """
-    from tribo.comparison.prediction import calibrated_cells
-    from tribo.comparison.prediction_runs import example_config, example_run, remove_strangers, run_cells
+    from tribo.comparison.prediction import run_named_cells
 
     campaign = with_flat_sample(ingested.campaign, options.flat)
-    flat = required_flat_sample(campaign)
-    _, cells = calibrated_cells(
-        campaign, fits, flat, runs=options.runs, seed=options.seed, jobs=options.jobs, kept=options.kept,
-        progress=progress,
-    )  # fmt: skip
-    if options.kept is not None:
-        remove_strangers(cells, options.kept)  # what a diagnosis finds kept is then of this calibration
-    chosen = tuple(c for c in cells if only in ("", c.sample, c.name))
-    if not chosen and only != "calibration":
-        allowed = ", ".join(["calibration", *dict.fromkeys(c.sample for c in cells), *(c.name for c in cells)])
-        raise CampaignError(Problem("no_such_cell", "no simulation has this name", found=only, allowed=allowed))
-    if chosen:
-        run_cells(
-            chosen, options.kept, options.jobs, options.scheduler,
-            lambda done, total: progress("simulating the samples", done, total),
-        )  # fmt: skip
-    for sample in dict.fromkeys(c.sample for c in chosen):
-        own = [c for c in cells if c.sample == sample]
-        if any(example_config(own) in c.configs for c in chosen):
-            example_run(own, options.kept)
-    return chosen
+    return run_named_cells(campaign, fits, required_flat_sample(campaign), options.model_runs, only, progress)
 
 
 def compare(
@@ -217,32 +137,19 @@ def compare(
         The flat sample gives no law, or the model cannot be run for a pattern.
     """
     from tribo.comparison.prediction import predict
+    from tribo.comparison.side_by_side import put_side_by_side
 
     campaign = with_flat_sample(ingested.campaign, options.flat)
-    flat = required_flat_sample(campaign)
     ingested = replace(ingested, campaign=campaign)
-    prediction = predict(
-        campaign, fits, flat, weights=options.weights, runs=options.runs, seed=options.seed, jobs=options.jobs,
-        kept=options.kept, scheduler=options.scheduler, progress=progress,
-    )  # fmt: skip
-    rows = [
-        ComparisonRow(sample, regime, load, mean, u, *prediction.force_N(sample, regime, load))
-        for regime in REGIMES
-        for sample in prediction.samples
-        for load, mean, u in load_means(ingested, sample, regime)
-    ]
-    comparison = Comparison(
-        campaign.title,
-        campaign.nominal_area_m2,
-        {s: campaign.area_fraction(s) for s in prediction.samples},
-        fits,
-        prediction.fits,
-        tuple(rows),
-        prediction.calibration,
-        flat,
-    )
+    flat = required_flat_sample(campaign)
+    prediction = predict(campaign, fits, flat, options.model_runs, weights=options.weights, progress=progress)
     return Study(
-        ingested, fits, (), comparison, prediction.table, prediction.example_runs, notes=prediction.notes
+        ingested,
+        fits,
+        comparison=put_side_by_side(ingested, fits, prediction),
+        simulated=prediction.table,
+        example_runs=prediction.example_runs,
+        notes=prediction.notes,
     )
 
 
@@ -261,37 +168,11 @@ def study(
 
 def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
     """Add to a study: fits with other weights and laws, uncertainty budget, power and outlying pulls."""
+    from tribo.fitting.assessment import assessment
+
     made_from = (walked.ingested, walked.fits, options.weights)
-    looks = Shelf(options.kept).take("assessment", made_from, lambda: _looks(walked, options), ASSESSED_BY)
+    looks = Shelf(options.kept).take("assessment", made_from, lambda: assessment(*made_from), ASSESSED_BY)
     return replace(walked, **looks)
-
-
-def _looks(walked: Study, options: StudyOptions) -> dict[str, Any]:
-    """What :func:`assess` adds to a study, by the name of its field."""
-    import pandas as pd
-
-    from tribo.fitting import campaign_budgets, outlying_pulls, outlying_specimens, power_of_campaign
-    from tribo.fitting.paired import differences_table, paired_differences
-
-    ingested = walked.ingested
-    table, area = ingested.table(), ingested.campaign.nominal_area_m2
-    budgets = campaign_budgets(ingested, walked.fits, weights=options.weights)
-    parts = [b.table().assign(sample=b.fit.sample, regime=b.fit.regime) for b in budgets]
-    power: list[str] = []
-    outlying: list[str] = []
-    for regime in REGIMES:
-        with suppress(FitError):
-            power += [p.text() for p in power_of_campaign(table, regime, area, weights=options.weights)]
-        for look in (outlying_pulls, outlying_specimens):
-            with suppress(FitError):
-                outlying += [found.text() for found in look(table, regime, area)]
-    return {
-        "other_fits": _other_fits(ingested, options),
-        "budget": pd.concat(parts, ignore_index=True) if parts else None,
-        "power": tuple(power),
-        "outlying": tuple(outlying),
-        "differences": differences_table(paired) if (paired := paired_differences(walked.fits)) else None,
-    }
 
 
 def diagnosis(
@@ -335,25 +216,6 @@ def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:
     if flat not in set(forces["sample"]):
         return None
     return simulated_predictor(campaign.samples, forces, flat, campaign.nominal_area_m2)
-
-
-def _other_fits(ingested: Ingested, options: StudyOptions) -> tuple[LawFit, ...]:
-    """The same law under the other weights, mixed models where they converge, and the three-term law."""
-    from tribo.fitting import fit_samples, fit_three_term, mixed_model
-
-    table, area = ingested.table(), ingested.campaign.nominal_area_m2
-    fractions = {s: ingested.campaign.area_fraction(s) for s in sorted(set(table["sample"]))}
-    found: list[LawFit] = []
-    for regime in REGIMES:
-        for weights in get_args(Weights):
-            if weights != options.weights:
-                with suppress(FitError):  # "repeats" needs repeats, "ratio" loads above zero
-                    found += fit_samples(table, regime, area, weights=weights)
-        mixed = (mixed_model(rows, regime, area) for _, rows in table.groupby("sample"))
-        found += [fit for fit in mixed if fit is not None]
-        with suppress(FitError):
-            found.append(fit_three_term(table, regime, area, fractions))
-    return tuple(found)
 
 
 def plan(campaign: Campaign, options: StudyOptions, until: Until) -> dict[str, Any]:

@@ -60,7 +60,7 @@ def test_the_generator_and_the_library_have_no_number_in_common() -> None:
     for folder in ("mechanisms", "mechanisms_in_model", "diagnose"):
         for path in (ROOT / "tribo" / folder).rglob("*.py"):
             library |= numbers_in(path.read_text())
-    assert len(library) > 30
+    assert len(library) > 20  # the scan sees the library
     for name in GENERATOR:
         own = numbers_in((ROOT / "tests" / "blind" / name).read_text())
         assert {v for k, v in own.items() if k in library} <= COMMON, name

@@ -12,6 +12,8 @@ import pytest
 from tribo import stages
 from tribo.campaign import load_campaign
 from tribo.comparison.prediction import MOST_LOADS, Prediction, loads_to_simulate, predict
+from tribo.comparison.prediction_runs import ModelRuns
+from tribo.comparison.side_by_side import load_means
 from tribo.errors import CampaignError, FitError
 from tribo.records import LawFit, Regime
 
@@ -35,7 +37,7 @@ def run(fitted: Fitted, kept: Path, **options: Any) -> tuple[Prediction, set[str
         if stage.startswith("calibrating"):
             computed.add("calibration")
 
-    found = predict(ingested.campaign, fits, "F", runs=2, kept=kept, progress=progress, **options)
+    found = predict(ingested.campaign, fits, "F", ModelRuns(runs=2, kept=kept, **options), progress=progress)
     computed |= {name for name, content in contents(kept).items() if before.get(name) != content}
     return found, computed
 
@@ -136,7 +138,7 @@ def test_many_loads_are_thinned_over_their_whole_range(small_campaign: Path) -> 
 def test_load_means_average_specimens_first(small_campaign: Path, regime: Regime) -> None:
     ingested = stages.ingest(load_campaign(small_campaign))
     table = ingested.table().query("sample == 'B'")
-    for load, mean, u in stages.load_means(ingested, "B", regime):
+    for load, mean, u in load_means(ingested, "B", regime):
         specimens = table[table["normal_load_N"] == load].groupby("specimen")[f"{regime}_N"].mean()
         assert mean == pytest.approx(specimens.mean())
         assert u == pytest.approx(specimens.sem())

@@ -6,10 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tribo.diagnose.from_table.published_diagnosis import PublishedDiagnosis, diagnose_published
 from tribo.diagnose.from_table.table_diagnosis import (
     LEAST_CORRELATION,
-    PublishedDiagnosis,
-    diagnose_published,
     look_at,
     readings,
 )

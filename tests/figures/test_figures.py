@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from report.synthetic import AREA_M2, make_study
 
-from tribo.figures import select
+from tribo.comparison import study_lookup
 from tribo.figures.catalogue import FIGURES
 from tribo.figures.style import SAMPLE_COLOURS, SAMPLE_MARKERS, house_style, sample_mark
-from tribo.records import Pattern, Study
+from tribo.records import Study
 
 NAMES = list(FIGURES)
 
@@ -99,7 +99,7 @@ def test_fig4_means_have_the_standard_deviation_of_the_mean(study: Study) -> Non
 
 def test_fig4_curve_is_mu_plus_tau0_over_p(study: Study) -> None:
     numbers = FIGURES["fig4"].numbers(study)
-    fit = select.fit_of(study.fits, "C", "sliding")
+    fit = study_lookup.fit_of(study.fits, "C", "sliding")
     assert fit is not None
     curve = numbers[(numbers["sample"] == "C") & (numbers["regime"] == "sliding") & (numbers["mark"] == "fit")]
     expected = fit.value("mu") + fit.value("tau0_Pa") / 1e3 / curve["pressure_kPa"]
@@ -108,7 +108,7 @@ def test_fig4_curve_is_mu_plus_tau0_over_p(study: Study) -> None:
 
 def test_the_area_prediction_is_the_flat_force_times_the_area_fraction(study: Study) -> None:
     numbers = FIGURES["fig6"].numbers(study)
-    flat = select.fit_of(study.fits, "F", "static")
+    flat = study_lookup.fit_of(study.fits, "F", "static")
     assert flat is not None
     line = numbers[(numbers["sample"] == "C") & (numbers["mark"] == "AF prediction")]
     expected = flat.force_N(line["normal_load_N"].to_numpy(float)) * study.ingested.campaign.area_fraction("C")
@@ -168,42 +168,6 @@ def test_drawing_leaves_the_settings_of_matplotlib_as_they_were(study: Study) ->
     assert dict(matplotlib.rcParams) == before
 
 
-def test_loads_within_two_percent_are_one_level() -> None:
-    loads = np.array([1.00, 0.5, 1.01, 2.0, 0.502])
-    assert select.load_levels(loads) == pytest.approx([1.005, 0.501, 1.005, 2.0, 0.501])
-    assert select.load_levels(np.array([])).shape == (0,)
-
-
-def test_a_thinned_trace_keeps_its_spikes_its_ends_and_its_order() -> None:
-    t = np.arange(100_000.0)
-    force = np.sin(t / 1e4)
-    force[[31_234, 77_777]] = [9.0, -9.0]
-    time, thin = select.thin_trace(t, force, 400)
-    assert len(thin) <= 402
-    assert {9.0, -9.0} <= set(thin)
-    assert (time[0], time[-1]) == (0.0, 99_999.0)
-    assert (np.diff(time) > 0).all()
-
-
-def test_a_short_trace_is_left_alone() -> None:
-    t = np.arange(10.0)
-    assert select.thin_trace(t, t)[1] is not None
-    assert (select.thin_trace(t, t)[1] == t).all()
-
-
-@pytest.mark.parametrize(
-    ("pattern", "expected"),
-    [
-        (Pattern("F"), False),
-        (Pattern("A", "circle", (5e-6, 5e-6), (2e-5, 2e-5)), False),
-        (Pattern("S", "rectangle", (2e-4, 4e-5), (2.2e-4, 1.2e-4)), True),
-        (Pattern("G", "square", (5e-6, 5e-6), (2e-5, 3e-5)), True),
-    ],
-)
-def test_a_pattern_is_anisotropic_if_its_cavities_or_spacing_are(pattern: Pattern, expected: bool) -> None:
-    assert select.is_anisotropic(pattern) is expected
-
-
 def test_numbers_name_their_units(study: Study) -> None:
     unitless = {
         "sample_number", "sample", "regime", "group", "mark", "test_id", "n_pulls", "seed", "parameter", "value",
@@ -220,13 +184,6 @@ def test_an_empty_campaign_has_empty_numbers(study: Study) -> None:
     for name in ("fig3", "fig4", "fig6"):
         assert isinstance(FIGURES[name].numbers(empty), pd.DataFrame)
         assert FIGURES[name].numbers(empty).empty
-
-
-def test_degrees_of_freedom_join_by_welch_and_satterthwaite() -> None:
-    assert select.welch_dof((1.0, 2.0), (1.0, 2.0)) == pytest.approx(4.0)
-    assert select.welch_dof((1.0, 5.0), (0.0, 0.0)) == pytest.approx(5.0)
-    assert select.welch_dof((0.0, 3.0)) == float("inf")
-    assert np.isnan(select.welch_dof((1.0, 0.0), (1.0, 4.0)))
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -9,7 +9,7 @@ import pytest
 
 from tribo.records import Study
 from tribo.report import drawings
-from tribo.report.drawings import draw_all, inline_svg
+from tribo.report.drawings import Drawing, draw_all, inline_svg
 from tribo.store.kept_results import Shelf
 
 
@@ -23,22 +23,22 @@ def test_a_kept_figure_is_not_drawn_again_unless_its_numbers_change(
     measured: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     keep = Shelf(tmp_path).take
-    first = draw_all(measured, keep=keep)
+    first = draw_all(measured, drawing=Drawing(keep=keep))
     drawn = []
     noted = lambda record, numbers, origin: drawn.append(record.name) or ("", ())  # noqa: E731
     monkeypatch.setattr(drawings, "_svg_and_series", noted)
     monkeypatch.setattr(drawings, "figure_files", lambda svg, title, origin: {})
-    again = draw_all(measured, keep=keep)
+    again = draw_all(measured, drawing=Drawing(keep=keep))
     assert drawn == []
     assert {n: f.files["svg"] for n, f in again.items()} == {n: f.files["svg"] for n, f in first.items()}
     ingested = measured.ingested
     pulls = {**ingested.pulls, "T0001": replace(ingested.pulls["T0001"], static_N=9.0)}
-    draw_all(replace(measured, ingested=replace(ingested, pulls=pulls)), keep=keep)
+    draw_all(replace(measured, ingested=replace(ingested, pulls=pulls)), drawing=Drawing(keep=keep))
     assert set(drawn) == {"fig4", "fig6"}  # no other one shows the static force of a pull
 
 
 def test_several_processes_draw_the_same_bytes(measured: Study) -> None:
-    one, two = draw_all(measured), draw_all(measured, jobs=2)
+    one, two = draw_all(measured), draw_all(measured, drawing=Drawing(jobs=2))
     assert list(one) == list(two)
     assert all(one[name].files == two[name].files for name in one)
 

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tribo.comparison import findings
+from tribo.comparison.findings import Agreement, LoadRatio, Ranking
 from tribo.records import REGIMES, LawFit, Study
-from tribo.report.words import findings, wording
-from tribo.report.words.findings import Agreement, LoadRatio, Ranking
+from tribo.report.words import wording
 from tribo.report.words.numerals import percent, significant, span, with_uncertainty
 from tribo.report.words.terminal_text import summary_text, table2_text
 

@@ -13,6 +13,7 @@ import xarray as xr
 from tribo.errors import SimulationError
 from tribo.records import Pattern
 from tribo.simulate import (
+    CalibrationRuns,
     SimConfig,
     angle_range_deg,
     calibrate,
@@ -69,7 +70,7 @@ def test_calibration_returns_the_measured_flat_law():
     """The simulated flat sample has the given mu and tau0, static and sliding, on runs it was not tuned on."""
     base = SMALL.with_(blocks=(48, 48))
     static, sliding = (3.9, 18e3), (2.2, 9e3)
-    friction = calibrate(static, sliding, base, repeats=4)
+    friction = calibrate(static, sliding, base, CalibrationRuns(repeats=4))
     design = stratified_design(["F"], [3e3, 8e3, 25e3], 8, seed=99, base=base.with_(friction=friction))
     table = run_ensemble(design)
     p = table["pressure_Pa"].to_numpy()

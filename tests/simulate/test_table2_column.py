@@ -49,8 +49,7 @@ def test_deviations_are_against_the_published_simulation():
 def test_table2_runs_what_it_is_asked():
     """Each sample in both regimes, all runs counted, and the text holds every number with its deviation."""
     base = SimConfig(blocks=(21, 21), dt_s=1e-7, rest_tolerance=1e-2, duration_peaks=1.5)
-    small = {"repeats": 2, "pressures_Pa": (5e3, 20e3), "samples": ("F", "B")}
-    table = table2(base, **small)
+    table = table2(table2_design(base, repeats=2, pressures_Pa=(5e3, 20e3), samples=("F", "B")))
     assert list(table["sample"] + table["regime"]) == ["Fstatic", "Fsliding", "Bstatic", "Bsliding"]
     assert set(table["runs"]) == {4}
     published = table.assign(source="simulation", mu=table["mu"] / 1.25)

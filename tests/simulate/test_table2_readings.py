@@ -9,7 +9,16 @@ import pandas as pd
 import pytest
 
 from tribo.simulate import SimConfig, simulate
-from tribo.simulate.table2_readings import VARIANTS, Variant, combinations, mean_between, peak_of, readings, run_study
+from tribo.simulate.table2_readings import (
+    VARIANTS,
+    Variant,
+    combinations,
+    mean_between,
+    peak_of,
+    readings,
+    run_study,
+    study_designs,
+)
 
 SMALL = SimConfig(blocks=(45, 21), dt_s=1e-7, rest_tolerance=1e-2, duration_peaks=1.5)
 TIME = np.linspace(0.0, 10.0, 1001)
@@ -54,10 +63,10 @@ def test_every_variant_is_possible_and_of_equal_size(name: str):
 def test_a_study_compares_its_variants_over_the_same_runs_and_goes_on(tmp_path: Path):
     """Halving K_s lowers B and leaves F; a variant that changes nothing differs by exactly nothing."""
     variants = {"baseline": Variant(), "same": Variant({"shear_factor": 1.0}), "half": Variant({"shear_factor": 0.5})}
-    asked = {"repeats": 2, "pressures_Pa": (5e3, 20e3), "samples": ("F", "B"), "variants": variants}
-    tables = run_study(tmp_path, SMALL, **asked)
+    designs = study_designs(SMALL, repeats=2, pressures_Pa=(5e3, 20e3), samples=("F", "B"), variants=variants)
+    tables = run_study(tmp_path, designs)
     seen: list[tuple[int, int]] = []
-    again = run_study(tmp_path, SMALL, **asked, progress=lambda done, total: seen.append((done, total)))
+    again = run_study(tmp_path, designs, progress=lambda done, total: seen.append((done, total)))
     assert seen == [(8, 24), (16, 24), (24, 24)]
     assert all(again[name].equals(tables[name]) for name in variants)
     rows = [{"sample": s, "regime": r, "source": "simulation", "mu": 4.0, "tau0_kPa": 10.0}

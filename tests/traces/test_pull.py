@@ -90,7 +90,7 @@ def test_stick_slip_is_measured_peak_to_peak_and_by_its_period() -> None:
     assert "stick_slip" in pull.flags
 
 
-def test_noise_is_no_stick_slip() -> None:
+def test_scatter_is_no_stick_slip() -> None:
     for seed in range(5):
         for name in ("plain", "1 kHz", "noise of 3 %"):
             assert math.isnan(read_pull(SHAPES[name].trace(seed)).stick_slip_period_s)
@@ -143,7 +143,7 @@ def test_pull_carries_rule_id_and_window_in_order() -> None:
     assert pull.onset_s < pull.peak_s < pull.window_s[0] < pull.window_s[1]
 
 
-def test_noise_does_not_lift_the_static_peak_as_it_lifts_a_maximum() -> None:
+def test_scatter_does_not_lift_the_static_peak_as_it_lifts_a_maximum() -> None:
     shape = Shape(noise_N=0.02, rate_Hz=200)
     traces = [shape.trace(seed) for seed in range(40)]
     bias = np.mean([read_pull(t).static_N for t in traces]) / shape.static_N - 1

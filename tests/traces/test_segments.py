@@ -142,7 +142,7 @@ def test_the_passage_of_a_slow_ramp_belongs_to_neither_level() -> None:
     assert 340 <= start <= 410
 
 
-def test_noise_drift_and_oscillation_are_no_steps() -> None:
+def test_scatter_drift_and_oscillation_are_no_steps() -> None:
     rng = np.random.default_rng(3)
     index = np.arange(2000)
     for values in (

@@ -212,6 +212,7 @@ def diagnose(
     from tribo import stages
     from tribo.campaign import open_campaign
     from tribo.report import write_until
+    from tribo.report.drawings import Drawing
     from tribo.report.words.verdict_text import verdict_text
     from tribo.store.kept_results import Shelf
 
@@ -219,9 +220,8 @@ def diagnose(
         chosen = stages.StudyOptions(kept=out / KEPT, **options)
         study = stages.study(_with_columns(opened, columns), chosen, until="ingest", progress=progress)
         found = _diagnosis(study, chosen, progress)
-        keep = Shelf(chosen.kept).take
-        provenance = _provenance(study, campaign, chosen)
-        write_until(study, out, "ingest", progress, provenance, diagnosis=found, jobs=chosen.jobs, keep=keep)
+        drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
+        write_until(study, out, "ingest", drawing, _provenance(study, campaign, chosen), found)
     verdict = found.verdict
     console.result(verdict.as_dict(), verdict_text(verdict))
     console.list_tests("set aside", study.ingested.set_aside, level=-1)
@@ -230,7 +230,7 @@ def diagnose(
 
 def _diagnose_published(console: Console, out: Path, seed: int) -> int:
     """The verdict on Table 2 of Berardo et al. (2019), for every interpretation of what it leaves open."""
-    from tribo.diagnose.from_table.table_diagnosis import diagnose_published
+    from tribo.diagnose.from_table.published_diagnosis import diagnose_published
     from tribo.published import BERARDO2019, data_dir, load_table2, load_table2_simulated_anew
     from tribo.report.provenance import provenance_of_table
     from tribo.report.table_report import write_published
@@ -375,6 +375,7 @@ def _walk(console: Console, path: Path, out: Path, until: Until, dry_run: bool, 
     from tribo import stages
     from tribo.campaign import open_campaign
     from tribo.report import write_until
+    from tribo.report.drawings import Drawing
     from tribo.store.kept_results import Shelf
 
     chosen = stages.StudyOptions(kept=out / KEPT, **options)
@@ -388,8 +389,8 @@ def _walk(console: Console, path: Path, out: Path, until: Until, dry_run: bool, 
             study = stages.study(campaign, chosen, until=until, progress=progress)
             study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
             provenance = _provenance(study, path, chosen)
-            keep = Shelf(chosen.kept).take
-            write_until(study, out, until, progress, provenance, diagnosis=found, jobs=chosen.jobs, keep=keep)
+            drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
+            write_until(study, out, until, drawing, provenance, found)
     return _conclude(console, study, out, found.verdict if found else None)
 
 

@@ -11,8 +11,11 @@ import click
 from tribo.cli.console import Console, command_options
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tribo.records import Run
     from tribo.simulate import SimConfig
+    from tribo.simulate.resume import Work
 
 # options that describe the runs; a design file may replace them
 _RUNS = (
@@ -68,9 +71,8 @@ def _described(command: Any) -> Any:
 )
 @command_options
 def simulate(
-    console: Console, design: Path | None, table2: bool, mechanisms: str, given: str, scheduler: str | None, out: Path,
-    seed: int, jobs: int, **options: Any,
-) -> None:  # fmt: skip
+    console: Console, design: Path | None, table2: bool, mechanisms: str, given: str, out: Path, **options: Any
+) -> None:
     """Run the spring-block model.
 
     Parameters not given have the values of the paper. One --sample and one --pressure without --repeats give a single
@@ -79,8 +81,10 @@ def simulate(
     runs.
     """
     from tribo.mechanisms_in_model import parse_given, parse_with
+    from tribo.simulate import run_stored
     from tribo.simulate.design_file import asked_runs, described_by_options, read_design, together
 
+    scheduler, seed, jobs = (options.pop(name) for name in ("scheduler", "seed", "jobs"))
     if design and (table2 or any(value not in (None, ()) for value in options.values())):
         raise click.UsageError(
             "--design describes all runs; it cannot be combined with other options that describe runs"
@@ -96,7 +100,12 @@ def simulate(
     if one:
         _one_run(console, pulled(runs[0], acting, conditions), out)
     else:
-        _ensemble(console, runs, out, jobs, scheduler, table2, acting, conditions)
+        with console.progress() as progress:
+            ran = run_stored(
+                runs, out, jobs, scheduler, lambda done, total: progress("simulating", done, total),
+                _work(acting, conditions),
+            )  # fmt: skip
+        _say_ensemble(console, ran, out, table2)
 
 
 def pulled(config: SimConfig, acting: Mapping[str, Any], conditions: Mapping[str, float]) -> Run:
@@ -124,21 +133,22 @@ def _one_run(console: Console, run: Run, out: Path) -> None:
     )
 
 
-def _ensemble(
-    console: Console, runs: list[SimConfig], out: Path, jobs: int, scheduler: str | None, table2: bool,
-    acting: Mapping[str, Any], conditions: Mapping[str, float],
-) -> None:  # fmt: skip
+def _work(acting: Mapping[str, Any], conditions: Mapping[str, float]) -> Work:
+    """What is done for each run of an ensemble: the run itself, with the mechanisms at work."""
     from functools import partial
 
+    from tribo.simulate.resume import FRICTION, Work
+
+    if not acting:
+        return FRICTION
+    return Work(partial(pulled, acting=acting, conditions=conditions), label=repr((acting, conditions)))
+
+
+def _say_ensemble(console: Console, table: pd.DataFrame, out: Path, table2: bool) -> None:
+    """The ensemble in words and as a record: beside the published column, or means and laws."""
     from tribo.published import load_table2
-    from tribo.simulate.resume import FRICTION, Work, run_stored
     from tribo.simulate.table2_column import beside, described, fitted, table2_text
 
-    work = FRICTION
-    if acting:
-        work = Work(partial(pulled, acting=acting, conditions=conditions), label=repr((acting, conditions)))
-    with console.progress() as progress:
-        table = run_stored(runs, out, jobs, scheduler, lambda done, total: progress("simulating", done, total), work)
     record: dict[str, Any] = {"out": str(out), "runs": len(table)}
     if table2:
         found = beside(fitted(table), load_table2())

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribo.comparison.prediction_runs import SOURCES, Cell, cells_of, example_run, remove_strangers, run_cells
-from tribo.errors import FitError, Problem
+from tribo.comparison.prediction_runs import (
+    SOURCES,
+    Cell,
+    ModelRuns,
+    cells_of,
+    example_config,
+    example_run,
+    remove_strangers,
+    run_cells,
+)
+from tribo.errors import CampaignError, FitError, Problem
 from tribo.records import REGIMES, Campaign, FloatArray, LawFit, Regime, Run
 from tribo.store.kept_results import Shelf
 
@@ -20,6 +28,7 @@ if TYPE_CHECKING:
     from tribo.simulate import LocalFriction, SimConfig
 
 Progress = Callable[[str, int, int], None]
+MODEL_RUNS = ModelRuns()
 MOST_LOADS = 8  # T(N) of the model is close to a straight line: more loads are interpolated
 
 
@@ -40,6 +49,7 @@ class Prediction:
     measured_flat: dict[Regime, LawFit]
     calibration: dict[str, float]
     example_runs: tuple[Run, ...]
+    flat: str
     notes: tuple[str, ...] = ()
 
     @property
@@ -66,13 +76,9 @@ def predict(
     campaign: Campaign,
     fits: tuple[LawFit, ...],
     flat: str,
+    model: ModelRuns = MODEL_RUNS,
     *,
     weights: str = "relative",
-    runs: int = 4,
-    seed: int = 0,
-    jobs: int = 2,
-    kept: Path | None = None,
-    scheduler: str | None = None,
     progress: Progress = lambda stage, done, total: None,
 ) -> Prediction:
     """Calibrate the model on the measured flat sample and simulate every measured sample at the campaign's loads.
@@ -80,10 +86,8 @@ def predict(
     Parameters
     ----------
     fits : laws measured on the samples, the flat one among them
-    runs : simulated runs per sample and load, at stratified pull angles with fresh local friction
+    model : number of runs, seed, and where the model is run
     weights : of the fits to the simulated forces
-    kept : folder for the calibration and every finished run; results made from other inputs are not used
-    scheduler : address of a dask.distributed scheduler whose workers run the simulations
 
     Raises
     ------
@@ -94,21 +98,21 @@ def predict(
     """
     from tribo.simulate import SimConfig
 
-    friction, cells = calibrated_cells(
-        campaign, fits, flat, runs=runs, seed=seed, jobs=jobs, kept=kept, progress=progress
-    )
-    if kept is not None:
-        remove_strangers(cells, kept)
+    friction, cells = calibrated_cells(campaign, fits, flat, model, progress)
+    if model.kept is not None:
+        remove_strangers(cells, model.kept)
     table = run_cells(
-        cells, kept, jobs, scheduler, lambda done, total: progress("simulating the samples", done, total)
-    )
+        cells, model.kept, model.jobs, model.scheduler,
+        lambda done, total: progress("simulating the samples", done, total),
+    )  # fmt: skip
     table = _as_forces(table, campaign)
     return Prediction(
         table,
         _simulated_fits(table, campaign.nominal_area_m2, weights),
         _flat_laws(fits, flat),
         _calibration(friction, SimConfig()),
-        tuple(example_run(own, kept) for own in _by_sample(cells).values()),
+        tuple(example_run(own, model.kept) for own in _by_sample(cells).values()),
+        flat,
     )
 
 
@@ -116,18 +120,14 @@ def calibrated_cells(
     campaign: Campaign,
     fits: tuple[LawFit, ...],
     flat: str,
-    *,
-    runs: int = 4,
-    seed: int = 0,
-    jobs: int = 2,
-    kept: Path | None = None,
+    model: ModelRuns = MODEL_RUNS,
     progress: Progress = lambda stage, done, total: None,
 ) -> tuple[LocalFriction, tuple[Cell, ...]]:
     """Local friction from the flat sample alone, and the runs that predict every sample, by sample and load.
 
     Parameters and exceptions are those of :func:`predict`.
     """
-    from tribo.simulate import SimConfig, calibrate, stratified_design
+    from tribo.simulate import CalibrationRuns, SimConfig, calibrate, stratified_design
 
     laws = _flat_laws(fits, flat)
     loads = loads_to_simulate(campaign)
@@ -136,13 +136,48 @@ def calibrated_cells(
 
     def calibration() -> LocalFriction:
         return calibrate(
-            *wanted, pressures_Pa=pressures, seed=seed, jobs=jobs,
+            *wanted, runs=CalibrationRuns(pressures, seed=model.seed), jobs=model.jobs,
             progress=lambda done, total: progress("calibrating on the flat sample", done, total),
         )  # fmt: skip
 
-    friction = Shelf(kept).take("calibration", (wanted, pressures, seed), calibration, SOURCES)
+    friction = Shelf(model.kept).take("calibration", (wanted, pressures, model.seed), calibration, SOURCES)
     samples = {s: campaign.samples[s] for s in _measured_samples(campaign)}
-    return friction, cells_of(stratified_design(samples, pressures, runs, seed, SimConfig(friction=friction)))
+    design = stratified_design(samples, pressures, model.runs, model.seed, SimConfig(friction=friction))
+    return friction, cells_of(design)
+
+
+def run_named_cells(
+    campaign: Campaign,
+    fits: tuple[LawFit, ...],
+    flat: str,
+    model: ModelRuns,
+    only: str = "",
+    progress: Progress = lambda stage, done, total: None,
+) -> tuple[Cell, ...]:
+    """Calibrate the model and run the cells that ``only`` names; returns those that ran.
+
+    Raises
+    ------
+    CampaignError
+        ``only`` names nothing this campaign measured.
+    """
+    _, cells = calibrated_cells(campaign, fits, flat, model, progress)
+    if model.kept is not None:
+        remove_strangers(cells, model.kept)  # what a diagnosis finds kept is then of this calibration
+    chosen = tuple(c for c in cells if only in ("", c.sample, c.name))
+    if not chosen and only != "calibration":
+        allowed = ", ".join(["calibration", *dict.fromkeys(c.sample for c in cells), *(c.name for c in cells)])
+        raise CampaignError(Problem("no_such_cell", "no simulation has this name", found=only, allowed=allowed))
+    if chosen:
+        run_cells(
+            chosen, model.kept, model.jobs, model.scheduler,
+            lambda done, total: progress("simulating the samples", done, total),
+        )  # fmt: skip
+    for sample in dict.fromkeys(c.sample for c in chosen):
+        own = [c for c in cells if c.sample == sample]
+        if any(example_config(own) in c.configs for c in chosen):
+            example_run(own, model.kept)
+    return chosen
 
 
 def _by_sample(cells: tuple[Cell, ...]) -> dict[str, list[Cell]]:

@@ -29,6 +29,22 @@ CELLS_AWAY = 16  # cells given to a scheduler at once
 
 
 @dataclass(frozen=True)
+class ModelRuns:
+    """How the model is run for a campaign.
+
+    ``runs`` simulations per sample and load, at stratified pull angles with random local friction from ``seed``,
+    ``jobs`` at a time or on the workers of a dask scheduler at the address ``scheduler``. The folder ``kept`` holds the
+    calibration and every finished run; results made from other inputs are not used.
+    """
+
+    runs: int = 4
+    seed: int = 0
+    jobs: int = 2
+    kept: Path | None = None
+    scheduler: str | None = None
+
+
+@dataclass(frozen=True)
 class Cell:
     """The runs of one sample at one nominal pressure."""
 

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Transform
 
-from tribo.figures import select, style
+from tribo.comparison import study_lookup
+from tribo.figures import style
 from tribo.records import REGIMES, LawFit, Regime, Study
 
 COLUMNS = ["regime", "parameter", "mark", "sample_number", "sample", "area_fraction", "value", "value_u"]
@@ -21,14 +22,14 @@ COLOURS = {"measured": style.VERMILLION, "simulated": style.GREEN, "AF predictio
 
 def numbers(study: Study) -> pd.DataFrame:
     """mu and tau0 (kPa) of every sample with standard uncertainties, their line in AF, the AF prediction."""
-    order = select.sample_numbers(study)
+    order = study_lookup.sample_numbers(study)
     simulated = study.comparison.simulated if study.comparison is not None else ()
     frames = []
     for regime in REGIMES:
         for parameter in PARAMETERS:
             measured = _points(study, study.fits, regime, parameter, "measured", order)
             model = _points(study, simulated, regime, parameter, "simulated", order)
-            flat = select.fit_of(study.fits, select.flat_sample(study), regime)
+            flat = study_lookup.fit_of(study.fits, study_lookup.flat_sample(study), regime)
             frames += [measured, model, _line(measured), _prediction(flat, measured, parameter)]
             frames[-2:] = [f.assign(regime=regime, parameter=parameter) for f in frames[-2:]]
     filled = [f for f in frames if not f.empty]

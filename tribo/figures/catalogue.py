@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tribo.comparison import agreement
 from tribo.figures import (
-    agreement,
     area,
     detectable,
     evidence,
     extended,
     force,
+    measured_over_simulated,
     misfit,
     normalised_pulls,
     published_table,
@@ -21,7 +22,7 @@ from tribo.figures import (
 from tribo.figures.record import FigureOf, StudyFigure
 
 if TYPE_CHECKING:
-    from tribo.diagnose.from_table.table_diagnosis import PublishedDiagnosis
+    from tribo.diagnose.from_table.published_diagnosis import PublishedDiagnosis
     from tribo.figures.record import DiagnosisFigure
 
 FIGURES: dict[str, StudyFigure] = {
@@ -33,8 +34,8 @@ FIGURES: dict[str, StudyFigure] = {
             "Ratio of the measured to the simulated friction force at each normal load, with its 95 % "
             "interval. At a ratio of 1 the model is exact; below 1 it predicts too much friction. The model "
             "was calibrated on the flat sample, so agreement there does not test the model.",
-            agreement.numbers,
-            agreement.draw,
+            agreement.ratios,
+            measured_over_simulated.draw,
         ),
         StudyFigure(
             "fig3",

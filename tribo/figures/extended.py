@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from tribo.figures import select, style
+from tribo.comparison import study_lookup
+from tribo.figures import style
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
@@ -43,10 +44,13 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     residuals = {"before": f.residual, "after": d.named.model.residual}
     if d.simulated is not None:
         residuals["simulated"] = o.log_force - d.simulated.log_force
-    levels = select.load_levels(o.conditions.normal_load_N)
+    levels = study_lookup.load_levels(o.conditions.normal_load_N)
     samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
     rows = [
-        _row(number, sample, regime, load, model, residual[:, k], here & (levels == load), here)
+        {
+            "sample_number": number, "sample": sample, "regime": regime, "normal_load_N": float(load), "model": model,
+            **_spread(residual[here & (levels == load), k], residual[here, k]),
+        }
         for k, regime in enumerate(REGIMES)
         for number, sample in enumerate(samples)
         for here in [o.conditions.sample == sample]
@@ -56,17 +60,14 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _row(
-    number: int, sample: str, regime: str, load: float, model: str, residual: np.ndarray, cell: np.ndarray,
-    panel: np.ndarray,
-) -> dict[str, Any]:  # fmt: skip
-    values = 100.0 * residual[cell]
+def _spread(at_load: np.ndarray, panel: np.ndarray) -> dict[str, Any]:
+    """Mean of the residuals at a load with twice its standard error, and the root mean square of those of a panel."""
+    values = 100.0 * at_load
     values = values[np.isfinite(values)]
     mean = float(values.mean()) if len(values) else float("nan")
     error = float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
-    whole = 100.0 * residual[panel]
+    whole = 100.0 * panel
     return {
-        "sample_number": number, "sample": sample, "regime": regime, "normal_load_N": float(load), "model": model,
         "residual_percent": mean, "low_percent": mean - 2 * error, "high_percent": mean + 2 * error,
         "rms_percent": float(np.sqrt(np.nanmean(whole**2))), "n_tests": len(values),
     }  # fmt: skip

@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from tribo.figures import select, style
+from tribo.comparison import study_lookup
+from tribo.figures import style
 from tribo.records import FloatArray, LawFit, Regime, Study
 
 COLUMNS = [
@@ -41,7 +42,7 @@ def numbers(regime: Regime) -> Callable[[Study], pd.DataFrame]:
                 regime=regime,
                 area_fraction=_area_fraction(study, sample),
             )
-            for sample, number in select.sample_numbers(study).items()
+            for sample, number in study_lookup.sample_numbers(study).items()
         ]
         return pd.concat(frames, ignore_index=True).reindex(columns=COLUMNS)
 
@@ -61,9 +62,9 @@ def _one_sample(study: Study, sample: str, regime: Regime, pulls: pd.DataFrame) 
         return points
     line = np.linspace(0.0, 1.05 * loads.max(), LINE_POINTS)
     simulated = study.comparison.simulated if study.comparison is not None else ()
-    frames = [points, *_fit_line("fit", select.fit_of(study.fits, sample, regime), line, band=True)]
-    frames += _fit_line("simulated", select.fit_of(simulated, sample, regime), line)
-    flat = select.fit_of(study.fits, select.flat_sample(study), regime)
+    frames = [points, *_fit_line("fit", study_lookup.fit_of(study.fits, sample, regime), line, band=True)]
+    frames += _fit_line("simulated", study_lookup.fit_of(simulated, sample, regime), line)
+    flat = study_lookup.fit_of(study.fits, study_lookup.flat_sample(study), regime)
     if flat is not None:
         forces = flat.force_N(line) * _area_fraction(study, sample)
         frames.append(pd.DataFrame({"mark": "AF prediction", "normal_load_N": line, "T_N": forces}))

@@ -51,9 +51,7 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     return pd.DataFrame([*(cell for part in rows for cell in part), *_trace_cells(d, columns)], columns=COLUMNS)
 
 
-def _cells(
-    d: Diagnosis, columns: list[Covariate], observable: str, residual: FloatArray
-) -> list[dict[str, Any]]:
+def _cells(d: Diagnosis, columns: list[Covariate], observable: str, residual: FloatArray) -> list[dict[str, Any]]:
     f, flat = d.baseline, d.baseline.setup.observations.flat
     sample = f.setup.observations.conditions.sample
     samples = sorted(set(sample.tolist()), key=lambda s: (s != flat, s))
@@ -113,9 +111,7 @@ def _strengths(f: ModelFit, shapes: FloatArray, observable: str) -> FloatArray:
     return np.asarray(left.T @ target / np.maximum(length, 1e-9))
 
 
-def _cell(
-    observable: str, row: str, column: Covariate, effect: float, strength: float, p: float
-) -> dict[str, Any]:
+def _cell(observable: str, row: str, column: Covariate, effect: float, strength: float, p: float) -> dict[str, Any]:
     mark = next((mark for level, mark in MARKS if p < level), "")
     return {
         "observable": observable, "row": row, "covariate": column.name, "label": column.label,

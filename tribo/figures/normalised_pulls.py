@@ -8,7 +8,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from tribo.figures import select, style
+from tribo.comparison import study_lookup
+from tribo.figures import style
+from tribo.figures.thinning import thin_trace
 from tribo.records import Pull, Study, Test, Trace
 
 COLUMNS = ["sample_number", "sample", "test_id", "normal_load_N", "mark", "time_s", "T_over_peak"]
@@ -32,7 +34,7 @@ def example_tests(study: Study) -> dict[str, Test]:
 
 
 def _typical(tests: list[Test], study: Study) -> Test:
-    levels = select.load_levels(np.array([t.normal_load_N for t in tests]))
+    levels = study_lookup.load_levels(np.array([t.normal_load_N for t in tests]))
     distinct = np.unique(levels)
     middle = distinct[len(distinct) // 2]
     pulls = study.ingested.pulls
@@ -46,7 +48,7 @@ def _typical(tests: list[Test], study: Study) -> Test:
 
 def numbers(study: Study) -> pd.DataFrame:
     """Force over static peak against time (s, as recorded) of the example pulls, with peak and window."""
-    order = select.sample_numbers(study)
+    order = study_lookup.sample_numbers(study)
     examples = sorted(example_tests(study).items(), key=lambda item: order[item[0]])
     frames = [
         _one_pull(order[sample], test, study.ingested.traces[test.test_id], study.ingested.pulls[test.test_id])
@@ -56,7 +58,7 @@ def numbers(study: Study) -> pd.DataFrame:
 
 
 def _one_pull(number: int, test: Test, trace: Trace, pull: Pull) -> pd.DataFrame:
-    time, force = select.thin_trace(trace.time_s, trace.force_N - pull.zero_N)
+    time, force = thin_trace(trace.time_s, trace.force_N - pull.zero_N)
     sliding = pull.sliding_N / pull.static_N
     marks = [("trace", t, f) for t, f in zip(time, force / pull.static_N, strict=True)]
     marks += [

@@ -16,7 +16,7 @@ from tribo.figures import style
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
-    from tribo.diagnose.from_table.table_diagnosis import PublishedDiagnosis
+    from tribo.diagnose.from_table.published_diagnosis import PublishedDiagnosis
     from tribo.diagnose.from_table.table_outlook import Outlook
 
 RATIO_COLUMNS = [

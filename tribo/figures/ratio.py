@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from tribo.figures import select, style
+from tribo.comparison import study_lookup
+from tribo.figures import style
 from tribo.records import REGIMES, Regime, Study
 
 COLUMNS = [
@@ -31,10 +32,10 @@ def numbers(study: Study) -> pd.DataFrame:
     if table.empty:
         return pd.DataFrame(columns=COLUMNS)
     frames = []
-    for sample, number in select.sample_numbers(study).items():
+    for sample, number in study_lookup.sample_numbers(study).items():
         pulls = table[table["sample"] == sample]
         pattern = study.ingested.campaign.samples.get(sample)
-        group = "anisotropic" if pattern is not None and select.is_anisotropic(pattern) else "isotropic"
+        group = "anisotropic" if pattern is not None and study_lookup.is_anisotropic(pattern) else "isotropic"
         for regime in REGIMES:
             points = _means(pulls, regime, study.ingested.campaign.nominal_area_m2)
             part = pd.concat([points, _curve(study, sample, regime, points)], ignore_index=True)
@@ -44,7 +45,7 @@ def numbers(study: Study) -> pd.DataFrame:
 
 def _means(pulls: pd.DataFrame, regime: Regime, area_m2: float) -> pd.DataFrame:
     pulls = pulls[np.isfinite(pulls[f"{regime}_N"])]
-    level_N = select.load_levels(pulls["normal_load_N"].to_numpy(float))
+    level_N = study_lookup.load_levels(pulls["normal_load_N"].to_numpy(float))
     ratio = pulls[f"{regime}_N"] / pulls["normal_load_N"]
     cells = ratio.groupby(level_N / area_m2 / 1e3).agg(["mean", "sem", "count"])
     cells = cells.rename_axis("pressure_kPa").reset_index()
@@ -53,7 +54,7 @@ def _means(pulls: pd.DataFrame, regime: Regime, area_m2: float) -> pd.DataFrame:
 
 
 def _curve(study: Study, sample: str, regime: Regime, points: pd.DataFrame) -> pd.DataFrame:
-    fit = select.fit_of(study.fits, sample, regime)
+    fit = study_lookup.fit_of(study.fits, sample, regime)
     if fit is None or points.empty:
         return pd.DataFrame(columns=points.columns)
     p_kPa = np.geomspace(0.9 * points["pressure_kPa"].min(), 1.05 * points["pressure_kPa"].max(), CURVE_POINTS)

@@ -152,7 +152,7 @@ def _summaries(
 
 def _variance(d: Diagnosis, weight: FloatArray) -> FloatArray:
     """Variance of one test's residual by the fitted noise: repeats, reading, specimens, error of the sample."""
-    from tribo.diagnose.statistics.noise import prior_precision
+    from tribo.diagnose.statistics.scatter import prior_precision
 
     f = d.baseline
     repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup), weight)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import pandas as pd
 from matplotlib.figure import Figure
 
-from tribo.figures import select, style
+from tribo.comparison import study_lookup
+from tribo.figures import style
+from tribo.figures.thinning import thin_trace
 from tribo.records import Run, Study
 
 COLUMNS = ["sample_number", "sample", "pressure_kPa", "angle_deg", "seed", "mark", "time_ms", "T_over_N"]
@@ -13,7 +15,7 @@ COLUMNS = ["sample_number", "sample", "pressure_kPa", "angle_deg", "seed", "mark
 
 def numbers(study: Study) -> pd.DataFrame:
     """T/N against time (ms) of the example runs, thinned for the page, with peak and sliding window."""
-    order = select.sample_numbers(study)
+    order = study_lookup.sample_numbers(study)
     first_runs = {run.sample: run for run in reversed(study.example_runs)}
     known = sorted(first_runs, key=lambda s: order.get(s, len(order)))
     frames = [_one_run(order.get(s, len(order) + k), first_runs[s]) for k, s in enumerate(known)]
@@ -21,7 +23,7 @@ def numbers(study: Study) -> pd.DataFrame:
 
 
 def _one_run(number: int, run: Run) -> pd.DataFrame:
-    time_s, ratio = select.thin_trace(run.time_s, run.force_N / run.normal_load_N)
+    time_s, ratio = thin_trace(run.time_s, run.force_N / run.normal_load_N)
     marks = [("trace", t * 1e3, f) for t, f in zip(time_s, ratio, strict=True)]
     marks.append(("peak", run.peak_s * 1e3, run.static_friction))
     marks += [("window", t * 1e3, run.sliding_friction) for t in run.window_s]

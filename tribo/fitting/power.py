@@ -33,6 +33,17 @@ MOST_REPEATS = 50
 
 
 @dataclass(frozen=True)
+class TwoSidedTest:
+    """A two-sided t test: its level, and the probability with which a difference is to be found."""
+
+    level: float = 0.05
+    power: float = 0.8
+
+
+TEST = TwoSidedTest()
+
+
+@dataclass(frozen=True)
 class Power:
     """Power of one campaign for one number ("mu", "tau0_kPa", "T_N" at ``pressure_Pa``) in one regime.
 
@@ -86,11 +97,12 @@ def power_of_campaign(
     *,
     weights: str = "relative",
     wanted_pct: float = 10.0,
-    level: float = 0.05,
-    power: float = 0.8,
+    test: TwoSidedTest = TEST,
     pressure_Pa: float = PRESSURE_PA,
 ) -> tuple[Power, ...]:
     """Power for mu, tau0 and T at ``pressure_Pa`` of the campaign in ``table`` (as for ``fit_samples``).
+
+    A difference counts as found where the two-sided t ``test`` finds it; ``wanted_pct`` is the one to plan for.
 
     Raises
     ------
@@ -112,14 +124,14 @@ def power_of_campaign(
     powers = []
     for number in NUMBERS:
         scatter = _pooled(fits, within, number, pressure_Pa, repeats)
-        smallest = smallest_difference(scatter.specimen_mean_sd(repeats), specimens, level, power)
+        smallest = smallest_difference(scatter.specimen_mean_sd(repeats), specimens, test.level, test.power)
         powers.append(
             Power(
                 regime, number, scatter.reference, specimens, repeats,
                 100 * scatter.specimen_sd, 100 * scatter.repeat_sd, 100 * smallest, wanted_pct,
-                _specimens_needed(scatter, repeats, wanted_pct / 100, level, power),
-                _repeats_needed(scatter, specimens, wanted_pct / 100, level, power),
-                level, power, pressure_Pa,
+                _specimens_needed(scatter, repeats, wanted_pct / 100, test),
+                _repeats_needed(scatter, specimens, wanted_pct / 100, test),
+                test.level, test.power, pressure_Pa,
             )
         )  # fmt: skip
     return tuple(powers)
@@ -195,14 +207,14 @@ def _pooled(
     return _Scatter(reference, float(np.sqrt(max(total - repeat / repeats, 0.0))), float(np.sqrt(repeat)))
 
 
-def _specimens_needed(scatter: _Scatter, repeats: float, wanted: float, level: float, power: float) -> int | None:
+def _specimens_needed(scatter: _Scatter, repeats: float, wanted: float, test: TwoSidedTest) -> int | None:
     sd = scatter.specimen_mean_sd(repeats)
-    return _fewest(lambda g: smallest_difference(sd, g, level, power) <= wanted, range(2, MOST_SPECIMENS + 1))
+    return _fewest(lambda g: smallest_difference(sd, g, test.level, test.power) <= wanted, range(2, MOST_SPECIMENS + 1))
 
 
-def _repeats_needed(scatter: _Scatter, specimens: float, wanted: float, level: float, power: float) -> int | None:
+def _repeats_needed(scatter: _Scatter, specimens: float, wanted: float, test: TwoSidedTest) -> int | None:
     def enough(repeats: int) -> bool:
-        return smallest_difference(scatter.specimen_mean_sd(repeats), specimens, level, power) <= wanted
+        return smallest_difference(scatter.specimen_mean_sd(repeats), specimens, test.level, test.power) <= wanted
 
     return _fewest(enough, range(1, MOST_REPEATS + 1))
 

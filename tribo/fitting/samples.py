@@ -19,7 +19,7 @@ from tribo.fitting.linear import LinearFit, least_squares
 from tribo.fitting.rows import Rows, sample_rows
 from tribo.fitting.weighting import WEIGHTS, weights_of
 from tribo.laws.table import LAWS
-from tribo.records import FloatArray, LawFit, Regime
+from tribo.records import REGIMES, FloatArray, LawFit, Regime
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -197,3 +197,25 @@ def lack_of_fit(rows: Rows, weight: FloatArray, lines: dict[str, LinearFit]) -> 
         return ratio, ()
     note = f"the load means deviate from a straight line: chi2_red {ratio:.2f}, p = {p:.1g}"
     return ratio, (note,)
+
+
+def fit_regimes(table: pd.DataFrame, nominal_area_m2: float, *, weights: str = "relative") -> tuple[LawFit, ...]:
+    """The fits of :func:`fit_samples` to static and to sliding friction; a regime that no pull shows has none.
+
+    Raises
+    ------
+    FitError
+        No sample has enough loads for the law.
+    """
+    found: list[LawFit] = []
+    problems: list[Problem] = []
+    for regime in REGIMES:
+        try:
+            found += fit_samples(table, regime, nominal_area_m2, weights=weights)
+        except FitError as why:
+            if np.isfinite(table[f"{regime}_N"]).any():
+                raise
+            problems += why.problems  # a log of steps while sliding has no static peaks, and a law all the same
+    if not found:
+        raise FitError(problems)
+    return tuple(found)

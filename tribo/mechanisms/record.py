@@ -19,7 +19,7 @@ from tribo.mechanisms.conditions import (
     StringArray,
     Values,
 )
-from tribo.mechanisms.evidence import DirectMeasurement, TraceEvidence, Variation
+from tribo.mechanisms.direct_estimates import DirectMeasurement, TraceEvidence, Variation
 from tribo.mechanisms.in_table import WEIGHED, BenchTest, InTable, Readings
 from tribo.mechanisms.placement import BY_LAW, Contact, Placement
 from tribo.records import FloatArray

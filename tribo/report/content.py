@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tribo import __version__
-from tribo.figures import select
+from tribo.comparison import findings, study_lookup
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
 from tribo.records import REGIMES, Regime, Study
 from tribo.report.html.pull_cards import pull_cards
@@ -17,7 +17,7 @@ from tribo.report.result_tables import all_set_aside
 from tribo.report.tribosystem import conditions
 from tribo.report.uncertainty import budget_origins, budget_tables, paired_sentences
 from tribo.report.verdict_file import verdict_in_words
-from tribo.report.words import findings, wording
+from tribo.report.words import wording
 from tribo.report.words.terminal_text import fit_cells
 
 LEAD_FIGURE = "agreement"
@@ -90,7 +90,7 @@ def _summary(study: Study) -> dict[str, Any]:
     return {
         "measured": wording.what_was_measured(study),
         "flat": wording.flat_law(study),
-        "model": wording.in_short(agreements, select.flat_sample(study)),
+        "model": wording.in_short(agreements, study_lookup.flat_sample(study)),
         "order": [wording.ranking_sentence(r) for r in findings.rankings(study)],
         "directions": wording.direction_sentences(findings.direction_ratios(study)),
         "correlation": wording.correlation_note(study),
@@ -104,10 +104,10 @@ def _table2(study: Study) -> dict[str, Any]:
     regimes = []
     for regime in REGIMES:
         rows = []
-        for sample in select.sample_numbers(study):
-            fit = select.fit_of(study.fits, sample, regime)
+        for sample in study_lookup.sample_numbers(study):
+            fit = study_lookup.fit_of(study.fits, sample, regime)
             if fit is not None:
-                model = fit_cells(select.fit_of(simulated, sample, regime), load)
+                model = fit_cells(study_lookup.fit_of(simulated, sample, regime), load)
                 area_fraction = study.ingested.campaign.area_fraction(sample)
                 rows.append((sample, area_fraction, fit_cells(fit, load), model, fit))
         regimes.append((regime, rows))
@@ -129,7 +129,7 @@ def _agreement_table(agreements: list[findings.Agreement], regime: Regime) -> di
     if not part:
         return {}
     every_load = np.array([load.normal_load_N for a in part for load in a.loads])
-    levels = select.load_levels(every_load)
+    levels = study_lookup.load_levels(every_load)
     level_of = dict(zip(every_load.tolist(), levels.tolist(), strict=True))
     columns = sorted(set(levels.tolist()))
     rows = [

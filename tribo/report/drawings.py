@@ -46,6 +46,21 @@ def make_anew(name: str, made_from: object, make: Callable[[], Any], rooms: Iter
 
 
 @dataclass(frozen=True)
+class Drawing:
+    """How figures are drawn: where the progress is reported, and in how many processes they are drawn.
+
+    ``keep`` (:meth:`tribo.store.kept_results.Shelf.take`) avoids redrawing a figure whose numbers have not changed.
+    """
+
+    progress: Progress | None = None
+    jobs: int = 1
+    keep: Keep = make_anew
+
+
+DRAWING = Drawing()
+
+
+@dataclass(frozen=True)
 class Drawn:
     """A figure as drawn: its words, its files by ending, and the positions of its points for hovering."""
 
@@ -63,18 +78,15 @@ class Drawn:
 def write_figures(
     study: Study | None,
     out: Path,
-    progress: Progress | None = None,
     diagnosis: Diagnosis | None = None,
     origin: str = "",
-    jobs: int = 1,
-    keep: Keep = make_anew,
+    drawing: Drawing = DRAWING,
 ) -> dict[str, Drawn]:
     """Write out/figures/NAME.svg, .pdf, .png and .csv of every figure there are numbers for, and return them.
 
-    ``origin`` is written to the metadata of every file and states its source; ``jobs`` processes share the drawing;
-    ``keep`` (:meth:`tribo.store.kept_results.Shelf.take`) avoids redrawing a figure whose numbers have not changed.
+    ``origin`` is written to the metadata of every file and states its source.
     """
-    drawn = draw_all(study, diagnosis, origin, progress, jobs, keep)
+    drawn = draw_all(study, diagnosis, origin, drawing)
     for figure in drawn.values():
         for ending, content in figure.files.items():
             write_bytes(out / "figures" / f"{figure.name}.{ending}", content)
@@ -85,19 +97,17 @@ def draw_all(
     study: Study | None,
     diagnosis: Diagnosis | None = None,
     origin: str = "",
-    progress: Progress | None = None,
-    jobs: int = 1,
-    keep: Keep = make_anew,
+    drawing: Drawing = DRAWING,
 ) -> dict[str, Drawn]:
     """Every figure there are numbers for, by name, those of the study before those of the diagnosis; no files."""
     todo = list(_with_numbers(study, diagnosis))
     found = {}
-    for done, figure in enumerate(each(partial(_draw, origin, keep), todo, jobs), start=1):
+    for done, figure in enumerate(each(partial(_draw, origin, drawing.keep), todo, drawing.jobs), start=1):
         # not in the other processes: typst keeps threads of its own, which do not survive a fork
         rest = figure_files(figure.files["svg"], figure.title, origin)
         found[figure.name] = replace(figure, files={**figure.files, **rest})
-        if progress is not None:
-            progress(STAGE, done, len(todo))
+        if drawing.progress is not None:
+            drawing.progress(STAGE, done, len(todo))
     return found
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from tribo.figures import select
+from tribo.comparison import study_lookup
 from tribo.records import REGIMES, Regime, Study
 
 ODD_SCORE = 3.5  # modified z-score of Iglewicz and Hoaglin (1993)
@@ -58,7 +58,7 @@ def oddness(standing: OddPull | None, flags: Collection[str]) -> float:
 
 def _judged_in(table: pd.DataFrame, regime: Regime) -> list[OddPull]:
     table = table[table[f"{regime}_N"] > 0]
-    level_N = select.load_levels(table["normal_load_N"].to_numpy(float))
+    level_N = study_lookup.load_levels(table["normal_load_N"].to_numpy(float))
     log_force = np.log(table[f"{regime}_N"])
     cells = log_force.groupby([table["sample"], level_N])
     siblings = cells.transform("size") - 1

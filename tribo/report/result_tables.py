@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tribo.figures import agreement
+from tribo.comparison.agreement import ratios
 from tribo.records import LawFit, Pull, SetAside, Study, Test
 from tribo.store.whole_files import write_text
 
@@ -147,8 +147,8 @@ def comparison_table(study: Study) -> pd.DataFrame:
     if study.comparison is None:
         return pd.DataFrame(columns=COMPARISON_COLUMNS)
     rows = pd.DataFrame([vars(row) for row in study.comparison.rows], columns=COMPARISON_COLUMNS[:7])
-    ratios = agreement.numbers(study).drop(columns="sample_number")
-    return rows.merge(ratios, on=["sample", "regime", "normal_load_N"], how="left", validate="1:1")
+    beside = ratios(study).drop(columns="sample_number")
+    return rows.merge(beside, on=["sample", "regime", "normal_load_N"], how="left", validate="1:1")
 
 
 def to_csv(table: pd.DataFrame) -> str:

@@ -14,7 +14,7 @@ from tribo.report.verdict_file import write_verdict
 from tribo.store.whole_files import write_bytes
 
 if TYPE_CHECKING:
-    from tribo.diagnose.from_table.table_diagnosis import PublishedDiagnosis
+    from tribo.diagnose.from_table.published_diagnosis import PublishedDiagnosis
 
 
 def write_published(d: PublishedDiagnosis, out: Path, provenance: Provenance) -> None:

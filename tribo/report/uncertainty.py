@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from tribo.figures import select
+from tribo.comparison import study_lookup
 from tribo.records import REGIMES, Regime, Study
 from tribo.report.result_tables import PA_PER_KPA
 from tribo.report.words.numerals import joined, significant
@@ -29,7 +29,7 @@ def budget_tables(study: Study) -> list[BudgetTable]:
     """The budget of T in both regimes, components that never matter (below half a percent everywhere) left out."""
     if study.budget is None or study.budget.empty:
         return []
-    order = select.sample_numbers(study)
+    order = study_lookup.sample_numbers(study)
     parts = [(r, study.budget[study.budget["regime"] == r]) for r in REGIMES]
     return [_budget_table(regime, part, list(order)) for regime, part in parts if not part.empty]
 

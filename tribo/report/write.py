@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
 from tribo.records import Study
 from tribo.report.campaign_nc import write_store
-from tribo.report.drawings import Keep, make_anew, write_figures
+from tribo.report.drawings import DRAWING, Drawing, Progress, write_figures
 from tribo.report.provenance import (
     Provenance,
     gather_provenance,
@@ -24,47 +23,42 @@ from tribo.store.whole_files import write_bytes, write_text
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
 
-Progress = Callable[[str, int, int], None]
-Until = Literal["ingest", "fit", "compare", "report"]
-
 
 def write_until(
     study: Study,
     out: Path,
     until: str = "report",
-    progress: Progress | None = None,
+    drawing: Drawing = DRAWING,
     provenance: Provenance | None = None,
-    verdict: Mapping[str, Any] | None = None,
     diagnosis: Diagnosis | None = None,
-    jobs: int = 1,
-    keep: Keep = make_anew,
 ) -> None:
     """Write the results of all stages up to ``until`` (ingest, fit, compare or report).
 
     Tables and campaign.nc always, as far as the study went; verdict.json and its figures where there is a
-    ``verdict`` or the whole ``diagnosis`` of it; the figures of the study from ``compare`` on; then page, PDF and
-    crate. ``keep`` avoids redrawing kept figures. Every file is whole or absent: it is written under a temporary
-    name and renamed. Last comes provenance.json with the hash of each; files of an earlier run that are no longer valid
-    are removed.
+    ``diagnosis``; the figures of the study from ``compare`` on; then page, PDF and crate. Every file is whole or
+    absent: it is written under a temporary name and renamed. Last comes provenance.json with the hash of each; files of
+    an earlier run that are no longer valid are removed.
     """
     before = read_record(out)
     made_by = provenance if provenance is not None else gather_provenance(study)
-    verdict = diagnosis.verdict.as_dict() if diagnosis is not None else verdict
+    verdict = diagnosis.verdict.as_dict() if diagnosis is not None else None
     keep_earlier = before is not None and until != "report" and same_origin(before, made_by)
     written = [*write_tables(study, out), write_store(study, out, made_by, diagnosis, keep_earlier)]
     if verdict is not None:
         written.append(write_verdict(verdict, out))
     if until in ("compare", "report") or diagnosis is not None:
         shown = study if until in ("compare", "report") else None
-        drawn = write_figures(shown, out, progress, diagnosis, made_by.origin, jobs, keep)
+        drawn = write_figures(shown, out, diagnosis, made_by.origin, drawing)
         written += [out / "figures" / f"{f.name}.{ending}" for f in drawn.values() for ending in f.files]
     if until == "report":
+        from tribo.report.content import content
         from tribo.report.crate import write_crate
-        from tribo.report.html.page import html
-        from tribo.report.paper.pdf import pdf
+        from tribo.report.html.page import page_of
+        from tribo.report.paper.pdf import pdf_of
 
-        written.append(write_text(out / "report.html", html(study, made_by, drawn, verdict)))
-        written.append(write_bytes(out / "report.pdf", pdf(study, made_by, drawn, verdict)))
+        said = content(study, made_by, verdict)
+        written.append(write_text(out / "report.html", page_of(said, drawn)))
+        written.append(write_bytes(out / "report.pdf", pdf_of(said, drawn, made_by.origin)))
         written.append(write_crate(study, out, made_by, written))
     write_provenance(made_by, out, settle_outputs(out, before, made_by, written, complete=until == "report"))
 
@@ -74,10 +68,8 @@ def write_report(
     out: Path | str,
     progress: Progress | None = None,
     provenance: Provenance | None = None,
-    verdict: Mapping[str, Any] | None = None,
     diagnosis: Diagnosis | None = None,
     jobs: int = 1,
-    keep: Keep = make_anew,
 ) -> None:
-    """Write all of OUT: tables, campaign.nc, figures, verdict.json where there is a verdict, page, PDF and crate."""
-    write_until(study, Path(out), "report", progress, provenance, verdict, diagnosis, jobs, keep)
+    """All of OUT: tables, campaign.nc, figures, verdict.json where there is a diagnosis, page, PDF and crate."""
+    write_until(study, Path(out), "report", Drawing(progress, jobs), provenance, diagnosis)

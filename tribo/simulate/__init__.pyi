@@ -1,4 +1,4 @@
-from .calibration import calibrate as calibrate
+from .calibration import CalibrationRuns as CalibrationRuns, calibrate as calibrate
 from .config import (
     PAPER as PAPER,
     FrictionTerms as FrictionTerms,
@@ -14,4 +14,4 @@ from .masks import PAPER_PATTERNS as PAPER_PATTERNS, contact_mask as contact_mas
 from .results_file import write_ensemble as write_ensemble, write_run as write_run
 from .resume import read_stored as read_stored, run_stored as run_stored
 from .run import simulate as simulate
-from .table2_column import table2 as table2
+from .table2_column import table2 as table2, table2_design as table2_design

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -41,14 +41,27 @@ def static_calibration(law: Law, blocks: int, spread: float = PAPER.mu_s_sd / PA
     return mean, spread * mean, tau0_Pa
 
 
+@dataclass(frozen=True)
+class CalibrationRuns:
+    """The runs that a calibration compares with the measured sliding law, ``iterations`` times over.
+
+    ``repeats`` runs at each of ``pressures_Pa``, which should cover the range of the measurement.
+    """
+
+    pressures_Pa: Sequence[float] = (3e3, 10e3, 25e3)
+    repeats: int = 3
+    iterations: int = 3
+    seed: int = 0
+
+
+CALIBRATION_RUNS = CalibrationRuns()
+
+
 def calibrate(
     static: Law,
     sliding: Law,
     base: SimConfig | None = None,
-    pressures_Pa: Sequence[float] = (3e3, 10e3, 25e3),
-    repeats: int = 3,
-    iterations: int = 3,
-    seed: int = 0,
+    runs: CalibrationRuns = CALIBRATION_RUNS,
     jobs: int = 2,
     progress: Progress | None = None,
 ) -> LocalFriction:
@@ -61,7 +74,7 @@ def calibrate(
     Parameters
     ----------
     base : configuration of the runs (blocks, time step, window); its sample and friction are replaced
-    pressures_Pa : where the sliding law is matched; give the range of the measurement
+    runs : pressures, repeats and seed of the runs that the sliding law is matched on
     """
     base = (base or SimConfig()).with_(sample="F", pattern=None)
     mean, sd, adhesion = static_calibration(static, base.blocks[0] * base.blocks[1])
@@ -72,9 +85,11 @@ def calibrate(
         mu_d = max(float(local[0]), 0.0)
         return LocalFriction(mean, sd, mu_d, ratio * mu_d, adhesion, float(local[1]))
 
-    for turn in range(iterations):
-        design = stratified_design(["F"], pressures_Pa, repeats, seed, replace(base, friction=friction()))
-        total = iterations * len(design)
+    for turn in range(runs.iterations):
+        design = stratified_design(
+            ["F"], runs.pressures_Pa, runs.repeats, runs.seed, replace(base, friction=friction())
+        )
+        total = runs.iterations * len(design)
         done_before = turn * len(design)
 
         def report(done: int, _: int, before: int = done_before, total: int = total) -> None:

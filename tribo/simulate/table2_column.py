@@ -22,7 +22,6 @@ PRESSURES_PA = (3e3, 5e3, 8e3, 11e3, 14e3, 17.5e3, 21e3, 25e3)
 """Eight pressures over the range of the paper, which does not list its own."""
 
 
-
 def table2_design(
     base: SimConfig | None = None,
     repeats: int = 20,
@@ -36,25 +35,20 @@ def table2_design(
 
 
 def table2(
-    base: SimConfig | None = None,
-    repeats: int = 20,
-    pressures_Pa: Sequence[float] = PRESSURES_PA,
-    samples: Sequence[str] = SAMPLES,
+    design: Sequence[SimConfig] | None = None,
     weights: str = "ratio",
-    seed: int = 0,
+    published: pd.DataFrame | None = None,
+    *,
     jobs: int = 2,
     path: str | Path | None = None,
     scheduler: str | None = None,
-    published: pd.DataFrame | None = None,
     progress: Progress | None = None,
-    angles: Angles = "midpoints",
 ) -> pd.DataFrame:
     """mu and tau0 of the simulated samples, static and sliding, as in Berardo 2019, Table 2.
 
     Parameters
     ----------
-    base : everything the design does not vary; the paper's parameters by default
-    repeats, pressures_Pa, samples : 20 runs at each of 8 pressures for 6 samples, 960 in all, by default
+    design : the runs, those of :func:`table2_design` by default
     weights : as for :func:`tribo.simulate.calibration.simulated_law`
     path, scheduler : as for :func:`tribo.simulate.resume.run_stored`; without a path nothing is kept
     published : the published table (columns sample, regime, source, mu, tau0_kPa); adds the deviations
@@ -64,7 +58,7 @@ def table2(
     DataFrame with sample, regime, mu, mu_se, tau0_kPa, tau0_kPa_se and, with ``published``, mu_paper,
     tau0_kPa_paper, mu_deviation_percent, tau0_deviation_percent.
     """
-    design = table2_design(base, repeats, pressures_Pa, samples, seed, angles)
+    design = table2_design() if design is None else list(design)
     runs = run_stored(design, path, jobs, scheduler, progress) if path else run_ensemble(design, jobs, progress)
     table = fitted(runs, weights)
     return table if published is None else beside(table, published)

@@ -106,20 +106,26 @@ UNITS = {"area_fraction": "1", "peak_s": "s", **dict.fromkeys((*PEAK_DROPS, *WIN
 READINGS = Work(read=studied, units=UNITS)
 
 
-def run_study(
-    folder: str | Path,
+def study_designs(
     base: SimConfig | None = None,
     repeats: int = 4,
     pressures_Pa: Sequence[float] = STUDY_PRESSURES_PA,
     samples: Sequence[str] = SAMPLES,
     variants: Mapping[str, Variant] = VARIANTS,
+) -> dict[str, list[SimConfig]]:
+    """The runs of every variant, by its name."""
+    return {name: v.design(samples, pressures_Pa, repeats, base or SimConfig()) for name, v in variants.items()}
+
+
+def run_study(
+    folder: str | Path,
+    designs: Mapping[str, list[SimConfig]],
+    *,
     jobs: int = 2,
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> dict[str, pd.DataFrame]:
     """The runs of every variant with all readings, one store per variant in ``folder``; a stopped study continues."""
-    base = base or SimConfig()
-    designs = {name: v.design(samples, pressures_Pa, repeats, base) for name, v in variants.items()}
     total, before, tables = sum(map(len, designs.values())), 0, {}
     for k, (name, design) in enumerate(designs.items()):
 

@@ -1,4 +1,4 @@
-"""The apex of a static peak: shapes fitted in closed form, below the resolution of the samples."""
+"""The static peak of a pull: shapes fitted in closed form about its first maximum, finer than its samples."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tribo.records import FloatArray
-from tribo.traces.noise import mean
+from tribo.traces.loading import Climb
+from tribo.traces.noise import condense
 
 FEWEST_SAMPLES = 4
 _FEWEST_FOR_PARABOLA = 8
@@ -18,6 +19,9 @@ _MORE_FALL_TIMES = np.append(np.geomspace(0.1, 2.0, 24), math.inf)
 _MANY = 200  # samples from which on a fit tells the finer series apart
 _CLOSEST = 2  # samples on either side of a top that tell a parabola
 _FITS = 1.5  # misfit per degree of freedom up to which a parabola fits
+_MOST_PAIRS = 8  # pairs of neighbours between which an apex is looked for; else samples are averaged together first
+_MOST_SAMPLES = 200  # on either side of the apex
+_CLEARLY_ROUNDED = 0.6  # a rounded top is taken where its misfit is below this share of that of a sharp apex
 
 
 @dataclass(frozen=True)
@@ -48,6 +52,126 @@ class _Side:
     value: FloatArray
     variance: FloatArray
     misfit: FloatArray
+
+
+@dataclass(frozen=True)
+class Search:
+    """Samples in which an apex is looked for: the rise starts at ``start``, the apex lies between ``low`` and ``high``,
+    the fall ends at ``end``."""
+
+    start: int
+    low: int
+    high: int
+    end: int
+
+
+def find_apex(climb: Climb) -> Apex:
+    """The static peak of a pull: a sharp apex where the shape is one, else the top of a rounded one.
+
+    The apex is looked for where the loading line ends and, if that fits badly, at the first maximum.
+    """
+    held = slice(climb.end)
+    time_s, force, smooth = climb.signal.time_s[held], climb.signal.force_N[held], climb.signal.smooth_N[held]
+    depart, peak, noise = climb.depart, climb.top, climb.signal.noise_N
+    long = max(depart - climb.rise.first, 2 * FEWEST_SAMPLES)
+    length = fall_length(smooth, peak, climb.level_N, 2 * FEWEST_SAMPLES, max(long, 3 * FEWEST_SAMPLES))
+    low, high = min(depart, peak + 1) - climb.lag, min(depart, peak + 1) + 2
+    candidates = [_resolved(time_s, force, Search(max(low - long, 0), low, high, high + length), noise)]
+    if not (candidates[0] and candidates[0].fits) and not low <= peak < high:
+        around = Search(max(peak - long, 0), peak - 2, peak + 2, peak + length)
+        candidates.append(_resolved(time_s, force, around, noise))
+    sharp = min((a for a in candidates if a), key=lambda a: a.chi2_red, default=None)
+    half = max(length // 2, 2)
+    if sharp and sharp.fits:
+        return with_shape_left_open(sharp, time_s, force, peak, half, noise)
+    rounded = rounded_apex(time_s, force, peak, half, noise)
+    if sharp and rounded.chi2_red > _CLEARLY_ROUNDED * sharp.chi2_red:
+        return with_shape_left_open(sharp, time_s, force, peak, half, noise)
+    return rounded
+
+
+def near(climb: Climb, peak_s: float) -> Climb:
+    """The climb of a pull whose static peak a person saw: it is looked for within two samples of that time."""
+    time = climb.signal.time_s
+    top = min(max(int(np.searchsorted(time, peak_s)), FEWEST_SAMPLES), time.size - FEWEST_SAMPLES - 1)
+    return replace(climb, depart=top, lag=2, top=top, end=max(climb.end, top + FEWEST_SAMPLES))
+
+
+def fall_length(smooth: FloatArray, peak: int, level: float, shortest: int, longest: int) -> int:
+    """Samples after ``peak`` until 80 % of the way down to ``level`` is gone, within the given bounds."""
+    target = level + 0.2 * (smooth[peak] - level)
+    down = smooth[peak : peak + longest + 1] <= target
+    length = int(np.argmax(down)) if down.any() else longest
+    return max(min(length, longest, smooth.size - 1 - peak), min(shortest, smooth.size - 1 - peak))
+
+
+def _resolved(time_s: FloatArray, force: FloatArray, search: Search, noise: float) -> Apex | None:
+    """Sharp apex within the search: on averaged samples where there are many, then finer while that tells more."""
+    factor = _factor(search)
+    apex = _condensed(time_s, force, search, factor, noise)
+    while apex and factor > 1:
+        finer = _closer(time_s, apex, search, factor)
+        if _factor(finer) > factor // 2:
+            break
+        factor = _factor(finer)
+        closer = _condensed(time_s, force, finer, factor, noise)
+        if closer is None or closer.u_N > apex.u_N:
+            break
+        apex, search = closer, finer
+    return apex
+
+
+def _factor(search: Search) -> int:
+    """Samples to average so that the pairs searched and the samples fitted stay few."""
+    longest = max(search.low - search.start, search.end - search.high)
+    return max(1, math.ceil((search.high - search.low) / _MOST_PAIRS), longest // _MOST_SAMPLES)
+
+
+def _closer(time_s: FloatArray, apex: Apex, search: Search, factor: int) -> Search:
+    """The search narrowed to three standard uncertainties in time (a condensed sample at the least) about an apex."""
+    low, high = np.searchsorted(time_s, (apex.time_s - 3.0 * apex.time_u_s, apex.time_s + 3.0 * apex.time_u_s))
+    low, high = int(low) - factor, int(high) + factor
+    finest = max(1, (high - low) // _MOST_PAIRS)
+    return Search(
+        max(search.start, low - _MOST_SAMPLES * finest // 2),
+        low,
+        high,
+        min(search.end, high + _MOST_SAMPLES * finest // 2),
+    )
+
+
+def _condensed(time_s: FloatArray, force: FloatArray, search: Search, factor: int, noise: float) -> Apex | None:
+    """Sharp apex of the samples of a search, averaged by ``factor``."""
+    t = condense(time_s[search.start : search.end + 1], factor)
+    f = condense(force[search.start : search.end + 1], factor)
+    low = (search.low - search.start) // factor
+    high = (search.high - search.start) // factor + 1
+    noise = noise / math.sqrt(factor)
+    apex = sharp_apex(t, f, low, high, noise)
+    if apex is None or apex.fits or not (skipped := _smooth_from(t, f, low, noise)):
+        return apex
+    return sharp_apex(t[skipped:], f[skipped:], low - skipped, high - skipped, noise)
+
+
+def _smooth_from(t: FloatArray, f: FloatArray, end: int, noise: float) -> int:
+    """First sample of the longest stretch up to the apex that a parabola fits: all, half or a quarter of the rise."""
+    first = 0
+    for share in (1.0, 0.5, 0.25):
+        first = round(end * (1.0 - share))
+        if end - first <= _FEWEST_FOR_PARABOLA:
+            return max(min(first, end - FEWEST_SAMPLES), 0)
+        if _parabola_misfit(t[first:end], f[first:end]) < 2.0 * noise**2 * (end - first):
+            break
+    return first
+
+
+def _parabola_misfit(t: FloatArray, f: FloatArray) -> float:
+    """Sum of squared departures from the least-squares parabola."""
+    x = (t - t[0]) / (t[-1] - t[0])
+    basis = np.stack((np.ones_like(x), x, x * x))
+    c = np.linalg.solve(basis @ basis.T, basis @ f)
+    away = f - c @ basis
+    return float(away @ away)
 
 
 def sharp_apex(time_s: FloatArray, force: FloatArray, first: int, last: int, noise: float) -> Apex | None:
@@ -88,7 +212,7 @@ def _weigh(
         return None
     chi2_red = best / noise**2 / max(t.size - 6, 1)
     scale = noise**2 * max(chi2_red, 1.0)
-    possible = np.maximum(rise.value - mean(force[-3:]), noise)
+    possible = np.maximum(rise.value - float(force[-3:].mean()), noise)
     occam = np.minimum(np.sqrt(2.0 * math.pi * scale * both) / possible, 1.0)
     occam[-1] = 0.0  # without a fall there is no drop to begin it
     sudden = np.where(apart > 0, occam * np.exp((best - misfit) / (2.0 * scale)), 0.0).sum(axis=0)  # (J, S)
@@ -185,7 +309,7 @@ def _parabola_top(time_s: FloatArray, force: FloatArray, peak: int, half: int, n
     t, f = time_s[low : high + 1] - time_s[peak], force[low : high + 1]
     reach = max(-float(t[0]), float(t[-1]))
     if t.size < FEWEST_SAMPLES or reach <= 0:
-        return Apex(float(time_s[peak]), reach, mean(f), noise / math.sqrt(t.size), math.inf, "rounded")
+        return Apex(float(time_s[peak]), reach, float(f.mean()), noise / math.sqrt(t.size), math.inf, "rounded")
     x = t / reach
     basis = np.array((np.ones_like(x), x, x * x))
     inverse = _inverse(basis @ basis.T)

@@ -9,8 +9,7 @@ import numpy as np
 
 from tribo.errors import Problem, TraceError
 from tribo.records import FloatArray, Trace
-from tribo.traces.contact import line
-from tribo.traces.noise import condense
+from tribo.traces.noise import condense, line
 
 _FEWEST = 3
 _PER_CYCLE = 50  # averages per cycle, enough for its shape and free of impulses

@@ -1,4 +1,4 @@
-"""Noise, wander and the uncertainty of a mean whose samples are correlated."""
+"""What samples say: their noise, smoother forms of them, a line through them, a mean with its uncertainty."""
 
 from __future__ import annotations
 
@@ -16,16 +16,6 @@ _SLOPE_U = 0.35  # standard uncertainty of a variogram's slope over BLOCKS block
 _MEDIAN_TO_SD = 1.4826  # of a normal distribution
 
 
-def median(values: FloatArray) -> float:
-    """Median of a non-empty array; np.median without its overhead on short arrays."""
-    n = values.size
-    half = n // 2
-    if n % 2:
-        return float(np.partition(values, half)[half])
-    ordered = np.partition(values, half)
-    return 0.5 * float(ordered[half] + ordered[:half].max())
-
-
 def sample_noise(values: FloatArray) -> float:
     """Standard deviation of the sample-to-sample noise, blind to levels, slopes and single jumps.
 
@@ -35,15 +25,23 @@ def sample_noise(values: FloatArray) -> float:
     if values.size < 3:
         return math.nan
     second = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
-    typical = _MEDIAN_TO_SD * median(second)
+    typical = _MEDIAN_TO_SD * float(np.median(second))
     if typical <= 0.0:
         typical = math.sqrt(float(second @ second) / second.size)
     return typical / math.sqrt(6.0)
 
 
-def mean(values: FloatArray) -> float:
-    """Mean of a non-empty array, without the overhead of np.mean on short arrays."""
-    return float(np.add.reduce(values)) / values.size
+def noise_of(force: FloatArray) -> float:
+    """Sample noise, or a small fraction of the range if the trace has none, so that it can be a denominator."""
+    return max(sample_noise(force), 1e-6 * float(np.ptp(force)))
+
+
+def line(time_s: FloatArray, force_N: FloatArray) -> tuple[float, float, float]:
+    """Least-squares line as (slope, mean time, mean force); slope 0 where all times are equal."""
+    t = float(time_s.mean())
+    away = time_s - t
+    spread = float(away @ away)
+    return (float(away @ force_N) / spread if spread > 0 else 0.0), t, float(force_N.mean())
 
 
 def block_means(values: FloatArray, blocks: int = BLOCKS) -> FloatArray:
@@ -109,13 +107,13 @@ def wander(values: FloatArray, duration_s: float) -> Wander:
     if count < 4:
         spread = float(values.std(ddof=1)) / math.sqrt(values.size) if values.size > 1 else math.nan
         return Wander(spread, 0.0, noise)
-    line = _variogram_line(count)
-    squares = (means[line.later] - means[line.earlier]) ** 2
-    level, slope = float(line.level @ squares), float(line.slope @ squares)
+    variogram = _variogram_line(count)
+    squares = (means[variogram.later] - means[variogram.earlier]) ** 2
+    level, slope = float(variogram.level @ squares), float(variogram.slope @ squares)
     white = noise**2 * count / values.size
-    most = max(level - 2.0 * white, 0.0) / line.centre
-    slope = (_mean_within(slope, _SLOPE_U * level / line.centre, most) + most) / 2.0
-    stationary = max(level - slope * line.centre, 2.0 * white) / 2.0
+    most = max(level - 2.0 * white, 0.0) / variogram.centre
+    slope = (_mean_within(slope, _SLOPE_U * level / variogram.centre, most) + most) / 2.0
+    stationary = max(level - slope * variogram.centre, 2.0 * white) / 2.0
     rate = slope * count / duration_s if duration_s > 0 else 0.0
     return Wander(math.sqrt(stationary / count), rate, noise)
 
@@ -163,3 +161,19 @@ def _mean_within(estimate: float, u: float, most: float) -> float:
         return min(max(estimate, 0.0), most)
     density = (math.exp(-low * low / 2.0) - math.exp(-high * high / 2.0)) / math.sqrt(2.0 * math.pi)
     return estimate + u * density / mass
+
+
+@dataclass(frozen=True)
+class Steady:
+    """Mean force over a window: standard uncertainty of the mean from short-lived noise, drift and sample noise."""
+
+    mean_N: float
+    u_N: float
+    drift_N_per_s: float
+    noise_N: float
+
+
+def steady(time_s: FloatArray, force: FloatArray) -> Steady:
+    """Mean over a window of samples with the uncertainty that their correlation leaves."""
+    slow = wander(force, float(time_s[-1] - time_s[0]))
+    return Steady(float(force.mean()), slow.mean_u, line(time_s, force)[0], slow.noise)

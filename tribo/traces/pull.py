@@ -10,16 +10,14 @@ import numpy as np
 
 from tribo.errors import Problem, TraceError
 from tribo.records import Pull, Test, Trace
-from tribo.traces.apex import Apex
-from tribo.traces.contact import line
-from tribo.traces.motion import Motion, lay_out, with_peak_at
-from tribo.traces.noise import wander
-from tribo.traces.rules import RULES, Rule, Window
-from tribo.traces.sliding import Steady, steady, stick_slip
+from tribo.traces.apex import Apex, find_apex, near
+from tribo.traces.loading import climb_of
+from tribo.traces.noise import line
+from tribo.traces.rules import RULES, Rule
+from tribo.traces.signal import signal_of
+from tribo.traces.sliding import Motion, Sliding, in_motion, sliding_over, window_between
 
-_FEWEST_SLIDING = 10
 _GAP = 3.0
-_NO_STEADY = Steady(math.nan, math.nan, math.nan, math.nan)
 
 
 def read_pull(
@@ -53,22 +51,24 @@ def read_pull(
     chosen = _rule(rule, parameters)
     test_id, file = (test.test_id if test else None), trace.file or None
     try:
-        motion = lay_out(trace, test.speed_m_s if test else None, zero)
-        motion = motion if peak_s is None else with_peak_at(motion, peak_s)
-        static = chosen.static(motion, chosen.parameters) if peak_s is None else motion.apex
-        window = chosen.sliding(motion, chosen.parameters) if window_s is None else _samples(motion, window_s)
+        signal = signal_of(trace)
+        climb = climb_of(signal, zero)
+        climb = climb if peak_s is None else near(climb, peak_s)
+        apex = find_apex(climb)
+        motion = in_motion(climb, apex, test.speed_m_s if test else None)
+        static = chosen.static(motion, chosen.parameters) if peak_s is None else apex
+        window = chosen.sliding(motion, chosen.parameters) if window_s is None else window_between(motion, *window_s)
+        sliding = sliding_over(motion, window)
     except TraceError as fault:
         raise TraceError([p.at(file=file, test_id=test_id) for p in fault.problems]) from None
-    problems = tuple(p.at(file=file, test_id=test_id) for p in motion.problems)
-    pull = _reduce(motion, static, window, chosen, test_id or trace.name, problems)
+    pull = _reduce(motion, static, sliding, chosen)
     by_hand = {"peak_by_hand": peak_s is not None, "window_by_hand": window_s is not None}
-    return replace(pull, flags=(*pull.flags, *(flag for flag, raised in by_hand.items() if raised)))
-
-
-def _samples(motion: Motion, window_s: tuple[float, float]) -> Window:
-    """The range of samples within a window of time."""
-    first, end = np.searchsorted(motion.time_s, window_s)
-    return int(first), int(end) + int(end < motion.time_s.size and motion.time_s[end] == window_s[1])
+    return replace(
+        pull,
+        test_id=test_id or trace.name,
+        problems=tuple(p.at(file=file, test_id=test_id) for p in motion.problems),
+        flags=(*pull.flags, *(flag for flag, raised in by_hand.items() if raised)),
+    )
 
 
 def _rule(name: str, parameters: Mapping[str, float] | None) -> Rule:
@@ -83,59 +83,31 @@ def _rule(name: str, parameters: Mapping[str, float] | None) -> Rule:
     return replace(rule, parameters={**rule.parameters, **parameters})
 
 
-def _reduce(motion: Motion, static: Apex, window: Window, rule: Rule, name: str, problems: tuple[Problem, ...]) -> Pull:
-    start, end = window
-    time, force = motion.time_s, motion.force_N
-    enough = end - start >= _FEWEST_SLIDING
-    sliding = steady(time[start:end], force[start:end]) if enough else _NO_STEADY
-    times = (float(time[start]), float(time[end - 1])) if enough else (math.nan, math.nan)
-    zero_u = motion.zero.u_N
-    static_wander, sliding_wander = _wander(motion, static, times)
-    swing, period = _stick_slip(motion)
+def _reduce(motion: Motion, static: Apex, sliding: Sliding, rule: Rule) -> Pull:
+    """The numbers of a pull; every uncertainty holds what a slow wander may have done since the zero was seen."""
+    zero, mean, window_s = motion.zero, sliding.mean, sliding.window_s
+    static_wander = zero.wander_rate * max(static.time_s - zero.time_s, 0.0)
+    since_zero_s = window_s[0] - zero.time_s + (window_s[1] - window_s[0]) / 3.0
     return Pull(
-        test_id=name,
+        test_id="",
         rule=rule.name,
         static_N=static.force_N,
-        static_u_N=math.sqrt(static.u_N**2 + static.shape_u_N**2 + zero_u**2 + static_wander),
-        sliding_N=sliding.mean_N,
-        sliding_u_N=math.sqrt(sliding.u_N**2 + zero_u**2 + sliding_wander),
-        zero_N=motion.zero.force_N,
-        zero_u_N=motion.zero.u_N,
+        static_u_N=math.sqrt(static.u_N**2 + static.shape_u_N**2 + zero.u_N**2 + static_wander),
+        sliding_N=mean.mean_N,
+        sliding_u_N=math.sqrt(mean.u_N**2 + zero.u_N**2 + sliding.wander_rate * max(since_zero_s, 0.0)),
+        zero_N=zero.force_N,
+        zero_u_N=zero.u_N,
         onset_s=motion.onset_s,
         peak_s=static.time_s,
-        window_s=times,
+        window_s=window_s,
         rise_N_per_s=motion.rise.rate,
         rise_stiffness_N_per_m=_rise_stiffness(motion),
-        stick_slip_amplitude_N=swing,
-        stick_slip_period_s=period,
-        noise_N=sliding.noise_N if enough else motion.noise_N,
-        drift_N_per_s=sliding.drift_N_per_s,
-        flags=_flags(motion, static, sliding, window, rule, period),
-        problems=problems,
+        stick_slip_amplitude_N=sliding.swing_N,
+        stick_slip_period_s=sliding.period_s,
+        noise_N=mean.noise_N if sliding.enough else motion.noise_N,
+        drift_N_per_s=mean.drift_N_per_s,
+        flags=_flags(motion, static, sliding, rule),
     )
-
-
-def _wander(motion: Motion, static: Apex, window_s: tuple[float, float]) -> tuple[float, float]:
-    """Variances that a slow wander has gathered since the zero was seen: of static and of sliding.
-
-    What the zero wanders may have moved the static peak; sliding friction wanders by itself as well, and the
-    whole record after the fall tells how much (the window alone was chosen for its steadiness, so it would
-    tell less).
-    """
-    since = motion.zero.time_s
-    static_variance = motion.zero.wander_rate * max(static.time_s - since, 0.0)
-    fallen, end = motion.fallen, motion.sliding[1]
-    if end - fallen < _FEWEST_SLIDING or math.isnan(window_s[0]):
-        return static_variance, 0.0
-    rate = wander(motion.force_N[fallen:end], float(motion.time_s[end - 1] - motion.time_s[fallen])).rate
-    return static_variance, rate * max(window_s[0] - since + (window_s[1] - window_s[0]) / 3.0, 0.0)
-
-
-def _stick_slip(motion: Motion) -> tuple[float, float]:
-    fallen, end = motion.fallen, motion.sliding[1]
-    if end - fallen < _FEWEST_SLIDING:
-        return math.nan, math.nan
-    return stick_slip(motion.time_s[fallen:end], motion.force_N[fallen:end], motion.noise_N)
 
 
 def _rise_stiffness(motion: Motion) -> float:
@@ -154,19 +126,18 @@ def _gap_at(motion: Motion, time_s: float) -> bool:
     return float(time[after] - time[after - 1]) > _GAP * float(time[-1] - time[0]) / (time.size - 1)
 
 
-def _flags(motion: Motion, static: Apex, sliding: Steady, window: Window, rule: Rule, period: float) -> tuple[str, ...]:
-    enough = not math.isnan(sliding.mean_N)
+def _flags(motion: Motion, static: Apex, sliding: Sliding, rule: Rule) -> tuple[str, ...]:
+    enough, mean, travel = sliding.enough, sliding.mean, motion.travel_m
+    start, end = sliding.window
     asked = rule.parameters.get("length_m", 0.0)
-    travel = motion.travel_m
-    short = enough and travel is not None and travel[window[1] - 1] - travel[window[0]] < 0.9 * asked
     raised = {
         "no_zero_phase": not motion.zero.seen,
         "spike": bool(motion.problems),
         "gap_at_peak": _gap_at(motion, static.time_s),
         "rounded_peak": static.shape == "rounded",
-        "no_drop": enough and static.force_N - sliding.mean_N < 3.0 * math.hypot(static.u_N, sliding.u_N),
+        "no_drop": enough and static.force_N - mean.mean_N < 3.0 * math.hypot(static.u_N, mean.u_N),
         "no_sliding": not enough,
-        "window_short": bool(short),
-        "stick_slip": not math.isnan(period),
+        "window_short": enough and travel is not None and bool(travel[end - 1] - travel[start] < 0.9 * asked),
+        "stick_slip": not math.isnan(sliding.period_s),
     }
     return tuple(name for name, is_raised in raised.items() if is_raised)

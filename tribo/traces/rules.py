@@ -10,11 +10,9 @@ import numpy as np
 
 from tribo.errors import Problem, TraceError
 from tribo.traces.apex import Apex, rounded_apex
-from tribo.traces.motion import Motion
-from tribo.traces.sliding import settled
+from tribo.traces.sliding import Motion, Window, settled
 
 Parameters = Mapping[str, float]
-Window = tuple[int, int]
 
 
 @dataclass(frozen=True)

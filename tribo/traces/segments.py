@@ -10,8 +10,8 @@ import numpy as np
 
 from tribo.errors import Problem, TraceError
 from tribo.records import FloatArray, Trace
-from tribo.traces.noise import mean, median, median_of_three, running_mean, sample_noise, wander
-from tribo.traces.quality import MINIMUM_SAMPLES
+from tribo.traces.noise import median_of_three, running_mean, sample_noise, wander
+from tribo.traces.signal import MINIMUM_SAMPLES
 
 _REVERSED = 0.25  # share of its swing by which a force passes the middle before its direction counts as reversed
 _OF_SPAN = 0.2  # a step is at least this share of the span of its channel,
@@ -79,7 +79,7 @@ def reversals(force_N: FloatArray) -> list[int]:
     The middle lies half-way between the 5th and 95th percentile; it counts as passed once the force is a quarter of
     their distance beyond it. A force that has only one sign, or hardly leaves zero on the other side, is not reversed.
     """
-    if -float(force_N.min()) < _REVERSED * median(force_N):
+    if -float(force_N.min()) < _REVERSED * float(np.median(force_N)):
         return []  # as below, without the percentiles, which take longer
     low, high = np.percentile(force_N, (5.0, 95.0))
     if min(high, -low) < _REVERSED * max(high, -low):
@@ -127,7 +127,7 @@ def _steps_over(values: FloatArray, width: int, least: float, sharp: bool) -> li
         return []
     before, after = _means_beside(values, width)
     jump = np.abs(after - before)
-    noise = max(sample_noise(values) * math.sqrt(2.0 / width), median(jump))
+    noise = max(sample_noise(values) * math.sqrt(2.0 / width), float(np.median(jump)))
     over = np.concatenate(([False], jump > max(least, _OF_NOISE * noise), [False]))
     edges = np.flatnonzero(np.diff(over))
     passages = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
@@ -162,7 +162,7 @@ def orient_strokes(strokes: Sequence[Trace]) -> Strokes:
     if not strokes:
         raise TraceError(Problem("no_strokes", "no strokes are given"))
     middles = [_middle(stroke) for stroke in strokes]
-    forces = np.array([mean(f) for f in middles])
+    forces = np.array([float(f.mean()) for f in middles])
     u = np.array([wander(f, 1.0).mean_u for f in middles])
     both = bool(forces.min() < 0 < forces.max())
     side = np.where(forces >= (forces.max() + forces.min()) / 2.0, 1, -1) if both else np.sign(forces).astype(int)

@@ -1,4 +1,4 @@
-"""Steady sliding: when the force has stabilised, its mean, its drift and its stick-slip."""
+"""The part of a pull in which it slides: its range, when the force has stabilised, its mean and its stick-slip."""
 
 from __future__ import annotations
 
@@ -7,10 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tribo.errors import Problem
 from tribo.records import FloatArray
-from tribo.traces.contact import line
-from tribo.traces.noise import condense, mean, wander
+from tribo.traces.apex import Apex
+from tribo.traces.loading import Climb, Rise, Zero
+from tribo.traces.noise import Steady, condense, line, steady, wander
 
+Window = tuple[int, int]
+
+_FEWEST = 10  # samples from which on a mean is taken
+_NO_STEADY = Steady(math.nan, math.nan, math.nan, math.nan)
 _BATCH = 5
 _MOST_BATCHES = 2000
 _LATEST = 0.5  # at most this share of the record after the peak is taken as unsettled
@@ -20,13 +26,96 @@ _REGULAR = 0.4  # largest spread of the cycle times over their mean that still c
 
 
 @dataclass(frozen=True)
-class Steady:
-    """Mean force over a window: standard uncertainty of the mean from short-lived noise, drift and sample noise."""
+class Motion:
+    """A pull in motion; arrays (n,) share the trace's samples, ``force_N`` is zeroed and free of impulses.
 
-    mean_N: float
-    u_N: float
-    drift_N_per_s: float
+    ``sliding`` is the range of indices after the static peak and before any unloading; ``travel_m`` the distance since
+    the onset, where the trace or the test's speed tells it.
+    """
+
+    time_s: FloatArray
+    force_N: FloatArray
+    smooth_N: FloatArray
+    travel_m: FloatArray | None
+    zero: Zero
+    rise: Rise
+    onset_s: float
+    apex: Apex
+    sliding: Window
     noise_N: float
+    problems: tuple[Problem, ...]
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """What a pull says of sliding. NaN where fewer than ten samples, or no stick-slip, leave a number out.
+
+    ``mean`` is taken over the ``window`` of samples that a rule or a person chose. The whole record after the fall
+    gives the stick-slip, and ``wander_rate``, the variance that a slow walk of the force gathers per second.
+    """
+
+    mean: Steady
+    window: Window
+    window_s: tuple[float, float]
+    swing_N: float
+    period_s: float
+    wander_rate: float
+
+    @property
+    def enough(self) -> bool:
+        """Whether there were samples enough for a mean."""
+        return not math.isnan(self.window_s[0])
+
+
+def in_motion(climb: Climb, apex: Apex, speed_m_s: float | None = None) -> Motion:
+    """A pull once it moves: how far it has come, and between which samples it slides."""
+    signal, onset_s = climb.signal, climb.onset_s
+    first = int(np.searchsorted(signal.time_s, apex.time_s, side="right"))
+    return Motion(
+        signal.time_s, signal.force_N, signal.smooth_N, _travel(climb, speed_m_s), climb.zero, climb.rise, onset_s,
+        apex, (first, climb.end), signal.noise_N, signal.problems,
+    )  # fmt: skip
+
+
+def _travel(climb: Climb, speed_m_s: float | None) -> FloatArray | None:
+    """Distance travelled since the onset, always counted forward; from the speed where no displacement was recorded."""
+    time, x = climb.signal.time_s, climb.signal.displacement_m
+    if x is not None:
+        away = x - float(np.interp(climb.onset_s, time, x))
+        return np.asarray(np.where(away[-1] < 0, -1.0, 1.0) * away)
+    return None if speed_m_s is None else np.asarray(speed_m_s * (time - climb.onset_s))
+
+
+def window_between(motion: Motion, start_s: float, end_s: float) -> Window:
+    """The range of samples from one time to another, both included."""
+    first, end = np.searchsorted(motion.time_s, (start_s, end_s))
+    return int(first), int(end) + int(end < motion.time_s.size and motion.time_s[end] == end_s)
+
+
+def sliding_over(motion: Motion, window: Window) -> Sliding:
+    """What a pull says of sliding: the mean over a window, and what the whole record after the fall tells."""
+    start, end = window
+    time, force = motion.time_s, motion.force_N
+    fallen, last = fallen_range(motion)
+    after_s, after_N = time[fallen:last], force[fallen:last]
+    swing, period, rate = math.nan, math.nan, 0.0
+    if long := last - fallen >= _FEWEST:
+        swing, period = stick_slip(after_s, after_N, motion.noise_N)
+    if end - start < _FEWEST:
+        return Sliding(_NO_STEADY, window, (math.nan, math.nan), swing, period, rate)
+    if long:  # the window was chosen for its steadiness, so it alone would tell too little wander
+        rate = wander(after_N, float(after_s[-1] - after_s[0])).rate
+    mean = steady(time[start:end], force[start:end])
+    return Sliding(mean, window, (float(time[start]), float(time[end - 1])), swing, period, rate)
+
+
+def fallen_range(motion: Motion) -> Window:
+    """The sliding range from where the force has come down to its median over that range; nothing of an empty range."""
+    first, end = motion.sliding
+    if end <= first:
+        return end, end
+    smooth = motion.smooth_N[first:end]
+    return first + int(np.argmax(smooth <= np.median(smooth))), end
 
 
 def settled(force: FloatArray) -> int:
@@ -40,19 +129,13 @@ def settled(force: FloatArray) -> int:
     batch = max(_BATCH, force.size // _MOST_BATCHES)
     means = condense(force, batch) if force.size >= 4 * batch else force
     step = batch if force.size >= 4 * batch else 1
-    means = means - mean(means)
+    means = means - means.mean()
     n = np.arange(means.size, 0, -1)
     total = np.cumsum(means[::-1])[::-1]
     squares = np.cumsum((means * means)[::-1])[::-1]
     error = (squares - total**2 / n) / n**2
     latest = max(1, int(means.size * _LATEST) + 1)
     return int(np.argmin(error[:latest])) * step
-
-
-def steady(time_s: FloatArray, force: FloatArray) -> Steady:
-    """Mean over a window of samples with the uncertainty that their correlation leaves."""
-    slow = wander(force, float(time_s[-1] - time_s[0]))
-    return Steady(mean(force), slow.mean_u, line(time_s, force)[0], slow.noise)
 
 
 def stick_slip(time_s: FloatArray, force: FloatArray, noise: float) -> tuple[float, float]:

@@ -10,12 +10,12 @@ import numpy as np
 
 from tribo.errors import Problem, TraceError
 from tribo.records import Pull, Test, Trace
-from tribo.traces import quality
-from tribo.traces.contact import starting_level
-from tribo.traces.noise import median_of_three
+from tribo.traces.loading import starting_level
+from tribo.traces.noise import median_of_three, steady
 from tribo.traces.pull import read_pull
 from tribo.traces.segments import Strokes, orient_strokes, split_pulls
-from tribo.traces.sliding import settled, steady
+from tribo.traces.signal import signal_of, unreadable
+from tribo.traces.sliding import settled
 
 _NO_PEAK = {"stopped_before_peak", "sign_flipped", "spike"}
 _CLIMB_OVER_SWING = 5.0
@@ -80,7 +80,7 @@ def pieces_of(traces: Trace | Sequence[Trace]) -> Strokes:
 def _read_piece(
     piece: Trace, rule: str, test: Test | None, parameters: Mapping[str, float] | None, zero: tuple[float, float] | None
 ) -> Pull:
-    if zero is None and not quality.unreadable(piece) and _slides_at_once(piece):
+    if zero is None and not unreadable(piece) and _slides_at_once(piece):
         return read_sliding(piece, zero=zero, rule=rule)
     try:
         return read_pull(piece, rule=rule, test=test, parameters=parameters, zero=zero)
@@ -106,15 +106,11 @@ def read_sliding(trace: Trace, *, zero: tuple[float, float] | None = None, rule:
     Raises
     ------
     TraceError
-        ``too_short``, ``nan_gap``, ``time_goes_back``.
+        ``too_short``, ``nan_gap``, ``time_goes_back``, ``time_stands_still``.
     """
-    if faults := quality.unreadable(trace):
-        raise TraceError(faults)
-    force = np.asarray(trace.force_N, float)
-    spikes = quality.impulse_spikes(force, quality.noise_of(force))
-    force = quality.without_spikes(force, spikes)
-    start = settled(force)
-    window = steady(trace.time_s[start:], force[start:])
+    signal = signal_of(trace)
+    start = settled(signal.force_N)
+    window = steady(trace.time_s[start:], signal.force_N[start:])
     offset, offset_u = zero or (0.0, 0.0)
     flags = ("no_static",) if zero else ("no_static", "no_zero_phase")
     nan = math.nan
@@ -122,8 +118,8 @@ def read_sliding(trace: Trace, *, zero: tuple[float, float] | None = None, rule:
         test_id=trace.name, rule=rule, static_N=nan, static_u_N=nan, sliding_N=window.mean_N - offset,
         sliding_u_N=math.hypot(window.u_N, offset_u), zero_N=offset, zero_u_N=offset_u if zero else nan, onset_s=nan,
         peak_s=nan, window_s=(float(trace.time_s[start]), float(trace.time_s[-1])), noise_N=window.noise_N,
-        drift_N_per_s=window.drift_N_per_s, flags=(*flags, "spike") if spikes.any() else flags,
-        problems=quality.spike_problems(trace, spikes),
+        drift_N_per_s=window.drift_N_per_s, flags=(*flags, "spike") if signal.problems else flags,
+        problems=signal.problems,
     )  # fmt: skip
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,36 +23,18 @@ from tribo.diagnose.from_table.table_observations import (
     friction_at,
     model_covariance,
     predict_table,
-    read_table,
     root_of,
 )
 from tribo.diagnose.from_table.table_outlook import PATTERNS, Outlook, Reading, Weighed
-from tribo.diagnose.from_table.table_sentences import verdict_of
-from tribo.diagnose.verdict import Gain, Verdict
+from tribo.diagnose.verdict import Gain
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 LEAST_CORRELATION = -2.0 * np.sqrt(RANGE_PA[0] * RANGE_PA[1]) / (RANGE_PA[0] + RANGE_PA[1])
 REPLICATES = 4000
 TAKEN_UP = 0.02  # share of a look that must be left once the flat law is free
 RESAMPLES = 400
 Progress = Callable[[str, int, int], None]
-
-
-@dataclass(frozen=True)
-class PublishedDiagnosis:
-    """The verdict on a printed table, with every reading of it; the verdict is that of the first."""
-
-    source: str
-    verdict: Verdict
-    outlooks: tuple[Outlook, ...]
-
-    @property
-    def main(self) -> Outlook:
-        return self.outlooks[0]
 
 
 def readings() -> list[Reading]:
@@ -71,34 +52,6 @@ def readings() -> list[Reading]:
         for specimens in (1, 3)
         for correlation, why in correlations.items()
     ]
-
-
-def diagnose_published(
-    table2: pd.DataFrame,
-    own: pd.DataFrame,
-    *,
-    seed: int = 0,
-    progress: Progress | None = None,
-) -> PublishedDiagnosis:
-    """The diagnosis of Table 2 of Berardo et al. (2019) in every reading.
-
-    Parameters
-    ----------
-    table2 : as :func:`tribo.published.load_table2` gives it
-    own : the same table simulated anew: sample, regime, mu, tau0_kPa
-    seed : of the simulated tables that stand for chance
-    """
-    measured = table2[table2["source"] == "experiment"]
-    models = {"paper": table2[table2["source"] == "simulation"], "tribo": own}
-    found = []
-    for k, reading in enumerate(readings()):
-        if progress is not None:
-            progress("reading the table", k, len(readings()))
-        table = read_table(measured, models[reading.model], reading.correlation, reading.specimens)
-        found.append(look_at(table, reading, np.random.default_rng(seed)))
-    rng = np.random.default_rng(seed)
-    gain = gain_on_samples(found[0].baseline, found[0].weighed[0], rng)
-    return PublishedDiagnosis("berardo2019", verdict_of(found, gain), tuple(found))
 
 
 def look_at(table: Table, reading: Reading, rng: np.random.Generator) -> Outlook:

@@ -13,7 +13,7 @@ from tribo.diagnose.search.looks import Look
 from tribo.diagnose.statistics.chance import as_measured, columns_of, drawn_residuals, refit, scores
 from tribo.diagnose.statistics.fit import jacobian_at, whitened
 from tribo.diagnose.statistics.model import ModelFit
-from tribo.diagnose.statistics.noise import prior_precision, weights, whitener
+from tribo.diagnose.statistics.scatter import prior_precision, weights, whitener
 from tribo.records import FloatArray
 
 Progress = Callable[[str, int, int], None]

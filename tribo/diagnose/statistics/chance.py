@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tribo.diagnose.statistics.fit import jacobian_at
 from tribo.diagnose.statistics.model import FIXED, ModelFit
-from tribo.diagnose.statistics.noise import (
+from tribo.diagnose.statistics.scatter import (
     inverse_noise,
     log_size_prior,
     prior_precision,

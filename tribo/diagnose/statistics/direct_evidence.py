@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import erfc
 
 from tribo.diagnose.statistics.observations import Observations
-from tribo.mechanisms.evidence import Quantity, TraceEvidence
+from tribo.mechanisms.direct_estimates import Quantity, TraceEvidence
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray
 

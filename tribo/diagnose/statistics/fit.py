@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.diagnose.statistics.model import N_LAW, Acting, ModelFit, Noise, Setup, first_law, predict
-from tribo.diagnose.statistics.noise import (
+from tribo.diagnose.statistics.scatter import (
     distance,
     first_noise,
     log_prior,

@@ -12,7 +12,7 @@ import numpy as np
 
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.model import FIXED, N_LAW, PATTERN, ModelFit
-from tribo.diagnose.statistics.noise import log_size_prior
+from tribo.diagnose.statistics.scatter import log_size_prior
 from tribo.mechanisms.record import Mechanism
 from tribo.records import FloatArray
 

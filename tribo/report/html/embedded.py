@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from tribo.figures import select
+from tribo.figures.thinning import thin_trace
 from tribo.records import FloatArray, Pull, Study, Trace
 from tribo.report.html.hover import Series
 from tribo.report.html.pull_cards import doubted_s, reading
@@ -44,7 +44,7 @@ def _pull_record(study: Study, test_id: str, points: int) -> dict[str, Any]:
 
 def _trace_record(trace: Trace, pull: Pull, points: int) -> dict[str, Any]:
     """Times and forces (zero subtracted) as 16-bit shares of their ranges: finer than any screen."""
-    time, force = select.thin_trace(trace.time_s, trace.force_N - pull.zero_N, points)
+    time, force = thin_trace(trace.time_s, trace.force_N - pull.zero_N, points)
     good = np.isfinite(force) & np.isfinite(time)
     time, force = (time[good], force[good]) if good.any() else (np.zeros(1), np.zeros(1))
     t, f = _packed(time), _packed(force)

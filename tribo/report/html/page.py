@@ -34,8 +34,11 @@ def html(
     ``drawn`` are the figures by name where they are at hand already, ``verdict`` the diagnosis in the form of
     verdict.json.
     """
-    figures = draw_all(study) if drawn is None else drawn
-    said = content(study, provenance, verdict)
+    return page_of(content(study, provenance, verdict), draw_all(study) if drawn is None else drawn)
+
+
+def page_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> str:
+    """The page with the given content (:func:`tribo.report.content.content`) and figures."""
     places = {k: [_shown(figures[n]) for n in names] for k, names in figure_places(list(figures)).items()}
     style, script = (_static(name) for name in ("style.css", "page.js"))
     return (
@@ -48,7 +51,7 @@ def html(
             diagnosis_figures=places,
             filters=_filters(said["cards"]),
             figure_data=figure_data({name: figure.series for name, figure in figures.items()}),
-            trace_data=trace_data(study, [card.test_id for card in said["cards"]]),
+            trace_data=trace_data(said["study"], [card.test_id for card in said["cards"]]),
             style=Markup(style),
             style_hash=_csp_hash(style),
             script=Markup(script),

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
-from tribo.figures import select
+from tribo.comparison import study_lookup
+from tribo.figures.thinning import thin_trace
 from tribo.records import ByHand, Pull, Study, Test, Trace
 from tribo.report.oddness import ODD_SCORE, OddPull, oddness, standings
 from tribo.report.words.numerals import significant, with_uncertainty
@@ -69,7 +70,7 @@ def doubted_s(trace: Trace, pull: Pull) -> dict[float, tuple[str, ...]]:
 def load_labels(study: Study) -> dict[str, str]:
     """The load level of every test in newton, as it is filtered by."""
     tests = study.ingested.campaign.tests
-    levels = select.load_levels(np.array([t.normal_load_N for t in tests], float)) if tests else np.empty(0)
+    levels = study_lookup.load_levels(np.array([t.normal_load_N for t in tests], float)) if tests else np.empty(0)
     return {t.test_id: significant(float(level)) for t, level in zip(tests, levels, strict=True)}
 
 
@@ -112,7 +113,7 @@ def trace_picture(trace: Trace, pull: Pull, points: int = 120) -> Markup:
 
     Notches from above point at samples with a doubt.
     """
-    time, force = select.thin_trace(trace.time_s, trace.force_N - pull.zero_N, points)
+    time, force = thin_trace(trace.time_s, trace.force_N - pull.zero_N, points)
     time, force = time[np.isfinite(force)], force[np.isfinite(force)]
     if len(force) < 2 or time[-1] <= time[0]:
         return Markup("")

@@ -32,13 +32,17 @@ def pdf(
     same choices give the same bytes.
     """
     figures = draw_all(study) if drawn is None else drawn
-    said = content(study, provenance, verdict)
+    return pdf_of(content(study, provenance, verdict), figures, provenance.origin if provenance is not None else "")
+
+
+def pdf_of(said: Mapping[str, Any], figures: Mapping[str, Drawn], origin: str) -> bytes:
+    """The document with the given content (:func:`tribo.report.content.content`) and figures."""
     record = _record(said, figures)
-    record["origin"] = provenance.origin if provenance is not None else ""
+    record["origin"] = origin
     pictures = {f"{name}.svg": figure.files["svg"] for name, figure in figures.items()}
     template = (files("tribo.report.paper") / "templates" / TEMPLATE).read_text(encoding="utf-8")
     data = json.dumps(record, ensure_ascii=False).encode("utf-8")
-    return document(template, {"data.json": data, **pictures}, _last_day(study))
+    return document(template, {"data.json": data, **pictures}, _last_day(said["study"]))
 
 
 def _last_day(study: Study) -> datetime:

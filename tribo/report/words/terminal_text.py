@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from tribo.figures import select
+from tribo.comparison import findings, study_lookup
 from tribo.records import REGIMES, LawFit, Regime, Study
 from tribo.report.result_tables import PA_PER_KPA
-from tribo.report.words import findings, wording
+from tribo.report.words import wording
 from tribo.report.words.numerals import with_uncertainty
 
 HEAD = ("sample", "mu", "tau0 (kPa)", "T (N)", "mu", "tau0 (kPa)", "T (N)", "specimens", "tests")
@@ -27,8 +27,11 @@ def table2_text(study: Study) -> str:
 def _regime_block(study: Study, regime: Regime, load: float) -> str:
     simulated = study.comparison.simulated if study.comparison is not None else ()
     rows = []
-    for sample in select.sample_numbers(study):
-        measured, model = select.fit_of(study.fits, sample, regime), select.fit_of(simulated, sample, regime)
+    for sample in study_lookup.sample_numbers(study):
+        measured, model = (
+            study_lookup.fit_of(study.fits, sample, regime),
+            study_lookup.fit_of(simulated, sample, regime),
+        )
         if measured is not None:
             counts = (str(measured.n_specimens), str(measured.n_tests))
             rows.append((sample, *fit_cells(measured, load), *fit_cells(model, load), *counts))
@@ -69,7 +72,7 @@ def fit_cells(fit: LawFit | None, load_N: float) -> tuple[str, str, str]:
 def summary_text(study: Study) -> str:
     """The measurements and the agreement with the model, in the words of the report, one sentence per line."""
     agreements = findings.agreements(study)
-    lines = [wording.what_was_measured(study), *wording.in_short(agreements, select.flat_sample(study))]
+    lines = [wording.what_was_measured(study), *wording.in_short(agreements, study_lookup.flat_sample(study))]
     lines += [wording.ranking_sentence(r) for r in findings.rankings(study)]
     lines += wording.direction_sentences(findings.direction_ratios(study))
     return "\n".join(lines)

@@ -6,12 +6,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from tribo.figures import select
+from tribo.comparison import findings, study_lookup
+from tribo.comparison.findings import Agreement, DirectionRatio, Ranking, Verdict
 from tribo.records import REGIMES, ByHand, LawFit, Pull, Regime, Study
 from tribo.report.oddness import OddPull
 from tribo.report.result_tables import PA_PER_KPA, all_set_aside
-from tribo.report.words import findings
-from tribo.report.words.findings import Agreement, DirectionRatio, Ranking, Verdict
 from tribo.report.words.numerals import counted, joined, percent, significant, span, with_uncertainty
 
 FLAGS = {
@@ -34,10 +33,10 @@ def what_was_measured(study: Study) -> str:
     campaign, used = study.ingested.campaign, study.ingested.pulls
     aside = len(all_set_aside(study))
     tests = [t for t in campaign.tests if t.test_id in used]
-    samples = [s for s in select.sample_numbers(study) if any(t.sample == s for t in tests)]
+    samples = [s for s in study_lookup.sample_numbers(study) if any(t.sample == s for t in tests)]
     specimens = {(t.sample, t.specimen) for t in tests}
     loads = np.array([t.normal_load_N for t in tests])
-    levels = np.unique(select.load_levels(loads))
+    levels = np.unique(study_lookup.load_levels(loads))
     lowest, highest = (significant(p / campaign.nominal_area_m2 / PA_PER_KPA) for p in (levels[0], levels[-1]))
     return (
         f"{counted(len(tests), 'pull')} of {counted(len(specimens), 'specimen')} of "
@@ -55,8 +54,8 @@ def _set_aside_clause(aside: int) -> str:
 
 def flat_law(study: Study) -> list[str]:
     """The measured law of the flat sample, one sentence per regime."""
-    flat = select.flat_sample(study)
-    fits = [(regime, select.fit_of(study.fits, flat, regime)) for regime in REGIMES]
+    flat = study_lookup.flat_sample(study)
+    fits = [(regime, study_lookup.fit_of(study.fits, flat, regime)) for regime in REGIMES]
     return [
         f"The {regime} friction of the flat sample {flat} follows T = μN + τ₀A with {_law_values(fit)} "
         "(± standard uncertainty)."

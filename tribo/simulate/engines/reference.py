@@ -50,6 +50,27 @@ class Model(NamedTuple):
     finite: bool
 
 
+class State(NamedTuple):
+    """Every block now: displacement and velocity (n, 2), and whether it rests (n,). Steps change it in place."""
+
+    u: FloatArray
+    v: FloatArray
+    resting: NDArray[np.bool_]
+
+
+class Steps(NamedTuple):
+    """How many steps are taken: from ``start``, each ``dt`` long, a sample every ``stride``.
+
+    The run ends early once the time exceeds ``stop_at_peaks`` peak times.
+    """
+
+    start: float
+    dt: float
+    number: int
+    stride: int
+    stop_at_peaks: float
+
+
 class Record(NamedTuple):
     """Samples every ``stride`` steps, and running sums that are exact to the order of the trapezoid."""
 
@@ -157,17 +178,9 @@ def runge_kutta(
 
 
 @compiled
-def finish_step(
-    u: FloatArray,
-    v: FloatArray,
-    t: float,
-    dt: float,
-    resting: NDArray[np.bool_],
-    m: Model,
-    new_v: FloatArray,
-    rec: Record,
-) -> None:
+def finish_step(state: State, t: float, dt: float, m: Model, new_v: FloatArray, rec: Record) -> None:
     """Stop the blocks that turned round, and add up force, friction work and viscous work of the step."""
+    u, v, resting = state.u, state.v, state.resting
     force_x = 0.0
     force_y = 0.0
     for i in range(len(u)):
@@ -194,33 +207,22 @@ def finish_step(
 
 
 @compiled
-def integrate_all(
-    u: FloatArray,
-    v: FloatArray,
-    resting: NDArray[np.bool_],
-    start: float,
-    dt: float,
-    steps: int,
-    stride: int,
-    stop_at_peaks: float,
-    m: Model,
-    w: FloatArray,
-    rec: Record,
-) -> int:
-    """Up to ``steps`` steps, or fewer once the time exceeds ``stop_at_peaks`` peak times; returns the samples taken."""
+def integrate_all(state: State, steps: Steps, m: Model, w: FloatArray, rec: Record) -> int:
+    """Take the steps, or fewer where the run ends early; returns the number of samples taken."""
     samples = 0
-    for step in range(steps):
-        t = start + step * dt
-        decide_friction(u, v, t, m, resting, w[9], rec)
-        runge_kutta(u, v, t, dt, resting, m, w)
-        finish_step(u, v, t, dt, resting, m, w[8], rec)
-        if (step + 1) % stride == 0:
+    dt = steps.dt
+    for step in range(steps.number):
+        t = steps.start + step * dt
+        decide_friction(state.u, state.v, t, m, state.resting, w[9], rec)
+        runge_kutta(state.u, state.v, t, dt, state.resting, m, w)
+        finish_step(state, t, dt, m, w[8], rec)
+        if (step + 1) % steps.stride == 0:
             rec.time[samples] = t + dt
             rec.force[samples] = rec.sums[FORCE]
             rec.impulse[samples] = rec.sums[IMPULSE]
-            rec.moving[samples] = np.sum(m.contact & ~resting)
+            rec.moving[samples] = np.sum(m.contact & ~state.resting)
             samples += 1
-            if not math.isfinite(rec.sums[FORCE]) or t > stop_at_peaks * rec.sums[PEAK_TIME]:
+            if not math.isfinite(rec.sums[FORCE]) or t > steps.stop_at_peaks * rec.sums[PEAK_TIME]:
                 break
     return samples
 
@@ -272,9 +274,8 @@ def run_reference(
         np.zeros(room), np.zeros(room), np.zeros(room), np.zeros(room, np.int64), np.full(64, -1, np.int64), sums
     )
     stop = np.inf if config.duration_s else config.duration_peaks
-    kept = integrate_all(
-        u, v, resting, start, config.dt_s, steps, stride, stop, model, np.zeros((10, *u.shape)), record
-    )
+    asked = Steps(start, config.dt_s, steps, stride, stop)
+    kept = integrate_all(State(u, v, resting), asked, model, np.zeros((10, *u.shape)), record)
     if not np.isfinite(sums[FORCE]):
         _refuse(u, lattice, float(record.time[kept - 1]))
     return Trajectory(

@@ -103,7 +103,7 @@ def test_simulated_campaigns_scatter_as_much_as_the_fit_says() -> None:
 
 
 def precision(f: ModelFit) -> np.ndarray:
-    from tribo.diagnose.statistics.noise import prior_precision
+    from tribo.diagnose.statistics.scatter import prior_precision
 
     return prior_precision(f.setup, f.noise)
 

@@ -1,7 +1,4 @@
-"""Measured over simulated friction force at each load, with its 95 % interval.
-
-mu and tau0 trade off against each other in a fit, so a model is judged by T at a load, not by either alone.
-"""
+"""Measured over simulated friction force at each load: the ratios of :mod:`tribo.comparison.agreement`, drawn."""
 
 from __future__ import annotations
 
@@ -12,11 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
-from tribo.figures import select, style
-from tribo.records import REGIMES, ComparisonRow, Study
+from tribo.figures import style
+from tribo.records import REGIMES
 
-COLUMNS = ["sample_number", "sample", "regime", "normal_load_N", "ratio", "ratio_low", "ratio_high"]
-LEVEL = 0.95
 RATIO_TICKS = (
     (0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4),
     (0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.2, 1.5, 2.0),
@@ -26,50 +21,6 @@ RATIO_TICKS = (
 REGIME_STYLE = {"static": (style.BLUE, "o", -1), "sliding": (style.VERMILLION, "s", 1)}
 DODGE_POINTS = 1.8
 MOST_BAR = 3.0  # an error bar beyond this factor runs off the panel, so that the others can be read
-
-
-def numbers(study: Study) -> pd.DataFrame:
-    """T measured over T simulated at each load (N), with the 95 % interval of the ratio.
-
-    The interval is symmetric in the logarithm of the ratio, with Student's t and the degrees of freedom of
-    both sides carried through Welch-Satterthwaite (GUM G.4): those of the sample's own fit, and for the model
-    those of the measured flat sample, on whose calibration it rests.
-    """
-    comparison = study.comparison
-    if comparison is None or not comparison.rows:
-        return pd.DataFrame(columns=COLUMNS)
-    order = select.sample_numbers(study)
-    rows = [
-        {
-            "sample_number": order.get(row.sample, len(order)),
-            "sample": row.sample,
-            "regime": row.regime,
-            "normal_load_N": row.normal_load_N,
-            **_ratio(row, _dof(study, row.sample, row), _dof(study, comparison.flat, row)),
-        }
-        for row in comparison.rows
-    ]
-    table = pd.DataFrame(rows, columns=COLUMNS)
-    table = table[np.isfinite(table["ratio"])]
-    return table.sort_values(["sample_number", "regime", "normal_load_N"], ascending=[True, False, True])
-
-
-def _dof(study: Study, sample: str, row: ComparisonRow) -> float:
-    fit = select.fit_of(study.fits, sample, row.regime)
-    return fit.dof if fit is not None else float("inf")
-
-
-def _ratio(row: ComparisonRow, measured_dof: float, simulated_dof: float) -> dict[str, float]:
-    from scipy.stats import t
-
-    if not (row.measured_N > 0 and row.simulated_N > 0):
-        return dict.fromkeys(("ratio", "ratio_low", "ratio_high"), float("nan"))
-    ratio = row.measured_N / row.simulated_N
-    measured, simulated = row.measured_u_N / row.measured_N, row.simulated_u_N / row.simulated_N
-    u = float(np.hypot(measured, simulated))
-    dof = select.welch_dof((measured, measured_dof), (simulated, simulated_dof))
-    half = float(t.ppf(0.5 + LEVEL / 2, dof)) * u
-    return {"ratio": ratio, "ratio_low": ratio * np.exp(-half), "ratio_high": ratio * np.exp(half)}
 
 
 @style.in_house_style

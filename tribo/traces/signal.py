@@ -1,15 +1,16 @@
-"""Faults of a trace, checked before friction is determined: spikes, clipping, sign, order of time."""
+"""The signal of a trace, checked before friction is determined: faults, spikes, noise."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.errors import Problem
+from tribo.errors import Problem, TraceError
 from tribo.records import FloatArray, Trace
-from tribo.traces.noise import sample_noise
+from tribo.traces.noise import median_of_three, noise_of, running_mean, sample_noise
 
 MINIMUM_SAMPLES = 20
 SPIKE_OVER_NOISE = 8.0
@@ -23,7 +24,52 @@ _SHORTEST_FLAT_TOP = 4
 _SHORTEST_STANDSTILL = 20
 _NO_NOISE = 1e-4  # noise over range below which a trace was never measured, and may stand still
 _AT_ZERO = 0.2  # share of the range below which a force may stand still: nothing pulls
+_SMOOTHED = 2000  # samples averaged before levels are searched: none up to this many, then this part of the trace
 _COARSE = 0.5  # share of equal neighbours from which on a resolution is too coarse to tell clipping
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Force against time that can be read; arrays (n,) share the trace's samples.
+
+    No two samples share a time, and the force is free of impulses, which ``problems`` list. ``calm_N`` is the force
+    without what lasts one sample, ``smooth_N`` that smoothed, ``noise_N`` the noise of a sample. ``recorder_fault``
+    says how the recorder failed, if it did. ``displacement_m`` is None where the trace has none.
+    """
+
+    time_s: FloatArray
+    force_N: FloatArray
+    calm_N: FloatArray
+    smooth_N: FloatArray
+    displacement_m: FloatArray | None
+    noise_N: float
+    recorder_fault: Problem | None
+    problems: tuple[Problem, ...]
+    file: str
+
+
+def signal_of(trace: Trace) -> Signal:
+    """The signal of a trace, not yet counted from any zero.
+
+    Raises
+    ------
+    TraceError
+        ``too_short``, ``nan_gap``, ``time_goes_back``, ``time_stands_still``.
+    """
+    if faults := unreadable(trace):
+        raise TraceError(faults)
+    time = apart_in_time(np.asarray(trace.time_s, float))
+    raw = np.asarray(trace.force_N, float)
+    noise = noise_of(raw)
+    spikes = impulse_spikes(raw, noise)
+    problems = spike_problems(trace, spikes)
+    force = without_spikes(raw, spikes)
+    fault = recorder_fault(trace, force)
+    noise = min(noise, noise_of(force)) if problems else noise
+    calm = median_of_three(force)
+    smooth = running_mean(calm, max(1, force.size // _SMOOTHED))
+    displacement = None if trace.displacement_m is None else np.asarray(trace.displacement_m, float)
+    return Signal(time, force, calm, smooth, displacement, noise, fault, problems, trace.file)
 
 
 def file_row(trace: Trace, index: int) -> int:
@@ -130,6 +176,24 @@ def without_spikes(force: FloatArray, spikes: NDArray[np.bool_]) -> FloatArray:
     return np.interp(index, index[~spikes], force[~spikes])
 
 
+def recorder_fault(trace: Trace, force: FloatArray) -> Problem | None:
+    """How the recorder failed, if it did: saturated at the largest force, or stuck at one value.
+
+    ``force`` (n,) is that of the trace with impulses taken out; a stuck recorder shows in the force as recorded.
+    """
+    if clipped := flat_top(force):
+        kind, (first, run) = "saturated", clipped
+        stays = f"the force stays at its largest value for {run} data points"
+        what = f"{stays}: the load cell or the recorder was saturated"
+    elif still := standstill(np.asarray(trace.force_N, float)):
+        kind, (first, run) = "stuck", still
+        what = f"the force keeps the same value for {run} data points: the sensor or the recorder stopped working"
+    else:
+        return None
+    found = f"{trace.force_N[first]:.6g} N"
+    return Problem(kind, what, trace.file or None, file_row(trace, first), "force", found)
+
+
 def flat_top(force: FloatArray) -> tuple[int, int] | None:
     """(first index, length) of a run of equal samples at the largest force that chance does not give, or None.
 
@@ -176,12 +240,6 @@ def standstill(force: FloatArray) -> tuple[int, int] | None:
         return None
     elsewhere = np.concatenate((force[:start], force[start + run :]))
     pairs = np.concatenate((equal[:start], equal[start + run - 1 :]))
-    if elsewhere.size < MINIMUM_SAMPLES or sample_noise(elsewhere) < _NO_NOISE * span:
+    if elsewhere.size < MINIMUM_SAMPLES or not _beyond_chance(run, pairs, force.size):
         return None
-    return (start, run) if _beyond_chance(run, pairs, force.size) else None
-
-
-def noise_of(force: FloatArray) -> float:
-    """Sample noise, or a small fraction of the range if the trace has none, so that it can be a denominator."""
-    floor = 1e-6 * float(np.ptp(force))
-    return max(sample_noise(force), floor)
+    return None if sample_noise(elsewhere) < _NO_NOISE * span else (start, run)

@@ -1,4 +1,4 @@
-"""Parts of a study for the figures: samples in order, loads, fits, traces thinned for drawing."""
+"""What is looked up in a study: its samples in order, the flat one, its load levels, its fits."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 from tribo.records import FloatArray, LawFit, Pattern, Study
 
 LOAD_TOLERANCE = 0.02  # loads closer than this (relative) are repeats of one load
-PAGE_POINTS = 1200  # a page is 190 mm wide: more points along a line cannot be seen
 
 
 def flat_sample(study: Study) -> str:
@@ -39,18 +38,6 @@ def fit_of(fits: Iterable[LawFit], sample: str, regime: str) -> LawFit | None:
     return next((f for f in fits if f.sample == sample and f.regime == regime), None)
 
 
-def welch_dof(*components: tuple[float, float]) -> float:
-    """Degrees of freedom of a sum of (standard uncertainty, degrees of freedom), Welch-Satterthwaite (GUM G.4).
-
-    NaN where a part has an uncertainty without degrees of freedom, infinite where no part is uncertain.
-    """
-    uncertain = [(u, dof) for u, dof in components if u != 0]
-    if not all(dof > 0 for _, dof in uncertain):
-        return float("nan")
-    parts = sum(u**4 / dof for u, dof in uncertain)
-    return float(sum(u**2 for u, _ in uncertain) ** 2 / parts) if parts > 0 else float("inf")
-
-
 def load_levels(normal_load_N: FloatArray, tolerance: float = LOAD_TOLERANCE) -> FloatArray:
     """The mean load of the level each load belongs to: loads within ``tolerance`` are one level."""
     loads = np.asarray(normal_load_N, float)
@@ -62,22 +49,3 @@ def load_levels(normal_load_N: FloatArray, tolerance: float = LOAD_TOLERANCE) ->
     levels = np.empty_like(loads)
     levels[order] = means[level]
     return levels
-
-
-def thin_trace(time: FloatArray, force: FloatArray, points: int = PAGE_POINTS) -> tuple[FloatArray, FloatArray]:
-    """At most about ``points`` samples that look the same: lowest and highest of each stretch, in order.
-
-    No spike or dip is lost, as it would be by taking every n-th sample.
-    """
-    n = len(force)
-    if n <= points:
-        return np.asarray(time), np.asarray(force)
-    stretch = -(-n // (points // 2))
-    padded = np.full(-(-n // stretch) * stretch, np.nan)
-    padded[:n] = force
-    rows = padded.reshape(-1, stretch)
-    starts = np.arange(len(rows)) * stretch
-    lowest = starts + np.argmin(np.where(np.isnan(rows), np.inf, rows), axis=1)
-    highest = starts + np.argmax(np.where(np.isnan(rows), -np.inf, rows), axis=1)
-    index = np.unique(np.concatenate([[0, n - 1], lowest, highest]))
-    return np.asarray(time)[index], np.asarray(force)[index]

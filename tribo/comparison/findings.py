@@ -11,7 +11,8 @@ from typing import Literal
 import numpy as np
 import pandas as pd
 
-from tribo.figures import agreement, select
+from tribo.comparison import study_lookup
+from tribo.comparison.agreement import ratios as ratios_of, welch_dof
 from tribo.records import REGIMES, LawFit, Regime, Study
 
 Verdict = Literal["agrees", "model too high", "model too low", "inconclusive"]
@@ -86,8 +87,8 @@ class Agreement:
 
 def agreements(study: Study) -> list[Agreement]:
     """Every sample in both regimes, static first; empty without a comparison."""
-    ratios = agreement.numbers(study)
-    flat = select.flat_sample(study)
+    ratios = ratios_of(study)
+    flat = study_lookup.flat_sample(study)
     return [
         Agreement(str(sample), regime, tuple(_load_ratios(part)), sample == flat)
         for regime in REGIMES
@@ -122,7 +123,7 @@ class Ranking:
 
 def common_loads(study: Study) -> tuple[float, float, float]:
     """Lowest, middle and highest load level of the campaign, in newton."""
-    levels = np.unique(select.load_levels(np.array([t.normal_load_N for t in study.ingested.campaign.tests])))
+    levels = np.unique(study_lookup.load_levels(np.array([t.normal_load_N for t in study.ingested.campaign.tests])))
     return float(levels[0]), float(levels[len(levels) // 2]), float(levels[-1])
 
 
@@ -152,7 +153,7 @@ def _differ(a: LawFit, b: LawFit, load: float) -> bool:
     from scipy.stats import t
 
     u_a, u_b = float(a.force_u_N(load)), float(b.force_u_N(load))
-    half = float(t.ppf(0.975, select.welch_dof((u_a, a.dof), (u_b, b.dof)))) * math.hypot(u_a, u_b)
+    half = float(t.ppf(0.975, welch_dof((u_a, a.dof), (u_b, b.dof)))) * math.hypot(u_a, u_b)
     return abs(float(a.force_N(load) - b.force_N(load))) > half
 
 
@@ -195,8 +196,8 @@ def _direction_ratio(study: Study, names: tuple[str, str, str], regime: Regime, 
 
     assert study.comparison is not None
     pattern, x, y = names
-    measured = [select.fit_of(study.fits, s, regime) for s in (x, y)]
-    model = [select.fit_of(study.comparison.simulated, s, regime) for s in (x, y)]
+    measured = [study_lookup.fit_of(study.fits, s, regime) for s in (x, y)]
+    model = [study_lookup.fit_of(study.comparison.simulated, s, regime) for s in (x, y)]
     if any(f is None for f in measured + model):
         return None
     (fx, fy), (mx, my) = [[f for f in pair if f is not None] for pair in (measured, model)]
@@ -204,7 +205,7 @@ def _direction_ratio(study: Study, names: tuple[str, str, str], regime: Regime, 
     if not ratio > 0:
         return None
     ux, uy = (float(f.force_u_N(load) / f.force_N(load)) for f in (fx, fy))
-    half = float(t.ppf(0.975, select.welch_dof((ux, fx.dof), (uy, fy.dof)))) * math.hypot(ux, uy)
+    half = float(t.ppf(0.975, welch_dof((ux, fx.dof), (uy, fy.dof)))) * math.hypot(ux, uy)
     simulated = float(mx.force_N(load) / my.force_N(load))
     return DirectionRatio(
         pattern, (x, y), regime, load, ratio, ratio * math.exp(-half), ratio * math.exp(half), simulated

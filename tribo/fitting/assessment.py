@@ -1,0 +1,58 @@
+"""What is reported beside the fits: other weights and laws, uncertainty budget, power and outlying pulls."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Any
+
+import pandas as pd
+
+from tribo.errors import FitError
+from tribo.fitting.budget import campaign_budgets
+from tribo.fitting.mixed import mixed_model
+from tribo.fitting.outlying import outlying_pulls, outlying_specimens
+from tribo.fitting.paired import differences_table, paired_differences
+from tribo.fitting.power import power_of_campaign
+from tribo.fitting.samples import fit_samples
+from tribo.fitting.three_term import fit_three_term
+from tribo.fitting.weighting import WEIGHTS
+from tribo.records import REGIMES, Ingested, LawFit
+
+
+def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> dict[str, Any]:
+    """The results that complete the fits of a study, by the name of their field in ``Study``."""
+    table, area = ingested.table(), ingested.campaign.nominal_area_m2
+    budgets = campaign_budgets(ingested, fits, weights=weights)
+    parts = [b.table().assign(sample=b.fit.sample, regime=b.fit.regime) for b in budgets]
+    power: list[str] = []
+    outlying: list[str] = []
+    for regime in REGIMES:
+        with suppress(FitError):
+            power += [p.text() for p in power_of_campaign(table, regime, area, weights=weights)]
+        for look in (outlying_pulls, outlying_specimens):
+            with suppress(FitError):
+                outlying += [found.text() for found in look(table, regime, area)]
+    return {
+        "other_fits": _other_fits(ingested, weights),
+        "budget": pd.concat(parts, ignore_index=True) if parts else None,
+        "power": tuple(power),
+        "outlying": tuple(outlying),
+        "differences": differences_table(paired) if (paired := paired_differences(fits)) else None,
+    }
+
+
+def _other_fits(ingested: Ingested, weights: str) -> tuple[LawFit, ...]:
+    """The same law under the other weights, mixed models where they converge, and the three-term law."""
+    table, area = ingested.table(), ingested.campaign.nominal_area_m2
+    fractions = {s: ingested.campaign.area_fraction(s) for s in sorted(set(table["sample"]))}
+    found: list[LawFit] = []
+    for regime in REGIMES:
+        for others in WEIGHTS:
+            if others != weights:
+                with suppress(FitError):  # "repeats" needs repeats, "ratio" loads above zero
+                    found += fit_samples(table, regime, area, weights=others)
+        mixed = (mixed_model(rows, regime, area) for _, rows in table.groupby("sample"))
+        found += [fit for fit in mixed if fit is not None]
+        with suppress(FitError):
+            found.append(fit_three_term(table, regime, area, fractions))
+    return tuple(found)
