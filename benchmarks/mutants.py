@@ -84,7 +84,8 @@ class Watch:
     def __init__(self, folder: Path) -> None:
         import coverage
 
-        self.coverage = coverage.Coverage(data_file=None, include=[f"{folder / place}*" for place in ROOMS.values()])
+        places = [str(folder / place) for place in ROOMS.values()]
+        self.coverage = coverage.Coverage(data_file=None, include=[*places, *(f"{place}/*" for place in places)])
         self.seconds: dict[str, float] = {}
         self.begin, self.unfit = 0.0, set[str]()  # skipped and failed tests kill no mutant
         self.coverage.start()
