@@ -6,6 +6,7 @@ from .diagnosis_tables import (
     residual_table as residual_table,
     weighing_table as weighing_table,
 )
+from .in_simulator import parse_given as parse_given, parse_with as parse_with, simulate_with as simulate_with
 from .plan import Plan as Plan, plan_design as plan_design
 from .simulated_extension import with_simulation as with_simulation
 from .statistics.predictor import (

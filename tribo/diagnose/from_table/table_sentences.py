@@ -99,11 +99,13 @@ def misfit_sentence(outlooks: Sequence[Outlook]) -> str:
     free = [o for o in outlooks if o.reading.correlation == 0.0 and o.reading.specimens == 1]
     failing = sum(o.p_misfit < LEVEL for o in possible)
     main = outlooks[0]
+    verb = "differs" if main.p_misfit < LEVEL else "does not differ"
     text = (
-        f"The model calibrated on the flat sample fails on Table 2 beyond chance: adjusted p {p_text(main.p_misfit)} "
-        f"for a correlation of mu and tau0 of {main.reading.correlation:.2f}, which loads spread evenly over 3 to 25 "
-        f"kPa would give. It fails in {failing} of {len(possible)} readings with a correlation that is possible for a "
-        "line fit over these loads."
+        f"The model calibrated on the flat sample {verb} from Table 2 beyond chance: adjusted p "
+        f"{p_text(main.p_misfit)} for a correlation of mu and tau0 of {main.reading.correlation:.2f}, "
+        "which loads spread evenly over 3 to 25 "
+        f"kPa would give. It differs beyond chance in {failing} of {len(possible)} readings with a correlation that is "
+        "possible for a line fit over these loads."
     )
     if free and all(o.p_misfit >= LEVEL for o in free):
         text += (
