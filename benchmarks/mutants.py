@@ -39,7 +39,7 @@ ROOMS = {
     "readers: reading": "tribo/readers/core/reading.py",
 }
 TESTS = ("traces", "fitting", "diagnose", "mechanisms", "mechanisms_in_model", "readers", "ingestion")
-LIMIT_S = 90.0  # of processor time for the tests of one mutant, as they take without it
+LIMIT_S = 30.0  # of processor time for the tests of one mutant, as they take without it
 LIBRARIES = ("h5py", "numba", "numpy", "pandas", "pint", "pytest", "scipy.optimize", "scipy.special",
              "scipy.stats", "statsmodels.api", "xarray")  # fmt: skip
 

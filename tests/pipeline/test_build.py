@@ -264,6 +264,6 @@ def test_an_unusable_campaign_is_named_and_keeps_no_other_back(tmp_path: Path) -
     first = lab.build()
     assert (first.status, first.said["status"]) == (3, {"broken": "unusable"})
     index = first.after["current/index.html"].decode()
-    assert "unusable input" in index
+    assert "input not usable" in index
     assert "this file does not exist" in index
     assert lab.build().said["steps"] == []
