@@ -243,8 +243,12 @@ def outcome(copy: Path, watched: dict[str, Any], mutant: dict[str, Any], log: Pa
         status = in_a_child(copy, work, 30 + 10 * spent, log)
     finally:
         file.write_text(before, encoding="utf-8")
-    by = next((line for line in log.read_text(errors="replace").splitlines() if line[:6] in ("FAILED", "ERROR ")), "")
-    what = "survived" if status == 0 else "killed" if status > 0 else "stopped"
+    said = log.read_text(errors="replace")
+    by = next((line for line in said.splitlines() if line[:6] in ("FAILED", "ERROR ")), "")
+    if status == 0 or (status > 0 and not by and "loading conftest" not in said):
+        what = "survived"  # or pytest itself refused: nothing was shown
+    else:
+        what = "killed" if status > 0 else "stopped"
     return {**mutant, "outcome": what, "tests": len(tests), "by": by[:160], "s": round(time.monotonic() - begin, 1)}
 
 
