@@ -3,12 +3,13 @@
 #   make test    lint, types and tests
 #   make docs    the documentation, into out/docs; warnings are errors, internal links are checked
 #   make blind   campaigns with hidden effects, about an hour on two cores; continues a run that was stopped
+#   make mutants 300 changes of the code at random, each tried against the quick tests; about two hours; continues too
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint types pytest docs links bench blind clean
+.PHONY: demo test lint types pytest docs links bench blind mutants clean
 
 $(VENV)/.run: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -49,6 +50,13 @@ bench: $(VENV)/.dev
 
 blind: $(VENV)/.dev
 	$(BIN)/python benchmarks/blind.py run out/blind.jsonl
+
+$(VENV)/.mutants: $(VENV)/.dev
+	$(PIP) -e '.[mutants]'
+	touch $@
+
+mutants: $(VENV)/.mutants
+	$(BIN)/python benchmarks/mutants.py run out/mutants
 
 clean:
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import shutil
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -46,56 +47,77 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {p.name: p.read_bytes() for p in folder.glob("*")}
 
 
-def test_a_second_start_computes_nothing_and_says_the_same(fitted: Fitted, tmp_path: Path) -> None:
-    first, computed = run(fitted, tmp_path)
-    again, recomputed = run(fitted, tmp_path)
-    assert "calibration" in computed
-    assert len([name for name in computed if name.endswith(".nc")]) == 4
+@dataclass(frozen=True)
+class First:
+    """A prediction from nothing, what had to be computed for it, and the folder of what it keeps: for tests to copy."""
+
+    prediction: Prediction
+    computed: set[str]
+    kept: Path
+
+
+@pytest.fixture(scope="module")
+def first(fitted: Fitted, tmp_path_factory: pytest.TempPathFactory) -> First:
+    kept = tmp_path_factory.mktemp("first")
+    return First(*run(fitted, kept), kept)
+
+
+@pytest.fixture
+def kept(first: First, tmp_path: Path) -> Path:
+    """A copy of what the first prediction keeps."""
+    return Path(shutil.copytree(first.kept, tmp_path / "kept"))
+
+
+def test_a_second_start_computes_nothing_and_says_the_same(fitted: Fitted, first: First, kept: Path) -> None:
+    again, recomputed = run(fitted, kept)
+    assert "calibration" in first.computed
+    assert len([name for name in first.computed if name.endswith(".nc")]) == 4
     assert recomputed == set()
-    assert again.table.equals(first.table)
-    assert [r.force_N.tolist() for r in again.example_runs] == [r.force_N.tolist() for r in first.example_runs]
+    assert again.table.equals(first.prediction.table)
+    assert [r.force_N.tolist() for r in again.example_runs] == [
+        r.force_N.tolist() for r in first.prediction.example_runs
+    ]
 
 
-def test_a_damaged_cell_is_run_again_and_no_other(fitted: Fitted, tmp_path: Path) -> None:
-    first, _ = run(fitted, tmp_path)
-    damaged = sorted(tmp_path.glob("B@*.nc"))[0]
+def test_a_damaged_cell_is_run_again_and_no_other(fitted: Fitted, first: First, kept: Path) -> None:
+    damaged = sorted(kept.glob("B@*.nc"))[0]
     damaged.write_bytes(b"not HDF5")
-    again, recomputed = run(fitted, tmp_path)
+    again, recomputed = run(fitted, kept)
     assert recomputed == {damaged.name}
-    assert again.table.equals(first.table)
+    assert again.table.equals(first.prediction.table)
 
 
-def test_runs_of_another_seed_replace_those_there_are(fitted: Fitted, tmp_path: Path) -> None:
-    run(fitted, tmp_path)
-    before = set(contents(tmp_path))
-    run(fitted, tmp_path, seed=1)
-    cells = {name for name in contents(tmp_path) if name.endswith(".nc")}
+def test_runs_of_another_seed_replace_those_there_are(fitted: Fitted, kept: Path) -> None:
+    before = set(contents(kept))
+    run(fitted, kept, seed=1)
+    cells = {name for name in contents(kept) if name.endswith(".nc")}
     assert len(cells) == 4
     assert not cells & before
 
 
-def test_cells_run_one_by_one_are_what_a_prediction_takes(fitted: Fitted, tmp_path: Path) -> None:
+def test_cells_run_one_by_one_are_what_a_prediction_takes(fitted: Fitted, kept: Path) -> None:
     ingested, fits = fitted
-    options = stages.StudyOptions(runs=2, kept=tmp_path)
+    for cell in kept.glob("*.nc"):
+        cell.unlink()
+    options = stages.StudyOptions(runs=2, kept=kept)
     (only_b,) = {c.sample for c in stages.simulate_cells(ingested, fits, options, "B")}
     assert only_b == "B"
-    cells = {p.name for p in tmp_path.glob("*.nc")}
+    cells = {p.name for p in kept.glob("*.nc")}
     stages.simulate_cells(ingested, fits, options, "F")
     assert len(cells) == 2
-    _, computed = run(fitted, tmp_path)
+    _, computed = run(fitted, kept)
     assert computed == set()
     stages.simulate_cells(ingested, fits, replace(options, seed=1), "calibration")
-    assert list(tmp_path.glob("*.nc")) == []
+    assert list(kept.glob("*.nc")) == []
     with pytest.raises(CampaignError, match="no simulation has this name"):
         stages.simulate_cells(ingested, fits, options, "B@1Pa")
 
 
-def test_the_flat_law_is_all_the_model_sees_of_the_measurement(fitted: Fitted, tmp_path: Path) -> None:
+def test_the_flat_law_is_all_the_model_sees_of_the_measurement(fitted: Fitted, first: First, tmp_path: Path) -> None:
     ingested, fits = fitted
     alone = tuple(f for f in fits if f.sample == "F")
-    with_all, _ = run((ingested, fits), tmp_path / "a")
-    flat_only, _ = run((ingested, alone), tmp_path / "b")
-    assert flat_only.table.equals(with_all.table)
+    flat_only, _ = run((ingested, alone), tmp_path)
+    assert flat_only.table.equals(first.prediction.table)
 
 
 def test_a_campaign_without_a_flat_law_is_refused(fitted: Fitted) -> None:

@@ -39,6 +39,13 @@ def test_suction_is_confused_with_a_load_error_and_named_so() -> None:
     assert any({"suction", "normal_load_error"} <= set(names) for names in p.tied)
 
 
+def test_mechanisms_whose_effects_are_alike_in_part_only_are_not_called_confused() -> None:
+    """A specimen's own pulls are counted apart from the clock, and rims are not in proportion to open area."""
+    found = by_name(plan_design(hidden().campaign))
+    assert found["run_in"].confused_with == ()
+    assert "edge_adhesion" not in found["suction"].confused_with
+
+
 def test_four_times_the_tests_find_a_trend_of_half_the_size() -> None:
     """Run-in depends on repeats only, so its detectable size falls with the square root of their number."""
     campaign = hidden(design=Design(specimens=2)).campaign

@@ -97,7 +97,7 @@ def site_with(tmp_path: Path, record: dict[str, object] | None, waiting: list[st
     (tmp_path / "current").mkdir()
     config = {
         "campaigns": {"a": {"waiting": waiting}} if listed else {}, "ready": {"a": {"digest": "D"}},
-        "version": "1", "options": {"words": "w"},
+        "sources": "1", "options": {"words": "w"},
     }  # fmt: skip
     (state / "build.json").write_text(json.dumps(config))
     if record is not None:

@@ -19,7 +19,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from tribo import __version__
 from tribo.errors import CampaignError, Problem, TriboError
 from tribo.pipeline.dated_copies import date_build
 from tribo.pipeline.scan import Dropped, difference, scan
@@ -181,7 +180,7 @@ def _configuration(found: Sequence[Dropped], inputs: Path, state: Path, options:
         "campaigns": campaigns,
         "digest": hashlib.sha256(listing.encode()).hexdigest(),
         "options": options.of_commands(),
-        "version": __version__,
+        "sources": package_sources(),
         "python": sys.executable,
         "threads": options.jobs,
     }

@@ -89,7 +89,7 @@ def _state(name: str, record: Mapping[str, Any] | None, config: Mapping[str, Any
     waiting = config["campaigns"][name]["waiting"]
     if waiting:
         return "waiting", tuple(waiting)
-    expected = f"{config['ready'][name]['digest']} {config['version']} {config['options']['words']}"
+    expected = f"{config['ready'][name]['digest']} {config['sources']} {config['options']['words']}"
     if record is None or record["digest"] != expected:
         return "failed", ("a step failed; see its log in .tribo/log; the next build will try it again",)
     if record["status"] == "unusable":
