@@ -82,7 +82,6 @@ CONSTANTS = {
     "IN_COMMON": Constant((NAMING,), "IN_COMMON"),
     "FORM": Constant((SCREEN,), "FORM"),
     "PER_PARAMETER": Constant((NAMING,), "PER_PARAMETER"),
-    "LABEL_SD": Constant((NAMING,), "LABEL_SD"),
     "CERTAIN": Constant((EVIDENCE,), "CERTAIN", on_clean=True),
     "specimen gain, expected": Constant((NOISE,), "SIZE_PRIORS", _row(0, 0), on_clean=True),
     "specimen slope, expected": Constant((NOISE,), "SIZE_PRIORS", _row(2, 0), on_clean=True),
