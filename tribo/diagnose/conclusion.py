@@ -15,8 +15,10 @@ from tribo.diagnose.sentences import (
     causes_from_evidence,
     causes_weighed,
     each_once,
+    excess_in_words,
     exclusions_beside,
     misfits_of,
+    misfits_of_patterns,
     patterns_apart,
     summary,
 )
@@ -24,6 +26,7 @@ from tribo.diagnose.statistics.direct_evidence import TraceFindings, stated_evid
 from tribo.diagnose.statistics.gain import gain, gain_of_zero
 from tribo.diagnose.statistics.interval import recovered
 from tribo.diagnose.statistics.linearisation import ModelFit, StartEffects
+from tribo.diagnose.statistics.pattern_excess import PatternExcess, pattern_excess
 from tribo.diagnose.verdict import Estimate, Excluded, Gain, Outcome, Verdict
 
 NEEDED = 3.7  # strength that chance reaches in one campaign of a hundred, where none was simulated
@@ -48,7 +51,9 @@ class Findings:
 def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
     """The verdict; ``rng`` draws the resamples behind the error of the gain."""
     baseline, named, level = found.baseline, found.named, found.level
+    excess = _excess(found)
     outcome = _outcome(named, bool(found.evidence.certain), level)
+    outcome = "unknown" if excess is not None and outcome == "no_misfit" else outcome
     smallest = _smallest_effects(found)
     shown = _shown(named) if outcome in ("named", "undetermined") else []
     gained = _gain(found, outcome, rng)
@@ -60,9 +65,12 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
     causes = [c for c, _ in direct] + sorted(weighed, key=lambda c: -c.weight)
     if named is not None and named.causes and outcome == "unknown" and not patterns_apart(misfits):
         misfits = [*misfits_of(named.left, level, flat), *misfits]
+    misfits = [*(misfits_of_patterns(excess) if excess is not None else ()), *misfits]
     excluded = exclusions_beside(causes, found.barred, named.weighed if named is not None else ())
     shown_misfits = each_once(misfits)
     text = summary(outcome, causes, equivalent, misfits, smallest)
+    if excess is not None:
+        text = f"{text} {excess_in_words(excess)}"
     return Verdict(
         verdict=outcome,
         misfits=shown_misfits,
@@ -75,6 +83,13 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
         text=text,
         smallest_effects=smallest,
     )
+
+
+def _excess(found: Findings) -> PatternExcess | None:
+    """Of the model with the causes that were named, where the patterned samples differ from it beyond its own error."""
+    named = found.named
+    excess = pattern_excess(named.model if named is not None and named.causes else found.baseline)
+    return excess if excess is not None and excess.p < found.level else None
 
 
 def _outcome(named: Named | None, direct: bool, level: float) -> Outcome:

@@ -12,6 +12,7 @@ from tribo.diagnose.search.screen import Screen
 from tribo.diagnose.statistics.direct_evidence import Evidence, stated_evidence
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting
+from tribo.diagnose.statistics.pattern_excess import WITHIN, PatternExcess
 from tribo.diagnose.terms import ABSORBED, in_words, not_varied
 from tribo.diagnose.verdict import Cause, Estimate, Excluded, Misfit, Outcome
 from tribo.mechanisms.direct_estimates import TraceEvidence
@@ -282,6 +283,26 @@ def _named(causes: Sequence[Cause], equivalent: Sequence[Sequence[str]]) -> str:
     return (
         f"The model fails beyond chance. {cause}: {'; '.join(reasons)}. With {these} included, the remaining "
         f"differences are within chance.{told}"
+    )
+
+
+def misfits_of_patterns(excess: PatternExcess) -> list[Misfit]:
+    """Each patterned sample with the mean by which its friction differs from the model, the largest first."""
+    found = []
+    for sample, both in excess.percent.items():
+        for observable, percent in zip(("static", "sliding"), both, strict=True):
+            side = "above" if percent > 0 else "below"
+            what = f"{WHAT[observable][0].upper()}{WHAT[observable][1:]} of {sample}"
+            text = f"{what} is on average {abs(percent):.0f} % {side} the model (adjusted p {p_text(excess.p)})."
+            found.append(Misfit(observable, sample, "sample", percent, excess.p, text))
+    return sorted(found, key=lambda m: -abs(m.effect_percent))
+
+
+def excess_in_words(excess: PatternExcess) -> str:
+    """By how much the patterned samples differ from the model."""
+    return (
+        f"The patterned samples differ from the model by about {excess.factor:.1f} times the error that is stated for "
+        f"it (p {p_text(excess.p)} for a factor of at most {WITHIN:g})."
     )
 
 
