@@ -52,8 +52,7 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
     """The verdict; ``rng`` draws the resamples behind the error of the gain."""
     baseline, named, level = found.baseline, found.named, found.level
     excess = _excess(found)
-    outcome = _outcome(named, bool(found.evidence.certain), level)
-    outcome = "unknown" if excess is not None and outcome == "no_misfit" else outcome
+    outcome = _outcome(named, excess, bool(found.evidence.certain), level)
     smallest = _smallest_effects(found)
     shown = _shown(named) if outcome in ("named", "undetermined") else []
     gained = _gain(found, outcome, rng)
@@ -92,9 +91,11 @@ def _excess(found: Findings) -> PatternExcess | None:
     return excess if excess is not None and excess.p < found.level else None
 
 
-def _outcome(named: Named | None, direct: bool, level: float) -> Outcome:
+def _outcome(named: Named | None, excess: PatternExcess | None, direct: bool, level: float) -> Outcome:
+    if named is None and not direct:
+        return "no_misfit" if excess is None else "unknown"
     if named is None:
-        return "named" if direct else "no_misfit"
+        return "named"
     if not named.causes or named.p_left < level:
         return "unknown"
     return "undetermined" if named.rivals else "named"
