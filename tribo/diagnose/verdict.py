@@ -11,7 +11,8 @@ from typing import Any, Literal
 from tribo.records import SetAside
 
 SCHEMA = "tribo.verdict/1"
-Outcome = Literal["no_misfit", "named", "undetermined", "unknown"]
+Outcome = Literal["no_misfit", "named", "undetermined", "partly", "unknown"]
+CERTAIN_CAUSES: tuple[Outcome, ...] = ("named", "undetermined", "partly")  # verdicts that hold causes
 
 
 @dataclass(frozen=True)

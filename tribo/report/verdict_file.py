@@ -20,6 +20,7 @@ OUTCOMES = {
     "no_misfit": "No misfit found.",
     "named": "The cause was identified.",
     "undetermined": "The model does not fit the data, and several causes explain the misfit about equally well.",
+    "partly": "A cause was identified, and a misfit remains that it does not explain.",
     "unknown": "The model does not fit the data, and no known mechanism explains the misfit.",
 }
 
