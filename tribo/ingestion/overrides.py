@@ -12,6 +12,7 @@ import numpy as np
 
 from tribo.campaign.table import Table, TestRow, read_table
 from tribo.errors import CampaignError, Problem, TraceError
+from tribo.links import LEADS_OUT, leads_out
 from tribo.records import ByHand, Ingested, Override, Pull, SetAside, Trace
 
 TIMES = ("window_start_s", "window_end_s", "peak_s")
@@ -77,8 +78,11 @@ def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
     ------
     CampaignError
         With every fault at once: an unknown test, action or column, a number that is none, a time outside the trace.
+        Or the file is a link that leads out of its folder.
     """
     file = path.name
+    if leads_out(path.parent, path):
+        raise CampaignError(Problem("link", LEADS_OUT, file=file))
     try:
         table = read_table(path, file)
     except OSError:
