@@ -7,12 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tribo.diagnose.layers import cause_layers, pattern_layers, remainder_layers
 from tribo.diagnose.next_test import next_test_of
 from tribo.diagnose.search.naming import Named
 from tribo.diagnose.search.rivals import weights_of
 from tribo.diagnose.search.screen import Screen
 from tribo.diagnose.search.weighing import Candidate
 from tribo.diagnose.sentences import (
+    NOT_TESTABLE,
     Weighed,
     causes_from_evidence,
     causes_weighed,
@@ -30,7 +32,7 @@ from tribo.diagnose.statistics.gain import gain, gain_of_zero
 from tribo.diagnose.statistics.interval import recovered
 from tribo.diagnose.statistics.linearisation import ModelFit, StartEffects
 from tribo.diagnose.statistics.pattern_excess import PatternExcess, pattern_excess
-from tribo.diagnose.verdict import CERTAIN_CAUSES, Estimate, Excluded, Gain, Outcome, Verdict
+from tribo.diagnose.verdict import CERTAIN_CAUSES, Estimate, Excluded, Gain, Layer, Outcome, Verdict
 
 NEEDED = 3.7  # strength that chance reaches in one campaign of a hundred, where none was simulated
 
@@ -79,13 +81,24 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
         misfits=shown_misfits,
         causes=tuple(causes),
         equivalent=equivalent,
-        excluded=tuple(excluded),
+        excluded=tuple(e for e in excluded if not e.reason.startswith(NOT_TESTABLE)),
+        not_testable=tuple(e for e in excluded if e.reason.startswith(NOT_TESTABLE)),
+        layers=_layers(found, rng),
         gain=gained,
         set_aside=baseline.setup.observations.set_aside,
         next_test=next_test_of(named, outcome, misfits, baseline.setup.observations.conditions),
         text=text,
         smallest_effects=smallest,
     )
+
+
+def _layers(found: Findings, rng: np.random.Generator) -> tuple[Layer, ...]:
+    """Of the final model: pattern corrections, causes, and what is left."""
+    named, baseline = found.named, found.baseline
+    if named is None:
+        return tuple(pattern_layers(baseline))
+    causes = cause_layers(named, found.screened, baseline, rng)
+    return (*pattern_layers(named.model), *causes, *remainder_layers(named))
 
 
 def _excess(found: Findings) -> PatternExcess | None:

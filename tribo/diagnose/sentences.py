@@ -46,17 +46,17 @@ def misfits_of(screened: Screen, level: float, flat: str = "") -> list[Misfit]:
             break
         if look.kind != "mechanism" and not look.is_taken_up(flat) and key not in seen:
             seen.add(key)
-            found.append(_misfit(look, float(screened.size[k]), screened.coefficients[k], p))
+            found.append(misfit_of(look, float(screened.size[k]), screened.coefficients[k], p))
     if not found and len(order) and screened.p[order[0]] < level:
         k = order[0]
         p = float(screened.p[k])
-        found.append(_misfit(screened.looks[k], float(screened.size[k]), screened.coefficients[k], p))
+        found.append(misfit_of(screened.looks[k], float(screened.size[k]), screened.coefficients[k], p))
     return found
 
 
 def misfits_remaining(remainders: Sequence[Remainder]) -> list[Misfit]:
     """What follows a recorded column and no mechanism, in the order in which it was found."""
-    return [_misfit(r.look, r.size, r.coefficients, r.p) for r in remainders]
+    return [misfit_of(r.look, r.size, r.coefficients, r.p) for r in remainders]
 
 
 def each_once(misfits: Sequence[Misfit]) -> tuple[Misfit, ...]:
@@ -72,7 +72,7 @@ def _covariate(look: Look) -> str:
     return look.acting.mechanism.column(look.acting.choice)
 
 
-def _misfit(look: Look, size: float, coefficients: np.ndarray, p: float) -> Misfit:
+def misfit_of(look: Look, size: float, coefficients: np.ndarray, p: float) -> Misfit:
     percent = 100.0 * float(np.expm1(min(size, 5.0)))
     of = f" of {look.sample}" if look.sample and look.kind != "specimen" else ""
     text = f"{sentence_case(WHAT[look.observable])}{of} {_predicate(look, coefficients)}"

@@ -1,4 +1,4 @@
-"""verdict.json (schema tribo.verdict/1), and the same verdict as a section of the report."""
+"""verdict.json (schema tribo.verdict/2), and the same verdict as a section of the report."""
 
 from __future__ import annotations
 

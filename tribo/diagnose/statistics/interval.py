@@ -13,7 +13,7 @@ import numpy as np
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import FIXED, N_LAW, PATTERN
-from tribo.diagnose.statistics.scatter import log_size_prior
+from tribo.diagnose.statistics.scatter import Noise, log_size_prior
 from tribo.mechanisms.record import Mechanism
 from tribo.records import FloatArray
 
@@ -91,16 +91,19 @@ def intervals(f: ModelFit, index: int) -> list[tuple[float, float]]:
 
 
 def standard_errors(f: ModelFit, index: int) -> list[float]:
-    """Of every parameter of one mechanism, from the curvature; zero for one held at a bound.
-
-    The weighted normal equations overstate what a pull tells about its location: under the bivariate t with ``tail``
-    degrees of freedom the expected information is smaller by (tail + 2) / (tail + 4) (Lange, Little and Taylor, JASA
-    84, 881, 1989, appendix B).
-    """
+    """Of every parameter of one mechanism, from the curvature; zero for one held at a bound."""
     first = N_LAW + sum(len(v) for v in f.values[:index])
     diagonal = np.diag(f.covariance)[first : first + len(f.values[index])]
-    informed = (f.noise.tail + 2.0) / (f.noise.tail + 4.0)
-    return [float(np.sqrt(max(d, 0.0) / informed)) for d in diagonal]
+    return [float(np.sqrt(max(d, 0.0) / informed_share(f.noise))) for d in diagonal]
+
+
+def informed_share(noise: Noise) -> float:
+    """Of the information in the weighted normal equations, what a pull really tells about its location.
+
+    Under the bivariate t with ``tail`` degrees of freedom the expected information is smaller by
+    (tail + 2) / (tail + 4) (Lange, Little and Taylor, JASA 84, 881, 1989, appendix B).
+    """
+    return (noise.tail + 2.0) / (noise.tail + 4.0)
 
 
 def _profile(f: ModelFit, index: int, k: int, error: float) -> tuple[float, float]:
