@@ -31,17 +31,22 @@ def recovered(f: ModelFit, index: int) -> list[tuple[float, float, float]]:
     """
     if not (f.setup.group == PATTERN).any():
         return [(float(v), *ends) for v, ends in zip(f.values[index], intervals(f, index), strict=True)]
-    factors = f.noise.pattern * np.exp(PATTERN_STEPS)
-    fits = [with_pattern_error(f, factor) for factor in factors]
-    log_weight = np.array([g.score + _log_freedom(g) for g in fits]) + log_size_prior(PATTERN, factors)
-    weight = np.exp(log_weight - log_weight.max())
-    weight /= weight.sum()
+    weight, fits = over_pattern_error(f)
     ends = np.array([intervals(g, index) for g in fits])  # (errors, parameters, 2)
     values = np.array([g.values[index] for g in fits])
     return [
         _averaged(weight, values[:, k], ends[:, k], (p.low, p.high))
         for k, p in enumerate(f.acting[index].mechanism.parameters)
     ]
+
+
+def over_pattern_error(f: ModelFit) -> tuple[FloatArray, list[ModelFit]]:
+    """The fit at several sizes of the pattern error, and how likely each makes the campaign, adding to one."""
+    factors = f.noise.pattern * np.exp(PATTERN_STEPS)
+    fits = [with_pattern_error(f, factor) for factor in factors]
+    log_weight = np.array([g.score + _log_freedom(g) for g in fits]) + log_size_prior(PATTERN, factors)
+    weight = np.exp(log_weight - log_weight.max())
+    return weight / weight.sum(), fits
 
 
 def _log_freedom(f: ModelFit) -> float:

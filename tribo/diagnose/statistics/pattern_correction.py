@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm
 
-from tribo.diagnose.statistics.interval import NORMAL_90, informed_share
+from tribo.diagnose.statistics.interval import NORMAL_90, informed_share, over_pattern_error
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import PATTERN
 from tribo.records import REGIMES, FloatArray
@@ -40,15 +41,14 @@ def pattern_corrections(f: ModelFit) -> list[PatternCorrection]:
     """The corrections of all patterned samples, static before sliding; none where no sample is patterned.
 
     The estimates are shrunk towards the model by as much as the campaign itself suggests: the size of the pattern error
-    is learnt from all samples together.
+    is learnt from all samples together, and the estimates are averaged over how large it may be.
     """
     s = f.setup
     patterns = np.flatnonzero(s.group == PATTERN)
     if not len(patterns):
         return []
-    spread = f.covariance[-s.random.shape[2] :, -s.random.shape[2] :][np.ix_(patterns, patterns)]
-    spread = spread / informed_share(f.noise)
-    effects, columns = f.effects[patterns], s.random[:, :, patterns]
+    effects, spread = _averaged(f, patterns)
+    columns = s.random[:, :, patterns]
     sample, load = s.observations.conditions.sample, s.observations.conditions.normal_load_N
     there = [str(name) for name in np.unique(sample) if np.any(columns[sample == name])]
     found = []
@@ -63,6 +63,17 @@ def pattern_corrections(f: ModelFit) -> list[PatternCorrection]:
             }
             found.append(PatternCorrection(name, regime, _percent(mean, sd), at, chance))
     return found
+
+
+def _averaged(f: ModelFit, patterns: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+    """Effects and their covariance over the sizes that the pattern error may have."""
+    weight, fits = over_pattern_error(f)
+    effects = np.array([g.effects[patterns] for g in fits])
+    mean = weight @ effects
+    apart = np.einsum("i,ip,iq->pq", weight, effects - mean, effects - mean)
+    q = f.setup.random.shape[2]
+    within = [g.covariance[-q:, -q:][np.ix_(patterns, patterns)] / informed_share(g.noise) for g in fits]
+    return mean, np.tensordot(weight, np.array(within), axes=1) + apart
 
 
 def _estimate(row: FloatArray, effects: FloatArray, spread: FloatArray) -> tuple[float, float]:
