@@ -38,7 +38,7 @@ INSTRUMENT = {"mass_u_g": 0.1, "wire_angle_deg": 1.0, "load_cell_u_N": 0.01, "no
 def campaign() -> pd.DataFrame:
     """Five samples of three specimens, five loads and two repeats, S pulled both ways; and three odd samples.
 
-    One pull of B is twice as high, one specimen of A, of five, more than twice; one force of F is missing. "lone" has one
+    One pull of B is twice as high, one specimen of five of A more than twice; one force of F is missing. "lone" has one
     specimen, "apart" one load for each of its specimens, "still" one load in all.
     """
     rows = [
