@@ -64,9 +64,7 @@ def test_an_unknown_uncertainty_counts_as_none() -> None:
 
 @pytest.mark.parametrize("regime", ["static_N", "sliding_N"])
 @pytest.mark.parametrize("force", [0.0, -1.0, math.nan])
-def test_a_test_without_a_positive_force_in_each_regime_is_set_aside_with_the_reason(
-    regime: str, force: float
-) -> None:
+def test_a_test_without_a_positive_force_in_each_regime_is_set_aside_with_the_reason(regime: str, force: float) -> None:
     tests = [row(k) for k in range(4)]
     pulls = {t.test_id: pull(k) for k, t in enumerate(tests)} | {"T1": pull(1, **{regime: force})}
     o = seen(tests, pulls)
