@@ -27,7 +27,7 @@ def campaigns(jump: float = 0.0) -> list[CampaignRow]:
 
 
 def rendered(rows: list[CampaignRow]) -> str:
-    changes = change_points({"|".join(k): v for k, v in series(rows).items()})
+    changes = change_points({series_name(k): v for k, v in series(rows).items()})
     return page(rows, changes)
 
 
