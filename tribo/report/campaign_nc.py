@@ -120,7 +120,7 @@ def _diagnosed(diagnosis: Diagnosis) -> dict[str, xr.Dataset]:
 
 
 def _table(frame: pd.DataFrame, dimension: str, covariates: Iterable[str] = ()) -> xr.Dataset:
-    """A table as variables of one dimension; texts of ``covariates`` become numbers where all of them are written so."""
+    """A table as variables of one dimension; texts of ``covariates`` become numbers where all are written as such."""
     variables: dict[str, Any] = {}
     for name in frame.columns:
         safe = stem = re.sub(r"[/\s\0]+", "_", str(name)).strip(".") or "unnamed"
