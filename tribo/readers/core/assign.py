@@ -9,13 +9,15 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from tribo.errors import Problem, ReadError
-from tribo.quantities import QUANTITIES, match_quantity, quantity_named, unit_factor
+from tribo.quantities import QUANTITIES, match_quantity, narrow, quantity_named, unit_factor
 
 NEEDED = ("time", "friction force")
 ASKED = "asked for"
 _BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^\[\]()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
-_AFTER_MARK = re.compile(r"^(.*\S)\s*(?:\s?/|\sin\s|,\s|_)\s*([A-Za-zµμ°%][\w/µμ°%^·²-]*)$")
-_MEANS_NORMAL_BESIDE_FRICTION = {"load", "last", "applied load", "charge"}
+_AFTER_MARK = re.compile(r"^(.*\S)\s*(?:\s?/|\sin\s|,\s|_)\s*((?:[^\W\d_]|[°%])[\w/°%^·²-]*)$")
+_MEANS_NORMAL_BESIDE_FRICTION = {
+    "load", "last", "applied load", "charge", "carga", "obciążenie", "нагрузка", "载荷", "负荷", "荷重", "하중",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -204,6 +206,7 @@ def _bare(unit: str) -> str:
 @lru_cache(maxsize=1024)
 def split_unit(name: str) -> tuple[str, str | None]:
     """("Kraft", "kN") of "Kraft [kN]", "Kraft (kN)", "Kraft / kN", "Kraft/kN", "Kraft in kN", "Kraft_kN"."""
+    name = narrow(name)
     found = _BRACKETS.search(name)
     if found:
         return name[: found.start()].strip(), found.group(1).strip()
