@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from tribo.errors import Problem, ReadError
-from tribo.readers.core.assign import match_column, split_unit
 from tribo.readers.core.family import Family
+from tribo.readers.core.names import match_column, split_unit
 from tribo.readers.core.source import Source
 from tribo.records import FloatArray
 
