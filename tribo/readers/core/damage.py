@@ -72,7 +72,7 @@ def without_empty_end(
 ) -> tuple[str, Problem | None]:
     """The text without the rows at its end that have no number in a column used, and the doubt that says so.
 
-    Only where another column goes on, as tables of records of unequal length do, or where all used columns end.
+    Only where another column goes on, as in tables of records of unequal length, or where the time or all of them end.
     """
     lines = text.split("\n")
     keep = len(lines)
@@ -92,12 +92,12 @@ def _is_past_the_end(line: str, layout: Layout, used: Sequence[int]) -> bool:
     ended = [empty[index] for index in used]
     others = [cell for k, cell in enumerate(cells) if k not in used and not empty[k]]
     goes_on = any(_not_a_number(cell, layout.decimal) is None for cell in others)
-    return all(ended) or (any(ended) and goes_on)
+    return all(ended) or ended[0] or (any(ended) and goes_on)  # the first column used is the time
 
 
 def empty_end(rows: int, file: str, row: int) -> Problem:
     """The doubt about rows at the end of a table that hold no number in a column used."""
-    what = f"{rows} rows at the end have no numbers and are left out; this is the first"
+    what = f"{rows} rows at the end lack the time or another value and are left out; this is the first"
     return Problem("empty_end", what, file, row)
 
 

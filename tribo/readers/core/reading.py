@@ -20,10 +20,12 @@ from tribo.readers.core.grouping import ambiguity, ambiguous_mark
 from tribo.readers.core.layout import Layout, cut, sniff
 from tribo.readers.core.sidecar import names_beside
 from tribo.readers.core.source import HEAD_BYTES, Source
-from tribo.readers.core.tables_in_file import Block, side_by_side, split_blocks, whole_block
+from tribo.readers.core.tables_in_file import Block, split_blocks, whole_block
+from tribo.readers.core.wide import looks_wide, parted, records_side_by_side
 from tribo.readers.families import family_of
 from tribo.records import FloatArray
 
+_WIDE = 'for several records side by side: friction_force = "* [N]", or "F* [N]" for the columns whose names begin so'
 _FLAGS = {"missing_unit": "column_without_unit"}
 _CLOCK = re.compile(r"(?<!\d)\d{1,2}:\d\d:\d\d(?!\d)")
 
@@ -68,12 +70,14 @@ def read_source(source: Source, given: Given) -> Contents:
     """
     family = family_of(source)
     layout = layout_of(source, given)
+    try:
+        records = records_side_by_side(layout, given)
+    except ReadError as why:
+        raise ReadError(replace(p, file=source.file, row=layout.names_row) for p in why.problems) from None
+    if records:
+        return _gather(list(parted(source, layout, records, given)), family)
     if source.arrays:
         return Contents((_read_block(source, family, Block(layout, 0, 0), given),))
-    beside = list(side_by_side(layout))
-    if beside:
-        parts = [_specimen(source, layout, columns, number) for number, columns in beside]
-        return _gather([(part, block) for part, block in parts], family, given)
     whole = whole_block(source, layout)
     try:
         return Contents((_read_block(source, family, whole, given),))
@@ -81,7 +85,7 @@ def read_source(source: Source, given: Given) -> Contents:
         blocks, footer = split_blocks(source, layout, given)
         if len(blocks) == 1 and blocks[0].end == whole.end:
             raise
-    return replace(_gather([(source, block) for block in blocks], family, given), footer=footer)
+    return replace(_gather([(source, block, given) for block in blocks], family), footer=footer)
 
 
 def layout_of(source: Source, given: Given) -> Layout:
@@ -106,12 +110,12 @@ def _named_from_beside(source: Source, layout: Layout) -> Layout:
     return replace(layout, names=found[0], metadata={**layout.metadata, "names of columns from": found[1]})
 
 
-def _gather(parts: Sequence[tuple[Source, Block]], family: Family, given: Given) -> Contents:
+def _gather(parts: Sequence[tuple[Source, Block, Given]], family: Family) -> Contents:
     readings: list[Reading] = []
     problems: list[Problem] = []
     misfits: list[Problem] = []
     others: list[str] = []
-    for source, block in parts:
+    for source, block, given in parts:
         try:
             readings.append(_read_block(source, family, block, given))
         except ReadError as why:
@@ -141,6 +145,8 @@ def _read_block(source: Source, family: Family, block: Block, given: Given) -> R
         problems = [_of_a_clock(p, source, block) for p in problems]
         if family.advice:
             problems = [replace(p, allowed=family.advice) for p in problems]
+        elif looks_wide(layout):
+            problems = [replace(p, allowed=f"{_WIDE}; {p.allowed}") for p in problems]
         raise ReadError(problems) from None
     used = [c.index for c in assignment.columns]
     if not given.decimal:
@@ -226,28 +232,6 @@ def _row_of(source: Source, block: Block, sample: int) -> int:
                 return row
         row -= 1  # a chunk ends with its last line's end
     return row
-
-
-def _specimen(source: Source, layout: Layout, columns: tuple[int, ...], number: int) -> tuple[Source, Block]:
-    """One of several specimens side by side, as a table of its own that keeps the rows of the file."""
-    text = source.text(bytes(source.data[source.offset(source.start, layout.header_rows) :]))
-    rows = [cut(line, layout.delimiter) for line in text.split("\n") if line.strip()]
-    rows = [row for row in rows if any(k < len(row) and row[k] for k in columns)]
-    delimiter = layout.delimiter if layout.delimiter != layout.decimal else "\t"
-    lines = [delimiter.join(row[k] if k < len(row) else "" for k in columns) for row in rows]
-    data = ("\n" * layout.header_rows + "\n".join(lines) + "\n").encode(source.codec, errors="replace")
-    alone = replace(
-        layout,
-        delimiter=delimiter,
-        n_cells=len(columns),
-        names=tuple(layout.names[k] for k in columns),
-        units=tuple(layout.units[k] for k in columns),
-        filled=tuple(layout.filled[k] for k in columns),
-    )
-    above = [cut(line, layout.delimiter) for line in source.head[: (layout.names_row or 1) - 1]]
-    label = next((row[columns[0]] for row in reversed(above) if columns[0] < len(row)), "") or f"specimen {number}"
-    part = replace(source, data=data, start=0, part=label)
-    return part, replace(whole_block(part, alone), label=label)
 
 
 def split_at_restarts(reading: Reading) -> tuple[Reading, ...]:

@@ -1,9 +1,8 @@
-"""Tables in a file: one below the other (steps, segments, specimens), or side by side."""
+"""Tables in a file, one below the other: steps, segments, specimens."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from tribo.errors import ReadError
@@ -77,15 +76,3 @@ def _labelled(block: Block, k: int) -> Block:
         if _LABEL.search(key) and not key.lower().startswith(("step type", "number of")):
             return replace(block, label=f"{key} {value}".strip())
     return replace(block, label=f"table {k + 1}")
-
-
-def side_by_side(layout: Layout) -> Iterator[tuple[int, tuple[int, ...]]]:
-    """(number, columns) of each specimen where the same names stand several times in a row; nothing otherwise."""
-    names = [name for name in layout.names if name]
-    for width in range(2, len(names) // 2 + 1):
-        repeats, rest = divmod(len(names), width)
-        if not rest and names == names[:width] * repeats and len(set(names[:width])) == width:
-            at = [k for k, name in enumerate(layout.names) if name]
-            for k in range(repeats):
-                yield k + 1, tuple(at[k * width : (k + 1) * width])
-            return
