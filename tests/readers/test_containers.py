@@ -84,7 +84,7 @@ def test_an_entry_of_a_file_that_is_no_zip_does_not_exist(tmp_path: Path) -> Non
 
 
 def test_a_packed_file_is_unpacked_up_to_a_limit_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(packed, "MOST_UNPACKED_BYTES", 3_000_000)
+    monkeypatch.setattr(packed, "MOST_UNPACKED_EXPORT_BYTES", 3_000_000)
     for path in (zipped(tmp_path / "a.zip", {"a.csv": bytes(4_000_000)}), tmp_path / "a.gz"):
         if path.suffix == ".gz":
             path.write_bytes(gzip.compress(bytes(4_000_000)))

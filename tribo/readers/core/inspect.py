@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tribo.errors import Problem, ReadError
+from tribo.input_files import MAPPED_BYTES
 from tribo.readers.core.assign import NEEDED, Column, assign
 from tribo.readers.core.export import read_contents
 from tribo.readers.core.family import Family
@@ -17,7 +18,7 @@ from tribo.readers.core.given import Columns, Given, parse_columns, what_is_know
 from tribo.readers.core.layout import Layout
 from tribo.readers.core.names import match_column
 from tribo.readers.core.reading import Contents, Reading, layout_of, split_at_restarts
-from tribo.readers.core.source import MAPPED_BYTES, Source
+from tribo.readers.core.source import Source
 from tribo.readers.families import family_of, open_sources
 from tribo.records import Correction, FloatArray
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import IO, Protocol
 
 from tribo.errors import Problem, ReadError
+from tribo.limits import MOST_UNPACKED_EXPORT_BYTES
 from tribo.readers.core.source import read_bytes
 
-MOST_UNPACKED_BYTES = 400_000_000
 _CHUNK = 1 << 20
 _MOST_LISTED = 12
 _GZIP, _ZIP = b"\x1f\x8b", b"PK\x03\x04"
@@ -132,8 +132,8 @@ def _bounded(packed: _Readable, file: str) -> bytes:
     found = bytearray()
     while chunk := packed.read(_CHUNK):
         found += chunk
-        if len(found) > MOST_UNPACKED_BYTES:
-            allowed = f"at most {MOST_UNPACKED_BYTES} bytes unpacked"
+        if len(found) > MOST_UNPACKED_EXPORT_BYTES:
+            allowed = f"at most {MOST_UNPACKED_EXPORT_BYTES} bytes unpacked"
             raise ReadError(Problem("too_large", "the file is too large", file=file, allowed=allowed))
     return bytes(found)
 

@@ -12,7 +12,7 @@ import numpy as np
 from tribo.errors import Problem, ReadError
 from tribo.readers.core.assign import Assignment, Column, assign
 from tribo.readers.core.body import parse_block
-from tribo.readers.core.checks import Finding, check_scale, check_time
+from tribo.readers.core.checks import Finding, beyond_measurement, check_scale, check_time
 from tribo.readers.core.complete import NO_TIME, complete
 from tribo.readers.core.family import Family
 from tribo.readers.core.given import Given
@@ -154,6 +154,10 @@ def _read_block(source: Source, family: Family, block: Block, given: Given) -> R
     written, end = parse_block(source, block, used)
     arrays = {c.quantity: _in_si(row, c) for c, row in zip(assignment.columns, written, strict=True)}
     arrays, assignment, completed = complete(arrays, assignment, given.correction, source.file)
+    labels = {c.quantity: c.label for c in assignment.columns}
+    impossible = beyond_measurement(arrays, source.file, labels, partial(_row_of, source, block))
+    if impossible:
+        raise ReadError(impossible)
     findings = (*_findings(source, block, assignment, arrays), *completed)
     findings += (Finding(end.kind, end),) if end else ()
     return Reading(source, family, block, assignment, arrays, findings)

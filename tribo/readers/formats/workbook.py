@@ -8,11 +8,13 @@ import mmap
 import re
 import zipfile
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from tribo.errors import Problem, ReadError
 from tribo.readers.core.packed import is_workbook_archive
 from tribo.readers.core.source import Source
+from tribo.zips import size_problems
 
 _OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 _ZIP = b"PK\x03\x04"
@@ -56,9 +58,8 @@ def open_workbook(path: Path, file: str, raw: bytes | mmap.mmap) -> tuple[Source
 def _refuse_large(data: bytes, file: str) -> None:
     with zipfile.ZipFile(io.BytesIO(data)) as packed:
         entries = packed.infolist()
-        unpacked = sum(entry.file_size for entry in entries)
-        if unpacked > _MOST_UNPACKED_BYTES:
-            raise _too_large(f"{unpacked} bytes unpacked", f"at most {_MOST_UNPACKED_BYTES}", file)
+        if problems := size_problems(entries, len(data), file, _MOST_UNPACKED_BYTES):
+            raise ReadError(replace(problem, kind="too_large") for problem in problems)
         for entry in entries:
             if entry.filename.startswith("xl/worksheets/") and entry.filename.endswith(".xml"):
                 cells = _spanned(packed.read(entry))
