@@ -28,6 +28,7 @@ MOST_STEPS = 100_000_000  # of a run
 # Zip archives
 MOST_ENTRIES = 50_000
 MOST_UNPACKED_BYTES = 2_000_000_000
+MOST_UNPACKED_EXPORT_BYTES = 400_000_000  # of an export in a .zip or .gz, which is held in memory
 MOST_EXPANSION = 200  # text of numbers shrinks about three- to tenfold
 SMALL_ENTRY_BYTES = 10_000_000  # below this no expansion is a danger
 
