@@ -39,8 +39,8 @@ def written(folder: Path) -> Path:
     stand_in.chmod(0o755)
     ready = {
         name: {
-            "path": f"/drop/{name}", "digest": f"d {name}", "samples": [name], "cells": [], "files": f"inputs/{name}.json",
-            "overrides": shlex.join(["--overrides", f"/drop/{name}{ODD}"]),
+            "path": f"/drop/{name}", "digest": f"d {name}", "samples": [name], "cells": [],
+            "files": f"inputs/{name}.json", "overrides": shlex.join(["--overrides", f"/drop/{name}{ODD}"]),
         }
         for name in NAMES
     }  # fmt: skip
