@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from tribo.errors import Problem, ReadError
+from tribo.limits import MOST_WORKBOOK_BYTES
 from tribo.readers.core.source import Source
 from tribo.zips import size_problems
 
 _OLD_EXCEL = b"\xd0\xcf\x11\xe0"
-_MOST_UNPACKED_BYTES = 200_000_000
 
 
 def is_workbook(head: bytes) -> bool:
@@ -38,7 +38,7 @@ def open_workbook(path: Path, file: str) -> tuple[Source, ...]:
             )
     try:
         with zipfile.ZipFile(path) as packed:
-            problems = size_problems(packed.infolist(), path.stat().st_size, file, _MOST_UNPACKED_BYTES)
+            problems = size_problems(packed.infolist(), path.stat().st_size, file, MOST_WORKBOOK_BYTES)
         if problems:
             raise ReadError(replace(problem, kind="too_large") for problem in problems)
         sheets = _sheets(path)
