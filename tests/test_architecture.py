@@ -12,11 +12,12 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
-GROUND = {"errors", "quantities", "records", "published"}
+GROUND = {"errors", "quantities", "zeroing", "records", "published"}
 STREET: tuple[tuple[str, set[str]], ...] = (
     ("errors", set()),
     ("quantities", {"errors"}),
-    ("records", {"errors"}),
+    ("zeroing", set()),
+    ("records", {"errors", "zeroing"}),
     ("published", set()),
     ("store", GROUND),
     ("campaign", GROUND),

@@ -13,6 +13,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from tribo.errors import Problem
 from tribo.quantities import QUANTITIES, quantity_named
+from tribo.zeroing import zero_choice
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -20,6 +21,14 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
+
+
+def _a_zero(given: str | float | list[float]) -> str | float | list[float]:
+    zero_choice(given)
+    return given
+
+
+Zero = Annotated[str | float | list[float], AfterValidator(_a_zero)]
 
 
 class CampaignTable(_Strict):
@@ -31,6 +40,8 @@ class CampaignTable(_Strict):
     nominal_area_mm2: Positive
     slider_mass_g: NotNegative = 0.0
     pull_speed_mm_s: Positive | None = None
+    zero: Zero = ""
+    load_zero: Zero = ""
 
 
 class PatternTable(_Strict):

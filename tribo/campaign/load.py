@@ -10,9 +10,10 @@ from pathlib import Path, PurePosixPath
 
 from tribo.campaign.choice import overlap, split_choice
 from tribo.campaign.described import CampaignFile, PatternTable, read_description
-from tribo.campaign.table import COUNTS, KNOWN, LOADS, NUMBERS, TestRow, read_tests_table
+from tribo.campaign.table import COUNTS, KNOWN, LOADS, NUMBERS, ZEROS, TestRow, read_tests_table
 from tribo.errors import CampaignError, Problem
 from tribo.records import STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
+from tribo.zeroing import ALLOWED, zero_choice
 
 _NOT_WORTH_A_NOTE = (".", "~$", "Thumbs.db")
 TOML = "campaign.toml"
@@ -83,6 +84,8 @@ def _campaign(
         problems=tuple(problems),
         columns=described.columns,
         instrument=described.instrument.model_dump(exclude_none=True),
+        zero=zero_choice(general.zero),
+        load_zero=zero_choice(general.load_zero),
     )
 
 
@@ -201,9 +204,20 @@ def _number_faults(row: TestRow, load_in_export: bool) -> list[Problem]:
             loads.append((column, value))
         if column in COUNTS and value is not None and value != int(value):
             problems.append(Problem("not_a_number", "not a whole number", *at, column, cell, "1, 2, ..."))
-        if column in ("speed_mm_s", "hold_s") and value is not None and value < 0:
+        if column in ("speed_mm_s", "hold_s", "stiffness_N_per_m") and value is not None and value < 0:
             problems.append(Problem("negative", "must not be negative", *at, column, cell, "0 or more"))
-    return problems + _load_faults(row, dict(loads), load_in_export)
+    return problems + _zero_faults(row) + _load_faults(row, dict(loads), load_in_export)
+
+
+def _zero_faults(row: TestRow) -> list[Problem]:
+    problems = []
+    for column in ZEROS:
+        cell = row.cells.get(column, "")
+        try:
+            zero_choice(cell)
+        except ValueError:
+            problems.append(Problem("unknown_zero", "not a zero", TESTS, row.row, column, cell, ALLOWED))
+    return problems
 
 
 def _load_faults(row: TestRow, loads: Mapping[str, float], load_in_export: bool) -> list[Problem]:
@@ -281,6 +295,9 @@ def _test(row: TestRow, described: CampaignFile) -> Test:
         operator=cells.get("operator", ""),
         covariates={name: cell for name, cell in cells.items() if name and name not in KNOWN},
         row=row.row,
+        zero=zero_choice(cells.get("zero") or described.campaign.zero),
+        load_zero=zero_choice(cells.get("load_zero") or described.campaign.load_zero),
+        stiffness_N_per_m=numbers["stiffness_N_per_m"] or described.instrument.stiffness_N_per_m,
     )
 
 

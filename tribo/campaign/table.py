@@ -13,10 +13,13 @@ from tribo.errors import Problem
 
 REQUIRED = ("test_id", "file", "sample")
 LOADS = ("mass_g", "normal_load_N")
-NUMBERS = ("mass_g", "normal_load_N", "speed_mm_s", "hold_s", "temperature_C", "humidity_pct")
+NUMBERS = (
+    "mass_g", "normal_load_N", "speed_mm_s", "hold_s", "temperature_C", "humidity_pct", "stiffness_N_per_m",
+)  # fmt: skip
 COUNTS = ("repeat", "run_order", "specimen_run")
 TEXTS = ("specimen", "direction", "started_at", "operator", "exclude")
-KNOWN = (*REQUIRED, *NUMBERS, *COUNTS, *TEXTS)
+ZEROS = ("zero", "load_zero")
+KNOWN = (*REQUIRED, *NUMBERS, *COUNTS, *TEXTS, *ZEROS)
 
 
 @dataclass(frozen=True)
