@@ -108,7 +108,8 @@ class Campaign:
     ``tests`` are the usable rows, ``set_aside`` the rows with faults or an ``exclude`` reason.
     ``samples`` maps each sample name to its pattern (``Sx`` is pattern S pulled along x).
     ``chosen_flat`` names the flat sample that calibrates the model where a user chose one; every stage asks
-    :attr:`flat_sample`.
+    :attr:`flat_sample`. ``inputs`` maps each input file that was read, by its path in the campaign, to the SHA-256 of
+    the bytes that were read.
     """
 
     title: str
@@ -127,6 +128,7 @@ class Campaign:
     chosen_flat: str = ""
     zero: ZeroChoice = DEFAULT
     load_zero: ZeroChoice = DEFAULT
+    inputs: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @property
     def flat_samples(self) -> tuple[str, ...]:

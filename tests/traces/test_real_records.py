@@ -100,7 +100,8 @@ def test_friction_in_motor_oil_is_a_constant_and_a_slope() -> None:
     for file in sorted((REAL / "motor-oil-rotary").glob("*.txt")):
         table = np.genfromtxt(file, delimiter=";", skip_header=1)
         columns = {"normal_force_N": table[:, 2], "speed_m_s": table[:, 5] * 2 * math.pi * 8e-3 / 3}
-        pull = read_record(Trace(file.stem, table[:, 1], table[:, 3] / (8e-3 / 3), columns=columns), test=a_test("at rest"))
+        trace = Trace(file.stem, table[:, 1], table[:, 3] / (8e-3 / 3), columns=columns)
+        pull = read_record(trace, test=a_test("at rest"))
         loads.append(pull.recorded_load_N)
         forces.append(pull.sliding_N)
     assert len(forces) == 16

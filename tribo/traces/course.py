@@ -17,7 +17,7 @@ Range = tuple[int, int]
 
 _FLAT_START = 0.02  # share of a record that shows the load before contact, if there is such a part
 _LEVEL = 0.1  # share of the swing of a load within which it counts as level, and above which the bodies touch
-_UNLOADED = 0.5  # an unloaded level lies below this share of the load later on
+_UNLOADED = 0.2  # an unloaded level lies below this share of the load later on
 _AT_REST = 0.05  # share of the usual speed below which the drive stands still
 _ONE_WAY = 0.5  # net over total displacement from which on a displacement channel shows the travel
 _FEWEST_AT_REST = 5
@@ -232,7 +232,8 @@ def _returns(signal: Signal, span: Range) -> bool:
     force = signal.smooth_N[span[0] : span[1]]
     if force.size < 4 * _FEWEST_AT_REST:
         return False
-    start = float(np.median(signal.calm_N[span[0] : span[0] + _FEWEST_AT_REST]))
+    begin = signal.force_N[span[0] : span[0] + _FEWEST_AT_REST]
+    start = min(float(np.median(begin)), float(np.median(begin[:3])), key=abs)
     later = force[force.size // 4 :]
     if np.median(later) < 0:
         later, start = -later, -start

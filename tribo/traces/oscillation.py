@@ -42,8 +42,8 @@ def oscillation_of(
 
     A fall counts from ``smallest_drop_N`` on (default: a tenth of the range of the force over ten cycles, eight times
     its noise at the least; slow waves of the force do not count). A cycle that rises for most of its time is
-    stick-slip, one that rises for half of it an inertial oscillation. ``drive_N_per_s`` is k v, where stiffness and speed are known: a slider that sticks is loaded at this
-    rate. ``free_period_s`` is 2 pi sqrt(m/k).
+    stick-slip, one that rises for half of it an inertial oscillation. ``drive_N_per_s`` is k v, where stiffness and
+    speed are known: a slider that sticks is loaded at this rate. ``free_period_s`` is 2 pi sqrt(m/k).
     """
     time, force = fine = _calm(time_s, force_N)
     least = _smallest_drop(force) if smallest_drop_N is None else smallest_drop_N
