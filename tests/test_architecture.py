@@ -24,7 +24,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("zeroing", set()),
     ("records", {"errors", "zeroing"}),
     ("published", set()),
-    ("zips", {"errors"}),
+    ("zips", {"errors", "limits"}),
     ("links", set()),
     ("store", GROUND),
     ("campaign", GROUND),
