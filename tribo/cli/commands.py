@@ -11,6 +11,7 @@ import click
 from tribo import __version__
 from tribo.cli.build_commands import build, schedule
 from tribo.cli.console import Console, command_options, set_aside_record, status_of
+from tribo.cli.discover_command import discover
 from tribo.cli.simulate_command import simulate
 
 if TYPE_CHECKING:
@@ -119,6 +120,7 @@ def main() -> None:
 main.add_command(build)
 main.add_command(schedule)
 main.add_command(simulate)
+main.add_command(discover)
 
 
 @main.command()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -58,9 +58,9 @@ def numeric_columns(c: Conditions) -> dict[str, FloatArray]:
     return found
 
 
-def shapes_of(c: Conditions) -> list[tuple[tuple[Shape, ...], float]]:
-    """Shapes of one column and products of two, each with what its choice costs."""
-    columns = numeric_columns(c)
+def shapes_of(c: Conditions, without: Collection[str] = ()) -> list[tuple[tuple[Shape, ...], float]]:
+    """Shapes of one column and products of two, each with what its choice costs; ``without`` some columns."""
+    columns = {name: values for name, values in numeric_columns(c).items() if name not in without}
     found: list[tuple[tuple[Shape, ...], float]] = []
     monotone = {}
     for name, values in columns.items():
@@ -69,6 +69,8 @@ def shapes_of(c: Conditions) -> list[tuple[tuple[Shape, ...], float]]:
         kinds = [s.kind for s in each]
         found += [((s,), float(np.log(kinds.count(s.kind)))) for s in each]
     for name, names in _named_columns(c).items():
+        if name in without:
+            continue
         found += [((Shape("level", name, level=level),), float(np.log(len(names)))) for level in names]
     pairs = [p for p in combinations(columns, 2) if not all(name.endswith("pressure_Pa") for name in p)]
     found += [((monotone[a], monotone[b]), float(np.log(len(pairs)))) for a, b in pairs]
@@ -90,7 +92,7 @@ def _of_column(name: str, x: FloatArray) -> Iterator[Shape]:
         yield from (Shape("saturating", name, low, high, width=(high - low) / k) for k in (20, 8, 3))
     if len(distinct) > 7:
         for p in np.quantile(x, np.arange(1, 8) / 8):
-            yield from (Shape("hump", name, low, high, place=float(p), width=(high - low) / k) for k in (16, 8))
+            yield from (Shape("hump", name, low, high, place=float(p), width=(high - low) / k) for k in (16, 8, 4))
     if name == "run_order" and len(distinct) > 18:
         yield from (Shape("wave", name, low, high, width=(high - low + 1) / k) for k in range(1, CYCLES + 1))
     if name == "elapsed_s" and high - low > DAY_S:

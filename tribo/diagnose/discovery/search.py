@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,6 +74,8 @@ def discover_laws(
 ) -> Discovery:
     """Add the best law of the grammar while it is beyond what chance gives the best of all laws.
 
+    A column has one law: what a second one would add is an error in the form of the first.
+
     Parameters
     ----------
     model : ModelFit
@@ -90,7 +92,8 @@ def discover_laws(
     table: tuple[Scored, ...] = ()
     searched = 0
     while len(found) < MOST_LAWS:
-        scored, chance = _searched(model, replicates, rng, progress)
+        used = {name for law in found for name in law.law.columns}
+        scored, chance = _searched(model, used, replicates, rng, progress)
         table, searched = table or tuple(scored[:SHOWN]), len(scored)
         p = _tail(chance, scored[0].net) if scored else 1.0
         if p >= level:
@@ -102,11 +105,11 @@ def discover_laws(
 
 
 def _searched(
-    model: ModelFit, replicates: int, rng: np.random.Generator, progress: Progress | None
+    model: ModelFit, used: Collection[str], replicates: int, rng: np.random.Generator, progress: Progress | None
 ) -> tuple[list[Scored], FloatArray]:
     """Every law scored, the best first, and the best net score in each simulated campaign."""
     c = model.setup.observations.conditions
-    shapes, groups = shapes_of(c), groups_of(c)
+    shapes, groups = shapes_of(c, used), groups_of(c)
     terms = _terms(model)
     measured = as_measured(model)
     best: list[Scored] = []
@@ -210,7 +213,7 @@ def _percent(law: WrittenLaw, f: ModelFit, parameters: dict[str, Estimate]) -> t
     c = f.setup.observations.conditions
     course = law.course(c)[law.weight(c) != 0]
     if course.shape[1] > 1:
-        size = 2.0 * float(np.hypot(*(parameters[name].value for name in ("a", "b"))))
+        size = 2.0 * float(np.hypot(parameters["a"].value, parameters["b"].value))
         error = (parameters["a"].high - parameters["a"].low) / 1.0
         ends = (size - 0.5 * error, size, size + 0.5 * error)
     else:

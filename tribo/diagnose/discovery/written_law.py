@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Parameter, Values, amplitude
+from tribo.mechanisms.record import Base, Choosing, Conditions, Forces, Mechanism, Parameter, Values, amplitude
 from tribo.records import REGIMES, FloatArray
 
 T, LOAD_TERM, ADHESION_TERM = "T", "load term", "adhesion term"
@@ -115,33 +115,40 @@ class WrittenLaw:
         if moving is not None:
             s = self.shapes[moving]
             text = f"place of the {s.kind} on {s.column}"
-            parameters.append(Parameter("place", UNITS.get(s.column, ""), s.low, s.high, s.place, text))
+            unit, reach = UNITS.get(s.column, ""), s.high - s.low
+            parameters.append(Parameter("place", unit, s.low, s.high, s.place, text))
+            if s.kind == "hump":
+                parameters.append(Parameter("width", unit, 0.02 * reach, reach, s.width, "standard deviation"))
 
         def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
-            here = self if moving is None else self._placed(moving, float(values[-1]))
+            here = self if moving is None else self._placed(moving, values[d:])
             change = here.course(conditions) @ values[:d] * here.weight(conditions)
             return here.changed(base, conditions.normal_load_N, change)
 
         needs = tuple(name for name in self.columns if name in UNITS and not name.endswith("pressure_Pa"))
         return Mechanism(
-            name="law of " + " and ".join(self.columns), kind="any", formula=self.formula(),
-            parameters=tuple(parameters), law=law, sign=0, regimes=REGIMES if self.regime == BOTH else (self.regime,), enters="the friction forces",
-            shows="", confused_with="", separates="", needs=needs,
+            name=f"law {self.formula()} ({self.regime}, {self.where})", kind="any", formula=self.formula(),
+            parameters=tuple(parameters), law=law, sign=0,
+            regimes=REGIMES if self.regime == BOTH else (self.regime,),
+            enters="the friction forces", shows="", confused_with="", separates="", needs=needs,
+            choosing=Choosing(held_out="loads" if self.where.startswith("sample ") else "samples"),
         )  # fmt: skip
 
     def _moving(self) -> int | None:
         """The shape whose place is fitted: of an optimum or a hump that stands alone."""
         return 0 if len(self.shapes) == 1 and self.shapes[0].kind in ("optimum", "hump") else None
 
-    def _placed(self, index: int, place: float) -> WrittenLaw:
+    def _placed(self, index: int, fitted: FloatArray) -> WrittenLaw:
         shapes = list(self.shapes)
-        shapes[index] = replace(shapes[index], place=place)
+        shapes[index] = replace(shapes[index], place=float(fitted[0]))
+        if shapes[index].kind == "hump":
+            shapes[index] = replace(shapes[index], width=float(fitted[1]))
         return replace(self, shapes=tuple(shapes))
 
     def with_values(self, values: Values) -> WrittenLaw:
         """The same law at the place that a fit found."""
         moving = self._moving()
-        return self if moving is None else self._placed(moving, float(values[-1]))
+        return self if moving is None else self._placed(moving, values[1:])
 
     def changed(self, base: Base, load_N: FloatArray, change: FloatArray) -> Forces:
         """The forces with ``change`` (n,) of ln T, or of the logarithm of the term it acts on."""
