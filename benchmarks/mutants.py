@@ -15,8 +15,10 @@ from __future__ import annotations
 
 import argparse
 import ast
+import compileall
 import json
 import os
+import py_compile
 import random
 import resource
 import shutil
@@ -52,6 +54,9 @@ def copy_of_repository(folder: Path) -> Path:
         if (ROOT / name).is_file():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, folder / name)
+    # compiled files that are checked by the text of their module, not by its date: a mutant never runs another one's
+    checked = py_compile.PycInvalidationMode.CHECKED_HASH
+    compileall.compile_dir(folder / "tribo", quiet=1, invalidation_mode=checked)
     return folder
 
 
@@ -64,7 +69,7 @@ def in_a_child(folder: Path, work: Callable[[], int], cpu_s: float, output: Path
     try:
         os.chdir(folder)
         sys.path.insert(0, str(folder))
-        sys.dont_write_bytecode = True
+        sys.dont_write_bytecode = False  # tests are compiled once
         resource.setrlimit(resource.RLIMIT_CPU, (int(cpu_s), int(cpu_s) + 5))
         with output.open("w") as out:
             os.dup2(out.fileno(), 1)
