@@ -41,7 +41,7 @@ ROOMS = {
     "readers: reading": "tribo/readers/core/reading.py",
 }
 TESTS = ("traces", "fitting", "diagnose", "mechanisms", "mechanisms_in_model", "readers", "ingestion")
-LIMIT_S = 30.0  # of processor time for the tests of one mutant, as they take without it
+LIMIT_S = 12.0  # of processor time for the tests of one mutant, as they take without it
 LIBRARIES = ("h5py", "numba", "numpy", "pandas", "pint", "pytest", "scipy.optimize", "scipy.special",
              "scipy.stats", "statsmodels.api", "xarray")  # fmt: skip
 
@@ -245,7 +245,7 @@ def outcome(copy: Path, watched: dict[str, Any], mutant: dict[str, Any], log: Pa
     file = copy / mutant["file"]
     try:
         file.write_text(after, encoding="utf-8")
-        status = in_a_child(copy, work, 30 + 10 * spent, log)
+        status = in_a_child(copy, work, 20 + 10 * spent, log)
     finally:
         file.write_text(before, encoding="utf-8")
     said = log.read_text(errors="replace")
