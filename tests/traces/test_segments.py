@@ -86,6 +86,19 @@ def test_strokes_of_both_directions_give_the_same_friction() -> None:
     assert "backward" in pulls[1].flags
 
 
+def test_a_stroke_without_a_static_peak_is_read_for_its_sliding_friction_and_a_faulty_one_is_refused() -> None:
+    record = reciprocating(zero=0.2)
+    third = (record.time_s >= 8.0) & (record.time_s < 12.0)
+    level = 1.2 + 0.01 * np.random.default_rng(9).standard_normal(record.time_s.size)
+    pulls = read_pulls(replace(record, force_N=np.where(third, level, record.force_N)))
+    assert [k for k, p in enumerate(pulls) if "no_static" in p.flags] == [2]
+    assert pulls[2].sliding_N == pytest.approx(1.0, rel=0.04)  # the reversal at its end is part of it
+    stuck = np.where(third & (record.time_s > 9.0) & (record.time_s < 11.0), record.force_N[920], record.force_N)
+    with pytest.raises(TraceError) as fault:
+        read_pulls(replace(record, force_N=stuck))
+    assert [p.kind for p in fault.value.problems] == ["stuck"]
+
+
 def test_strokes_all_one_way_have_no_zero() -> None:
     strokes = orient_strokes([Shape(noise_N=0.01, offset_N=0.3).trace()])
     assert math.isnan(strokes.zero_N)
