@@ -23,7 +23,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("quantities", {"errors"}),
     ("records", {"errors"}),
     ("published", set()),
-    ("zips", {"errors"}),
+    ("zips", {"errors", "limits"}),
     ("links", set()),
     ("store", GROUND),
     ("campaign", GROUND),

@@ -16,6 +16,7 @@ from tribo.diagnose.statistics.interval import (
     intervals,
     recovered,
     standard_errors,
+    understated,
     with_pattern_error,
 )
 from tribo.diagnose.statistics.linearisation import ModelFit
@@ -89,14 +90,16 @@ def test_an_interval_averaged_over_the_pattern_error_has_the_variance_of_the_mix
     """Normal distributions (1, 0.2) with a quarter and (2, 0.5) with three quarters of the weight."""
     weight, mean, sd = np.array([0.25, 0.75]), np.array([1.0, 2.0]), np.array([0.2, 0.5])
     ends = np.column_stack([mean - 1.645 * sd, mean + 1.645 * sd])
-    value, low, high = _averaged(weight, mean, ends, (-9.0, 9.0))
+    value, low, high = _averaged(weight, mean, ends, 1.0, (-9.0, 9.0))
     variance = 0.25 * (0.2**2 + 0.75**2) + 0.75 * (0.5**2 + 0.25**2)
     assert value == 1.75
     assert (low, high) == pytest.approx((1.75 - 1.645 * variance**0.5, 1.75 + 1.645 * variance**0.5))
-    assert _averaged(weight, mean, ends, (1.5, 1.9)) == (1.75, 1.5, 1.9)
+    assert _averaged(weight, mean, ends, 1.0, (1.5, 1.9)) == (1.75, 1.5, 1.9)
+    twice = 0.25 * (0.4**2 + 0.75**2) + 0.75 * (1.0**2 + 0.25**2)  # what the values differ by is not widened
+    assert _averaged(weight, mean, ends, 2.0, (-9.0, 9.0))[1] == pytest.approx(1.75 - 1.645 * twice**0.5)
     wider = ends + np.array([[0.0, 0.0], [0.0, 1.0]])  # the upper end of the second alone lies further out
-    assert _averaged(weight, mean, wider, (-9.0, 9.0))[1] == pytest.approx(low)
-    assert _averaged(weight, mean, wider, (-9.0, 9.0))[2] > high
+    assert _averaged(weight, mean, wider, 1.0, (-9.0, 9.0))[1] == pytest.approx(low)
+    assert _averaged(weight, mean, wider, 1.0, (-9.0, 9.0))[2] > high
 
 
 def test_a_standard_error_is_that_of_the_curvature_under_the_expected_information_of_the_t() -> None:
@@ -128,3 +131,20 @@ def test_without_patterns_there_is_nothing_to_average_over() -> None:
     f = fitted("temperature", ("temperature", 1.0))
     flat = fit(with_pattern_error(f, 1.0).setup, f.acting)
     assert recovered(flat, 0)[0] == pytest.approx((flat.values[0][0], *intervals(flat, 0)[0]))
+
+
+def test_standard_errors_are_widened_by_what_campaigns_of_the_fit_itself_show() -> None:
+    """Normal repeats under weights of a t distribution: the curvature is a little too confident, never by half."""
+    factors = [understated(fitted(name, (name, 1.5)), 0) for name in ("covariate:operator", "run_in", "tilt")]
+    assert [f.size for f in factors] == [1, 2, 1]
+    every = np.concatenate(factors)
+    assert every.min() >= 1.0
+    assert 1.02 < every.mean() < 1.2
+
+
+def test_an_interval_is_as_much_wider_as_the_errors_are_understated() -> None:
+    f = fitted("covariate:operator", ("covariate:operator", 1.5))
+    value, low, high = recovered(f, 0)[0]
+    stated = 2 * 1.645 * standard_errors(f, 0)[0]
+    assert high - low > 0.97 * stated * understated(f, 0)[0]
+    assert low < value < high

@@ -8,18 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tribo.diagnose.search import naming
-from tribo.diagnose.search.naming import (
-    CHOICES_FITTED,
-    CLOSE,
-    IN_COMMON,
-    PER_PARAMETER,
-    TIED,
-    Candidate,
-    best_beyond_chance,
-    weights_of,
-)
+from tribo.diagnose.search import rivals, weighing
+from tribo.diagnose.search.naming import best_beyond_chance
+from tribo.diagnose.search.rivals import CLOSE, IN_COMMON, TIED, sort_rivals, weights_of
 from tribo.diagnose.search.screen import FEWEST, Screen, _decided as decided, _strongest as strongest, deviate
+from tribo.diagnose.search.weighing import CHOICES_FITTED, PER_PARAMETER, Candidate, judged
 from tribo.diagnose.statistics.model import Acting
 from tribo.mechanisms.table import MECHANISMS
 
@@ -39,9 +32,9 @@ def fitted(score: float, name: str, *values: float) -> Any:
 
 def test_a_fit_earns_its_score_less_one_for_every_further_parameter_and_the_logarithm_of_its_choices() -> None:
     start: Any = SimpleNamespace(score=-100.0)
-    one = naming._judged(start, fitted(-90.0, "suction", 5e3), choosing=0.0)
+    one = judged(start, fitted(-90.0, "suction", 5e3), choosing=0.0)
     assert (one.raw, one.gain) == (10.0, 10.0)
-    three = naming._judged(start, fitted(-90.0, "cavity_collapse", 0.5, 1e4, 0.3), choosing=np.log(7.0))
+    three = judged(start, fitted(-90.0, "cavity_collapse", 0.5, 1e4, 0.3), choosing=np.log(7.0))
     assert three.raw == 10.0 - 2 * PER_PARAMETER
     assert three.gain == pytest.approx(8.0 - np.log(7.0))
     assert three.values.tolist() == [0.5, 1e4, 0.3]
@@ -51,9 +44,9 @@ def test_a_wrong_label_pays_for_being_less_or_more_than_whole() -> None:
     """Two standard deviations, of 0.15, from the whole effect cost two units of log likelihood."""
     start: Any = SimpleNamespace(score=-100.0)
     for share in (0.7, 1.3):
-        found = naming._judged(start, fitted(-90.0, "mislabelled_specimen", share), choosing=0.0)
+        found = judged(start, fitted(-90.0, "mislabelled_specimen", share), choosing=0.0)
         assert found.raw == pytest.approx(10.0 - 2.0)
-    assert naming._judged(start, fitted(-90.0, "mislabelled_specimen", 1.0), choosing=0.0).raw == 10.0
+    assert judged(start, fitted(-90.0, "mislabelled_specimen", 1.0), choosing=0.0).raw == 10.0
 
 
 def test_the_strength_of_a_candidate_is_that_of_a_normal_deviate_before_choices_are_paid_for() -> None:
@@ -72,7 +65,7 @@ def test_the_first_that_chance_does_not_make_as_strong_is_the_best() -> None:
 def ranked_by(start_left: np.ndarray, target: np.ndarray, name: str) -> list[str]:
     acting = tuple(Acting(MECHANISMS[name], str(k)) for k in range(start_left.shape[1]))
     start: Any = SimpleNamespace(acting=acting, left=start_left, target=target)
-    return [a.choice for a in naming._most_promising(start, list(range(len(acting))))]
+    return [a.choice for a in weighing._most_promising(start, list(range(len(acting))))]
 
 
 def test_of_many_choices_those_with_the_strongest_score_are_fitted_whatever_their_sign() -> None:
@@ -97,11 +90,11 @@ def sorted_by(
 ) -> tuple[list[Candidate], list[Candidate]]:
     """Those alike and the rivals, where each other candidate has a cosine with the best."""
     cosines = {id(c): cosine for cosine, c in others.items()}
-    monkeypatch.setattr(naming, "_likeness", lambda start, b, near: np.array([cosines[id(c)] for c in near]))
+    monkeypatch.setattr(rivals, "_likeness", lambda start, b, near: np.array([cosines[id(c)] for c in near]))
     start: Any = None
-    alike, rivals = naming._sort_rivals(start, best, [best, *others.values()])
+    alike, distinct = sort_rivals(start, best, [best, *others.values()])
     assert alike[0] is best
-    return list(alike[1:]), list(rivals)
+    return list(alike[1:]), list(distinct)
 
 
 def test_a_mechanism_is_told_apart_by_its_difference_or_by_having_little_in_common(
