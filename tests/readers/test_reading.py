@@ -90,3 +90,12 @@ def test_two_specimens_side_by_side_keep_their_rows_where_one_is_shorter(tmp_pat
     assert (one.time_s.size, two.time_s.size) == (6, 9)
     assert (one.first_row, two.first_row) == (3, 3)
     assert two.force_N == pytest.approx(0.2 * np.arange(9))
+
+
+def test_two_specimens_side_by_side_may_end_in_rows_without_the_cells_of_the_second(tmp_path: Path) -> None:
+    head = ["first,,second,", "Time (s),Fx (N),Time (s),Fx (N)"]
+    both = [f"{0.1 * k:.1f},{0.1 * k:.2f},{0.1 * k:.1f},{0.2 * k:.2f}" for k in range(6)]
+    longer = [f"{0.1 * k:.1f},{0.1 * k:.2f}" for k in range(6, 9)]
+    one, two = read_blocks(saved(tmp_path, [*head, *both, *longer]))
+    assert (one.time_s.size, two.time_s.size) == (9, 6)
+    assert one.force_N == pytest.approx(0.1 * np.arange(9))
