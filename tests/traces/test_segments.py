@@ -12,6 +12,7 @@ from tribo.errors import TraceError
 from tribo.records import Trace
 from tribo.traces import orient_strokes, read_pulls, split_pulls
 from tribo.traces.segments import reversals, steps
+from tribo.traces.strokes import _slides_at_once as slides_at_once
 from tribo.traces.strokes import load_of, pieces_of, sampling_clip_N, sampling_rate_Hz
 
 from .synthetic import Shape
@@ -177,3 +178,16 @@ def test_sampling_clip_is_half_the_rise_between_two_samples() -> None:
     assert sampling_clip_N(2.0, 50) == pytest.approx(0.02)
     lost = [Shape(rate_Hz=50, zero_s=2 + k / 5000).trace().force_N.max() for k in range(100)]
     assert 2.0 - np.mean(lost) < sampling_clip_N(2.0 / 1.5, 50) * 1.05
+
+
+@pytest.mark.parametrize(
+    ("climb", "swing", "at_once"),
+    [(0.0, 0.01, True), (0.15, 0.01, False), (0.15, 0.05, True), (1.2, 0.5, False)],
+)
+def test_a_piece_slides_at_once_where_it_climbs_little_for_the_swing_of_its_second_half(
+    climb: float, swing: float, at_once: bool
+) -> None:
+    """From 1 N to a top at 30 % of the piece; with a climb of 1.2 N it begins below half of its maximum."""
+    k = np.arange(400)
+    force = 1.0 + climb * np.exp(-(((k - 120) / 30) ** 2)) + swing * np.where(k % 40 < 20, 1.0, -1.0) * (k >= 200)
+    assert slides_at_once(Trace("piece", k / RATE, force)) == at_once
