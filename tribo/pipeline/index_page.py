@@ -27,7 +27,7 @@ STATES = {
 }  # fmt: skip
 VERDICTS = {
     "no_misfit": "no misfit", "named": "cause identified", "undetermined": "several possible causes",
-    "unknown": "misfit of unknown cause", "": "–",
+    "partly": "cause identified, misfit left", "unknown": "misfit of unknown cause", "": "–",
 }  # fmt: skip
 SYMBOLS = {"mu": ("μ", ""), "tau0": ("τ₀", "kPa")}
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 300.0, 136.0, 44.0, 8.0, 16.0, 18.0
