@@ -65,7 +65,12 @@ class Cell:
 
 def cell_name(sample: str, pressure_Pa: float) -> str:
     """Sample and nominal pressure as one word without a space or a slash."""
-    return f"{quote(sample, safe='')}@{pressure_Pa:.0f}Pa"
+    return f"{sample_as_word(sample)}@{pressure_Pa:.0f}Pa"
+
+
+def sample_as_word(sample: str) -> str:
+    """The name of a sample as part of a file name and of a step of a build."""
+    return quote(sample, safe="")
 
 
 def cells_of(design: Iterable[SimConfig]) -> tuple[Cell, ...]:

@@ -211,19 +211,20 @@ def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
     """Samples and cells as the description of a campaign has them; none where it cannot be read (ingest says why)."""
     from tribo.campaign import open_campaign
     from tribo.comparison.prediction import loads_to_simulate
-    from tribo.comparison.prediction_runs import cell_name
+    from tribo.comparison.prediction_runs import cell_name, sample_as_word
 
     try:
         with open_campaign(campaign.path) as opened:
             measured = {test.sample for test in opened.tests}
             samples = [s for s in opened.samples if s in measured]
+            words = [sample_as_word(s) for s in samples]
             pressures = [opened.nominal_pressure_Pa(load) for load in loads_to_simulate(opened)]
     except (CampaignError, OSError):
         return [], []
     except Exception as why:  # ingest will say it again, as the fault of this campaign
         unexpected(why, "the samples of this campaign cannot be listed", campaign.name)
         return [], []
-    return samples, [cell_name(s, p) for s in samples for p in pressures]
+    return words, [cell_name(s, p) for s in samples for p in pressures]
 
 
 def _snakemake(
