@@ -20,8 +20,10 @@ import click
 
 from tribo.errors import Problem, TriboError
 from tribo.records import SetAside
+from tribo.store.lock import BusyError
 
 DONE, UNUSABLE, SOME_SET_ASIDE = 0, 1, 3
+BUSY = 75  # EX_TEMPFAIL of sysexits.h: nothing is wrong, try again later
 
 
 @dataclass(frozen=True)
@@ -168,6 +170,9 @@ def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
         logging.basicConfig(level=logging.INFO if verbose else logging.ERROR, stream=sys.stderr)
         try:
             status = function(console=console, **options)
+        except BusyError as why:
+            _report_faults(console, why)
+            status = BUSY
         except TriboError as why:
             _report_faults(console, why)
             status = UNUSABLE
