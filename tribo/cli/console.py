@@ -8,9 +8,11 @@ import logging
 import math
 import os
 import shutil
+import signal
 import sys
 import textwrap
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -20,9 +22,11 @@ import click
 
 from tribo.errors import Problem, TriboError
 from tribo.records import SetAside
+from tribo.store.kept_results import DamagedResultWarning
 from tribo.store.lock import BusyError
 
 DONE, UNUSABLE, SOME_SET_ASIDE = 0, 1, 3
+INTERRUPTED = 130
 BUSY = 75  # EX_TEMPFAIL of sysexits.h: nothing is wrong, try again later
 
 
@@ -169,7 +173,8 @@ def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
         console = Console(as_json, -1 if quiet else verbose)
         logging.basicConfig(level=logging.INFO if verbose else logging.ERROR, stream=sys.stderr)
         try:
-            status = function(console=console, **options)
+            with _damage_said(console), ended_by_terminate():
+                status = function(console=console, **options)
         except BusyError as why:
             _report_faults(console, why)
             status = BUSY
@@ -178,10 +183,47 @@ def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
             status = UNUSABLE
         except (KeyboardInterrupt, click.Abort):
             console.say("interrupted; finished results are kept and no file is incomplete", level=-1)
-            status = 130
+            status = INTERRUPTED
         sys.exit(status or DONE)
 
     return command
+
+
+@contextmanager
+def _damage_said(console: Console) -> Iterator[None]:
+    """Say it as a line where a kept result is damaged and made again; other warnings are shown as ever."""
+    with warnings.catch_warnings():
+        shown = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:
+            if issubclass(category, DamagedResultWarning):
+                console.say(f"warning: {message}", level=-1)
+            else:
+                shown(message, category, *more, **named)
+
+        warnings.showwarning = show
+        yield
+
+
+@contextmanager
+def ended_by_terminate() -> Iterator[None]:
+    """Let SIGTERM end the command as Ctrl-C does, so that nothing is left half written."""
+    process = os.getpid()
+
+    def interrupt(number: int, _: Any) -> None:
+        if os.getpid() != process:  # a forked worker: it has nothing to tidy up
+            os._exit(128 + number)
+        raise KeyboardInterrupt
+
+    try:
+        before = signal.signal(signal.SIGTERM, interrupt)
+    except ValueError:  # not the main thread
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _report_faults(console: Console, why: TriboError) -> None:

@@ -127,7 +127,10 @@ def _built(drop: Path, state: Path, options: BuildOptions, *, dry_run: bool, des
     forced = _forced(due, state)
     if dry_run:
         said = _snakemake(state, config, options, ("--dry-run", *forced), None)
-        return Built(state.parent, due, waiting, steps=tuple(planned_steps(said.stdout)))
+        if said.returncode:
+            raise BuildError(_failures(state, said.stdout))
+        expected = {c.name: _expected_status(c, due, state) for c in found}
+        return Built(state.parent, due, waiting, expected, tuple(planned_steps(said.stdout)))
     said = _snakemake(state, config, options, forced, descriptor)
     write_text(state / "log" / "snakemake.log", said.stdout)
     dated = date_build(state.parent, options.keep)
@@ -266,6 +269,19 @@ def _plain_reason(reason: str) -> str:
     if reason.startswith("Input files updated by another job"):
         return "an earlier step runs again"
     return reason
+
+
+def _expected_status(campaign: Dropped, due: Mapping[str, str], state: Path) -> str:
+    """How a campaign stands after a build, as far as this is known before it: unusable where it cannot be opened."""
+    from tribo.campaign import open_campaign
+
+    if campaign.name not in due:
+        return _status(campaign.name, state)
+    try:
+        with open_campaign(campaign.path):
+            return "to be built"
+    except CampaignError:
+        return "unusable"
 
 
 def _status(name: str, state: Path) -> str:

@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,8 @@ class CampaignRow:
     """One campaign as the index page shows it.
 
     ``state`` is done, some set aside, unusable, failed, waiting or gone (no longer in the folder of campaigns); ``why``
-    the reason. ``measured`` is when the first pull started, ``built`` when the report was made.
+    the reason. ``measured`` is the day on which the first pull started, ``started_s`` its time in seconds since 1970 (by
+    which campaigns are ordered), ``built`` when the report was made.
     """
 
     name: str
@@ -40,6 +42,7 @@ class CampaignRow:
     state: str
     why: tuple[str, ...] = ()
     measured: str = ""
+    started_s: float = math.inf
     built: str = ""
     tests: int = 0
     set_aside: int = 0
@@ -56,7 +59,7 @@ def history(site: Path) -> tuple[CampaignRow, ...]:
     steps = state / "steps"
     names = set(config["campaigns"]) | ({p.parent.name for p in steps.glob("*/report.json")})
     rows = [_row(name, site, config) for name in names]
-    return tuple(sorted(rows, key=lambda row: (row.measured or "9999", row.name)))
+    return tuple(sorted(rows, key=lambda row: (row.started_s, row.name)))
 
 
 def _row(name: str, site: Path, config: Mapping[str, Any]) -> CampaignRow:
@@ -65,13 +68,14 @@ def _row(name: str, site: Path, config: Mapping[str, Any]) -> CampaignRow:
     state, why = _state(name, record, config)
     verdict = read_record(out / "verdict.json") or {}
     tests = _table(out / "tests.csv")
-    started = sorted(t["started_at"] for t in tests if t.get("started_at"))
+    started = min((s for t in tests if (s := _moment(t.get("started_at") or ""))), key=datetime.timestamp, default=None)
     return CampaignRow(
         name=name,
         title=_title(out) or name,
         state=state,
         why=why,
-        measured=started[0][:10] if started else "",
+        measured=started.date().isoformat() if started else "",
+        started_s=started.timestamp() if started else math.inf,
         built=record["finished"][:16].replace("T", " ") if record else "",
         tests=sum(not t["set_aside"] for t in tests),
         set_aside=sum(bool(t["set_aside"]) for t in tests),
@@ -129,6 +133,15 @@ def _laws(fits: Sequence[Mapping[str, str]]) -> list[Law]:
             if math.isfinite(value):
                 found.append(Law(fit["sample"], fit["regime"], parameter, value, low, high))
     return found
+
+
+def _moment(cell: str) -> datetime | None:
+    """The time that a cell says, in UTC where it names no zone; None where it says none."""
+    try:
+        found = datetime.fromisoformat(cell)
+    except ValueError:
+        return None
+    return found if found.tzinfo else found.replace(tzinfo=UTC)
 
 
 def _number(cell: str) -> float:

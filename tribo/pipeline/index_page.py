@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
+import io
 import json
 import math
 import sys
@@ -80,12 +82,14 @@ def series(rows: Sequence[CampaignRow]) -> dict[Key, list[float]]:
 
 def trend_csv(rows: Sequence[CampaignRow]) -> str:
     """The plotted numbers: one row per campaign, sample, regime and parameter."""
-    lines = ["campaign,measured,sample,regime,parameter,value,low,high"]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["campaign", "measured", "sample", "regime", "parameter", "value", "low", "high"])
     for row in rows:
         for law in row.laws:
-            numbers = ",".join("" if math.isnan(v) else f"{v:.8g}" for v in (law.value, law.low, law.high))
-            lines.append(f'"{row.name}",{row.measured},"{law.sample}",{law.regime},{law.parameter},{numbers}')
-    return "\n".join(lines) + "\n"
+            numbers = ["" if math.isnan(v) else f"{v:.8g}" for v in (law.value, law.low, law.high)]
+            writer.writerow([row.name, row.measured, law.sample, law.regime, law.parameter, *numbers])
+    return text.getvalue()
 
 
 def page(rows: Sequence[CampaignRow], changes: Sequence[Change]) -> str:
