@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -125,7 +126,8 @@ def test_a_store_of_another_version_is_not_continued(tmp_path: Path):
 def test_a_store_with_a_damaged_description_is_made_again(tmp_path: Path):
     """An attribute or an input that is not that of the design leaves no doubt that the file was changed."""
     first = run_stored(design(1), tmp_path / "e.h5")
-    for change in (lambda file: file.attrs.modify("dt_s", 2e-7), lambda file: file["angle_deg"].write_direct(np.ones(4))):
+    time_step, angles = ("dt_s", 2e-7), np.ones(4)
+    for change in (lambda file: file.attrs.modify(*time_step), lambda file: file["angle_deg"].write_direct(angles)):
         edited(tmp_path / "e.h5", change)
         with pytest.warns(DamagedResultWarning, match="all runs are computed again"):
             again = run_stored(design(1), tmp_path / "e.h5")
@@ -178,6 +180,24 @@ def test_two_processes_do_not_write_one_store(tmp_path: Path):
     (tmp_path / ".e.h5.abc.part").touch()
     assert run_stored(design(1), store)["done"].all()
     assert [path.name for path in tmp_path.iterdir()] == ["e.h5"]
+
+
+def test_a_command_that_is_asked_to_end_leaves_whole_files_only(tmp_path: Path):
+    """SIGTERM ends an ensemble as Ctrl-C does: status 130, no lock, no half file, and the next start goes on."""
+    store = tmp_path / "e.nc"
+    asked = ["simulate", "--sample", "F", "--sample", "C", "--pressure", "5", "--repeats", "400", "--dt", "1e-7",
+             "--blocks", "40", "--set", "rest_tolerance=0.01", "-o", str(store)]  # fmt: skip
+    process = subprocess.Popen([sys.executable, "-m", "tribo", *asked], stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 300
+    while not (store.exists() and read_stored(store)["done"].any()):
+        assert process.poll() is None
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    process.terminate()
+    _, said = process.communicate()
+    assert process.returncode == 130, said
+    assert "interrupted; finished results are kept" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["e.nc"]
 
 
 KILLED = """

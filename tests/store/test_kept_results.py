@@ -12,7 +12,15 @@ import pandas as pd
 import pytest
 
 from tribo.records import LawFit
-from tribo.store.kept_results import DamagedResultWarning, Shelf, decoded, encoded, fingerprint, package_sources, sources
+from tribo.store.kept_results import (
+    DamagedResultWarning,
+    Shelf,
+    decoded,
+    encoded,
+    fingerprint,
+    package_sources,
+    sources,
+)
 
 FIT = LawFit(
     "B", "static", "coulomb_adhesion", ("mu", "tau0_Pa"), np.array([4.0, 2e4]), np.diag([0.1, 1e6]), 2.0, 3, 12,

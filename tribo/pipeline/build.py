@@ -14,6 +14,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
@@ -30,6 +31,7 @@ from tribo.store.whole_files import write_text
 
 CURRENT = "current"
 GONE = "report.html has been deleted"
+END_S = 60.0  # how long the steps of an interrupted build may take to end
 PROFILES = ("local", "slurm")
 _BLOCKS = re.compile(r"(?m)^(?=\[|\s*$)")  # Snakemake says one thing after a blank line or a date in brackets
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -237,10 +239,34 @@ def _snakemake(
         "--nocolor", *more,
     ]  # fmt: skip
     (state / "log").mkdir(parents=True, exist_ok=True)
-    return subprocess.run(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False,
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
         env={**os.environ, "PYTHONUNBUFFERED": "1"}, pass_fds=() if descriptor is None else (descriptor,),
     )  # fmt: skip
+    try:
+        said, _ = process.communicate()
+    except BaseException:
+        _end(process)
+        raise
+    return subprocess.CompletedProcess(command, process.returncode, said)
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """Ask the workflow and its steps to end, and wait for them, so that none writes on after the build."""
+    import psutil
+
+    try:
+        workflow = psutil.Process(process.pid)
+        everyone = [workflow, *workflow.children(recursive=True)]
+    except psutil.NoSuchProcess:
+        everyone = []
+    for each in everyone:
+        with suppress(psutil.NoSuchProcess):
+            each.terminate()
+    for each in psutil.wait_procs(everyone, timeout=END_S)[1]:
+        with suppress(psutil.NoSuchProcess):
+            each.kill()
+    process.communicate()
 
 
 def planned_steps(said: str) -> list[str]:

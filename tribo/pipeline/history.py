@@ -33,8 +33,8 @@ class CampaignRow:
     """One campaign as the index page shows it.
 
     ``state`` is done, some set aside, unusable, failed, waiting or gone (no longer in the folder of campaigns); ``why``
-    the reason. ``measured`` is the day on which the first pull started, ``started_s`` its time in seconds since 1970 (by
-    which campaigns are ordered), ``built`` when the report was made.
+    the reason. ``measured`` is the day on which the first pull started, ``started_s`` its time in seconds since 1970,
+    by which campaigns are ordered, ``built`` when the report was made.
     """
 
     name: str
