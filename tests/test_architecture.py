@@ -24,7 +24,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("quantities", {"errors"}),
     ("records", {"errors"}),
     ("published", set()),
-    ("zips", {"errors"}),
+    ("zips", {"errors", "limits"}),
     ("links", set()),
     ("forked", set()),
     ("store", GROUND),
