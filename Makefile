@@ -75,7 +75,7 @@ release: $(VENV)/.release
 
 hashes: $(VENV)/.release
 	sed -n '/^#/p' constraints-hashed.txt > constraints-hashed.part
-	$(BIN)/uv pip compile --quiet pyproject.toml --extra cluster --extra pipelines --extra excel -c constraints.txt \
+	$(BIN)/uv pip compile --quiet pyproject.toml --extra cluster --extra pipelines -c constraints.txt \
 	  --universal --python-version 3.11 --generate-hashes --no-header --no-annotate >> constraints-hashed.part
 	mv constraints-hashed.part constraints-hashed.txt
 

@@ -35,7 +35,7 @@ def test_every_pin_with_hashes_has_one() -> None:
 def test_everything_tribo_needs_is_pinned_with_hashes() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]
-    needed = [*project["dependencies"], *extras["cluster"], *extras["pipelines"], *extras["excel"]]
+    needed = [*project["dependencies"], *extras["cluster"], *extras["pipelines"]]
     names = {re.sub(r"[-_.]+", "-", re.split(r"[<>=\[]", word)[0]).lower() for word in needed}
     assert names <= set(pins("constraints-hashed.txt"))
 
