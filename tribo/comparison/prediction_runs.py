@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 SOURCES = ("simulate", "laws", "records")  # packages whose sources decide a run
 SUFFIX = ".nc"
+WAIT_S = 86400.0  # for another process that runs the same cell: its runs are then there
 CELLS_AWAY = 16  # cells given to a scheduler at once
 
 
@@ -128,17 +129,13 @@ def _run_stored(
     cell: Cell, kept: Path, threads: int, scheduler: str | None, progress: Callable[[int, int], None]
 ) -> pd.DataFrame:
     """The runs of one cell, from its file as far as it holds them; a damaged file is replaced."""
-    from tribo.simulate import run_stored
+    from tribo.simulate.resume import continues, run_stored
 
     path = cell.path(kept)
     kept.mkdir(parents=True, exist_ok=True)
-    try:
-        return run_stored(cell.configs, path, threads, scheduler, progress)
-    except SimulationError as why:
-        if not {p.kind for p in why.problems} <= {"other_design", "not_a_store"}:
-            raise
-    path.unlink()
-    return run_stored(cell.configs, path, threads, scheduler, progress)
+    if path.exists() and not continues(cell.configs, path):
+        path.unlink(missing_ok=True)
+    return run_stored(cell.configs, path, threads, scheduler, progress, wait_s=WAIT_S)
 
 
 def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | None:
@@ -149,13 +146,14 @@ def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | Non
     import pandas as pd
 
     from tribo.simulate import read_stored
+    from tribo.simulate.stored_rows import UNREADABLE
 
     found = []
     for path in sorted(kept.glob(f"*@*{SUFFIX}")):
         try:
             table = read_stored(path)
             cell = _cell_of(path, table, patterns)
-        except (OSError, KeyError, ValueError):  # another program's file, or a damaged one
+        except (SimulationError, *UNREADABLE):  # another program's file, or a damaged one
             continue
         if cell is not None and cell.path(kept) == path and table["done"].all():
             found.append(table)
