@@ -7,14 +7,14 @@ from typing import Any
 
 import click
 
-from tribo.cli.console import Console, command_options
+from tribo.cli.console import Console, command_options, status_of
+from tribo.cli.output import Output, output_options
+from tribo.cli.run_record import provenance_of_run
 
 
 @click.command()
 @click.argument("campaign", type=click.Path(exists=True, path_type=Path))
-@click.option(
-    "-o", "--out", type=click.Path(file_okay=False, path_type=Path), required=True, help="Folder of the results."
-)
+@output_options()
 @click.option(
     "--with", "law_file", type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="LAW.TOML",
     help="Test this law, found in another campaign, instead of searching.",
@@ -25,7 +25,7 @@ from tribo.cli.console import Console, command_options
 @click.option("--flat", default="", metavar="SAMPLE", help="Flat sample for the calibration, as in tribo report.")
 @command_options
 def discover(
-    console: Console, campaign: Path, out: Path, law_file: Path | None, rule: str, flat: str, seed: int, **options: Any
+    console: Console, campaign: Path, out: Output, law_file: Path | None, **options: Any
 ) -> int:
     """Search for the law of what no mechanism explains.
 
@@ -35,19 +35,19 @@ def discover(
     """
     from tribo import stages
     from tribo.campaign import open_campaign
-    from tribo.cli.console import status_of
     from tribo.diagnose.discovery.law_file import read_law
     from tribo.diagnose.discovery.on_campaign import discover_in, hold_law_against
     from tribo.report.discovery_files import write_discovery, write_held
 
-    with open_campaign(campaign) as opened, console.progress() as progress:
-        chosen = stages.StudyOptions(kept=None, rule=rule, flat=flat, seed=seed, **options)
-        ingested = stages.study(opened, chosen, until="ingest", progress=progress).ingested
-        if law_file is not None:
-            held = hold_law_against(ingested, *read_law(law_file), seed=seed)
-            written = write_held(held, out)
+    law = read_law(law_file) if law_file is not None else None
+    with out.taken(campaign), open_campaign(campaign) as opened, console.progress() as progress:
+        chosen = stages.StudyOptions(kept=out.kept, **options)
+        study = stages.study(opened, chosen, until="ingest", progress=progress)
+        record = provenance_of_run(study, campaign, chosen)
+        if law is not None:
+            written = write_held(hold_law_against(study.ingested, *law, seed=chosen.seed), out.path, record)
         else:
-            found = discover_in(ingested, seed=seed, progress=progress)
-            written = write_discovery(found, str(opened.title), out)
+            found = discover_in(study.ingested, seed=chosen.seed, progress=progress)
+            written = write_discovery(found, study.ingested.campaign.title, out.path, record)
     console.result(written.record, written.text)
-    return status_of(ingested.set_aside)
+    return status_of(study.ingested.set_aside)

@@ -14,6 +14,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
@@ -25,12 +26,13 @@ from tribo.pipeline.dated_copies import date_build
 from tribo.pipeline.scan import Dropped, difference, scan
 from tribo.pipeline.step_record import OF_A_REPORT, read_record
 from tribo.store.kept_results import package_sources
-from tribo.store.lock import only_build
+from tribo.store.lock import WAIT, only_writer
+from tribo.store.own_folder import STATE, check_site
 from tribo.store.whole_files import write_text
 
-STATE = ".tribo"
 CURRENT = "current"
 GONE = "report.html has been deleted"
+END_S = 60.0  # how long the steps of an interrupted build may take to end
 PROFILES = ("local", "slurm")
 _BLOCKS = re.compile(r"(?m)^(?=\[|\s*$)")  # Snakemake says one thing after a blank line or a date in brackets
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -55,6 +57,7 @@ class BuildOptions:
     settle_s: float = 60.0
     keep: int = 10
     wait_s: float = 0.0
+    force: bool = False  # also into a folder that holds files of others
 
     def of_commands(self) -> dict[str, str]:
         """Options of the commands of the workflow, and all of them in words for what a step is made from."""
@@ -99,20 +102,22 @@ def build_site(drop: Path, site: Path, options: BuildOptions, *, dry_run: bool =
 
     Raises
     ------
-    SiteBusyError
+    BusyError
         Another build of this site is running.
     CampaignError
-        The drop folder cannot be used.
+        The drop folder cannot be used; the site is, holds or lies in it, or holds files that tribo has not written.
     BuildError
         Snakemake is missing, or a step failed other than by unusable input; everything else is built.
     """
     if find_spec("snakemake") is None:
         what, allowed = "tribo build requires snakemake", "pip install 'tribo[pipelines]'"
         raise BuildError(Problem("missing_package", what, allowed=allowed))
+    check_site(site, drop, options.force)
     state = site.resolve() / STATE
     if dry_run:
         return _built(drop, state, options, dry_run=True, descriptor=None)
-    with only_build(state, options.wait_s) as descriptor:
+    busy = Problem("busy", f"another build of this site is running; {WAIT}", file=str(site))
+    with only_writer(state / "lock", options.wait_s, lasting=True, busy=busy) as descriptor:
         return _built(drop, state, options, dry_run=False, descriptor=descriptor)
 
 
@@ -125,7 +130,10 @@ def _built(drop: Path, state: Path, options: BuildOptions, *, dry_run: bool, des
     forced = _forced(due, state)
     if dry_run:
         said = _snakemake(state, config, options, ("--dry-run", *forced), None)
-        return Built(state.parent, due, waiting, steps=tuple(planned_steps(said.stdout)))
+        if said.returncode:
+            raise BuildError(_failures(state, said.stdout))
+        expected = {c.name: _expected_status(c, due, state) for c in found}
+        return Built(state.parent, due, waiting, expected, tuple(planned_steps(said.stdout)))
     said = _snakemake(state, config, options, forced, descriptor)
     write_text(state / "log" / "snakemake.log", said.stdout)
     dated = date_build(state.parent, options.keep)
@@ -211,19 +219,20 @@ def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
     """Samples and cells as the description of a campaign has them; none where it cannot be read (ingest says why)."""
     from tribo.campaign import open_campaign
     from tribo.comparison.prediction import loads_to_simulate
-    from tribo.comparison.prediction_runs import cell_name
+    from tribo.comparison.prediction_runs import cell_name, sample_as_word
 
     try:
         with open_campaign(campaign.path) as opened:
             measured = {test.sample for test in opened.tests}
             samples = [s for s in opened.samples if s in measured]
+            words = [sample_as_word(s) for s in samples]
             pressures = [opened.nominal_pressure_Pa(load) for load in loads_to_simulate(opened)]
     except (CampaignError, OSError):
         return [], []
     except Exception as why:  # ingest will say it again, as the fault of this campaign
         unexpected(why, "the samples of this campaign cannot be listed", campaign.name)
         return [], []
-    return samples, [cell_name(s, p) for s in samples for p in pressures]
+    return words, [cell_name(s, p) for s in samples for p in pressures]
 
 
 def _snakemake(
@@ -241,11 +250,35 @@ def _snakemake(
         "--cores", str(options.jobs), "--nolock", "--nocolor", *more,
     ]  # fmt: skip
     (state / "log").mkdir(parents=True, exist_ok=True)
-    return subprocess.run(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False,
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
         env={**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONSAFEPATH": "1"},
         pass_fds=() if descriptor is None else (descriptor,),
     )  # fmt: skip
+    try:
+        said, _ = process.communicate()
+    except BaseException:
+        _end(process)
+        raise
+    return subprocess.CompletedProcess(command, process.returncode, said)
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """Ask the workflow and its steps to end, and wait for them, so that none writes on after the build."""
+    import psutil
+
+    try:
+        workflow = psutil.Process(process.pid)
+        everyone = [workflow, *workflow.children(recursive=True)]
+    except psutil.NoSuchProcess:
+        everyone = []
+    for each in everyone:
+        with suppress(psutil.NoSuchProcess):
+            each.terminate()
+    for each in psutil.wait_procs(everyone, timeout=END_S)[1]:
+        with suppress(psutil.NoSuchProcess):
+            each.kill()
+    process.communicate()
 
 
 def planned_steps(said: str) -> list[str]:
@@ -274,6 +307,19 @@ def _plain_reason(reason: str) -> str:
     if reason.startswith("Input files updated by another job"):
         return "an earlier step runs again"
     return reason
+
+
+def _expected_status(campaign: Dropped, due: Mapping[str, str], state: Path) -> str:
+    """How a campaign stands after a build, as far as this is known before it: unusable where it cannot be opened."""
+    from tribo.campaign import open_campaign
+
+    if campaign.name not in due:
+        return _status(campaign.name, state)
+    try:
+        with open_campaign(campaign.path):
+            return "to be built"
+    except CampaignError:
+        return "unusable"
 
 
 def _status(name: str, state: Path) -> str:

@@ -9,11 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 from tribo.diagnose.discovery.law_file import law_text
 from tribo.diagnose.discovery.law_words import discovery_text, law_layers, subject
+from tribo.report.provenance import Provenance, read_record, settle_outputs, write_provenance
+from tribo.report.result_tables import to_csv
 from tribo.store.whole_files import write_text
 
 if TYPE_CHECKING:
     from tribo.diagnose.discovery.held import Held
     from tribo.diagnose.discovery.search import Discovery
+
+SCHEMA, RECORD = "tribo.discovery/1", "discovery.json"
 
 
 @dataclass(frozen=True)
@@ -24,14 +28,14 @@ class Written:
     text: str
 
 
-def write_discovery(d: Discovery, title: str, out: Path) -> Written:
-    """law-1.toml and further laws, laws.csv (the best of all that were tried) and discovery.json."""
+def write_discovery(d: Discovery, title: str, out: Path, provenance: Provenance) -> Written:
+    """law-1.toml and further laws, laws.csv (the best of all that were tried), discovery.json and provenance.json."""
     import pandas as pd
 
-    out.mkdir(parents=True, exist_ok=True)
     text = discovery_text(d)
-    for k, found in enumerate(d.laws, start=1):
-        write_text(out / f"law-{k}.toml", law_text(found.law, found.parameters, title))
+    laws = {
+        f"law-{k}.toml": law_text(found.law, found.parameters, title) for k, found in enumerate(d.laws, start=1)
+    }
     rows = [
         {
             "formula": s.law.formula(), "regime": s.law.regime, "where": s.law.where, "log_likelihood_gain": s.gain,
@@ -39,19 +43,26 @@ def write_discovery(d: Discovery, title: str, out: Path) -> Written:
         }
         for s in d.scored
     ]  # fmt: skip
-    write_text(out / "laws.csv", pd.DataFrame(rows).to_csv(index=False, float_format="%.4g"))
-    layers = [asdict(layer) for layer in law_layers(d)]
     record: dict[str, Any] = {
-        "schema": "tribo.discovery/1", "text": text, "laws_tried": d.searched, "layers": layers,
-        "ties": [f.n_ties for f in d.laws],
+        "schema": SCHEMA, "text": text, "laws_tried": d.searched,
+        "layers": [asdict(layer) for layer in law_layers(d)], "ties": [f.n_ties for f in d.laws],
     }  # fmt: skip
-    write_text(out / "discovery.json", json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    _write({**laws, "laws.csv": to_csv(pd.DataFrame(rows)), RECORD: _json(record)}, out, provenance)
     return Written(record, text)
 
 
-def write_held(held: Held, out: Path) -> Written:
-    """discovery.json of the test of one law."""
-    out.mkdir(parents=True, exist_ok=True)
-    record: dict[str, Any] = {"schema": "tribo.discovery/1", **asdict(held)}
-    write_text(out / "discovery.json", json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+def write_held(held: Held, out: Path, provenance: Provenance) -> Written:
+    """discovery.json of the test of one law, and provenance.json."""
+    record: dict[str, Any] = {"schema": SCHEMA, **asdict(held)}
+    _write({RECORD: _json(record)}, out, provenance)
     return Written(record, held.text)
+
+
+def _json(record: dict[str, Any]) -> str:
+    return json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _write(texts: dict[str, str], out: Path, provenance: Provenance) -> None:
+    before = read_record(out)
+    written = [write_text(out / name, text) for name, text in texts.items()]
+    write_provenance(provenance, out, settle_outputs(out, before, provenance, written, complete=True))
