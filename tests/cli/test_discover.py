@@ -26,7 +26,7 @@ def test_a_law_that_is_none_is_refused_before_anything_is_read(small_campaign: P
 
 def test_what_was_searched_is_written_with_its_provenance(small_campaign: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    status, said = run("discover", str(small_campaign), "-o", str(out), "--jobs", "1", "-q")
+    status, _ = run("discover", str(small_campaign), "-o", str(out), "--jobs", "1", "-q")
     assert status in (0, 3)
     record = json.loads((out / "discovery.json").read_text())
     assert record["laws_tried"] > 1000
