@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tribo.diagnose import examine
-from tribo.diagnose.search.naming import weigh
+from tribo.diagnose.search.naming import best_beyond_chance, weigh
 from tribo.diagnose.statistics.linearisation import start_effects
 from tribo.diagnose.statistics.model import Setup
 
@@ -22,8 +24,8 @@ def steps(s: Setup) -> np.ndarray:
 
 
 def half_and_half(s: Setup) -> np.ndarray:
-    """A loss of contact area and a friction that depends on pressure, together."""
-    return acting("contact_area_loss", 3e-12)(s) + acting("pressure_dependent_friction", 0.1)(s)
+    """A little of the temperature and a little tilt of the specimens: either alone leaves no misfit beyond chance."""
+    return acting("temperature", 0.022)(s) + acting("tilt", 0.012)(s)
 
 
 def suction_that_varies(s: Setup) -> np.ndarray:
@@ -42,11 +44,21 @@ def test_what_chance_would_give_a_mechanism_is_no_cause_however_certain_the_misf
     assert found.named.causes == ()
 
 
+def test_of_the_mechanisms_weighed_only_one_beyond_chance_can_be_the_cause() -> None:
+    """A swap among hundreds is stronger than chance makes any; pressure has no choices to pay for, but is within it."""
+    found = examine(made(half_and_half, seed=2), replicates=FEW)
+    assert found.named is not None
+    candidate, chance = found.named.weighed[0], replace(found.screened, chance_library=np.linspace(2.0, 3.0, 100))
+    pressure, swap = replace(candidate, gain=3.7, raw=3.7), replace(candidate, gain=2.4, raw=8.1)
+    assert best_beyond_chance([pressure, swap], chance, 0.01) is swap
+    assert best_beyond_chance([pressure], chance, 0.01) is None
+
+
 def test_mechanisms_that_the_design_tells_apart_are_rivals_not_equivalent() -> None:
     """Two laws of different shape explain the campaign about equally well: the verdict stays open between them."""
-    verdict = examine(made(half_and_half, seed=1), replicates=FEW).verdict
+    verdict = examine(made(half_and_half, seed=2), replicates=FEW).verdict
     assert verdict.verdict == "undetermined"
-    assert {c.mechanism for c in verdict.causes} == {"contact_area_loss", "pressure_dependent_friction"}
+    assert {c.mechanism for c in verdict.causes} == {"temperature", "tilt"}
     assert not verdict.equivalent
 
 

@@ -49,6 +49,26 @@ def test_the_quick_score_is_that_of_the_cleared_columns() -> None:
     assert quick[seen] == pytest.approx(np.abs(left.T @ target / size)[seen], rel=1e-4, abs=1e-5)
 
 
+def test_a_look_that_is_whole_or_absent_is_tested_at_a_size_about_one() -> None:
+    f = baseline(("mislabelled_specimen", 1.0))
+    looks = [look for look in looks_at(f) if look.acting is not None and look.acting.name == "mislabelled_specimen"]
+    stacked, about_one = np.concatenate([look.columns for look in looks], axis=2), np.full(len(looks), 0.15**-2)
+    spans = [slice(k, k + 1) for k in range(len(looks))]
+    found = scores(as_measured(f), columns_in(stacked, spans, about_one), steps=AS_FITTED)[0][0]
+    left, target = f.linear.cleared(stacked)
+    sizes = np.linspace(-1.0, 3.0, 40001)[:, None]
+    at_size = 2.0 * sizes * (left.T @ target) - sizes**2 * np.sum(left**2, axis=0) - ((sizes - 1.0) / 0.15) ** 2
+    assert found == pytest.approx(np.maximum(at_size.max(axis=0), 0.0), abs=1e-3)
+    assert 0 < np.sum(found > 0) < len(found)
+
+
+def test_every_wrong_label_is_looked_for_as_a_whole_and_nothing_else_is() -> None:
+    looks = looks_at(baseline())
+    whole = {look.acting.name for look in looks if look.wholeness > 0 and look.acting is not None}
+    assert whole == {"mislabelled_specimen"}
+    assert all(look.wholeness == 0 for look in looks if look.acting is None)
+
+
 def test_an_effect_is_the_strongest_look_at_its_own_column() -> None:
     f = baseline(("run_in", 2.5))
     looks = looks_at(f)

@@ -33,6 +33,12 @@ class Look:
         return self.kind == "sample" and self.sample == flat and not self.covariate.endswith(BENT)
 
     @property
+    def wholeness(self) -> float:
+        """Precision with which its coefficient is known to be one: of a mechanism that is present as a whole."""
+        sd = self.acting.mechanism.choosing.all_or_nothing_sd if self.acting is not None else None
+        return 0.0 if sd is None else sd**-2.0
+
+    @property
     def freedom(self) -> int:
         return int(self.columns.shape[2])
 

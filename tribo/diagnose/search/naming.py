@@ -19,9 +19,10 @@ from tribo.records import FloatArray
 PER_PARAMETER = 1.0  # log likelihood that a further parameter has to earn
 CHOICES_FITTED = 4  # of a mechanism with many choices, how many are fitted in full
 IN_REACH, CLOSE_BY = 0.5, 3.0  # share of the best first gain, less so much, from which a mechanism is fitted to the end
-# Log likelihood, at least and as a share of what the best gains, by which two mechanisms must differ to be told apart:
-# if the one is at work, the difference has the expected value gain (1 - cosine^2) and twice that as its variance.
-TIED = (5.0, 0.08)
+# Log likelihood, at least and as a share of what the best gains, by which two mechanisms must differ to be told apart.
+# If the one is at work, the difference has the expected value D = gain (1 - cosine^2) and the variance 2 D: the other
+# one is ahead by 3 in at most 0.7 % of campaigns, whatever D is.
+TIED = (3.0, 0.08)
 ALIKE = float(np.sqrt(1.0 - 2.0 * TIED[1]))  # cosine above which not even a strong effect tells two mechanisms apart
 CLOSE = 3.0  # log likelihood within which a mechanism that can be told apart explains about equally
 IN_COMMON = 0.5  # share of its effect that a mechanism must have in common with one it is tied to
@@ -45,6 +46,11 @@ class Candidate:
     @property
     def values(self) -> FloatArray:
         return self.fit.values[-1]
+
+    @property
+    def strength(self) -> float:
+        """As a standard normal deviate, before the choices are paid for: comparable with what chance reaches."""
+        return float(np.sqrt(2.0 * max(self.raw, 0.0)))
 
 
 @dataclass(frozen=True)
@@ -81,9 +87,10 @@ def name_causes(
     while len(causes) < MAX_CAUSES and seen.p.min() < level:
         ranked = weigh(start, excluded) if not causes else _weighed(model, excluded)
         weighed = weighed or tuple(ranked)
-        if not ranked or seen.p_library(float(np.sqrt(2.0 * max(ranked[0].raw, 0.0)))) >= level:
+        best = best_beyond_chance(ranked, seen, level)
+        if best is None:
             break
-        alike, rivals = _sort_rivals(model, ranked)
+        alike, rivals = _sort_rivals(model, best, ranked)
         causes.append(alike)
         model = alike[0].fit
         seen = screen_left(model, replicates=replicates, rng=rng, progress=progress)
@@ -91,6 +98,11 @@ def name_causes(
         model, causes, rivals = _revisit(model, causes, rivals, excluded)
         seen = screen_left(model, replicates=replicates, rng=rng, progress=progress)
     return Named(model, tuple(causes), rivals, tuple(weighed), seen, float(seen.p.min()))
+
+
+def best_beyond_chance(ranked: Sequence[Candidate], seen: Screen, level: float) -> Candidate | None:
+    """The first of those that chance does not make as strong; what is within chance explains no misfit."""
+    return next((c for c in ranked if seen.p_library(c.strength) < level), None)
 
 
 def _revisit(
@@ -104,7 +116,7 @@ def _revisit(
     ranked = _weighed(alone, excluded)
     if not ranked:
         return model, causes, rivals
-    alike, others = _sort_rivals(alone, ranked)
+    alike, others = _sort_rivals(alone, ranked[0], ranked)
     return ranked[0].fit, [alike, causes[-1]], (*rivals, *others)
 
 
@@ -172,19 +184,25 @@ def _judged(start: ModelFit, fitted: ModelFit, choosing: float) -> Candidate:
 
 
 def _sort_rivals(
-    start: ModelFit, ranked: Sequence[Candidate]
+    start: ModelFit, best: Candidate, ranked: Sequence[Candidate]
 ) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
-    """Those that the design cannot distinguish from the best, and distinct ones that explain about as much."""
-    best = ranked[0]
+    """Those that the design cannot distinguish from the best, and distinct ones that explain about as much.
+
+    What explains about as much does so whether or not the choices a mechanism had are paid for.
+    """
     tied = max(TIED[0], TIED[1] * best.gain)
-    near = [c for c in ranked[1:] if c.gain > best.gain - max(CLOSE, tied)]
+    near = [c for c in ranked if c is not best and c.gain > best.gain - max(CLOSE, tied)]
     if not near:
         return (best,), ()
     cosine = np.maximum(_likeness(start, best, near), 0.0)
     told = (best.gain * (1.0 - cosine**2) > 2.0 * tied) | (cosine**2 < IN_COMMON)
     alike = [c for c, apart in zip(near, told, strict=True) if not apart and c.gain > best.gain - tied]
-    rivals = [c for c, apart in zip(near, told, strict=True) if apart and c.gain > best.gain - CLOSE]
+    rivals = [c for c, apart in zip(near, told, strict=True) if apart and _about_equal(c, best)]
     return (best, *alike), tuple(rivals)
+
+
+def _about_equal(c: Candidate, best: Candidate) -> bool:
+    return c.gain > best.gain - CLOSE and c.raw > best.raw - CLOSE
 
 
 def _likeness(start: ModelFit, best: Candidate, others: Sequence[Candidate]) -> FloatArray:
@@ -194,7 +212,8 @@ def _likeness(start: ModelFit, best: Candidate, others: Sequence[Candidate]) -> 
     and the specimens are taken out here.
     """
     f, ground = best.fit, Target(best.fit.setup, best.fit.acting[:-1])
-    jacobian = ground.jacobian(np.concatenate([f.law, *f.values[:-1]]), f.predicted)
+    x = np.concatenate([f.law, *f.values[:-1]])
+    jacobian = ground.jacobian(x, ground.predict(x))
     changes = [c.fit.predicted - start.predicted for c in (best, *others)]
     left = replace(f.linear, jacobian=jacobian).cleared(np.stack(changes, axis=2))[0]
     length = np.sqrt(np.sum(left**2, axis=0)) + 1e-12

@@ -145,31 +145,36 @@ class Columns:
     """The columns of all looks, (2, n, k) regime by regime, and the products that their informations need.
 
     Each look spans ``spans`` of the k; ``products`` (3, n, m) are the static, mixed and sliding products of every
-    pair of columns of one look, those of each look at ``pairs`` of the m.
+    pair of columns of one look, those of each look at ``pairs`` of the m. ``whole`` (looks,) is the precision with
+    which the coefficient of a look is known to be one: zero where its size is free.
     """
 
     columns: FloatArray
     spans: tuple[slice, ...]
     products: FloatArray
     pairs: tuple[slice, ...]
+    whole: FloatArray
 
 
 def columns_of(looks: Sequence[Look]) -> Columns:
     """The columns of all looks, made ready for many replicates."""
     stacked = np.concatenate([look.columns for look in looks], axis=2)
     ends = np.cumsum([look.freedom for look in looks])
-    return columns_in(stacked, [slice(int(e - look.freedom), int(e)) for e, look in zip(ends, looks, strict=True)])
+    spans = [slice(int(e - look.freedom), int(e)) for e, look in zip(ends, looks, strict=True)]
+    return columns_in(stacked, spans, np.array([look.wholeness for look in looks]))
 
 
-def columns_in(stacked: FloatArray, spans: Sequence[slice]) -> Columns:
-    """Columns (n, 2, k) made ready for many replicates, those of each look at one of ``spans``."""
+def columns_in(stacked: FloatArray, spans: Sequence[slice], whole: FloatArray | None = None) -> Columns:
+    """Columns (n, 2, k) made ready for many replicates, those of each look at one of ``spans``; ``whole`` (looks,) as
+    in :class:`Columns`, free by default."""
     columns = np.ascontiguousarray(stacked.transpose(1, 0, 2))
     index = [np.arange(span.start, span.stop) for span in spans]
     first = np.concatenate([np.repeat(i, len(i)) for i in index])
     second = np.concatenate([np.tile(i, len(i)) for i in index])
     ends = np.cumsum([len(i) ** 2 for i in index])
     pairs = [slice(int(end) - len(i) ** 2, int(end)) for end, i in zip(ends, index, strict=True)]
-    return Columns(columns, tuple(spans), _products(columns, first, second), tuple(pairs))
+    whole = np.zeros(len(pairs)) if whole is None else whole
+    return Columns(columns, tuple(spans), _products(columns, first, second), tuple(pairs), whole)
 
 
 def _products(columns: FloatArray, first: NDArray[np.int64], second: NDArray[np.int64]) -> FloatArray:
@@ -190,6 +195,9 @@ class Products:
 
 def scores(fitted: Replicates, looks: Columns, steps: int = len(SIZE_STEPS)) -> tuple[FloatArray, list[FloatArray]]:
     """Score test of every look beyond the model's own columns.
+
+    A look that is present as a whole or absent is tested at its known size: its chi-squared value is twice the log
+    likelihood ratio of a coefficient about one against zero.
 
     The scores are taken at several sizes of the random effects, the first ``steps`` of SIZE_STEPS from the fitted
     ones; each pays what it loses of the likelihood of the model without the look. Returns the largest
@@ -248,8 +256,10 @@ def _solved(
     first = [span.start for span in looks.spans]
     left = whole[:, [pair.start for pair in looks.pairs]] - np.sum(crossed**2, axis=1)[:, first]
     seen = left > TAKEN_UP * whole[:, [pair.start for pair in looks.pairs]]
-    alone = np.where(seen, pull[:, first] / np.maximum(left, 1e-300), 0.0)
-    chi2, coefficients = alone * pull[:, first], list(alone.T[:, :, None])
+    toward_one = pull[:, first] + looks.whole
+    alone = np.where(seen, toward_one / np.maximum(left + looks.whole, 1e-300), 0.0)
+    chi2 = np.where(seen, alone * toward_one - looks.whole, 0.0)
+    coefficients = list(alone.T[:, :, None])
     for i, (span, pair) in enumerate(zip(looks.spans, looks.pairs, strict=True)):
         if span.stop > span.start + 1:
             coefficients[i] = _solution(pull[:, span], whole[:, pair], crossed[:, :, span])

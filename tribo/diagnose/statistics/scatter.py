@@ -16,7 +16,7 @@ from tribo.diagnose.statistics.model import FIXED, GAIN, PATTERN, SLOPE, Setup
 from tribo.records import FloatArray
 
 # Expected size, and how many effects that is worth: specimen gains and slopes, pattern factor
-SPECIMEN_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR = (0.05, 4.0), (0.03, 2.0), (1.0, 1.0)
+SPECIMEN_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR = (0.05, 4.0), (0.01, 2.0), (1.0, 1.0)
 SIZE_PRIORS = np.array([SPECIMEN_PRIOR, SPECIMEN_PRIOR, SLOPE_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR])
 REPEAT_PRIOR = (0.08, 4.0)
 SCATTER_SD = 0.5  # of ln of the ratio of repeats between samples, and of the power of the force they follow
