@@ -104,7 +104,8 @@ class Campaign:
     ``tests`` are the usable rows, ``set_aside`` the rows with faults or an ``exclude`` reason.
     ``samples`` maps each sample name to its pattern (``Sx`` is pattern S pulled along x).
     ``chosen_flat`` names the flat sample that calibrates the model where a user chose one; every stage asks
-    :attr:`flat_sample`.
+    :attr:`flat_sample`. ``inputs`` maps each input file that was read, by its path in the campaign, to the SHA-256 of
+    the bytes that were read.
     """
 
     title: str
@@ -121,6 +122,7 @@ class Campaign:
     columns: Mapping[str, str] = field(default_factory=dict)
     instrument: Mapping[str, float] = field(default_factory=dict)
     chosen_flat: str = ""
+    inputs: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @property
     def flat_samples(self) -> tuple[str, ...]:

@@ -422,12 +422,17 @@ def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[
     """The diagnosis of a study; a note instead where there is too little to diagnose."""
     from dataclasses import replace
 
-    from tribo.errors import FitError
+    from tribo.errors import FitError, TriboError, unexpected
 
     try:
         return study, _diagnosis(study, chosen, progress)
     except FitError as why:
         return replace(study, notes=(*study.notes, f"no diagnosis: {why}")), None
+    except (TriboError, OSError):
+        raise
+    except Exception as why:  # the other results stand without it
+        problem = unexpected(why, "the diagnosis stopped")
+        return replace(study, notes=(*study.notes, f"no diagnosis: {problem}")), None
 
 
 def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis:

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from tribo.cli.console import DONE, SOME_SET_ASIDE, UNUSABLE
+from tribo.errors import is_of_the_system
 from tribo.pipeline.step_record import read_record
 
 DONE_WORDS = {DONE: "done", SOME_SET_ASIDE: "some_set_aside", UNUSABLE: "unusable"}
@@ -36,6 +37,8 @@ def run_step(
         status, said = _run(command)
     if status not in DONE_WORDS:
         return status
+    if status == UNUSABLE and any(is_of_the_system(str(p.get("kind"))) for p in said.get("problems", ())):
+        return status  # no fault of the input: the next build tries again
     finished = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     written = {
         "command": ["tribo", *command],

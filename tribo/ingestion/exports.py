@@ -8,7 +8,7 @@ import threading
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.campaign.choice import is_chosen, names_pulls, split_choice
-from tribo.errors import Problem, TraceError, TriboError
+from tribo.errors import Problem, TraceError, TriboError, unexpected
+from tribo.input_files import hashes_of_reads
+from tribo.limits import LARGEST_LOAD_N, SMALLEST_LOAD_N
 from tribo.records import Campaign, Pull, SetAside, Test, Trace
 
 if TYPE_CHECKING:
@@ -28,9 +30,25 @@ _OFF_SPEED = 0.2  # share by which the travel while sliding may differ from the 
 _UNLOADED = 0.05  # share of the largest load of an export below which a piece of it carries none
 
 Outcome = tuple[Trace, Pull] | SetAside
+Outcomes = tuple[tuple[Test, Outcome], ...]
 
 
-def read_row(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> tuple[tuple[Test, Outcome], ...]:
+@dataclass(frozen=True)
+class RowRead:
+    """The tests of a row of tests.csv with their outcomes, and the SHA-256 of every file read for them."""
+
+    outcomes: Outcomes
+    hashes: Mapping[str, str]
+
+
+def read_hashed(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> RowRead:
+    """:func:`read_row` with the hashes of the bytes that were read, by their path in the campaign."""
+    with hashes_of_reads() as found:
+        outcomes = read_row(root, columns, rule, test)
+    return RowRead(outcomes, {Path(p).relative_to(root).as_posix(): digest for p, digest in found.items()})
+
+
+def read_row(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> Outcomes:
     """The tests of a row of tests.csv: usually one, or one per pull if the row selects pulls of its export.
 
     ``PATH#2/3`` is the third pull of the second table, ``PATH#2/*`` every pull of it, ``PATH#*`` every pull of every
@@ -42,7 +60,9 @@ def read_row(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> t
             return _chosen_pulls(root, columns, rule, test)
         return (_whole(root, columns, rule, test),)
     except TriboError as why:
-        return ((test, _set_aside(test, why)),)
+        return ((test, _set_aside(test, why.problems)),)
+    except Exception as why:  # one export must not cost the others
+        return ((test, _set_aside(test, [unexpected(why, "this export cannot be evaluated", test.file)])),)
 
 
 def inspect_file(path: Path, columns: Mapping[str, str] | None = None) -> Inspection:
@@ -74,8 +94,8 @@ def _pulls_in_words(tables: Sequence[Trace]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _set_aside(test: Test, why: TriboError) -> SetAside:
-    problems = tuple(replace(p, file=test.file, test_id=test.test_id) for p in why.problems)
+def _set_aside(test: Test, found: Sequence[Problem]) -> SetAside:
+    problems = tuple(replace(p, file=test.file, test_id=test.test_id) for p in found)
     return SetAside(test.test_id, "; ".join(str(p) for p in problems), problems)
 
 
@@ -143,7 +163,7 @@ def _with_load(test: Test, trace: Trace) -> Test:
     if not math.isnan(test.normal_load_N):
         return test
     load = load_of(trace)[0]
-    if not load > 0:
+    if not SMALLEST_LOAD_N <= load <= LARGEST_LOAD_N:
         found = None if math.isnan(load) else f"{load:.4g} N"
         what, allowed = "neither tests.csv nor the export gives the normal load", "normal_load_N in tests.csv"
         raise TraceError(Problem("no_load", what, found=found, allowed=allowed))
@@ -180,11 +200,11 @@ def _chosen_pulls(root: Path, columns: Mapping[str, str], rule: str, test: Test)
 def _one_of_several(test: Test, piece: Trace, zero_N: float, pull: Pull | TraceError) -> tuple[Test, Outcome]:
     """One pull of an export; the trace keeps its zero, as one that was read alone does."""
     if isinstance(pull, TraceError):
-        return test, _set_aside(test, pull)
+        return test, _set_aside(test, pull.problems)
     try:
         test = _with_load(test, piece)
     except TraceError as why:
-        return test, _set_aside(test, why)
+        return test, _set_aside(test, why.problems)
     trace = replace(piece, name=test.test_id, file=test.file, force_N=piece.force_N + zero_N)
     flags = tuple(dict.fromkeys((*trace.flags, *pull.flags)))
     return test, (trace, replace(pull, test_id=test.test_id, zero_N=zero_N or pull.zero_N, flags=flags))
@@ -203,9 +223,9 @@ def _with_note(found: tuple[tuple[Test, Outcome], ...], left_out: Sequence[str])
     return *found[:first], (test, (trace, pull)), *found[first + 1 :]
 
 
-def read_all(campaign: Campaign, rule: str, jobs: int = 1) -> Iterator[tuple[tuple[Test, Outcome], ...]]:
+def read_all(campaign: Campaign, rule: str, jobs: int = 1) -> Iterator[RowRead]:
     """The tests of every row with their outcomes, in the order of the campaign."""
-    read = partial(read_row, campaign.root, dict(campaign.columns), rule)
+    read = partial(read_hashed, campaign.root, dict(campaign.columns), rule)
     if jobs == 1 or len(campaign.tests) < FEWEST_FOR_PROCESSES or not _may_fork():
         yield from map(read, campaign.tests)
         return

@@ -7,11 +7,12 @@ import os
 import platform
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
-from hashlib import sha256
+from hashlib import file_digest, sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from tribo.escaping import well_formed
 from tribo.records import Study
 from tribo.store.whole_files import write_text
 
@@ -22,6 +23,7 @@ PACKAGES = (
 )  # fmt: skip
 DESCRIBED_IN = ("campaign.toml", "tests.csv")
 RAW = "raw"
+OVERRIDES = "--overrides"  # the table of manual decisions, among the inputs of a campaign
 OPTIONS = {"rule": "Rule", "weights": "Weights", "flat": "Flat sample", "runs": "Simulations per load"}
 
 
@@ -45,7 +47,7 @@ class Provenance:
     @property
     def inputs_digest(self) -> str:
         """One SHA-256 over the names and hashes of all inputs, the overrides among them."""
-        hashes = {**self.inputs, **({"--overrides": self.overrides["sha256"]} if self.overrides else {})}
+        hashes = {**self.inputs, **({OVERRIDES: self.overrides["sha256"]} if self.overrides else {})}
         listing = "".join(f"{digest}  {name}\n" for name, digest in sorted(hashes.items()))
         return sha256(listing.encode()).hexdigest()
 
@@ -90,15 +92,18 @@ def gather_provenance(
     campaign: Path | None = None,
     overrides: Path | None = None,
 ) -> Provenance:
-    """Versions of the software, and hashes of all files of the campaign.
+    """Versions of the software, and hashes of all files of the campaign: those read as they were when they were read.
 
     ``campaign`` is the folder or .zip as the user gave it, ``overrides`` the table of manual decisions.
     """
-    root = study.ingested.campaign.root
-    named = {test.file.partition("#")[0] for test in study.ingested.campaign.tests}
-    inputs = {name: file_hash(root / name) for name in dict.fromkeys((*input_names(root), *sorted(named)))
-              if (root / name).is_file()}  # fmt: skip
-    decided = {} if overrides is None else {"file": str(overrides), "sha256": file_hash(overrides)}
+    root, read = study.ingested.campaign.root, dict(study.ingested.campaign.inputs)
+    decided = {}
+    if overrides is not None:
+        decided = {"file": str(overrides), "sha256": read.pop(OVERRIDES, "") or file_hash(overrides)}
+    inputs = {}
+    for name in dict.fromkeys((*input_names(root), *sorted(read))):
+        if name in read or (root / name).is_file():
+            inputs[well_formed(name)] = read.get(name) or file_hash(root / name)
     where = str(campaign or root)
     return Provenance(command, started_at, seed, dict(options or {}), _versions(), inputs, where, decided)
 
@@ -130,7 +135,8 @@ def _versions() -> dict[str, str]:
 
 def file_hash(path: Path) -> str:
     """SHA-256 of a file."""
-    return sha256(path.read_bytes()).hexdigest()
+    with path.open("rb") as stream:
+        return file_digest(stream, "sha256").hexdigest()
 
 
 def write_provenance(provenance: Provenance, out: Path, outputs: Mapping[str, str] | None = None) -> Path:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from tribo.errors import CampaignError, Problem
+from tribo.escaping import well_formed
 from tribo.report.provenance import DESCRIBED_IN, FILE, RAW, file_hash, input_names, read_record
 
 KEPT = "kept"  # intermediate results, each checked against its own hash whenever it is used
@@ -101,7 +102,7 @@ def _input_hashes(campaign: Path, recorded: Mapping[str, str]) -> Iterator[tuple
     root = campaign if (campaign / DESCRIBED_IN[0]).is_file() else _only_campaign_below(campaign)
     for name in dict.fromkeys((*input_names(root), *recorded)):
         if (root / name).is_file():
-            yield name, file_hash(root / name)
+            yield well_formed(name), file_hash(root / name)
 
 
 def _only_campaign_below(folder: Path) -> Path:

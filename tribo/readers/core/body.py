@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from tribo.errors import Problem, ReadError
+from tribo.limits import MOST_EXPORT_ROWS as LARGEST_TABLE_ROWS
 from tribo.readers.core.damage import MOST_PROBLEMS, cut_short, find_damage
 from tribo.readers.core.layout import Layout, cut
-from tribo.readers.core.source import LARGEST_TABLE_ROWS, Source
+from tribo.readers.core.source import Source
 from tribo.readers.core.tables_in_file import Block
 from tribo.records import FloatArray
 

@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from tribo.errors import Problem, ReadError
+from tribo.input_files import MAPPED_BYTES
 from tribo.quantities import quantity_named
 from tribo.readers.core.assign import NEEDED, Column, Hint, assign, match_column
 from tribo.readers.core.export import read_contents
 from tribo.readers.core.family import Family
 from tribo.readers.core.layout import Layout
 from tribo.readers.core.reading import Contents, Reading, layout_of, split_at_restarts
-from tribo.readers.core.source import MAPPED_BYTES, Source
+from tribo.readers.core.source import Source
 from tribo.readers.families import family_of, open_sources
 from tribo.records import FloatArray
 

@@ -12,7 +12,7 @@ import numpy as np
 from tribo.errors import Problem, ReadError
 from tribo.readers.core.assign import Assignment, Column, Hint, assign, is_asked_for
 from tribo.readers.core.body import parse_block
-from tribo.readers.core.checks import Finding, check_scale, check_time
+from tribo.readers.core.checks import Finding, beyond_measurement, check_scale, check_time
 from tribo.readers.core.family import Family
 from tribo.readers.core.layout import Layout, cut, sniff
 from tribo.readers.core.sidecar import names_beside
@@ -139,6 +139,10 @@ def _read_block(source: Source, family: Family, block: Block, asked: tuple[Hint,
     columns = assignment.columns
     written = parse_block(source, block, [c.index for c in columns])
     arrays = {c.quantity: _in_si(row, c) for c, row in zip(columns, written, strict=True)}
+    labels = {c.quantity: c.label for c in columns}
+    impossible = beyond_measurement(arrays, source.file, labels, partial(_row_of, source, block))
+    if impossible:
+        raise ReadError(impossible)
     findings = _findings(source, block, assignment, arrays)
     return Reading(source, family, block, assignment, arrays, findings)
 

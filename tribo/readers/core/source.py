@@ -10,14 +10,13 @@ from functools import cached_property
 from pathlib import Path
 
 from tribo.errors import Problem, ReadError
+from tribo.input_files import MAPPED_BYTES, NotRegularError, TooLargeError, read_or_map
+from tribo.limits import LARGEST_EXPORT_BYTES as LARGEST_FILE_BYTES
 from tribo.records import FloatArray
 
 HEAD_BYTES = 2_500
 LARGEST_HEAD_BYTES = 400_000
-LARGEST_FILE_BYTES = 2 << 30
-MAPPED_BYTES = 64 << 20  # larger files are mapped and read in pieces, so that memory holds the numbers only
 CHUNK_BYTES = 16 << 20
-LARGEST_TABLE_ROWS = 40_000_000  # reading takes 8 bytes a number, and a pull about 110 bytes a row: 4.4 GB
 _WIDE_BOMS = {
     codecs.BOM_UTF32_LE: "utf-32",
     codecs.BOM_UTF32_BE: "utf-32",
@@ -175,15 +174,13 @@ def read_bytes(path: Path, file: str) -> bytes | mmap.mmap:
         missing, unreadable or too_large.
     """
     try:
-        size = path.stat().st_size
-        if size > LARGEST_FILE_BYTES:
-            raise _too_large(size, LARGEST_FILE_BYTES, file)
-        if size > MAPPED_BYTES:
-            with path.open("rb") as stream:
-                return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-        return path.read_bytes()
+        return read_or_map(path, LARGEST_FILE_BYTES, MAPPED_BYTES)
     except FileNotFoundError as why:
         raise ReadError(Problem("missing", "this file does not exist", file=file)) from why
+    except TooLargeError as why:
+        raise _too_large(why.size, LARGEST_FILE_BYTES, file) from why
+    except NotRegularError as why:
+        raise ReadError(Problem("not_a_file", "not a regular file", file=file)) from why
     except OSError as why:
         raise ReadError(Problem("unreadable", f"cannot be opened ({why.strerror})", file=file)) from why
 
