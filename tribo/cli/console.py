@@ -21,8 +21,10 @@ import click
 from tribo.errors import Problem, TriboError, system_problem, unexpected
 from tribo.escaping import printable
 from tribo.records import SetAside
+from tribo.store.lock import BusyError
 
 DONE, UNUSABLE, SOME_SET_ASIDE = 0, 1, 3
+BUSY = 75  # EX_TEMPFAIL of sysexits.h: nothing is wrong, try again later
 
 
 @dataclass(frozen=True)
@@ -173,6 +175,9 @@ def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
             status = function(console=console, **options)
         except (click.ClickException, BrokenPipeError):
             raise
+        except BusyError as why:
+            _report_faults(console, why)
+            status = BUSY
         except Exception as why:
             _report_faults(console, why)
             status = UNUSABLE

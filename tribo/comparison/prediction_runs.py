@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from tribo.errors import SimulationError
 from tribo.records import Pattern, Run
 from tribo.store.kept_results import Shelf, sources
 
@@ -123,16 +122,12 @@ def _run_stored(
     cell: Cell, kept: Path, threads: int, scheduler: str | None, progress: Callable[[int, int], None]
 ) -> pd.DataFrame:
     """The runs of one cell, from its file as far as it holds them; a damaged file is replaced."""
-    from tribo.simulate import run_stored
+    from tribo.simulate.resume import continues, run_stored
 
     path = cell.path(kept)
     kept.mkdir(parents=True, exist_ok=True)
-    try:
-        return run_stored(cell.configs, path, threads, scheduler, progress)
-    except SimulationError as why:
-        if not {p.kind for p in why.problems} <= {"other_design", "not_a_store"}:
-            raise
-    path.unlink()
+    if path.exists() and not continues(cell.configs, path):
+        path.unlink(missing_ok=True)
     return run_stored(cell.configs, path, threads, scheduler, progress)
 
 

@@ -24,10 +24,10 @@ from tribo.pipeline.dated_copies import date_build
 from tribo.pipeline.scan import Dropped, difference, scan
 from tribo.pipeline.step_record import read_record
 from tribo.store.kept_results import package_sources
-from tribo.store.lock import only_build
+from tribo.store.lock import WAIT, only_writer
+from tribo.store.own_folder import STATE, check_site
 from tribo.store.whole_files import write_text
 
-STATE = ".tribo"
 CURRENT = "current"
 GONE = "report.html has been deleted"
 PROFILES = ("local", "slurm")
@@ -54,6 +54,7 @@ class BuildOptions:
     settle_s: float = 60.0
     keep: int = 10
     wait_s: float = 0.0
+    force: bool = False  # also into a folder that holds files of others
 
     def of_commands(self) -> dict[str, str]:
         """Options of the commands of the workflow, and all of them in words for what a step is made from."""
@@ -98,20 +99,22 @@ def build_site(drop: Path, site: Path, options: BuildOptions, *, dry_run: bool =
 
     Raises
     ------
-    SiteBusyError
+    BusyError
         Another build of this site is running.
     CampaignError
-        The drop folder cannot be used.
+        The drop folder cannot be used; the site is, holds or lies in it, or holds files that tribo has not written.
     BuildError
         Snakemake is missing, or a step failed other than by unusable input; everything else is built.
     """
     if find_spec("snakemake") is None:
         what, allowed = "tribo build requires snakemake", "pip install 'tribo[pipelines]'"
         raise BuildError(Problem("missing_package", what, allowed=allowed))
+    check_site(site, drop, options.force)
     state = site.resolve() / STATE
     if dry_run:
         return _built(drop, state, options, dry_run=True, descriptor=None)
-    with only_build(state, options.wait_s) as descriptor:
+    busy = Problem("busy", f"another build of this site is running; {WAIT}", file=str(site))
+    with only_writer(state / "lock", options.wait_s, lasting=True, busy=busy) as descriptor:
         return _built(drop, state, options, dry_run=False, descriptor=descriptor)
 
 

@@ -18,6 +18,7 @@ from tribo.report.provenance import (
 )
 from tribo.report.result_tables import write_tables
 from tribo.report.verdict_file import write_verdict
+from tribo.store.own_folder import own_folder
 from tribo.store.whole_files import write_bytes, write_text
 
 if TYPE_CHECKING:
@@ -71,5 +72,14 @@ def write_report(
     diagnosis: Diagnosis | None = None,
     jobs: int = 1,
 ) -> None:
-    """All of OUT: tables, campaign.nc, figures, verdict.json where there is a diagnosis, page, PDF and crate."""
-    write_until(study, Path(out), "report", Drawing(progress, jobs), provenance, diagnosis)
+    """All of OUT: tables, campaign.nc, figures, verdict.json where there is a diagnosis, page, PDF and crate.
+
+    Raises
+    ------
+    CampaignError
+        ``out`` is, holds or lies in a campaign, or holds files that tribo has not written.
+    BusyError
+        Another process writes into it.
+    """
+    with own_folder(Path(out), (study.ingested.campaign.root,)) as folder:
+        write_until(study, folder, "report", Drawing(progress, jobs), provenance, diagnosis)

@@ -127,6 +127,15 @@ def fingerprint(design: Iterable[SimConfig], work: Work = FRICTION) -> str:
     return digest.hexdigest()
 
 
+def continues(design: Sequence[SimConfig], path: str | Path, work: Work = FRICTION) -> bool:
+    """Whether ``path`` is a store of exactly these runs, finished or not."""
+    try:
+        _refuse_other_design(design, Path(path), work)
+    except SimulationError:
+        return False
+    return True
+
+
 def _create(design: Sequence[SimConfig], path: Path, work: Work) -> None:
     import h5py
 
