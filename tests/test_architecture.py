@@ -17,7 +17,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("errors", set()),
     ("limits", set()),
     ("escaping", set()),
-    ("input_files", {"limits"}),
+    ("input_files", {"errors", "limits"}),
     ("quantities", {"errors"}),
     ("records", {"errors"}),
     ("published", set()),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 _LOG = logging.getLogger("tribo")
@@ -80,6 +81,17 @@ class FitError(TriboError):
 
 class SimulationError(TriboError):
     """A simulation cannot be run, or produced a non-finite number."""
+
+
+@contextmanager
+def naming(path: object, also_for: object = None) -> Iterator[None]:
+    """Put ``path`` into errors of the system that name no file (a read, a write), or that name ``also_for``."""
+    try:
+        yield
+    except OSError as why:
+        if why.filename is None or why.filename == str(also_for):
+            why.filename, why.filename2 = str(path), None
+        raise
 
 
 def system_problem(why: OSError, file: str | None = None) -> Problem:

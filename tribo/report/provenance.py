@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from tribo.errors import naming
 from tribo.escaping import well_formed
 from tribo.records import Study
 from tribo.store.whole_files import write_text
@@ -135,7 +136,7 @@ def _versions() -> dict[str, str]:
 
 def file_hash(path: Path) -> str:
     """SHA-256 of a file."""
-    with path.open("rb") as stream:
+    with naming(path), path.open("rb") as stream:
         return file_digest(stream, "sha256").hexdigest()
 
 

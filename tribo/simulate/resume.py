@@ -23,8 +23,9 @@ from tribo.errors import Problem, SimulationError
 from tribo.records import Run
 from tribo.simulate.config import SimConfig
 from tribo.simulate.ensemble import Progress, check_all, run_row
-from tribo.simulate.results_file import attributes, unit_of, versions, written
+from tribo.simulate.results_file import attributes, unit_of, versions
 from tribo.simulate.run import simulate
+from tribo.store.hdf5_files import whole_hdf5
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -143,21 +144,18 @@ def _create(design: Sequence[SimConfig], path: Path, work: Work) -> None:
     empty = dict.fromkeys(work.units, np.full(len(design), np.nan))
     columns = given | empty | {"done": np.zeros(len(design), np.uint8)}
 
-    def write(target: Path) -> None:
-        with h5py.File(target, "w") as file:
-            file.attrs["title"] = "an ensemble of the spring-block model, one entry per run"
-            file.attrs["design"] = fingerprint(design, work)
-            file.attrs["columns"] = list(columns)
-            for name, value in (attributes(_shared_parameters(design)) | versions()).items():
-                file.attrs[name] = value
-            run = file.create_dataset("run", data=np.arange(len(design)))
-            run.make_scale("run")
-            for name, values in columns.items():
-                column = file.create_dataset(name, data=_as_stored(values))
-                column.dims[0].attach_scale(run)
-                column.attrs["units"] = {**INPUTS, **work.units}.get(name) or unit_of(name)
-
-    written(path, write)
+    with whole_hdf5(path) as held, h5py.File(held, "w") as file:
+        file.attrs["title"] = "an ensemble of the spring-block model, one entry per run"
+        file.attrs["design"] = fingerprint(design, work)
+        file.attrs["columns"] = list(columns)
+        for name, value in (attributes(_shared_parameters(design)) | versions()).items():
+            file.attrs[name] = value
+        run = file.create_dataset("run", data=np.arange(len(design)))
+        run.make_scale("run")
+        for name, values in columns.items():
+            column = file.create_dataset(name, data=_as_stored(values))
+            column.dims[0].attach_scale(run)
+            column.attrs["units"] = {**INPUTS, **work.units}.get(name) or unit_of(name)
 
 
 def _as_stored(values: Any) -> Any:

@@ -34,7 +34,7 @@ class HeldBackErrors(io.RawIOBase):
         return len(view)
 
     def readinto(self, buffer: Any) -> int:
-        return self._raw.readinto(buffer) or 0  # type: ignore[attr-defined]
+        return self._raw.readinto(buffer) or 0
 
     def truncate(self, size: int | None = None) -> int:
         try:
