@@ -17,6 +17,7 @@ from tribo.campaign.table import COUNTS, KNOWN, NUMBERS, TestRow, read_tests_tab
 from tribo.errors import CampaignError, Problem, unexpected
 from tribo.escaping import well_formed
 from tribo.input_files import hashes_of_reads
+from tribo.links import LEADS_OUT, leads_out, paths_below
 from tribo.records import STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
 
 _NOT_WORTH_A_NOTE = (".", "~$", "Thumbs.db")
@@ -43,10 +44,12 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     ------
     CampaignError
         campaign.toml is wrong, a required column is missing, or no test is usable; with the errors of both
-        files.
+        files. Or one of the two files, or raw/, is a link that leads out of the folder.
     """
     root = Path(folder)
-    problems: list[Problem] = []
+    problems = [Problem("link", LEADS_OUT, file=name) for name in (TOML, TESTS, RAW) if leads_out(root, root / name)]
+    if problems:
+        raise CampaignError(problems)
     with hashes_of_reads() as hashes:
         described = read_description(root / TOML, TOML, problems)
         rows = read_tests_table(root / TESTS, TESTS, problems)
@@ -205,7 +208,7 @@ def _file_faults(root: Path, row: TestRow) -> list[Problem]:
     place = (TESTS, row.row, "file", name)
     path = _relative(name)
     try:
-        if path is None or not (root / path).resolve().is_relative_to(root.resolve()):  # links are followed
+        if path is None or leads_out(root, root / path):
             what = "the path leads outside the campaign"
             return [Problem("path_outside_campaign", what, *place, "a path inside the campaign folder")]
         if (root / path).is_file():
@@ -281,8 +284,12 @@ def _unlisted(root: Path, rows: Sequence[TestRow]) -> list[Problem]:
     """Notes on files of raw/ that no row names."""
     named = {str(_relative(row.cells.get("file", ""))) for row in rows}
     notes = []
-    for path in sorted((root / RAW).rglob("*")) if (root / RAW).is_dir() else []:
+    for path, outward in paths_below(root, RAW):
         name = path.relative_to(root).as_posix()
+        if outward:
+            if name not in named:
+                notes.append(Problem("link", LEADS_OUT, file=well_formed(name)))
+            continue
         if name in named or path.name.startswith(_NOT_WORTH_A_NOTE) or not path.is_file():
             continue
         if _holds_numbers(path):

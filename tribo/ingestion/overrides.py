@@ -13,6 +13,7 @@ import numpy as np
 from tribo.campaign.table import Table, TestRow, read_table
 from tribo.errors import CampaignError, Problem, TraceError, system_problem, unexpected
 from tribo.input_files import hashes_of_reads
+from tribo.links import LEADS_OUT, leads_out
 from tribo.records import ByHand, Ingested, Override, Pull, SetAside, Trace
 
 TIMES = ("window_start_s", "window_end_s", "peak_s")
@@ -85,8 +86,11 @@ def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
     ------
     CampaignError
         With every fault at once: an unknown test, action or column, a number that is none, a time outside the trace.
+        Or the file is a link that leads out of its folder.
     """
     file = path.name
+    if leads_out(path.parent, path):
+        raise CampaignError(Problem("link", LEADS_OUT, file=file))
     try:
         table = read_table(path, file)
     except FileNotFoundError:

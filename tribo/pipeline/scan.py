@@ -10,12 +10,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tribo.errors import CampaignError, Problem
+from tribo.links import LEADS_OUT, leads_out, paths_below
 
 # how copying programs and browsers name a file that is not whole yet
 UPLOAD_SUFFIXES = (".part", ".partial", ".tmp", ".temp", ".crdownload", ".download", ".filepart", ".upload", ".!ut")
 OVERRIDES = ".overrides.csv"
 IGNORED = ("Thumbs.db", "desktop.ini", ".DS_Store")
 _CHUNK = 1 << 20
+_LINK = "a link that leads out of the campaign"  # in place of a hash: nothing behind it is read
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,8 @@ def _uploading(name: str) -> bool:
 
 
 def _look(path: Path, settle_s: float) -> Dropped:
+    if leads_out(path.parent, path):
+        return Dropped(path.stem if path.suffix.lower() == ".zip" else path.name, path, waiting=(LEADS_OUT,))
     if path.is_file():
         name = path.stem if not _uploading(path.name) else path.name
         why = _not_whole(path, settle_s)
@@ -83,8 +87,11 @@ def _look(path: Path, settle_s: float) -> Dropped:
         digest, changed = _hashed(path)
         return Dropped(name, path, {path.name: digest}, (f"{path.name} is still being written",) if changed else ())
     files, waiting = {}, []
-    for file in _files(path):
+    for file, outward in _files(path):
         shown = file.relative_to(path).as_posix()
+        if outward:
+            files[shown] = _LINK
+            continue
         why = _not_whole(file, settle_s)
         if not why:
             files[shown], changed = _hashed(file)
@@ -99,6 +106,8 @@ def _look(path: Path, settle_s: float) -> Dropped:
 def _with_overrides(campaign: Dropped, settle_s: float) -> Dropped:
     """The campaign with the overrides that lie beside it."""
     beside = campaign.path.with_name(f"{campaign.name}{OVERRIDES}")
+    if leads_out(campaign.path.parent, beside):
+        return replace(campaign, waiting=(*campaign.waiting, f"{beside.name} is {LEADS_OUT}"))
     if not beside.is_file():
         return campaign
     why = _not_whole(beside, settle_s)
@@ -108,11 +117,12 @@ def _with_overrides(campaign: Dropped, settle_s: float) -> Dropped:
     )
 
 
-def _files(folder: Path) -> Iterator[Path]:
-    for path in sorted(folder.rglob("*")):
+def _files(folder: Path) -> Iterator[tuple[Path, bool]]:
+    """The files of a campaign, each with whether it is a link that leads out of the campaign."""
+    for path, outward in paths_below(folder):
         hidden = path.name.startswith(".") and not _uploading(path.name)
-        if path.is_file() and path.name not in IGNORED and not hidden:
-            yield path
+        if (outward or path.is_file()) and path.name not in IGNORED and not hidden:
+            yield path, outward
 
 
 def _not_whole(file: Path, settle_s: float) -> str:

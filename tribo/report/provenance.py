@@ -14,6 +14,7 @@ from typing import Any
 
 from tribo.errors import naming
 from tribo.escaping import well_formed
+from tribo.links import leads_out, paths_below
 from tribo.records import Study
 from tribo.store.whole_files import write_text
 
@@ -118,10 +119,10 @@ def provenance_of_table(
 
 
 def input_names(root: Path) -> Iterator[str]:
-    """What a campaign folder holds: its two tables and every file of raw/, in order."""
-    yield from (name for name in DESCRIBED_IN if (root / name).is_file())
-    if (root / RAW).is_dir():
-        yield from (p.relative_to(root).as_posix() for p in sorted((root / RAW).rglob("*")) if p.is_file())
+    """What a campaign folder holds: its two tables and every file of raw/, in order; no links that lead out of it."""
+    yield from (name for name in DESCRIBED_IN if (root / name).is_file() and not leads_out(root, root / name))
+    below = paths_below(root, RAW)
+    yield from (path.relative_to(root).as_posix() for path, outward in below if not outward and path.is_file())
 
 
 def _versions() -> dict[str, str]:

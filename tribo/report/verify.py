@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from hashlib import sha256
@@ -11,7 +10,9 @@ from typing import Any, Literal
 
 from tribo.errors import CampaignError, Problem
 from tribo.escaping import well_formed
+from tribo.links import leads_out
 from tribo.report.provenance import DESCRIBED_IN, FILE, RAW, file_hash, input_names, read_record
+from tribo.zips import opened_zip, pieces
 
 KEPT = "kept"  # intermediate results, each checked against its own hash whenever it is used
 
@@ -60,7 +61,8 @@ def verify(out: Path, campaign: Path | None = None) -> Verification:
     Raises
     ------
     CampaignError
-        There is no provenance.json in ``out``, or it lists no outputs.
+        There is no provenance.json in ``out``, or it lists no outputs; or the .zip of the campaign is refused
+        (:func:`tribo.zips.opened_zip`).
     """
     record = read_record(out)
     if record is None:
@@ -101,7 +103,7 @@ def _input_hashes(campaign: Path, recorded: Mapping[str, str]) -> Iterator[tuple
         return
     root = campaign if (campaign / DESCRIBED_IN[0]).is_file() else _only_campaign_below(campaign)
     for name in dict.fromkeys((*input_names(root), *recorded)):
-        if (root / name).is_file():
+        if not leads_out(root, root / name) and (root / name).is_file():
             yield well_formed(name), file_hash(root / name)
 
 
@@ -111,17 +113,17 @@ def _only_campaign_below(folder: Path) -> Path:
 
 
 def _zipped_hashes(archive: Path, recorded: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    try:
-        with zipfile.ZipFile(archive) as opened:
-            names = [i.filename for i in opened.infolist() if not i.is_dir() and not i.filename.startswith("__MACOSX/")]
-            tomls = [n for n in names if n.rpartition("/")[2] == DESCRIBED_IN[0]]
-            base = tomls[0].removesuffix(DESCRIBED_IN[0]) if len(tomls) == 1 else ""
-            for name in names:
-                inside = name.removeprefix(base)
-                if inside in DESCRIBED_IN or inside.startswith(f"{RAW}/") or inside in recorded:
-                    yield inside, sha256(opened.read(name)).hexdigest()
-    except (zipfile.BadZipFile, OSError):
-        return
+    with opened_zip(archive) as (opened, entries):
+        files = [entry for entry in entries if not entry.is_folder]
+        tomls = [e.name for e in files if e.name.rpartition("/")[2] == DESCRIBED_IN[0]]
+        base = tomls[0].removesuffix(DESCRIBED_IN[0]) if len(tomls) == 1 else ""
+        for entry in files:
+            inside = entry.name.removeprefix(base)
+            if inside in DESCRIBED_IN or inside.startswith(f"{RAW}/") or inside in recorded:
+                digest = sha256()
+                for piece in pieces(opened, entry, archive.name):
+                    digest.update(piece)
+                yield inside, digest.hexdigest()
 
 
 def _output_hashes(out: Path) -> Iterator[tuple[str, str]]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 from tribo.errors import Problem, ReadError
 from tribo.readers.core.source import Source
+from tribo.zips import size_problems
 
 _OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 _MOST_UNPACKED_BYTES = 200_000_000
@@ -36,10 +38,9 @@ def open_workbook(path: Path, file: str) -> tuple[Source, ...]:
             )
     try:
         with zipfile.ZipFile(path) as packed:
-            unpacked = sum(entry.file_size for entry in packed.infolist())
-        if unpacked > _MOST_UNPACKED_BYTES:
-            found, allowed = f"{unpacked} bytes unpacked", f"at most {_MOST_UNPACKED_BYTES}"
-            raise ReadError(Problem("too_large", "the file is too large", file=file, found=found, allowed=allowed))
+            problems = size_problems(packed.infolist(), path.stat().st_size, file, _MOST_UNPACKED_BYTES)
+        if problems:
+            raise ReadError(replace(problem, kind="too_large") for problem in problems)
         sheets = _sheets(path)
     except ReadError:
         raise
