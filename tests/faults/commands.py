@@ -54,7 +54,7 @@ class _Page:
         return found
 
 
-def prepared(place: Place, aside: Path) -> dict[str, Command]:
+def prepared(place: Place, aside: Path, build: bool = True) -> dict[str, Command]:
     """Every command by name. Runs what they have in common once, so that what is forked from here starts at once.
 
     ``aside`` holds what trials start from; it lies outside the watched folder.
@@ -79,15 +79,10 @@ def prepared(place: Place, aside: Path) -> dict[str, Command]:
     for folder in (kept, partly, site / "current" / "monday"):
         shutil.copytree(complete / "kept", folder / "kept")
     next((partly / "kept").glob("B@*.nc")).unlink()
+    (site / ".tribo").mkdir()  # known as a site of tribo
     runs = ("simulate", "--design", str(place.design), "-o", f"{out}/runs.nc", "--jobs", "1")
-    build = ("build", str(place.drop), "-o", out, "--settle", "0", *RUNS)
     with _quiet(place):
         run_command(runs)
-        shutil.rmtree(out)
-        shutil.copytree(site, out)
-        assert build_in_one_process(build) == 0
-    indexed = aside / "indexed-site"
-    shutil.copytree(out, indexed, symlinks=True, ignore=shutil.ignore_patterns("builds", "latest", "index.json"))
     found = [
         Command("ingest", ("ingest", campaign, "-o", out, "--jobs", "1")),
         Command("fit", ("fit", campaign, "-o", out, "--jobs", "1")),
@@ -98,10 +93,25 @@ def prepared(place: Place, aside: Path) -> dict[str, Command]:
         Command("verify", ("verify", out), complete),
         Command("simulate one run", ("simulate", *_ONE, "-o", f"{out}/one.nc", "--jobs", "1")),
         Command("simulate --design", runs),
-        Command("build", build, site, build_in_one_process),
-        Command("build of the index", build, indexed, build_in_one_process),
+        *(_builds(place, aside, site) if build else ()),
     ]
     return {command.name: command for command in found}
+
+
+def _builds(place: Place, aside: Path, site: Path) -> list[Command]:
+    """tribo build with kept results at hand, and where only the index and the dated copy are missing."""
+    arguments = ("build", str(place.drop), "-o", str(place.out), "--settle", "0", *RUNS)
+    indexed = aside / "indexed-site"
+    shutil.rmtree(place.out)
+    shutil.copytree(site, place.out)
+    with _quiet(place) as said:
+        status = build_in_one_process(arguments)
+    assert status == 0, said.getvalue()
+    shutil.copytree(place.out, indexed, symlinks=True, ignore=shutil.ignore_patterns("builds", "latest", "index.json"))
+    return [
+        Command("build", arguments, site, build_in_one_process),
+        Command("build of the index", arguments, indexed, build_in_one_process),
+    ]
 
 
 def small_lattice() -> None:
@@ -117,12 +127,13 @@ _ONE = ("--sample", "F", "--pressure", "20", "--blocks", "10")
 
 
 @contextlib.contextmanager
-def _quiet(place: Place) -> Iterator[None]:
-    before = dict(os.environ)
+def _quiet(place: Place) -> Iterator[io.StringIO]:
+    """What is printed in this process; temporary files and times as in a trial."""
+    before, said = dict(os.environ), io.StringIO()
     os.environ |= {"TMPDIR": str(place.temporary), "SOURCE_DATE_EPOCH": "1700000000"}
     try:
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-            yield
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            yield said
     finally:
         os.environ.clear()
         os.environ |= before
