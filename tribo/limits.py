@@ -22,10 +22,13 @@ DEEPEST_NESTING = 50  # arrays and tables within each other in TOML and JSON
 
 # Designs of simulations
 MOST_RUNS = 100_000
+MOST_BLOCKS = 4_000_000  # 2000 x 2000; a run of them takes about 2 GB
+MOST_STEPS = 100_000_000  # of a run
 
 # Zip archives
 MOST_ENTRIES = 50_000
 MOST_UNPACKED_BYTES = 2_000_000_000
+MOST_UNPACKED_EXPORT_BYTES = 400_000_000  # of an export in a .zip or .gz, which is held in memory
 MOST_EXPANSION = 200  # text of numbers shrinks about three- to tenfold
 SMALL_ENTRY_BYTES = 10_000_000  # below this no expansion is a danger
 

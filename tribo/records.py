@@ -89,6 +89,24 @@ class Test:
 
 
 @dataclass(frozen=True)
+class Correction:
+    """What a user states about the numbers of an export; applied once, at the end of reading.
+
+    The friction force is multiplied by ``sign`` (1 or -1) and ``gain``; a torque becomes a force over ``lever_arm_m``.
+    ``sampling_rate_Hz`` gives the time where the export has none, else ``speed_m_s`` does for a recorded path.
+    """
+
+    sign: float = 1.0
+    gain: float = 1.0
+    lever_arm_m: float | None = None
+    sampling_rate_Hz: float | None = None
+    speed_m_s: float | None = None
+
+
+UNCORRECTED = Correction()
+
+
+@dataclass(frozen=True)
 class SetAside:
     """A test that is not used in the results, with the reason."""
 

@@ -14,6 +14,7 @@ from tribo.diagnose.statistics.interval import (
     intervals,
     recovered,
     standard_errors,
+    understated,
     with_pattern_error,
 )
 from tribo.diagnose.statistics.linearisation import ModelFit
@@ -81,3 +82,20 @@ def test_an_averaged_interval_keeps_to_the_bounds() -> None:
     f = fitted("suction", ("normal_load_error", -0.4))
     value, low, high = recovered(f, 0)[0]
     assert low == 0.0 <= value < high
+
+
+def test_standard_errors_are_widened_by_what_campaigns_of_the_fit_itself_show() -> None:
+    """Normal repeats under weights of a t distribution: the curvature is a little too confident, never by half."""
+    factors = [understated(fitted(name, (name, 1.5)), 0) for name in ("covariate:operator", "run_in", "tilt")]
+    assert [f.size for f in factors] == [1, 2, 1]
+    every = np.concatenate(factors)
+    assert every.min() >= 1.0
+    assert 1.02 < every.mean() < 1.2
+
+
+def test_an_interval_is_as_much_wider_as_the_errors_are_understated() -> None:
+    f = fitted("covariate:operator", ("covariate:operator", 1.5))
+    value, low, high = recovered(f, 0)[0]
+    stated = 2 * 1.645 * standard_errors(f, 0)[0]
+    assert high - low > 0.97 * stated * understated(f, 0)[0]
+    assert low < value < high

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tribo.pipeline.history import CampaignRow, Law, history
-from tribo.pipeline.index_page import change_sentence, page, series, trend_csv, write_index
+from tribo.pipeline.index_page import change_sentence, page, series, series_name, trend_csv, write_index
 from tribo.pipeline.trend import change_points
 
 
@@ -27,7 +27,7 @@ def campaigns(jump: float = 0.0) -> list[CampaignRow]:
 
 
 def rendered(rows: list[CampaignRow]) -> str:
-    changes = change_points({"|".join(k): v for k, v in series(rows).items()})
+    changes = change_points({series_name(k): v for k, v in series(rows).items()})
     return page(rows, changes)
 
 
@@ -86,7 +86,7 @@ def test_the_numbers_of_the_figures_stand_in_the_table() -> None:
 @pytest.mark.parametrize(("after", "verb"), [(1.0, "rises"), (-1.0, "falls")])
 def test_a_change_is_said_in_its_direction(after: float, verb: str) -> None:
     rows = campaigns(after)
-    (change,) = change_points({"F|static|mu": series(rows)["F", "static", "mu"]})
+    (change,) = change_points({series_name(("F", "static", "mu")): series(rows)["F", "static", "mu"]})
     assert verb in change_sentence(change, rows)
 
 

@@ -29,7 +29,8 @@ def run_step(
     record: Path, command: Sequence[str], digest: str, after: Sequence[Path] = (), files: Path | None = None
 ) -> int:
     """Run a tribo command as a step and write its record; returns the exit status for the workflow."""
-    before = next((r for r in map(read_record, after) if r and r["status"] == "unusable"), None)
+    records = (read_record(path, "status", "problems") for path in after)
+    before = next((r for r in records if r and r["status"] == "unusable"), None)
     started = time.time()
     if before is not None:
         status, said = UNUSABLE, {"problems": before["problems"]}

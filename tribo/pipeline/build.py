@@ -19,10 +19,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from tribo.errors import CampaignError, Problem, TriboError
+from tribo.errors import CampaignError, Problem, TriboError, unexpected
+from tribo.escaping import well_formed
 from tribo.pipeline.dated_copies import date_build
 from tribo.pipeline.scan import Dropped, difference, scan
-from tribo.pipeline.step_record import read_record
+from tribo.pipeline.step_record import OF_A_REPORT, read_record
 from tribo.store.kept_results import package_sources
 from tribo.store.lock import WAIT, only_writer
 from tribo.store.own_folder import STATE, check_site
@@ -120,7 +121,7 @@ def build_site(drop: Path, site: Path, options: BuildOptions, *, dry_run: bool =
 
 def _built(drop: Path, state: Path, options: BuildOptions, *, dry_run: bool, descriptor: int | None) -> Built:
     found = scan(drop.resolve(), options.settle_s)
-    due = {c.name: why for c in found if not c.waiting and (why := _why_due(c, state, options))}
+    due = {c.name: why for c in found if c.is_ready and (why := _why_due(c, state, options))}
     waiting = {c.name: c.waiting for c in found if c.waiting}
     target = state / ("dry-run" if dry_run else "inputs")
     config = _configuration(found, target, state, options)
@@ -133,13 +134,13 @@ def _built(drop: Path, state: Path, options: BuildOptions, *, dry_run: bool, des
     dated = date_build(state.parent, options.keep)
     if said.returncode:
         raise BuildError(_failures(state, said.stdout))
-    status = {c.name: _status(c.name, state) for c in found}
+    status = {c.name: "unusable" if c.refused else _status(c.name, state) for c in found}
     return Built(state.parent, due, waiting, status, tuple(planned_steps(said.stdout)), dated)
 
 
 def _why_due(campaign: Dropped, state: Path, options: BuildOptions) -> str:
     """Why a campaign is to be built, in words; empty where its report is of exactly these files and options."""
-    record = read_record(state / "steps" / campaign.name / "report.json")
+    record = read_record(state / "steps" / campaign.name / "report.json", *OF_A_REPORT, "files")
     if record is None:
         started = (state / "steps" / campaign.name).is_dir()
         return "not finished in an earlier build" if started else "new"
@@ -174,9 +175,12 @@ def _configuration(found: Sequence[Dropped], inputs: Path, state: Path, options:
     """Write what the workflow needs to know; returns the file."""
     ready: dict[str, Any] = {}
     for campaign in found:
-        if not campaign.waiting:
+        if campaign.is_ready:
             ready[campaign.name] = _inputs(campaign, inputs)
-    campaigns = {c.name: {"path": str(c.path), "waiting": list(c.waiting)} for c in found}
+    campaigns = {
+        c.name: {"path": well_formed(str(c.path)), "waiting": list(c.waiting), "refused": list(c.refused)}
+        for c in found
+    }
     listing = json.dumps([campaigns, {n: r["digest"] for n, r in ready.items()}, step_digest("", options)])
     config = {
         "ready": ready,
@@ -194,7 +198,7 @@ def _configuration(found: Sequence[Dropped], inputs: Path, state: Path, options:
 def _inputs(campaign: Dropped, folder: Path) -> dict[str, Any]:
     """Path, digest, samples and cells of a campaign, and the file that lists its exports by content."""
     file = folder / f"{campaign.name}.json"
-    known = read_record(file)
+    known = read_record(file, "digest", "samples", "cells")
     if known is None or known["digest"] != campaign.digest:
         samples, cells = _to_simulate(campaign)
         known = {"digest": campaign.digest, "samples": samples, "cells": cells, "files": dict(campaign.files)}
@@ -217,7 +221,10 @@ def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
             measured = {test.sample for test in opened.tests}
             samples = [s for s in opened.samples if s in measured]
             pressures = [opened.nominal_pressure_Pa(load) for load in loads_to_simulate(opened)]
-    except CampaignError:
+    except (CampaignError, OSError):
+        return [], []
+    except Exception as why:  # ingest will say it again, as the fault of this campaign
+        unexpected(why, "the samples of this campaign cannot be listed", campaign.name)
         return [], []
     return samples, [cell_name(s, p) for s in samples for p in pressures]
 
@@ -269,7 +276,7 @@ def _plain_reason(reason: str) -> str:
 
 
 def _status(name: str, state: Path) -> str:
-    record = read_record(state / "steps" / name / "report.json")
+    record = read_record(state / "steps" / name / "report.json", *OF_A_REPORT)
     return str(record["status"]) if record else "not built yet"
 
 

@@ -168,9 +168,24 @@ def read_record(out: Path) -> dict[str, Any] | None:
     """The contents of provenance.json of a folder; None if there is none, or none of this kind."""
     try:
         record = json.loads((out / FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None
-    return record if isinstance(record, dict) and isinstance(record.get("outputs"), dict) else None
+    return record if isinstance(record, dict) and _is_whole(record) else None
+
+
+def _is_whole(record: Mapping[str, Any]) -> bool:
+    """Whether a record has every part that is read from it, each of its kind."""
+    texts = [record.get("inputs_sha256"), record.get("campaign", "")]
+    tables = [record.get(name) for name in ("inputs", "outputs", "options", "versions")]
+    overrides = record.get("overrides") or {}
+    return (
+        all(isinstance(text, str) and "\0" not in text for text in texts)
+        and all(isinstance(table, dict) for table in tables)
+        and all(isinstance(t, str) and "\0" not in n for name in ("inputs", "outputs") for n, t in record[name].items())
+        and isinstance(overrides, dict)
+        and (not overrides or all(isinstance(overrides.get(key), str) for key in ("file", "sha256")))
+        and isinstance(record.get("seed"), int | None)
+    )
 
 
 def settle_outputs(

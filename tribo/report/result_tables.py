@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from tribo.comparison.agreement import ratios
+from tribo.escaping import for_spreadsheet
 from tribo.records import LawFit, Pull, SetAside, Study, Test
 from tribo.store.whole_files import write_text
 
@@ -62,9 +63,13 @@ def tests_table(study: Study) -> pd.DataFrame:
     ]
     placed += [(_faulty_row(fault), {"test_id": fault.test_id, "set_aside": fault.reason}) for fault in aside.values()]
     rows = [row for _, row in sorted(placed, key=lambda item: math.inf if item[0] is None else item[0])]
-    covariates = list(dict.fromkeys(name for t in ingested.campaign.tests for name in t.covariates))
-    extra = [name for name in covariates if name not in TESTS_COLUMNS]
-    return pd.DataFrame(rows, columns=[*TESTS_COLUMNS, *extra])
+    return pd.DataFrame(rows, columns=[*TESTS_COLUMNS, *covariates(study)])
+
+
+def covariates(study: Study) -> list[str]:
+    """Columns of tests.csv that tribo does not know and keeps as they are."""
+    found = dict.fromkeys(name for t in study.ingested.campaign.tests for name in t.covariates)
+    return [name for name in found if name not in TESTS_COLUMNS]
 
 
 def _faulty_row(fault: SetAside) -> int | None:
@@ -152,8 +157,13 @@ def comparison_table(study: Study) -> pd.DataFrame:
 
 
 def to_csv(table: pd.DataFrame) -> str:
-    """CSV text, the same for the same table on every machine."""
-    table = table.copy()
+    """CSV text, the same for the same table on every machine; texts that a spreadsheet would take for formulas escaped.
+
+    See :func:`tribo.escaping.for_spreadsheet`.
+    """
+    table = table.rename(columns=lambda name: for_spreadsheet(str(name)))
+    for name in table.select_dtypes(exclude="number"):
+        table[name] = [for_spreadsheet(cell) if isinstance(cell, str) else cell for cell in table[name]]
     for name in table.select_dtypes("float"):
         table[name] = table[name].replace(-0.0, 0.0).where(np.isfinite(table[name]) | table[name].isna(), np.nan)
     return str(table.to_csv(index=False, float_format=FLOAT_FORMAT, lineterminator="\n"))

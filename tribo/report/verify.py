@@ -67,6 +67,8 @@ def verify(out: Path, campaign: Path | None = None) -> Verification:
     record = read_record(out)
     if record is None:
         what = "this folder holds no record of inputs and outputs"
+        if (out / FILE).is_file():
+            what = "the record of inputs and outputs is damaged"
         raise CampaignError(Problem("no_provenance", what, file=str(out / FILE), allowed="an output folder of tribo"))
     place = campaign or out / record["campaign"]
     recorded = dict(record["inputs"])

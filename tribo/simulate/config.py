@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal
 
 from tribo.errors import Problem, SimulationError
+from tribo.limits import MOST_BLOCKS, MOST_STEPS
 from tribo.records import Pattern
 from tribo.simulate.masks import contact_mask, pattern_of
 
@@ -251,6 +252,11 @@ def _problems(config: SimConfig) -> Iterator[Problem]:
             "unstable_step", "the time step exceeds the stability limit", column="dt_s",
             found=f"{config.dt_s:g}", allowed=f"at most {config.largest_dt_s:.3g} s for these springs and masses",
         )  # fmt: skip
+    if not faulty & {"dt_s", "duration_s"} and (config.duration_s or 0.0) > MOST_STEPS * config.dt_s:
+        yield Problem(
+            "too_many_steps", "the run has too many time steps", column="duration_s",
+            found=f"{config.duration_s:g} s", allowed=f"at most {MOST_STEPS} steps of {config.dt_s:g} s",
+        )  # fmt: skip
     end = config.window_end_peaks
     if not faulty & _OF_THE_WINDOW and end is not None and end <= config.window_start_peaks:
         yield Problem(
@@ -328,6 +334,10 @@ def _geometry_problems(config: SimConfig) -> Iterator[Problem]:
         yield Problem(
             "too_small", "too few blocks", column="blocks", found=f"{nx} x {ny}", allowed="3 x 3 or more"
         )
+        return
+    if nx * ny > MOST_BLOCKS:
+        allowed = f"at most {MOST_BLOCKS} blocks"
+        yield Problem("too_many_blocks", "too many blocks", column="blocks", found=f"{nx} x {ny}", allowed=allowed)
         return
     pattern = config.pattern or pattern_of(config.sample)
     if pattern is None:

@@ -7,6 +7,8 @@ opens the file for writing again, so that a process killed at any moment leaves 
 
 from __future__ import annotations
 
+import asyncio
+import concurrent.futures
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -254,8 +256,13 @@ def _distributed_rows(
     with _client(scheduler) as (client, as_done):
         futures = client.map(one, [design[k] for k in missing], pure=False)
         place = {future.key: k for future, k in zip(futures, missing, strict=True)}
-        for future, row in as_done(futures, with_results=True):
-            yield place[future.key], row
+        try:
+            for future, row in as_done(futures, with_results=True):
+                yield place[future.key], row
+        except (OSError, asyncio.CancelledError, concurrent.futures.CancelledError) as why:
+            what = "the dask scheduler stopped answering; finished runs are kept and the next start continues"
+            reason = str(why) or type(why).__name__
+            raise SimulationError(Problem("scheduler_gone", what, column="scheduler", found=reason[:200])) from why
 
 
 @contextmanager
