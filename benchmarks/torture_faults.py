@@ -106,7 +106,8 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="torture-") as folder:
         root = Path(folder).resolve()
         place = write_inputs(root / "watched")
-        for name, command in prepared(place, root, not given.only or any("build" in name for name in given.only)).items():
+        builds = not given.only or any("build" in name for name in given.only)
+        for name, command in prepared(place, root, builds).items():
             if given.only and name not in given.only:
                 continue
             for what, trials in trials_of(Bench(place, command), given.every, given.seed).items():

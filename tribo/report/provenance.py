@@ -165,10 +165,17 @@ def _from(out: Path, place: str) -> str:
 
 
 def read_record(out: Path) -> dict[str, Any] | None:
-    """The contents of provenance.json of a folder; None if there is none, or none of this kind."""
+    """The contents of provenance.json of a folder; None if there is none, or none of this kind.
+
+    Raises
+    ------
+    OSError
+        It is there and cannot be read.
+    """
     try:
-        record = json.loads((out / FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        with naming(out / FILE):
+            record = json.loads((out / FILE).read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
         return None
     return record if isinstance(record, dict) and _is_whole(record) else None
 
