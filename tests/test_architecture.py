@@ -13,7 +13,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
 GROUND = {
-    "errors", "limits", "escaping", "input_files", "quantities", "records", "published", "zips", "links",
+    "errors", "limits", "escaping", "input_files", "quantities", "zeroing", "records", "published", "zips", "links",
 }  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
     ("errors", set()),
@@ -21,9 +21,10 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("escaping", set()),
     ("input_files", {"errors", "limits"}),
     ("quantities", {"errors"}),
-    ("records", {"errors"}),
+    ("zeroing", set()),
+    ("records", {"errors", "zeroing"}),
     ("published", set()),
-    ("zips", {"errors"}),
+    ("zips", {"errors", "limits"}),
     ("links", set()),
     ("store", GROUND),
     ("campaign", GROUND),

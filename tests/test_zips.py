@@ -8,10 +8,11 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from hostile_zips import EXPORT, GOOD, TESTS, Hostile, all_hostile, named, numbers, packed, sharing
+from hostile_zips import EXPORT, GOOD, TESTS, Hostile, all_hostile, named, numbers, packed, raw_name, sharing
 
 from tribo.campaign import open_campaign
-from tribo.errors import CampaignError
+from tribo.errors import CampaignError, ReadError
+from tribo.readers import read_export
 from tribo.zips import opened_zip, pieces, unpack
 
 HOSTILE = all_hostile()
@@ -81,3 +82,10 @@ def test_the_entries_at_fault_are_named_five_at_most_of_each_kind(tmp_path: Path
     assert outside.found == "../0, ../1, ../2, ../3, ../4 and 995 more"
     assert control.found == "raw/\n"
     assert "\n" not in str(control)
+
+
+def test_a_packed_export_with_a_name_that_is_not_utf8_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "T1.zip").write_bytes(raw_name(b"raw/\xff.csv"))
+    with pytest.raises(ReadError) as caught:
+        read_export(tmp_path / "T1.zip")
+    assert [p.kind for p in caught.value.problems] == ["bad_archive"]

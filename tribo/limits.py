@@ -31,6 +31,11 @@ MOST_UNPACKED_BYTES = 2_000_000_000
 MOST_UNPACKED_EXPORT_BYTES = 400_000_000  # of an export in a .zip or .gz, which is held in memory
 MOST_EXPANSION = 200  # text of numbers shrinks about three- to tenfold
 SMALL_ENTRY_BYTES = 10_000_000  # below this no expansion is a danger
+MOST_WORKBOOK_BYTES = 200_000_000  # an Excel export, unpacked
+LONGEST_ENTRY_NAME_BYTES = 1_000
+LONGEST_PATH_PART_BYTES = 255  # on all common file systems
+DEEPEST_PATH = 32
+LARGEST_LISTING_BYTES = 200 * MOST_ENTRIES  # of the list of entries: 46 bytes, a name and time stamps each
 
 # Numbers in SI units. Squares of these, summed over the longest table, stay finite and above zero in double precision;
 # no friction test comes near them.

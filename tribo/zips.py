@@ -15,15 +15,17 @@ from pathlib import Path
 from typing import IO
 
 from tribo.errors import CampaignError, Problem
+from tribo.limits import (
+    DEEPEST_PATH,
+    LARGEST_LISTING_BYTES,
+    LONGEST_ENTRY_NAME_BYTES,
+    LONGEST_PATH_PART_BYTES,
+    MOST_ENTRIES,
+    MOST_EXPANSION,
+    MOST_UNPACKED_BYTES,
+    SMALL_ENTRY_BYTES,
+)
 
-MOST_ENTRIES = 50_000
-MOST_BYTES = 2_000_000_000
-MOST_EXPANSION = 200  # text of numbers shrinks about three- to tenfold
-SMALL_BYTES = 10_000_000  # below this no expansion is a danger
-LONGEST_NAME_BYTES = 1_000
-LONGEST_PART_BYTES = 255  # of a path, on all common file systems
-DEEPEST_PATH = 32
-LARGEST_LISTING_BYTES = 200 * MOST_ENTRIES  # of the list of entries; 46 bytes, a name and time stamps each
 MOST_NAMED = 5
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _CHUNK = 1 << 20
@@ -60,7 +62,7 @@ def opened_zip(archive: Path) -> Iterator[tuple[zipfile.ZipFile, tuple[Entry, ..
     """
     opened, infos = _listing(archive)
     with opened:
-        problems = size_problems(infos, archive.stat().st_size, archive.name, MOST_BYTES)
+        problems = size_problems(infos, archive.stat().st_size, archive.name, MOST_UNPACKED_BYTES)
         if problems:
             raise CampaignError(problems)
         entries = [e for info in infos if (e := _entry(info)).name.split("/")[0] != _NOT_OF_THE_CAMPAIGN]
@@ -158,7 +160,7 @@ def size_problems(
 
 
 def _expands(size: int, packed: int) -> bool:
-    return size > SMALL_BYTES and size > MOST_EXPANSION * max(packed, 1)
+    return size > SMALL_ENTRY_BYTES and size > MOST_EXPANSION * max(packed, 1)
 
 
 def _parent(entry: Entry) -> str:
@@ -193,7 +195,7 @@ def _entry_problems(entries: Sequence[Entry], file: str) -> list[Problem]:
 def _listed(names: Iterable[str]) -> str:
     names = list(names)
     more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return ", ".join(name[:LONGEST_PART_BYTES] for name in names[:MOST_NAMED]) + more
+    return ", ".join(name[:LONGEST_PATH_PART_BYTES] for name in names[:MOST_NAMED]) + more
 
 
 def _name_fault(entry: Entry) -> Fault | None:
@@ -203,12 +205,12 @@ def _name_fault(entry: Entry) -> Fault | None:
         return "bad_entry_name", "the name of an entry contains a control character", ""
     if given.startswith(("/", "\\")) or ".." in parts or re.match(r"[A-Za-z]:", given):
         return "entry_outside", "the path of an entry leads outside the folder", ""
-    if len(parts) > DEEPEST_PATH or len(given.encode()) > LONGEST_NAME_BYTES:
+    if len(parts) > DEEPEST_PATH or len(given.encode()) > LONGEST_ENTRY_NAME_BYTES:
         return "bad_entry_name", "the path of an entry is too long", (
-            f"at most {DEEPEST_PATH} levels, {LONGEST_NAME_BYTES} bytes"
+            f"at most {DEEPEST_PATH} levels, {LONGEST_ENTRY_NAME_BYTES} bytes"
         )
-    if any(len(part.encode()) > LONGEST_PART_BYTES for part in parts):
-        return "bad_entry_name", "the name of an entry is too long", f"at most {LONGEST_PART_BYTES} bytes"
+    if any(len(part.encode()) > LONGEST_PATH_PART_BYTES for part in parts):
+        return "bad_entry_name", "the name of an entry is too long", f"at most {LONGEST_PATH_PART_BYTES} bytes"
     if not entry.name and not entry.is_folder:
         return "bad_entry_name", "an entry has no name", ""
     return None

@@ -67,14 +67,14 @@ def test_an_exception_while_evaluating_one_export_is_the_fault_of_that_test(
     from tribo import traces
 
     campaign = load_campaign(folder)
-    read_pull, bad = traces.read_pull, campaign.tests[3].test_id
+    read_record, bad = traces.read_record, campaign.tests[3].test_id
 
     def broken(trace: object, *, test: Test, **options: object) -> object:
         if test.test_id == bad:
             raise ZeroDivisionError("division by zero")
-        return read_pull(trace, test=test, **options)  # type: ignore[arg-type]
+        return read_record(trace, test=test, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(traces, "read_pull", broken)
+    monkeypatch.setattr(traces, "read_record", broken)
     ingested = stages.ingest(campaign)
     (fault,) = ingested.set_aside
     assert fault.test_id == bad

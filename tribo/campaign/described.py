@@ -16,6 +16,7 @@ from tribo.escaping import is_control
 from tribo.input_files import nests_too_deeply, read_input
 from tribo.limits import DEEPEST_NESTING, LARGEST_DESCRIPTION_BYTES, LARGEST_NUMBER, SMALLEST_NUMBER
 from tribo.quantities import QUANTITIES, quantity_named
+from tribo.zeroing import zero_choice
 
 
 def _on_one_line(text: str) -> str:
@@ -39,6 +40,14 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
+def _a_zero(given: str | float | list[float]) -> str | float | list[float]:
+    zero_choice(given)
+    return given
+
+
+Zero = Annotated[str | float | list[float], AfterValidator(_a_zero)]
+
+
 class CampaignTable(_Strict):
     """[campaign]: properties of the whole campaign."""
 
@@ -48,6 +57,8 @@ class CampaignTable(_Strict):
     nominal_area_mm2: Positive
     slider_mass_g: NotNegative = 0.0
     pull_speed_mm_s: Positive | None = None
+    zero: Zero = ""
+    load_zero: Zero = ""
 
 
 class PatternTable(_Strict):

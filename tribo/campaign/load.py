@@ -13,12 +13,13 @@ from tribo.campaign.choice import overlap, split_choice
 from tribo.campaign.dates import ALLOWED as ALLOWED_DATES, order_of, parsed
 from tribo.campaign.described import CampaignFile, PatternTable, read_description
 from tribo.campaign.numbers import load_faults, number, number_faults
-from tribo.campaign.table import COUNTS, KNOWN, NUMBERS, TestRow, read_tests_table
+from tribo.campaign.table import COUNTS, KNOWN, NUMBERS, ZEROS, TestRow, read_tests_table
 from tribo.errors import CampaignError, Problem, unexpected
 from tribo.escaping import well_formed
 from tribo.input_files import hashes_of_reads
 from tribo.links import LEADS_OUT, leads_out, paths_below
 from tribo.records import STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
+from tribo.zeroing import ALLOWED, zero_choice
 
 _NOT_WORTH_A_NOTE = (".", "~$", "Thumbs.db")
 TOML = "campaign.toml"
@@ -99,6 +100,8 @@ def _campaign(
         problems=tuple(problems),
         columns=described.columns,
         instrument=described.instrument.model_dump(exclude_none=True),
+        zero=zero_choice(general.zero),
+        load_zero=zero_choice(general.load_zero),
     )
 
 
@@ -176,7 +179,7 @@ def _row_faults(root: Path, row: TestRow, patterns: Mapping[str, Pattern], measu
     if not row.cells["test_id"]:
         problems.append(Problem("no_test_id", "test_id is missing", TESTS, row.row, "test_id"))
     problems += _sample_faults(row, patterns)
-    problems += number_faults(row, TESTS)
+    problems += number_faults(row, TESTS) + _zero_faults(row)
     problems += load_faults(row, TESTS, load_in_export=measured and bool(_export_of(row)[1]))
     problems += [p for p in _file_faults(root, row) if measured or p.kind != "missing"]
     return problems
@@ -190,6 +193,17 @@ def _sample_faults(row: TestRow, patterns: Mapping[str, Pattern]) -> list[Proble
     hint = f"; did you mean {near[0]}?" if near else ""
     allowed = f"{', '.join(patterns)}, or one of these names followed by x or y{hint}"
     return [Problem("unknown_sample", "no pattern has this name", TESTS, row.row, "sample", sample, allowed)]
+
+
+def _zero_faults(row: TestRow) -> list[Problem]:
+    problems = []
+    for column in ZEROS:
+        cell = row.cells.get(column, "")
+        try:
+            zero_choice(cell)
+        except ValueError:
+            problems.append(Problem("unknown_zero", "not a zero", TESTS, row.row, column, cell, ALLOWED))
+    return problems
 
 
 def _date_faults(row: TestRow, order: str) -> list[Problem]:
@@ -264,6 +278,9 @@ def _test(row: TestRow, described: CampaignFile, order: str) -> Test:
         operator=cells.get("operator", ""),
         covariates={name: cell for name, cell in cells.items() if name and name not in KNOWN},
         row=row.row,
+        zero=zero_choice(cells.get("zero") or described.campaign.zero),
+        load_zero=zero_choice(cells.get("load_zero") or described.campaign.load_zero),
+        stiffness_N_per_m=numbers["stiffness_N_per_m"] or described.instrument.stiffness_N_per_m,
     )
 
 

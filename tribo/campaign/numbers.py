@@ -16,7 +16,7 @@ from tribo.limits import (
     SMALLEST_NUMBER,
 )
 
-_NOT_NEGATIVE = ("speed_mm_s", "hold_s")
+_NOT_NEGATIVE = ("speed_mm_s", "hold_s", "stiffness_N_per_m")
 _SMALL_OR_ZERO = ("mass_g", *_NOT_NEGATIVE)
 
 

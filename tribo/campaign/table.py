@@ -16,11 +16,14 @@ from tribo.limits import LARGEST_TABLE_BYTES, LONGEST_CELL, MOST_COLUMNS, MOST_T
 
 REQUIRED = ("test_id", "file", "sample")
 LOADS = ("mass_g", "normal_load_N")
-NUMBERS = ("mass_g", "normal_load_N", "speed_mm_s", "hold_s", "temperature_C", "humidity_pct")
+NUMBERS = (
+    "mass_g", "normal_load_N", "speed_mm_s", "hold_s", "temperature_C", "humidity_pct", "stiffness_N_per_m",
+)  # fmt: skip
 COUNTS = ("repeat", "run_order", "specimen_run")
 TEXTS = ("specimen", "direction", "started_at", "operator", "exclude")
+ZEROS = ("zero", "load_zero")
 NAMES = ("test_id", "file", "sample", "specimen", "direction", "operator")  # on one line, without control characters
-KNOWN = (*REQUIRED, *NUMBERS, *COUNTS, *TEXTS)
+KNOWN = (*REQUIRED, *NUMBERS, *COUNTS, *TEXTS, *ZEROS)
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,32 @@ FLAT = click.option(
     help="Flat sample on which the model is calibrated. [default: F, or the only flat sample]",
 )  # fmt: skip
 
+def _a_zero(context: click.Context, parameter: click.Parameter, given: str) -> str:
+    """The text of a zero as given, checked.
+
+    Raises click.BadParameter.
+    """
+    from tribo.zeroing import zero_choice
+
+    try:
+        zero_choice(given)
+    except ValueError as why:
+        raise click.BadParameter(str(why)) from None
+    return given
+
+
+ZEROS = (
+    click.option(
+        "--zero", default="", metavar="ZERO", callback=_a_zero,
+        help='Zero of the force for tests without their own: "before contact", "at rest", "none", a number of newtons, '
+        "or [from, to] in seconds.",
+    ),
+    click.option(
+        "--load-zero", default="", metavar="ZERO", callback=_a_zero,
+        help="Zero of the recorded normal load, in the same form.",
+    ),
+)  # fmt: skip
+
 OVERRIDES = click.option(
     "--overrides",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
@@ -49,6 +75,7 @@ OVERRIDES = click.option(
 def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         COLUMNS,
+        *ZEROS,
         OVERRIDES,
         click.option(
             "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
@@ -198,6 +225,8 @@ def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **opti
 )
 @FLAT
 @COLUMNS
+@ZEROS[0]
+@ZEROS[1]
 @OVERRIDES
 @command_options
 def diagnose(

@@ -29,7 +29,7 @@ def pattern_layers(model: ModelFit) -> list[Layer]:
 def _pattern_layer(c: PatternCorrection) -> Layer:
     parameters = {f"at {load:g} N": _estimate(percent) for load, percent in c.at_load.items()}
     text = (
-        f"The measured {c.regime} friction of {c.sample} is {_signed(c.mean.value)} of the model's, on average over "
+        f"The measured {c.regime} friction of {c.sample} is {_signed(c.mean.value)} of the model, on average over "
         f"its loads (90 % interval {c.mean.low:.0f} to {c.mean.high:.0f} %, adjusted p {p_text(c.p)})."
     )
     return Layer(

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 FEWEST_FOR_PROCESSES = 100  # below, starting processes costs more than it gains
 CHUNK = 16
+_OFF_LOAD = 0.02  # share by which the recorded load may differ from that of the test
 _OFF_SPEED = 0.2  # share by which the travel while sliding may differ from the speed of the test times the time
 _UNLOADED = 0.05  # share of the largest load of an export below which a piece of it carries none
 
@@ -102,12 +103,12 @@ def _set_aside(test: Test, found: Sequence[Problem]) -> SetAside:
 def _whole(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> tuple[Test, Outcome]:
     """An export, or one table of it, as one pull."""
     from tribo.readers import read_export
-    from tribo.traces import read_pull
+    from tribo.traces import read_record
 
     trace = read_export(root / test.file, columns=columns or None, name=test.test_id, file=test.file)
-    test = _with_load(test, trace)
-    pull = read_pull(trace, rule=rule, test=test)
-    doubts = [doubt for doubt in (_several_pulls(trace), _off_speed(trace, pull, test)) if doubt]
+    pull = read_record(trace, rule=rule, test=test)
+    test = _with_load(test, pull.recorded_load_N)
+    doubts = [d for d in (_several_pulls(trace), _off_speed(trace, pull, test), _other_load(pull, test)) if d]
     if doubts:
         flags, problems = (*trace.flags, *(d.kind for d in doubts)), (*trace.problems, *doubts)
         trace = replace(trace, flags=flags, problems=problems)
@@ -150,19 +151,25 @@ def _carry_load(pieces: Sequence[Trace]) -> list[bool]:
     return [bool(load >= _UNLOADED * loads.max()) for load in loads]
 
 
-def _with_load(test: Test, trace: Trace) -> Test:
-    """The test with the load of its trace where tests.csv gives none.
+def _other_load(pull: Pull, test: Test) -> Problem | None:
+    """A doubt if the load recorded while sliding is not the one that tests.csv gives."""
+    recorded, given = pull.recorded_load_N, test.normal_load_N
+    if math.isnan(recorded) or not given > 0 or abs(recorded / given - 1.0) < _OFF_LOAD:
+        return None
+    what, found = "the normal load recorded while sliding differs from that of the test", f"{recorded:.4g} N"
+    return Problem("off_load", what, test.file, None, "normal force", found, f"about {given:.4g} N, which is used")
+
+
+def _with_load(test: Test, load: float) -> Test:
+    """The test with the ``load`` of its trace where tests.csv gives none.
 
     Raises
     ------
     TraceError
         ``no_load``: neither gives it.
     """
-    from tribo.traces import load_of
-
     if not math.isnan(test.normal_load_N):
         return test
-    load = load_of(trace)[0]
     if not SMALLEST_LOAD_N <= load <= LARGEST_LOAD_N:
         found = None if math.isnan(load) else f"{load:.4g} N"
         what, allowed = "neither tests.csv nor the export gives the normal load", "normal_load_N in tests.csv"
@@ -201,8 +208,10 @@ def _one_of_several(test: Test, piece: Trace, zero_N: float, pull: Pull | TraceE
     """One pull of an export; the trace keeps its zero, as one that was read alone does."""
     if isinstance(pull, TraceError):
         return test, _set_aside(test, pull.problems)
+    from tribo.traces import load_of
+
     try:
-        test = _with_load(test, piece)
+        test = _with_load(test, load_of(piece)[0])
     except TraceError as why:
         return test, _set_aside(test, why.problems)
     trace = replace(piece, name=test.test_id, file=test.file, force_N=piece.force_N + zero_N)

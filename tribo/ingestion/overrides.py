@@ -66,7 +66,10 @@ def _moved(ingested: Ingested, overrides: list[Override], rule: str) -> dict[str
     for o in overrides:
         trace = ingested.traces[o.test_id]
         try:
-            pull = read_pull(trace, rule=rule, test=tests[o.test_id], peak_s=o.peak_s, window_s=o.window_s)
+            automatic = ingested.pulls[o.test_id]
+            known = automatic.zero_rule not in ("", "before contact") and math.isfinite(automatic.zero_u_N)
+            zero = (automatic.zero_N, automatic.zero_u_N) if known else None
+            pull = read_pull(trace, rule=rule, test=tests[o.test_id], zero=zero, peak_s=o.peak_s, window_s=o.window_s)
         except TraceError as why:
             problems += why.problems
             continue

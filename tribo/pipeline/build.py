@@ -232,18 +232,22 @@ def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
 def _snakemake(
     state: Path, config: Path, options: BuildOptions, more: Sequence[str], descriptor: int | None
 ) -> subprocess.CompletedProcess[str]:
-    """Run the workflow; the lock of the site is what keeps two apart, so that Snakemake needs none of its own."""
+    """Run the workflow; the lock of the site is what keeps two apart, so that Snakemake needs none of its own.
+
+    Neither Python nor Snakemake takes modules or settings from the folder that the build happens to start in.
+    """
     folder = workflow_dir()
     profile = folder / "profiles" / options.profile if options.profile in PROFILES else Path(options.profile)
     command = [
-        sys.executable, "-m", "snakemake", "--snakefile", str(folder / "Snakefile"), "--directory", str(state),
-        "--configfile", str(config), "--profile", str(profile.resolve()), "--cores", str(options.jobs), "--nolock",
-        "--nocolor", *more,
+        sys.executable, "-P", "-m", "snakemake", "--snakefile", str(folder / "Snakefile"), "--directory", str(state),
+        "--configfile", str(config), "--profile", str(profile.resolve()), "--workflow-profile", "none",
+        "--cores", str(options.jobs), "--nolock", "--nocolor", *more,
     ]  # fmt: skip
     (state / "log").mkdir(parents=True, exist_ok=True)
     return subprocess.run(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"}, pass_fds=() if descriptor is None else (descriptor,),
+        env={**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONSAFEPATH": "1"},
+        pass_fds=() if descriptor is None else (descriptor,),
     )  # fmt: skip
 
 

@@ -18,7 +18,9 @@ _CHUNK = 1 << 20
 _MOST_LISTED = 12
 _GZIP, _ZIP = b"\x1f\x8b", b"PK\x03\x04"
 _WORKBOOK_ENTRIES = {"[Content_Types].xml", "META-INF/manifest.xml"}
-_DAMAGED = (zipfile.BadZipFile, gzip.BadGzipFile, NotImplementedError, EOFError, OSError, RuntimeError, zlib.error)
+_DAMAGED = (
+    zipfile.BadZipFile, gzip.BadGzipFile, NotImplementedError, EOFError, OSError, RuntimeError, ValueError, zlib.error,
+)  # fmt: skip
 
 
 class _Readable(Protocol):

@@ -12,13 +12,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from tribo.errors import Problem, ReadError
+from tribo.limits import MOST_WORKBOOK_BYTES
 from tribo.readers.core.packed import is_workbook_archive
 from tribo.readers.core.source import Source
 from tribo.zips import size_problems
 
 _OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 _ZIP = b"PK\x03\x04"
-_MOST_UNPACKED_BYTES = 200_000_000
 _MOST_CELLS = 20_000_000  # of the rectangle that a sheet spans, filled or not: its reader keeps all of them
 _CELL = re.compile(rb'<c [^>]*?r="([A-Z]{1,3})(\d{1,7})"')
 
@@ -58,7 +58,7 @@ def open_workbook(path: Path, file: str, raw: bytes | mmap.mmap) -> tuple[Source
 def _refuse_large(data: bytes, file: str) -> None:
     with zipfile.ZipFile(io.BytesIO(data)) as packed:
         entries = packed.infolist()
-        if problems := size_problems(entries, len(data), file, _MOST_UNPACKED_BYTES):
+        if problems := size_problems(entries, len(data), file, MOST_WORKBOOK_BYTES):
             raise ReadError(replace(problem, kind="too_large") for problem in problems)
         for entry in entries:
             if entry.filename.startswith("xl/worksheets/") and entry.filename.endswith(".xml"):
