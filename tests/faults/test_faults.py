@@ -1,4 +1,4 @@
-"""Faults at a few file operations of `tribo report` and `tribo build`; benchmarks/torture_faults.py tries every one."""
+"""Faults at a few file operations of some commands; benchmarks/torture_faults.py tries every one of every command."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from faults.commands import prepared
 from faults.file_operations import KILL, Fault, Operation, errors_of
 from faults.small_site import write_inputs
-from faults.trial import Bench
+from faults.trial import Bench, Command
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="the bench forks")
 
@@ -36,6 +36,25 @@ def failures(bench: Bench, kinds: list[str], per_kind: int = 1) -> list[tuple[st
     return found
 
 
+def test_ingest_withstands_a_fault_at_each_kind_of_file_operation(tmp_path: Path) -> None:
+    place = write_inputs(tmp_path.resolve() / "watched")
+    bench = Bench(place, Command("ingest", ("ingest", str(place.campaign), "-o", str(place.out), "--jobs", "1")))
+    kinds = ["stat", "list", "open to read", "read", "make folder", "open to write", "write", "rename"]
+    assert bench.expected.status == 0
+    assert {o.kind for o in bench.operations} >= set(kinds)
+    assert failures(bench, kinds) == []
+
+
+def test_a_limit_on_the_size_of_files_ends_a_simulation_with_a_sentence(tmp_path: Path) -> None:
+    place = write_inputs(tmp_path.resolve() / "watched")
+    runs = ("simulate", "--design", str(place.design), "-o", str(place.out / "runs.nc"), "--jobs", "1")
+    bench = Bench(place, Command("simulate --design", runs))
+    assert bench.expected.status == 0
+    largest = (place.out / "runs.nc").stat().st_size
+    assert [(size, wrong) for size in (0, 600, largest - 1) if (wrong := bench.with_largest_file(size)[1])] == []
+
+
+@pytest.mark.slow
 def test_report_and_build_withstand_a_fault_at_each_kind_of_file_operation(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

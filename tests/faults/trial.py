@@ -21,7 +21,7 @@ from pathlib import Path
 from faults.file_operations import KILL, KILLED, LASTING, Fault, Operation, watch
 from faults.small_site import Place, hashes
 
-SLOW_S = 300
+SLOW_S = 1200
 TEMPORARY_NAME = re.compile(r"\.(?P<name>.+?)(\.[^.]+)?\.part$")
 TIMES = re.compile(r'\d{4}-\d\d-\d\d[T ]\d\d:?\d\d(:?\d\d)?Z?|"seconds": [\d.]+|process \d+')
 
