@@ -17,7 +17,7 @@ from typing import Any
 
 from faults.file_operations import real_listdir, real_open
 from faults.small_site import Place
-from faults.trial import Command, in_child, run_command
+from faults.trial import Bench, Command, in_child, run_command
 
 RUNS = ("--runs", "2", "--jobs", "1")
 
@@ -112,6 +112,13 @@ def _builds(place: Place, aside: Path, site: Path) -> list[Command]:
         Command("build", arguments, site, build_in_one_process),
         Command("build of the index", arguments, indexed, build_in_one_process),
     ]
+
+
+def warm(place: Place, command: Command) -> Bench:
+    """A bench of a command whose modules and compiled code this process has loaded, so that its children have them."""
+    with _quiet(place):
+        (command.run or run_command)(command.arguments)
+    return Bench(place, command)
 
 
 def small_lattice() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from faults.commands import prepared
+from faults.commands import prepared, warm
 from faults.file_operations import KILL, Fault, Operation, errors_of
 from faults.small_site import write_inputs
 from faults.trial import Bench, Command
@@ -38,7 +38,7 @@ def failures(bench: Bench, kinds: list[str], per_kind: int = 1) -> list[tuple[st
 
 def test_ingest_withstands_a_fault_at_each_kind_of_file_operation(tmp_path: Path) -> None:
     place = write_inputs(tmp_path.resolve() / "watched")
-    bench = Bench(place, Command("ingest", ("ingest", str(place.campaign), "-o", str(place.out), "--jobs", "1")))
+    bench = warm(place, Command("ingest", ("ingest", str(place.campaign), "-o", str(place.out), "--jobs", "1")))
     kinds = ["stat", "list", "open to read", "read", "make folder", "open to write", "write", "rename"]
     assert bench.expected.status == 0
     assert {o.kind for o in bench.operations} >= set(kinds)
@@ -48,7 +48,7 @@ def test_ingest_withstands_a_fault_at_each_kind_of_file_operation(tmp_path: Path
 def test_a_limit_on_the_size_of_files_ends_a_simulation_with_a_sentence(tmp_path: Path) -> None:
     place = write_inputs(tmp_path.resolve() / "watched")
     runs = ("simulate", "--design", str(place.design), "-o", str(place.out / "runs.nc"), "--jobs", "1")
-    bench = Bench(place, Command("simulate --design", runs))
+    bench = warm(place, Command("simulate --design", runs))
     assert bench.expected.status == 0
     largest = (place.out / "runs.nc").stat().st_size
     assert [(size, wrong) for size in (0, 600, largest - 1) if (wrong := bench.with_largest_file(size)[1])] == []

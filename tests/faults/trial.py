@@ -263,6 +263,7 @@ class Bench:
             if not (named and caused) and _wanted(outcome.struck):
                 wrong.append("done in silence")
         elif outcome.status == 3 and outcome.struck.path.startswith("campaign/raw/"):
+            named = named or "tests.csv, row" in said
             wrong += [] if named and caused else ["set aside without path and cause"]
         elif outcome.status != 1:
             wrong.append(f"exit status {outcome.status}")

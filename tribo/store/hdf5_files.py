@@ -17,32 +17,41 @@ from tribo.store.whole_files import whole_file
 
 
 class HeldBackErrors(io.RawIOBase):
-    """A binary file in which every write succeeds; ``failure`` is the first error. After it nothing is written."""
+    """A binary file in which every write succeeds; ``failure`` is the first error.
+
+    After it the file goes on in memory: the library reads back what it wrote, and may crash where it finds other bytes.
+    """
 
     def __init__(self, raw: io.RawIOBase):
-        self._raw = raw
+        self._raw: io.RawIOBase | io.BytesIO = raw
         self.failure: OSError | None = None
 
     def write(self, data: Any) -> int:
         view = memoryview(data).cast("B")
         done = 0
-        try:
-            while self.failure is None and done < len(view):
+        while done < len(view):
+            try:
                 done += self._raw.write(view[done:]) or 0
-        except OSError as why:
-            self.failure = why
+            except OSError as why:
+                self._go_on_in_memory(why)
         return len(view)
+
+    def _go_on_in_memory(self, why: OSError) -> None:
+        self.failure = why
+        place = self._raw.tell()
+        self._raw.seek(0)
+        self._raw = io.BytesIO(self._raw.read() or b"")
+        self._raw.seek(place)
 
     def readinto(self, buffer: Any) -> int:
         return self._raw.readinto(buffer) or 0
 
     def truncate(self, size: int | None = None) -> int:
         try:
-            if self.failure is None:
-                return self._raw.truncate(size)
+            return self._raw.truncate(size)
         except OSError as why:
-            self.failure = why
-        return size or 0
+            self._go_on_in_memory(why)
+            return self._raw.truncate(size)
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
         return self._raw.seek(offset, whence)
