@@ -21,7 +21,7 @@ MOST_EXPORT_ROWS = 40_000_000  # reading takes 8 bytes a number, and a pull abou
 DEEPEST_NESTING = 50  # arrays and tables within each other in TOML and JSON
 
 # Designs of simulations
-MOST_RUNS = 100_000
+MOST_RUNS = 50_000
 MOST_BLOCKS = 4_000_000  # 2000 x 2000; a run of them takes about 2 GB
 MOST_STEPS = 100_000_000  # of a run
 

@@ -128,6 +128,7 @@ def test_a_quotation_mark_that_is_not_closed_does_not_swallow_tests(tmp_path: Pa
         TOML.replace("55.0", "9" * 5000),
         TOML.replace("55.0", "1e300"), TOML.replace("55.0", "5e-324"), TOML.replace('"door"', '"\\u001b[31m"'),
         TOML.replace("patterns.F", 'patterns."F\\u0000"'), TOML + 'x = "\x00"\n',
+        TOML.replace("patterns.F", f'patterns."{"ü" * 60}"'),
     ],
 )  # fmt: skip
 def test_a_hostile_description_is_refused_with_its_file(tmp_path: Path, toml: str) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tribo.pipeline.build import BuildOptions, _configuration
+from tribo.pipeline.build import BuildOptions, _configuration, _to_simulate
 from tribo.pipeline.history import CampaignRow, Law, history
 from tribo.pipeline.index_page import page, series_name, trend_csv, write_index
 from tribo.pipeline.scan import scan
@@ -55,6 +55,24 @@ def test_refused_campaigns_stand_in_the_index_with_their_reason(tmp_path: Path) 
     assert {row.state for row in rows} == {"unusable"}
     write_index(tmp_path / "site")
     assert (tmp_path / "site" / "current" / "index.html").read_text(encoding="utf-8").count("rename it") == len(rows)
+
+
+def test_a_slash_or_a_brace_in_the_name_of_a_sample_reaches_no_path_of_the_workflow(tmp_path: Path) -> None:
+    drop = drop_of(tmp_path / "drop", "a")
+    names = ("F", "A/B", "{x}", "..", "$\\frac$")
+    patterns = "".join(f"[patterns.{json.dumps(n)}]\ncavity = 'none'\n" for n in names)
+    (drop / "a" / "campaign.toml").write_text(f'[campaign]\ntitle = "t"\nnominal_area_mm2 = 55.0\n{patterns}')
+    (drop / "a" / "raw").mkdir()
+    rows = ["test_id,file,sample,normal_load_N"]
+    for k, name in enumerate(names):
+        (drop / "a" / "raw" / f"{k}.csv").write_text("1,2\n")
+        rows.append(f"T{k},raw/{k}.csv,{name},{k + 1}")
+    (drop / "a" / "tests.csv").write_text("\n".join(rows) + "\n")
+    (campaign,) = scan(drop, settle_s=0.0)
+    samples, cells = _to_simulate(campaign)
+    assert samples == ["F", "A%2FB", "%7Bx%7D", "..", "%24%5Cfrac%24"]
+    assert len(cells) == 25
+    assert not any(set("/{}\\") & set(word) for word in (*samples, *cells))
 
 
 DAMAGED = (b"", b"{", b"[]", b"null", b"{}", b"[" * 100_000, b'{"status": 3}', b"\xff\xfe", b'{"status": "done"}',

@@ -30,6 +30,8 @@ BASE = {"samples": ["F"], "pressures_kPa": [10.0]}
         ({"parameters": {"blocks": [10**9, 10**9]}}, "too_many_blocks"),
         ({"parameters": {"duration_s": 1e9}}, "too_many_steps"),
         ({"seed": 10**400}, "wrong_value"),
+        ({"parameters": {"spacing_m": 1e-300}}, "impossible_number"),
+        ({"parameters": {"modulus_Pa": 1e300}}, "impossible_number"),
     ],
 )
 def test_a_design_beyond_the_limits_is_refused_before_it_is_laid_out(more: dict[str, Any], kind: str) -> None:

@@ -50,6 +50,9 @@ def pulls() -> Iterator[tuple[str, Trace]]:
         "short zero": Shape(zero_s=0.3, rise_s=6),
         "short record": Shape(sliding_s=1.0),
         "steep": Shape(rise_s=0.1),
+        "risen in four samples": Shape(rise_s=0.07),
+        "risen in two samples": Shape(rise_s=0.03),
+        "risen in one sample": Shape(rise_s=0.015, fall_s=0.5),
     }
     for seed, (name, shape) in enumerate(shapes.items()):
         yield name, noisy(shape, seed)

@@ -8,13 +8,14 @@ import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
+from urllib.parse import quote
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from tribo.errors import Problem, system_problem
 from tribo.escaping import is_control
 from tribo.input_files import nests_too_deeply, read_input
-from tribo.limits import DEEPEST_NESTING, LARGEST_DESCRIPTION_BYTES, LARGEST_NUMBER, SMALLEST_NUMBER
+from tribo.limits import DEEPEST_NESTING, LARGEST_DESCRIPTION_BYTES, LARGEST_NUMBER, LONGEST_NAME, SMALLEST_NUMBER
 from tribo.quantities import QUANTITIES, quantity_named
 from tribo.zeroing import zero_choice
 
@@ -31,9 +32,16 @@ def _measurable(value: float) -> float:
     return value
 
 
+def _fit_for_a_file_name(name: str) -> str:
+    if len(quote(name, safe="")) > LONGEST_NAME:
+        raise ValueError(f"must not be longer than {LONGEST_NAME} bytes in the encoding of addresses")
+    return name
+
+
 Positive = Annotated[float, Field(gt=0, le=LARGEST_NUMBER, allow_inf_nan=False), AfterValidator(_measurable)]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST_NUMBER, allow_inf_nan=False), AfterValidator(_measurable)]
 Line = Annotated[str, AfterValidator(_on_one_line)]
+Name = Annotated[Line, AfterValidator(_fit_for_a_file_name)]
 
 
 class _Strict(BaseModel):
@@ -135,7 +143,7 @@ class CampaignFile(_Strict):
     """The whole of campaign.toml."""
 
     campaign: CampaignTable
-    patterns: Annotated[dict[Line, PatternTable], Field(min_length=1)]
+    patterns: Annotated[dict[Name, PatternTable], Field(min_length=1)]
     columns: Annotated[dict[str, str], AfterValidator(_only_quantities)] = {}
     instrument: InstrumentTable = InstrumentTable()
 

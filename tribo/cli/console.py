@@ -18,12 +18,14 @@ from typing import Any
 
 import click
 
+from tribo.cli.interruption import damage_said, ended_by_terminate
 from tribo.errors import Problem, TriboError, system_problem, unexpected
 from tribo.escaping import printable
 from tribo.records import SetAside
 from tribo.store.lock import BusyError
 
 DONE, UNUSABLE, SOME_SET_ASIDE = 0, 1, 3
+INTERRUPTED = 130
 BUSY = 75  # EX_TEMPFAIL of sysexits.h: nothing is wrong, try again later
 
 
@@ -172,18 +174,16 @@ def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
         logging.basicConfig(level=logging.INFO if verbose else logging.ERROR, stream=sys.stderr, format="%(message)s")
         logging.getLogger("tribo").setLevel(logging.DEBUG if debug else logging.NOTSET)
         try:
-            status = function(console=console, **options)
+            with damage_said(lambda text: console.say(text, level=-1)), ended_by_terminate():
+                status = function(console=console, **options)
         except (click.ClickException, BrokenPipeError):
             raise
-        except BusyError as why:
-            _report_faults(console, why)
-            status = BUSY
         except Exception as why:
             _report_faults(console, why)
-            status = UNUSABLE
+            status = BUSY if isinstance(why, BusyError) else UNUSABLE
         except (KeyboardInterrupt, click.Abort):
             console.say("interrupted; finished results are kept and no file is incomplete", level=-1)
-            status = 130
+            status = INTERRUPTED
         sys.exit(status or DONE)
 
     return command

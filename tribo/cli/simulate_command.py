@@ -114,7 +114,7 @@ def simulate(
             out.unlink()
         with console.progress() as progress:
             ran = run_stored(
-                runs, out, jobs, scheduler, lambda done, total: progress("simulating", done, total), work
+                runs, out, jobs, scheduler, lambda done, total: progress("simulating", done, total), work, wait_s
             )  # fmt: skip
         _say_ensemble(console, ran, out, table2)
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
+from tribo.errors import SimulationError
 from tribo.records import Pattern, Run
 from tribo.store.kept_results import Shelf, sources
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 SOURCES = ("simulate", "laws", "records")  # packages whose sources decide a run
 SUFFIX = ".nc"
+WAIT_S = 86400.0  # for another process that runs the same cell: its runs are then there
 CELLS_AWAY = 16  # cells given to a scheduler at once
 
 
@@ -64,7 +66,12 @@ class Cell:
 
 def cell_name(sample: str, pressure_Pa: float) -> str:
     """Sample and nominal pressure as one word without a space or a slash."""
-    return f"{quote(sample, safe='')}@{pressure_Pa:.0f}Pa"
+    return f"{sample_as_word(sample)}@{pressure_Pa:.0f}Pa"
+
+
+def sample_as_word(sample: str) -> str:
+    """The name of a sample as part of a file name and of a step of a build."""
+    return quote(sample, safe="")
 
 
 def cells_of(design: Iterable[SimConfig]) -> tuple[Cell, ...]:
@@ -128,7 +135,7 @@ def _run_stored(
     kept.mkdir(parents=True, exist_ok=True)
     if path.exists() and not continues(cell.configs, path):
         path.unlink(missing_ok=True)
-    return run_stored(cell.configs, path, threads, scheduler, progress)
+    return run_stored(cell.configs, path, threads, scheduler, progress, wait_s=WAIT_S)
 
 
 def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | None:
@@ -139,13 +146,14 @@ def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | Non
     import pandas as pd
 
     from tribo.simulate import read_stored
+    from tribo.simulate.stored_rows import UNREADABLE
 
     found = []
     for path in sorted(kept.glob(f"*@*{SUFFIX}")):
         try:
             table = read_stored(path)
             cell = _cell_of(path, table, patterns)
-        except (OSError, KeyError, ValueError):  # another program's file, or a damaged one
+        except (SimulationError, *UNREADABLE):  # another program's file, or a damaged one
             continue
         if cell is not None and cell.path(kept) == path and table["done"].all():
             found.append(table)

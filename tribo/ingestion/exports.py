@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import math
-import multiprocessing
-import threading
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -17,6 +13,7 @@ import numpy as np
 
 from tribo.campaign.choice import is_chosen, names_pulls, split_choice
 from tribo.errors import Problem, TraceError, TriboError, unexpected
+from tribo.forked import each, may_fork
 from tribo.input_files import hashes_of_reads
 from tribo.limits import LARGEST_LOAD_N, SMALLEST_LOAD_N
 from tribo.records import Campaign, Pull, SetAside, Test, Trace
@@ -235,22 +232,8 @@ def _with_note(found: tuple[tuple[Test, Outcome], ...], left_out: Sequence[str])
 def read_all(campaign: Campaign, rule: str, jobs: int = 1) -> Iterator[RowRead]:
     """The tests of every row with their outcomes, in the order of the campaign."""
     read = partial(read_hashed, campaign.root, dict(campaign.columns), rule)
-    if jobs == 1 or len(campaign.tests) < FEWEST_FOR_PROCESSES or not _may_fork():
+    if jobs == 1 or len(campaign.tests) < FEWEST_FOR_PROCESSES or not may_fork():
         yield from map(read, campaign.tests)
         return
     read(campaign.tests[0])  # what it imports is then in every process
-    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("fork")) as pool:
-        try:
-            with warnings.catch_warnings():
-                # Python 3.12 and later warn of threads at a fork; the ones here are those of BLAS, which survives it
-                warnings.simplefilter("ignore", DeprecationWarning)
-                outcomes = pool.map(read, campaign.tests, chunksize=CHUNK)
-            yield from outcomes
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def _may_fork() -> bool:
-    """Processes are forked, which is quick, and safe only where no other thread of Python runs."""
-    return "fork" in multiprocessing.get_all_start_methods() and threading.active_count() == 1
+    yield from each(read, campaign.tests, jobs, CHUNK)

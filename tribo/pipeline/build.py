@@ -14,6 +14,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
@@ -31,6 +32,7 @@ from tribo.store.whole_files import write_text
 
 CURRENT = "current"
 GONE = "report.html has been deleted"
+END_S = 60.0  # how long the steps of an interrupted build may take to end
 PROFILES = ("local", "slurm")
 _BLOCKS = re.compile(r"(?m)^(?=\[|\s*$)")  # Snakemake says one thing after a blank line or a date in brackets
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -128,7 +130,10 @@ def _built(drop: Path, state: Path, options: BuildOptions, *, dry_run: bool, des
     forced = _forced(due, state)
     if dry_run:
         said = _snakemake(state, config, options, ("--dry-run", *forced), None)
-        return Built(state.parent, due, waiting, steps=tuple(planned_steps(said.stdout)))
+        if said.returncode:
+            raise BuildError(_failures(state, said.stdout))
+        expected = {c.name: _expected_status(c, due, state) for c in found}
+        return Built(state.parent, due, waiting, expected, tuple(planned_steps(said.stdout)))
     said = _snakemake(state, config, options, forced, descriptor)
     write_text(state / "log" / "snakemake.log", said.stdout)
     dated = date_build(state.parent, options.keep)
@@ -214,19 +219,20 @@ def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
     """Samples and cells as the description of a campaign has them; none where it cannot be read (ingest says why)."""
     from tribo.campaign import open_campaign
     from tribo.comparison.prediction import loads_to_simulate
-    from tribo.comparison.prediction_runs import cell_name
+    from tribo.comparison.prediction_runs import cell_name, sample_as_word
 
     try:
         with open_campaign(campaign.path) as opened:
             measured = {test.sample for test in opened.tests}
             samples = [s for s in opened.samples if s in measured]
+            words = [sample_as_word(s) for s in samples]
             pressures = [opened.nominal_pressure_Pa(load) for load in loads_to_simulate(opened)]
     except (CampaignError, OSError):
         return [], []
     except Exception as why:  # ingest will say it again, as the fault of this campaign
         unexpected(why, "the samples of this campaign cannot be listed", campaign.name)
         return [], []
-    return samples, [cell_name(s, p) for s in samples for p in pressures]
+    return words, [cell_name(s, p) for s in samples for p in pressures]
 
 
 def _snakemake(
@@ -244,11 +250,35 @@ def _snakemake(
         "--cores", str(options.jobs), "--nolock", "--nocolor", *more,
     ]  # fmt: skip
     (state / "log").mkdir(parents=True, exist_ok=True)
-    return subprocess.run(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False,
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
         env={**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONSAFEPATH": "1"},
         pass_fds=() if descriptor is None else (descriptor,),
     )  # fmt: skip
+    try:
+        said, _ = process.communicate()
+    except BaseException:
+        _end(process)
+        raise
+    return subprocess.CompletedProcess(command, process.returncode, said)
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """Ask the workflow and its steps to end, and wait for them, so that none writes on after the build."""
+    import psutil
+
+    try:
+        workflow = psutil.Process(process.pid)
+        everyone = [workflow, *workflow.children(recursive=True)]
+    except psutil.NoSuchProcess:
+        everyone = []
+    for each in everyone:
+        with suppress(psutil.NoSuchProcess):
+            each.terminate()
+    for each in psutil.wait_procs(everyone, timeout=END_S)[1]:
+        with suppress(psutil.NoSuchProcess):
+            each.kill()
+    process.communicate()
 
 
 def planned_steps(said: str) -> list[str]:
@@ -277,6 +307,19 @@ def _plain_reason(reason: str) -> str:
     if reason.startswith("Input files updated by another job"):
         return "an earlier step runs again"
     return reason
+
+
+def _expected_status(campaign: Dropped, due: Mapping[str, str], state: Path) -> str:
+    """How a campaign stands after a build, as far as this is known before it: unusable where it cannot be opened."""
+    from tribo.campaign import open_campaign
+
+    if campaign.name not in due:
+        return _status(campaign.name, state)
+    try:
+        with open_campaign(campaign.path):
+            return "to be built"
+    except CampaignError:
+        return "unusable"
 
 
 def _status(name: str, state: Path) -> str:

@@ -22,10 +22,10 @@ from tribo.escaping import printable
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES, FIGURES
 from tribo.figures.record import FigureOf
 from tribo.figures.style import house_style
+from tribo.forked import each
 from tribo.records import Study
 from tribo.report.html.hover import Series, series_of
 from tribo.report.paper.typeset import figure_files
-from tribo.report.parallel import each
 from tribo.report.result_tables import to_csv
 from tribo.store.whole_files import write_bytes
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from hashlib import sha256
+from html import unescape
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,8 +13,11 @@ from tribo.errors import CampaignError, Problem
 from tribo.escaping import well_formed
 from tribo.links import leads_out
 from tribo.report.provenance import DESCRIBED_IN, FILE, RAW, file_hash, input_names, read_record
+from tribo.store.own_folder import MARK
 from tribo.zips import opened_zip, pieces
 
+ORIGIN = "inputs SHA-256 "  # begins what determines the numbers of a file, to the end of its origin
+BEAR_THEIR_ORIGIN = (".svg", ".nc")
 KEPT = "kept"  # intermediate results, each checked against its own hash whenever it is used
 
 
@@ -22,7 +26,7 @@ class Difference:
     """One file that differs from its record."""
 
     kind: Literal["input", "output"]
-    status: Literal["changed", "missing", "added"]
+    status: Literal["changed", "missing", "added", "another run's"]
     file: str
 
 
@@ -34,10 +38,11 @@ class Verification:
     n_inputs: int
     n_outputs: int
     differences: tuple[Difference, ...]
+    unfinished: bool = False  # a run that was to write here was killed or failed
 
     @property
     def unchanged(self) -> bool:
-        return not self.differences
+        return not self.differences and not self.unfinished
 
     def as_record(self) -> dict[str, Any]:
         return {**asdict(self), "unchanged": self.unchanged}
@@ -47,7 +52,8 @@ class Verification:
         if self.unchanged:
             return f"{compared}: no changes"
         lines = [f"{d.status} {d.kind}: {d.file}" for d in self.differences]
-        return "\n".join([f"{compared}: {len(lines)} difference{'s' if len(lines) > 1 else ''}", *lines])
+        ended = ["a run that was to write into this folder has not ended; start it again"] if self.unfinished else []
+        return "\n".join([f"{compared}: {len(lines)} difference{'' if len(lines) == 1 else 's'}", *lines, *ended])
 
 
 def verify(out: Path, campaign: Path | None = None) -> Verification:
@@ -82,8 +88,20 @@ def verify(out: Path, campaign: Path | None = None) -> Verification:
     differences = (
         *_differences("input", recorded, found),
         *_differences("output", record["outputs"], outputs),
+        *(Difference("output", "another run's", name) for name in of_other_runs(out, record) if name in outputs),
     )
-    return Verification(str(place), len(recorded), len(record["outputs"]), differences)
+    return Verification(str(place), len(recorded), len(record["outputs"]), differences, (out / MARK).exists())
+
+
+def of_other_runs(out: Path, record: Mapping[str, Any]) -> Iterator[str]:
+    """Outputs that name other inputs or options than the record: figures and tables of two runs that were mixed."""
+    _, start, rest = str(record.get("origin", "")).partition(ORIGIN)
+    for name in record["outputs"] if start else ():
+        path = out / name
+        if path.suffix in BEAR_THEIR_ORIGIN and path.is_file():
+            text = unescape(path.read_bytes().decode("utf-8", "replace"))
+            if any(not part.startswith(rest) for part in text.split(ORIGIN)[1:]):
+                yield name
 
 
 def _differences(

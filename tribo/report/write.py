@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tribo.records import Study
 from tribo.report.campaign_nc import write_store
 from tribo.report.drawings import DRAWING, Drawing, Progress, write_figures
 from tribo.report.provenance import (
     Provenance,
+    file_hash,
     gather_provenance,
     read_record,
     same_origin,
@@ -43,7 +45,9 @@ def write_until(
     before = read_record(out)
     made_by = provenance if provenance is not None else gather_provenance(study)
     verdict = diagnosis.verdict.as_dict() if diagnosis is not None else None
-    keep_earlier = before is not None and until != "report" and same_origin(before, made_by)
+    keep_earlier = before is not None and until != "report" and same_origin(before, made_by) and _is_as_recorded(
+        out / "campaign.nc", before
+    )
     written = [*write_tables(study, out), write_store(study, out, made_by, diagnosis, keep_earlier)]
     if verdict is not None:
         written.append(write_verdict(verdict, out))
@@ -62,6 +66,11 @@ def write_until(
         written.append(write_bytes(out / "report.pdf", pdf_of(said, drawn, made_by.origin)))
         written.append(write_crate(study, out, made_by, written))
     write_provenance(made_by, out, settle_outputs(out, before, made_by, written, complete=until == "report"))
+
+
+def _is_as_recorded(path: Path, record: Mapping[str, Any]) -> bool:
+    """Whether a file of an earlier run is still what that run wrote."""
+    return path.is_file() and record["outputs"].get(path.name) == file_hash(path)
 
 
 def write_report(

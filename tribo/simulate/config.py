@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal
 
 from tribo.errors import Problem, SimulationError
-from tribo.limits import MOST_BLOCKS, MOST_STEPS
+from tribo.limits import LARGEST_NUMBER, MOST_BLOCKS, MOST_STEPS, SMALLEST_NUMBER
 from tribo.records import Pattern
 from tribo.simulate.masks import contact_mask, pattern_of
 
@@ -287,13 +287,23 @@ def _term_problems(config: SimConfig) -> Iterator[Problem]:
         )  # fmt: skip
 
 
+def _beyond_measure(name: str, value: float) -> bool:
+    """Whether a number is so large or small that products of it leave double precision."""
+    return abs(value) > LARGEST_NUMBER or (name in _POSITIVE and 0 < value < SMALLEST_NUMBER)
+
+
 def _number_problems(config: SimConfig) -> Iterator[Problem]:
     for field in fields(config):
         value = getattr(config, field.name)
-        if isinstance(value, float | int) and not isinstance(value, bool) and not math.isfinite(value):
+        if isinstance(value, float) and not math.isfinite(value):
             yield Problem("not_finite", "not a finite number", column=field.name, found=str(value), allowed="a number")
             continue
         if value is None:
+            continue
+        if field.name != "seed" and isinstance(value, float | int) and _beyond_measure(field.name, value):
+            allowed = f"{SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}"
+            found = f"{value:g}" if abs(value) < 1e300 else "more than 1e300"
+            yield Problem("impossible_number", "not a possible value", column=field.name, found=found, allowed=allowed)
             continue
         if field.name in _POSITIVE and not value > 0:
             yield Problem("not_positive", "must be positive", column=field.name, found=f"{value:g}", allowed="> 0")
