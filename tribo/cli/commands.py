@@ -12,6 +12,7 @@ from tribo import __version__
 from tribo.cli.build_commands import build, schedule
 from tribo.cli.console import Console, command_options, set_aside_record, status_of
 from tribo.cli.discover_command import discover
+from tribo.cli.given_paths import GivenPath
 from tribo.cli.output import Output, output_options
 from tribo.cli.run_record import command_line, now, provenance_of_run
 from tribo.cli.simulate_command import simulate
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from tribo.records import Campaign, Study
     from tribo.stages import Progress, StudyOptions, Until
 
-CAMPAIGN = click.argument("campaign", type=click.Path(exists=True, path_type=Path))
+CAMPAIGN = click.argument("campaign", type=GivenPath())
 OUT = output_options()
 SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler; its workers run the simulations.")
 DRY_RUN = click.option("--dry-run", is_flag=True, help="List the steps without running them.")
@@ -68,7 +69,7 @@ ZEROS = (
 
 OVERRIDES = click.option(
     "--overrides",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=GivenPath(dir_okay=False),
     help="overrides.csv as saved from the report page: pulls excluded by hand, static peaks and windows moved by hand.",
 )
 
@@ -219,7 +220,7 @@ def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **opti
 
 
 @main.command()
-@click.argument("campaign", required=False, type=click.Path(exists=True, path_type=Path))
+@click.argument("campaign", required=False, type=GivenPath())
 @OUT
 @click.option("--published", type=click.Choice(["berardo2019"]), help="Diagnose a published table instead of CAMPAIGN.")
 @click.option(
@@ -295,9 +296,9 @@ def report(console: Console, campaign: Path, out: Output, dry_run: bool, **optio
 
 
 @main.command()
-@click.argument("out", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.argument("out", type=GivenPath(file_okay=False))
 @click.option(
-    "--campaign", type=click.Path(exists=True, path_type=Path), help="The campaign, if it has been moved since."
+    "--campaign", type=GivenPath(), help="The campaign, if it has been moved since."
 )
 @command_options
 def verify(console: Console, out: Path, campaign: Path | None, **_: Any) -> int:
@@ -349,7 +350,7 @@ def demo(console: Console, out: Output, **options: Any) -> int:
 
 
 @main.command()
-@click.argument("files", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("files", nargs=-1, required=True, type=GivenPath(dir_okay=False))
 @COLUMNS
 @command_options
 def inspect(console: Console, files: tuple[Path, ...], columns: str, **_: Any) -> int:
@@ -369,7 +370,7 @@ def inspect(console: Console, files: tuple[Path, ...], columns: str, **_: Any) -
 @main.command()
 @click.option(
     "--campaign",
-    type=click.Path(exists=True, path_type=Path),
+    type=GivenPath(),
     help="Campaign whose exports are read.  [default: the bundled example]",
 )
 @click.option("--large", is_flag=True, help="Also time a lattice of 1000 x 1000 blocks; takes several minutes.")

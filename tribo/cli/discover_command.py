@@ -8,12 +8,13 @@ from typing import Any
 import click
 
 from tribo.cli.console import Console, command_options, status_of
+from tribo.cli.given_paths import GivenPath
 from tribo.cli.output import Output, output_options
 from tribo.cli.run_record import provenance_of_run
 
 
 @click.command()
-@click.argument("campaign", type=click.Path(exists=True, path_type=Path))
+@click.argument("campaign", type=GivenPath())
 @output_options()
 @click.option(
     "--with", "law_file", type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="LAW.TOML",
