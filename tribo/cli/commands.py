@@ -11,15 +11,16 @@ import click
 from tribo import __version__
 from tribo.cli.build_commands import build, schedule
 from tribo.cli.console import Console, command_options, set_aside_record, status_of
+from tribo.cli.discover_command import discover
 from tribo.cli.given_paths import GivenPath
 from tribo.cli.output import Output, output_options
+from tribo.cli.run_record import command_line, now, provenance_of_run
 from tribo.cli.simulate_command import simulate
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
     from tribo.diagnose.verdict import Verdict
     from tribo.records import Campaign, Study
-    from tribo.report import Provenance
     from tribo.stages import Progress, StudyOptions, Until
 
 CAMPAIGN = click.argument("campaign", type=GivenPath())
@@ -119,6 +120,7 @@ def main() -> None:
 main.add_command(build)
 main.add_command(schedule)
 main.add_command(simulate)
+main.add_command(discover)
 
 
 @main.command()
@@ -254,7 +256,7 @@ def diagnose(
         study = stages.study(_with_columns(opened, columns), chosen, until="ingest", progress=progress)
         found = _diagnosis(study, chosen, progress)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
-        write_until(study, out.path, "ingest", drawing, _provenance(study, campaign, chosen), found)
+        write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found)
     verdict = found.verdict
     console.result(verdict.as_dict(), verdict_text(verdict))
     console.list_tests("set aside", study.ingested.set_aside, level=-1)
@@ -272,7 +274,7 @@ def _diagnose_published(console: Console, out: Output, seed: int) -> int:
     folder, tables = data_dir() / BERARDO2019, ("table2.csv", "table2_tribo.csv")
     with out.taken(folder), console.progress() as progress:
         found = diagnose_published(load_table2(), load_table2_simulated_anew(), seed=seed, progress=progress)
-        write_published(found, out.path, provenance_of_table(folder, tables, _command_line(), seed, _now()))
+        write_published(found, out.path, provenance_of_table(folder, tables, command_line(), seed, now()))
     console.result(found.verdict.as_dict(), verdict_text(found.verdict))
     return 0
 
@@ -422,23 +424,8 @@ def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool
         study = stages.study(_with_columns(described, columns), chosen, until=until, progress=progress)
         study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
-        write_until(study, out.path, until, drawing, _provenance(study, path, chosen), found)
+        write_until(study, out.path, until, drawing, provenance_of_run(study, path, chosen), found)
     return _conclude(console, study, out.path, found.verdict if found else None)
-
-
-def _provenance(study: Study, campaign: Path, chosen: StudyOptions) -> Provenance:
-    """Provenance of a study run by this command."""
-    from tribo.report import gather_provenance
-
-    return gather_provenance(
-        study,
-        command=_command_line(),
-        seed=chosen.seed,
-        started_at=_now(),
-        options={**chosen.as_words(), "flat": study.ingested.campaign.flat_sample},
-        campaign=campaign,
-        overrides=chosen.overrides,
-    )
 
 
 def _with_columns(campaign: Campaign, columns: str) -> Campaign:
@@ -509,20 +496,3 @@ def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None
 def _plan_text(planned: dict[str, Any], out: Path) -> str:
     lines = [f"would {step}" for step in planned["steps"]]
     return "\n".join([*lines, f"would write into {out}", *(f"set aside: {s}" for s in planned["set_aside"])])
-
-
-def _command_line() -> str:
-    import shlex
-    import sys
-
-    return shlex.join(["tribo", *sys.argv[1:]])
-
-
-def _now() -> str:
-    """The time of this run, or that of SOURCE_DATE_EPOCH (reproducible-builds.org) where it is set."""
-    import os
-    from datetime import UTC, datetime
-
-    fixed = os.environ.get("SOURCE_DATE_EPOCH")
-    now = datetime.fromtimestamp(int(fixed), UTC) if fixed else datetime.now(UTC)
-    return now.isoformat(timespec="seconds")
