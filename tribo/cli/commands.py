@@ -13,14 +13,16 @@ from tribo.cli.build_commands import build, schedule
 from tribo.cli.console import Console, command_options, set_aside_record, status_of
 from tribo.cli.discover_command import discover
 from tribo.cli.given_paths import GivenPath
+from tribo.cli.init_command import init
 from tribo.cli.output import Output, output_options
+from tribo.cli.reading_options import corrected, reading_options, with_reading_options
 from tribo.cli.run_record import command_line, now, provenance_of_run
 from tribo.cli.simulate_command import simulate
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
     from tribo.diagnose.verdict import Verdict
-    from tribo.records import Campaign, Study
+    from tribo.records import Study
     from tribo.stages import Progress, StudyOptions, Until
 
 CAMPAIGN = click.argument("campaign", type=GivenPath())
@@ -29,17 +31,11 @@ SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler; its w
 DRY_RUN = click.option("--dry-run", is_flag=True, help="List the steps without running them.")
 
 
-COLUMNS = click.option(
-    "--columns",
-    default="",
-    help="Column of each quantity: QUANTITY=NAME [UNIT],... as in the [columns] table of campaign.toml. "
-    "#3 means the third column.",
-)
-
 FLAT = click.option(
     "--flat", default="", metavar="SAMPLE",
     help="Flat sample on which the model is calibrated. [default: F, or the only flat sample]",
 )  # fmt: skip
+
 
 def _a_zero(context: click.Context, parameter: click.Parameter, given: str) -> str:
     """The text of a zero as given, checked.
@@ -76,7 +72,7 @@ OVERRIDES = click.option(
 
 def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
-        COLUMNS,
+        reading_options,
         *ZEROS,
         OVERRIDES,
         click.option(
@@ -118,25 +114,10 @@ def main() -> None:
 
 
 main.add_command(build)
+main.add_command(init)
 main.add_command(schedule)
 main.add_command(simulate)
 main.add_command(discover)
-
-
-@main.command()
-@click.argument("folder", type=click.Path(path_type=Path))
-@command_options
-def init(console: Console, folder: Path, **_: Any) -> None:
-    """Create a campaign template in FOLDER.
-
-    Fill in campaign.toml and tests.csv, and copy the exports of the testing machine into raw/.
-    """
-    from tribo.campaign import write_template
-
-    write_template(folder)
-    console.result(
-        {"folder": str(folder)}, f"{folder}: fill in campaign.toml and tests.csv, and copy the exports into raw/"
-    )
 
 
 @main.command()
@@ -188,13 +169,15 @@ def predict(console: Console, campaign: Path, out: Output, only: str, columns: s
     from tribo import stages
     from tribo.campaign import open_campaign
 
+    stated = options.pop("stated")
     chosen = stages.StudyOptions(kept=out.kept, **options)
     with (
         out.taken(campaign, shared=True),
         open_campaign(campaign) as described,
         console.progress() as progress,
     ):
-        ingested = stages.study(_with_columns(described, columns), chosen, until="ingest", progress=progress).ingested
+        stated_so = with_reading_options(described, columns, stated)
+        ingested = stages.study(stated_so, chosen, until="ingest", progress=progress).ingested
         cells = stages.simulate_cells(ingested, stages.fit(ingested, weights=chosen.weights), chosen, only, progress)
     names = [cell.name for cell in cells]
     console.result(
@@ -227,13 +210,19 @@ def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **opti
     "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
 )
 @FLAT
-@COLUMNS
+@reading_options
 @ZEROS[0]
 @ZEROS[1]
 @OVERRIDES
 @command_options
 def diagnose(
-    console: Console, campaign: Path | None, out: Output, published: str | None, columns: str, **options: Any
+    console: Console,
+    campaign: Path | None,
+    out: Output,
+    published: str | None,
+    columns: str,
+    stated: dict[str, float],
+    **options: Any,
 ) -> int:
     """Find where the model fails, and the likely cause.
 
@@ -253,7 +242,7 @@ def diagnose(
 
     with out.taken(campaign), open_campaign(campaign) as opened, console.progress() as progress:
         chosen = stages.StudyOptions(kept=out.kept, **options)
-        study = stages.study(_with_columns(opened, columns), chosen, until="ingest", progress=progress)
+        study = stages.study(with_reading_options(opened, columns, stated), chosen, until="ingest", progress=progress)
         found = _diagnosis(study, chosen, progress)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
         write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found)
@@ -351,18 +340,19 @@ def demo(console: Console, out: Output, **options: Any) -> int:
 
 @main.command()
 @click.argument("files", nargs=-1, required=True, type=GivenPath(dir_okay=False))
-@COLUMNS
+@reading_options
 @command_options
-def inspect(console: Console, files: tuple[Path, ...], columns: str, **_: Any) -> int:
+def inspect(console: Console, files: tuple[Path, ...], columns: str, stated: dict[str, float], **_: Any) -> int:
     """Show how an export file is read.
 
     Lists its format, encoding, columns, units, time base and pulls, and anything doubtful.
     """
     from tribo.ingestion.exports import inspect_file
     from tribo.readers import columns_from_text
+    from tribo.records import UNCORRECTED
 
     given = columns_from_text(columns) if columns else None
-    found = [inspect_file(file, given) for file in files]
+    found = [inspect_file(file, given, corrected(UNCORRECTED, stated)) for file in files]
     console.result({"files": [f.record() for f in found]}, "\n\n".join(f.in_words() for f in found))
     return 1 if all(f.refused for f in found) else 0
 
@@ -413,28 +403,22 @@ def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool
     from tribo.report.drawings import Drawing
     from tribo.store.kept_results import Shelf
 
+    stated = options.pop("stated")
     chosen = stages.StudyOptions(kept=out.kept, **options)
     if dry_run:
         out.check(path)
         with open_campaign(path) as described:
-            planned = stages.plan(_with_columns(described, columns), chosen, until)
+            planned = stages.plan(with_reading_options(described, columns, stated), chosen, until)
             console.result(planned, _plan_text(planned, out.path))
             return status_of(described.set_aside)
     with out.taken(path), open_campaign(path) as described, console.progress() as progress:
-        study = stages.study(_with_columns(described, columns), chosen, until=until, progress=progress)
+        study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
         study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
         write_until(study, out.path, until, drawing, provenance_of_run(study, path, chosen), found)
     return _conclude(console, study, out.path, found.verdict if found else None)
 
 
-def _with_columns(campaign: Campaign, columns: str) -> Campaign:
-    """The campaign with the columns of the command line added to, or replacing, its own."""
-    from dataclasses import replace
-
-    from tribo.readers import columns_from_text
-
-    return replace(campaign, columns={**campaign.columns, **columns_from_text(columns)}) if columns else campaign
 
 
 def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[Study, Diagnosis | None]:
