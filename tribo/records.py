@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 Regime = Literal["static", "sliding"]
 REGIMES: tuple[Regime, ...] = ("static", "sliding")
+NO_AREA_M2 = 1.0  # stands for a nominal area that is not known: tau0 A in newton is then tau0 itself
 STANDARD_GRAVITY = 9.80665  # m/s2, CGPM 1901
 
 
@@ -162,7 +163,13 @@ class Campaign:
     chosen_flat: str = ""
     zero: ZeroChoice = DEFAULT
     load_zero: ZeroChoice = DEFAULT
+    contact: str = "sled"
     inputs: Mapping[str, str] = field(default_factory=dict, compare=False)
+
+    @property
+    def has_area(self) -> bool:
+        """Whether a nominal area is known; without one forces are reported, and tau0 A as T0 in newton."""
+        return self.nominal_area_m2 != NO_AREA_M2
 
     @property
     def flat_samples(self) -> tuple[str, ...]:
@@ -332,6 +339,11 @@ class LawFit:
     nominal_area_m2: float
     specimens: Mapping[str, FloatArray] = field(default_factory=dict)  # specimen -> its own values
     notes: tuple[str, ...] = ()
+
+    @property
+    def has_area(self) -> bool:
+        """Whether a nominal area is known; without one, tau0_Pa stands for T0 in newton."""
+        return self.nominal_area_m2 != NO_AREA_M2
 
     def value(self, parameter: str) -> float:
         return float(self.values[self.parameters.index(parameter)])
@@ -504,7 +516,8 @@ class Study:
     sliding_N. ``example_runs`` holds one full force trace of the model per sample. ``budget`` is the uncertainty
     budget of every fitted number, one row per component. ``power`` states the differences this campaign could detect,
     ``outlying`` the outlying pulls and specimens. ``differences`` holds the differences between samples measured on the
-    same specimens, one row per pair of samples, regime and number.
+    same specimens, one row per pair of samples, regime and number. ``laws`` compares the candidate laws of every sample
+    by held-out loads, ``dependence`` states how T/N changes with each recorded variable.
     """
 
     ingested: Ingested
@@ -517,4 +530,6 @@ class Study:
     power: tuple[str, ...] = ()
     outlying: tuple[str, ...] = ()
     differences: pd.DataFrame | None = None
+    laws: pd.DataFrame | None = None
+    dependence: pd.DataFrame | None = None
     notes: tuple[str, ...] = ()

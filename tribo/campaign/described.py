@@ -62,7 +62,8 @@ class CampaignTable(_Strict):
     title: Line
     material: Line = ""
     counterface: Line = ""
-    nominal_area_mm2: Positive
+    nominal_area_mm2: Positive | None = None
+    contact: Literal["sled", "pin_on_disc", "ball_on_disc", "ring_shear", "reciprocating", "rotary"] = "sled"
     slider_mass_g: NotNegative = 0.0
     pull_speed_mm_s: Positive | None = None
     sign: Literal[1, -1] | None = None

@@ -26,7 +26,7 @@ from tribo.errors import CampaignError, Problem, unexpected
 from tribo.escaping import well_formed
 from tribo.input_files import hashes_of_reads
 from tribo.links import LEADS_OUT, leads_out, paths_below
-from tribo.records import STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
+from tribo.records import NO_AREA_M2, STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
 from tribo.zeroing import ALLOWED, zero_choice
 
 _NOT_WORTH_A_NOTE = (".", "~$", "Thumbs.db")
@@ -70,12 +70,22 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     if not usable:
         nothing = Problem("no_usable_test", "no test of this campaign is usable", file=TESTS)
         raise CampaignError([*problems, nothing])
+    area_m2 = _area_m2(described, usable)
     problems += _unlisted(root, rows)
     problems += [note for row in usable if (note := _loads_disagree(row, described))]
     order = _date_order(rows)
-    tests = tuple(_test(row, described, order) for row in usable)
+    tests = tuple(_test(row, described, order, area_m2) for row in usable)
     campaign = _campaign(root, described, patterns, tests, set_aside, problems)
     return replace(campaign, inputs={Path(path).name: digest for path, digest in hashes.items()})
+
+
+def _area_m2(described: CampaignFile, rows: Sequence[TestRow]) -> float:
+    """The nominal area, NO_AREA_M2 where none is stated. Raises CampaignError where a normal stress needs it."""
+    area = described.campaign.nominal_area_mm2
+    if area is None and any(row.cells.get("normal_stress_Pa") for row in rows):
+        what, allowed = "a load given as normal stress needs the nominal area", "more than 0 mm2"
+        raise CampaignError(Problem("no_area", what, file=TOML, column="nominal_area_mm2", allowed=allowed))
+    return NO_AREA_M2 if area is None else area * _MM2
 
 
 def _date_order(rows: Sequence[TestRow]) -> str:
@@ -98,7 +108,8 @@ def _campaign(
     return Campaign(
         title=general.title,
         root=root,
-        nominal_area_m2=general.nominal_area_mm2 * _MM2,
+        nominal_area_m2=_area_m2(described, ()),
+        contact=general.contact,
         tests=tests,
         samples={name: patterns[_pattern_of(name, patterns)] for name in names},
         material=general.material,
@@ -268,7 +279,7 @@ def _relative(name: str) -> PurePosixPath | None:
     return path
 
 
-def _test(row: TestRow, described: CampaignFile, order: str) -> Test:
+def _test(row: TestRow, described: CampaignFile, order: str, area_m2: float) -> Test:
     """A row without faults as a Test. N = normal_load_N, or (mass + slider mass) g; NaN where the export tells it."""
     cells = row.cells
     numbers = {column: number(row, column) for column in NUMBERS}
@@ -276,7 +287,7 @@ def _test(row: TestRow, described: CampaignFile, order: str) -> Test:
     speed = numbers["speed_mm_s"] if numbers["speed_mm_s"] is not None else described.campaign.pull_speed_mm_s
     load = numbers["normal_load_N"]
     if load is None and numbers["normal_stress_Pa"] is not None:
-        load = numbers["normal_stress_Pa"] * described.campaign.nominal_area_mm2 * _MM2
+        load = numbers["normal_stress_Pa"] * area_m2
     if load is None and numbers["mass_g"] is None:
         load = math.nan
     if load is None:

@@ -70,6 +70,12 @@ OVERRIDES = click.option(
 )
 
 
+NO_MODEL = click.option(
+    "--no-model", is_flag=True,
+    help="Report without the spring-block model: friction, its laws and what it varies with.",
+)  # fmt: skip
+
+
 def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         reading_options,
@@ -94,6 +100,7 @@ def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
 def _model_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         FLAT,
+        NO_MODEL,
         click.option("--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulations per load."),
         SCHEDULER,
     ):
@@ -413,7 +420,8 @@ def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool
             return status_of(described.set_aside)
     with out.taken(path), open_campaign(path) as described, console.progress() as progress:
         study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
-        study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
+        compared = until == "report" and study.comparison is not None
+        study, found = _diagnosed(study, chosen, progress) if compared else (study, None)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
         write_until(study, out.path, until, drawing, provenance_of_run(study, path, chosen), found)
     return _conclude(console, study, out.path, found.verdict if found else None)
