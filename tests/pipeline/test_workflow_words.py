@@ -71,7 +71,8 @@ def expected(name: str, step: str, *more: str, after: str, first: str = "") -> l
     own += ["--after", f"steps/{name}/{after}.json"] if after else []
     own += ["--files", f"inputs/{name}.json"] if step == "report" else []
     given = ["--flat", ODD, "--overrides", f"/drop/{name}{ODD}"]
-    return [*own, "--", "predict" if first else step, *more, f"/drop/{name}", "-o", f"../current/{name}", *given]
+    out = ["-o", f"../current/{name}", "--wait", "600"]
+    return [*own, "--", "predict" if first else step, *more, f"/drop/{name}", *out, *given]
 
 
 def test_every_step_gets_the_words_meant_for_it_and_nothing_else_runs(tmp_path: Path) -> None:
