@@ -4,12 +4,15 @@
 #   make docs    the documentation, into out/docs; warnings are errors, internal links are checked
 #   make blind   campaigns with hidden effects, about an hour on two cores; continues a run that was stopped
 #   make mutants 300 changes of the code at random, each tried against the quick tests; about two hours; continues too
+#   make release the wheel and the source archive in dist/, tried outside of the checkout; see SECURITY.md
+#   make hashes  constraints-hashed.txt anew, after a change of constraints.txt; needs a connection
+#   make audit   the pinned versions against published advisories; needs a connection
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint types pytest docs links bench blind mutants clean
+.PHONY: demo test lint types pytest docs links bench blind mutants release hashes audit clean
 
 $(VENV)/.run: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -57,6 +60,27 @@ $(VENV)/.mutants: $(VENV)/.dev
 
 mutants: $(VENV)/.mutants
 	$(BIN)/python benchmarks/mutants.py run out/mutants
+
+$(VENV)/.release: $(VENV)/.run
+	$(PIP) -e '.[release]'
+	touch $@
+
+release: $(VENV)/.release
+	rm -rf dist $(VENV)/tried
+	$(BIN)/python -m build --outdir dist
+	$(PYTHON) -m venv $(VENV)/tried
+	$(VENV)/tried/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r constraints-hashed.txt
+	$(VENV)/tried/bin/python -m pip install --quiet --disable-pip-version-check --no-deps dist/*.whl
+	cd $(VENV)/tried && bin/tribo demo -o demo --quiet && bin/tribo verify demo
+
+hashes: $(VENV)/.release
+	sed -n '/^#/p' constraints-hashed.txt > constraints-hashed.part
+	$(BIN)/uv pip compile --quiet pyproject.toml --extra cluster --extra pipelines -c constraints.txt \
+	  --universal --python-version 3.11 --generate-hashes --no-header --no-annotate >> constraints-hashed.part
+	mv constraints-hashed.part constraints-hashed.txt
+
+audit: $(VENV)/.release
+	$(BIN)/pip-audit --strict --disable-pip --require-hashes -r constraints-hashed.txt
 
 clean:
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache

@@ -240,7 +240,7 @@ def true_parameter(name: str, size: float) -> dict[str, float]:
 
 def gain_of_the_best(d: Diagnosis, seed: int) -> list[float]:
     """What the mechanism that fits best by chance gains on samples left out: mean log score, standard error."""
-    from tribo.diagnose.search.naming import weigh
+    from tribo.diagnose.search.weighing import weigh
     from tribo.diagnose.statistics.gain import gain
     from tribo.diagnose.statistics.linearisation import start_effects
 

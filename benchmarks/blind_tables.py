@@ -17,6 +17,7 @@ AXES = {
     "pattern_error": "pattern error, times the assumed one", "specimen_slope": "specimen slope per e-fold of load",
     "noise": "noise law", "pattern_draw": "distribution of the pattern error",
 }  # fmt: skip
+CAUSES_CERTAIN = ("named", "partly")  # verdicts whose causes are certain, whatever else is left
 Row = dict[str, Any]
 Test = Callable[[Row], bool]
 
@@ -32,17 +33,18 @@ def right(row: Row) -> bool:
         return bool(row["verdict"] == "no_misfit")
     if any(name.startswith("outside") for name in names):
         return bool(row["verdict"] == "unknown")
-    return row["verdict"] == "named" and not wrong(row) and all(any(n in c for c in row["causes"]) for n in names)
+    all_named = all(any(n in c for c in row["causes"]) for n in names)
+    return row["verdict"] in CAUSES_CERTAIN and not wrong(row) and all_named
 
 
 def wrong(row: Row) -> bool:
     """A set was named that holds nothing of what was hidden."""
-    return row["verdict"] == "named" and any(not set(c) & hidden(row) for c in row["causes"])
+    return row["verdict"] in CAUSES_CERTAIN and any(not set(c) & hidden(row) for c in row["causes"])
 
 
 def part(row: Row) -> bool:
     """At least one hidden cause named, and no wrong one."""
-    return row["verdict"] == "named" and not wrong(row) and bool(row["causes"])
+    return row["verdict"] in CAUSES_CERTAIN and not wrong(row) and bool(row["causes"])
 
 
 def tied(row: Row) -> bool:
@@ -71,7 +73,7 @@ def blamed(row: Row) -> bool:
 def both_tied(row: Row) -> bool:
     """Suction and load error named together, with a test that separates them."""
     together = any(set(c) >= TIED for c in row["causes"])
-    return row["verdict"] == "named" and together and set(row.get("next_test", {}).get("separates", ())) >= TIED
+    return row["verdict"] in CAUSES_CERTAIN and together and set(row.get("next_test", {}).get("separates", ())) >= TIED
 
 
 def covariate_right(row: Row) -> bool:

@@ -10,10 +10,13 @@ from typing import Any
 def in_one_test(cases: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[[Path], None]]:
     """Turn a check of one case, ``check(exports, *case)``, into one test of all cases."""
 
+    listed = list(cases)
+    assert listed, "a test without cases checks nothing"
+
     def decorate(check: Callable[..., None]) -> Callable[[Path], None]:
         def test(exports: Path) -> None:
             failed: list[Exception] = []
-            for case in cases:
+            for case in listed:
                 values = case if isinstance(case, tuple) else (case,)
                 try:
                     check(exports, *values)

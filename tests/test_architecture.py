@@ -12,12 +12,22 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
-GROUND = {"errors", "quantities", "records", "published"}
+GROUND = {
+    "errors", "limits", "escaping", "input_files", "quantities", "zeroing", "records", "published", "zips", "links",
+    "forked",
+}  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
     ("errors", set()),
+    ("limits", set()),
+    ("escaping", set()),
+    ("input_files", {"limits"}),
     ("quantities", {"errors"}),
-    ("records", {"errors"}),
+    ("zeroing", set()),
+    ("records", {"errors", "zeroing"}),
     ("published", set()),
+    ("zips", {"errors", "limits"}),
+    ("links", set()),
+    ("forked", set()),
     ("store", GROUND),
     ("campaign", GROUND),
     ("readers", GROUND),

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import logging
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+
+_LOG = logging.getLogger("tribo")
+_OF_THE_SYSTEM = "system"  # kind of a problem that another try may not have: disk full, no permission
 
 
 @dataclass(frozen=True)
@@ -75,3 +80,30 @@ class FitError(TriboError):
 
 class SimulationError(TriboError):
     """A simulation cannot be run, or produced a non-finite number."""
+
+
+def system_problem(why: OSError, file: str | None = None) -> Problem:
+    """An error of the operating system with its path and cause."""
+    place = next((str(part) for part in (why.filename2, why.filename) if part), None) or file
+    cause = why.strerror or str(why) or type(why).__name__
+    return Problem(_OF_THE_SYSTEM, cause[:1].lower() + cause[1:], file=place)
+
+
+def unexpected(why: Exception, what: str, file: str | None = None) -> Problem:
+    """Any other error as a problem: ``what`` could not be done, and why. The traceback is shown with --debug."""
+    _LOG.debug("%s", what, exc_info=why)
+    if isinstance(why, OSError):
+        problem = system_problem(why, file)
+        return replace(problem, what=f"{what}: {problem.what}")
+    if isinstance(why, MemoryError):
+        return Problem("out_of_memory", f"{what}: not enough memory", file=file)
+    if isinstance(why, RecursionError):
+        return Problem("too_deep", f"{what}: nested too deeply", file=file)
+    reason = re.sub(r"\s+", " ", str(why))[:200]
+    detail = f"{type(why).__name__}: {reason}" if reason else type(why).__name__
+    return Problem("unexpected", f"{what} because of an error in tribo ({detail})", file=file)
+
+
+def is_of_the_system(kind: str) -> bool:
+    """Whether a problem of this kind is one of the machine and not of the input."""
+    return kind in (_OF_THE_SYSTEM, "out_of_memory")

@@ -52,6 +52,24 @@ _ALIASES = {
         tijd
         total elapsed time
         cycle elapsed time
+        czas
+        czas testu
+        aika
+        tid
+        cas
+        ido
+        zaman
+        sure
+        timp
+        время
+        час
+        χρονος
+        时间
+        试验时间
+        時間
+        試験時間
+        経過時間
+        시간
     """,
     "friction force": """
         friction force
@@ -100,6 +118,40 @@ _ALIASES = {
         tensile load
         zugkraft
         charge
+        sila tarcia
+        sila
+        sila styczna
+        kitkavoima
+        voima
+        friktionskraft
+        friktion
+        wrijvingskracht
+        treci sila
+        sila treni
+        surtunme kuvveti
+        kuvvet
+        forta de frecare
+        forta
+        forca de atrito
+        forca de friccao
+        tangencialni sila
+        сила трения
+        сила
+        усилие
+        τριβη
+        摩擦力
+        obciazenie
+        нагрузка
+        力
+        负荷
+        切向力
+        载荷
+        試験力
+        摩擦荷重
+        荷重
+        마찰력
+        하중
+        힘
     """,
     "displacement": """
         extension
@@ -148,6 +200,35 @@ _ALIASES = {
         disp
         displ
         xyz x position
+        droga
+        przemieszczenie
+        wydluzenie
+        droga tarcia
+        siirtyma
+        matka
+        forskjutning
+        forflyttning
+        stracka
+        weglange
+        draha
+        posun
+        posuv
+        elmozdulas
+        yer degistirme
+        deplasare
+        recorrido
+        corsa
+        percorso
+        curso
+        перемещение
+        путь
+        ход
+        位移
+        行程
+        変位
+        ストローク
+        移動距離
+        변위
     """,
     "normal force": """
         normal force
@@ -167,6 +248,27 @@ _ALIASES = {
         carga normal
         forza normale
         fuerza normal
+        sila normalna
+        obciazenie normalne
+        sila nacisku
+        normaalivoima
+        normaalkracht
+        normalova sila
+        pritlacna sila
+        normal kuvvet
+        forta normala
+        forca normal
+        нормальная сила
+        нормальная нагрузка
+        法向力
+        正压力
+        法向载荷
+        垂直力
+        垂直荷重
+        法線力
+        押付力
+        수직하중
+        수직력
     """,
     "friction coefficient": """
         cof
@@ -183,6 +285,45 @@ _ALIASES = {
         coefficiente di attrito
         coeficiente de friccion
         cof mu
+        wspolczynnik tarcia
+        kitkakerroin
+        friktionskoefficient
+        wrijvingscoefficient
+        koeficient treni
+        surtunme katsayisi
+        coeficient de frecare
+        coeficiente de atrito
+        coeficiente de rozamiento
+        coefficient de friction
+        коэффициент трения
+        摩擦系数
+        摩擦係数
+        마찰계수
+    """,
+    "torque": """
+        friction torque
+        torque
+        frictional torque
+        friction moment
+        reibmoment
+        drehmoment
+        moment
+        couple
+        couple de frottement
+        moment de frottement
+        coppia
+        momento
+        par
+        koppel
+        moment tarcia
+        moment sily
+        момент
+        момент трения
+        扭矩
+        摩擦力矩
+        トルク
+        摩擦トルク
+        토크
     """,
     "temperature": """
         temperature
@@ -191,6 +332,15 @@ _ALIASES = {
         ambient temperature
         room temperature
         raumtemperatur
+        temperature c
+        temperatura
+        temperature ambiante
+        lampotila
+        teplota
+        sicaklik
+        температура
+        温度
+        온도
     """,
     "humidity": """
         humidity
@@ -199,6 +349,20 @@ _ALIASES = {
         feuchte
         luftfeuchte
         humidite
+        luftfeuchtigkeit
+        relative luftfeuchte
+        wilgotnosc
+        humedad
+        umidita
+        humidade
+        vochtigheid
+        kosteus
+        luftfuktighet
+        vlhkost
+        nem
+        влажность
+        湿度
+        습도
     """,
     "speed": """
         sliding velocity
@@ -209,6 +373,24 @@ _ALIASES = {
         gleitgeschwindigkeit
         vitesse
         vitesse de glissement
+        gleitgeschw
+        predkosc
+        predkosc poslizgu
+        velocidad
+        velocita
+        velocidade
+        snelheid
+        nopeus
+        hastighet
+        rychlost
+        hiz
+        viteza
+        скорость
+        скорость скольжения
+        速度
+        滑动速度
+        すべり速度
+        속도
     """,
 }
 
@@ -226,14 +408,11 @@ QUANTITIES: dict[str, Quantity] = {
         _quantity("displacement", "x", "m", "displacement_m"),
         _quantity("normal force", "N", "N", "normal_force_N"),
         _quantity("friction coefficient", "mu", "", "friction_coefficient"),
+        _quantity("torque", "M", "N m", "torque_Nm"),
         _quantity("temperature", "theta", "degC", "temperature_C"),
         _quantity("humidity", "RH", "percent", "humidity_pct"),
         _quantity("speed", "v", "m/s", "speed_m_s"),
     )
-}
-
-_RANKS: dict[str, tuple[str, int]] = {
-    alias: (q.name, rank) for q in QUANTITIES.values() for rank, alias in enumerate(q.aliases)
 }
 
 # Spellings that pint does not know, or knows as something else.
@@ -273,8 +452,43 @@ _SPELLINGS = {
     "degc": "degC",
     "c": "degC",
     "°f": "degF",
+    "℃": "degC",
+    "sek": "s",
+    "sek.": "s",
+    "seg": "s",
+    "с": "s",
+    "сек": "s",
+    "秒": "s",
+    "초": "s",
+    "mm/sec": "mm/s",
+    "мс": "ms",
+    "毫秒": "ms",
+    "мин": "minute",
+    "н": "newton",
+    "кн": "kilonewton",
+    "мн": "millinewton",
+    "牛": "newton",
+    "牛顿": "newton",
+    "千牛": "kilonewton",
+    "毫牛": "millinewton",
+    "мм": "millimeter",
+    "мкм": "micrometer",
+    "м": "meter",
+    "毫米": "millimeter",
+    "微米": "micrometer",
+    "米": "meter",
 }
-_CASE_MATTERS = {"mN": "millinewton", "MN": "meganewton", "Mm": "megameter", "Nm": "newton * meter"}
+_CASE_MATTERS = {
+    "mN": "millinewton",
+    "MN": "meganewton",
+    "Mm": "megameter",
+    "МН": "meganewton",
+    "Мм": "megameter",
+    "Nm": "newton * meter",
+    "mNm": "millinewton * meter",
+    "Ncm": "newton * centimeter",
+    "Nmm": "newton * millimeter",
+}
 _MASSES_AS_FORCES = {"g": "gram_force", "kg": "kilogram_force"}
 _NO_UNIT = {"", "-", "1"}
 _LONGEST_UNIT = 40
@@ -285,16 +499,28 @@ _NUMBER_BELOW = re.compile(r"/\s*([\d.]+\s*[^\W\d_]+)")
 
 
 _LONGEST_NAME = 80  # characters; longer cells are no column names
+_WIDE = str.maketrans("（）［］【】：／，　", "()[][]:/, ")
+_BARRED = str.maketrans({"ł": "l", "ø": "o", "đ": "d", "ß": "ss", "æ": "ae", "œ": "oe", "ı": "i"})
 _CHANNEL = re.compile(r"^\s*(?:c|ch|channel|kanal)[ _]?\d+[ _]", re.I)
+
+
+def narrow(text: str) -> str:
+    """Brackets, blanks and marks of full width, as Chinese and Japanese programs write them, as ordinary ones."""
+    return text if text.isascii() else text.translate(_WIDE)
 
 
 def plain_name(text: str) -> str:
     """A column name without case, accents, units in brackets or punctuation: "Prüfzeit [s]" -> "prufzeit"."""
-    text = re.sub(r"[\[(].*?[\])]", " ", text)
+    text = re.sub(r"[\[(].*?[\])]", " ", narrow(text))
     text = _CHANNEL.sub("", text)
     text = unicodedata.normalize("NFKD", text).replace("μ", "mu ")
-    text = "".join(c for c in text if not unicodedata.combining(c)).lower()
-    return re.sub(r"[^a-z0-9%]+", " ", text).strip()
+    text = "".join(c for c in text if not unicodedata.combining(c)).lower().translate(_BARRED)
+    return re.sub(r"[^\w%]+|_+", " ", text).strip()
+
+
+_RANKS: dict[str, tuple[str, int]] = {
+    plain_name(alias): (q.name, rank) for q in QUANTITIES.values() for rank, alias in enumerate(q.aliases)
+}
 
 
 @lru_cache(maxsize=1)

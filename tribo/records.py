@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.errors import Problem
+from tribo.zeroing import DEFAULT, ZeroChoice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -86,6 +87,27 @@ class Test:
     exclude: str = ""
     covariates: Mapping[str, str] = field(default_factory=dict)
     row: int | None = None
+    zero: ZeroChoice = DEFAULT
+    load_zero: ZeroChoice = DEFAULT
+    stiffness_N_per_m: float | None = None  # of the spring, wire or beam through which the slider is pulled
+
+
+@dataclass(frozen=True)
+class Correction:
+    """What a user states about the numbers of an export; applied once, at the end of reading.
+
+    The friction force is multiplied by ``sign`` (1 or -1) and ``gain``; a torque becomes a force over ``lever_arm_m``.
+    ``sampling_rate_Hz`` gives the time where the export has none, else ``speed_m_s`` does for a recorded path.
+    """
+
+    sign: float = 1.0
+    gain: float = 1.0
+    lever_arm_m: float | None = None
+    sampling_rate_Hz: float | None = None
+    speed_m_s: float | None = None
+
+
+UNCORRECTED = Correction()
 
 
 @dataclass(frozen=True)
@@ -104,7 +126,8 @@ class Campaign:
     ``tests`` are the usable rows, ``set_aside`` the rows with faults or an ``exclude`` reason.
     ``samples`` maps each sample name to its pattern (``Sx`` is pattern S pulled along x).
     ``chosen_flat`` names the flat sample that calibrates the model where a user chose one; every stage asks
-    :attr:`flat_sample`.
+    :attr:`flat_sample`. ``inputs`` maps each input file that was read, by its path in the campaign, to the SHA-256 of
+    the bytes that were read.
     """
 
     title: str
@@ -121,6 +144,9 @@ class Campaign:
     columns: Mapping[str, str] = field(default_factory=dict)
     instrument: Mapping[str, float] = field(default_factory=dict)
     chosen_flat: str = ""
+    zero: ZeroChoice = DEFAULT
+    load_zero: ZeroChoice = DEFAULT
+    inputs: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @property
     def flat_samples(self) -> tuple[str, ...]:
@@ -181,11 +207,61 @@ class Trace:
 
 
 @dataclass(frozen=True)
+class Phase:
+    """A part of a record by what the rig did, from ``start_s`` to ``end_s`` on the clock of the trace."""
+
+    name: str
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
+class Restart:
+    """The static friction of one restart: the peak after the drive stood still for ``hold_s``."""
+
+    hold_s: float
+    stop_s: float
+    peak_s: float
+    static_N: float
+    static_u_N: float
+    sliding_N: float
+    sliding_u_N: float
+
+
+@dataclass(frozen=True)
+class Oscillation:
+    """How the force varies while sliding: its regime, and its cycles where it has any.
+
+    ``regime`` is "steady", "stick-slip", "inertial oscillation" or "irregular". ``peak_N`` is the force at the end of a
+    stick, ``trough_N`` that after the slip, ``drop_N`` the force lost, ``loading_N_per_s`` the slope while the force
+    rises: medians over ``cycles`` with standard uncertainties ``*_u``. ``stuck_share`` is the share of time spent
+    stuck. NaN where there are no cycles.
+    """
+
+    regime: str
+    cycles: int = 0
+    peak_N: float = float("nan")
+    peak_u_N: float = float("nan")
+    trough_N: float = float("nan")
+    trough_u_N: float = float("nan")
+    drop_N: float = float("nan")
+    drop_u_N: float = float("nan")
+    period_s: float = float("nan")
+    period_u_s: float = float("nan")
+    loading_N_per_s: float = float("nan")
+    loading_u_N_per_s: float = float("nan")
+    stuck_share: float = float("nan")
+    stuck_share_u: float = float("nan")
+
+
+@dataclass(frozen=True)
 class Pull:
     """Static peak and mean sliding force of one trace, by a named rule. Times as recorded in the trace.
 
     ``*_u_N`` are standard uncertainties (k = 1) of the reading within the trace. ``zero_N`` was subtracted
     from every force. ``window_s`` is the sliding window (start, end). NaN where a trace does not determine a value.
+    ``first_maximum_N``, ``highest_N`` and ``first_drop_N`` are three readings of the static peak: where they differ,
+    ``static_u_N`` includes the difference.
     """
 
     test_id: str
@@ -207,6 +283,15 @@ class Pull:
     drift_N_per_s: float = float("nan")
     flags: tuple[str, ...] = ()
     problems: tuple[Problem, ...] = ()
+    first_maximum_N: float = float("nan")
+    highest_N: float = float("nan")
+    first_drop_N: float = float("nan")
+    zero_rule: str = ""
+    recorded_load_N: float = float("nan")
+    recorded_load_u_N: float = float("nan")
+    oscillation: Oscillation | None = None
+    restarts: tuple[Restart, ...] = ()
+    phases: tuple[Phase, ...] = ()
 
 
 @dataclass(frozen=True)

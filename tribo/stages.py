@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from tribo.campaign.flat_sample import required_flat_sample, with_flat_sample
+from tribo.campaign.zeros import with_zeros
 from tribo.records import (
     Campaign,
     Ingested,
@@ -42,6 +43,8 @@ class StudyOptions:
 
     rule: str = "seed"
     weights: Weights = "relative"
+    zero: str = ""  # of the force, for tests without their own
+    load_zero: str = ""  # of the recorded normal load
     flat: str = ""  # the sample that calibrates the model; empty: F, or the only flat sample
     runs: int = 4
     seed: int = 0
@@ -59,7 +62,8 @@ class StudyOptions:
 
     def as_words(self) -> dict[str, str]:
         """The options as text, for the provenance."""
-        return {"rule": self.rule, "weights": self.weights, "flat": self.flat, "runs": str(self.runs)}
+        zeros = {name: text for name, text in (("zero", self.zero), ("load_zero", self.load_zero)) if text}
+        return {"rule": self.rule, "weights": self.weights, "flat": self.flat, "runs": str(self.runs), **zeros}
 
 
 DEFAULTS = StudyOptions()
@@ -157,7 +161,7 @@ def study(
     campaign: Campaign, options: StudyOptions = DEFAULTS, *, until: Until = "report", progress: Progress = _silent
 ) -> Study:
     """Run the stages up to ``until`` on one campaign."""
-    chosen = with_flat_sample(campaign, options.flat)
+    chosen = with_zeros(with_flat_sample(campaign, options.flat), options.zero, options.load_zero)
     ingested = ingest(chosen, rule=options.rule, jobs=options.jobs, overrides=options.overrides, progress=progress)
     if until == "ingest":
         return Study(ingested)

@@ -85,15 +85,18 @@ def test_a_point_of_a_figure_tells_its_numbers(report: Opened) -> None:
           const svg = document.querySelector('#figure-agreement svg');
           svg.scrollIntoView({block: 'center'});
           const at = new DOMPoint(series.place[0], series.place[1]).matrixTransform(svg.getScreenCTM());
-          return [at.x, at.y, series.value[1], series.y];
+          return {at: [at.x, at.y], x: series.x, y: series.y, value: series.value.slice(0, 2)};
         }"""
     )
-    page.mouse.move(place[0] - 30, place[1] - 30)
-    page.mouse.move(place[0], place[1])
     tip = page.locator(".tip")
+    page.mouse.move(place["at"][0] - 30, place["at"][1] - 30)
+    expect(tip).to_be_hidden()
+    page.mouse.move(*place["at"])
     expect(tip).to_be_visible()
-    expect(tip).to_contain_text(place[3])
-    expect(tip).to_contain_text(f"{place[2]:.4g}"[:4])
+    said = dict(line.rsplit(": ", 1) for line in tip.inner_text().splitlines() if ": " in line)
+    assert set(said) == {place["x"], place["y"]}
+    shown = [float(said[place[axis]].replace("\u2212", "-")) for axis in ("x", "y")]
+    assert shown == pytest.approx(place["value"], rel=1e-3)  # four digits are shown
 
 
 def moved_start(page: Page) -> float:

@@ -223,7 +223,7 @@ def test_an_impossible_simulation_is_refused_with_everything_that_is_wrong(tmp_p
 
 def test_report_carries_a_verdict_in_the_binding_schema(report: tuple[Result, Path]) -> None:
     verdict = json.loads((report[1] / "verdict.json").read_text(encoding="utf-8"))
-    assert verdict["schema"] == "tribo.verdict/1"
+    assert verdict["schema"] == "tribo.verdict/2"
     assert verdict["verdict"] in {"no_misfit", "named", "undetermined", "unknown"}
     assert {"misfits", "causes", "equivalent", "excluded", "gain", "set_aside", "next_test"} <= set(verdict)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tribo.diagnose.search.screen import columns_in, scores, screen
-from tribo.diagnose.statistics.chance import as_measured, drawn_residuals, refit
+from tribo.diagnose.statistics.chance import as_measured, drawn_residuals, refit, refit_sizes, standardised
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.model import setup
 from tribo.diagnose.statistics.observations import observe
@@ -65,3 +65,35 @@ def test_a_column_that_the_law_takes_up_counts_for_nothing() -> None:
     chi2, coefficients = scores(as_measured(f), law)
     assert chi2.max() == 0.0
     assert all((c == 0.0).all() for c in coefficients)
+
+
+def test_what_repeats_are_drawn_from_has_a_weighted_covariance_of_one() -> None:
+    """Under the weights of the t distribution, as the fit estimates it."""
+    f = baseline()
+    left = standardised(f)
+    weight = (f.noise.tail + 2) / (f.noise.tail + np.sum(left**2, axis=1))
+    assert (left * weight[:, None]).T @ left / len(left) == pytest.approx(np.eye(2), abs=0.02)
+    assert np.abs(left.mean(axis=0)).max() < 0.1
+
+
+def test_the_campaign_itself_as_a_replicate_has_the_weights_and_the_residual_of_its_fit() -> None:
+    f = baseline()
+    r = as_measured(f)
+    assert pytest.approx(f.residual) == r.residual[0].T
+    assert r.precision.shape == (1, 3, f.setup.observations.n)
+    inverse = np.linalg.inv(f.noise.per_test(f.setup) + f.setup.observations.reading[:, :, None] ** 2 * np.eye(2))
+    entries = np.array([inverse[:, 0, 0], inverse[:, 0, 1], inverse[:, 1, 1]])
+    assert r.precision[0] == pytest.approx(entries * f.weight)
+    along = np.concatenate([f.linear.jacobian, f.linear.random], axis=2).reshape(-1, r.normal.shape[1])
+    assert r.weighted[0].shape == along.T.shape
+
+
+def test_the_campaign_refitted_as_a_replicate_keeps_its_law_and_its_noise() -> None:
+    """The fit is where the steps of a replicate stand still."""
+    f = baseline()
+    again = refit(f, f.residual.T[None])
+    assert pytest.approx(f.residual, abs=2e-3) == again.residual[0].T
+    sizes = refit_sizes(f, f.residual.T[None])
+    assert sizes.effects[0] == pytest.approx(f.noise.sizes, rel=0.02)
+    assert sizes.repeat[0] == pytest.approx(f.noise.repeat, rel=0.02, abs=2e-5)
+    assert sizes.scatter[0] == pytest.approx(f.noise.scatter, abs=0.02)

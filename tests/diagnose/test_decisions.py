@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tribo.diagnose import examine
-from tribo.diagnose.search.naming import best_beyond_chance, weigh
+from tribo.diagnose.search.naming import best_beyond_chance
+from tribo.diagnose.search.weighing import weigh
 from tribo.diagnose.statistics.linearisation import start_effects
 from tribo.diagnose.statistics.model import Setup
 

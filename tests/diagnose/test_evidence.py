@@ -15,7 +15,7 @@ from tribo.diagnose.statistics.direct_evidence import (
     zero_drift,
     zero_offset,
 )
-from tribo.diagnose.statistics.observations import observe
+from tribo.diagnose.statistics.observations import Observations, observe
 from tribo.records import Trace
 
 from .synthetic import Design, hidden
@@ -114,3 +114,127 @@ def test_a_drift_includes_the_offset_that_it_leaves() -> None:
     }
     assert list(certain_evidence(found)) == ["load_cell_drift"]
     assert list(certain_evidence(found | {"load_cell_drift": Evidence(0.1, 0.1, False, "N/h")})) == ["load_cell_offset"]
+
+
+def series(**changes: object) -> Observations:
+    """Twenty tests in two days, seven minutes apart, with a pause of sixteen hours after the tenth."""
+    o = observe(hidden()).take(np.arange(20))
+    minutes = 7.0 * np.arange(20) + np.where(np.arange(20) >= 10, 960.0, 0.0)
+    quiet = replace(
+        o, conditions=replace(o.conditions, elapsed_s=60.0 * minutes), noise_N=np.full(20, 0.01),
+        zero_N=np.zeros(20), zero_slope_N_per_s=np.full(20, np.nan), rise_N_per_m=np.full(20, 6e3),
+    )  # fmt: skip
+    return replace(quiet, **changes)  # type: ignore[arg-type]
+
+
+def test_an_offset_is_the_median_and_its_error_that_of_a_median() -> None:
+    """1.2533 times the standard deviation over root n, the latter from the median deviation (normal distribution)."""
+    zero = 0.05 + 0.001 * np.arange(-10.0, 10.0)
+    zero[3] = np.nan
+    known = zero[np.isfinite(zero)]
+    found = zero_offset(series(zero_N=zero))
+    assert found is not None
+    centre = np.median(known)
+    assert found.value == found.change == pytest.approx(centre)
+    spread = 1.4826 * np.median(np.abs(known - centre))
+    assert found.standard_error == pytest.approx(1.2533 * spread / np.sqrt(19))
+    half = 1.645 * found.standard_error
+    assert found.interval == pytest.approx((centre - half, centre + half))
+    assert zero_offset(series(zero_N=np.array([0.1, 0.1] + [np.nan] * 18))) is None
+    assert zero_offset(series(zero_N=np.array([0.1, 0.1, 0.1] + [np.nan] * 17))) is not None
+
+
+@pytest.mark.parametrize(("offset", "matters"), [(0.0049, False), (0.0051, True), (-0.0051, True)])
+def test_an_offset_below_half_the_noise_of_a_reading_does_not_matter(offset: float, matters: bool) -> None:
+    found = zero_offset(series(zero_N=np.full(20, offset)))
+    assert found is not None
+    assert found.certain == matters
+
+
+def test_an_offset_within_five_standard_errors_is_not_certain() -> None:
+    zero = 0.1 * np.where(np.arange(20) % 2, 1.0, -1.0)
+    error = 1.2533 * 1.4826 * 0.1 / np.sqrt(20)
+    for times, certain in ((4.9, False), (5.1, True)):
+        found = zero_offset(series(zero_N=zero + times * error))
+        assert found is not None
+        assert found.standard_error == pytest.approx(error)
+        assert found.certain == certain
+
+
+def test_where_the_noise_is_unknown_half_a_percent_of_a_weak_pull_matters() -> None:
+    unknown = np.full(20, np.nan)
+    o = series(noise_N=unknown)
+    weak = 0.005 * float(np.exp(np.quantile(o.log_force, 0.05)))
+    for offset, matters in ((0.99 * weak, False), (1.01 * weak, True)):
+        found = zero_offset(series(noise_N=unknown, zero_N=np.full(20, offset)))
+        assert found is not None
+        assert found.certain == matters
+
+
+def test_a_drift_by_the_clock_and_one_by_the_hours_at_the_bench_are_told_apart() -> None:
+    """A pause counts for at most five times the usual one: the night for 35 minutes."""
+    o = series()
+    clock = o.conditions.elapsed_s / 3600.0
+    bench = 7.0 / 60.0 * (np.arange(20) + np.where(np.arange(20) >= 10, 4.0, 0.0))
+    shaken = 1e-4 * np.where(np.arange(20) % 2, 1.0, -1.0)
+    for hours in (clock, bench):
+        found = zero_drift(series(zero_N=0.02 * hours + shaken))
+        assert found is not None
+        assert found.value == pytest.approx(0.02, rel=0.02)
+        assert found.change == pytest.approx(0.02 * np.ptp(hours), rel=0.02)
+        assert found.certain
+        assert found.looks == 2
+
+
+def test_a_drift_needs_ten_zeros_and_a_clock() -> None:
+    zero = 0.02 * np.arange(20.0)
+    nine, ten = (np.where(np.arange(20) < k, zero, np.nan) for k in (9, 10))
+    assert zero_drift(series(zero_N=nine)) is None
+    assert zero_drift(series(zero_N=ten)) is not None
+    still = replace(series().conditions, elapsed_s=np.zeros(20))
+    assert zero_drift(series(zero_N=zero, conditions=still)) is None
+
+
+def test_a_drift_within_pulls_is_that_of_twenty_seconds() -> None:
+    """The slopes before contact are per second; 2e-4 N/s over a pull of some 20 s is less than half the noise."""
+    unknown = replace(series().conditions, elapsed_s=np.full(20, np.nan))
+    for slope, certain in ((2.4e-4, False), (2.6e-4, True)):
+        found = zero_drift(series(conditions=unknown, zero_slope_N_per_s=np.full(20, slope)))
+        assert found is not None
+        assert found.value == pytest.approx(3600 * slope)
+        assert found.change == pytest.approx(20 * slope)
+        assert found.certain == certain
+        assert found.unit == "N/h"
+    nine = np.where(np.arange(20) < 9, 1e-3, np.nan)
+    assert zero_drift(series(conditions=unknown, zero_slope_N_per_s=nine)) is None
+
+
+def test_the_stiffening_is_the_slope_of_the_logarithm_of_the_rise_on_that_of_the_speed() -> None:
+    speeds = np.where(np.arange(20) % 2, 2e-4, 8e-4)
+    shaken = 0.001 * np.where(np.arange(20) % 4 < 2, 1.0, -1.0)
+    o = series()
+    c = replace(o.conditions, speed_m_s=speeds)
+    for slope, certain in ((0.018, False), (0.022, True), (-0.022, True)):
+        rise = 6e3 * np.exp(slope * np.log(speeds / 4e-4) + shaken)
+        found = rise_stiffening(series(conditions=c, rise_N_per_m=rise))
+        assert found is not None
+        assert found.value == pytest.approx(slope, abs=2e-4)
+        spread = np.sqrt(np.sum((np.log(speeds) - np.log(speeds).mean()) ** 2))
+        assert found.standard_error == pytest.approx(1.4826 * 0.001 / spread, rel=0.3)
+        assert found.change == pytest.approx(found.value * np.log(4.0))
+        assert found.certain == certain
+
+
+@pytest.mark.parametrize(
+    ("good", "ratio", "there"), [(9, 4.0, False), (10, 4.0, True), (10, 1.1, False), (10, 1.11, True)]
+)
+def test_stiffening_needs_ten_rises_at_speeds_a_tenth_of_an_e_fold_apart(good: int, ratio: float, there: bool) -> None:
+    speeds = np.where(np.arange(20) % 2, 2e-4, 2e-4 * ratio)
+    rise = np.where(np.arange(20) < good, 6e3, np.where(np.arange(20) % 2, np.nan, -1.0))
+    c = replace(series().conditions, speed_m_s=speeds)
+    assert (rise_stiffening(series(conditions=c, rise_N_per_m=rise)) is not None) == there
+
+
+def test_a_p_value_has_a_least_and_is_never_above_one() -> None:
+    assert Evidence(9.0, 0.1, True, "N").p_adjusted(3) == 1e-12
+    assert Evidence(0.0, 1.0, False, "N").p_adjusted(1) == 1.0

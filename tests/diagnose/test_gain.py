@@ -10,7 +10,7 @@ from blind.tribometer import Design
 from scipy.stats import norm
 
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.gain import gain, gain_of_zero
+from tribo.diagnose.statistics.gain import _folds, gain, gain_of_zero
 from tribo.diagnose.statistics.model import Acting, Setup
 from tribo.diagnose.statistics.observations import observe
 from tribo.mechanisms.table import MECHANISMS
@@ -68,3 +68,44 @@ def test_the_error_of_the_gain_of_a_zero_is_that_of_a_mean_over_specimens() -> N
     assert found is not None
     assert found.difference == pytest.approx(np.mean(each), rel=1e-6)
     assert found.se == pytest.approx(np.std(each) / np.sqrt(len(each)), rel=0.15)
+
+
+def test_what_is_left_out_are_loads_for_a_label_else_samples_where_there_are_four_else_specimens() -> None:
+    four = baseline(made(lambda s: np.zeros((s.observations.n, 2)), 0)).setup
+    c = four.observations.conditions
+    suction, label = Acting(MECHANISMS["suction"]), Acting(MECHANISMS["mislabelled_specimen"], "x")
+    kind, labels = _folds(four, (suction,))
+    assert (kind, labels.tolist()) == ("samples", c.sample.tolist())
+    kind, labels = _folds(four, (suction, label))
+    assert kind == "loads"
+    assert np.array_equal(labels.astype(float), c.normal_load_N.round(4))
+    three = four.take(c.sample != "C")
+    kind, labels = _folds(three, (suction,))
+    assert (kind, labels.tolist()) == ("specimens", three.observations.conditions.specimen.tolist())
+
+
+def test_the_gain_of_a_drift_is_that_of_a_line_over_a_load_cell_at_zero() -> None:
+    """Each specimen is scored by the line through the others, with the scatter of the others about it."""
+    o = observe(made(lambda s: np.zeros((s.observations.n, 2)), 0, FLAT))
+    hours = o.conditions.elapsed_s / 3600.0
+    zero = 0.004 * hours + 0.002 * np.random.default_rng(1).normal(size=o.n)
+    zero[5] = np.nan
+    known, specimen = np.isfinite(zero), o.conditions.specimen
+    before, after, off = [], [], []
+    for name in np.unique(specimen):
+        here, rest = known & (specimen == name), known & (specimen != name)
+        line = np.polyfit(hours[rest], zero[rest], 1)
+        for found, centre in ((before, np.zeros_like(zero)), (after, np.polyval(line, hours))):
+            spread = np.sqrt(np.mean((zero - centre)[rest] ** 2))
+            found += list(norm(0.0, spread).logpdf((zero - centre)[here]))
+        off += list((zero - np.polyval(line, hours))[here])
+    found = gain_of_zero(replace(o, zero_N=zero), True, np.random.default_rng(0))
+    assert found is not None
+    assert (found.log_score_baseline, found.log_score_extended) == pytest.approx((np.mean(before), np.mean(after)))
+    assert found.difference == pytest.approx(np.mean(after) - np.mean(before))
+    force = np.exp(np.median(o.log_force[:, 1]))
+    assert found.rmse_percent_before == pytest.approx(100 * np.sqrt(np.nanmean(zero**2)) / force)
+    assert found.rmse_percent_after == pytest.approx(100 * np.sqrt(np.mean(np.square(off))) / force)
+    assert found.held_out == "specimens"
+    one = o.take(specimen == specimen[0])
+    assert gain_of_zero(one, False, np.random.default_rng(0)) is None

@@ -10,14 +10,17 @@ import pytest
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.interval import (
     DROP_90,
+    _averaged,
+    _log_freedom,
     _score_at,
     intervals,
     recovered,
     standard_errors,
+    understated,
     with_pattern_error,
 )
 from tribo.diagnose.statistics.linearisation import ModelFit
-from tribo.diagnose.statistics.model import candidates
+from tribo.diagnose.statistics.model import FIXED, PATTERN, candidates
 
 from .test_screen import baseline
 
@@ -81,3 +84,67 @@ def test_an_averaged_interval_keeps_to_the_bounds() -> None:
     f = fitted("suction", ("normal_load_error", -0.4))
     value, low, high = recovered(f, 0)[0]
     assert low == 0.0 <= value < high
+
+
+def test_an_interval_averaged_over_the_pattern_error_has_the_variance_of_the_mixture() -> None:
+    """Normal distributions (1, 0.2) with a quarter and (2, 0.5) with three quarters of the weight."""
+    weight, mean, sd = np.array([0.25, 0.75]), np.array([1.0, 2.0]), np.array([0.2, 0.5])
+    ends = np.column_stack([mean - 1.645 * sd, mean + 1.645 * sd])
+    value, low, high = _averaged(weight, mean, ends, 1.0, (-9.0, 9.0))
+    variance = 0.25 * (0.2**2 + 0.75**2) + 0.75 * (0.5**2 + 0.25**2)
+    assert value == 1.75
+    assert (low, high) == pytest.approx((1.75 - 1.645 * variance**0.5, 1.75 + 1.645 * variance**0.5))
+    assert _averaged(weight, mean, ends, 1.0, (1.5, 1.9)) == (1.75, 1.5, 1.9)
+    twice = 0.25 * (0.4**2 + 0.75**2) + 0.75 * (1.0**2 + 0.25**2)  # what the values differ by is not widened
+    assert _averaged(weight, mean, ends, 2.0, (-9.0, 9.0))[1] == pytest.approx(1.75 - 1.645 * twice**0.5)
+    wider = ends + np.array([[0.0, 0.0], [0.0, 1.0]])  # the upper end of the second alone lies further out
+    assert _averaged(weight, mean, wider, 1.0, (-9.0, 9.0))[1] == pytest.approx(low)
+    assert _averaged(weight, mean, wider, 1.0, (-9.0, 9.0))[2] > high
+
+
+def test_a_standard_error_is_that_of_the_curvature_under_the_expected_information_of_the_t() -> None:
+    """(tail + 4) / (tail + 2) times the variance, of the parameter behind the four of the law."""
+    f = fitted("run_in", ("run_in", 1.0))
+    tail = f.noise.tail
+    for k, error in enumerate(standard_errors(f, 0)):
+        assert error**2 == pytest.approx(f.covariance[4 + k, 4 + k] * (tail + 4) / (tail + 2))
+    assert len(standard_errors(f, 0)) == len(f.values[0]) > 1
+
+
+def test_the_freedom_of_a_fit_is_half_the_log_determinant_of_law_and_mechanisms() -> None:
+    f = fitted("run_in", ("run_in", 1.0))
+    p = 4 + len(f.values[0])
+    assert _log_freedom(f) == pytest.approx(0.5 * np.linalg.slogdet(f.covariance[:p, :p])[1])
+
+
+def test_a_pattern_error_that_is_held_is_no_longer_estimated() -> None:
+    f = fitted("temperature", ("temperature", 1.0))
+    held, here = with_pattern_error(f, 2.5), f.setup.group == PATTERN
+    assert held.setup.unit[here] == pytest.approx(2.5 * f.setup.unit[here])
+    assert np.array_equal(held.setup.unit[~here], f.setup.unit[~here])
+    assert (held.setup.group[here] == FIXED).all()
+    assert np.array_equal(held.setup.group[~here], f.setup.group[~here])
+    assert held.acting == f.acting
+
+
+def test_without_patterns_there_is_nothing_to_average_over() -> None:
+    f = fitted("temperature", ("temperature", 1.0))
+    flat = fit(with_pattern_error(f, 1.0).setup, f.acting)
+    assert recovered(flat, 0)[0] == pytest.approx((flat.values[0][0], *intervals(flat, 0)[0]))
+
+
+def test_standard_errors_are_widened_by_what_campaigns_of_the_fit_itself_show() -> None:
+    """Normal repeats under weights of a t distribution: the curvature is a little too confident, never by half."""
+    factors = [understated(fitted(name, (name, 1.5)), 0) for name in ("covariate:operator", "run_in", "tilt")]
+    assert [f.size for f in factors] == [1, 2, 1]
+    every = np.concatenate(factors)
+    assert every.min() >= 1.0
+    assert 1.02 < every.mean() < 1.2
+
+
+def test_an_interval_is_as_much_wider_as_the_errors_are_understated() -> None:
+    f = fitted("covariate:operator", ("covariate:operator", 1.5))
+    value, low, high = recovered(f, 0)[0]
+    stated = 2 * 1.645 * standard_errors(f, 0)[0]
+    assert high - low > 0.97 * stated * understated(f, 0)[0]
+    assert low < value < high

@@ -28,7 +28,7 @@ def tied() -> Diagnosis:
 def test_the_json_has_every_key_of_the_schema(tied: Diagnosis) -> None:
     plain = json.loads(tied.verdict.to_json())
     assert set(plain) >= KEYS
-    assert plain["schema"] == "tribo.verdict/1"
+    assert plain["schema"] == "tribo.verdict/2"
     assert set(plain["misfits"][0]) == {"observable", "sample", "covariate", "effect_percent", "p_adjusted", "text"}
     assert set(plain["causes"][0]) == {"mechanism", "weight", "parameters", "text"}
     suction = next(cause for cause in plain["causes"] if cause["mechanism"] == "suction")
@@ -70,9 +70,9 @@ def test_every_mechanism_is_either_a_cause_or_excluded_with_a_reason(tied: Diagn
     from tribo.mechanisms.table import NAMES
 
     v = tied.verdict
-    spoken_of = {c.mechanism for c in v.causes} | {e.mechanism.split(":")[0] for e in v.excluded}
+    spoken_of = {c.mechanism for c in v.causes} | {e.mechanism.split(":")[0] for e in (*v.excluded, *v.not_testable)}
     assert spoken_of == set(NAMES)
-    reasons = {e.mechanism: e.reason for e in v.excluded}
+    reasons = {e.mechanism: e.reason for e in (*v.excluded, *v.not_testable)}
     assert "before contact" in reasons["load_cell_offset"]
     assert "the pull speed does not vary" in reasons["velocity_dependence"]
     assert "the calibration on the flat sample absorbs" in reasons["pulley_friction"]

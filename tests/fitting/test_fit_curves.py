@@ -83,6 +83,16 @@ def test_one_specimen_keeps_the_covariance_of_its_pulls() -> None:
     np.testing.assert_allclose(both.covariance, ordinary.covariance, rtol=1e-3)
 
 
+def test_a_pull_at_zero_load_takes_part_where_loads_are_known_to_a_share() -> None:
+    """The load zero is then known exactly: the line goes through that pull as the ordinary one does."""
+    table = pulls(scatter=0.05, specimens=1)
+    at_rest = table.iloc[[0, 1]].assign(normal_load_N=0.0, static_N=[0.60, 0.62])
+    table = pd.concat([table, at_rest], ignore_index=True)
+    (ordinary,) = fit_samples(table, "static", AREA)
+    (both,) = fit_errors_in_both(table, "static", AREA, load_u_share=0.02)
+    assert both.values == pytest.approx(ordinary.values, rel=0.03)
+
+
 @pytest.mark.parametrize(("constant", "share"), [(0.0, 0.0), (-0.1, 0.2)])
 def test_no_error_of_the_load_is_refused(constant: float, share: float) -> None:
     with pytest.raises(FitError, match="above zero"):

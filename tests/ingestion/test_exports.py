@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tribo import stages
 from tribo.campaign import load_campaign
@@ -15,8 +16,16 @@ from tribo.records import SetAside
 EXAMPLE = Path(__file__).resolve().parents[2] / "data" / "example"
 
 
+def allow_forks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processes are forked although a test runner may have threads."""
+    monkeypatch.setattr("tribo.forked.may_fork", lambda: True)
+    monkeypatch.setattr("tribo.ingestion.exports.may_fork", lambda: True)
+
+
+
+
 def test_two_processes_read_the_same_bits_as_one(monkeypatch) -> None:  # type: ignore[no-untyped-def]
-    monkeypatch.setattr(exports, "_may_fork", lambda: True)
+    allow_forks(monkeypatch)
     campaign = load_campaign(EXAMPLE)
     assert len(campaign.tests) >= exports.FEWEST_FOR_PROCESSES
     one, two = stages.ingest(campaign), stages.ingest(campaign, jobs=2)
@@ -29,7 +38,7 @@ def test_two_processes_read_the_same_bits_as_one(monkeypatch) -> None:  # type: 
 def test_faults_come_back_from_the_processes_too(monkeypatch, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     import shutil
 
-    monkeypatch.setattr(exports, "_may_fork", lambda: True)
+    allow_forks(monkeypatch)
     shutil.copytree(EXAMPLE, tmp_path / "campaign")
     (tmp_path / "campaign" / "raw" / "T005.csv").write_bytes(b"")
     ingested = stages.ingest(load_campaign(tmp_path / "campaign"), jobs=2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import re
 from html.parser import HTMLParser
@@ -11,7 +13,7 @@ import numpy as np
 import pytest
 
 from tribo.pipeline.history import CampaignRow, Law, history
-from tribo.pipeline.index_page import change_sentence, page, series, trend_csv, write_index
+from tribo.pipeline.index_page import change_sentence, page, series, series_name, trend_csv, write_index
 from tribo.pipeline.trend import change_points
 
 
@@ -27,7 +29,7 @@ def campaigns(jump: float = 0.0) -> list[CampaignRow]:
 
 
 def rendered(rows: list[CampaignRow]) -> str:
-    changes = change_points({"|".join(k): v for k, v in series(rows).items()})
+    changes = change_points({series_name(k): v for k, v in series(rows).items()})
     return page(rows, changes)
 
 
@@ -83,10 +85,17 @@ def test_the_numbers_of_the_figures_stand_in_the_table() -> None:
     assert len(lines) == 13
 
 
+def test_names_with_quotes_commas_and_line_breaks_come_back_from_the_table() -> None:
+    names = ('6" wafer, "old"', "a\nb", "plain")
+    rows = [CampaignRow(name, "", "done", laws=(Law(f"{name},F", "static", "mu", 1.0, 0.9, 1.1),)) for name in names]
+    back = list(csv.DictReader(io.StringIO(trend_csv(rows), newline="")))
+    assert [(row["campaign"], row["sample"]) for row in back] == [(name, f"{name},F") for name in names]
+
+
 @pytest.mark.parametrize(("after", "verb"), [(1.0, "rises"), (-1.0, "falls")])
 def test_a_change_is_said_in_its_direction(after: float, verb: str) -> None:
     rows = campaigns(after)
-    (change,) = change_points({"F|static|mu": series(rows)["F", "static", "mu"]})
+    (change,) = change_points({series_name(("F", "static", "mu")): series(rows)["F", "static", "mu"]})
     assert verb in change_sentence(change, rows)
 
 
@@ -104,6 +113,24 @@ def site_with(tmp_path: Path, record: dict[str, object] | None, waiting: list[st
         known = {"digest": "D 1 w", "status": "done", "problems": [], "finished": "2026-01-02T03:04:05Z"}
         (state / "steps" / "a" / "report.json").write_text(json.dumps({**known, **record}))
     return tmp_path
+
+
+def test_campaigns_are_ordered_by_the_time_of_measurement_whatever_its_spelling(tmp_path: Path) -> None:
+    starts = {
+        "a": ["2026-03-02T23:30:00-05:00"], "b": ["2026-03-03T09:00:00+01:00", "2026-03-03 03:00"],
+        "c": ["yesterday", "20260302T120000"], "d": ["2026-03-02T11:59"], "e": ["2026-13-45"],
+    }  # fmt: skip
+    site_with(tmp_path, None, [], listed=False)
+    for name, times in starts.items():
+        record = {"digest": "D 1 w", "status": "done", "problems": [], "finished": "2026-01-02T03:04:05Z"}
+        (tmp_path / ".tribo" / "steps" / name).mkdir(exist_ok=True)
+        (tmp_path / ".tribo" / "steps" / name / "report.json").write_text(json.dumps(record))
+        (tmp_path / "current" / name).mkdir()
+        cells = "".join(f"T{k},,{time}\n" for k, time in enumerate(times))
+        (tmp_path / "current" / name / "tests.csv").write_text(f"test_id,set_aside,started_at\n{cells}")
+    rows = history(tmp_path)
+    assert [row.name for row in rows] == ["d", "c", "b", "a", "e"]
+    assert [row.measured for row in rows] == ["2026-03-02", "2026-03-02", "2026-03-03", "2026-03-02", ""]
 
 
 PROBLEM = {"kind": "k", "what": "no such file", "file": "tests.csv", "row": 2}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -410,15 +409,6 @@ def test_times_of_day_are_refused_with_what_to_give(tmp_path: Path, stamp: str) 
     np.testing.assert_allclose(np.diff(trace.time_s), 0.1)
 
 
-def test_old_excel_files_are_refused_with_what_to_save_them_as(tmp_path: Path) -> None:
-    path = tmp_path / "export.xls"
-    path.write_bytes(bytes.fromhex("d0cf11e0a1b11ae1") + bytes(2000))
-    with pytest.raises(ReadError) as caught:
-        read_export(path)
-    (problem,) = caught.value.problems
-    assert (problem.kind, problem.allowed) == ("old_excel", "the sheet saved as .xlsx or as CSV")
-
-
 def test_a_table_without_units_is_refused_with_what_to_give(tmp_path: Path) -> None:
     path = saved(tmp_path, CSM)
     with pytest.raises(ReadError, match=r"time = .Time \[s\]."):
@@ -508,14 +498,6 @@ def _as_cell(text: str) -> float | str | None:
         return text or None
 
 
-def test_a_workbook_without_openpyxl_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    openpyxl = pytest.importorskip("openpyxl")
-    openpyxl.Workbook().save(tmp_path / "a.xlsx")
-    monkeypatch.setitem(sys.modules, "openpyxl", None)
-    with pytest.raises(ReadError, match="pip install openpyxl"):
-        read_export(tmp_path / "a.xlsx")
-
-
 def test_every_sheet_of_a_workbook_is_looked_at(tmp_path: Path) -> None:
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()
@@ -558,7 +540,7 @@ def test_a_damaged_container_is_refused(tmp_path: Path, data: bytes) -> None:
     (tmp_path / "a.bin").write_bytes(data)
     with pytest.raises(ReadError) as caught:
         read_export(tmp_path / "a.bin")
-    assert caught.value.problems[0].kind in {"bad_mat", "bad_xlsx", "old_excel"}
+    assert caught.value.problems[0].kind in {"bad_mat", "bad_archive", "bad_workbook"}
 
 
 def test_damage_in_one_of_several_tables_is_named_with_its_row(tmp_path: Path) -> None:
@@ -571,4 +553,4 @@ def test_damage_in_one_of_several_tables_is_named_with_its_row(tmp_path: Path) -
 
 def test_every_family_has_a_sample_here() -> None:
     tested = {family for _, family, _, _ in SAMPLES.values()} | {"trapezium", "te67", "csm", "newport", "matlab"}
-    assert tested == set(READERS)
+    assert tested | {"tdms"} == set(READERS)

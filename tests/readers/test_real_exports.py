@@ -149,21 +149,29 @@ def test_friction_over_load_of_the_csm_runs_is_three_newton(exports: Path, name:
 
 
 @in_one_test(
-    [("k168Nm_v42", 0.304, None), ("k168Nm_v1100", 0.334, 0.037), ("k1002Nm_v4300", 0.292, 0.050)],
+    [("k168Nm_v42", 0.304), ("k168Nm_v1100", 0.334), ("k1002Nm_v4300", 0.292)],
 )
-def test_paper_on_paper_has_its_friction(exports: Path, name: str, mean: float, sd: float | None) -> None:
-    """The stick phases of the slow pull rise with the slope of spring and drive, k v / (m g)."""
+def test_paper_on_paper_has_its_friction(exports: Path, name: str, mean: float) -> None:
+    time, ratio = _paper_on_paper(exports, name)
+    assert ratio.mean() == pytest.approx(mean, abs=5e-4)
+    assert 1 / np.median(np.diff(time)) == pytest.approx(2000, rel=1e-3)
+
+
+def test_paper_on_paper_scatters_when_pulled_fast_and_rises_with_the_spring_when_pulled_slowly(exports: Path) -> None:
+    """Standard deviations as published; stick phases rise at k v / (m g), 168 N/m pulled at 42 um/s, 30.7 g."""
+    for name, sd in (("k168Nm_v1100", 0.037), ("k1002Nm_v4300", 0.050)):
+        assert _paper_on_paper(exports, name)[1].std() == pytest.approx(sd, abs=5e-4)
+    time, ratio = _paper_on_paper(exports, "k168Nm_v42")
+    step = round(0.2 / float(np.median(np.diff(time))))
+    slopes = (ratio[step::step] - ratio[:-step:step]) / (time[step::step] - time[:-step:step])
+    assert np.median(slopes[slopes > 0]) == pytest.approx(168 * 42e-6 / (0.0307 * 9.80665), rel=0.03)
+
+
+def _paper_on_paper(exports: Path, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Time and the ratio of friction to weight."""
     columns = {"time": "t [s]", "force": "Fnorm [30.7 gf]"}
     trace = read_export(exports / f"fr_paper_stickslip_{name}.mat", columns=columns)
-    ratio = trace.force_N / (30.7 * GRAM_FORCE)
-    assert ratio.mean() == pytest.approx(mean, abs=5e-4)
-    if sd is not None:
-        assert ratio.std() == pytest.approx(sd, abs=5e-4)
-    assert 1 / np.median(np.diff(trace.time_s)) == pytest.approx(2000, rel=1e-3)
-    if name == "k168Nm_v42":
-        step = round(0.2 / float(np.median(np.diff(trace.time_s))))
-        slopes = (ratio[step::step] - ratio[:-step:step]) / (trace.time_s[step::step] - trace.time_s[:-step:step])
-        assert np.median(slopes[slopes > 0]) == pytest.approx(168 * 42e-6 / (0.0307 * 9.80665), rel=0.03)
+    return trace.time_s, trace.force_N / (30.7 * GRAM_FORCE)
 
 
 @in_one_test([*READ, *REFUSED])

@@ -16,7 +16,7 @@ from tribo.cli import main
 from tribo.errors import CampaignError
 from tribo.records import Study
 from tribo.report import gather_provenance, verify, write_until
-from tribo.report.provenance import input_names, read_record
+from tribo.report.provenance import file_hash, input_names, read_record
 
 
 @pytest.fixture
@@ -64,6 +64,28 @@ def test_every_change_is_named(placed: tuple[Study, Path, Path]) -> None:
         ("output", "missing", "campaign.nc"),
         ("output", "added", "note.txt"),
     }
+
+
+def test_results_of_two_runs_are_told_apart_although_every_hash_is_that_of_the_record(
+    placed: tuple[Study, Path, Path],
+) -> None:
+    only_read, _, out = placed
+    other = out.with_name("other")
+    write_until(only_read, other, "ingest", provenance=gather_provenance(only_read, options={"rule": "iso_8295"}))
+    shutil.copy(other / "campaign.nc", out / "campaign.nc")
+    record = read_record(out)
+    assert record is not None
+    record["outputs"]["campaign.nc"] = file_hash(out / "campaign.nc")
+    (out / "provenance.json").write_text(json.dumps(record))
+    assert differences(out) == {("output", "another run's", "campaign.nc")}
+
+
+def test_a_run_that_has_not_ended_is_said(placed: tuple[Study, Path, Path]) -> None:
+    _, _, out = placed
+    (out / ".tribo.unfinished").touch()
+    found = verify(out)
+    assert not found.unchanged
+    assert "has not ended" in found.in_words()
 
 
 def test_what_is_kept_for_the_next_start_is_no_output(placed: tuple[Study, Path, Path]) -> None:

@@ -7,10 +7,13 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+import warnings
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
@@ -21,6 +24,8 @@ from tribo.errors import SimulationError
 from tribo.records import Run
 from tribo.simulate import SimConfig, run_ensemble, stratified_design
 from tribo.simulate.resume import Work, read_stored, run_stored, varied_columns
+from tribo.store.kept_results import DamagedResultWarning
+from tribo.store.lock import BusyError
 
 SMALL = SimConfig(blocks=(40, 40), dt_s=1e-7, rest_tolerance=1e-2)
 RESULTS = ["static_friction", "sliding_friction", "peak_s", "window_end_s"]
@@ -68,6 +73,131 @@ def test_another_design_is_refused(tmp_path: Path):
     (tmp_path / "text.h5").write_text("not HDF5")
     with pytest.raises(SimulationError, match="cannot be read as HDF5"):
         run_stored(design(1), tmp_path / "text.h5")
+
+
+def edited(path: Path, change: Callable[[h5py.File], None]) -> Path:
+    """The store after a change by another program."""
+    with h5py.File(path, "r+") as file:
+        change(file)
+    return path
+
+
+def falsify_one_result(file: h5py.File) -> None:
+    file["static_friction"][1] = 9.9
+
+
+def mark_a_run_done_that_is_not(file: h5py.File) -> None:
+    for name in ("static_friction", "sliding_friction"):
+        file[name][1] = float("nan")
+    file["checksum"][1] = 0
+
+
+def move_a_result_to_another_run(file: h5py.File) -> None:
+    for name in ("static_friction", "sliding_friction", "peak_s", "checksum"):
+        file[name][1] = file[name][0]
+
+
+@pytest.mark.parametrize(
+    "change", [falsify_one_result, mark_a_run_done_that_is_not, move_a_result_to_another_run], ids=lambda f: f.__name__
+)
+def test_a_run_that_differs_from_its_checksum_is_not_read_and_is_computed_again(
+    tmp_path: Path, change: Callable[[h5py.File], None]
+):
+    """The other rows stay; a warning names the file; the whole is then as it was."""
+    first = run_stored(design(1), tmp_path / "e.h5")
+    edited(tmp_path / "e.h5", change)
+    with pytest.warns(DamagedResultWarning, match="1 of 4 runs differ"):
+        table = read_stored(tmp_path / "e.h5")
+    assert table["done"].tolist() == [True, False, True, True]
+    assert table.loc[1, ["static_friction", "sliding_friction", "normal_load_N"]].isna().all()
+    with pytest.warns(DamagedResultWarning, match="1 of 4 runs differ"):
+        again = run_stored(design(1), tmp_path / "e.h5")
+    pd.testing.assert_frame_equal(again, first, check_exact=True)
+
+
+def test_a_store_of_another_version_is_not_continued(tmp_path: Path):
+    """The sources that computed its runs are part of what it is; a changed value is of no use then."""
+    run_stored(design(1), tmp_path / "e.h5")
+    edited(tmp_path / "e.h5", lambda file: file.attrs.modify("sources", "0" * 64))
+    with pytest.raises(SimulationError, match="another version of tribo"):
+        run_stored(design(1), tmp_path / "e.h5")
+
+
+def test_a_store_with_a_damaged_description_is_made_again(tmp_path: Path):
+    """An attribute or an input that is not that of the design leaves no doubt that the file was changed."""
+    first = run_stored(design(1), tmp_path / "e.h5")
+    time_step, angles = ("dt_s", 2e-7), np.ones(4)
+    for change in (lambda file: file.attrs.modify(*time_step), lambda file: file["angle_deg"].write_direct(angles)):
+        edited(tmp_path / "e.h5", change)
+        with pytest.warns(DamagedResultWarning, match="all runs are computed again"):
+            again = run_stored(design(1), tmp_path / "e.h5")
+        pd.testing.assert_frame_equal(again, first, check_exact=True)
+        with h5py.File(tmp_path / "e.h5") as file:
+            assert file.attrs["dt_s"] == 1e-7
+
+
+def test_no_flipped_bit_of_a_store_gives_another_number_in_silence(tmp_path: Path):
+    """A table with a flipped bit is the same, has runs marked as not done, or is refused."""
+    path = tmp_path / "e.h5"
+    expected = run_stored(design(1), path)
+    intact = path.read_bytes()
+    rng = np.random.default_rng(3)
+    for place in rng.choice(8 * len(intact), 150, replace=False):
+        damaged = bytearray(intact)
+        damaged[place // 8] ^= 1 << (place % 8)
+        path.write_bytes(bytes(damaged))
+        with warnings.catch_warnings(record=True):
+            warnings.simplefilter("always")
+            try:
+                table = read_stored(path)
+            except SimulationError:
+                continue
+        pd.testing.assert_frame_equal(table[table["done"]], expected[table["done"]], check_exact=True)
+
+
+HOLDING = """
+import sys, time
+sys.path.insert(0, {folder!r})
+from test_resume import design
+from tribo.simulate.resume import run_stored
+run_stored(design(1), {store!r}, jobs=1, progress=lambda done, total: (print(done, flush=True), time.sleep(60)))
+"""
+
+
+def test_two_processes_do_not_write_one_store(tmp_path: Path):
+    """The second is refused with the name of the first, whose rows it would otherwise take for its own."""
+    store = tmp_path / "e.h5"
+    script = HOLDING.format(folder=str(Path(__file__).parent), store=str(store))
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "0\n"
+    try:
+        with pytest.raises(BusyError, match=f"process {process.pid} on "):
+            run_stored(design(1), store)
+    finally:
+        process.kill()
+        process.communicate()
+    (tmp_path / ".e.h5.abc.part").touch()
+    assert run_stored(design(1), store)["done"].all()
+    assert [path.name for path in tmp_path.iterdir()] == ["e.h5"]
+
+
+def test_a_command_that_is_asked_to_end_leaves_whole_files_only(tmp_path: Path):
+    """SIGTERM ends an ensemble as Ctrl-C does: status 130, no lock, no half file, and the next start goes on."""
+    store = tmp_path / "e.nc"
+    asked = ["simulate", "--sample", "F", "--sample", "C", "--pressure", "5", "--repeats", "400", "--dt", "1e-7",
+             "--blocks", "40", "--set", "rest_tolerance=0.01", "-o", str(store)]  # fmt: skip
+    process = subprocess.Popen([sys.executable, "-m", "tribo", *asked], stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 300
+    while not (store.exists() and read_stored(store)["done"].any()):
+        assert process.poll() is None
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    process.terminate()
+    _, said = process.communicate()
+    assert process.returncode == 130, said
+    assert "interrupted; finished results are kept" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["e.nc"]
 
 
 KILLED = """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +12,15 @@ import pandas as pd
 import pytest
 
 from tribo.records import LawFit
-from tribo.store.kept_results import Shelf, decoded, encoded, fingerprint, package_sources, sources
+from tribo.store.kept_results import (
+    DamagedResultWarning,
+    Shelf,
+    decoded,
+    encoded,
+    fingerprint,
+    package_sources,
+    sources,
+)
 
 FIT = LawFit(
     "B", "static", "coulomb_adhesion", ("mu", "tau0_Pa"), np.array([4.0, 2e4]), np.diag([0.1, 1e6]), 2.0, 3, 12,
@@ -75,10 +84,28 @@ def test_records_arrays_and_tables_come_back_equal_through_json() -> None:
     assert (number, text, nothing) == (0.1, "text", None)
 
 
-@pytest.mark.parametrize("content", [b"", b"{", b"[]", b"{}", b"\xff"])
-def test_a_damaged_file_is_made_anew(tmp_path: Path, content: bytes) -> None:
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", b"{}", b"\xff", b'{"made_from": "1", "result": 1}'])
+def test_a_damaged_file_is_made_anew_and_said(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "result.json").write_bytes(content)
-    assert [counted(Shelf(tmp_path), 1)[1] for _ in range(2)] == [1, 0]
+    with pytest.warns(DamagedResultWarning, match=r"result\.json: this kept result is damaged"):
+        assert counted(Shelf(tmp_path), 1)[1] == 1
+    assert counted(Shelf(tmp_path), 1)[1] == 0
+
+
+def test_every_flipped_bit_of_a_kept_file_is_noticed(tmp_path: Path) -> None:
+    expected = fingerprint(counted(Shelf(tmp_path), 1)[0])
+    path = tmp_path / "result.json"
+    intact = path.read_bytes()
+    rng = np.random.default_rng(5)
+    for place in rng.choice(8 * len(intact), 300, replace=False):
+        damaged = bytearray(intact)
+        damaged[place // 8] ^= 1 << (place % 8)
+        path.write_bytes(bytes(damaged))
+        with warnings.catch_warnings(record=True):
+            warnings.simplefilter("always")
+            result, made = counted(Shelf(tmp_path), 1)
+        assert made == 1, place
+        assert fingerprint(result) == expected
 
 
 def test_a_result_of_other_sources_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from hypothesis import given, settings, strategies as st
 from tribo.errors import TraceError
 from tribo.records import Trace
 from tribo.traces import RULES, read_pull, read_pulls, split_pulls
+from tribo.traces.pull import _gap_at as gap_at
 
 from .synthetic import Shape, with_samples
 
@@ -140,6 +143,39 @@ def test_a_gap_beside_the_peak_is_flagged_and_counted_in_its_uncertainty() -> No
     pull = read_pull(Trace("gap", trace.time_s[kept], trace.force_N[kept]))
     assert "gap_at_peak" in pull.flags
     assert abs(pull.static_N - 2.0) < 3 * pull.static_u_N
+
+
+@pytest.mark.parametrize(("apart", "listed"), [(5, 0), (6, 2)])
+def test_impulses_with_four_quiet_samples_between_them_are_impulses_and_closer_ones_are_a_swing(
+    apart: int, listed: int
+) -> None:
+    trace = SHAPE.trace()
+    spiked = with_samples(trace, {k: trace.force_N[k] + 0.5 for k in (500, 500 + apart)})
+    assert len(read_pull(spiked).problems) == listed
+
+
+@pytest.mark.parametrize(
+    ("spikes", "listed", "last"), [(20, 20, "left out"), (21, 21, "1 more spike"), (25, 21, "5 more")]
+)
+def test_twenty_impulses_are_listed_one_by_one_and_the_rest_is_counted(spikes: int, listed: int, last: str) -> None:
+    trace = SHAPE.trace()
+    at = [300 + 15 * k for k in range(spikes)]
+    problems = read_pull(with_samples(trace, {k: trace.force_N[k] + 5.0 for k in at})).problems
+    assert len(problems) == listed
+    assert last in str(problems[-1])
+    assert problems[-1].row == at[listed - 1] + 1
+    assert ("more" in str(problems[-1])) == (spikes > 20)
+
+
+@pytest.mark.parametrize(("step_s", "is_gap"), [(3.8, False), (3.9, True)])
+def test_a_gap_is_longer_than_three_mean_steps_of_the_record(step_s: float, is_gap: bool) -> None:
+    """Nine steps of a second and one of g: the mean is (9 + g)/10 s, three times that is g at 3.86 s."""
+    time = np.concatenate([np.arange(6.0), 5.0 + step_s + np.arange(5.0)])
+    motion: Any = SimpleNamespace(time_s=time)
+    assert gap_at(motion, 5.0 + step_s / 2) == is_gap
+    assert not gap_at(motion, 2.5)
+    assert not gap_at(motion, -1.0)
+    assert not gap_at(motion, 99.0)
 
 
 def test_a_sharp_apex_and_stick_slip_are_no_spikes() -> None:

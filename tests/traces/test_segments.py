@@ -12,7 +12,13 @@ from tribo.errors import TraceError
 from tribo.records import Trace
 from tribo.traces import orient_strokes, read_pulls, split_pulls
 from tribo.traces.segments import reversals, steps
-from tribo.traces.strokes import load_of, pieces_of, sampling_clip_N, sampling_rate_Hz
+from tribo.traces.strokes import (
+    _slides_at_once as slides_at_once,
+    load_of,
+    pieces_of,
+    sampling_clip_N,
+    sampling_rate_Hz,
+)
 
 from .synthetic import Shape
 
@@ -84,6 +90,19 @@ def test_strokes_of_both_directions_give_the_same_friction() -> None:
     assert {p.zero_N for p in pulls} == {pieces_of(reciprocating(zero=0.3)).zero_N}
     assert "forward" in pulls[0].flags
     assert "backward" in pulls[1].flags
+
+
+def test_a_stroke_without_a_static_peak_is_read_for_its_sliding_friction_and_a_faulty_one_is_refused() -> None:
+    record = reciprocating(zero=0.2)
+    third = (record.time_s >= 8.0) & (record.time_s < 12.0)
+    level = 1.2 + 0.01 * np.random.default_rng(9).standard_normal(record.time_s.size)
+    pulls = read_pulls(replace(record, force_N=np.where(third, level, record.force_N)))
+    assert [k for k, p in enumerate(pulls) if "no_static" in p.flags] == [2]
+    assert pulls[2].sliding_N == pytest.approx(1.0, rel=0.04)  # the reversal at its end is part of it
+    stuck = np.where(third & (record.time_s > 9.0) & (record.time_s < 11.0), record.force_N[920], record.force_N)
+    with pytest.raises(TraceError) as fault:
+        read_pulls(replace(record, force_N=stuck))
+    assert [p.kind for p in fault.value.problems] == ["stuck"]
 
 
 def test_strokes_all_one_way_have_no_zero() -> None:
@@ -164,3 +183,16 @@ def test_sampling_clip_is_half_the_rise_between_two_samples() -> None:
     assert sampling_clip_N(2.0, 50) == pytest.approx(0.02)
     lost = [Shape(rate_Hz=50, zero_s=2 + k / 5000).trace().force_N.max() for k in range(100)]
     assert 2.0 - np.mean(lost) < sampling_clip_N(2.0 / 1.5, 50) * 1.05
+
+
+@pytest.mark.parametrize(
+    ("climb", "swing", "at_once"),
+    [(0.0, 0.01, True), (0.15, 0.01, False), (0.15, 0.05, True), (1.2, 0.5, False)],
+)
+def test_a_piece_slides_at_once_where_it_climbs_little_for_the_swing_of_its_second_half(
+    climb: float, swing: float, at_once: bool
+) -> None:
+    """From 1 N to a top at 30 % of the piece; with a climb of 1.2 N it begins below half of its maximum."""
+    k = np.arange(400)
+    force = 1.0 + climb * np.exp(-(((k - 120) / 30) ** 2)) + swing * np.where(k % 40 < 20, 1.0, -1.0) * (k >= 200)
+    assert slides_at_once(Trace("piece", k / RATE, force)) == at_once

@@ -8,29 +8,65 @@ import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
+from urllib.parse import quote
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from tribo.errors import Problem
+from tribo.errors import Problem, system_problem
+from tribo.escaping import is_control
+from tribo.input_files import nests_too_deeply, read_input
+from tribo.limits import DEEPEST_NESTING, LARGEST_DESCRIPTION_BYTES, LARGEST_NUMBER, LONGEST_NAME, SMALLEST_NUMBER
 from tribo.quantities import QUANTITIES, quantity_named
+from tribo.zeroing import zero_choice
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+def _on_one_line(text: str) -> str:
+    if any(map(is_control, text)):
+        raise ValueError("must not contain control characters or line breaks")
+    return text
+
+
+def _measurable(value: float) -> float:
+    if 0 < value < SMALLEST_NUMBER:
+        raise ValueError(f"must be 0, or {SMALLEST_NUMBER:g} or more")
+    return value
+
+
+def _fit_for_a_file_name(name: str) -> str:
+    if len(quote(name, safe="")) > LONGEST_NAME:
+        raise ValueError(f"must not be longer than {LONGEST_NAME} bytes in the encoding of addresses")
+    return name
+
+
+Positive = Annotated[float, Field(gt=0, le=LARGEST_NUMBER, allow_inf_nan=False), AfterValidator(_measurable)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST_NUMBER, allow_inf_nan=False), AfterValidator(_measurable)]
+Line = Annotated[str, AfterValidator(_on_one_line)]
+Name = Annotated[Line, AfterValidator(_fit_for_a_file_name)]
 
 
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
+def _a_zero(given: str | float | list[float]) -> str | float | list[float]:
+    zero_choice(given)
+    return given
+
+
+Zero = Annotated[str | float | list[float], AfterValidator(_a_zero)]
+
+
 class CampaignTable(_Strict):
     """[campaign]: properties of the whole campaign."""
 
-    title: str
-    material: str = ""
-    counterface: str = ""
+    title: Line
+    material: Line = ""
+    counterface: Line = ""
     nominal_area_mm2: Positive
     slider_mass_g: NotNegative = 0.0
     pull_speed_mm_s: Positive | None = None
+    zero: Zero = ""
+    load_zero: Zero = ""
 
 
 class PatternTable(_Strict):
@@ -107,7 +143,7 @@ class CampaignFile(_Strict):
     """The whole of campaign.toml."""
 
     campaign: CampaignTable
-    patterns: Annotated[dict[str, PatternTable], Field(min_length=1)]
+    patterns: Annotated[dict[Name, PatternTable], Field(min_length=1)]
     columns: Annotated[dict[str, str], AfterValidator(_only_quantities)] = {}
     instrument: InstrumentTable = InstrumentTable()
 
@@ -120,11 +156,19 @@ def _pair(value: float | list[float] | None) -> tuple[float, float] | None:
 
 def read_description(path: Path, file: str, problems: list[Problem]) -> CampaignFile | None:
     """campaign.toml as checked tables; None where it cannot be used; every fault goes to ``problems``."""
+    deep = Problem("too_deep", "tables and arrays nested too deeply", file, allowed=f"at most {DEEPEST_NESTING} levels")
     try:
-        text = path.read_bytes().decode("utf-8-sig")
-        return CampaignFile.model_validate(tomllib.loads(text))
+        text = read_input(path, LARGEST_DESCRIPTION_BYTES).decode("utf-8-sig")
+        table = tomllib.loads(text)
+        if not nests_too_deeply(table):
+            return CampaignFile.model_validate(table)
+        problems.append(deep)
     except FileNotFoundError:
         problems.append(Problem("missing_file", f"a campaign must contain {file}", file=file))
+    except OSError as why:
+        problems.append(system_problem(why, file))
+    except RecursionError:
+        problems.append(deep)
     except UnicodeDecodeError as why:
         row = why.object[: why.start].count(b"\n") + 1
         problems.append(Problem("not_utf8", "TOML files must be encoded in UTF-8", file=file, row=row))
@@ -133,7 +177,9 @@ def read_description(path: Path, file: str, problems: list[Problem]) -> Campaign
         row = int(row_said.group(1)) if row_said else text.count("\n") + 1
         problems.append(Problem("not_toml", f"not valid TOML: {why}", file=file, row=row))
     except ValidationError as why:
-        problems.extend(_problem(error, text, file) for error in why.errors())
+        problems.extend(_problem(error, text, file) for error in why.errors(include_url=False))
+    except ValueError as why:  # a whole number of more digits than Python converts
+        problems.append(Problem("not_toml", f"not valid TOML: {why}", file=file))
     return None
 
 
@@ -159,7 +205,7 @@ def _is_branch(part: object) -> bool:
 
 
 def _shown(value: object) -> str | None:
-    return None if isinstance(value, dict) else str(value)
+    return None if isinstance(value, dict) else str(value)[:200]
 
 
 def _allowed_keys(path: Sequence[str]) -> list[str]:

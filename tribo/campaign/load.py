@@ -6,13 +6,20 @@ import difflib
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 from tribo.campaign.choice import overlap, split_choice
+from tribo.campaign.dates import ALLOWED as ALLOWED_DATES, order_of, parsed
 from tribo.campaign.described import CampaignFile, PatternTable, read_description
-from tribo.campaign.table import COUNTS, KNOWN, LOADS, NUMBERS, TestRow, read_tests_table
-from tribo.errors import CampaignError, Problem
+from tribo.campaign.numbers import load_faults, number, number_faults
+from tribo.campaign.table import COUNTS, KNOWN, NUMBERS, ZEROS, TestRow, read_tests_table
+from tribo.errors import CampaignError, Problem, unexpected
+from tribo.escaping import well_formed
+from tribo.input_files import hashes_of_reads
+from tribo.links import LEADS_OUT, leads_out, paths_below
 from tribo.records import STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
+from tribo.zeroing import ALLOWED, zero_choice
 
 _NOT_WORTH_A_NOTE = (".", "~$", "Thumbs.db")
 TOML = "campaign.toml"
@@ -38,12 +45,15 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     ------
     CampaignError
         campaign.toml is wrong, a required column is missing, or no test is usable; with the errors of both
-        files.
+        files. Or one of the two files, or raw/, is a link that leads out of the folder.
     """
     root = Path(folder)
-    problems: list[Problem] = []
-    described = read_description(root / TOML, TOML, problems)
-    rows = read_tests_table(root / TESTS, TESTS, problems)
+    problems = [Problem("link", LEADS_OUT, file=name) for name in (TOML, TESTS, RAW) if leads_out(root, root / name)]
+    if problems:
+        raise CampaignError(problems)
+    with hashes_of_reads() as hashes:
+        described = read_description(root / TOML, TOML, problems)
+        rows = read_tests_table(root / TESTS, TESTS, problems)
     if described is None or rows is None:
         raise CampaignError(problems)
     patterns = {name: pattern_of_table(name, table) for name, table in described.patterns.items()}
@@ -54,8 +64,15 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
         raise CampaignError([*problems, nothing])
     problems += _unlisted(root, rows)
     problems += [note for row in usable if (note := _loads_disagree(row, described))]
-    tests = tuple(_test(row, described) for row in usable)
-    return _campaign(root, described, patterns, tests, set_aside, problems)
+    order = _date_order(rows)
+    tests = tuple(_test(row, described, order) for row in usable)
+    campaign = _campaign(root, described, patterns, tests, set_aside, problems)
+    return replace(campaign, inputs={Path(path).name: digest for path, digest in hashes.items()})
+
+
+def _date_order(rows: Sequence[TestRow]) -> str:
+    """Order of day and month that the column started_at settles as a whole."""
+    return order_of(row.cells.get("started_at", "") for row in rows)
 
 
 def _campaign(
@@ -83,6 +100,8 @@ def _campaign(
         problems=tuple(problems),
         columns=described.columns,
         instrument=described.instrument.model_dump(exclude_none=True),
+        zero=zero_choice(general.zero),
+        load_zero=zero_choice(general.load_zero),
     )
 
 
@@ -118,11 +137,12 @@ def _sort_rows(
         path, choice = _export_of(row)
         users.setdefault(path, []).append((row.test_id, choice))
     usable, set_aside = [], []
+    order = _date_order(rows)
     for row in rows:
         test_id = row.test_id
         if row.row != places[test_id][0]:
             continue
-        problems = _row_faults(root, row, patterns, measured)
+        problems = _row_faults(root, row, patterns, measured) + _date_faults(row, order)
         if len(places[test_id]) > 1:
             problems.append(_duplicate(test_id, places[test_id]))
         path, choice = _export_of(row)
@@ -159,7 +179,8 @@ def _row_faults(root: Path, row: TestRow, patterns: Mapping[str, Pattern], measu
     if not row.cells["test_id"]:
         problems.append(Problem("no_test_id", "test_id is missing", TESTS, row.row, "test_id"))
     problems += _sample_faults(row, patterns)
-    problems += _number_faults(row, load_in_export=measured and bool(_export_of(row)[1]))
+    problems += number_faults(row, TESTS) + _zero_faults(row)
+    problems += load_faults(row, TESTS, load_in_export=measured and bool(_export_of(row)[1]))
     problems += [p for p in _file_faults(root, row) if measured or p.kind != "missing"]
     return problems
 
@@ -174,54 +195,25 @@ def _sample_faults(row: TestRow, patterns: Mapping[str, Pattern]) -> list[Proble
     return [Problem("unknown_sample", "no pattern has this name", TESTS, row.row, "sample", sample, allowed)]
 
 
-def _number(row: TestRow, column: str) -> float | None:
-    """A cell as a number; None where it is empty. ValueError where it is none."""
-    cell = row.cells.get(column, "")
-    if not cell:
-        return None
-    if "_" in cell:
-        raise ValueError(cell)
-    value = float(cell.replace(",", ".") if row.decimal_comma and "." not in cell else cell)
-    if not math.isfinite(value):
-        raise ValueError(cell)
-    return value
-
-
-def _number_faults(row: TestRow, load_in_export: bool) -> list[Problem]:
-    problems, loads, at = [], [], (TESTS, row.row)
-    for column in (*NUMBERS, *COUNTS):
+def _zero_faults(row: TestRow) -> list[Problem]:
+    problems = []
+    for column in ZEROS:
         cell = row.cells.get(column, "")
         try:
-            value = _number(row, column)
+            zero_choice(cell)
         except ValueError:
-            kind = "load_not_a_number" if column in LOADS else "not_a_number"
-            problems.append(Problem(kind, "not a number", *at, column, cell, "a number"))
-            continue
-        if column in LOADS and value is not None:
-            loads.append((column, value))
-        if column in COUNTS and value is not None and value != int(value):
-            problems.append(Problem("not_a_number", "not a whole number", *at, column, cell, "1, 2, ..."))
-        if column in ("speed_mm_s", "hold_s") and value is not None and value < 0:
-            problems.append(Problem("negative", "must not be negative", *at, column, cell, "0 or more"))
-    return problems + _load_faults(row, dict(loads), load_in_export)
+            problems.append(Problem("unknown_zero", "not a zero", TESTS, row.row, column, cell, ALLOWED))
+    return problems
 
 
-def _load_faults(row: TestRow, loads: Mapping[str, float], load_in_export: bool) -> list[Problem]:
-    """normal_load_N must be positive; a sled may carry no mass of its own, but none may be negative.
-
-    A row that names a table or pulls within its export may leave the load to the normal force recorded there.
-    """
-    at = (TESTS, row.row)
-    if not loads and not any(row.cells.get(column) for column in LOADS):
-        if load_in_export:
-            return []
-        return [Problem("no_load", "the load is missing", *at, " or ".join(LOADS), None, "mass_g or normal_load_N")]
-    if loads.get("normal_load_N", 1.0) <= 0:
-        found, what = row.cells["normal_load_N"], "a load must be positive"
-        return [Problem("load_not_positive", what, *at, "normal_load_N", found, "more than 0 N")]
-    if "normal_load_N" not in loads and loads.get("mass_g", 1.0) < 0:
-        found, what = row.cells["mass_g"], "a mass must not be negative"
-        return [Problem("load_not_positive", what, *at, "mass_g", found, "0 g or more")]
+def _date_faults(row: TestRow, order: str) -> list[Problem]:
+    cell = row.cells.get("started_at", "")
+    if not cell or row.fault is not None:
+        return []
+    try:
+        parsed(cell, order)
+    except ValueError as why:
+        return [Problem("not_a_date", str(why), TESTS, row.row, "started_at", cell, ALLOWED_DATES)]
     return []
 
 
@@ -229,13 +221,18 @@ def _file_faults(root: Path, row: TestRow) -> list[Problem]:
     name = row.cells["file"]
     place = (TESTS, row.row, "file", name)
     path = _relative(name)
-    if path is None or not (root / path).resolve().is_relative_to(root.resolve()):  # links are followed
-        what = "the path leads outside the campaign"
-        return [Problem("path_outside_campaign", what, *place, "a path inside the campaign folder")]
-    if (root / path).is_file():
-        return []
-    folder = (root / path).parent
-    beside = [p.name for p in folder.iterdir()] if folder.is_dir() else []
+    try:
+        if path is None or leads_out(root, root / path):
+            what = "the path leads outside the campaign"
+            return [Problem("path_outside_campaign", what, *place, "a path inside the campaign folder")]
+        if (root / path).is_file():
+            return []
+        if (root / path).exists() and name:
+            return [Problem("not_a_file", "not a regular file", *place, "a file of the campaign")]
+        folder = (root / path).parent
+        beside = [p.name for p in folder.iterdir()] if folder.is_dir() else []
+    except (OSError, ValueError, RuntimeError) as why:  # too long, no permission, links in a circle
+        return [replace(unexpected(why, "this path cannot be followed"), file=TESTS, row=row.row, column="file")]
     near = [n for n in beside if n.lower() == path.name.lower()]
     near = near or difflib.get_close_matches(path.name, beside, 1, 0.9)
     hint = f"a file of the campaign{f'; did you mean {near[0]}?' if near else ''}"
@@ -250,11 +247,11 @@ def _relative(name: str) -> PurePosixPath | None:
     return path
 
 
-def _test(row: TestRow, described: CampaignFile) -> Test:
+def _test(row: TestRow, described: CampaignFile, order: str) -> Test:
     """A row without faults as a Test. N = normal_load_N, or (mass + slider mass) g; NaN where the export tells it."""
     cells = row.cells
-    numbers = {column: _number(row, column) for column in NUMBERS}
-    counts = {c: None if (v := _number(row, c)) is None else int(v) for c in COUNTS}
+    numbers = {column: number(row, column) for column in NUMBERS}
+    counts = {c: None if (v := number(row, c)) is None else int(v) for c in COUNTS}
     speed = numbers["speed_mm_s"] if numbers["speed_mm_s"] is not None else described.campaign.pull_speed_mm_s
     load = numbers["normal_load_N"]
     if load is None and numbers["mass_g"] is None:
@@ -275,18 +272,21 @@ def _test(row: TestRow, described: CampaignFile) -> Test:
         repeat=counts["repeat"],
         run_order=counts["run_order"],
         specimen_run=counts["specimen_run"],
-        started_at=cells.get("started_at", ""),
+        started_at=parsed(cells["started_at"], order) if cells.get("started_at") else "",
         temperature_C=numbers["temperature_C"],
         humidity_pct=numbers["humidity_pct"],
         operator=cells.get("operator", ""),
         covariates={name: cell for name, cell in cells.items() if name and name not in KNOWN},
         row=row.row,
+        zero=zero_choice(cells.get("zero") or described.campaign.zero),
+        load_zero=zero_choice(cells.get("load_zero") or described.campaign.load_zero),
+        stiffness_N_per_m=numbers["stiffness_N_per_m"] or described.instrument.stiffness_N_per_m,
     )
 
 
 def _loads_disagree(row: TestRow, described: CampaignFile) -> Problem | None:
     """A note where both loads are given and are not the same; normal_load_N is used."""
-    mass, load = _number(row, "mass_g"), _number(row, "normal_load_N")
+    mass, load = number(row, "mass_g"), number(row, "normal_load_N")
     if mass is None or load is None:
         return None
     weight = (mass + described.campaign.slider_mass_g) * _GRAM * STANDARD_GRAVITY
@@ -301,18 +301,26 @@ def _unlisted(root: Path, rows: Sequence[TestRow]) -> list[Problem]:
     """Notes on files of raw/ that no row names."""
     named = {str(_relative(row.cells.get("file", ""))) for row in rows}
     notes = []
-    for path in sorted((root / RAW).rglob("*")) if (root / RAW).is_dir() else []:
+    for path, outward in paths_below(root, RAW):
         name = path.relative_to(root).as_posix()
-        if not path.is_file() or name in named or path.name.startswith(_NOT_WORTH_A_NOTE):
+        if outward:
+            if name not in named:
+                notes.append(Problem("link", LEADS_OUT, file=well_formed(name)))
+            continue
+        if name in named or path.name.startswith(_NOT_WORTH_A_NOTE) or not path.is_file():
             continue
         if _holds_numbers(path):
-            notes.append(Problem("not_listed", f"not listed in {TESTS}; this export is not read", file=name))
+            note = Problem("not_listed", f"not listed in {TESTS}; this export is not read", file=well_formed(name))
         else:
             what = f"not an export and not listed in {TESTS}; it is not read"
-            notes.append(Problem("not_an_export_and_not_listed", what, file=name))
+            note = Problem("not_an_export_and_not_listed", what, file=well_formed(name))
+        notes.append(note)
     return notes
 
 
 def _holds_numbers(path: Path) -> bool:
-    with path.open("rb") as stream:
-        return len(_NUMBER_ROW.findall(stream.read(8000))) > 2
+    try:
+        with path.open("rb") as stream:
+            return len(_NUMBER_ROW.findall(stream.read(8000))) > 2
+    except OSError:
+        return False

@@ -9,14 +9,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from tribo.errors import Problem
+from tribo.errors import CampaignError, Problem, system_problem
+from tribo.escaping import is_control
+from tribo.input_files import read_input
+from tribo.limits import LARGEST_TABLE_BYTES, LONGEST_CELL, MOST_COLUMNS, MOST_TABLE_ROWS
 
 REQUIRED = ("test_id", "file", "sample")
 LOADS = ("mass_g", "normal_load_N")
-NUMBERS = ("mass_g", "normal_load_N", "speed_mm_s", "hold_s", "temperature_C", "humidity_pct")
+NUMBERS = (
+    "mass_g", "normal_load_N", "speed_mm_s", "hold_s", "temperature_C", "humidity_pct", "stiffness_N_per_m",
+)  # fmt: skip
 COUNTS = ("repeat", "run_order", "specimen_run")
 TEXTS = ("specimen", "direction", "started_at", "operator", "exclude")
-KNOWN = (*REQUIRED, *NUMBERS, *COUNTS, *TEXTS)
+ZEROS = ("zero", "load_zero")
+NAMES = ("test_id", "file", "sample", "specimen", "direction", "operator")  # on one line, without control characters
+KNOWN = (*REQUIRED, *NUMBERS, *COUNTS, *TEXTS, *ZEROS)
 
 
 @dataclass(frozen=True)
@@ -51,6 +58,12 @@ def read_tests_table(path: Path, file: str, problems: list[Problem]) -> list[Tes
     except FileNotFoundError:
         problems.append(Problem("missing_file", f"a campaign must contain {file}", file=file))
         return None
+    except OSError as why:
+        problems.append(system_problem(why, file))
+        return None
+    except CampaignError as why:
+        problems.extend(why.problems)
+        return None
     if table is None:
         problems.append(Problem("empty", "the file has neither a header nor tests", file=file))
         return None
@@ -62,9 +75,14 @@ def read_tests_table(path: Path, file: str, problems: list[Problem]) -> list[Tes
 def read_table(path: Path, file: str) -> Table | None:
     """A delimited table of any encoding and delimiter; None where there is not even a header.
 
-    Raises FileNotFoundError.
+    Raises
+    ------
+    OSError
+        The file is missing, no regular file, too large, or cannot be read.
+    CampaignError
+        The table has too many rows or columns, or a cell is too long to be one.
     """
-    text = _decoded(path.read_bytes())
+    text = _decoded(read_input(path, LARGEST_TABLE_BYTES))
     lines = text.splitlines()
     first = next((k for k, line in enumerate(lines) if line.strip()), None)
     if first is None:
@@ -73,15 +91,34 @@ def read_table(path: Path, file: str) -> Table | None:
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
     names: list[str] = []
     header_row, rows = 0, []
-    for cells in reader:
-        stripped = [cell.strip() for cell in cells]
-        if not any(stripped):
-            continue
-        if not names:
-            names, header_row = stripped, reader.line_num
-            continue
-        rows.append(_row(stripped, names, reader.line_num, delimiter, file))
+    try:
+        for cells in reader:
+            stripped = [cell.strip() for cell in cells]
+            if not any(stripped):
+                continue
+            if not names:
+                names, header_row = stripped, reader.line_num
+                _check_size("too_many_columns", len(names), MOST_COLUMNS, "columns", file)
+                continue
+            rows.append(_row(stripped, names, reader.line_num, delimiter, file))
+            _check_size("too_many_rows", len(rows), MOST_TABLE_ROWS, "rows", file)
+    except csv.Error as why:
+        raise CampaignError(_unreadable_cell(why, file, reader.line_num)) from why
     return Table(tuple(names), header_row, tuple(rows))
+
+
+def _check_size(kind: str, found: int, most: int, what: str, file: str) -> None:
+    if found > most:
+        allowed = f"at most {most}"
+        raise CampaignError(Problem(kind, f"too many {what}", file, found=f"{found} or more", allowed=allowed))
+
+
+def _unreadable_cell(why: csv.Error, file: str, row: int) -> Problem:
+    """A cell beyond the limit of the csv module, usually behind a quotation mark that is not closed."""
+    if "field limit" not in str(why):
+        return Problem("not_a_table", f"not a readable table ({why})", file, row)
+    what = "a cell is too long; a quotation mark before it may not be closed"
+    return Problem("cell_too_long", what, file, row, allowed=f"at most {LONGEST_CELL} characters")
 
 
 def _decoded(raw: bytes) -> str:
@@ -100,7 +137,32 @@ def _row(cells: list[str], names: list[str], row: int, delimiter: str, file: str
     if len(cells) != len(names):
         what = f"{len(cells)} cells under {len(names)} column names"
         fault = Problem("wrong_number_of_cells", what, file, row, found=delimiter.join(cells)[:80])
-    return TestRow(row, dict(zip(names, cells, strict=False)), delimiter != ",", fault)
+    given = dict(zip(names, cells, strict=False))
+    fault = fault or next((f for name, cell in given.items() if (f := _cell_fault(name, cell, file, row))), None)
+    fault = fault or _swallowed(given, delimiter, file, row)
+    return TestRow(row, given, delimiter != ",", fault)
+
+
+def _cell_fault(name: str, cell: str, file: str, row: int) -> Problem | None:
+    """Why a cell cannot be what it is for: longer than any, or a name that a terminal would obey."""
+    if len(cell) > LONGEST_CELL:
+        found, allowed = f"{len(cell)} characters", f"at most {LONGEST_CELL} characters"
+        return Problem("cell_too_long", "this cell is too long", file, row, name, found, allowed)
+    if "\0" in cell or (name in NAMES and any(map(is_control, cell))):
+        what = "this cell contains a control character or a line break"
+        return Problem("control_character", what, file, row, name, cell[:80], "text on one line")
+    return None
+
+
+def _swallowed(cells: Mapping[str, str], delimiter: str, file: str, row: int) -> Problem | None:
+    """A cell that holds what looks like further rows, behind a quotation mark that is not closed."""
+    enough = max(2, (len(cells) - 1) // 2)
+    for name, cell in cells.items():
+        inside = cell.split("\n")[1:]
+        if any(line.count(delimiter) >= enough for line in inside):
+            what = f"this cell contains {len(inside)} further lines of the table; a quotation mark is not closed"
+            return Problem("quote_not_closed", what, file, row, name, cell[:80], "one test per line")
+    return None
 
 
 def _header_faults(names: list[str], file: str, row: int) -> list[Problem]:

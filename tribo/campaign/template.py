@@ -17,6 +17,8 @@ counterface = "polycarbonate"
 nominal_area_mm2 = 55.0   # area of the sample face, including cavities
 slider_mass_g = 1.5       # mass of sled and sample, without the added mass
 pull_speed_mm_s = 0.2     # used for tests without speed_mm_s in tests.csv
+# zero = "none"           # of the force: "before contact", "at rest", "none", a number of newtons, or [from, to] in s
+# load_zero = "none"      # of the recorded normal load, in the same form
 
 # Patterns, one table each. cavity is "none", "circle" (with diameter_um), "square" or "rectangle" (with size_um);
 # all but "none" also need pitch_um. Sizes and pitches are one number or [x, y], in micrometres.

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tribo.cli.console import DONE, SOME_SET_ASIDE, Console, command_options
+from tribo.cli.output import FOLDER, FORCE
 
 if TYPE_CHECKING:
     from tribo.pipeline.build import Built
 
-BUSY = 75  # EX_TEMPFAIL of sysexits.h: nothing is wrong, try again later
 DROP = click.argument("drop", type=click.Path(exists=True, file_okay=False, path_type=Path))
-FOLDER = click.Path(file_okay=False, path_type=Path)
 SITE = click.option("-o", "--site", type=FOLDER, required=True, help="Folder of the site.")
 KEEP = click.option(
     "--keep", type=click.IntRange(min=1), default=10, show_default=True, help="Number of dated builds to keep."
@@ -41,6 +40,7 @@ KEEP = click.option(
 @click.option(
     "--wait", "wait_s", default=0.0, show_default=True, help="Seconds to wait if another build of the site is running."
 )
+@FORCE
 @KEEP
 @click.option(
     "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
@@ -58,13 +58,8 @@ def build(console: Console, drop: Path, site: Path, dry_run: bool, **options: An
     another build of the site is running.
     """
     from tribo.pipeline.build import BuildOptions, build_site
-    from tribo.store.lock import SiteBusyError
 
-    try:
-        built = build_site(drop, site, BuildOptions(**options), dry_run=dry_run)
-    except SiteBusyError as why:
-        console.say(str(why), level=-1)
-        return BUSY
+    built = build_site(drop, site, BuildOptions(**options), dry_run=dry_run)
     console.result(built.as_dict(), _words(built, dry_run))
     unusable = any(status == "unusable" for status in built.status.values())
     return SOME_SET_ASIDE if unusable or built.waiting else DONE

@@ -11,6 +11,7 @@ import click
 from tribo import __version__
 from tribo.cli.build_commands import build, schedule
 from tribo.cli.console import Console, command_options, set_aside_record, status_of
+from tribo.cli.output import Output, output_options
 from tribo.cli.simulate_command import simulate
 
 if TYPE_CHECKING:
@@ -21,9 +22,7 @@ if TYPE_CHECKING:
     from tribo.stages import Progress, StudyOptions, Until
 
 CAMPAIGN = click.argument("campaign", type=click.Path(exists=True, path_type=Path))
-FOLDER = click.Path(file_okay=False, path_type=Path)
-OUT = click.option("-o", "--out", type=FOLDER, required=True, help="Output folder.")
-KEPT = "kept"  # folder of OUT with finished simulations and the like, for the next start
+OUT = output_options()
 SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler; its workers run the simulations.")
 DRY_RUN = click.option("--dry-run", is_flag=True, help="List the steps without running them.")
 
@@ -40,6 +39,32 @@ FLAT = click.option(
     help="Flat sample on which the model is calibrated. [default: F, or the only flat sample]",
 )  # fmt: skip
 
+def _a_zero(context: click.Context, parameter: click.Parameter, given: str) -> str:
+    """The text of a zero as given, checked.
+
+    Raises click.BadParameter.
+    """
+    from tribo.zeroing import zero_choice
+
+    try:
+        zero_choice(given)
+    except ValueError as why:
+        raise click.BadParameter(str(why)) from None
+    return given
+
+
+ZEROS = (
+    click.option(
+        "--zero", default="", metavar="ZERO", callback=_a_zero,
+        help='Zero of the force for tests without their own: "before contact", "at rest", "none", a number of newtons, '
+        "or [from, to] in seconds.",
+    ),
+    click.option(
+        "--load-zero", default="", metavar="ZERO", callback=_a_zero,
+        help="Zero of the recorded normal load, in the same form.",
+    ),
+)  # fmt: skip
+
 OVERRIDES = click.option(
     "--overrides",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
@@ -50,6 +75,7 @@ OVERRIDES = click.option(
 def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         COLUMNS,
+        *ZEROS,
         OVERRIDES,
         click.option(
             "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
@@ -116,7 +142,7 @@ def init(console: Console, folder: Path, **_: Any) -> None:
 @DRY_RUN
 @_fit_options
 @command_options
-def ingest(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
+def ingest(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
     """Read the exports of CAMPAIGN.
 
     Determines the static peak and the mean sliding force of each pull. Writes tests.csv and campaign.nc.
@@ -130,7 +156,7 @@ def ingest(console: Console, campaign: Path, out: Path, dry_run: bool, **options
 @DRY_RUN
 @_fit_options
 @command_options
-def fit(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
+def fit(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
     """Fit mu and tau0 of every sample.
 
     Writes fits.csv, with the uncertainties of both parameters, in addition to the files of tribo ingest.
@@ -150,7 +176,7 @@ def fit(console: Console, campaign: Path, out: Path, dry_run: bool, **options: A
 @_fit_options
 @_model_options
 @command_options
-def predict(console: Console, campaign: Path, out: Path, only: str, columns: str, **options: Any) -> int:
+def predict(console: Console, campaign: Path, out: Output, only: str, columns: str, **options: Any) -> int:
     """Run the simulations of CAMPAIGN only.
 
     Calibrates the model on the flat sample, runs it for every sample and stores the results in OUT/kept, where
@@ -159,13 +185,17 @@ def predict(console: Console, campaign: Path, out: Path, only: str, columns: str
     from tribo import stages
     from tribo.campaign import open_campaign
 
-    chosen = stages.StudyOptions(kept=out / KEPT, **options)
-    with open_campaign(campaign) as described, console.progress() as progress:
+    chosen = stages.StudyOptions(kept=out.kept, **options)
+    with (
+        out.taken(campaign, shared=True),
+        open_campaign(campaign) as described,
+        console.progress() as progress,
+    ):
         ingested = stages.study(_with_columns(described, columns), chosen, until="ingest", progress=progress).ingested
         cells = stages.simulate_cells(ingested, stages.fit(ingested, weights=chosen.weights), chosen, only, progress)
     names = [cell.name for cell in cells]
     console.result(
-        {"out": str(out), "cells": names}, f"model calibrated; simulations run: {', '.join(names) or 'none'}"
+        {"out": str(out.path), "cells": names}, f"model calibrated; simulations run: {', '.join(names) or 'none'}"
     )
     return status_of(ingested.set_aside)
 
@@ -177,7 +207,7 @@ def predict(console: Console, campaign: Path, out: Path, only: str, columns: str
 @_fit_options
 @_model_options
 @command_options
-def compare(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
+def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
     """Compare the measurements with the model.
 
     The model is calibrated on the flat sample alone. Writes comparison.csv and the figures in addition to the files
@@ -195,10 +225,12 @@ def compare(console: Console, campaign: Path, out: Path, dry_run: bool, **option
 )
 @FLAT
 @COLUMNS
+@ZEROS[0]
+@ZEROS[1]
 @OVERRIDES
 @command_options
 def diagnose(
-    console: Console, campaign: Path | None, out: Path, published: str | None, columns: str, **options: Any
+    console: Console, campaign: Path | None, out: Output, published: str | None, columns: str, **options: Any
 ) -> int:
     """Find where the model fails, and the likely cause.
 
@@ -216,19 +248,19 @@ def diagnose(
     from tribo.report.words.verdict_text import verdict_text
     from tribo.store.kept_results import Shelf
 
-    with open_campaign(campaign) as opened, console.progress() as progress:
-        chosen = stages.StudyOptions(kept=out / KEPT, **options)
+    with out.taken(campaign), open_campaign(campaign) as opened, console.progress() as progress:
+        chosen = stages.StudyOptions(kept=out.kept, **options)
         study = stages.study(_with_columns(opened, columns), chosen, until="ingest", progress=progress)
         found = _diagnosis(study, chosen, progress)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
-        write_until(study, out, "ingest", drawing, _provenance(study, campaign, chosen), found)
+        write_until(study, out.path, "ingest", drawing, _provenance(study, campaign, chosen), found)
     verdict = found.verdict
     console.result(verdict.as_dict(), verdict_text(verdict))
     console.list_tests("set aside", study.ingested.set_aside, level=-1)
     return status_of(study.ingested.set_aside)
 
 
-def _diagnose_published(console: Console, out: Path, seed: int) -> int:
+def _diagnose_published(console: Console, out: Output, seed: int) -> int:
     """The verdict on Table 2 of Berardo et al. (2019), for every interpretation of what it leaves open."""
     from tribo.diagnose.from_table.published_diagnosis import diagnose_published
     from tribo.published import BERARDO2019, data_dir, load_table2, load_table2_simulated_anew
@@ -236,10 +268,10 @@ def _diagnose_published(console: Console, out: Path, seed: int) -> int:
     from tribo.report.table_report import write_published
     from tribo.report.words.verdict_text import verdict_text
 
-    with console.progress() as progress:
+    folder, tables = data_dir() / BERARDO2019, ("table2.csv", "table2_tribo.csv")
+    with out.taken(folder), console.progress() as progress:
         found = diagnose_published(load_table2(), load_table2_simulated_anew(), seed=seed, progress=progress)
-        folder, tables = data_dir() / BERARDO2019, ("table2.csv", "table2_tribo.csv")
-        write_published(found, out, provenance_of_table(folder, tables, _command_line(), seed, _now()))
+        write_published(found, out.path, provenance_of_table(folder, tables, _command_line(), seed, _now()))
     console.result(found.verdict.as_dict(), verdict_text(found.verdict))
     return 0
 
@@ -251,7 +283,7 @@ def _diagnose_published(console: Console, out: Path, seed: int) -> int:
 @_fit_options
 @_model_options
 @command_options
-def report(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
+def report(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
     """Run every stage and write the report.
 
     Runs ingest, fit, compare and diagnose on CAMPAIGN. Writes their files, report.html, report.pdf and
@@ -301,16 +333,16 @@ def plan(console: Console, campaign: Path, **_: Any) -> None:
 
 
 @main.command()
-@click.option("-o", "--out", type=FOLDER, default="out/demo", show_default=True, help="Output folder.")
+@output_options("out/demo")
 @_fit_options
 @_model_options
 @command_options
-def demo(console: Console, out: Path, **options: Any) -> int:
+def demo(console: Console, out: Output, **options: Any) -> int:
     """Write the report on the bundled example."""
     from tribo.published import data_dir
 
     status = _walk(console, data_dir() / "example", out, "report", False, **options)
-    console.say(f"open {out / 'report.html'}")
+    console.say(f"open {out.path / 'report.html'}")
     return status
 
 
@@ -370,7 +402,7 @@ def doctor(console: Console, **_: Any) -> int:
     return 0 if found["healthy"] else 1
 
 
-def _walk(console: Console, path: Path, out: Path, until: Until, dry_run: bool, columns: str, **options: Any) -> int:
+def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool, columns: str, **options: Any) -> int:
     """Run the stages up to ``until`` on one campaign and write their results."""
     from tribo import stages
     from tribo.campaign import open_campaign
@@ -378,20 +410,19 @@ def _walk(console: Console, path: Path, out: Path, until: Until, dry_run: bool, 
     from tribo.report.drawings import Drawing
     from tribo.store.kept_results import Shelf
 
-    chosen = stages.StudyOptions(kept=out / KEPT, **options)
-    with open_campaign(path) as described:
-        campaign = _with_columns(described, columns)
-        if dry_run:
-            planned = stages.plan(campaign, chosen, until)
-            console.result(planned, _plan_text(planned, out))
-            return status_of(campaign.set_aside)
-        with console.progress() as progress:
-            study = stages.study(campaign, chosen, until=until, progress=progress)
-            study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
-            provenance = _provenance(study, path, chosen)
-            drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
-            write_until(study, out, until, drawing, provenance, found)
-    return _conclude(console, study, out, found.verdict if found else None)
+    chosen = stages.StudyOptions(kept=out.kept, **options)
+    if dry_run:
+        out.check(path)
+        with open_campaign(path) as described:
+            planned = stages.plan(_with_columns(described, columns), chosen, until)
+            console.result(planned, _plan_text(planned, out.path))
+            return status_of(described.set_aside)
+    with out.taken(path), open_campaign(path) as described, console.progress() as progress:
+        study = stages.study(_with_columns(described, columns), chosen, until=until, progress=progress)
+        study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
+        drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
+        write_until(study, out.path, until, drawing, _provenance(study, path, chosen), found)
+    return _conclude(console, study, out.path, found.verdict if found else None)
 
 
 def _provenance(study: Study, campaign: Path, chosen: StudyOptions) -> Provenance:
@@ -422,12 +453,17 @@ def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[
     """The diagnosis of a study; a note instead where there is too little to diagnose."""
     from dataclasses import replace
 
-    from tribo.errors import FitError
+    from tribo.errors import FitError, TriboError, unexpected
 
     try:
         return study, _diagnosis(study, chosen, progress)
     except FitError as why:
         return replace(study, notes=(*study.notes, f"no diagnosis: {why}")), None
+    except (TriboError, OSError):
+        raise
+    except Exception as why:  # the other results stand without it
+        problem = unexpected(why, "the diagnosis stopped")
+        return replace(study, notes=(*study.notes, f"no diagnosis: {problem}")), None
 
 
 def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis:

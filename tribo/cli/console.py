@@ -18,10 +18,15 @@ from typing import Any
 
 import click
 
-from tribo.errors import Problem, TriboError
+from tribo.cli.interruption import damage_said, ended_by_terminate
+from tribo.errors import Problem, TriboError, system_problem, unexpected
+from tribo.escaping import printable
 from tribo.records import SetAside
+from tribo.store.lock import BusyError
 
 DONE, UNUSABLE, SOME_SET_ASIDE = 0, 1, 3
+INTERRUPTED = 130
+BUSY = 75  # EX_TEMPFAIL of sysexits.h: nothing is wrong, try again later
 
 
 @dataclass(frozen=True)
@@ -34,7 +39,7 @@ class Console:
     def say(self, text: str, *, level: int = 0) -> None:
         """Print a line to standard error; level 1 is shown only with -v, level -1 even with -q."""
         if self.verbosity >= level:
-            click.echo(text, err=True)
+            click.echo(printable(text), err=True)
 
     def list_tests(self, what: str, tests: Sequence[SetAside], *, level: int = 0) -> None:
         """The tests of one kind with their reasons, one line each; nothing where there are none."""
@@ -48,7 +53,7 @@ class Console:
             text = json.dumps(without_nan(record), indent=1, default=str)
         elif sys.stdout.isatty():
             text = wrapped(text, shutil.get_terminal_size().columns)
-        click.echo(text)
+        click.echo(text if self.as_json else printable(text))
 
     @contextmanager
     def progress(self) -> Iterator[Callable[[str, int, int], None]]:
@@ -150,7 +155,7 @@ def status_of(set_aside: Sequence[SetAside]) -> int:
 
 
 def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
-    """Add --json, --seed, --jobs, -v and -q; errors become a list and exit status 1, never a traceback."""
+    """Add --json, --seed, --jobs, -v, -q and --debug; errors become a list and exit status 1, never a traceback."""
 
     @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
     @click.option("--seed", type=int, default=0, show_default=True, help="Seed of all random numbers.")
@@ -162,25 +167,40 @@ def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
     )
     @click.option("-v", "--verbose", count=True, help="Print more messages.")
     @click.option("-q", "--quiet", is_flag=True, help="Print only results and errors.")
+    @click.option("--debug", is_flag=True, help="Print the traceback of unexpected errors.")
     @functools.wraps(function)
-    def command(as_json: bool, verbose: int, quiet: bool, **options: Any) -> None:
+    def command(as_json: bool, verbose: int, quiet: bool, debug: bool, **options: Any) -> None:
         console = Console(as_json, -1 if quiet else verbose)
-        logging.basicConfig(level=logging.INFO if verbose else logging.ERROR, stream=sys.stderr)
+        logging.basicConfig(level=logging.INFO if verbose else logging.ERROR, stream=sys.stderr, format="%(message)s")
+        logging.getLogger("tribo").setLevel(logging.DEBUG if debug else logging.NOTSET)
         try:
-            status = function(console=console, **options)
-        except TriboError as why:
+            with damage_said(lambda text: console.say(text, level=-1)), ended_by_terminate():
+                status = function(console=console, **options)
+        except (click.ClickException, BrokenPipeError):
+            raise
+        except Exception as why:
             _report_faults(console, why)
-            status = UNUSABLE
+            status = BUSY if isinstance(why, BusyError) else UNUSABLE
         except (KeyboardInterrupt, click.Abort):
             console.say("interrupted; finished results are kept and no file is incomplete", level=-1)
-            status = 130
+            status = INTERRUPTED
         sys.exit(status or DONE)
 
     return command
 
 
-def _report_faults(console: Console, why: TriboError) -> None:
-    count = len(why.problems)
-    console.say(f"{count} problem{'s' if count != 1 else ''}:\n{faults_text(why.problems)}", level=-1)
+def _report_faults(console: Console, why: Exception) -> None:
+    problems = problems_of(why)
+    console.say(f"{len(problems)} problem{'s' if len(problems) != 1 else ''}:\n{faults_text(problems)}", level=-1)
     if console.as_json:
-        click.echo(json.dumps({"problems": [asdict(p) for p in why.problems]}, indent=1, default=str))
+        click.echo(json.dumps({"problems": [asdict(p) for p in problems]}, indent=1, default=str))
+
+
+def problems_of(why: Exception) -> tuple[Problem, ...]:
+    """What ended a command: the problems it found, an error of the system with its path, or an error of tribo."""
+    if isinstance(why, TriboError):
+        return why.problems
+    if isinstance(why, OSError):
+        logging.getLogger("tribo").debug("an error of the system", exc_info=why)
+        return (system_problem(why),)
+    return (unexpected(why, "this command stopped"),)

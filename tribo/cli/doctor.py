@@ -11,7 +11,6 @@ from typing import Any
 
 OPTIONAL = {
     "distributed": "simulations on a dask cluster (--scheduler)",
-    "openpyxl": "exports saved as .xlsx",
     "snakemake": "building a folder of campaigns (tribo build)",
 }
 

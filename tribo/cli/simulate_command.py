@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tribo.cli.console import Console, command_options
+from tribo.cli.output import FORCE, WAIT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -74,6 +75,8 @@ def _described(command: Any) -> Any:
 @click.option(
     "-o", "--out", type=click.Path(dir_okay=False, path_type=Path), required=True, help="File to write, FILE.nc."
 )
+@FORCE
+@WAIT
 @command_options
 def simulate(
     console: Console, design: Path | None, table2: bool, mechanisms: str, given: str, out: Path, **options: Any
@@ -86,10 +89,13 @@ def simulate(
     runs.
     """
     from tribo.mechanisms_in_model import parse_given, parse_with
-    from tribo.simulate import run_stored
     from tribo.simulate.design_file import asked_runs, described_by_options, read_design, together
+    from tribo.simulate.results_file import ENSEMBLE, ONE_RUN, kind_of
+    from tribo.simulate.resume import continues, run_stored
+    from tribo.store.own_file import check_file, only_writer_of
 
     scheduler, seed, jobs = (options.pop(name) for name in ("scheduler", "seed", "jobs"))
+    force, wait_s = options.pop("force"), options.pop("wait_s")
     if design and (table2 or any(value not in (None, ()) for value in options.values())):
         raise click.UsageError(
             "--design describes all runs; it cannot be combined with other options that describe runs"
@@ -102,13 +108,17 @@ def simulate(
         lambda: parse_with(mechanisms),
         lambda: parse_given(given),
     )
+    check_file(out, ONE_RUN if one else ENSEMBLE, kind_of, force)
     if one:
-        _one_run(console, pulled(runs[0], acting, conditions), out)
+        with only_writer_of(out, wait_s):
+            _one_run(console, pulled(runs[0], acting, conditions), out)
     else:
+        work = _work(acting, conditions)
+        if force and out.exists() and not continues(runs, out, work):
+            out.unlink()
         with console.progress() as progress:
             ran = run_stored(
-                runs, out, jobs, scheduler, lambda done, total: progress("simulating", done, total),
-                _work(acting, conditions),
+                runs, out, jobs, scheduler, lambda done, total: progress("simulating", done, total), work, wait_s
             )  # fmt: skip
         _say_ensemble(console, ran, out, table2)
 

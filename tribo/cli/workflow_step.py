@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from tribo.cli.console import DONE, SOME_SET_ASIDE, UNUSABLE
+from tribo.errors import is_of_the_system
 from tribo.pipeline.step_record import read_record
 
 DONE_WORDS = {DONE: "done", SOME_SET_ASIDE: "some_set_aside", UNUSABLE: "unusable"}
@@ -28,7 +29,8 @@ def run_step(
     record: Path, command: Sequence[str], digest: str, after: Sequence[Path] = (), files: Path | None = None
 ) -> int:
     """Run a tribo command as a step and write its record; returns the exit status for the workflow."""
-    before = next((r for r in map(read_record, after) if r and r["status"] == "unusable"), None)
+    records = (read_record(path, "status", "problems") for path in after)
+    before = next((r for r in records if r and r["status"] == "unusable"), None)
     started = time.time()
     if before is not None:
         status, said = UNUSABLE, {"problems": before["problems"]}
@@ -36,6 +38,8 @@ def run_step(
         status, said = _run(command)
     if status not in DONE_WORDS:
         return status
+    if status == UNUSABLE and any(is_of_the_system(str(p.get("kind"))) for p in said.get("problems", ())):
+        return status  # no fault of the input: the next build tries again
     finished = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     written = {
         "command": ["tribo", *command],

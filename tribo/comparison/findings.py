@@ -175,7 +175,9 @@ def direction_pairs(study: Study) -> list[tuple[str, str, str]]:
     """(pattern, sample along x, sample along y) for every pattern pulled both ways."""
     samples = study.ingested.campaign.samples
     names = {pattern.name for pattern in samples.values()}
-    return [(n, f"{n}x", f"{n}y") for n in sorted(names) if f"{n}x" in samples and f"{n}y" in samples]
+    both = [(n, f"{n}x", f"{n}y") for n in sorted(names) if f"{n}x" in samples and f"{n}y" in samples]
+    # a pattern that is itself called Sx is not pattern S along x
+    return [(n, x, y) for n, x, y in both if samples[x].name == samples[y].name == n]
 
 
 def direction_ratios(study: Study) -> list[DirectionRatio]:

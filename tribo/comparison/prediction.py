@@ -17,6 +17,7 @@ from tribo.comparison.prediction_runs import (
     example_run,
     remove_strangers,
     run_cells,
+    sample_as_word,
 )
 from tribo.errors import CampaignError, FitError, Problem
 from tribo.records import REGIMES, Campaign, FloatArray, LawFit, Regime, Run
@@ -164,7 +165,7 @@ def run_named_cells(
     _, cells = calibrated_cells(campaign, fits, flat, model, progress)
     if model.kept is not None:
         remove_strangers(cells, model.kept)  # what a diagnosis finds kept is then of this calibration
-    chosen = tuple(c for c in cells if only in ("", c.sample, c.name))
+    chosen = tuple(c for c in cells if only in ("", c.sample, sample_as_word(c.sample), c.name))
     if not chosen and only != "calibration":
         allowed = ", ".join(["calibration", *dict.fromkeys(c.sample for c in cells), *(c.name for c in cells)])
         raise CampaignError(Problem("no_such_cell", "no simulation has this name", found=only, allowed=allowed))

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 SOURCES = ("simulate", "laws", "records")  # packages whose sources decide a run
 SUFFIX = ".nc"
+WAIT_S = 86400.0  # for another process that runs the same cell: its runs are then there
 CELLS_AWAY = 16  # cells given to a scheduler at once
 
 
@@ -65,7 +66,12 @@ class Cell:
 
 def cell_name(sample: str, pressure_Pa: float) -> str:
     """Sample and nominal pressure as one word without a space or a slash."""
-    return f"{quote(sample, safe='')}@{pressure_Pa:.0f}Pa"
+    return f"{sample_as_word(sample)}@{pressure_Pa:.0f}Pa"
+
+
+def sample_as_word(sample: str) -> str:
+    """The name of a sample as part of a file name and of a step of a build."""
+    return quote(sample, safe="")
 
 
 def cells_of(design: Iterable[SimConfig]) -> tuple[Cell, ...]:
@@ -123,17 +129,13 @@ def _run_stored(
     cell: Cell, kept: Path, threads: int, scheduler: str | None, progress: Callable[[int, int], None]
 ) -> pd.DataFrame:
     """The runs of one cell, from its file as far as it holds them; a damaged file is replaced."""
-    from tribo.simulate import run_stored
+    from tribo.simulate.resume import continues, run_stored
 
     path = cell.path(kept)
     kept.mkdir(parents=True, exist_ok=True)
-    try:
-        return run_stored(cell.configs, path, threads, scheduler, progress)
-    except SimulationError as why:
-        if not {p.kind for p in why.problems} <= {"other_design", "not_a_store"}:
-            raise
-    path.unlink()
-    return run_stored(cell.configs, path, threads, scheduler, progress)
+    if path.exists() and not continues(cell.configs, path):
+        path.unlink(missing_ok=True)
+    return run_stored(cell.configs, path, threads, scheduler, progress, wait_s=WAIT_S)
 
 
 def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | None:
@@ -144,13 +146,14 @@ def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | Non
     import pandas as pd
 
     from tribo.simulate import read_stored
+    from tribo.simulate.stored_rows import UNREADABLE
 
     found = []
     for path in sorted(kept.glob(f"*@*{SUFFIX}")):
         try:
             table = read_stored(path)
             cell = _cell_of(path, table, patterns)
-        except (OSError, KeyError, ValueError):  # another program's file, or a damaged one
+        except (SimulationError, *UNREADABLE):  # another program's file, or a damaged one
             continue
         if cell is not None and cell.path(kept) == path and table["done"].all():
             found.append(table)

@@ -7,10 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tribo.diagnose.layers import cause_layers, pattern_layers, remainder_layers
 from tribo.diagnose.next_test import next_test_of
-from tribo.diagnose.search.naming import Candidate, Named, weights_of
+from tribo.diagnose.search.naming import Named
+from tribo.diagnose.search.rivals import weights_of
 from tribo.diagnose.search.screen import Screen
+from tribo.diagnose.search.weighing import Candidate
 from tribo.diagnose.sentences import (
+    NOT_TESTABLE,
     Weighed,
     causes_from_evidence,
     causes_weighed,
@@ -19,6 +23,7 @@ from tribo.diagnose.sentences import (
     exclusions_beside,
     misfits_of,
     misfits_of_patterns,
+    misfits_remaining,
     patterns_apart,
     summary,
 )
@@ -27,7 +32,7 @@ from tribo.diagnose.statistics.gain import gain, gain_of_zero
 from tribo.diagnose.statistics.interval import recovered
 from tribo.diagnose.statistics.linearisation import ModelFit, StartEffects
 from tribo.diagnose.statistics.pattern_excess import PatternExcess, pattern_excess
-from tribo.diagnose.verdict import Estimate, Excluded, Gain, Outcome, Verdict
+from tribo.diagnose.verdict import CERTAIN_CAUSES, Estimate, Excluded, Gain, Layer, Outcome, Verdict
 
 NEEDED = 3.7  # strength that chance reaches in one campaign of a hundred, where none was simulated
 
@@ -54,16 +59,17 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
     excess = _excess(found)
     outcome = _outcome(named, excess, bool(found.evidence.certain), level)
     smallest = _smallest_effects(found)
-    shown = _shown(named) if outcome in ("named", "undetermined") else []
+    shown = _shown(named) if outcome in CERTAIN_CAUSES else []
     gained = _gain(found, outcome, rng)
-    equivalent = _equivalent(named) if outcome == "named" else ()
+    equivalent = _equivalent(named) if outcome in ("named", "partly") else ()
     flat = baseline.setup.observations.flat
     direct = causes_from_evidence(found.evidence.certain)
     weighed = causes_weighed(shown, baseline)
     misfits = [m for _, m in direct] + misfits_of(found.screened, level, flat)
     causes = [c for c, _ in direct] + sorted(weighed, key=lambda c: -c.weight)
-    if named is not None and named.causes and outcome == "unknown" and not patterns_apart(misfits):
-        misfits = [*misfits_of(named.left, level, flat), *misfits]
+    if named is not None:
+        left = [*misfits_remaining(named.remainders), *misfits_of(named.left, level, flat)]
+        misfits = [*left, *misfits] if named.causes and not patterns_apart(misfits) else [*misfits, *left]
     misfits = [*(misfits_of_patterns(excess) if excess is not None else ()), *misfits]
     excluded = exclusions_beside(causes, found.barred, named.weighed if named is not None else ())
     shown_misfits = each_once(misfits)
@@ -75,13 +81,24 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
         misfits=shown_misfits,
         causes=tuple(causes),
         equivalent=equivalent,
-        excluded=tuple(excluded),
+        excluded=tuple(e for e in excluded if not e.reason.startswith(NOT_TESTABLE)),
+        not_testable=tuple(e for e in excluded if e.reason.startswith(NOT_TESTABLE)),
+        layers=_layers(found, rng),
         gain=gained,
         set_aside=baseline.setup.observations.set_aside,
         next_test=next_test_of(named, outcome, misfits, baseline.setup.observations.conditions),
         text=text,
         smallest_effects=smallest,
     )
+
+
+def _layers(found: Findings, rng: np.random.Generator) -> tuple[Layer, ...]:
+    """Of the final model: pattern corrections, causes, and what is left."""
+    named, baseline = found.named, found.baseline
+    if named is None:
+        return tuple(pattern_layers(baseline))
+    causes = cause_layers(named, found.screened, baseline, rng)
+    return (*pattern_layers(named.model), *causes, *remainder_layers(named))
 
 
 def _excess(found: Findings) -> PatternExcess | None:
@@ -96,8 +113,10 @@ def _outcome(named: Named | None, excess: PatternExcess | None, direct: bool, le
         return "no_misfit" if excess is None else "unknown"
     if named is None:
         return "named"
-    if not named.causes or named.p_left < level:
+    if not named.causes:
         return "unknown"
+    if named.remainders or named.p_left < level:
+        return "partly"
     return "undetermined" if named.rivals else "named"
 
 

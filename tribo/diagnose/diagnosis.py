@@ -7,7 +7,7 @@ import numpy as np
 from tribo.diagnose.conclusion import Findings, conclude
 from tribo.diagnose.diagnosis_record import Diagnosis
 from tribo.diagnose.search.looks import all_looks
-from tribo.diagnose.search.naming import name_causes
+from tribo.diagnose.search.naming import Rules, name_causes
 from tribo.diagnose.search.screen import Progress, screen
 from tribo.diagnose.sentences import exclusions
 from tribo.diagnose.statistics.direct_evidence import trace_findings
@@ -75,10 +75,8 @@ def examine(
     barred = exclusions(observations.conditions, evidence.found, effects.absorbed)
     named = None
     if screened.p.min() < level:
-        named = name_causes(
-            effects, screened, [e.mechanism for e in barred],
-            level=level, replicates=replicates[1], rng=rng, progress=progress,
-        )  # fmt: skip
+        rules = Rules([e.mechanism for e in barred], level, replicates[1], rng, progress)
+        named = name_causes(effects, screened, rules)
     verdict = conclude(Findings(effects, screened, evidence, barred, named, level), rng)
     return Diagnosis(verdict, baseline, screened, named)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.diagnose.diagnosis_record import Diagnosis
-from tribo.diagnose.search.naming import weights_of
+from tribo.diagnose.search.rivals import weights_of
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tribo.diagnose.search.naming import Candidate, Named
+from tribo.diagnose.search.naming import Named
+from tribo.diagnose.search.weighing import Candidate
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import effect_of, log_forces
 from tribo.diagnose.terms import in_words

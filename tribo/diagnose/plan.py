@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tribo.diagnose.search.naming import ALIKE
+from tribo.diagnose.search.rivals import ALIKE
 from tribo.diagnose.statistics.linearisation import Linear, ModelFit, StartEffects, begin, scored, start_effects
 from tribo.diagnose.statistics.model import Acting, Setup, Target, predict, setup
 from tribo.diagnose.statistics.observations import NO_FLAT, Observations, conditions_of

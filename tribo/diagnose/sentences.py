@@ -7,8 +7,9 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from tribo.diagnose.search.looks import Look
-from tribo.diagnose.search.naming import Candidate
+from tribo.diagnose.search.naming import Remainder
 from tribo.diagnose.search.screen import Screen
+from tribo.diagnose.search.weighing import Candidate
 from tribo.diagnose.statistics.direct_evidence import Evidence, stated_evidence
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting
@@ -45,12 +46,17 @@ def misfits_of(screened: Screen, level: float, flat: str = "") -> list[Misfit]:
             break
         if look.kind != "mechanism" and not look.is_taken_up(flat) and key not in seen:
             seen.add(key)
-            found.append(_misfit(look, float(screened.size[k]), screened.coefficients[k], p))
+            found.append(misfit_of(look, float(screened.size[k]), screened.coefficients[k], p))
     if not found and len(order) and screened.p[order[0]] < level:
         k = order[0]
         p = float(screened.p[k])
-        found.append(_misfit(screened.looks[k], float(screened.size[k]), screened.coefficients[k], p))
+        found.append(misfit_of(screened.looks[k], float(screened.size[k]), screened.coefficients[k], p))
     return found
+
+
+def misfits_remaining(remainders: Sequence[Remainder]) -> list[Misfit]:
+    """What follows a recorded column and no mechanism, in the order in which it was found."""
+    return [misfit_of(r.look, r.size, r.coefficients, r.p) for r in remainders]
 
 
 def each_once(misfits: Sequence[Misfit]) -> tuple[Misfit, ...]:
@@ -66,7 +72,7 @@ def _covariate(look: Look) -> str:
     return look.acting.mechanism.column(look.acting.choice)
 
 
-def _misfit(look: Look, size: float, coefficients: np.ndarray, p: float) -> Misfit:
+def misfit_of(look: Look, size: float, coefficients: np.ndarray, p: float) -> Misfit:
     percent = 100.0 * float(np.expm1(min(size, 5.0)))
     of = f" of {look.sample}" if look.sample and look.kind != "specimen" else ""
     text = f"{sentence_case(WHAT[look.observable])}{of} {_predicate(look, coefficients)}"
@@ -260,7 +266,10 @@ def summary(
             f"{shown}."
         )
     if outcome == "named":
-        return _named(causes, equivalent)
+        return f"{_named(causes, equivalent)} {_within_chance(causes)}{_joined(equivalent)}"
+    if outcome == "partly":
+        rest = misfits[0].text if misfits else "No single column explains it."
+        return f"{_named(causes, equivalent)} A misfit remains beyond chance: {rest}{_joined(equivalent)}"
     if outcome == "undetermined":
         names = ", ".join(dict.fromkeys(name_in_words(c.mechanism) for c in causes))
         return f"The model fails beyond chance. Several mechanisms explain the misfit about equally well: {names}."
@@ -278,12 +287,16 @@ def _named(causes: Sequence[Cause], equivalent: Sequence[Sequence[str]]) -> str:
     tied = [" or ".join(name_in_words(n) for n in names) for names in equivalent]
     alone = [name_in_words(c.mechanism) for c in causes if not any(c.mechanism in names for names in equivalent)]
     reasons = list(dict.fromkeys([*tied, *alone]))
-    told = " This design cannot distinguish the mechanisms joined by \"or\"." if tied else ""
-    cause, these = ("Cause", "this mechanism") if len(reasons) == 1 else ("Causes", "these mechanisms")
-    return (
-        f"The model fails beyond chance. {cause}: {'; '.join(reasons)}. With {these} included, the remaining "
-        f"differences are within chance.{told}"
-    )
+    return f"The model fails beyond chance. {'Cause' if len(reasons) == 1 else 'Causes'}: {'; '.join(reasons)}."
+
+
+def _within_chance(causes: Sequence[Cause]) -> str:
+    these = "this mechanism" if len(causes) == 1 else "these mechanisms"
+    return f"With {these} included, the remaining differences are within chance."
+
+
+def _joined(equivalent: Sequence[Sequence[str]]) -> str:
+    return " This design cannot distinguish the mechanisms joined by \"or\"." if equivalent else ""
 
 
 def misfits_of_patterns(excess: PatternExcess) -> list[Misfit]:

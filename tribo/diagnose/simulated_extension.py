@@ -20,6 +20,7 @@ from tribo.diagnose.sentences import name_in_words
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import effect_of
 from tribo.diagnose.statistics.pattern_table import flat_law
+from tribo.diagnose.verdict import CERTAIN_CAUSES
 from tribo.errors import SimulationError
 from tribo.mechanisms.record import Conditions, Values
 from tribo.mechanisms_in_model.extended_run import simulate_pair
@@ -238,7 +239,7 @@ def with_simulation(
     model: dict[str, object] = {"shares_from": d.baseline.setup.predictor.source}
     words = [d.verdict.text, f"The predictions for the patterned samples are based on {model['shares_from']}."]
     found = None
-    if d.named is not None and d.named.causes and d.verdict.verdict in ("named", "undetermined"):
+    if d.named is not None and d.named.causes and d.verdict.verdict in CERTAIN_CAUSES:
         found = simulate_extension(d.named.model, seed=seed, jobs=jobs, progress=progress)
         key, record, sentence = _reported(d, found)
         model[key] = record

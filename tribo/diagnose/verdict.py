@@ -1,4 +1,4 @@
-"""The verdict: what a diagnosis hands on, and its JSON form (schema tribo.verdict/1)."""
+"""The verdict: what a diagnosis hands on, and its JSON form (schema tribo.verdict/2)."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from typing import Any, Literal
 
 from tribo.records import SetAside
 
-SCHEMA = "tribo.verdict/1"
-Outcome = Literal["no_misfit", "named", "undetermined", "unknown"]
+SCHEMA = "tribo.verdict/2"
+Outcome = Literal["no_misfit", "named", "undetermined", "partly", "unknown"]
+LayerKind = Literal["pattern_correction", "cause", "law", "remainder"]
+CERTAIN_CAUSES: tuple[Outcome, ...] = ("named", "undetermined", "partly")  # verdicts that hold causes
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,30 @@ class Gain:
 
 
 @dataclass(frozen=True)
+class Layer:
+    """One part of what explains a campaign, with its evidence beside all other layers.
+
+    ``effect_percent`` is 100 (measured / model - 1) of a pattern correction, and the largest signed change of T by a
+    cause, with a 90 % interval from ``low`` to ``high``; of a remainder it is the peak-to-peak effect. ``tied_with``
+    are mechanisms that the design cannot distinguish from it, ``gain`` what the layer gains on tests left out.
+    """
+
+    kind: LayerKind
+    name: str
+    samples: tuple[str, ...]
+    regimes: tuple[str, ...]
+    p_adjusted: float
+    effect_percent: float
+    low: float
+    high: float
+    parameters: Mapping[str, Estimate] = field(default_factory=dict)
+    formula: str = ""
+    tied_with: tuple[str, ...] = ()
+    gain: Gain | None = None
+    text: str = ""
+
+
+@dataclass(frozen=True)
 class NextTest:
     """The test that best distinguishes mechanisms that explain a campaign about equally."""
 
@@ -86,6 +112,8 @@ class Verdict:
     causes: tuple[Cause, ...] = ()
     equivalent: tuple[tuple[str, ...], ...] = ()
     excluded: tuple[Excluded, ...] = ()
+    not_testable: tuple[Excluded, ...] = ()
+    layers: tuple[Layer, ...] = ()
     gain: Gain | None = None
     set_aside: tuple[SetAside, ...] = ()
     next_test: NextTest | None = None
@@ -103,6 +131,8 @@ class Verdict:
             "causes": [asdict(c) for c in self.causes],
             "equivalent": [list(names) for names in self.equivalent],
             "excluded": [asdict(e) for e in self.excluded],
+            "not_testable": [asdict(e) for e in self.not_testable],
+            "layers": [asdict(layer) for layer in self.layers],
             "gain": asdict(self.gain) if self.gain else None,
             "set_aside": [{"test_id": s.test_id, "reason": s.reason} for s in self.set_aside],
             "next_test": asdict(self.next_test) if self.next_test else None,

@@ -45,7 +45,7 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
         amplitude = f"{row['parameter']} = {row['value']:.3g} {row['unit']}".rstrip()
         rows.append((row["mechanism"], row["choice"], known, row["gain"], row["weight"], amplitude, ""))
     weighed = {row[0] for row in rows}
-    out = [e for e in d.verdict.excluded if e.mechanism not in weighed]
+    out = [e for e in (*d.verdict.excluded, *d.verdict.not_testable) if e.mechanism not in weighed]
     rows += [(e.mechanism, "", "out", float("nan"), float("nan"), "", e.reason) for e in out]
     return pd.DataFrame(rows, columns=COLUMNS)
 

@@ -127,6 +127,6 @@ def _handles(numbers: pd.DataFrame) -> list[Line2D]:
         "measured": Line2D([], [], color=style.BLUE, marker="o", mfc="none", ls="", ms=3.5, label="measured pulls"),
         "fit": Line2D([], [], color=style.VERMILLION, label="fit T = μN + τ₀A, 95 % band"),
         "simulated": Line2D([], [], color=style.GREEN, ls="--", label="spring-block model"),
-        "AF prediction": Line2D([], [], color=style.ORANGE, ls=":", lw=1.4, label=r"T = T$_\mathrm{flat}$ · AF"),
+        "AF prediction": Line2D([], [], color=style.ORANGE, ls=":", lw=1.4, label="T = T(flat) · AF"),
     }
     return [handle for mark, handle in handles.items() if (numbers["mark"] == mark).any()]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from tribo.errors import FitError
@@ -33,7 +34,7 @@ def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> di
             with suppress(FitError):
                 outlying += [found.text() for found in look(table, regime, area)]
     return {
-        "other_fits": _other_fits(ingested, weights),
+        "other_fits": _other_fits(ingested, fits, weights),
         "budget": pd.concat(parts, ignore_index=True) if parts else None,
         "power": tuple(power),
         "outlying": tuple(outlying),
@@ -41,7 +42,7 @@ def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> di
     }
 
 
-def _other_fits(ingested: Ingested, weights: str) -> tuple[LawFit, ...]:
+def _other_fits(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> tuple[LawFit, ...]:
     """The same law under the other weights, mixed models where they converge, and the three-term law."""
     table, area = ingested.table(), ingested.campaign.nominal_area_m2
     fractions = {s: ingested.campaign.area_fraction(s) for s in sorted(set(table["sample"]))}
@@ -51,7 +52,8 @@ def _other_fits(ingested: Ingested, weights: str) -> tuple[LawFit, ...]:
             if others != weights:
                 with suppress(FitError):  # "repeats" needs repeats, "ratio" loads above zero
                     found += fit_samples(table, regime, area, weights=others)
-        mixed = (mixed_model(rows, regime, area) for _, rows in table.groupby("sample"))
+        resolved = {f.sample for f in fits if f.regime == regime and np.isfinite(f.values).all()}
+        mixed = (mixed_model(rows, regime, area) for s, rows in table.groupby("sample") if s in resolved)
         found += [fit for fit in mixed if fit is not None]
         with suppress(FitError):
             found.append(fit_three_term(table, regime, area, fractions))

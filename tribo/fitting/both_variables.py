@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 LAW = LAWS["coulomb_adhesion"]
 _PA_PER_KPA = 1e3  # tau0 is fitted in kPa, of a size with mu
+_EXACT = 1e-3  # of the largest uncertainty of a load: one below, as at zero load, is taken as this small
 _LEAST_SHARE = 0.05  # of the scatter about the line that is left to T when N is said to explain it all
 
 
@@ -99,7 +100,7 @@ def _orthogonal(
         load_N,
         force_N,
         fit.values / by,
-        weight_x=load_u**-2.0,
+        weight_x=np.maximum(load_u, _EXACT * load_u.max()) ** -2.0,
         weight_y=1 / force_variance,
         jac_beta=lambda load, beta: np.stack([load, np.full_like(load, area)]),
         jac_x=lambda load, beta: np.full_like(load, beta[0]),

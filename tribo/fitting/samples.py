@@ -16,6 +16,7 @@ import numpy as np
 
 from tribo.errors import FitError, Problem
 from tribo.fitting.linear import LinearFit, least_squares
+from tribo.fitting.resolution import loads_too_close
 from tribo.fitting.rows import Rows, sample_rows
 from tribo.fitting.weighting import WEIGHTS, weights_of
 from tribo.laws.table import LAWS
@@ -58,8 +59,9 @@ def fit_samples(
     tuple of LawFit
         ``covariance`` of (mu, tau0_Pa) is that of the mean over specimens, ``dof`` = G - 1. One specimen:
         its own covariance, dof = n - 2, and a note. tau0 is never clamped. A sample whose tests do not
-        determine the law has NaN values and a note with the reason. ``chi2_red`` is the reduced chi-squared of the load
-        means about each specimen's line, the variance of a mean taken from its repeats (NaN without repeats).
+        determine the law, such as at loads too close to each other, has NaN values and a note with the reason.
+        ``chi2_red`` is the reduced chi-squared of the load means about each specimen's line, the variance of a mean
+        taken from its repeats (NaN without repeats).
 
     Raises
     ------
@@ -114,6 +116,8 @@ def _fit_sample(rows: Rows, regime: Regime, area: float, weights: str, by: str) 
     own = {name: _line(rows, weight, rows.specimen == name, area) for name in rows.specimens}
     usable = {name: fit for name, fit in own.items() if fit is not None}
     part = _pooled(rows, weight, area) if by == "tests" else _specimens(rows, weight, area, usable)
+    if too_close := loads_too_close(rows, float(np.sqrt(part.covariance[0, 0]))):
+        return replace(empty, notes=(*notes, too_close))
     ratio, bend = lack_of_fit(rows, weight, usable)
     left_out = [name for name in own if name not in usable]
     if left_out and usable:

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import math
-import multiprocessing
-import threading
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.campaign.choice import is_chosen, names_pulls, split_choice
-from tribo.errors import Problem, TraceError, TriboError
+from tribo.errors import Problem, TraceError, TriboError, unexpected
+from tribo.forked import each, may_fork
+from tribo.input_files import hashes_of_reads
+from tribo.limits import LARGEST_LOAD_N, SMALLEST_LOAD_N
 from tribo.records import Campaign, Pull, SetAside, Test, Trace
 
 if TYPE_CHECKING:
@@ -24,13 +23,30 @@ if TYPE_CHECKING:
 
 FEWEST_FOR_PROCESSES = 100  # below, starting processes costs more than it gains
 CHUNK = 16
+_OFF_LOAD = 0.02  # share by which the recorded load may differ from that of the test
 _OFF_SPEED = 0.2  # share by which the travel while sliding may differ from the speed of the test times the time
 _UNLOADED = 0.05  # share of the largest load of an export below which a piece of it carries none
 
 Outcome = tuple[Trace, Pull] | SetAside
+Outcomes = tuple[tuple[Test, Outcome], ...]
 
 
-def read_row(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> tuple[tuple[Test, Outcome], ...]:
+@dataclass(frozen=True)
+class RowRead:
+    """The tests of a row of tests.csv with their outcomes, and the SHA-256 of every file read for them."""
+
+    outcomes: Outcomes
+    hashes: Mapping[str, str]
+
+
+def read_hashed(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> RowRead:
+    """:func:`read_row` with the hashes of the bytes that were read, by their path in the campaign."""
+    with hashes_of_reads() as found:
+        outcomes = read_row(root, columns, rule, test)
+    return RowRead(outcomes, {Path(p).relative_to(root).as_posix(): digest for p, digest in found.items()})
+
+
+def read_row(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> Outcomes:
     """The tests of a row of tests.csv: usually one, or one per pull if the row selects pulls of its export.
 
     ``PATH#2/3`` is the third pull of the second table, ``PATH#2/*`` every pull of it, ``PATH#*`` every pull of every
@@ -42,7 +58,9 @@ def read_row(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> t
             return _chosen_pulls(root, columns, rule, test)
         return (_whole(root, columns, rule, test),)
     except TriboError as why:
-        return ((test, _set_aside(test, why)),)
+        return ((test, _set_aside(test, why.problems)),)
+    except Exception as why:  # one export must not cost the others
+        return ((test, _set_aside(test, [unexpected(why, "this export cannot be evaluated", test.file)])),)
 
 
 def inspect_file(path: Path, columns: Mapping[str, str] | None = None) -> Inspection:
@@ -74,20 +92,20 @@ def _pulls_in_words(tables: Sequence[Trace]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _set_aside(test: Test, why: TriboError) -> SetAside:
-    problems = tuple(replace(p, file=test.file, test_id=test.test_id) for p in why.problems)
+def _set_aside(test: Test, found: Sequence[Problem]) -> SetAside:
+    problems = tuple(replace(p, file=test.file, test_id=test.test_id) for p in found)
     return SetAside(test.test_id, "; ".join(str(p) for p in problems), problems)
 
 
 def _whole(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> tuple[Test, Outcome]:
     """An export, or one table of it, as one pull."""
     from tribo.readers import read_export
-    from tribo.traces import read_pull
+    from tribo.traces import read_record
 
     trace = read_export(root / test.file, columns=columns or None, name=test.test_id, file=test.file)
-    test = _with_load(test, trace)
-    pull = read_pull(trace, rule=rule, test=test)
-    doubts = [doubt for doubt in (_several_pulls(trace), _off_speed(trace, pull, test)) if doubt]
+    pull = read_record(trace, rule=rule, test=test)
+    test = _with_load(test, pull.recorded_load_N)
+    doubts = [d for d in (_several_pulls(trace), _off_speed(trace, pull, test), _other_load(pull, test)) if d]
     if doubts:
         flags, problems = (*trace.flags, *(d.kind for d in doubts)), (*trace.problems, *doubts)
         trace = replace(trace, flags=flags, problems=problems)
@@ -130,20 +148,26 @@ def _carry_load(pieces: Sequence[Trace]) -> list[bool]:
     return [bool(load >= _UNLOADED * loads.max()) for load in loads]
 
 
-def _with_load(test: Test, trace: Trace) -> Test:
-    """The test with the load of its trace where tests.csv gives none.
+def _other_load(pull: Pull, test: Test) -> Problem | None:
+    """A doubt if the load recorded while sliding is not the one that tests.csv gives."""
+    recorded, given = pull.recorded_load_N, test.normal_load_N
+    if math.isnan(recorded) or not given > 0 or abs(recorded / given - 1.0) < _OFF_LOAD:
+        return None
+    what, found = "the normal load recorded while sliding differs from that of the test", f"{recorded:.4g} N"
+    return Problem("off_load", what, test.file, None, "normal force", found, f"about {given:.4g} N, which is used")
+
+
+def _with_load(test: Test, load: float) -> Test:
+    """The test with the ``load`` of its trace where tests.csv gives none.
 
     Raises
     ------
     TraceError
         ``no_load``: neither gives it.
     """
-    from tribo.traces import load_of
-
     if not math.isnan(test.normal_load_N):
         return test
-    load = load_of(trace)[0]
-    if not load > 0:
+    if not SMALLEST_LOAD_N <= load <= LARGEST_LOAD_N:
         found = None if math.isnan(load) else f"{load:.4g} N"
         what, allowed = "neither tests.csv nor the export gives the normal load", "normal_load_N in tests.csv"
         raise TraceError(Problem("no_load", what, found=found, allowed=allowed))
@@ -180,11 +204,13 @@ def _chosen_pulls(root: Path, columns: Mapping[str, str], rule: str, test: Test)
 def _one_of_several(test: Test, piece: Trace, zero_N: float, pull: Pull | TraceError) -> tuple[Test, Outcome]:
     """One pull of an export; the trace keeps its zero, as one that was read alone does."""
     if isinstance(pull, TraceError):
-        return test, _set_aside(test, pull)
+        return test, _set_aside(test, pull.problems)
+    from tribo.traces import load_of
+
     try:
-        test = _with_load(test, piece)
+        test = _with_load(test, load_of(piece)[0])
     except TraceError as why:
-        return test, _set_aside(test, why)
+        return test, _set_aside(test, why.problems)
     trace = replace(piece, name=test.test_id, file=test.file, force_N=piece.force_N + zero_N)
     flags = tuple(dict.fromkeys((*trace.flags, *pull.flags)))
     return test, (trace, replace(pull, test_id=test.test_id, zero_N=zero_N or pull.zero_N, flags=flags))
@@ -203,25 +229,11 @@ def _with_note(found: tuple[tuple[Test, Outcome], ...], left_out: Sequence[str])
     return *found[:first], (test, (trace, pull)), *found[first + 1 :]
 
 
-def read_all(campaign: Campaign, rule: str, jobs: int = 1) -> Iterator[tuple[tuple[Test, Outcome], ...]]:
+def read_all(campaign: Campaign, rule: str, jobs: int = 1) -> Iterator[RowRead]:
     """The tests of every row with their outcomes, in the order of the campaign."""
-    read = partial(read_row, campaign.root, dict(campaign.columns), rule)
-    if jobs == 1 or len(campaign.tests) < FEWEST_FOR_PROCESSES or not _may_fork():
+    read = partial(read_hashed, campaign.root, dict(campaign.columns), rule)
+    if jobs == 1 or len(campaign.tests) < FEWEST_FOR_PROCESSES or not may_fork():
         yield from map(read, campaign.tests)
         return
     read(campaign.tests[0])  # what it imports is then in every process
-    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("fork")) as pool:
-        try:
-            with warnings.catch_warnings():
-                # Python 3.12 and later warn of threads at a fork; the ones here are those of BLAS, which survives it
-                warnings.simplefilter("ignore", DeprecationWarning)
-                outcomes = pool.map(read, campaign.tests, chunksize=CHUNK)
-            yield from outcomes
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def _may_fork() -> bool:
-    """Processes are forked, which is quick, and safe only where no other thread of Python runs."""
-    return "fork" in multiprocessing.get_all_start_methods() and threading.active_count() == 1
+    yield from each(read, campaign.tests, jobs, CHUNK)

@@ -26,8 +26,10 @@ def ingest_campaign(campaign: Campaign, rule: str, jobs: int, progress: Progress
     pulls: dict[str, Pull] = {}
     set_aside = list(campaign.set_aside)
     tests: list[Test] = []
-    for done, outcomes in enumerate(read_all(campaign, rule, jobs), start=1):
-        for test, outcome in outcomes:
+    inputs = dict(campaign.inputs)
+    for done, row in enumerate(read_all(campaign, rule, jobs), start=1):
+        inputs |= row.hashes
+        for test, outcome in row.outcomes:
             tests.append(test)
             if isinstance(outcome, SetAside):
                 set_aside.append(outcome)
@@ -43,4 +45,4 @@ def ingest_campaign(campaign: Campaign, rule: str, jobs: int, progress: Progress
             [p for fault in set_aside for p in fault.problems]
             or [Problem("no_usable_test", "no test of this campaign is usable", file=str(campaign.root))]
         )
-    return Ingested(replace(campaign, tests=tuple(tests)), traces, pulls, tuple(set_aside))
+    return Ingested(replace(campaign, tests=tuple(tests), inputs=inputs), traces, pulls, tuple(set_aside))

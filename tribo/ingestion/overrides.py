@@ -11,13 +11,16 @@ from pathlib import Path
 import numpy as np
 
 from tribo.campaign.table import Table, TestRow, read_table
-from tribo.errors import CampaignError, Problem, TraceError
+from tribo.errors import CampaignError, Problem, TraceError, system_problem, unexpected
+from tribo.input_files import hashes_of_reads
+from tribo.links import LEADS_OUT, leads_out
 from tribo.records import ByHand, Ingested, Override, Pull, SetAside, Trace
 
 TIMES = ("window_start_s", "window_end_s", "peak_s")
 COLUMNS = ("test_id", "action", "reason", *TIMES)
 ACTIONS = ("exclude", "move")
 FEWEST_IN_WINDOW = 10
+OVERRIDES = "--overrides"  # among the inputs of a campaign; no file of a campaign has this name
 
 
 def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
@@ -32,7 +35,8 @@ def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
     CampaignError
         All errors of the table at once, with row and column; or no test is left.
     """
-    overrides = read_overrides(path, ingested)
+    with hashes_of_reads() as hashes:
+        overrides = read_overrides(path, ingested)
     known = [o for o in overrides if o.test_id in ingested.pulls]  # what is set aside already stays so
     by_hand = {o.test_id: ByHand(o, ingested.traces[o.test_id], ingested.pulls[o.test_id]) for o in known}
     left_out = tuple(_left_out(o, path.name) for o in known if o.action == "exclude")
@@ -42,9 +46,11 @@ def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
         raise CampaignError(Problem("no_usable_test", "all tests are excluded", file=path.name))
     pulls |= _moved(ingested, [o for o in known if o.action == "move"], rule)
     traces = {i: t for i, t in ingested.traces.items() if i not in gone}
+    inputs = {**ingested.campaign.inputs, **dict.fromkeys([OVERRIDES], *hashes.values())}
     return replace(
-        ingested, traces=traces, pulls=pulls, set_aside=(*ingested.set_aside, *left_out), by_hand=by_hand
-    )
+        ingested, campaign=replace(ingested.campaign, inputs=inputs), traces=traces, pulls=pulls,
+        set_aside=(*ingested.set_aside, *left_out), by_hand=by_hand,
+    )  # fmt: skip
 
 
 def _left_out(override: Override, file: str) -> SetAside:
@@ -60,9 +66,15 @@ def _moved(ingested: Ingested, overrides: list[Override], rule: str) -> dict[str
     for o in overrides:
         trace = ingested.traces[o.test_id]
         try:
-            pull = read_pull(trace, rule=rule, test=tests[o.test_id], peak_s=o.peak_s, window_s=o.window_s)
+            automatic = ingested.pulls[o.test_id]
+            known = automatic.zero_rule not in ("", "before contact") and math.isfinite(automatic.zero_u_N)
+            zero = (automatic.zero_N, automatic.zero_u_N) if known else None
+            pull = read_pull(trace, rule=rule, test=tests[o.test_id], zero=zero, peak_s=o.peak_s, window_s=o.window_s)
         except TraceError as why:
             problems += why.problems
+            continue
+        except Exception as why:
+            problems.append(unexpected(why, "this pull cannot be evaluated", trace.file).at(test_id=o.test_id))
             continue
         found[o.test_id] = replace(pull, flags=tuple(dict.fromkeys((*trace.flags, *pull.flags))))
     if problems:
@@ -77,12 +89,17 @@ def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
     ------
     CampaignError
         With every fault at once: an unknown test, action or column, a number that is none, a time outside the trace.
+        Or the file is a link that leads out of its folder.
     """
     file = path.name
+    if leads_out(path.parent, path):
+        raise CampaignError(Problem("link", LEADS_OUT, file=file))
     try:
         table = read_table(path, file)
-    except OSError:
+    except FileNotFoundError:
         raise CampaignError(Problem("missing_file", "this file does not exist", file=str(path))) from None
+    except OSError as why:
+        raise CampaignError(system_problem(why, str(path))) from None
     if table is None:
         raise CampaignError(Problem("empty", "the file has no header", file=file, allowed=",".join(COLUMNS)))
     if faults := list(_header_faults(table, file)):

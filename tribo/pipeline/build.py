@@ -14,22 +14,25 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from tribo.errors import CampaignError, Problem, TriboError
+from tribo.errors import CampaignError, Problem, TriboError, unexpected
+from tribo.escaping import well_formed
 from tribo.pipeline.dated_copies import date_build
 from tribo.pipeline.scan import Dropped, difference, scan
-from tribo.pipeline.step_record import read_record
+from tribo.pipeline.step_record import OF_A_REPORT, read_record
 from tribo.store.kept_results import package_sources
-from tribo.store.lock import only_build
+from tribo.store.lock import WAIT, only_writer
+from tribo.store.own_folder import STATE, check_site
 from tribo.store.whole_files import write_text
 
-STATE = ".tribo"
 CURRENT = "current"
 GONE = "report.html has been deleted"
+END_S = 60.0  # how long the steps of an interrupted build may take to end
 PROFILES = ("local", "slurm")
 _BLOCKS = re.compile(r"(?m)^(?=\[|\s*$)")  # Snakemake says one thing after a blank line or a date in brackets
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -54,6 +57,7 @@ class BuildOptions:
     settle_s: float = 60.0
     keep: int = 10
     wait_s: float = 0.0
+    force: bool = False  # also into a folder that holds files of others
 
     def of_commands(self) -> dict[str, str]:
         """Options of the commands of the workflow, and all of them in words for what a step is made from."""
@@ -98,45 +102,50 @@ def build_site(drop: Path, site: Path, options: BuildOptions, *, dry_run: bool =
 
     Raises
     ------
-    SiteBusyError
+    BusyError
         Another build of this site is running.
     CampaignError
-        The drop folder cannot be used.
+        The drop folder cannot be used; the site is, holds or lies in it, or holds files that tribo has not written.
     BuildError
         Snakemake is missing, or a step failed other than by unusable input; everything else is built.
     """
     if find_spec("snakemake") is None:
         what, allowed = "tribo build requires snakemake", "pip install 'tribo[pipelines]'"
         raise BuildError(Problem("missing_package", what, allowed=allowed))
+    check_site(site, drop, options.force)
     state = site.resolve() / STATE
     if dry_run:
         return _built(drop, state, options, dry_run=True, descriptor=None)
-    with only_build(state, options.wait_s) as descriptor:
+    busy = Problem("busy", f"another build of this site is running; {WAIT}", file=str(site))
+    with only_writer(state / "lock", options.wait_s, lasting=True, busy=busy) as descriptor:
         return _built(drop, state, options, dry_run=False, descriptor=descriptor)
 
 
 def _built(drop: Path, state: Path, options: BuildOptions, *, dry_run: bool, descriptor: int | None) -> Built:
     found = scan(drop.resolve(), options.settle_s)
-    due = {c.name: why for c in found if not c.waiting and (why := _why_due(c, state, options))}
+    due = {c.name: why for c in found if c.is_ready and (why := _why_due(c, state, options))}
     waiting = {c.name: c.waiting for c in found if c.waiting}
     target = state / ("dry-run" if dry_run else "inputs")
     config = _configuration(found, target, state, options)
     forced = _forced(due, state)
     if dry_run:
         said = _snakemake(state, config, options, ("--dry-run", *forced), None)
-        return Built(state.parent, due, waiting, steps=tuple(planned_steps(said.stdout)))
+        if said.returncode:
+            raise BuildError(_failures(state, said.stdout))
+        expected = {c.name: _expected_status(c, due, state) for c in found}
+        return Built(state.parent, due, waiting, expected, tuple(planned_steps(said.stdout)))
     said = _snakemake(state, config, options, forced, descriptor)
     write_text(state / "log" / "snakemake.log", said.stdout)
     dated = date_build(state.parent, options.keep)
     if said.returncode:
         raise BuildError(_failures(state, said.stdout))
-    status = {c.name: _status(c.name, state) for c in found}
+    status = {c.name: "unusable" if c.refused else _status(c.name, state) for c in found}
     return Built(state.parent, due, waiting, status, tuple(planned_steps(said.stdout)), dated)
 
 
 def _why_due(campaign: Dropped, state: Path, options: BuildOptions) -> str:
     """Why a campaign is to be built, in words; empty where its report is of exactly these files and options."""
-    record = read_record(state / "steps" / campaign.name / "report.json")
+    record = read_record(state / "steps" / campaign.name / "report.json", *OF_A_REPORT, "files")
     if record is None:
         started = (state / "steps" / campaign.name).is_dir()
         return "not finished in an earlier build" if started else "new"
@@ -171,9 +180,12 @@ def _configuration(found: Sequence[Dropped], inputs: Path, state: Path, options:
     """Write what the workflow needs to know; returns the file."""
     ready: dict[str, Any] = {}
     for campaign in found:
-        if not campaign.waiting:
+        if campaign.is_ready:
             ready[campaign.name] = _inputs(campaign, inputs)
-    campaigns = {c.name: {"path": str(c.path), "waiting": list(c.waiting)} for c in found}
+    campaigns = {
+        c.name: {"path": well_formed(str(c.path)), "waiting": list(c.waiting), "refused": list(c.refused)}
+        for c in found
+    }
     listing = json.dumps([campaigns, {n: r["digest"] for n, r in ready.items()}, step_digest("", options)])
     config = {
         "ready": ready,
@@ -191,7 +203,7 @@ def _configuration(found: Sequence[Dropped], inputs: Path, state: Path, options:
 def _inputs(campaign: Dropped, folder: Path) -> dict[str, Any]:
     """Path, digest, samples and cells of a campaign, and the file that lists its exports by content."""
     file = folder / f"{campaign.name}.json"
-    known = read_record(file)
+    known = read_record(file, "digest", "samples", "cells")
     if known is None or known["digest"] != campaign.digest:
         samples, cells = _to_simulate(campaign)
         known = {"digest": campaign.digest, "samples": samples, "cells": cells, "files": dict(campaign.files)}
@@ -207,34 +219,66 @@ def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
     """Samples and cells as the description of a campaign has them; none where it cannot be read (ingest says why)."""
     from tribo.campaign import open_campaign
     from tribo.comparison.prediction import loads_to_simulate
-    from tribo.comparison.prediction_runs import cell_name
+    from tribo.comparison.prediction_runs import cell_name, sample_as_word
 
     try:
         with open_campaign(campaign.path) as opened:
             measured = {test.sample for test in opened.tests}
             samples = [s for s in opened.samples if s in measured]
+            words = [sample_as_word(s) for s in samples]
             pressures = [opened.nominal_pressure_Pa(load) for load in loads_to_simulate(opened)]
-    except CampaignError:
+    except (CampaignError, OSError):
         return [], []
-    return samples, [cell_name(s, p) for s in samples for p in pressures]
+    except Exception as why:  # ingest will say it again, as the fault of this campaign
+        unexpected(why, "the samples of this campaign cannot be listed", campaign.name)
+        return [], []
+    return words, [cell_name(s, p) for s in samples for p in pressures]
 
 
 def _snakemake(
     state: Path, config: Path, options: BuildOptions, more: Sequence[str], descriptor: int | None
 ) -> subprocess.CompletedProcess[str]:
-    """Run the workflow; the lock of the site is what keeps two apart, so that Snakemake needs none of its own."""
+    """Run the workflow; the lock of the site is what keeps two apart, so that Snakemake needs none of its own.
+
+    Neither Python nor Snakemake takes modules or settings from the folder that the build happens to start in.
+    """
     folder = workflow_dir()
     profile = folder / "profiles" / options.profile if options.profile in PROFILES else Path(options.profile)
     command = [
-        sys.executable, "-m", "snakemake", "--snakefile", str(folder / "Snakefile"), "--directory", str(state),
-        "--configfile", str(config), "--profile", str(profile.resolve()), "--cores", str(options.jobs), "--nolock",
-        "--nocolor", *more,
+        sys.executable, "-P", "-m", "snakemake", "--snakefile", str(folder / "Snakefile"), "--directory", str(state),
+        "--configfile", str(config), "--profile", str(profile.resolve()), "--workflow-profile", "none",
+        "--cores", str(options.jobs), "--nolock", "--nocolor", *more,
     ]  # fmt: skip
     (state / "log").mkdir(parents=True, exist_ok=True)
-    return subprocess.run(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"}, pass_fds=() if descriptor is None else (descriptor,),
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
+        env={**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONSAFEPATH": "1"},
+        pass_fds=() if descriptor is None else (descriptor,),
     )  # fmt: skip
+    try:
+        said, _ = process.communicate()
+    except BaseException:
+        _end(process)
+        raise
+    return subprocess.CompletedProcess(command, process.returncode, said)
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """Ask the workflow and its steps to end, and wait for them, so that none writes on after the build."""
+    import psutil
+
+    try:
+        workflow = psutil.Process(process.pid)
+        everyone = [workflow, *workflow.children(recursive=True)]
+    except psutil.NoSuchProcess:
+        everyone = []
+    for each in everyone:
+        with suppress(psutil.NoSuchProcess):
+            each.terminate()
+    for each in psutil.wait_procs(everyone, timeout=END_S)[1]:
+        with suppress(psutil.NoSuchProcess):
+            each.kill()
+    process.communicate()
 
 
 def planned_steps(said: str) -> list[str]:
@@ -265,8 +309,21 @@ def _plain_reason(reason: str) -> str:
     return reason
 
 
+def _expected_status(campaign: Dropped, due: Mapping[str, str], state: Path) -> str:
+    """How a campaign stands after a build, as far as this is known before it: unusable where it cannot be opened."""
+    from tribo.campaign import open_campaign
+
+    if campaign.name not in due:
+        return _status(campaign.name, state)
+    try:
+        with open_campaign(campaign.path):
+            return "to be built"
+    except CampaignError:
+        return "unusable"
+
+
 def _status(name: str, state: Path) -> str:
-    record = read_record(state / "steps" / name / "report.json")
+    record = read_record(state / "steps" / name / "report.json", *OF_A_REPORT)
     return str(record["status"]) if record else "not built yet"
 
 

@@ -13,15 +13,16 @@ from tribo.errors import Problem, TriboError
 
 BUILDS, LATEST, CURRENT = "builds", "latest", "current"
 NOT_COPIED = ("kept",)  # work in progress, not results
-_DATED = re.compile(r"\d{4}-\d\d-\d\dT\d{6}Z(-\d+)?")
+NUMBER = ".number"  # file in a copy: how many copies were made before, whatever the clock said
+_DATED = re.compile(r"(\d{4}-\d\d-\d\dT\d{6}Z)(?:-(\d+))?")
 
 
 def date_build(site: Path, keep: int, now: float | None = None) -> Path | None:
     """Copy ``current`` to ``builds/DATE`` if it differs from the newest copy, and delete all but the last ``keep``.
 
-    Files that did not change since the newest copy share its storage (hard links; plain copies where the file system
-    has none): tribo never writes into a finished file. The copy appears whole or not at all, ``latest`` last.
-    Returns the new copy, None where there was nothing new.
+    A copy shares no storage with ``current`` or with another copy: an edit of one changes no other. It appears whole
+    or not at all, ``latest`` after it; the order of the copies is that in which they were made, also where the clock
+    was set back. Returns the new copy, None where there was nothing new.
 
     Raises
     ------
@@ -35,23 +36,32 @@ def date_build(site: Path, keep: int, now: float | None = None) -> Path | None:
     builds.mkdir(parents=True, exist_ok=True)
     for part in builds.glob(".*.part"):  # of a build that was killed
         shutil.rmtree(part)
+    before = dated(builds)
     new = None
-    if current.is_dir() and contents(current) != (contents(newest) if (newest := _newest(builds)) else None):
+    if current.is_dir() and contents(current) != (contents(before[-1]) if before else None):
         new = _copy(current, builds, now)
-        _point(site, new)
-    for old in dated(builds)[:-keep]:
+    copies = [*before, *([new] if new else [])]
+    if copies and not _points_to(site, copies[-1]):
+        _point(site, copies[-1])
+    for old in copies[:-keep]:
         shutil.rmtree(old)
     return new
 
 
 def dated(builds: Path) -> list[Path]:
-    """The dated copies, oldest first."""
-    return sorted(p for p in builds.iterdir() if p.is_dir() and _DATED.fullmatch(p.name))
+    """The dated copies in the order in which they were made, oldest first."""
+    return sorted((p for p in builds.iterdir() if p.is_dir() and _DATED.fullmatch(p.name)), key=_order)
 
 
-def _newest(builds: Path) -> Path | None:
-    found = dated(builds)
-    return found[-1] if found else None
+def _order(copy: Path) -> tuple[int, str, int]:
+    """Number of a copy, then its date: copies of earlier versions bear no number and came before."""
+    found = _DATED.fullmatch(copy.name)
+    assert found is not None
+    try:
+        number = int((copy / NUMBER).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        number = 0
+    return number, found[1], int(found[2] or 1)
 
 
 def contents(folder: Path) -> dict[str, str]:
@@ -65,30 +75,30 @@ def _left_out(place: Path) -> bool:
 
 
 def _copy(current: Path, builds: Path, now: float | None) -> Path:
-    name = time.strftime("%Y-%m-%dT%H%M%SZ", time.gmtime(now))
-    number = 1
+    stamp = time.strftime("%Y-%m-%dT%H%M%SZ", time.gmtime(now))
+    name, repeated = stamp, 1
     while (builds / name).exists():
-        number += 1
-        name = f"{name[:18]}-{number}"
+        repeated += 1
+        name = f"{stamp}-{repeated}"
     part = builds / f".{name}.part"
 
     def skipped(folder: str, names: list[str]) -> set[str]:
         return {n for n in names if n.startswith(".") or n in NOT_COPIED}
 
-    shutil.copytree(current, part, ignore=skipped, copy_function=_linked)
+    shutil.copytree(current, part, ignore=skipped)
+    number = max((_order(copy)[0] for copy in dated(builds)), default=0) + 1
+    (part / NUMBER).write_text(f"{number}\n", encoding="utf-8")
     part.rename(builds / name)
     return builds / name
 
 
-def _linked(source: str, target: str) -> None:
-    try:
-        os.link(source, target)
-    except OSError:
-        shutil.copy2(source, target)
+def _points_to(site: Path, newest: Path) -> bool:
+    link = site / LATEST
+    return link.is_symlink() and link.resolve() == newest.resolve()
 
 
 def _point(site: Path, new: Path) -> None:
-    """Let ``latest`` point to the new copy, in one step."""
+    """Let ``latest`` point to the newest copy, in one step."""
     part = site / f".{LATEST}.part"
     part.unlink(missing_ok=True)
     part.symlink_to(new.relative_to(site), target_is_directory=True)

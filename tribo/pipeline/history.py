@@ -7,10 +7,12 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from tribo.pipeline.step_record import read_record
+from tribo.escaping import from_spreadsheet
+from tribo.pipeline.step_record import OF_A_REPORT, read_record
 
 PARAMETERS = {"mu": ("mu", "mu_low", "mu_high"), "tau0": ("tau0_kPa", "tau0_low_kPa", "tau0_high_kPa")}
 
@@ -47,6 +49,7 @@ class CampaignRow:
     verdict_text: str = ""
     has_report: bool = False
     laws: tuple[Law, ...] = ()
+    measured_s: float = math.inf  # the same moment in seconds since 1970
 
 
 def history(site: Path) -> tuple[CampaignRow, ...]:
@@ -56,29 +59,30 @@ def history(site: Path) -> tuple[CampaignRow, ...]:
     steps = state / "steps"
     names = set(config["campaigns"]) | ({p.parent.name for p in steps.glob("*/report.json")})
     rows = [_row(name, site, config) for name in names]
-    return tuple(sorted(rows, key=lambda row: (row.measured or "9999", row.name)))
+    return tuple(sorted(rows, key=lambda row: (row.measured_s, row.name)))
 
 
 def _row(name: str, site: Path, config: Mapping[str, Any]) -> CampaignRow:
     out = site / "current" / name
-    record = read_record(site / ".tribo" / "steps" / name / "report.json")
+    record = read_record(site / ".tribo" / "steps" / name / "report.json", *OF_A_REPORT)
     state, why = _state(name, record, config)
     verdict = read_record(out / "verdict.json") or {}
     tests = _table(out / "tests.csv")
-    started = sorted(t["started_at"] for t in tests if t.get("started_at"))
+    started = sorted(moment for t in tests if (moment := _moment(t.get("started_at", ""))))
     return CampaignRow(
         name=name,
         title=_title(out) or name,
         state=state,
         why=why,
-        measured=started[0][:10] if started else "",
+        measured=started[0].date().isoformat() if started else "",
         built=record["finished"][:16].replace("T", " ") if record else "",
-        tests=sum(not t["set_aside"] for t in tests),
-        set_aside=sum(bool(t["set_aside"]) for t in tests),
+        tests=sum(not t.get("set_aside") for t in tests),
+        set_aside=sum(bool(t.get("set_aside")) for t in tests),
         verdict=str(verdict.get("verdict", "")),
         verdict_text=str(verdict.get("text") or ""),
         has_report=(out / "report.html").is_file(),
         laws=tuple(_laws(_table(out / "fits.csv"))),
+        measured_s=started[0].timestamp() if started else math.inf,
     )
 
 
@@ -86,6 +90,8 @@ def _state(name: str, record: Mapping[str, Any] | None, config: Mapping[str, Any
     """State of a campaign after a build, and why."""
     if name not in config["campaigns"]:
         return "gone", ("no longer in the folder of campaigns; the last report is kept",)
+    if refused := config["campaigns"][name].get("refused"):
+        return "unusable", tuple(refused)
     waiting = config["campaigns"][name]["waiting"]
     if waiting:
         return "waiting", tuple(waiting)
@@ -97,10 +103,23 @@ def _state(name: str, record: Mapping[str, Any] | None, config: Mapping[str, Any
     return record["status"].replace("_", " "), ()
 
 
-def _problem(problem: Mapping[str, Any]) -> str:
+def _problem(problem: Any) -> str:
+    """A recorded problem in words; whatever else a damaged record holds, as it is."""
     from tribo.errors import Problem
 
-    return str(Problem(**problem))
+    try:
+        return str(Problem(**problem))
+    except TypeError:
+        return str(problem)
+
+
+def _moment(started_at: str) -> datetime | None:
+    """The start of a test as a time that can be compared; None where it is none."""
+    try:
+        moment = datetime.fromisoformat(started_at)
+    except ValueError:
+        return None
+    return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
 
 
 def _title(out: Path) -> str:
@@ -109,15 +128,16 @@ def _title(out: Path) -> str:
     try:
         with h5py.File(out / "campaign.nc") as file:
             return str(file.attrs.get("title", ""))
-    except OSError:
+    except (OSError, RuntimeError, KeyError, ValueError):  # h5py on damaged files
         return ""
 
 
 def _table(path: Path) -> list[dict[str, str]]:
     try:
         with path.open(encoding="utf-8", newline="") as stream:
-            return list(csv.DictReader(stream))
-    except OSError:
+            rows = csv.DictReader(stream)
+            return [{k: from_spreadsheet(v or "") for k, v in row.items() if k is not None} for row in rows]
+    except (OSError, ValueError, csv.Error):
         return []
 
 
@@ -125,11 +145,14 @@ def _laws(fits: Sequence[Mapping[str, str]]) -> list[Law]:
     found = []
     for fit in fits:
         for parameter, columns in PARAMETERS.items():
-            value, low, high = (_number(fit[column]) for column in columns)
-            if math.isfinite(value):
+            value, low, high = (_number(fit.get(column, "")) for column in columns)
+            if {"sample", "regime"} <= set(fit) and math.isfinite(value):
                 found.append(Law(fit["sample"], fit["regime"], parameter, value, low, high))
     return found
 
 
 def _number(cell: str) -> float:
-    return float(cell) if cell else math.nan
+    try:
+        return float(cell) if cell else math.nan
+    except ValueError:
+        return math.nan

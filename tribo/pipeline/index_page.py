@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
+import io
 import json
 import math
 import sys
@@ -15,6 +17,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from tribo import __version__
+from tribo.escaping import for_spreadsheet
 from tribo.pipeline.history import CampaignRow, Law, history
 from tribo.pipeline.trend import FEWEST, LEVEL, SHORTEST, Change, change_points
 
@@ -24,7 +27,7 @@ STATES = {
 }  # fmt: skip
 VERDICTS = {
     "no_misfit": "no misfit", "named": "cause identified", "undetermined": "several possible causes",
-    "unknown": "misfit of unknown cause", "": "–",
+    "partly": "cause identified, misfit left", "unknown": "misfit of unknown cause", "": "–",
 }  # fmt: skip
 SYMBOLS = {"mu": ("μ", ""), "tau0": ("τ₀", "kPa")}
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 300.0, 136.0, 44.0, 8.0, 16.0, 18.0
@@ -61,11 +64,11 @@ def write_index(site: Path) -> str:
     from tribo.store.whole_files import write_text
 
     rows = history(site)
-    changes = change_points({"|".join(key): values for key, values in series(rows).items()})
+    changes = change_points({series_name(key): values for key, values in series(rows).items()})
     digest = hashlib.sha256()
     for name, text in {"index.html": page(rows, changes), "trend.csv": trend_csv(rows)}.items():
         path = site / "current" / name
-        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+        if not path.is_file() or path.read_bytes() != text.encode("utf-8"):
             write_text(path, text)
         digest.update(text.encode())
     return digest.hexdigest()
@@ -80,12 +83,26 @@ def series(rows: Sequence[CampaignRow]) -> dict[Key, list[float]]:
 
 def trend_csv(rows: Sequence[CampaignRow]) -> str:
     """The plotted numbers: one row per campaign, sample, regime and parameter."""
-    lines = ["campaign,measured,sample,regime,parameter,value,low,high"]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["campaign", "measured", "sample", "regime", "parameter", "value", "low", "high"])
     for row in rows:
         for law in row.laws:
-            numbers = ",".join("" if math.isnan(v) else f"{v:.8g}" for v in (law.value, law.low, law.high))
-            lines.append(f'"{row.name}",{row.measured},"{law.sample}",{law.regime},{law.parameter},{numbers}')
-    return "\n".join(lines) + "\n"
+            numbers = ["" if math.isnan(v) else f"{v:.8g}" for v in (law.value, law.low, law.high)]
+            words = map(for_spreadsheet, (row.name, row.measured, law.sample, law.regime, law.parameter))
+            writer.writerow([*words, *numbers])
+    return text.getvalue()
+
+
+def series_name(key: Key) -> str:
+    """Sample, regime and parameter as one text; :func:`key_of` gives them back, whatever the sample is called."""
+    return json.dumps(key)
+
+
+def key_of(name: str) -> Key:
+    """The key of a :func:`series_name`."""
+    sample, regime, parameter = json.loads(name)
+    return sample, regime, parameter
 
 
 def page(rows: Sequence[CampaignRow], changes: Sequence[Change]) -> str:
@@ -98,7 +115,7 @@ def page(rows: Sequence[CampaignRow], changes: Sequence[Change]) -> str:
     )
     by_sample: dict[str, list[Panel]] = {}
     for key in series(rows):
-        by_sample.setdefault(key[0], []).append(panel(key, rows, [c for c in changes if c.series == "|".join(key)]))
+        by_sample.setdefault(key[0], []).append(panel(key, rows, [c for c in changes if key_of(c.series) == key]))
     longest = max((sum(map(math.isfinite, v)) for v in series(rows).values()), default=0)
     return environment.get_template("index.html").render(
         rows=list(reversed(rows)), states=STATES, verdicts=VERDICTS, link=report_link, panels=by_sample,
@@ -173,7 +190,7 @@ def _short(value: float) -> str:
 
 def change_sentence(change: Change, rows: Sequence[CampaignRow]) -> str:
     """A change in words."""
-    sample, regime, parameter = change.series.split("|")
+    sample, regime, parameter = key_of(change.series)
     symbol, unit = SYMBOLS[parameter]
     verb = "rises" if change.after > change.before else "falls"
     p = "below 0.001" if change.p < 0.001 else f"{change.p:.3f}"

@@ -9,13 +9,19 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from tribo.errors import CampaignError, Problem
+from tribo.errors import CampaignError, Problem, system_problem
+from tribo.escaping import is_control, well_formed
+from tribo.limits import LONGEST_NAME
+from tribo.links import LEADS_OUT, leads_out, paths_below
 
 # how copying programs and browsers name a file that is not whole yet
 UPLOAD_SUFFIXES = (".part", ".partial", ".tmp", ".temp", ".crdownload", ".download", ".filepart", ".upload", ".!ut")
 OVERRIDES = ".overrides.csv"
+_NOT_IN_NAMES = ("{", "}", "\\")  # the workflow would take braces for placeholders
+_PAGES_OF_THE_SITE = ("index.html", "trend.csv")
 IGNORED = ("Thumbs.db", "desktop.ini", ".DS_Store")
 _CHUNK = 1 << 20
+_LINK = "a link that leads out of the campaign"  # in place of a hash: nothing behind it is read
 
 
 @dataclass(frozen=True)
@@ -24,7 +30,7 @@ class Dropped:
 
     ``files`` maps each file (relative to the campaign) to its SHA-256, ``waiting`` says which files are not whole
     yet and why; a campaign with such files is postponed. ``overrides`` is NAME.overrides.csv beside the
-    campaign: decisions made by hand about single pulls.
+    campaign: decisions made by hand about single pulls. ``refused`` says why it cannot be built as it is.
     """
 
     name: str
@@ -32,6 +38,12 @@ class Dropped:
     files: Mapping[str, str] = field(default_factory=dict)
     waiting: tuple[str, ...] = ()
     overrides: Path | None = None
+    refused: tuple[str, ...] = ()
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it can be built now."""
+        return not (self.waiting or self.refused)
 
     @property
     def digest(self) -> str:
@@ -53,15 +65,37 @@ def scan(drop: Path, settle_s: float = 60.0) -> tuple[Dropped, ...]:
     """
     if not drop.is_dir():
         raise CampaignError(Problem("missing", "this folder does not exist", file=str(drop)))
-    found = [
-        _with_overrides(_look(path, settle_s), settle_s) for path in sorted(drop.iterdir()) if _is_campaign(path)
-    ]
+    found = [_looked_at(path, settle_s) for path in sorted(drop.iterdir()) if _is_campaign(path)]
     names = [campaign.name for campaign in found]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         what = "a folder and a .zip have the same name; rename one of them"
         raise CampaignError(Problem("duplicate_campaign", what, file=str(drop), found=name) for name in twice)
     return tuple(found)
+
+
+def _looked_at(path: Path, settle_s: float) -> Dropped:
+    """A campaign with its files; one whose name or files cannot be used is refused, and no other."""
+    shown = well_formed(path.name)
+    if why := _name_fault(path.stem if path.is_file() and not _uploading(path.name) else path.name):
+        return Dropped(shown, path, refused=(f"the name of this campaign {why}; rename it",))
+    try:
+        return _with_overrides(_look(path, settle_s), settle_s)
+    except OSError as why_not:
+        return Dropped(shown, path, refused=(str(system_problem(why_not, shown)),))
+
+
+def _name_fault(name: str) -> str:
+    """Why files and folders cannot be named after a campaign, as the end of a sentence; empty where they can."""
+    if well_formed(name) != name or any(map(is_control, name)):
+        return "is not valid UTF-8 or contains a control character"
+    if len(name.encode()) > LONGEST_NAME:
+        return f"is longer than {LONGEST_NAME} bytes"
+    if found := [c for c in _NOT_IN_NAMES if c in name]:
+        return f"contains {' '.join(found)}"
+    if name.lower() in _PAGES_OF_THE_SITE:
+        return "is that of a page of the site"
+    return ""
 
 
 def _is_campaign(path: Path) -> bool:
@@ -75,6 +109,8 @@ def _uploading(name: str) -> bool:
 
 
 def _look(path: Path, settle_s: float) -> Dropped:
+    if leads_out(path.parent, path):
+        return Dropped(path.stem if path.suffix.lower() == ".zip" else path.name, path, waiting=(LEADS_OUT,))
     if path.is_file():
         name = path.stem if not _uploading(path.name) else path.name
         why = _not_whole(path, settle_s)
@@ -83,8 +119,11 @@ def _look(path: Path, settle_s: float) -> Dropped:
         digest, changed = _hashed(path)
         return Dropped(name, path, {path.name: digest}, (f"{path.name} is still being written",) if changed else ())
     files, waiting = {}, []
-    for file in _files(path):
-        shown = file.relative_to(path).as_posix()
+    for file, outward in _files(path):
+        shown = well_formed(file.relative_to(path).as_posix())
+        if outward:
+            files[shown] = _LINK
+            continue
         why = _not_whole(file, settle_s)
         if not why:
             files[shown], changed = _hashed(file)
@@ -99,6 +138,8 @@ def _look(path: Path, settle_s: float) -> Dropped:
 def _with_overrides(campaign: Dropped, settle_s: float) -> Dropped:
     """The campaign with the overrides that lie beside it."""
     beside = campaign.path.with_name(f"{campaign.name}{OVERRIDES}")
+    if leads_out(campaign.path.parent, beside):
+        return replace(campaign, waiting=(*campaign.waiting, f"{beside.name} is {LEADS_OUT}"))
     if not beside.is_file():
         return campaign
     why = _not_whole(beside, settle_s)
@@ -108,11 +149,12 @@ def _with_overrides(campaign: Dropped, settle_s: float) -> Dropped:
     )
 
 
-def _files(folder: Path) -> Iterator[Path]:
-    for path in sorted(folder.rglob("*")):
+def _files(folder: Path) -> Iterator[tuple[Path, bool]]:
+    """The files of a campaign, each with whether it is a link that leads out of the campaign."""
+    for path, outward in paths_below(folder):
         hidden = path.name.startswith(".") and not _uploading(path.name)
-        if path.is_file() and path.name not in IGNORED and not hidden:
-            yield path
+        if (outward or path.is_file()) and path.name not in IGNORED and not hidden:
+            yield path, outward
 
 
 def _not_whole(file: Path, settle_s: float) -> str:

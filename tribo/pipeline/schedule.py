@@ -6,13 +6,18 @@ import hashlib
 import re
 import shlex
 import sys
-from collections.abc import Mapping
+import unicodedata
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from tribo.errors import Problem, TriboError
 
 LEFT_OR_SET_ASIDE = "3 75"  # some campaigns postponed or unusable, or another build running: no failure
+_LABEL = r"[A-Za-z0-9](?:[A-Za-z0-9-]*[A-Za-z0-9])?"
+_ADDRESS = re.compile(rf"[A-Za-z0-9][A-Za-z0-9._+-]*@{_LABEL}(?:\.{_LABEL})*")
+_TIME = re.compile(r"([01]?[0-9]|2[0-3]):([0-5][0-9])")
+_BREAKS_LINES = ("Cc", "Cs", "Zl", "Zp")  # control characters, bytes that are no UTF-8, line and paragraph separators
 
 
 @dataclass(frozen=True)
@@ -35,21 +40,25 @@ class Schedule:
         Raises
         ------
         TriboError
-            ``at`` is no time of day, ``mail`` no address, or both a command and a mail address are given.
+            ``at`` is no time of day, ``mail`` no address, ``notify`` no complete command, both a command and a mail
+            address are given, or one of the texts contains a character that would end a line.
         """
-        problems = []
-        time = re.fullmatch(r"([01]?\d|2[0-3]):([0-5]\d)", at)
-        if not time:
-            what, allowed = "not a time of day", "00:00 to 23:59"
-            problems.append(Problem("not_a_time", what, column="--at", found=at, allowed=allowed))
-        if mail and not re.fullmatch(r"[\w.+-]+@[\w.-]+", mail):
-            problems.append(Problem("not_an_address", "not a mail address", column="--mail", found=mail))
+        time = _TIME.fullmatch(at)
+        problems = [] if time else [_wrong("not_a_time", "not a time of day", "--at", at, "00:00 to 23:59")]
+        drop, site = drop.resolve(), site.resolve()
+        texts = {"DROP": str(drop), "--site": str(site), "--notify": notify, "--mail": mail}
+        problems += [p for option, text in texts.items() for p in _line_breaks(option, text)]
+        if mail and not _ADDRESS.fullmatch(mail):
+            problems.append(_wrong("not_an_address", "not a mail address", "--mail", mail, "name@domain"))
+        if not _is_whole_command(notify):
+            what, allowed = "not a complete command", "a command with all its quotes closed"
+            problems.append(_wrong("not_a_command", what, "--notify", notify, allowed))
         if mail and notify:
             problems.append(Problem("two_notices", "give only one of these options", allowed="--notify or --mail"))
         if problems or time is None:
             raise TriboError(problems)
         told = f'mail -s "tribo: $1 failed" {mail}' if mail else notify
-        return cls(drop.resolve(), site.resolve(), int(time[1]), int(time[2]), keep, told)
+        return cls(drop, site, int(time[1]), int(time[2]), keep, told)
 
     @property
     def name(self) -> str:
@@ -60,8 +69,26 @@ class Schedule:
     @property
     def command(self) -> list[str]:
         """The build command, with this installation of tribo. The lock of the site prevents simultaneous builds."""
-        tribo = [sys.executable, "-m", "tribo"]
+        tribo = [sys.executable, "-P", "-m", "tribo"]  # -P: nothing is imported from the folder it happens to start in
         return [*tribo, "build", str(self.drop), "-o", str(self.site), "--keep", str(self.keep), "--quiet"]
+
+
+def _wrong(kind: str, what: str, option: str, found: str, allowed: str) -> Problem:
+    return Problem(kind, what, column=option, found=found, allowed=allowed)
+
+
+def _line_breaks(option: str, text: str) -> Iterator[Problem]:
+    """A unit or crontab is read line by line, so that a text with a line end in it would add lines of its own."""
+    if any(unicodedata.category(character) in _BREAKS_LINES for character in text):
+        what = "this text contains a line end, another control character, or bytes that are not UTF-8"
+        yield _wrong("control_character", what, option, text, "one line of text")
+
+
+def _is_whole_command(notify: str) -> bool:
+    try:
+        return bool(shlex.split(notify)) or not notify
+    except ValueError:
+        return False
 
 
 def units(schedule: Schedule) -> dict[str, str]:
@@ -80,9 +107,9 @@ def units(schedule: Schedule) -> dict[str, str]:
     )
     found = {f"{name}.service": service, f"{name}.timer": timer}
     if schedule.notify:
-        # the shell gets the unit's name as $1 and its last lines on standard input
-        hook = f"journalctl --user -u \"$1\" -n 40 --no-pager | {schedule.notify}"
-        words = ["/bin/sh", "-c", hook, "sh", f"{name}.service"]
+        # the command gets the unit's name as $1 and its last lines on standard input
+        hook = 'journalctl --user -u "$1" -n 40 --no-pager | /bin/sh -c "$2" sh "$1"'
+        words = ["/bin/sh", "-c", hook, "sh", f"{name}.service", schedule.notify]
         found[f"{name}-failed.service"] = (
             f"[Unit]\nDescription=Notice that {name} failed\n\n"
             f"[Service]\nType=oneshot\nExecStart={' '.join(map(_unit_quoted, words))}\n"
@@ -91,7 +118,8 @@ def units(schedule: Schedule) -> dict[str, str]:
 
 
 def _unit_text(text: str) -> str:
-    return text.replace("%", "%%")
+    r"""A text of a unit as it is; in quotes, because a line that ends in ``\`` would go on in the next one."""
+    return '"' + text.replace("%", "%%") + '"'
 
 
 def _unit_quoted(word: str) -> str:
@@ -104,10 +132,21 @@ def cron_line(schedule: Schedule) -> str:
     """One line for `crontab -e`; the notice gets the build's last lines on standard input."""
     log = schedule.site / ".tribo" / "cron.log"
     build = f"mkdir -p {_shell(log.parent)}; {shlex.join(schedule.command)} > {_shell(log)} 2>&1; s=$?"
-    notice = f"set -- {schedule.name}; tail -n 40 {_shell(log)} | {schedule.notify}" if schedule.notify else "exit $s"
+    told = f"tail -n 40 {_shell(log)} | /bin/sh -c {shlex.quote(schedule.notify)} sh {schedule.name}"
+    notice = told if schedule.notify else "exit $s"
     line = f"{build}; case $s in 0|3|75) ;; *) {notice};; esac"
-    escaped = line.replace("%", r"\%")  # cron ends the command at a bare %
-    return f"{schedule.minute} {schedule.hour} * * * {escaped}\n"
+    return f"{schedule.minute} {schedule.hour} * * * {_for_cron(line)}\n"
+
+
+def _for_cron(line: str) -> str:
+    r"""A shell command as a crontab holds it: cron ends the command at a bare ``%``, and reads ``\%`` as ``%``.
+
+    ``\`` before ``%`` has no spelling in a crontab. Where it occurs, the command is quoted as one word, in which the
+    two can be kept apart by a pair of quotes.
+    """
+    if r"\%" not in line:
+        return line.replace("%", r"\%")
+    return "/bin/sh -c " + shlex.quote(line).replace("%", r"''\%")
 
 
 def _shell(path: Path) -> str:

@@ -6,11 +6,17 @@ import json
 from pathlib import Path
 from typing import Any
 
+OF_A_REPORT = ("status", "digest", "problems", "finished")
+_TYPES: dict[str, type | tuple[type, ...]] = {
+    "status": str, "digest": str, "finished": str, "files": dict, "problems": list, "samples": list, "cells": list,
+}  # fmt: skip
 
-def read_record(path: Path) -> dict[str, Any] | None:
-    """The record of a finished step; None where there is none."""
+
+def read_record(path: Path, *keys: str) -> dict[str, Any] | None:
+    """The record of a finished step; None where there is none, or a damaged one that lacks any of ``keys``."""
     try:
-        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
         return None
-    return record
+    whole = isinstance(record, dict) and all(isinstance(record.get(key), _TYPES[key]) for key in keys)
+    return record if whole else None

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -28,6 +28,7 @@ UNIT_ENDINGS = {
     "_percent": "percent",
 }  # fmt: skip
 OF_DIAGNOSIS = ("/residuals", "/extended_runs")  # groups that a diagnosis rewrites or leaves out as a whole
+_PLAIN_NUMBER = re.compile(r"-?(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d{1,2})?")  # 001 is a name
 UNITLESS = {"mu": "1", "mu_u": "1", "ratio": "1", "ratio_low": "1", "ratio_high": "1", "cov": "kPa"}
 
 
@@ -74,7 +75,8 @@ def write_store(
     if provenance is not None:
         about |= {"source": provenance.origin, "history": f"{provenance.started_at} {provenance.command}".strip()}
         about["provenance"] = json.dumps(provenance.as_record(), ensure_ascii=False, default=str)
-    groups = {"/": xr.Dataset(attrs=about), "/tests": _table(result_tables.tests_table(study), "test")}
+    tests, own = result_tables.tests_table(study), result_tables.covariates(study)
+    groups = {"/": xr.Dataset(attrs=about), "/tests": _table(tests, "test", own)}
     groups["/traces"] = _ragged(study)
     if study.fits:
         groups["/fits"] = _table(result_tables.fits_table(study.fits), "fit")
@@ -117,22 +119,31 @@ def _diagnosed(diagnosis: Diagnosis) -> dict[str, xr.Dataset]:
     return groups
 
 
-def _table(frame: pd.DataFrame, dimension: str) -> xr.Dataset:
-    variables = {}
+def _table(frame: pd.DataFrame, dimension: str, covariates: Iterable[str] = ()) -> xr.Dataset:
+    """A table as variables of one dimension; texts of ``covariates`` become numbers where all are written as such."""
+    variables: dict[str, Any] = {}
     for name in frame.columns:
-        safe = re.sub(r"[/\s]+", "_", str(name))
-        variables[safe] = (dimension, _values(frame[name]), _units(str(name)))
+        safe = stem = re.sub(r"[/\s\0]+", "_", str(name)).strip(".") or "unnamed"
+        number = 2
+        while safe in variables:  # "a b" and "a/b" are two columns
+            safe, number = f"{stem}_{number}", number + 1
+        values = _values(frame[name], as_numbers=name in covariates)
+        variables[safe] = (dimension, values, _units(str(name)))
     return xr.Dataset(variables)
 
 
-def _values(column: pd.Series) -> np.ndarray:
+def _values(column: pd.Series, as_numbers: bool = False) -> np.ndarray:
     """Numbers as float64 or int64, everything else as text; a missing number is NaN, a missing text empty."""
+    if pd.api.types.is_integer_dtype(column):
+        return column.to_numpy(np.int64)
     if pd.api.types.is_numeric_dtype(column) or column.isna().all():
-        return column.to_numpy(float) if not pd.api.types.is_integer_dtype(column) else column.to_numpy(np.int64)
-    try:
+        return column.to_numpy(float)
+    given = column.dropna()
+    if not any(isinstance(value, str) for value in given):
         return pd.to_numeric(column).to_numpy(float)
-    except (ValueError, TypeError):
-        return column.fillna("").astype(str).to_numpy(object)
+    if as_numbers and all(_PLAIN_NUMBER.fullmatch(str(value)) for value in given if value != ""):
+        return pd.to_numeric(column.replace("", np.nan)).to_numpy(float)
+    return column.fillna("").astype(str).to_numpy(object)
 
 
 def _ragged(study: Study) -> xr.Dataset:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import logging
 import re
-from collections.abc import Callable, Iterable, Iterator
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -15,13 +17,15 @@ import pandas as pd
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from tribo.errors import Problem, unexpected
+from tribo.escaping import printable
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES, FIGURES
 from tribo.figures.record import FigureOf
 from tribo.figures.style import house_style
+from tribo.forked import each
 from tribo.records import Study
 from tribo.report.html.hover import Series, series_of
 from tribo.report.paper.typeset import figure_files
-from tribo.report.parallel import each
 from tribo.report.result_tables import to_csv
 from tribo.store.whole_files import write_bytes
 
@@ -102,7 +106,7 @@ def draw_all(
     """Every figure there are numbers for, by name, those of the study before those of the diagnosis; no files."""
     todo = list(_with_numbers(study, diagnosis))
     found = {}
-    for done, figure in enumerate(each(partial(_draw, origin, drawing.keep), todo, drawing.jobs), start=1):
+    for done, figure in enumerate(each(partial(_drawn_or_said, origin, drawing.keep), todo, drawing.jobs), start=1):
         # not in the other processes: typst keeps threads of its own, which do not survive a fork
         rest = figure_files(figure.files["svg"], figure.title, origin)
         found[figure.name] = replace(figure, files={**figure.files, **rest})
@@ -111,15 +115,51 @@ def draw_all(
     return found
 
 
-def _with_numbers(study: Study | None, diagnosis: Diagnosis | None) -> Iterator[tuple[str, pd.DataFrame]]:
-    of_study = ((name, figure.numbers(study)) for name, figure in FIGURES.items() if study is not None)
-    of_diagnosis = ((n, figure.numbers(diagnosis)) for n, figure in DIAGNOSIS_FIGURES.items() if diagnosis is not None)
-    yield from ((name, numbers) for name, numbers in (*of_study, *of_diagnosis) if not numbers.empty)
+Numbers = pd.DataFrame | Problem
 
 
-def _draw(origin: str, keep: Keep, todo: tuple[str, pd.DataFrame]) -> Drawn:
+def _with_numbers(study: Study | None, diagnosis: Diagnosis | None) -> Iterator[tuple[str, Numbers]]:
+    made_of: list[tuple[Mapping[str, FigureOf[Any]], Any]] = [(FIGURES, study), (DIAGNOSIS_FIGURES, diagnosis)]
+    for figures, results in made_of:
+        for name, figure in figures.items() if results is not None else ():
+            try:
+                numbers = figure.numbers(results)
+            except Exception as why:  # one figure must not cost the others
+                yield name, unexpected(why, "the numbers of this figure cannot be computed", name)
+                continue
+            if not numbers.empty:
+                yield name, numbers
+
+
+def _record_of(name: str) -> FigureOf[Any]:
+    return FIGURES[name] if name in FIGURES else DIAGNOSIS_FIGURES[name]
+
+
+def _drawn_or_said(origin: str, keep: Keep, todo: tuple[str, Numbers]) -> Drawn:
+    """A figure, or in its place the sentence that says why it is not there."""
     name, numbers = todo
-    record: FigureOf[Any] = FIGURES[name] if name in FIGURES else DIAGNOSIS_FIGURES[name]
+    if isinstance(numbers, Problem):
+        return _said_instead(name, numbers, pd.DataFrame(), origin)
+    try:
+        return _draw(origin, keep, name, numbers)
+    except OSError:
+        raise
+    except Exception as why:  # one figure must not cost the others
+        return _said_instead(name, unexpected(why, "this figure cannot be drawn", name), numbers, origin)
+
+
+def _said_instead(name: str, why: Problem, numbers: pd.DataFrame, origin: str) -> Drawn:
+    logging.getLogger("tribo").error("%s", printable(str(why)))
+    with house_style():
+        figure = Figure(figsize=(5.0, 1.0))
+        figure.text(0.02, 0.5, "\n".join(textwrap.wrap(str(why), 90)), va="center")
+    title = _record_of(name).title
+    files = {"csv": to_csv(numbers).encode("utf-8"), "svg": svg_text(figure, title, origin).encode("utf-8")}
+    return Drawn(name, title, str(why), files)
+
+
+def _draw(origin: str, keep: Keep, name: str, numbers: pd.DataFrame) -> Drawn:
+    record = _record_of(name)
     made_from = (numbers, record.title, origin, matplotlib.__version__)
     svg, series = keep(f"figure-{name}", made_from, lambda: _svg_and_series(record, numbers, origin), DRAWN_BY)
     csv = to_csv(numbers).encode("utf-8")

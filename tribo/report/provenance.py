@@ -7,11 +7,13 @@ import os
 import platform
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
-from hashlib import sha256
+from hashlib import file_digest, sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from tribo.escaping import well_formed
+from tribo.links import leads_out, paths_below
 from tribo.records import Study
 from tribo.store.whole_files import write_text
 
@@ -22,6 +24,7 @@ PACKAGES = (
 )  # fmt: skip
 DESCRIBED_IN = ("campaign.toml", "tests.csv")
 RAW = "raw"
+OVERRIDES = "--overrides"  # the table of manual decisions, among the inputs of a campaign
 OPTIONS = {"rule": "Rule", "weights": "Weights", "flat": "Flat sample", "runs": "Simulations per load"}
 
 
@@ -45,7 +48,7 @@ class Provenance:
     @property
     def inputs_digest(self) -> str:
         """One SHA-256 over the names and hashes of all inputs, the overrides among them."""
-        hashes = {**self.inputs, **({"--overrides": self.overrides["sha256"]} if self.overrides else {})}
+        hashes = {**self.inputs, **({OVERRIDES: self.overrides["sha256"]} if self.overrides else {})}
         listing = "".join(f"{digest}  {name}\n" for name, digest in sorted(hashes.items()))
         return sha256(listing.encode()).hexdigest()
 
@@ -90,15 +93,18 @@ def gather_provenance(
     campaign: Path | None = None,
     overrides: Path | None = None,
 ) -> Provenance:
-    """Versions of the software, and hashes of all files of the campaign.
+    """Versions of the software, and hashes of all files of the campaign: those read as they were when they were read.
 
     ``campaign`` is the folder or .zip as the user gave it, ``overrides`` the table of manual decisions.
     """
-    root = study.ingested.campaign.root
-    named = {test.file.partition("#")[0] for test in study.ingested.campaign.tests}
-    inputs = {name: file_hash(root / name) for name in dict.fromkeys((*input_names(root), *sorted(named)))
-              if (root / name).is_file()}  # fmt: skip
-    decided = {} if overrides is None else {"file": str(overrides), "sha256": file_hash(overrides)}
+    root, read = study.ingested.campaign.root, dict(study.ingested.campaign.inputs)
+    decided = {}
+    if overrides is not None:
+        decided = {"file": str(overrides), "sha256": read.pop(OVERRIDES, "") or file_hash(overrides)}
+    inputs = {}
+    for name in dict.fromkeys((*input_names(root), *sorted(read))):
+        if name in read or (root / name).is_file():
+            inputs[well_formed(name)] = read.get(name) or file_hash(root / name)
     where = str(campaign or root)
     return Provenance(command, started_at, seed, dict(options or {}), _versions(), inputs, where, decided)
 
@@ -112,10 +118,10 @@ def provenance_of_table(
 
 
 def input_names(root: Path) -> Iterator[str]:
-    """What a campaign folder holds: its two tables and every file of raw/, in order."""
-    yield from (name for name in DESCRIBED_IN if (root / name).is_file())
-    if (root / RAW).is_dir():
-        yield from (p.relative_to(root).as_posix() for p in sorted((root / RAW).rglob("*")) if p.is_file())
+    """What a campaign folder holds: its two tables and every file of raw/, in order; no links that lead out of it."""
+    yield from (name for name in DESCRIBED_IN if (root / name).is_file() and not leads_out(root, root / name))
+    below = paths_below(root, RAW)
+    yield from (path.relative_to(root).as_posix() for path, outward in below if not outward and path.is_file())
 
 
 def _versions() -> dict[str, str]:
@@ -130,7 +136,8 @@ def _versions() -> dict[str, str]:
 
 def file_hash(path: Path) -> str:
     """SHA-256 of a file."""
-    return sha256(path.read_bytes()).hexdigest()
+    with path.open("rb") as stream:
+        return file_digest(stream, "sha256").hexdigest()
 
 
 def write_provenance(provenance: Provenance, out: Path, outputs: Mapping[str, str] | None = None) -> Path:
@@ -160,9 +167,24 @@ def read_record(out: Path) -> dict[str, Any] | None:
     """The contents of provenance.json of a folder; None if there is none, or none of this kind."""
     try:
         record = json.loads((out / FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None
-    return record if isinstance(record, dict) and isinstance(record.get("outputs"), dict) else None
+    return record if isinstance(record, dict) and _is_whole(record) else None
+
+
+def _is_whole(record: Mapping[str, Any]) -> bool:
+    """Whether a record has every part that is read from it, each of its kind."""
+    texts = [record.get("inputs_sha256"), record.get("campaign", "")]
+    tables = [record.get(name) for name in ("inputs", "outputs", "options", "versions")]
+    overrides = record.get("overrides") or {}
+    return (
+        all(isinstance(text, str) and "\0" not in text for text in texts)
+        and all(isinstance(table, dict) for table in tables)
+        and all(isinstance(t, str) and "\0" not in n for name in ("inputs", "outputs") for n, t in record[name].items())
+        and isinstance(overrides, dict)
+        and (not overrides or all(isinstance(overrides.get(key), str) for key in ("file", "sha256")))
+        and isinstance(record.get("seed"), int | None)
+    )
 
 
 def settle_outputs(

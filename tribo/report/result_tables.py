@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from tribo.comparison.agreement import ratios
+from tribo.escaping import for_spreadsheet
 from tribo.records import LawFit, Pull, SetAside, Study, Test
 from tribo.store.whole_files import write_text
 
@@ -20,7 +21,15 @@ TESTS_COLUMNS = [
     "set_aside", "sample", "specimen", "normal_load_N", "peak_s", "onset_s", "window_start_s", "window_end_s",
     "zero_u_N", "rise_N_per_s", "rise_stiffness_N_per_m", "stick_slip_amplitude_N", "stick_slip_period_s", "noise_N",
     "drift_N_per_s", "direction", "speed_m_s", "hold_s", "repeat", "run_order", "specimen_run", "started_at",
-    "temperature_C", "humidity_pct", "operator", "file", "doubts",
+    "temperature_C", "humidity_pct", "operator", "file", "doubts", "zero_rule", "first_maximum_N", "highest_N",
+    "first_drop_N", "recorded_load_N", "recorded_load_u_N", "regime", "cycles", "stick_peak_N", "stick_peak_u_N",
+    "stick_trough_N", "stick_trough_u_N", "stick_drop_N", "stick_drop_u_N", "stick_period_s", "stick_period_u_s",
+    "loading_N_per_s", "loading_u_N_per_s", "stuck_share", "stuck_share_u", "restarts", "restart_N", "restart_u_N",
+    "restart_hold_s",
+]  # fmt: skip
+RESTARTS_COLUMNS = [
+    "test_id", "sample", "specimen", "normal_load_N", "restart", "hold_s", "stop_s", "peak_s", "static_N", "static_u_N",
+    "sliding_N", "sliding_u_N",
 ]  # fmt: skip
 FITS_COLUMNS = [
     "sample", "regime", "mu", "mu_u", "tau0_kPa", "tau0_u_kPa", "cov", "n_specimens", "n_tests", "method",
@@ -33,7 +42,8 @@ COMPARISON_COLUMNS = [
 _READINGS = [
     "static_N", "static_u_N", "sliding_N", "sliding_u_N", "rule", "zero_N", "peak_s", "onset_s", "zero_u_N",
     "rise_N_per_s", "rise_stiffness_N_per_m", "stick_slip_amplitude_N", "stick_slip_period_s", "noise_N",
-    "drift_N_per_s",
+    "drift_N_per_s", "zero_rule", "first_maximum_N", "highest_N", "first_drop_N", "recorded_load_N",
+    "recorded_load_u_N",
 ]  # fmt: skip
 _CONDITIONS = [
     "sample", "specimen", "normal_load_N", "direction", "speed_m_s", "hold_s", "repeat", "run_order",
@@ -62,9 +72,13 @@ def tests_table(study: Study) -> pd.DataFrame:
     ]
     placed += [(_faulty_row(fault), {"test_id": fault.test_id, "set_aside": fault.reason}) for fault in aside.values()]
     rows = [row for _, row in sorted(placed, key=lambda item: math.inf if item[0] is None else item[0])]
-    covariates = list(dict.fromkeys(name for t in ingested.campaign.tests for name in t.covariates))
-    extra = [name for name in covariates if name not in TESTS_COLUMNS]
-    return pd.DataFrame(rows, columns=[*TESTS_COLUMNS, *extra])
+    return pd.DataFrame(rows, columns=[*TESTS_COLUMNS, *covariates(study)])
+
+
+def covariates(study: Study) -> list[str]:
+    """Columns of tests.csv that tribo does not know and keeps as they are."""
+    found = dict.fromkeys(name for t in study.ingested.campaign.tests for name in t.covariates)
+    return [name for name in found if name not in TESTS_COLUMNS]
 
 
 def _faulty_row(fault: SetAside) -> int | None:
@@ -81,7 +95,41 @@ def _test_row(test: Test, pull: Pull | None, fault: SetAside | None) -> dict[str
         row |= {name: getattr(pull, name) for name in _READINGS}
         row |= {"window": f"{start:.6g}:{end:.6g}", "window_start_s": start, "window_end_s": end}
         row["flags"] = ";".join(pull.flags)
+        row |= _oscillation_cells(pull) | _restart_cells(pull)
     return row
+
+
+def _oscillation_cells(pull: Pull) -> dict[str, object]:
+    """How the force varies while sliding; a steady or irregular one has no cycles to report."""
+    found = pull.oscillation
+    if found is None:
+        return {}
+    named = {name: getattr(found, name) for name in ("regime", "cycles", "loading_N_per_s", "loading_u_N_per_s")}
+    named |= {"stuck_share": found.stuck_share, "stuck_share_u": found.stuck_share_u}
+    for name in ("peak", "trough", "drop"):
+        named |= {f"stick_{name}_N": getattr(found, f"{name}_N"), f"stick_{name}_u_N": getattr(found, f"{name}_u_N")}
+    return named | {"stick_period_s": found.period_s, "stick_period_u_s": found.period_u_s}
+
+
+def _restart_cells(pull: Pull) -> dict[str, object]:
+    """The number of restarts, and the first of them; all are in restarts.csv."""
+    if not pull.restarts:
+        return {}
+    first = pull.restarts[0]
+    found = {"restart_N": first.static_N, "restart_u_N": first.static_u_N, "restart_hold_s": first.hold_s}
+    return {"restarts": len(pull.restarts), **found}
+
+
+def restarts_table(study: Study) -> pd.DataFrame:
+    """One row per restart after a stop of the drive, with the time it stood still."""
+    pulls = study.ingested.pulls
+    rows = [
+        {name: getattr(test, name) for name in RESTARTS_COLUMNS[:4]} | {"restart": number} | vars(restart)
+        for test in study.ingested.campaign.tests
+        if test.test_id in pulls
+        for number, restart in enumerate(pulls[test.test_id].restarts, start=1)
+    ]
+    return pd.DataFrame(rows, columns=RESTARTS_COLUMNS)
 
 
 def fits_table(fits: Iterable[LawFit]) -> pd.DataFrame:
@@ -152,8 +200,13 @@ def comparison_table(study: Study) -> pd.DataFrame:
 
 
 def to_csv(table: pd.DataFrame) -> str:
-    """CSV text, the same for the same table on every machine."""
-    table = table.copy()
+    """CSV text, the same for the same table on every machine; texts that a spreadsheet would take for formulas escaped.
+
+    See :func:`tribo.escaping.for_spreadsheet`.
+    """
+    table = table.rename(columns=lambda name: for_spreadsheet(str(name)))
+    for name in table.select_dtypes(exclude="number"):
+        table[name] = [for_spreadsheet(cell) if isinstance(cell, str) else cell for cell in table[name]]
     for name in table.select_dtypes("float"):
         table[name] = table[name].replace(-0.0, 0.0).where(np.isfinite(table[name]) | table[name].isna(), np.nan)
     return str(table.to_csv(index=False, float_format=FLOAT_FORMAT, lineterminator="\n"))
@@ -162,6 +215,8 @@ def to_csv(table: pd.DataFrame) -> str:
 def write_tables(study: Study, out: Path) -> list[Path]:
     """tests.csv, and fits, other_fits, budget, differences and comparison as far as the study went."""
     tables = {"tests.csv": tests_table(study)}
+    if not (restarts := restarts_table(study)).empty:
+        tables["restarts.csv"] = restarts
     if study.fits:
         tables["fits.csv"] = fits_table(study.fits)
         tables["other_fits.csv"] = other_fits_table(study)

@@ -1,4 +1,4 @@
-"""verdict.json (schema tribo.verdict/1), and the same verdict as a section of the report."""
+"""verdict.json (schema tribo.verdict/2), and the same verdict as a section of the report."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ OUTCOMES = {
     "no_misfit": "No misfit found.",
     "named": "The cause was identified.",
     "undetermined": "The model does not fit the data, and several causes explain the misfit about equally well.",
+    "partly": "A cause was identified, and a misfit remains that it does not explain.",
     "unknown": "The model does not fit the data, and no known mechanism explains the misfit.",
 }
 
@@ -40,7 +41,22 @@ def verdict_in_words(verdict: Mapping[str, Any]) -> dict[str, Any]:
         "next_test": str((verdict.get("next_test") or {}).get("text") or ""),
         "misfits": [_misfit(misfit) for misfit in verdict.get("misfits") or ()],
         "excluded": [(_plain(e["mechanism"]), e["reason"]) for e in verdict.get("excluded") or ()],
+        "not_testable": [(_plain(e["mechanism"]), _why(e["reason"])) for e in verdict.get("not_testable") or ()],
+        "corrections": [_correction(x) for x in verdict.get("layers") or () if x["kind"] == "pattern_correction"],
     }
+
+
+def _why(reason: str) -> str:
+    """The reason without the words that stand above the table."""
+    return reason.partition(": ")[2] or reason
+
+
+def _correction(layer: Mapping[str, Any]) -> tuple[str, str, str, str]:
+    """Sample, regime, mean of measured over modelled T less one with its interval, and the adjusted p value."""
+    value, low, high = (f"{_number(layer[key]):+.0f}" for key in ("effect_percent", "low", "high"))
+    p = _number(layer["p_adjusted"])
+    size = f"{value} % ({low} to {high} %)".replace("-", "−")
+    return layer["name"], layer["regimes"][0], size, "below 0.001" if p < 0.001 else f"{p:.3f}"
 
 
 def _plain(mechanism: str) -> str:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from hashlib import sha256
+from html import unescape
 from pathlib import Path
 from typing import Any, Literal
 
 from tribo.errors import CampaignError, Problem
+from tribo.escaping import well_formed
+from tribo.links import leads_out
 from tribo.report.provenance import DESCRIBED_IN, FILE, RAW, file_hash, input_names, read_record
+from tribo.store.own_folder import MARK
+from tribo.zips import opened_zip, pieces
 
+ORIGIN = "inputs SHA-256 "  # begins what determines the numbers of a file, to the end of its origin
+BEAR_THEIR_ORIGIN = (".svg", ".nc")
 KEPT = "kept"  # intermediate results, each checked against its own hash whenever it is used
 
 
@@ -20,7 +26,7 @@ class Difference:
     """One file that differs from its record."""
 
     kind: Literal["input", "output"]
-    status: Literal["changed", "missing", "added"]
+    status: Literal["changed", "missing", "added", "another run's"]
     file: str
 
 
@@ -32,10 +38,11 @@ class Verification:
     n_inputs: int
     n_outputs: int
     differences: tuple[Difference, ...]
+    unfinished: bool = False  # a run that was to write here was killed or failed
 
     @property
     def unchanged(self) -> bool:
-        return not self.differences
+        return not self.differences and not self.unfinished
 
     def as_record(self) -> dict[str, Any]:
         return {**asdict(self), "unchanged": self.unchanged}
@@ -45,7 +52,8 @@ class Verification:
         if self.unchanged:
             return f"{compared}: no changes"
         lines = [f"{d.status} {d.kind}: {d.file}" for d in self.differences]
-        return "\n".join([f"{compared}: {len(lines)} difference{'s' if len(lines) > 1 else ''}", *lines])
+        ended = ["a run that was to write into this folder has not ended; start it again"] if self.unfinished else []
+        return "\n".join([f"{compared}: {len(lines)} difference{'' if len(lines) == 1 else 's'}", *lines, *ended])
 
 
 def verify(out: Path, campaign: Path | None = None) -> Verification:
@@ -59,11 +67,14 @@ def verify(out: Path, campaign: Path | None = None) -> Verification:
     Raises
     ------
     CampaignError
-        There is no provenance.json in ``out``, or it lists no outputs.
+        There is no provenance.json in ``out``, or it lists no outputs; or the .zip of the campaign is refused
+        (:func:`tribo.zips.opened_zip`).
     """
     record = read_record(out)
     if record is None:
         what = "this folder holds no record of inputs and outputs"
+        if (out / FILE).is_file():
+            what = "the record of inputs and outputs is damaged"
         raise CampaignError(Problem("no_provenance", what, file=str(out / FILE), allowed="an output folder of tribo"))
     place = campaign or out / record["campaign"]
     recorded = dict(record["inputs"])
@@ -77,8 +88,20 @@ def verify(out: Path, campaign: Path | None = None) -> Verification:
     differences = (
         *_differences("input", recorded, found),
         *_differences("output", record["outputs"], outputs),
+        *(Difference("output", "another run's", name) for name in of_other_runs(out, record) if name in outputs),
     )
-    return Verification(str(place), len(recorded), len(record["outputs"]), differences)
+    return Verification(str(place), len(recorded), len(record["outputs"]), differences, (out / MARK).exists())
+
+
+def of_other_runs(out: Path, record: Mapping[str, Any]) -> Iterator[str]:
+    """Outputs that name other inputs or options than the record: figures and tables of two runs that were mixed."""
+    _, start, rest = str(record.get("origin", "")).partition(ORIGIN)
+    for name in record["outputs"] if start else ():
+        path = out / name
+        if path.suffix in BEAR_THEIR_ORIGIN and path.is_file():
+            text = unescape(path.read_bytes().decode("utf-8", "replace"))
+            if any(not part.startswith(rest) for part in text.split(ORIGIN)[1:]):
+                yield name
 
 
 def _differences(
@@ -100,8 +123,8 @@ def _input_hashes(campaign: Path, recorded: Mapping[str, str]) -> Iterator[tuple
         return
     root = campaign if (campaign / DESCRIBED_IN[0]).is_file() else _only_campaign_below(campaign)
     for name in dict.fromkeys((*input_names(root), *recorded)):
-        if (root / name).is_file():
-            yield name, file_hash(root / name)
+        if not leads_out(root, root / name) and (root / name).is_file():
+            yield well_formed(name), file_hash(root / name)
 
 
 def _only_campaign_below(folder: Path) -> Path:
@@ -110,17 +133,17 @@ def _only_campaign_below(folder: Path) -> Path:
 
 
 def _zipped_hashes(archive: Path, recorded: Mapping[str, str]) -> Iterator[tuple[str, str]]:
-    try:
-        with zipfile.ZipFile(archive) as opened:
-            names = [i.filename for i in opened.infolist() if not i.is_dir() and not i.filename.startswith("__MACOSX/")]
-            tomls = [n for n in names if n.rpartition("/")[2] == DESCRIBED_IN[0]]
-            base = tomls[0].removesuffix(DESCRIBED_IN[0]) if len(tomls) == 1 else ""
-            for name in names:
-                inside = name.removeprefix(base)
-                if inside in DESCRIBED_IN or inside.startswith(f"{RAW}/") or inside in recorded:
-                    yield inside, sha256(opened.read(name)).hexdigest()
-    except (zipfile.BadZipFile, OSError):
-        return
+    with opened_zip(archive) as (opened, entries):
+        files = [entry for entry in entries if not entry.is_folder]
+        tomls = [e.name for e in files if e.name.rpartition("/")[2] == DESCRIBED_IN[0]]
+        base = tomls[0].removesuffix(DESCRIBED_IN[0]) if len(tomls) == 1 else ""
+        for entry in files:
+            inside = entry.name.removeprefix(base)
+            if inside in DESCRIBED_IN or inside.startswith(f"{RAW}/") or inside in recorded:
+                digest = sha256()
+                for piece in pieces(opened, entry, archive.name):
+                    digest.update(piece)
+                yield inside, digest.hexdigest()
 
 
 def _output_hashes(out: Path) -> Iterator[tuple[str, str]]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tribo.records import Study
 from tribo.report.campaign_nc import write_store
 from tribo.report.drawings import DRAWING, Drawing, Progress, write_figures
 from tribo.report.provenance import (
     Provenance,
+    file_hash,
     gather_provenance,
     read_record,
     same_origin,
@@ -18,6 +20,7 @@ from tribo.report.provenance import (
 )
 from tribo.report.result_tables import write_tables
 from tribo.report.verdict_file import write_verdict
+from tribo.store.own_folder import own_folder
 from tribo.store.whole_files import write_bytes, write_text
 
 if TYPE_CHECKING:
@@ -42,7 +45,9 @@ def write_until(
     before = read_record(out)
     made_by = provenance if provenance is not None else gather_provenance(study)
     verdict = diagnosis.verdict.as_dict() if diagnosis is not None else None
-    keep_earlier = before is not None and until != "report" and same_origin(before, made_by)
+    keep_earlier = before is not None and until != "report" and same_origin(before, made_by) and _is_as_recorded(
+        out / "campaign.nc", before
+    )
     written = [*write_tables(study, out), write_store(study, out, made_by, diagnosis, keep_earlier)]
     if verdict is not None:
         written.append(write_verdict(verdict, out))
@@ -63,6 +68,11 @@ def write_until(
     write_provenance(made_by, out, settle_outputs(out, before, made_by, written, complete=until == "report"))
 
 
+def _is_as_recorded(path: Path, record: Mapping[str, Any]) -> bool:
+    """Whether a file of an earlier run is still what that run wrote."""
+    return path.is_file() and record["outputs"].get(path.name) == file_hash(path)
+
+
 def write_report(
     study: Study,
     out: Path | str,
@@ -71,5 +81,14 @@ def write_report(
     diagnosis: Diagnosis | None = None,
     jobs: int = 1,
 ) -> None:
-    """All of OUT: tables, campaign.nc, figures, verdict.json where there is a diagnosis, page, PDF and crate."""
-    write_until(study, Path(out), "report", Drawing(progress, jobs), provenance, diagnosis)
+    """All of OUT: tables, campaign.nc, figures, verdict.json where there is a diagnosis, page, PDF and crate.
+
+    Raises
+    ------
+    CampaignError
+        ``out`` is, holds or lies in a campaign, or holds files that tribo has not written.
+    BusyError
+        Another process writes into it.
+    """
+    with own_folder(Path(out), (study.ingested.campaign.root,)) as folder:
+        write_until(study, folder, "report", Drawing(progress, jobs), provenance, diagnosis)

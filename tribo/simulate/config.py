@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal
 
 from tribo.errors import Problem, SimulationError
+from tribo.limits import LARGEST_NUMBER, MOST_BLOCKS, MOST_STEPS, SMALLEST_NUMBER
 from tribo.records import Pattern
 from tribo.simulate.masks import contact_mask, pattern_of
 from tribo.simulate.readings import OPEN_CHOICES, READINGS, reading_of
@@ -283,6 +284,11 @@ def _problems(config: SimConfig) -> Iterator[Problem]:
             "unstable_step", "the time step exceeds the stability limit", column="dt_s",
             found=f"{config.dt_s:g}", allowed=f"at most {config.largest_dt_s:.3g} s for these springs and masses",
         )  # fmt: skip
+    if not faulty & {"dt_s", "duration_s"} and (config.duration_s or 0.0) > MOST_STEPS * config.dt_s:
+        yield Problem(
+            "too_many_steps", "the run has too many time steps", column="duration_s",
+            found=f"{config.duration_s:g} s", allowed=f"at most {MOST_STEPS} steps of {config.dt_s:g} s",
+        )  # fmt: skip
     end = config.window_end_peaks
     if not faulty & _OF_THE_WINDOW and end is not None and end <= config.window_start_peaks:
         yield Problem(
@@ -325,13 +331,23 @@ def _term_problems(config: SimConfig) -> Iterator[Problem]:
         )  # fmt: skip
 
 
+def _beyond_measure(name: str, value: float) -> bool:
+    """Whether a number is so large or small that products of it leave double precision."""
+    return abs(value) > LARGEST_NUMBER or (name in _POSITIVE and 0 < value < SMALLEST_NUMBER)
+
+
 def _number_problems(config: SimConfig) -> Iterator[Problem]:
     for field in fields(config):
         value = getattr(config, field.name)
-        if isinstance(value, float | int) and not isinstance(value, bool) and not math.isfinite(value):
+        if isinstance(value, float) and not math.isfinite(value):
             yield Problem("not_finite", "not a finite number", column=field.name, found=str(value), allowed="a number")
             continue
         if value is None:
+            continue
+        if field.name != "seed" and isinstance(value, float | int) and _beyond_measure(field.name, value):
+            allowed = f"{SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}"
+            found = f"{value:g}" if abs(value) < 1e300 else "more than 1e300"
+            yield Problem("impossible_number", "not a possible value", column=field.name, found=found, allowed=allowed)
             continue
         if field.name in _POSITIVE and not value > 0:
             yield Problem("not_positive", "must be positive", column=field.name, found=f"{value:g}", allowed="> 0")
@@ -376,6 +392,10 @@ def _geometry_problems(config: SimConfig) -> Iterator[Problem]:
         yield Problem(
             "too_small", "too few blocks", column="blocks", found=f"{nx} x {ny}", allowed="3 x 3 or more"
         )
+        return
+    if nx * ny > MOST_BLOCKS:
+        allowed = f"at most {MOST_BLOCKS} blocks"
+        yield Problem("too_many_blocks", "too many blocks", column="blocks", found=f"{nx} x {ny}", allowed=allowed)
         return
     pattern = config.pattern or pattern_of(config.sample)
     if pattern is None:

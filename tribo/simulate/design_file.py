@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import math
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
@@ -34,7 +35,9 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError,
 
 from tribo.campaign.described import PatternTable
 from tribo.campaign.load import pattern_of_table
-from tribo.errors import Problem, SimulationError
+from tribo.errors import Problem, SimulationError, system_problem
+from tribo.input_files import nests_too_deeply, read_input
+from tribo.limits import DEEPEST_NESTING, LARGEST_DESCRIPTION_BYTES, MOST_RUNS
 from tribo.records import Pattern
 from tribo.simulate.config import FrictionTerms, LocalFriction, SimConfig
 from tribo.simulate.ensemble import AngleRule, angle_range_deg, check_all, middle_deg, stratified_design
@@ -57,7 +60,7 @@ class DesignTable(BaseModel):
         Field(description="midpoints, random, nominal, or a list of degrees", union_mode="left_to_right"),
     ] = None
     repeats: Annotated[int, Field(ge=1, description="a whole number, 1 or more")] = 4
-    seed: Annotated[int, Field(ge=0, description="a whole number, 0 or more")] = 0
+    seed: Annotated[int, Field(ge=0, lt=2**63, description="a whole number, 0 or more, below 2^63")] = 0
     reading: Annotated[Literal["text", "berardo2019"], Field(description="text or berardo2019")] = "text"
     parameters: Annotated[dict[str, Any], Field(description="a table of parameters")] = {}
     patterns: Annotated[dict[str, PatternTable], Field(description="tables as in campaign.toml")] = {}
@@ -80,14 +83,25 @@ def read_design(path: str | Path, seed: int = 0) -> list[SimConfig]:
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_input(path, LARGEST_DESCRIPTION_BYTES).decode("utf-8-sig")
         table = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
-    except (OSError, ValueError) as why:
+    except OSError as why:
+        raise SimulationError(system_problem(why, str(path))) from why
+    except ValueError as why:
         kind = "JSON" if path.suffix.lower() == ".json" else "TOML"
         raise SimulationError(Problem("unreadable", f"cannot be read as {kind}: {why}", file=str(path))) from why
+    except RecursionError as why:
+        raise SimulationError(_too_deep(path)) from why
+    if nests_too_deeply(table):
+        raise SimulationError(_too_deep(path))
     if not isinstance(table, dict):
         raise SimulationError(Problem("wrong_value", "must be a table", file=str(path), found=type(table).__name__))
     return runs_of_design({"seed": seed, **table}, file=str(path))
+
+
+def _too_deep(path: Path) -> Problem:
+    allowed = f"at most {DEEPEST_NESTING} levels"
+    return Problem("too_deep", "tables and arrays nested too deeply", file=str(path), allowed=allowed)
 
 
 def runs_of_design(table: Mapping[str, Any], file: str | None = None) -> list[SimConfig]:
@@ -103,6 +117,8 @@ def runs_of_design(table: Mapping[str, Any], file: str | None = None) -> list[Si
     problems: list[Problem] = []
     design = _checked(table, problems)
     axes = _axes(design.parameters, problems)
+    if too_many := _too_many(design, axes):
+        raise SimulationError([p.at(file=file) for p in (*problems, too_many)])
     patterns = {name: pattern_of_table(name, p) for name, p in design.patterns.items()}
     runs = [
         run
@@ -123,6 +139,17 @@ def runs_of_design(table: Mapping[str, Any], file: str | None = None) -> list[Si
     if problems:
         raise SimulationError([p.at(file=file) for p in problems])
     return runs
+
+
+def _too_many(design: DesignTable, axes: Mapping[str, Sequence[Any]]) -> Problem | None:
+    """The number of runs as a problem where it is beyond the limit; nothing is laid out before."""
+    runs = design.repeats * len(design.samples) * len(design.pressures_kPa)
+    runs *= math.prod(len(values) for values in axes.values())
+    runs *= len(design.angles_deg) if isinstance(design.angles_deg, list) else 1
+    if runs <= MOST_RUNS:
+        return None
+    found = f"{runs} runs" if runs < 10**15 else f"about 10^{len(str(runs)) - 1} runs"
+    return Problem("too_many_runs", "this design has too many runs", found=found, allowed=f"at most {MOST_RUNS} runs")
 
 
 def described_by_options(options: Mapping[str, Any], seed: int, table2: bool) -> tuple[bool, dict[str, Any]]:

@@ -16,6 +16,8 @@ from tribo.records import Run
 if TYPE_CHECKING:
     import pandas as pd
 
+ONE_RUN = "one run of the spring-block model"
+ENSEMBLE = "an ensemble of the spring-block model"
 UNITS = {
     "s": "s", "m": "m", "Pa": "Pa", "N": "N", "deg": "degree", "N_m": "N/m", "kg_m3": "kg/m3", "per_s": "1/s",
     "m_s": "m/s",
@@ -74,7 +76,7 @@ def write_run(run: Run, path: str | Path) -> Path:
         },
         coords={"time": ("time", run.time_s, {"units": "s"})},
         attrs={
-            "title": "one run of the spring-block model",
+            "title": ONE_RUN,
             "sample": run.sample,
             "static_friction": run.static_friction,
             "sliding_friction": run.sliding_friction,
@@ -101,13 +103,25 @@ def write_ensemble(table: pd.DataFrame, path: str | Path, parameters: Mapping[st
             name: ("run", _column(table[name].to_numpy()), {"units": unit_of(str(name))})
             for name in map(str, table.columns)
         },
-        attrs={"title": "an ensemble of the spring-block model", **attributes(parameters or {}), **versions()},
+        attrs={"title": ENSEMBLE, **attributes(parameters or {}), **versions()},
     )
     return written(path, lambda target: dataset.to_netcdf(target, engine="h5netcdf"))
 
 
 def _column(values: Any) -> Any:
     return values.astype(str).astype(object) if values.dtype.kind in "OUT" else values
+
+
+def kind_of(path: Path) -> str:
+    """What a file of results holds, one run or an ensemble in the words of its title; empty for any other file."""
+    import h5py
+
+    try:
+        with h5py.File(path) as file:
+            title = str(file.attrs.get("title", ""))
+    except (OSError, ValueError, KeyError):
+        return ""
+    return next((kind for kind in (ONE_RUN, ENSEMBLE) if title.startswith(kind)), "")
 
 
 def written(path: str | Path, write: Callable[[Path], Any]) -> Path:

@@ -7,7 +7,10 @@ opens the file for writing again, so that a process killed at any moment leaves 
 
 from __future__ import annotations
 
+import asyncio
+import concurrent.futures
 import hashlib
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -23,8 +26,11 @@ from tribo.errors import Problem, SimulationError
 from tribo.records import Run
 from tribo.simulate.config import SimConfig
 from tribo.simulate.ensemble import Progress, check_all, run_row
-from tribo.simulate.results_file import attributes, unit_of, versions, written
+from tribo.simulate.results_file import ENSEMBLE, attributes, unit_of, versions, written
 from tribo.simulate.run import simulate
+from tribo.simulate.stored_rows import CHECKSUM, DONE, fault_of_store, read_stored as read_stored, row_checksum
+from tribo.store.kept_results import DamagedResultWarning, sources
+from tribo.store.own_file import only_writer_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,12 +54,14 @@ class Work:
     read : numbers by name, read off the run
     units : names of the numbers that are kept, with their units
     label : tells this work from another that keeps the same names
+    rooms : packages of tribo whose sources decide the result
     """
 
     run: Callable[[SimConfig], Run] | None = None
     read: Callable[[Run], Mapping[str, Any]] = run_row
     units: Mapping[str, str] = field(default_factory=lambda: RESULTS)
     label: str = ""
+    rooms: Sequence[str] = ("simulate", "laws", "records")
 
 
 FRICTION = Work()
@@ -66,8 +74,12 @@ def run_stored(
     scheduler: str | None = None,
     progress: Progress | None = None,
     work: Work = FRICTION,
+    wait_s: float = 0.0,
 ) -> pd.DataFrame:
     """Compute the runs of a design that ``path`` does not hold yet, and return all of them.
+
+    One process at a time writes the file. Runs that differ from their checksums are computed again, and a warning says
+    so.
 
     Parameters
     ----------
@@ -77,46 +89,66 @@ def run_stored(
     scheduler : address of a dask.distributed scheduler; its workers then run the cells (optional dependency)
     progress : called with the runs done, earlier starts included, and their total
     work : how a run is made and what is kept of it, static and sliding friction with their times by default
+    wait_s : how long to wait for another process that writes the file
 
     Raises
     ------
     SimulationError
-        An impossible configuration, a file of another design, or no dask or no scheduler where one is given.
+        An impossible configuration, a file of another design or version, or no dask or no scheduler where one is given.
+    BusyError
+        Another process writes the file.
     """
     path = Path(path)
     check_all(design)
-    if not path.exists():
+    with only_writer_of(path, wait_s):
+        _open_store(design, path, work)
+        missing = [k for k, done in enumerate(read_stored(path)[DONE]) if not done]
+        finished = len(design) - len(missing)
+        if progress is not None:
+            progress(finished, len(design))
+        given = _given(design)
+        made_from = " ".join(identity(design, work).values())
+        with _columns(path, work) as columns:
+            for k, row in _rows(design, missing, jobs, scheduler, partial(cell, work=work)):
+                for name in work.units:
+                    columns[name][k] = row[name]
+                results = [(name, columns[name][k]) for name in work.units]
+                columns[CHECKSUM][k] = row_checksum(made_from, k, [*_row(given, k), *results])
+                columns[DONE][k] = 1
+                finished += 1
+                if progress is not None:
+                    progress(finished, len(design))
+        table = read_stored(path)
+    if not table[DONE].all():
+        what = "runs are missing after all have been computed: the file was changed from outside meanwhile"
+        raise SimulationError(Problem("incomplete", what, file=str(path)))
+    return table
+
+
+def _open_store(design: Sequence[SimConfig], path: Path, work: Work) -> None:
+    """Let ``path`` be a store of exactly these runs: made where it is absent, and made anew where it is damaged."""
+    fault = _fault(design, path, work) if path.exists() else None
+    if fault is not None and fault.kind == "damaged_store":
+        warnings.warn(f"{path}: the file is damaged; all runs are computed again", DamagedResultWarning, stacklevel=3)
+    elif fault is not None:
+        raise SimulationError(fault)
+    if fault is not None or not path.exists():
         _create(design, path, work)
-    _refuse_other_design(design, path, work)
-    missing = [k for k, done in enumerate(read_stored(path)["done"]) if not done]
-    finished = len(design) - len(missing)
-    if progress is not None:
-        progress(finished, len(design))
-    with _columns(path, work) as columns:
-        for k, row in _rows(design, missing, jobs, scheduler, partial(cell, work=work)):
-            for name in work.units:
-                columns[name][k] = row[name]
-            columns["done"][k] = 1
-            finished += 1
-            if progress is not None:
-                progress(finished, len(design))
-    return read_stored(path)
 
 
-def read_stored(path: str | Path) -> pd.DataFrame:
-    """The table of a stored ensemble, finished or not; ``done`` tells which rows hold results."""
-    import h5py
-    import pandas as pd
+def _given(design: Sequence[SimConfig]) -> dict[str, Any]:
+    """The columns of inputs as they are stored: text, or numbers of one type."""
+    columns = {name: [getattr(c, name) for c in design] for name in INPUTS} | _varied_parameters(design)
+    return {name: _as_stored(values) for name, values in columns.items()}
 
-    with h5py.File(path) as file:
-        columns = {name: file[name][:] for name in file.attrs["columns"]}
-    texts = {name: [t.decode() for t in column] for name, column in columns.items() if column.dtype == object}
-    return pd.DataFrame(columns | texts | {"done": columns["done"].astype(bool)})
+
+def _row(given: Mapping[str, Any], k: int) -> list[tuple[str, Any]]:
+    return [(name, str(values[k]) if values.dtype.kind == "O" else values[k]) for name, values in given.items()]
 
 
 def varied_columns(table: pd.DataFrame) -> list[str]:
     """The columns of a stored ensemble that hold parameters the design varies beside its inputs."""
-    return [str(name) for name in table.columns if name not in {*INPUTS, *RESULTS, "done"}]
+    return [str(name) for name in table.columns if name not in {*INPUTS, *RESULTS, DONE}]
 
 
 def fingerprint(design: Iterable[SimConfig], work: Work = FRICTION) -> str:
@@ -127,24 +159,46 @@ def fingerprint(design: Iterable[SimConfig], work: Work = FRICTION) -> str:
     return digest.hexdigest()
 
 
+def identity(design: Sequence[SimConfig], work: Work = FRICTION) -> dict[str, str]:
+    """What a store is made from: the hash of its design, and that of the sources that compute it."""
+    return {"design": fingerprint(design, work), "sources": sources(*work.rooms)}
+
+
+def continues(design: Sequence[SimConfig], path: str | Path, work: Work = FRICTION) -> bool:
+    """Whether ``path`` is an intact store of exactly these runs, finished or not."""
+    return _fault(design, Path(path), work) is None
+
+
+def _fault(design: Sequence[SimConfig], path: Path, work: Work) -> Problem | None:
+    given = {"run": np.arange(len(design)), **_given(design)}
+    return fault_of_store(path, identity(design, work), _attributes(design, work), given)
+
+
+def _attributes(design: Sequence[SimConfig], work: Work) -> dict[str, Any]:
+    """All attributes of a store but those that say what it is made from."""
+    return {
+        "title": f"{ENSEMBLE}, one entry per run",
+        "columns": [*_given(design), *work.units, DONE, CHECKSUM],
+        "results": list(work.units),
+        **attributes(_shared_parameters(design)),
+        **versions(),
+    }
+
+
 def _create(design: Sequence[SimConfig], path: Path, work: Work) -> None:
     import h5py
 
-    given: dict[str, Any] = {name: [getattr(c, name) for c in design] for name in INPUTS} | _varied_parameters(design)
     empty = dict.fromkeys(work.units, np.full(len(design), np.nan))
-    columns = given | empty | {"done": np.zeros(len(design), np.uint8)}
+    marks = {DONE: np.zeros(len(design), np.uint8), CHECKSUM: np.zeros(len(design), np.uint64)}
 
     def write(target: Path) -> None:
-        with h5py.File(target, "w") as file:
-            file.attrs["title"] = "an ensemble of the spring-block model, one entry per run"
-            file.attrs["design"] = fingerprint(design, work)
-            file.attrs["columns"] = list(columns)
-            for name, value in (attributes(_shared_parameters(design)) | versions()).items():
+        with h5py.File(target, "w", libver=("v108", "v108")) as file:  # from 1.8 on, HDF5 checks its own structure
+            for name, value in (_attributes(design, work) | identity(design, work)).items():
                 file.attrs[name] = value
             run = file.create_dataset("run", data=np.arange(len(design)))
             run.make_scale("run")
-            for name, values in columns.items():
-                column = file.create_dataset(name, data=_as_stored(values))
+            for name, values in (_given(design) | empty | marks).items():
+                column = file.create_dataset(name, data=values)
                 column.dims[0].attach_scale(run)
                 column.attrs["units"] = {**INPUTS, **work.units}.get(name) or unit_of(name)
 
@@ -178,28 +232,12 @@ def _shared_parameters(design: Sequence[SimConfig]) -> dict[str, Any]:
     return {name: value for name, value in first.items() if all(p.get(name) == value for p in all_parameters)}
 
 
-def _refuse_other_design(design: Sequence[SimConfig], path: Path, work: Work) -> None:
-    import h5py
-
-    try:
-        with h5py.File(path) as file:
-            known = file.attrs.get("design")
-    except OSError as why:
-        raise SimulationError(Problem("not_a_store", f"cannot be read as HDF5: {why}", file=str(path))) from why
-    if known != fingerprint(design, work):
-        raise SimulationError(
-            Problem(
-                "other_design", "it holds runs of a different design", file=str(path), allowed="a new file, or the same"
-            )
-        )
-
-
 @contextmanager
 def _columns(path: Path, work: Work) -> Iterator[dict[str, Any]]:
     """The result columns of a store as arrays mapped into memory, writable in place."""
     import h5py
 
-    names = (*work.units, "done")
+    names = (*work.units, DONE, CHECKSUM)
     with h5py.File(path) as file:
         places = {name: (file[name].id.get_offset(), file[name].shape, file[name].dtype) for name in names}
     columns = {
@@ -247,8 +285,13 @@ def _distributed_rows(
     with _client(scheduler) as (client, as_done):
         futures = client.map(one, [design[k] for k in missing], pure=False)
         place = {future.key: k for future, k in zip(futures, missing, strict=True)}
-        for future, row in as_done(futures, with_results=True):
-            yield place[future.key], row
+        try:
+            for future, row in as_done(futures, with_results=True):
+                yield place[future.key], row
+        except (OSError, asyncio.CancelledError, concurrent.futures.CancelledError) as why:
+            what = "the dask scheduler stopped answering; finished runs are kept and the next start continues"
+            reason = str(why) or type(why).__name__
+            raise SimulationError(Problem("scheduler_gone", what, column="scheduler", found=reason[:200])) from why
 
 
 @contextmanager

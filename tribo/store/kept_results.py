@@ -3,7 +3,8 @@
 A step asks for its result by name and gives everything the result is made from. If the file was made from exactly
 that, it is read; otherwise the result is computed and written. The hash covers the input values, the sources of the
 packages that compute and the versions of the libraries they use, so that no outdated result is returned after an edit
-or an upgrade. The files are JSON: deleting one, or the folder, costs time and nothing else.
+or an upgrade. Each file bears a checksum; a damaged one is said and made again. The files are JSON: deleting one, or
+the folder, costs time and nothing else.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
@@ -25,6 +27,12 @@ import numpy as np
 from tribo.published import PATTERN_SHARES, data_dir
 
 T = TypeVar("T")
+
+
+class DamagedResultWarning(RuntimeWarning):
+    """A kept result differs from its checksum and is made again."""
+
+
 LIBRARIES = ("numpy", "scipy", "pandas", "statsmodels", "numba", "odrpack")
 _PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -49,28 +57,44 @@ class Shelf:
             return make()
         key = fingerprint(made_from, sources(*rooms))
         path = self.folder / f"{name}.json"
-        kept = _read(path)
-        if kept is not None and kept["made_from"] == key:
+        kept = _read(path, key)
+        if kept is not None:
             return cast(T, decoded(kept["result"]))
         result = make()
         try:
-            text = json.dumps({"made_from": key, "result": encoded(result)})
+            text = json.dumps(encoded(result))
         except TypeError as why:  # a result in hand is worth more than keeping it
             warnings.warn(f"{name} is not kept: {why}", RuntimeWarning, stacklevel=2)
             return result
-        from tribo.store.whole_files import write_text
+        from tribo.store.whole_files import write_bytes
 
-        write_text(path, text + "\n")
+        body = b'"result": ' + text.encode() + b"}\n"
+        write_bytes(path, _head(key, body) + body)
         return result
 
 
-def _read(path: Path) -> dict[str, Any] | None:
-    """The contents of a kept file; None if there is none or it is damaged."""
+def _head(key: str, body: bytes) -> bytes:
+    """The first line of a kept file: what the result is made from, and the checksum of this and the result."""
+    checksum = hashlib.sha256(key.encode() + body).hexdigest()
+    return f'{{"made_from": "{key}", "sha256": "{checksum}",\n'.encode()
+
+
+def _read(path: Path, key: str) -> dict[str, Any] | None:
+    """The contents of a kept file made from ``key``; None where there is none, and with a warning where damaged."""
     try:
-        kept = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = path.read_bytes()
+    except OSError:
         return None
-    return kept if isinstance(kept, dict) and {"made_from", "result"} <= set(kept) else None
+    head, newline, body = content.partition(b"\n")
+    made_from = re.match(rb'\{"made_from": "([0-9a-f]{64})"', head)
+    if made_from is None or _head(made_from[1].decode(), body) != head + newline:
+        what = f"{path}: this kept result is damaged or of an older version; it is made again"
+        warnings.warn(what, DamagedResultWarning, stacklevel=3)
+        return None
+    if made_from[1].decode() != key:
+        return None
+    kept: dict[str, Any] = json.loads(content)
+    return kept
 
 
 @lru_cache(maxsize=32)

@@ -20,6 +20,10 @@ def whole_file(path: Path) -> Iterator[Path]:
     try:
         yield part
         os.replace(part, path)
+    except OSError as why:
+        if why.filename is None and why.errno is not None:  # a full disk does not say what was being written
+            why.filename = str(path)
+        raise
     finally:
         part.unlink(missing_ok=True)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,8 +14,9 @@ from tribo.traces.apex import Apex, find_apex, near
 from tribo.traces.loading import climb_of
 from tribo.traces.noise import line
 from tribo.traces.rules import RULES, Rule
-from tribo.traces.signal import signal_of
+from tribo.traces.signal import Signal, signal_of
 from tribo.traces.sliding import Motion, Sliding, in_motion, sliding_over, window_between
+from tribo.traces.static_readings import StaticReadings, static_readings, within_samples
 
 _GAP = 3.0
 
@@ -48,30 +49,50 @@ def read_pull(
     TraceError
         The rule is unknown, or the trace holds no readable pull; every problem found is listed.
     """
-    chosen = _rule(rule, parameters)
+    asked = Asked(named_rule(rule, parameters), test.speed_m_s if test else None, zero, peak_s, window_s)
     test_id, file = (test.test_id if test else None), trace.file or None
     try:
-        signal = signal_of(trace)
-        climb = climb_of(signal, zero)
-        climb = climb if peak_s is None else near(climb, peak_s)
-        apex = find_apex(climb)
-        motion = in_motion(climb, apex, test.speed_m_s if test else None)
-        static = chosen.static(motion, chosen.parameters) if peak_s is None else apex
-        window = chosen.sliding(motion, chosen.parameters) if window_s is None else window_between(motion, *window_s)
-        sliding = sliding_over(motion, window)
+        pull = pull_of(signal_of(trace), asked)
     except TraceError as fault:
         raise TraceError([p.at(file=file, test_id=test_id) for p in fault.problems]) from None
-    pull = _reduce(motion, static, sliding, chosen)
-    by_hand = {"peak_by_hand": peak_s is not None, "window_by_hand": window_s is not None}
     return replace(
         pull,
         test_id=test_id or trace.name,
-        problems=tuple(p.at(file=file, test_id=test_id) for p in motion.problems),
-        flags=(*pull.flags, *(flag for flag, raised in by_hand.items() if raised)),
+        problems=tuple(p.at(file=file, test_id=test_id) for p in pull.problems),
     )
 
 
-def _rule(name: str, parameters: Mapping[str, float] | None) -> Rule:
+@dataclass(frozen=True)
+class Asked:
+    """How a pull is to be read: its rule, its speed, and what is known otherwise or was chosen by hand."""
+
+    rule: Rule
+    speed_m_s: float | None = None
+    zero: tuple[float, float] | None = None
+    peak_s: float | None = None
+    window_s: tuple[float, float] | None = None
+
+
+def pull_of(signal: Signal, asked: Asked) -> Pull:
+    """The pull of a signal, without a name (see :func:`read_pull`)."""
+    rule, peak_s, window_s = asked.rule, asked.peak_s, asked.window_s
+    climb = climb_of(signal, asked.zero)
+    climb = climb if peak_s is None else near(climb, peak_s)
+    apex = find_apex(climb)
+    motion = in_motion(climb, apex, asked.speed_m_s)
+    if peak_s is None:
+        motion = replace(motion, apex=within_samples(motion, apex))
+    static = within_samples(motion, rule.static(motion, rule.parameters)) if peak_s is None else apex
+    window = rule.sliding(motion, rule.parameters) if window_s is None else window_between(motion, *window_s)
+    sliding = sliding_over(motion, window)
+    readings = StaticReadings(static.force_N, math.nan, math.nan) if peak_s else static_readings(motion, climb.end)
+    pull = _reduce(motion, static, sliding, rule, readings)
+    by_hand = {"peak_by_hand": peak_s is not None, "window_by_hand": window_s is not None}
+    flags = (*pull.flags, *(flag for flag, raised in by_hand.items() if raised))
+    return replace(pull, problems=motion.problems, flags=flags)
+
+
+def named_rule(name: str, parameters: Mapping[str, float] | None) -> Rule:
     if name not in RULES:
         raise TraceError(Problem("unknown_rule", "unknown rule", found=name, allowed=", ".join(RULES)))
     rule = RULES[name]
@@ -83,16 +104,17 @@ def _rule(name: str, parameters: Mapping[str, float] | None) -> Rule:
     return replace(rule, parameters={**rule.parameters, **parameters})
 
 
-def _reduce(motion: Motion, static: Apex, sliding: Sliding, rule: Rule) -> Pull:
+def _reduce(motion: Motion, static: Apex, sliding: Sliding, rule: Rule, readings: StaticReadings) -> Pull:
     """The numbers of a pull; every uncertainty holds what a slow wander may have done since the zero was seen."""
     zero, mean, window_s = motion.zero, sliding.mean, sliding.window_s
     static_wander = zero.wander_rate * max(static.time_s - zero.time_s, 0.0)
+    open_N = readings.open_N(static)
     since_zero_s = window_s[0] - zero.time_s + (window_s[1] - window_s[0]) / 3.0
     return Pull(
         test_id="",
         rule=rule.name,
         static_N=static.force_N,
-        static_u_N=math.sqrt(static.u_N**2 + static.shape_u_N**2 + zero.u_N**2 + static_wander),
+        static_u_N=math.sqrt(static.u_N**2 + static.shape_u_N**2 + zero.u_N**2 + static_wander + open_N**2),
         sliding_N=mean.mean_N,
         sliding_u_N=math.sqrt(mean.u_N**2 + zero.u_N**2 + sliding.wander_rate * max(since_zero_s, 0.0)),
         zero_N=zero.force_N,
@@ -106,7 +128,10 @@ def _reduce(motion: Motion, static: Apex, sliding: Sliding, rule: Rule) -> Pull:
         stick_slip_period_s=sliding.period_s,
         noise_N=mean.noise_N if sliding.enough else motion.noise_N,
         drift_N_per_s=mean.drift_N_per_s,
-        flags=_flags(motion, static, sliding, rule),
+        flags=(*_flags(motion, static, sliding, rule), *(("peak_ambiguous",) if open_N else ())),
+        first_maximum_N=readings.first_N,
+        highest_N=readings.highest_N,
+        first_drop_N=readings.drop_N,
     )
 
 
@@ -135,6 +160,7 @@ def _flags(motion: Motion, static: Apex, sliding: Sliding, rule: Rule) -> tuple[
         "spike": bool(motion.problems),
         "gap_at_peak": _gap_at(motion, static.time_s),
         "rounded_peak": static.shape == "rounded",
+        "peak_between_samples": static.shape == "highest sample",
         "no_drop": enough and static.force_N - mean.mean_N < 3.0 * math.hypot(static.u_N, mean.u_N),
         "no_sliding": not enough,
         "window_short": enough and travel is not None and bool(travel[end - 1] - travel[start] < 0.9 * asked),

@@ -47,6 +47,16 @@ def highest_in_skip(motion: Motion, parameters: Parameters) -> Apex:
     return rounded_apex(motion.time_s, motion.force_N, first + int(np.argmax(later)), 3, motion.noise_N)
 
 
+def highest_before_stop(motion: Motion, parameters: Parameters) -> Apex:
+    """The highest force up to the end of sliding: a later maximum where it tops the first."""
+    first, end = motion.sliding
+    later = motion.smooth_N[first:end]
+    if later.size < 3 or float(later.max()) <= motion.apex.force_N:
+        return motion.apex
+    half = max(3, later.size // 100)
+    return rounded_apex(motion.time_s, motion.force_N, first + int(np.argmax(later)), half, motion.noise_N)
+
+
 def highest_early(motion: Motion, parameters: Parameters) -> Apex:
     """The highest force, impulses left out, in the first ``start_s`` of the record."""
     end = int(np.searchsorted(motion.time_s, motion.time_s[0] + parameters["start_s"], side="right"))
@@ -134,6 +144,14 @@ RULES: dict[str, Rule] = {
             highest_in_skip,
             length_after_skip,
             {"skip_m": 0.013, "length_m": 0.150},
+        ),
+        Rule(
+            "highest",
+            "highest force before the drive stops",
+            "mean from the time the force has stabilised (MSER-5) to the end of sliding",
+            "practice of ring shear testers: Schulze 1994; Schmid et al. 2020, quartz sand of the Univ. of Bern",
+            highest_before_stop,
+            once_stabilised,
         ),
         Rule(
             "middle_share",

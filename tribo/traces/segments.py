@@ -55,12 +55,15 @@ def split_pulls(trace: Trace) -> tuple[Trace, ...]:
     if not cuts:
         return (trace,)
     stretches = [(a, b) for a, b in between(cuts, trace.time_s.size) if b - a >= MINIMUM_SAMPLES]
+    if speed is not None:
+        stretches = [(a, b) for a, b in stretches if (moving[a:b] > rest).any()] or stretches
     shortest = _FRAGMENT * float(np.median([b - a for a, b in stretches])) if stretches else 0.0
     kept = [(a, b) for a, b in stretches if b - a >= shortest] or [(0, trace.time_s.size)]
-    return tuple(_piece(trace, a, b, f"{trace.name}/{k}") for k, (a, b) in enumerate(kept, start=1))
+    return tuple(piece_of(trace, a, b, f"{trace.name}/{k}") for k, (a, b) in enumerate(kept, start=1))
 
 
-def _piece(trace: Trace, start: int, end: int, name: str) -> Trace:
+def piece_of(trace: Trace, start: int, end: int, name: str) -> Trace:
+    """The samples ``start`` to ``end`` of a trace as a trace of their own."""
     part = slice(start, end)
     return replace(
         trace,

@@ -18,7 +18,7 @@ SPIKE_OVER_NEIGHBOURS = 3.0
 SPIKE_RETURN = 0.5
 SPIKE_WIDTHS = (1, 2, 3)
 _NEIGHBOURS = 4
-_MOST_LISTED = 20
+_MOST_IMPULSES = 20  # more of them belong to the signal, as slips or as its own noise, and are left in it
 _CHANCE_OF_FLAT_TOP = 1e-4
 _SHORTEST_FLAT_TOP = 4
 _SHORTEST_STANDSTILL = 20
@@ -32,7 +32,8 @@ _COARSE = 0.5  # share of equal neighbours from which on a resolution is too coa
 class Signal:
     """Force against time that can be read; arrays (n,) share the trace's samples.
 
-    No two samples share a time, and the force is free of impulses, which ``problems`` list. ``calm_N`` is the force
+    No two samples share a time, and the force is free of impulses, which ``problems`` list; where there are many, they
+    belong to the signal and stay in it (``impulsive``). ``calm_N`` is the force
     without what lasts one sample, ``smooth_N`` that smoothed, ``noise_N`` the noise of a sample. ``recorder_fault``
     says how the recorder failed, if it did. ``displacement_m`` is None where the trace has none.
     """
@@ -46,6 +47,7 @@ class Signal:
     recorder_fault: Problem | None
     problems: tuple[Problem, ...]
     file: str
+    impulsive: bool = False
 
 
 def signal_of(trace: Trace) -> Signal:
@@ -62,6 +64,8 @@ def signal_of(trace: Trace) -> Signal:
     raw = np.asarray(trace.force_N, float)
     noise = noise_of(raw)
     spikes = impulse_spikes(raw, noise)
+    if impulsive := bool(np.count_nonzero(spikes) > _MOST_IMPULSES):
+        spikes = np.zeros(raw.size, bool)
     problems = spike_problems(trace, spikes)
     force = without_spikes(raw, spikes)
     fault = recorder_fault(trace, force)
@@ -69,7 +73,7 @@ def signal_of(trace: Trace) -> Signal:
     calm = median_of_three(force)
     smooth = running_mean(calm, max(1, force.size // _SMOOTHED))
     displacement = None if trace.displacement_m is None else np.asarray(trace.displacement_m, float)
-    return Signal(time, force, calm, smooth, displacement, noise, fault, problems, trace.file)
+    return Signal(time, force, calm, smooth, displacement, noise, fault, problems, trace.file, impulsive)
 
 
 def file_row(trace: Trace, index: int) -> int:
@@ -149,9 +153,9 @@ def _largest_beside(size: FloatArray, first: NDArray[np.int64], width: int) -> F
 
 
 def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ...]:
-    """One Problem of kind ``spike`` a spiked sample, with its row, time and value; the last of many counts the rest."""
+    """One Problem of kind ``spike`` a spiked sample, with its row, time and value."""
     at = np.flatnonzero(spikes)
-    problems = [
+    return tuple(
         Problem(
             "spike",
             f"a spike at {trace.time_s[k]:.6g} s; this data point is left out",
@@ -160,12 +164,8 @@ def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ..
             "force",
             f"{trace.force_N[k]:.6g} N",
         )
-        for k in at[:_MOST_LISTED]
-    ]
-    if at.size > _MOST_LISTED:
-        what = f"{at.size - _MOST_LISTED} more spikes; these data points are left out"
-        problems.append(Problem("spike", what, trace.file or None, file_row(trace, int(at[_MOST_LISTED])), "force"))
-    return tuple(problems)
+        for k in at
+    )
 
 
 def without_spikes(force: FloatArray, spikes: NDArray[np.bool_]) -> FloatArray:

@@ -7,6 +7,8 @@ effects are estimated for every replicate by the steps of :mod:`tribo.diagnose.s
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from tribo.diagnose.statistics.linearisation import ModelFit
@@ -64,21 +66,35 @@ def standardised(f: ModelFit) -> FloatArray:
     return np.asarray(left)
 
 
+@dataclass(frozen=True)
+class Refits:
+    """Campaigns fitted again: the noise of each, the coefficients (r, p + q) of the model's columns with their
+    covariance (r, p + q, p + q), and what is left of every test, (r, 2, n)."""
+
+    sizes: Sizes
+    solution: FloatArray
+    covariance: FloatArray
+    left: FloatArray
+
+
 def refit(f: ModelFit, residual: FloatArray) -> Replicates:
     """Law, random effects, weights and noise sizes of campaigns that differ from ``f`` by ``residual`` (r, 2, n)."""
-    return _refitted(f, residual)[0]
+    found, along, p = refits(f, residual), _along_of(f), f.linear.jacobian.shape[2]
+    without = found.left + np.tensordot(found.solution[:, p:], along[:, :, p:], axes=(1, 2))
+    return replicates_at(f.setup, along, found.sizes, found.left, without, f.noise.tail)
 
 
 def refit_sizes(f: ModelFit, residual: FloatArray) -> Sizes:
     """The noise alone, estimated in each of these campaigns."""
-    return _refitted(f, residual)[1]
+    return refits(f, residual).sizes
 
 
-def _refitted(f: ModelFit, residual: FloatArray) -> tuple[Replicates, Sizes]:
+def refits(f: ModelFit, residual: FloatArray) -> Refits:
+    """Each of these campaigns fitted, linear about ``f``."""
     s, along, tail = f.setup, _along_of(f), f.noise.tail
     p = f.linear.jacobian.shape[2]
     sizes, left = fitted_sizes(s, f.noise, len(residual)), residual
-    solution = np.zeros((len(residual), along.shape[2]))
+    spread, solution = np.zeros(0), np.zeros((len(residual), along.shape[2]))
     for _ in range(STEPS):
         weight = replicate_weights(sizes, left, tail)
         spread, solution = solved_at_once(along, sizes.inverse * weight[:, None], residual, prior_of_columns(p, sizes))
@@ -86,5 +102,4 @@ def _refitted(f: ModelFit, residual: FloatArray) -> tuple[Replicates, Sizes]:
         squares = weight[:, None] * (products_of(left) + blurred(along, spread))
         found = solution[:, p:], np.diagonal(spread, axis1=1, axis2=2)[:, p:]
         sizes = sizes_updated(s, sizes, found, squares, tail)
-    without = left + np.tensordot(solution[:, p:], along[:, :, p:], axes=(1, 2))
-    return replicates_at(s, along, sizes, left, without, tail), sizes
+    return Refits(sizes, solution, spread, left)

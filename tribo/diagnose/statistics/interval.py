@@ -10,16 +10,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from tribo.diagnose.statistics.chance import drawn_residuals, refits
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import FIXED, N_LAW, PATTERN
-from tribo.diagnose.statistics.scatter import log_size_prior
+from tribo.diagnose.statistics.scatter import Noise, log_size_prior
 from tribo.mechanisms.record import Mechanism
 from tribo.records import FloatArray
 
 NORMAL_90 = 1.645
 DROP_90 = 0.5 * NORMAL_90**2  # of the log likelihood at the ends of a 90 % interval
 NEAR = 2.0 * NORMAL_90  # standard errors from a bound within which the curvature is not trusted
+REPLICATES, WIDEST = 80, 1.5  # campaigns that show how far estimates scatter; a factor beyond this is their chance
 SMALLEST_SHARE = 1e-6  # of the way to a bound
 PATTERN_STEPS = np.linspace(-0.8, 1.2, 6)  # of the logarithm of the pattern error about its estimate, to average over
 
@@ -31,17 +33,37 @@ def recovered(f: ModelFit, index: int) -> list[tuple[float, float, float]]:
     """
     if not (f.setup.group == PATTERN).any():
         return [(float(v), *ends) for v, ends in zip(f.values[index], intervals(f, index), strict=True)]
+    weight, fits = over_pattern_error(f)
+    ends = np.array([intervals(g, index) for g in fits])  # (errors, parameters, 2)
+    values = np.array([g.values[index] for g in fits])
+    wider = understated(f, index)
+    return [
+        _averaged(weight, values[:, k], ends[:, k], wider[k], (p.low, p.high))
+        for k, p in enumerate(f.acting[index].mechanism.parameters)
+    ]
+
+
+def understated(f: ModelFit, index: int) -> FloatArray:
+    """Factor (at least one) by which the standard errors of a mechanism's parameters are too small.
+
+    The curvature knows neither that the weights of the tests are estimated nor that the repeats need not follow the t
+    distribution. Campaigns that the fit makes itself, with its own residuals, show how far their estimates scatter.
+    """
+    made = refits(f, drawn_residuals(f, np.random.default_rng(0), REPLICATES))
+    first = N_LAW + sum(len(v) for v in f.values[:index])
+    here = slice(first, first + len(f.values[index]))
+    variance = np.diagonal(made.covariance, axis1=1, axis2=2)[:, here] / informed_share(f.noise)
+    squares = made.solution[:, here] ** 2 / np.maximum(variance, 1e-300)
+    return np.asarray(np.clip(np.sqrt(np.mean(squares, axis=0)), 1.0, WIDEST))
+
+
+def over_pattern_error(f: ModelFit) -> tuple[FloatArray, list[ModelFit]]:
+    """The fit at several sizes of the pattern error, and how likely each makes the campaign, adding to one."""
     factors = f.noise.pattern * np.exp(PATTERN_STEPS)
     fits = [with_pattern_error(f, factor) for factor in factors]
     log_weight = np.array([g.score + _log_freedom(g) for g in fits]) + log_size_prior(PATTERN, factors)
     weight = np.exp(log_weight - log_weight.max())
-    weight /= weight.sum()
-    ends = np.array([intervals(g, index) for g in fits])  # (errors, parameters, 2)
-    values = np.array([g.values[index] for g in fits])
-    return [
-        _averaged(weight, values[:, k], ends[:, k], (p.low, p.high))
-        for k, p in enumerate(f.acting[index].mechanism.parameters)
-    ]
+    return weight / weight.sum(), fits
 
 
 def _log_freedom(f: ModelFit) -> float:
@@ -62,12 +84,14 @@ def with_pattern_error(f: ModelFit, factor: float) -> ModelFit:
 
 
 def _averaged(
-    weight: FloatArray, values: FloatArray, ends: FloatArray, bounds: tuple[float, float]
+    weight: FloatArray, values: FloatArray, ends: FloatArray, wider: float, bounds: tuple[float, float]
 ) -> tuple[float, float, float]:
-    """Mean, and ends whose distance has the mean square of the single ones and of what the values differ by."""
+    """Mean, and ends whose distance has the mean square of the single ones, ``wider`` times, and of what the values
+    differ by."""
     value = float(weight @ values)
     apart = weight @ (NORMAL_90 * (values - value)) ** 2
-    below, above = (float(np.sqrt(weight @ (ends[:, k] - values) ** 2 + apart)) for k in (0, 1))
+    squares = wider**2 * (weight @ (ends - values[:, None]) ** 2) + apart
+    below, above = np.sqrt(squares).tolist()
     return value, max(value - below, bounds[0]), min(value + above, bounds[1])
 
 
@@ -91,16 +115,19 @@ def intervals(f: ModelFit, index: int) -> list[tuple[float, float]]:
 
 
 def standard_errors(f: ModelFit, index: int) -> list[float]:
-    """Of every parameter of one mechanism, from the curvature; zero for one held at a bound.
-
-    The weighted normal equations overstate what a pull tells about its location: under the bivariate t with ``tail``
-    degrees of freedom the expected information is smaller by (tail + 2) / (tail + 4) (Lange, Little and Taylor, JASA
-    84, 881, 1989, appendix B).
-    """
+    """Of every parameter of one mechanism, from the curvature; zero for one held at a bound."""
     first = N_LAW + sum(len(v) for v in f.values[:index])
     diagonal = np.diag(f.covariance)[first : first + len(f.values[index])]
-    informed = (f.noise.tail + 2.0) / (f.noise.tail + 4.0)
-    return [float(np.sqrt(max(d, 0.0) / informed)) for d in diagonal]
+    return [float(np.sqrt(max(d, 0.0) / informed_share(f.noise))) for d in diagonal]
+
+
+def informed_share(noise: Noise) -> float:
+    """Of the information in the weighted normal equations, what a pull really tells about its location.
+
+    Under the bivariate t with ``tail`` degrees of freedom the expected information is smaller by
+    (tail + 2) / (tail + 4) (Lange, Little and Taylor, JASA 84, 881, 1989, appendix B).
+    """
+    return (noise.tail + 2.0) / (noise.tail + 4.0)
 
 
 def _profile(f: ModelFit, index: int, k: int, error: float) -> tuple[float, float]:

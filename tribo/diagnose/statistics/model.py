@@ -201,6 +201,17 @@ def with_form_error(
     )
 
 
+def with_free_columns(s: Setup, columns: FloatArray, coefficients: FloatArray) -> Setup:
+    """Further random effects along ``columns`` (n, 2, d), free to be about twice as large as ``coefficients`` (d,)."""
+    freedom = np.maximum(2.0 * np.abs(coefficients), 0.5 * np.abs(coefficients).max())
+    return replace(
+        s,
+        random=np.concatenate([s.random, columns], axis=2),
+        unit=np.concatenate([s.unit, freedom]),
+        group=np.concatenate([s.group, np.full(len(freedom), FIXED)]),
+    )
+
+
 def candidates(s: Setup, law: FloatArray) -> list[Acting]:
     """Every mechanism and choice that could show in the friction forces of this design."""
     base, conditions = s.base(law), s.observations.conditions

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 
 import numpy as np
 
@@ -180,9 +180,10 @@ def _numbers(values: Sequence[float | None]) -> FloatArray:
 
 def _seconds(stamp: str) -> float | None:
     try:
-        return datetime.fromisoformat(stamp).timestamp()
+        when = datetime.fromisoformat(stamp)
     except ValueError:
         return None
+    return (when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp()  # not by the clock of this machine
 
 
 def _clock_h(stamp: str) -> float:

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from tribo.errors import Problem, ReadError
-from tribo.readers.core.damage import MOST_PROBLEMS, cut_short, find_damage
+from tribo.limits import MOST_EXPORT_ROWS as LARGEST_TABLE_ROWS
+from tribo.readers.core.damage import MOST_PROBLEMS, cut_short, empty_end, find_damage, without_empty_end
+from tribo.readers.core.grouping import parse_grouped
 from tribo.readers.core.layout import Layout, cut
-from tribo.readers.core.source import LARGEST_TABLE_ROWS, Source
+from tribo.readers.core.source import Source
 from tribo.readers.core.tables_in_file import Block
 from tribo.records import FloatArray
 
@@ -20,8 +22,8 @@ _COMMA_TO_POINT = bytes.maketrans(b",", b".")
 _EXACT_BY_DEFAULT = (3, 1)  # from this pandas on; earlier ones are asked for the nearest double
 
 
-def parse_block(source: Source, block: Block, used: Sequence[int]) -> FloatArray:
-    """Columns ``used`` of a table, shape (len(used), rows), as written (no unit applied).
+def parse_block(source: Source, block: Block, used: Sequence[int]) -> tuple[FloatArray, Problem | None]:
+    """Columns ``used`` of a table, shape (len(used), rows), as written (no unit applied), and a doubt about its end.
 
     Raises
     ------
@@ -30,10 +32,11 @@ def parse_block(source: Source, block: Block, used: Sequence[int]) -> FloatArray
         all at once.
     """
     if source.arrays:
-        return np.array([source.arrays[index] for index in used], dtype=float)
+        return _end_of_arrays(np.array([source.arrays[index] for index in used], dtype=float), source)
     table = _room_for(source, block, len(used))
     filled = 0
     problems: list[Problem] = []
+    doubt: Problem | None = None
     row, start = block.layout.header_rows + 1, block.start
     for chunk in source.chunks(block.start, block.end):
         start += len(chunk)
@@ -42,8 +45,13 @@ def parse_block(source: Source, block: Block, used: Sequence[int]) -> FloatArray
         breaks_off = ends_file and cut_short(source, block)
         if values is None or breaks_off or not np.isfinite(values).all():
             text = source.text(chunk).replace("\r\n", "\n")
+            if start >= block.end and not breaks_off:
+                text, doubt = without_empty_end(text, block.layout, used, source.file, row)
             found = find_damage(text, block.layout, used, source.file, row, ends_file, breaks_off)
             values = None if found else _parse_slowly(text, block.layout, used)
+            if found and all(p.kind in ("two_decimal_marks", "more") for p in found):
+                values = parse_grouped(text, block.layout, used)
+                found = [] if values is not None else found
             if values is None and not found:
                 found = [Problem("unreadable", "the table does not consist of numbers", source.file, row)]
             problems += found
@@ -55,7 +63,16 @@ def parse_block(source: Source, block: Block, used: Sequence[int]) -> FloatArray
             filled += len(values)
     if problems:
         raise ReadError(problems)
-    return table[:, :filled]
+    return table[:, :filled], doubt
+
+
+def _end_of_arrays(values: FloatArray, source: Source) -> tuple[FloatArray, Problem | None]:
+    """Named arrays without the rows at their end in which one has no number, as arrays of one length are padded."""
+    finite = np.isfinite(values).all(axis=0)
+    last = int(np.flatnonzero(finite)[-1]) + 1 if finite.any() else 0
+    if last == finite.size:
+        return values, None
+    return values[:, :last], empty_end(finite.size - last, source.file, last + 1)
 
 
 def _room_for(source: Source, block: Block, columns: int) -> FloatArray:
@@ -104,7 +121,8 @@ def _parse_few(rows: bytes, delimiter: str | None, n_cells: int, used: Sequence[
     if not everything and delimiter and not _same_cells_in_all_rows(rows, delimiter, n_cells):
         return None
     if everything:
-        return np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2)[:, list(used)]
+        values = np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2)
+        return values[:, list(used)] if values.shape[1] == n_cells else None
     return np.loadtxt(lines, delimiter=delimiter, comments=None, ndmin=2, usecols=list(used))
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tribo.errors import Problem
+from tribo.limits import LARGEST_NUMBER, SMALLEST_NUMBER
 from tribo.records import FloatArray
 
 GAP_STEPS = 5.0  # a time step this many median steps long is a gap
@@ -32,6 +33,25 @@ class Finding:
     flag: str
     problem: Problem
     fatal: bool = False
+
+
+def beyond_measurement(
+    arrays: Mapping[str, FloatArray], file: str, labels: Mapping[str, str], row_of: RowOf
+) -> list[Problem]:
+    """Columns (SI units) with numbers that no instrument gives: too large for any, or a force or time too small."""
+    problems = []
+    for quantity, values in arrays.items():
+        largest = float(max(values.max(), -values.min())) if values.size else 0.0
+        column = labels.get(quantity, quantity)
+        if largest > LARGEST_NUMBER:
+            k = int(np.argmax(np.abs(values) > LARGEST_NUMBER))
+            place = (file, row_of(k), column, f"{values[k]:.6g}", f"at most {LARGEST_NUMBER:g} in SI units")
+            problems.append(Problem("impossible_number", "not a possible value", *place))
+        elif quantity in ("time", "friction force") and 0 < largest < SMALLEST_NUMBER:
+            found, allowed = f"at most {largest:.3g}", f"values of at least {SMALLEST_NUMBER:g} in SI units"
+            what = "no value of this column is large enough to have been measured"
+            problems.append(Problem("impossible_number", what, file, None, column, found, allowed))
+    return problems
 
 
 def check_time(time: FloatArray, file: str, column: str, row_of: RowOf) -> list[Finding]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from tribo.errors import Problem
@@ -12,9 +13,12 @@ from tribo.readers.core.source import Source
 from tribo.readers.core.tables_in_file import Block
 
 MOST_PROBLEMS = 50
+MOST_COUNTED = 1000
+_BLANK = ' \t;,"|'
+FEWEST_GROUPED = 4
 _TAIL_BYTES = 4000
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-_MARKS_AND_DIGITS = re.compile(r"[-+\d.,'\s]+")
+_MARKS_AND_DIGITS = re.compile(r"[-+\d.,'’\s]+")
 _OTHER_MARK = "a different decimal mark, or more than one"
 _NOTHING = frozenset({"", "nan", "n/a", "na", "#n/a", "--", "---", "-", "null", "none", "inf", "infinity"})
 
@@ -51,7 +55,7 @@ def find_damage(
     for k in range(last + 1):
         if not lines[k].strip():
             continue
-        if len(problems) >= MOST_PROBLEMS:
+        if len(problems) >= MOST_COUNTED:
             problems.append(Problem("more", "there are further errors in the rows below", file=file, row=first_row + k))
             break
         row_fault = _row_fault(lines[k], layout, file, first_row + k, ends_file and k == last, breaks_off)
@@ -59,8 +63,56 @@ def find_damage(
             problems.append(row_fault)
         else:
             problems += _cell_faults(lines[k], layout, used, file, first_row + k, gaps)
-    problems += _gap_problems(layout, gaps, file)
+    problems = _grouped(problems) + _gap_problems(layout, gaps, file)
     return sorted(problems, key=lambda p: p.row or 0)
+
+
+def without_empty_end(
+    text: str, layout: Layout, used: Sequence[int], file: str, first_row: int
+) -> tuple[str, Problem | None]:
+    """The text without the rows at its end that have no number in a column used, and the doubt that says so.
+
+    Only where another column goes on, as in tables of records of unequal length, or where the time or all of them end.
+    """
+    lines = text.split("\n")
+    keep = len(lines)
+    while keep and (not lines[keep - 1].strip(_BLANK) or _is_past_the_end(lines[keep - 1], layout, used)):
+        keep -= 1
+    left_out = sum(bool(line.strip(_BLANK)) for line in lines[keep:])
+    if not left_out or not keep:
+        return text, None
+    return "\n".join(lines[:keep]) + "\n", empty_end(left_out, file, first_row + keep)
+
+
+def _is_past_the_end(line: str, layout: Layout, used: Sequence[int]) -> bool:
+    cells = cut(line, layout.delimiter)
+    if len(cells) != layout.n_cells:
+        return False
+    empty = [cell.lower().lstrip("+-") in _NOTHING for cell in cells]
+    ended = [empty[index] for index in used]
+    others = [cell for k, cell in enumerate(cells) if k not in used and not empty[k]]
+    goes_on = any(_not_a_number(cell, layout.decimal) is None for cell in others)
+    return all(ended) or ended[0] or (any(ended) and goes_on)  # the first column used is the time
+
+
+def empty_end(rows: int, file: str, row: int) -> Problem:
+    """The doubt about rows at the end of a table that hold no number in a column used."""
+    what = f"{rows} rows at the end lack the time or another value and are left out; this is the first"
+    return Problem("empty_end", what, file, row)
+
+
+def _grouped(problems: Sequence[Problem]) -> list[Problem]:
+    """Faults of one kind in one column as one problem from a few on, at the first of them."""
+    places: dict[tuple[str, str | None], list[Problem]] = {}
+    for problem in problems:
+        places.setdefault((problem.kind, problem.column), []).append(problem)
+    found = []
+    for (kind, _), alike in places.items():
+        if len(alike) < FEWEST_GROUPED or kind == "more":
+            found += alike
+        else:
+            found.append(replace(alike[0], what=f"{alike[0].what}, in {len(alike)} rows; this is the first"))
+    return found
 
 
 def _ends_in_a_number(line: str, layout: Layout) -> bool:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from pathlib import Path
 
 from tribo.errors import Problem, ReadError
 from tribo.quantities import QUANTITIES
-from tribo.readers.core.assign import parse_columns
+from tribo.readers.core.given import Columns, Given, parse_columns
 from tribo.readers.core.reading import Contents, Reading, read_source, split_at_restarts
 from tribo.readers.families import open_sources
-from tribo.records import ExportFormat, Trace
+from tribo.records import Correction, ExportFormat, Trace
 
 _CHOICE = re.compile(r"(.+)#(\d+)")
 
@@ -19,7 +18,8 @@ _CHOICE = re.compile(r"(.+)#(\d+)")
 def read_export(
     path: Path | str,
     *,
-    columns: Mapping[str, str] | None = None,
+    columns: Columns | None = None,
+    correction: Correction | None = None,
     name: str | None = None,
     file: str | None = None,
 ) -> Trace:
@@ -32,7 +32,10 @@ def read_export(
         decimal mark and header are found from the content.
     columns : mapping, optional
         ``{quantity: "name [unit]"}`` overrides what the names say, e.g. ``{"friction force": "Fx [gf]"}``;
-        ``"#3 [N]"`` is the third column. A unit may carry a number: ``"Fnorm [30.7 gf]"``.
+        ``"#3 [N]"`` is the third column. A unit may carry a number: ``"Fnorm [30.7 gf]"``. ``"none"`` leaves a
+        quantity out, ``ignore`` lists columns not to look at, ``decimal`` is the decimal mark.
+    correction : Correction, optional
+        Sign, gain and lever arm of the friction force; sampling rate or speed where the export has no time.
     name : str, optional
         Name of the trace (the test_id); the file's stem by default.
     file : str, optional
@@ -52,7 +55,7 @@ def read_export(
         several_tables.
     """
     path, choice = _split_choice(Path(path))
-    traces = _read(path, columns, name, file, split=choice is not None)
+    traces = _read(path, parse_columns(columns, correction), name, file, split=choice is not None)
     if choice is None and len(traces) == 1:
         return traces[0]
     if choice is not None and 1 <= choice <= len(traces):
@@ -66,7 +69,8 @@ def read_export(
 def read_blocks(
     path: Path | str,
     *,
-    columns: Mapping[str, str] | None = None,
+    columns: Columns | None = None,
+    correction: Correction | None = None,
     name: str | None = None,
     file: str | None = None,
 ) -> tuple[Trace, ...]:
@@ -75,7 +79,7 @@ def read_blocks(
     Arguments and errors are those of :func:`read_export`, except several_tables. A table whose time starts again
     is split there. The traces are named ``name#1``, ``name#2`` and so on if there are several.
     """
-    return _read(Path(path), columns, name, file, split=True)
+    return _read(Path(path), parse_columns(columns, correction), name, file, split=True)
 
 
 def _split_choice(path: Path) -> tuple[Path, int | None]:
@@ -86,14 +90,12 @@ def _split_choice(path: Path) -> tuple[Path, int | None]:
     return path.with_name(chosen[1]), int(chosen[2])
 
 
-def _read(
-    path: Path, columns: Mapping[str, str] | None, name: str | None, file: str | None, *, split: bool
-) -> tuple[Trace, ...]:
+def _read(path: Path, given: Given, name: str | None, file: str | None, *, split: bool) -> tuple[Trace, ...]:
     file = str(path) if file is None else file
     name = path.stem if name is None else name
     readings = [
         part
-        for reading in read_contents(path, columns, file).readings
+        for reading in read_contents(path, given, file).readings
         for part in (split_at_restarts(reading) if split else (reading,))
     ]
     fatal = [f.problem for reading in readings for f in reading.findings if f.fatal]
@@ -104,9 +106,7 @@ def _read(
     return tuple(_trace(reading, f"{name}#{k}", file) for k, reading in enumerate(readings, start=1))
 
 
-def read_contents(
-    path: Path, columns: Mapping[str, str] | None, file: str, *, beginning_only: bool = False
-) -> Contents:
+def read_contents(path: Path, given: Given, file: str, *, beginning_only: bool = False) -> Contents:
     """All tables of an export that are traces, of all sheets; a sheet without any counts only if none has.
 
     With ``beginning_only`` no more is read of a large file than tells what it is.
@@ -116,11 +116,10 @@ def read_contents(
     ReadError
         No table can be read, or one of several cannot.
     """
-    asked = parse_columns(columns)
     found, refused = [], []
     for source in open_sources(path, file):
         try:
-            found.append(read_source(source.beginning_only() if beginning_only else source, asked))
+            found.append(read_source(source.beginning_only() if beginning_only else source, given))
         except ReadError as why:
             refused.append(why)
     problems = [p for contents in found for p in contents.problems]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tribo.readers.core.assign import Hint
+from tribo.readers.core.given import Hint
 from tribo.readers.core.layout import Layout
 from tribo.readers.core.source import Source
 

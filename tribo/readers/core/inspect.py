@@ -10,15 +10,17 @@ from typing import Any
 import numpy as np
 
 from tribo.errors import Problem, ReadError
-from tribo.quantities import quantity_named
-from tribo.readers.core.assign import NEEDED, Column, Hint, assign, match_column
+from tribo.input_files import MAPPED_BYTES
+from tribo.readers.core.assign import NEEDED, Column, assign
 from tribo.readers.core.export import read_contents
 from tribo.readers.core.family import Family
+from tribo.readers.core.given import Columns, Given, parse_columns, what_is_known
 from tribo.readers.core.layout import Layout
+from tribo.readers.core.names import match_column
 from tribo.readers.core.reading import Contents, Reading, layout_of, split_at_restarts
-from tribo.readers.core.source import MAPPED_BYTES, Source
+from tribo.readers.core.source import Source
 from tribo.readers.families import family_of, open_sources
-from tribo.records import FloatArray
+from tribo.records import Correction, FloatArray
 
 _BASELINE_SHARE = 0.05  # of the largest force: a pull that starts above it has no zero phase
 _FLAT_TOP = 5  # equal samples at an extreme in a row
@@ -114,19 +116,21 @@ class Inspection:
         return "\n".join(lines)
 
 
-def inspect_export(path: Path | str, *, columns: Mapping[str, str] | None = None) -> Inspection:
+def inspect_export(
+    path: Path | str, *, columns: Columns | None = None, correction: Correction | None = None
+) -> Inspection:
     """Description of an export: family, encoding, columns and why, units, tables, time base, doubts.
 
     Never raises because of the contents of the file: for an export that cannot be read, ``problems`` states why.
-    Only the beginning of a large file is checked; a doubt then says so. ``columns`` as in
-    :func:`tribo.readers.read_export`.
+    Only the beginning of a large file is checked; a doubt then says so. ``columns`` and ``correction``
+    as in :func:`tribo.readers.read_export`.
     """
     path = Path(path)
     file = str(path)
     try:
-        contents = read_contents(path, columns, file, beginning_only=True)
+        contents = read_contents(path, parse_columns(columns, correction), file, beginning_only=True)
     except ReadError as why:
-        return _refused(path, file, why.problems, parse_hints(columns))
+        return _refused(path, file, why.problems, what_is_known(columns, correction))
     seen = _read(file, contents)
     return replace(seen, doubts=(*_unseen(path, file), *seen.doubts))
 
@@ -141,12 +145,7 @@ def _unseen(path: Path, file: str) -> tuple[Problem, ...]:
     return (Problem("only_beginning", what, file, found=source.last_line()[:60]),)
 
 
-def parse_hints(columns: Mapping[str, str] | None) -> tuple[Hint, ...]:
-    """Columns asked for, without those that name no quantity."""
-    return tuple(Hint(q, wanted) for key, wanted in (columns or {}).items() if (q := quantity_named(key)))
-
-
-def _refused(path: Path, file: str, problems: tuple[Problem, ...], asked: tuple[Hint, ...]) -> Inspection:
+def _refused(path: Path, file: str, problems: tuple[Problem, ...], given: Given) -> Inspection:
     """What is known about an export that cannot be read."""
     try:
         source = open_sources(path, file)[0]
@@ -155,7 +154,7 @@ def _refused(path: Path, file: str, problems: tuple[Problem, ...], asked: tuple[
     family = family_of(source)
     seen = Inspection(file, family.name, family.text, source.encoding, problems=problems)
     try:
-        layout = layout_of(source, asked)
+        layout = layout_of(source, given)
     except ReadError:
         return seen
     return replace(
@@ -163,16 +162,15 @@ def _refused(path: Path, file: str, problems: tuple[Problem, ...], asked: tuple[
         delimiter=layout.delimiter,
         decimal=layout.decimal,
         header_rows=layout.header_rows,
-        columns=_columns(layout, _taken(source, family, layout, asked)),
+        columns=_columns(layout, _taken(source, family, layout, given)),
         metadata=layout.metadata,
         advice=_advice(problems, family, layout),
     )
 
 
-def _taken(source: Source, family: Family, layout: Layout, asked: tuple[Hint, ...]) -> tuple[Column, ...]:
-    hints = asked + family.hints(source, layout)
+def _taken(source: Source, family: Family, layout: Layout, given: Given) -> tuple[Column, ...]:
     try:
-        return assign(layout.names, layout.units, layout.filled, hints).columns
+        return assign(layout.names, layout.units, layout.filled, given.with_hints(family.hints(source, layout))).columns
     except ReadError:
         return ()
 

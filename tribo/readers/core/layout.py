@@ -5,21 +5,23 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from tribo.errors import Problem, ReadError
-from tribo.readers.core.assign import match_column
+from tribo.readers.core.given import Given
+from tribo.readers.core.names import bare_unit, is_unit, match_column
 from tribo.readers.core.source import HEAD_BYTES, LARGEST_HEAD_BYTES, Source
 
-Named = Callable[[str], bool]
 _NUMBER_START = re.compile(r"[-+]?[.,]?\d")
-_ROW_OF_NUMBERS = re.compile(r'[\s";,|]*[-+]?[.,]?\d[-+\d\s.,;|"/:eEnaNATZ]*')
+_ROW_OF_NUMBERS = re.compile(r"""[\s";,|]*[-+]?[.,]?\d[-+\d\s.,;|"'’/:eEnaNATZ]*""")
 _COMMA_NUMBER = re.compile(r"[-+]?(?:\d+,\d*|,\d+)(?:[eE][-+]?\d+)?")
 _DOT_NUMBER = re.compile(r"[-+]?(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(?:(?P<mark>[.,'’\s])\d{3})+(?!(?P=mark))(?P<decimal>[.,])\d*")
 _ROWS_LOOKED_AT = 5
 _HEADER_LINES_LOOKED_AT = 200
+_MEASURED = ("time", "friction force", "displacement", "temperature", "speed", "torque")
 _COMMENTS = {"comment", "comments", "kommentar", "commentaire"}
 _COMMENT_MARKS = ("#", "%", "//", ";")
 _BLANK = ' \t;,"|'
@@ -67,10 +69,8 @@ def cut(line: str, delimiter: str) -> list[str]:
         return [cell.strip(' "') for cell in line.split(delimiter)]
 
 
-def sniff(source: Source, named: Named, start: int = 0, rows_above: int = 0) -> Layout:
+def sniff(source: Source, given: Given, start: int = 0, rows_above: int = 0) -> Layout:
     """The layout of the first table below the line at offset ``start``, which has ``rows_above`` lines above it.
-
-    ``named(name)`` says that a column of this name was asked for.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def sniff(source: Source, named: Named, start: int = 0, rows_above: int = 0) -> 
         if first is not None and (first + 3 < len(lines) or not more):
             break
         if not more or size > LARGEST_HEAD_BYTES:
-            raise ReadError(_no_numbers(lines, named, source.file, rows_above))
+            raise ReadError(_no_numbers(lines, given, source.file, rows_above))
         size *= 4
     rows = [line for line in lines[first : first + _ROWS_LOOKED_AT] if line.strip(_BLANK)]
     delimiter = _delimiter(rows, source.file)
@@ -96,9 +96,9 @@ def sniff(source: Source, named: Named, start: int = 0, rows_above: int = 0) -> 
     if len(cells[0]) == 1 < n_cells:
         first += 1  # a line of settings in another delimiter belongs to the header
     first = _step_back_over_damage(lines, first, delimiter, n_cells)
-    layout = Layout(delimiter, _decimal(cells), first, n_cells, filled=_filled(cells, n_cells))
+    layout = Layout(delimiter, given.decimal or _decimal(cells), first, n_cells, filled=_filled(cells, n_cells))
     _refuse_decimal_comma_as_delimiter(lines, layout, source.file, rows_above)
-    return _below(_with_header(lines, layout, named), rows_above)
+    return _below(_with_header(lines, layout, given), rows_above)
 
 
 def _below(layout: Layout, rows_above: int) -> Layout:
@@ -146,17 +146,17 @@ def _mostly_numbers(line: str, following: str) -> bool:
     return len(starts) > 1 and starts[0] and 2 * sum(starts) >= len(starts) and line[:1] == following[:1]
 
 
-def _no_numbers(lines: Sequence[str], named: Named, file: str, rows_above: int) -> Problem:
+def _no_numbers(lines: Sequence[str], given: Given, file: str, rows_above: int) -> Problem:
     for k, line in enumerate(lines[:_HEADER_LINES_LOOKED_AT]):
         for delimiter in "\t;,|":
-            if sum(_known(cell, named) for cell in cut(line, delimiter)) >= 2:
+            if sum(_known(cell, given) for cell in cut(line, delimiter)) >= 2:
                 return Problem("header_only", "a header without data rows", file=file, row=rows_above + k + 1)
     what, allowed = "the file contains no table of numbers", "an export of a test"
     return Problem("not_an_export", what, file=file, allowed=allowed)
 
 
-def _known(name: str, named: Named) -> bool:
-    return bool(name) and (match_column(name) is not None or named(name))
+def _known(name: str, given: Given) -> bool:
+    return bool(name) and (match_column(name) is not None or given.names(name))
 
 
 def _delimiter(rows: Sequence[str], file: str) -> str:
@@ -175,9 +175,15 @@ def _delimiter(rows: Sequence[str], file: str) -> str:
 
 def _decimal(rows: Sequence[Sequence[str]]) -> str:
     cells = [cell for row in rows for cell in row]
-    commas = sum(1 for cell in cells if "," in cell and _COMMA_NUMBER.fullmatch(cell))
-    dots = sum(1 for cell in cells if "." in cell and _DOT_NUMBER.fullmatch(cell))
+    commas = sum(1 for cell in cells if "," in cell and (_COMMA_NUMBER.fullmatch(cell) or _last_mark(cell) == ","))
+    dots = sum(1 for cell in cells if "." in cell and (_DOT_NUMBER.fullmatch(cell) or _last_mark(cell) == "."))
     return "," if commas > dots else "."
+
+
+def _last_mark(cell: str) -> str:
+    """The decimal mark of a number with thousands separators: the last of two different marks, which occurs once."""
+    found = _GROUPED.fullmatch(cell)
+    return found["decimal"] if found else ""
 
 
 def _filled(rows: Sequence[Sequence[str]], n_cells: int) -> tuple[bool, ...]:
@@ -195,15 +201,15 @@ def _step_back_over_damage(lines: Sequence[str], first: int, delimiter: str, n_c
     return first
 
 
-def _with_header(lines: Sequence[str], layout: Layout, named: Named) -> Layout:
+def _with_header(lines: Sequence[str], layout: Layout, given: Given) -> Layout:
     """Names and units are the two lines nearest above the data; the rest of the header is metadata."""
     above = [k for k in range(layout.header_rows) if lines[k].strip(_BLANK)]
     cells = {k: _header_cells(lines[k], layout) for k in above[-2:]}
     if not above or len(cells[above[-1]]) == 1 < layout.n_cells:
         return replace(layout, **_nameless(lines, above, layout))
-    hits = {k: sum(_known(cell, named) for cell in row) for k, row in cells.items()}
+    hits = {k: sum(_known(cell, given) for cell in row) for k, row in cells.items()}
     names_row, units_row = above[-1], None
-    if len(above) > 1 and hits[above[-2]] > hits[above[-1]]:
+    if len(above) > 1 and (hits[above[-2]] > hits[above[-1]] or _are_units(cells[above[-1]], cells[above[-2]])):
         names_row, units_row = above[-2], above[-1]
     header = _nameless(lines, [k for k in above if k < names_row], layout)
     if units_row is not None:
@@ -213,10 +219,19 @@ def _with_header(lines: Sequence[str], layout: Layout, named: Named) -> Layout:
         header["names"] = _fit(cells[names_row], layout.n_cells)
         header["names_row"] = names_row + 1
     else:
-        given = sum(bool(cell) for cell in cells[names_row])
-        header["misfit"] = f"{given} column names for {layout.n_cells} columns: they cannot be matched"
+        named = sum(bool(cell) for cell in cells[names_row])
+        header["misfit"] = f"{named} column names for {layout.n_cells} columns: they cannot be matched"
         header["names_row"] = names_row + 1
     return replace(layout, **header)
+
+
+def _are_units(cells: Sequence[str], names: Sequence[str]) -> bool:
+    """Whether a line of cells, none of them a name, are units under a line of as many unknown names."""
+    filled = [cell for cell in cells if cell]
+    known = [cell for cell in filled if match_column(cell)]
+    units = [cell for cell in filled if any(is_unit(bare_unit(cell), quantity) for quantity in _MEASURED)]
+    named = sum(bool(name) for name in names)
+    return not known and 2 * len(units) > len(filled) > 1 and len(cells) == len(names) and named >= len(filled)
 
 
 def _header_cells(line: str, layout: Layout) -> list[str]:

@@ -10,17 +10,23 @@ from functools import partial
 import numpy as np
 
 from tribo.errors import Problem, ReadError
-from tribo.readers.core.assign import Assignment, Column, Hint, assign, is_asked_for
+from tribo.readers.core.assign import Assignment, Column, assign
 from tribo.readers.core.body import parse_block
-from tribo.readers.core.checks import Finding, check_scale, check_time
+from tribo.readers.core.checks import Finding, beyond_measurement, check_scale, check_time
+from tribo.readers.core.complete import NO_TIME, complete
 from tribo.readers.core.family import Family
+from tribo.readers.core.given import Given
+from tribo.readers.core.grouping import ambiguity, ambiguous_mark
 from tribo.readers.core.layout import Layout, cut, sniff
 from tribo.readers.core.sidecar import names_beside
 from tribo.readers.core.source import HEAD_BYTES, Source
-from tribo.readers.core.tables_in_file import Block, side_by_side, split_blocks, whole_block
+from tribo.readers.core.tables_in_file import Block, split_blocks, whole_block
+from tribo.readers.core.wide import looks_wide, parted, records_side_by_side
 from tribo.readers.families import family_of
 from tribo.records import FloatArray
 
+_WIDE = 'for several records side by side: friction_force = "* [N]", or "F* [N]" for the columns whose names begin so'
+_FLAGS = {"missing_unit": "column_without_unit"}
 _CLOCK = re.compile(r"(?<!\d)\d{1,2}:\d\d:\d\d(?!\d)")
 
 
@@ -54,7 +60,7 @@ class Contents:
     footer: tuple[str, ...] = ()
 
 
-def read_source(source: Source, asked: tuple[Hint, ...]) -> Contents:
+def read_source(source: Source, given: Given) -> Contents:
     """The tables of one text, sheet or set of variables.
 
     Raises
@@ -63,25 +69,26 @@ def read_source(source: Source, asked: tuple[Hint, ...]) -> Contents:
         There is no table at all, or the one there is cannot be read.
     """
     family = family_of(source)
-    layout = layout_of(source, asked)
+    layout = layout_of(source, given)
+    try:
+        records = records_side_by_side(layout, given)
+    except ReadError as why:
+        raise ReadError(replace(p, file=source.file, row=layout.names_row) for p in why.problems) from None
+    if records:
+        return _gather(list(parted(source, layout, records, given)), family)
     if source.arrays:
-        return Contents((_read_block(source, family, Block(layout, 0, 0), asked),))
-    named = partial(is_asked_for, hints=asked)
-    beside = list(side_by_side(layout))
-    if beside:
-        parts = [_specimen(source, layout, columns, number) for number, columns in beside]
-        return _gather([(part, block) for part, block in parts], family, asked)
+        return Contents((_read_block(source, family, Block(layout, 0, 0), given),))
     whole = whole_block(source, layout)
     try:
-        return Contents((_read_block(source, family, whole, asked),))
+        return Contents((_read_block(source, family, whole, given),))
     except ReadError:
-        blocks, footer = split_blocks(source, layout, named)
+        blocks, footer = split_blocks(source, layout, given)
         if len(blocks) == 1 and blocks[0].end == whole.end:
             raise
-    return replace(_gather([(source, block) for block in blocks], family, asked), footer=footer)
+    return replace(_gather([(source, block, given) for block in blocks], family), footer=footer)
 
 
-def layout_of(source: Source, asked: tuple[Hint, ...]) -> Layout:
+def layout_of(source: Source, given: Given) -> Layout:
     """The layout of the first table, names from a sidecar where the file has none.
 
     Raises
@@ -92,7 +99,7 @@ def layout_of(source: Source, asked: tuple[Hint, ...]) -> Layout:
     if source.arrays:
         n = len(source.names)
         return Layout("", ".", 0, n, source.names, ("",) * n, (True,) * n)
-    return _named_from_beside(source, sniff(source, partial(is_asked_for, hints=asked), source.start))
+    return _named_from_beside(source, sniff(source, given, source.start))
 
 
 def _named_from_beside(source: Source, layout: Layout) -> Layout:
@@ -103,14 +110,14 @@ def _named_from_beside(source: Source, layout: Layout) -> Layout:
     return replace(layout, names=found[0], metadata={**layout.metadata, "names of columns from": found[1]})
 
 
-def _gather(parts: Sequence[tuple[Source, Block]], family: Family, asked: tuple[Hint, ...]) -> Contents:
+def _gather(parts: Sequence[tuple[Source, Block, Given]], family: Family) -> Contents:
     readings: list[Reading] = []
     problems: list[Problem] = []
     misfits: list[Problem] = []
     others: list[str] = []
-    for source, block in parts:
+    for source, block, given in parts:
         try:
-            readings.append(_read_block(source, family, block, asked))
+            readings.append(_read_block(source, family, block, given))
         except ReadError as why:
             if all(p.kind == "missing_column" for p in why.problems):
                 others.append(block.label)
@@ -119,14 +126,17 @@ def _gather(parts: Sequence[tuple[Source, Block]], family: Family, asked: tuple[
                 problems.extend(why.problems)
     if not readings:
         raise ReadError(problems or misfits[:2])
+    timed = [r for r in readings if not any(f.flag == NO_TIME for f in r.findings)]
+    if timed:  # a table of peaks or results beside records has no time and is none
+        others += [r.block.label for r in readings if not any(r is other for other in timed)]
+        readings = timed
     return Contents(tuple(readings), tuple(problems), tuple(others))
 
 
-def _read_block(source: Source, family: Family, block: Block, asked: tuple[Hint, ...]) -> Reading:
+def _read_block(source: Source, family: Family, block: Block, given: Given) -> Reading:
     layout = block.layout
-    hints = asked + family.hints(source, layout)
     try:
-        assignment = assign(layout.names, layout.units, layout.filled, hints)
+        assignment = assign(layout.names, layout.units, layout.filled, given.with_hints(family.hints(source, layout)))
     except ReadError as why:
         row = layout.units_row or layout.names_row
         problems = [replace(p, file=source.file, row=row) for p in why.problems]
@@ -135,12 +145,40 @@ def _read_block(source: Source, family: Family, block: Block, asked: tuple[Hint,
         problems = [_of_a_clock(p, source, block) for p in problems]
         if family.advice:
             problems = [replace(p, allowed=family.advice) for p in problems]
+        elif looks_wide(layout):
+            problems = [replace(p, allowed=f"{_WIDE}; {p.allowed}") for p in problems]
         raise ReadError(problems) from None
-    columns = assignment.columns
-    written = parse_block(source, block, [c.index for c in columns])
-    arrays = {c.quantity: _in_si(row, c) for c, row in zip(columns, written, strict=True)}
-    findings = _findings(source, block, assignment, arrays)
+    used = [c.index for c in assignment.columns]
+    if not given.decimal:
+        _refuse_ambiguous_marks(source, block, used)
+    written, end = parse_block(source, block, used)
+    arrays = {c.quantity: _in_si(row, c) for c, row in zip(assignment.columns, written, strict=True)}
+    arrays, assignment, completed = complete(arrays, assignment, given.correction, source.file)
+    labels = {c.quantity: c.label for c in assignment.columns}
+    impossible = beyond_measurement(arrays, source.file, labels, partial(_row_of, source, block))
+    if impossible:
+        raise ReadError(impossible)
+    findings = (*_findings(source, block, assignment, arrays), *completed)
+    findings += (Finding(end.kind, end),) if end else ()
     return Reading(source, family, block, assignment, arrays, findings)
+
+
+def _refuse_ambiguous_marks(source: Source, block: Block, used: Sequence[int]) -> None:
+    """Refuse a table in which no number tells decimals from thousands."""
+    if source.arrays:
+        return
+    head = "\n".join(source.lines(block.start, min(HEAD_BYTES, block.end - block.start))[0])
+    if ambiguous_mark(head, block.layout, used) is None:
+        return
+    first: Problem | None = None
+    for chunk in source.chunks(block.start, block.end):
+        found = ambiguous_mark(source.text(chunk), block.layout, used)
+        if found is None:
+            return
+        row, column = block.layout.header_rows + 1 + found[0], block.layout.name(found[1])
+        first = first or ambiguity(source.file, row, column, found[2])
+    if first is not None:
+        raise ReadError(first)
 
 
 def _of_a_clock(problem: Problem, source: Source, block: Block) -> Problem:
@@ -175,8 +213,8 @@ def _findings(
         if quantity in arrays:
             found += check_scale(arrays[quantity], source.file, label[quantity], row_of)
     row = block.layout.units_row or block.layout.names_row
-    left_out = [replace(p, file=source.file, row=row) for p in assignment.left_out]
-    return (*found, *(Finding("column_without_unit", p) for p in left_out))
+    doubts = [replace(p, file=source.file, row=row) for p in assignment.doubts]
+    return (*found, *(Finding(_FLAGS.get(p.kind, p.kind), p) for p in doubts))
 
 
 def _load_varies(arrays: dict[str, FloatArray]) -> bool:
@@ -198,28 +236,6 @@ def _row_of(source: Source, block: Block, sample: int) -> int:
                 return row
         row -= 1  # a chunk ends with its last line's end
     return row
-
-
-def _specimen(source: Source, layout: Layout, columns: tuple[int, ...], number: int) -> tuple[Source, Block]:
-    """One of several specimens side by side, as a table of its own that keeps the rows of the file."""
-    text = source.text(bytes(source.data[source.offset(source.start, layout.header_rows) :]))
-    rows = [cut(line, layout.delimiter) for line in text.split("\n") if line.strip()]
-    rows = [row for row in rows if any(k < len(row) and row[k] for k in columns)]
-    delimiter = layout.delimiter if layout.delimiter != layout.decimal else "\t"
-    lines = [delimiter.join(row[k] if k < len(row) else "" for k in columns) for row in rows]
-    data = ("\n" * layout.header_rows + "\n".join(lines) + "\n").encode(source.codec, errors="replace")
-    alone = replace(
-        layout,
-        delimiter=delimiter,
-        n_cells=len(columns),
-        names=tuple(layout.names[k] for k in columns),
-        units=tuple(layout.units[k] for k in columns),
-        filled=tuple(layout.filled[k] for k in columns),
-    )
-    above = [cut(line, layout.delimiter) for line in source.head[: (layout.names_row or 1) - 1]]
-    label = next((row[columns[0]] for row in reversed(above) if columns[0] < len(row)), "") or f"specimen {number}"
-    part = replace(source, data=data, start=0, part=label)
-    return part, replace(whole_block(part, alone), label=label)
 
 
 def split_at_restarts(reading: Reading) -> tuple[Reading, ...]:

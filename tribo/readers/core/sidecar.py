@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tribo.input_files import read_input
+
 _SUFFIXES = (".toml", ".json", ".hdr", ".header", ".names", ".columns", ".meta", ".info", ".ini")
 _MOST_BYTES = 100_000
 
@@ -29,7 +31,7 @@ def names_beside(path: Path, n_cells: int) -> tuple[tuple[str, ...], str] | None
 
 
 def _names(path: Path) -> list[str]:
-    text = path.read_bytes().decode("utf-8-sig", errors="replace")
+    text = read_input(path, _MOST_BYTES).decode("utf-8-sig", errors="replace")
     try:
         if path.suffix == ".toml":
             return _listed(tomllib.loads(text).get("columns", []))

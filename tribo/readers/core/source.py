@@ -4,26 +4,31 @@ from __future__ import annotations
 
 import codecs
 import mmap
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 from tribo.errors import Problem, ReadError
+from tribo.input_files import MAPPED_BYTES, NotRegularError, TooLargeError, read_or_map
+from tribo.limits import LARGEST_EXPORT_BYTES as LARGEST_FILE_BYTES
+from tribo.quantities import match_quantity
 from tribo.records import FloatArray
 
 HEAD_BYTES = 2_500
 LARGEST_HEAD_BYTES = 400_000
-LARGEST_FILE_BYTES = 2 << 30
-MAPPED_BYTES = 64 << 20  # larger files are mapped and read in pieces, so that memory holds the numbers only
 CHUNK_BYTES = 16 << 20
-LARGEST_TABLE_ROWS = 40_000_000  # reading takes 8 bytes a number, and a pull about 110 bytes a row: 4.4 GB
 _WIDE_BOMS = {
     codecs.BOM_UTF32_LE: "utf-32",
     codecs.BOM_UTF32_BE: "utf-32",
     codecs.BOM_UTF16_LE: "utf-16",
     codecs.BOM_UTF16_BE: "utf-16",
 }
+_CELL = re.compile(r"[^\t;,|\n\"]+")
+# Code pages of Central Europe, China, Japan, Korea, Taiwan and Russia: recognised by names of columns in them.
+_BY_NAMES = ("cp1250", "gb18030", "cp932", "cp949", "big5", "cp1251", "iso8859-2")
+_MULTIBYTE = ("gb18030", "cp932", "cp949", "big5")
 _ASCII = bytes(range(128))
 # Letters and signs that western machines write; anything else makes cp1252 an unlikely reading.
 _PLAUSIBLE = frozenset("äöüÄÖÜßéèêëàâçîïôùûÉÈÀÇñÑåÅøØæÆáíóúìòãõµ°²³±·×«»‘’“”–—…€ \xa0")
@@ -75,7 +80,7 @@ class Source:
     @property
     def codec(self) -> str:
         """The encoding of ``data``."""
-        return "utf-8" if self.encoding.startswith("utf") else self.encoding
+        return "utf-8" if self.encoding.startswith("utf") or self.encoding in _MULTIBYTE else self.encoding
 
     def text(self, piece: bytes) -> str:
         """Bytes of this file as text; bytes that the encoding does not know become U+FFFD."""
@@ -145,6 +150,8 @@ def open_text(path: Path, file: str, raw: bytes | mmap.mmap) -> Source:
         data = raw.decode(encoding, errors="replace").encode("utf-8")
     else:
         encoding, data = ("utf-8-sig" if bom else _narrow_encoding(raw)), raw
+        if encoding in _MULTIBYTE:  # their second bytes may look like delimiters
+            data = raw[:].decode(encoding, errors="replace").encode("utf-8")
     source = Source(path, file, data, encoding, start=len(bom) if bom == codecs.BOM_UTF8 else 0)
     return source if isinstance(data, mmap.mmap) else _with_one_line_ending(source, data)
 
@@ -175,15 +182,13 @@ def read_bytes(path: Path, file: str) -> bytes | mmap.mmap:
         missing, unreadable or too_large.
     """
     try:
-        size = path.stat().st_size
-        if size > LARGEST_FILE_BYTES:
-            raise _too_large(size, LARGEST_FILE_BYTES, file)
-        if size > MAPPED_BYTES:
-            with path.open("rb") as stream:
-                return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-        return path.read_bytes()
+        return read_or_map(path, LARGEST_FILE_BYTES, MAPPED_BYTES)
     except FileNotFoundError as why:
         raise ReadError(Problem("missing", "this file does not exist", file=file)) from why
+    except TooLargeError as why:
+        raise _too_large(why.size, LARGEST_FILE_BYTES, file) from why
+    except NotRegularError as why:
+        raise ReadError(Problem("not_a_file", "not a regular file", file=file)) from why
     except OSError as why:
         raise ReadError(Problem("unreadable", f"cannot be opened ({why.strerror})", file=file)) from why
 
@@ -191,6 +196,20 @@ def read_bytes(path: Path, file: str) -> bytes | mmap.mmap:
 def _too_large(size: int, limit: int, file: str) -> ReadError:
     found, allowed = f"{size} bytes", f"at most {limit} bytes of this encoding"
     return ReadError(Problem("too_large", "the file is too large", file=file, found=found, allowed=allowed))
+
+
+def _encoding_of_names(head: bytes) -> str:
+    """The code page in which more cells of the beginning are names of quantities than in cp1252, or ""."""
+    best, most = "", _names_in(head, "cp1252")
+    for encoding in _BY_NAMES:
+        if (found := _names_in(head, encoding)) > most:
+            best, most = encoding, found
+    return best
+
+
+def _names_in(head: bytes, encoding: str) -> int:
+    text = head.decode(encoding, errors="replace")
+    return sum(match_quantity(cell.strip()) is not None for cell in _CELL.findall(text) if not cell.isascii())
 
 
 def _narrow_encoding(raw: bytes | mmap.mmap) -> str:
@@ -202,6 +221,8 @@ def _narrow_encoding(raw: bytes | mmap.mmap) -> str:
         return "utf-8"
     except UnicodeDecodeError:
         pass
+    if by_names := _encoding_of_names(looked_at[:HEAD_BYTES]):
+        return by_names
     strange = looked_at.translate(None, delete=_ASCII)
     try:
         if set(strange.decode("cp1252")) <= _PLAUSIBLE:

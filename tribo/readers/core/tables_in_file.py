@@ -1,14 +1,14 @@
-"""Tables in a file: one below the other (steps, segments, specimens), or side by side."""
+"""Tables in a file, one below the other: steps, segments, specimens."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from tribo.errors import ReadError
-from tribo.readers.core.assign import match_column
-from tribo.readers.core.layout import Layout, Named, cut, sniff
+from tribo.readers.core.given import Given
+from tribo.readers.core.layout import Layout, cut, sniff
+from tribo.readers.core.names import match_column
 from tribo.readers.core.source import Source
 
 _TEXT_LINE = re.compile(rb'^[ \t;,"]*[A-Za-z#*<\[({=_\x80-\xff][^\n]*', re.M)
@@ -30,7 +30,7 @@ def whole_block(source: Source, layout: Layout) -> Block:
     return Block(layout, source.offset(source.start, layout.header_rows), len(source.data))
 
 
-def split_blocks(source: Source, layout: Layout, named: Named) -> tuple[tuple[Block, ...], tuple[str, ...]]:
+def split_blocks(source: Source, layout: Layout, given: Given) -> tuple[tuple[Block, ...], tuple[str, ...]]:
     """Tables one below the other, and the closing lines that hold no data.
 
     A line of text inside a table begins a new header only if a table with known column names follows, and the
@@ -47,13 +47,16 @@ def split_blocks(source: Source, layout: Layout, named: Named) -> tuple[tuple[Bl
             continue
         rows_above = current.layout.header_rows + source.data[current.start : start].count(b"\n")
         try:
-            following = sniff(source, named, start, rows_above)
+            following = sniff(source, given, start, rows_above)
         except ReadError:
             footer = [text for text in source.text(bytes(source.data[start:])).split("\n") if text.strip()][:20]
             current = replace(current, end=start)
             break
         begin = source.offset(start, following.header_rows - rows_above)
-        if not any(named(name) or (name and match_column(name)) for name in following.names):
+        known = following.names == layout.names or any(
+            n and (given.names(n) or match_column(n)) for n in following.names
+        )
+        if not known:
             searched = max(begin, found.end())
             continue
         blocks.append(replace(current, end=start))
@@ -73,15 +76,3 @@ def _labelled(block: Block, k: int) -> Block:
         if _LABEL.search(key) and not key.lower().startswith(("step type", "number of")):
             return replace(block, label=f"{key} {value}".strip())
     return replace(block, label=f"table {k + 1}")
-
-
-def side_by_side(layout: Layout) -> Iterator[tuple[int, tuple[int, ...]]]:
-    """(number, columns) of each specimen where the same names stand several times in a row; nothing otherwise."""
-    names = [name for name in layout.names if name]
-    for width in range(2, len(names) // 2 + 1):
-        repeats, rest = divmod(len(names), width)
-        if not rest and names == names[:width] * repeats and len(set(names[:width])) == width:
-            at = [k for k, name in enumerate(layout.names) if name]
-            for k in range(repeats):
-                yield k + 1, tuple(at[k * width : (k + 1) * width])
-            return

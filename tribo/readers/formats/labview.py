@@ -5,14 +5,18 @@ With "X_Columns No" the rows hold no time: it follows from X0 and Delta_X of the
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
-from tribo.readers.core.assign import Hint, match_column, split_unit
 from tribo.readers.core.family import Family
+from tribo.readers.core.given import Hint
 from tribo.readers.core.layout import Layout
+from tribo.readers.core.names import match_column, split_unit
 from tribo.readers.core.source import Source
 
 _HEADER_END = "***End_of_Header***"
+_NUMBER_OR_NOTHING = re.compile(r"\s*(?:[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?|NaN)?\s*")
+_ACCELERATION = re.compile(r"m/s(?:ec)?(?:\^?2|²)")
 
 
 def recognises(source: Source) -> bool:
@@ -20,22 +24,40 @@ def recognises(source: Source) -> bool:
 
 
 def with_times_written(source: Source) -> Source:
-    """The file with the times that its rows leave out written into their empty first cells; any other as it is."""
+    """The file as a plain table: times that its rows leave out written, comments behind its rows left out.
+
+    Any other file stays as it is.
+    """
     if not recognises(source) or source.is_large:
         return source
     lines = source.text(bytes(source.data)).split("\n")
     header: dict[str, str] = {}
     row: int | None = None
+    width = 0  # cells of a row without its comment; 0 where the header names no column of comments
     for k, line in enumerate(lines):
         key, _, rest = line.partition("\t")
         if key.startswith((_HEADER_END, "X_Value")):
             row = 0 if key == "X_Value" else None
-        elif key:
-            header[key] = rest.split("\t")[0]
-        elif row is not None and rest.strip() and header.get("X_Columns") == "No":
-            lines[k] = f"{_time(header, row)}\t{rest}"
+            width = _cells_before_comment(line)
+        elif row is not None and _is_row(line):
+            first = _time(header, row) if not key.strip() and header.get("X_Columns") == "No" else key
+            lines[k] = "\t".join([first, *(rest.split("\t")[: width - 1] if width else [rest])])
             row += 1
+        elif key.strip():
+            header[key] = rest.split("\t")[0]
+            row = None
     return replace(source, data="\n".join(lines).encode(source.codec, errors="replace"))
+
+
+def _is_row(line: str) -> bool:
+    """Whether a line below the names is a row: numbers, and words only behind them."""
+    cells = line.split("\t")
+    return any(cells[1:]) and all(_NUMBER_OR_NOTHING.fullmatch(cell) for cell in cells[:2])
+
+
+def _cells_before_comment(line: str) -> int:
+    names = line.split("\t")
+    return names.index("Comment") if "Comment" in names else 0
 
 
 def _time(header: dict[str, str], row: int) -> str:
@@ -55,10 +77,12 @@ def hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
     if "X_Value" in layout.names and dimension.startswith("Time"):
         found.append(Hint("time", "X_Value [s]", "X_Value of a LabVIEW file is in seconds"))
     labels = layout.metadata.get("Y_Unit_Label", "").split()
+    if any(_ACCELERATION.match(label) for label in labels):  # g is then the acceleration of gravity as well
+        labels = ["" if label == "g" else label for label in labels]
     channels = [name for name in layout.names[1:] if name and name != "Comment"]
     for name, unit in zip(channels, labels, strict=False):
         hit = match_column(name)
-        if hit and split_unit(name)[1] is None and not any(h.quantity == hit[0] for h in found):
+        if unit and hit and split_unit(name)[1] is None and not any(h.quantity == hit[0] for h in found):
             found.append(Hint(hit[0], f"{name} [{unit}]", "unit from Y_Unit_Label"))
     return tuple(found)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import mmap
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,7 @@ def is_matlab(head: bytes) -> bool:
     return head.startswith((b"MATLAB 5.0", b"MATLAB 7.3")) or head.startswith(_HDF5)
 
 
-def open_matlab(path: Path, file: str) -> Source:
+def open_matlab(path: Path, file: str, raw: bytes | mmap.mmap) -> Source:
     """All vectors of the most frequent length, as named columns.
 
     Raises
@@ -27,7 +29,7 @@ def open_matlab(path: Path, file: str) -> Source:
     ReadError
         bad_mat, or not_an_export where no two vectors share a length.
     """
-    vectors = _vectors(path, file)
+    vectors = _vectors(raw, file)
     lengths = [v.size for v in vectors.values() if v.size > 1]
     if not lengths:
         raise ReadError(Problem("not_an_export", "no vectors in it", file=file, found=", ".join(vectors) or None))
@@ -36,9 +38,10 @@ def open_matlab(path: Path, file: str) -> Source:
     return Source(path, file, b"", "binary", names=tuple(kept), arrays=tuple(kept.values()))
 
 
-def _vectors(path: Path, file: str) -> dict[str, FloatArray]:
+def _vectors(raw: bytes | mmap.mmap, file: str) -> dict[str, FloatArray]:
+    stream = io.BytesIO(raw)
     try:
-        found = _from_hdf5(path) if _is_hdf5(path) else _from_mat5(path)
+        found = _from_hdf5(stream) if _HDF5 in raw[:520] else _from_mat5(stream)
     except ReadError:
         raise
     except Exception as why:  # scipy and h5py raise many kinds on damaged files
@@ -50,21 +53,16 @@ def _vectors(path: Path, file: str) -> dict[str, FloatArray]:
     }
 
 
-def _is_hdf5(path: Path) -> bool:
-    with path.open("rb") as stream:
-        return _HDF5 in stream.read(520)
-
-
-def _from_mat5(path: Path) -> dict[str, Any]:
+def _from_mat5(stream: io.BytesIO) -> dict[str, Any]:
     from scipy.io import loadmat
 
-    return {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+    return {name: value for name, value in loadmat(stream).items() if not name.startswith("__")}
 
 
-def _from_hdf5(path: Path) -> dict[str, Any]:
+def _from_hdf5(stream: io.BytesIO) -> dict[str, Any]:
     import h5py
 
-    with h5py.File(path, "r") as stored:
+    with h5py.File(stream, "r") as stored:
         return {name: item[()] for name, item in stored.items() if isinstance(item, h5py.Dataset)}
 
 

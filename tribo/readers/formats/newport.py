@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 
-from tribo.readers.core.assign import Hint
 from tribo.readers.core.family import Family
+from tribo.readers.core.given import Hint
 from tribo.readers.core.layout import Layout
 from tribo.readers.core.source import Source
 

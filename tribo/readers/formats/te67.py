@@ -10,8 +10,8 @@ import re
 
 import numpy as np
 
-from tribo.readers.core.assign import Hint
 from tribo.readers.core.family import Family
+from tribo.readers.core.given import Hint
 from tribo.readers.core.layout import Layout, cut
 from tribo.readers.core.source import Source
 

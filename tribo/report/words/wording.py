@@ -14,9 +14,12 @@ from tribo.report.result_tables import PA_PER_KPA, all_set_aside
 from tribo.report.words.numerals import counted, joined, percent, significant, span, with_uncertainty
 
 FLAGS = {
-    "gap_at_peak": "gap in the data at the peak", "no_drop": "no drop after the peak", "no_static": "no static peak",
-    "no_sliding": "no sliding phase", "no_zero_phase": "no zero phase", "peak_by_hand": "peak moved by hand",
+    "follows_load": "follows the normal load", "gap_at_peak": "gap in the data at the peak",
+    "impulsive": "impulsive noise", "no_drop": "no drop after the peak", "no_sliding": "no sliding phase",
+    "no_static": "no static peak", "no_zero_phase": "no zero phase", "peak_ambiguous": "readings of the peak differ",
+    "peak_between_samples": "peak between samples", "peak_by_hand": "peak moved by hand", "restarts": "restarts",
     "stick_slip": "stick-slip", "window_by_hand": "window moved by hand", "window_short": "window too short",
+    "zero_uncertain": "zero uncertain",
 }  # fmt: skip
 SIDE: dict[Verdict, str] = {"model too high": "too high", "model too low": "too low"}
 HOW_TO_READ = (

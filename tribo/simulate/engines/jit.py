@@ -2,7 +2,8 @@
 
 numba's ``cache=True`` looks only at the file a function stands in, so an edit of something it calls is missed.
 Here the cache directory carries a hash of every source file of this package: a changed file means a new
-directory, and directories no start has used for a month are removed. ``TRIBO_CACHE_DIR`` moves it.
+directory, and directories no start has used for a month are removed. ``TRIBO_CACHE_DIR`` moves it. The directory
+belongs to this user alone, or else to this process alone.
 """
 
 from __future__ import annotations
@@ -21,28 +22,27 @@ from numba import config, njit, types
 from numba.core.compiler import Compiler
 from numba.extending import intrinsic
 
+from tribo.store.private_folder import private_folder
+
 UNUSED_DAYS = 30.0
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 @lru_cache(maxsize=1)
 def cache_directory() -> Path:
-    """The directory of compiled code for exactly these sources, created where it can be written."""
+    """The directory of compiled code for exactly these sources, created where it can be written.
+
+    Compiled code is loaded as it lies there (pickles and machine code), so a directory that anyone else could write
+    to is never used: see :func:`tribo.store.private_folder.private_folder`.
+    """
     digest = hashlib.sha256()
     for source in sorted(Path(__file__).parents[1].rglob("*.py")):
         digest.update(source.name.encode() + b"\0" + source.read_bytes())
     name = f"numba-{digest.hexdigest()[:16]}"
-    for base in _cache_bases():
-        folder = base / name
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                os.utime(folder)
-                remove_unused(base)
-                return folder
-        except OSError:
-            continue
-    return Path(tempfile.mkdtemp(prefix=name))
+    folder = private_folder((base / name for base in _cache_bases()), "tribo-numba-")
+    if folder.name == name:
+        remove_unused(folder.parent)
+    return folder
 
 
 def remove_unused(base: Path, days: float = UNUSED_DAYS) -> None:
@@ -66,7 +66,8 @@ def remove_unused(base: Path, days: float = UNUSED_DAYS) -> None:
 def _cache_bases() -> list[Path]:
     chosen = os.environ.get("TRIBO_CACHE_DIR")
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    return ([Path(chosen)] if chosen else []) + [Path(home) / "tribo", Path(tempfile.gettempdir()) / "tribo-cache"]
+    own = f"tribo-cache-{os.getuid()}" if hasattr(os, "getuid") else "tribo-cache"
+    return ([Path(chosen)] if chosen else []) + [Path(home) / "tribo", Path(tempfile.gettempdir()) / own]
 
 
 def compiled(function: Function) -> Function:

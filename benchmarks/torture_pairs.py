@@ -1,0 +1,148 @@
+"""Two processes at once on one folder of results, file or site: the results are wholly those of one of them.
+
+    python benchmarks/torture_pairs.py [report | ensemble | build] [--pairs 50] [--seed 1]
+
+The two differ in an option (report: weights of the fit; ensemble: the same runs or, in every second pair, others), or
+are the same (build), and the second starts after a random part of the time that one takes. Each has to end with status
+0, or with 75 because it was refused; one at least with 0. Then every file must be that of one of the two run alone, no
+run may be missing, and `tribo verify` must find no difference. Exit status 1 where anything differs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+from torture_kills import BUILD
+from torture_processes import ENSEMBLE, REPORT, ensemble, finished, leftovers, results, run, small_campaign, start
+
+BUSY = 75
+Pair = Callable[[Path, int, random.Random], tuple[tuple[int | None, ...], list[str]]]
+
+
+def pair_reports(base: Path) -> Pair:
+    """Pairs of `tribo report` with other weights."""
+    small_campaign(base / "campaign")
+    ways = [REPORT, (*REPORT, "--weights", "force")]
+    expected, took = [], 1.0
+    for k, way in enumerate(ways):
+        run(base / f"first-{k}", *way)
+        shutil.rmtree(base / f"first-{k}" / "out" / "figures")
+        began = time.monotonic()
+        assert run(base / f"first-{k}", *way) == 0
+        took = time.monotonic() - began
+        expected.append(results(base / f"first-{k}" / "out"))
+
+    def one(folder: Path, number: int, rng: random.Random) -> tuple[tuple[int | None, ...], list[str]]:
+        for k in (0, 1):
+            shutil.copytree(base / f"first-{k}" / "out" / "kept", folder / "out" / "kept", dirs_exist_ok=True)
+        waiting = ("--wait", "600") if number % 3 == 0 else ()
+        first = start(folder, *ways[number % 2])
+        time.sleep(rng.random() * took)
+        second = start(folder, *ways[1 - number % 2], *waiting)
+        ended = first.wait(), second.wait()
+        found = results(folder / "out")
+        wrong = [] if any(_same_but_command(found, one) for one in expected) else ["mixed or incomplete results"]
+        verified = run(folder, "verify", "out")
+        return ended, wrong + [f"verify: status {verified}"] * (verified != 0) + leftovers(folder)
+
+    return one
+
+
+def _same_but_command(found: dict[str, str], expected: dict[str, str]) -> bool:
+    """Equal results; where the commands differ by --wait, files that hold the command differ with it."""
+    with_command = {"provenance.json", "ro-crate-metadata.json", "report.html", "report.pdf", "campaign.nc"}
+    return found.keys() == expected.keys() and all(
+        found[name] == expected[name] for name in found if name not in with_command
+    )
+
+
+def pair_ensembles(base: Path) -> Pair:
+    """Pairs of `tribo simulate` on one file, with the same runs or with others."""
+    ways = [(*ENSEMBLE, "6"), (*ENSEMBLE, "5")]
+    expected, took = [], 1.0
+    for k, way in enumerate(ways):
+        began = time.monotonic()
+        assert run(base / f"first-{k}", *way) == 0
+        took = time.monotonic() - began
+        expected.append(ensemble(base / f"first-{k}" / "e.nc"))
+
+    def one(folder: Path, number: int, rng: random.Random) -> tuple[tuple[int | None, ...], list[str]]:
+        first = start(folder, *ways[0])
+        time.sleep(rng.random() * took * (number % 5) / 4)
+        second = start(folder, *ways[number % 2], *(("--wait", "600") if number % 3 == 0 else ()))
+        ended = first.wait(), second.wait()
+        if ended[number % 2] == 1:  # the other runs were there first: refused by the design
+            ended = (*ended[: number % 2], BUSY, *ended[number % 2 + 1 :])
+        wrong = [] if ensemble(folder / "e.nc") in expected else ["mixed or missing runs"]
+        return ended, wrong + leftovers(folder)
+
+    return one
+
+
+def pair_builds(base: Path) -> Pair:
+    """Pairs of `tribo build` of one site."""
+    small_campaign(base / "drop" / "a")
+    began = time.monotonic()
+    assert _build(base / "first").wait() == 0
+    took = time.monotonic() - began
+    expected = results(base / "first" / "site" / "current")
+
+    def one(folder: Path, number: int, rng: random.Random) -> tuple[tuple[int | None, ...], list[str]]:
+        first = _build(folder)
+        time.sleep(rng.random() * took * (number % 5) / 4)
+        second = _build(folder, *(("--wait", "600") if number % 3 == 0 else ()))
+        ended = first.wait(), second.wait()
+        same = results(folder / "site" / "current") == expected
+        return ended, ["mixed or incomplete results"] * (not same) + leftovers(folder / "site" / "current")
+
+    return one
+
+
+def _build(folder: Path, *more: str) -> subprocess.Popen[bytes]:
+    folder.mkdir(exist_ok=True)
+    with (folder.parent / f"{folder.name}.log").open("ab") as log:
+        return subprocess.Popen(
+            [sys.executable, "-m", "tribo", *BUILD, *more], cwd=folder, stdout=log, stderr=log,
+            env={**os.environ, "SOURCE_DATE_EPOCH": "1700000000"},
+        )  # fmt: skip
+
+
+KINDS = {"report": pair_reports, "ensemble": pair_ensembles, "build": pair_builds}
+
+
+def main() -> int:
+    """Start as many pairs as asked for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("kind", choices=KINDS)
+    parser.add_argument("--pairs", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    rng = random.Random(given.seed)
+    failures: list[str] = []
+    statuses: Counter[str] = Counter()
+    with tempfile.TemporaryDirectory(prefix="tribo-torture-") as base:
+        one = KINDS[given.kind](Path(base))
+        for number in range(given.pairs):
+            folder = Path(base) / f"pair-{number}"
+            ended, found = one(folder, number, rng)
+            statuses[" and ".join(map(str, sorted(map(int, map(str, ended)))))] += 1
+            if not set(ended) <= {0, BUSY} or 0 not in ended:
+                found = [*found, f"statuses {ended}"]
+            failures += [f"pair {number}: {what}" for what in found]
+            print(f"{number + 1} of {given.pairs} pairs, {len(failures)} failures", file=sys.stderr, flush=True)
+    record = {"pairs": given.pairs, "seed": given.seed, "statuses": dict(statuses)}
+    return finished(f"pairs of {given.kind}", record, failures)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

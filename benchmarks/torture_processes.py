@@ -1,0 +1,148 @@
+"""Shared by the runs that kill, pair and damage: a small campaign, commands in forked processes, and their results.
+
+Commands run in children forked from a process that has imported tribo, so that a start costs no import. The clock of
+the outputs is fixed (SOURCE_DATE_EPOCH) and all paths are relative, so that equal results are equal bytes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import random
+import shutil
+import signal
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tribo.virtual_tribometer.sled import SledDesign, SledLaw, write_campaign
+
+TOML = (
+    '[campaign]\ntitle = "torture"\nnominal_area_mm2 = 55.0\nslider_mass_g = 1.5\n'
+    '[patterns.F]\ncavity = "none"\n'
+    '[patterns.B]\ncavity = "circle"\ndiameter_um = 10.0\npitch_um = [15.0, 15.0]\n'
+)
+REPORT = ("report", "../campaign", "-o", "out", "--runs", "2", "--jobs", "2", "-q")
+ENSEMBLE = (
+    "simulate", "--sample", "F", "--sample", "B", "--pressure", "5", "--pressure", "12", "--blocks", "40", "--dt",
+    "1e-7", "--set", "rest_tolerance=0.01", "--jobs", "2", "-q", "-o", "e.nc", "--repeats",
+)  # fmt: skip
+
+
+def small_campaign(folder: Path, specimens: int = 2, seed: int = 3) -> Path:
+    """Two samples at two loads, in a folder that other folders stand beside."""
+    laws = {"F": SledLaw(4.8, 23e3, 2.9, 12e3), "B": SledLaw(3.6, 10e3, 2.9, 6e3)}
+    write_campaign(folder, SledDesign(laws, masses_g=(25.0, 138.5), specimens=specimens, repeats=2), TOML, seed=seed)
+    return folder
+
+
+@dataclass
+class Command:
+    """A tribo command in a process of its own, with its words in a file."""
+
+    pid: int
+    said: Path
+    status: int | None = None
+
+    def wait(self, seconds: float | None = None) -> int | None:
+        """The exit status, negative for a signal; None where it still runs after so many seconds."""
+        until = None if seconds is None else time.monotonic() + seconds
+        while self.status is None:
+            done, code = os.waitpid(self.pid, 0 if until is None else os.WNOHANG)
+            if done:
+                self.status = os.waitstatus_to_exitcode(code)
+            elif until is not None and time.monotonic() >= until:
+                return None
+            else:
+                time.sleep(0.005)
+        return self.status
+
+    def kill(self) -> None:
+        """Kill it with all its workers, without a word."""
+        os.killpg(self.pid, signal.SIGKILL)
+        self.wait()
+
+
+def start(folder: Path, *arguments: str) -> Command:
+    """Start a command in ``folder``, in a process group of its own."""
+    folder.mkdir(parents=True, exist_ok=True)
+    said = folder.parent / f"{folder.name}-{time.monotonic_ns()}.log"
+    pid = os.fork()
+    if pid:
+        return Command(pid, said)
+    try:
+        os.setsid()
+        os.chdir(folder)
+        stream = os.open(said, os.O_WRONLY | os.O_CREAT, 0o644)
+        for number in (1, 2):
+            os.dup2(stream, number)
+        os.environ["SOURCE_DATE_EPOCH"] = "1700000000"
+        sys.argv = ["tribo", *arguments]
+        from tribo.cli import main
+
+        main(list(arguments), prog_name="tribo")
+    except SystemExit as ended:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(ended.code if isinstance(ended.code, int) else 1)
+    except BaseException:
+        import traceback
+
+        traceback.print_exc()
+        os._exit(70)
+    os._exit(0)
+
+
+def run(folder: Path, *arguments: str) -> int:
+    """A command to its end."""
+    status = start(folder, *arguments).wait()
+    assert status is not None
+    return status
+
+
+def results(out: Path) -> dict[str, str]:
+    """Every file of a folder of results and its hash; what is kept for the next start and hidden locks left out."""
+    files = (p for p in sorted(out.rglob("*")) if p.is_file() and "kept" not in p.relative_to(out).parts)
+    return {p.relative_to(out).as_posix(): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
+
+
+def leftovers(folder: Path) -> list[str]:
+    """Files that only a killed process leaves."""
+    hidden = (p for p in folder.rglob(".*") if p.name.endswith((".part", ".lock", ".unfinished")))
+    return [str(p.relative_to(folder)) for p in hidden]
+
+
+def differing(found: dict[str, str], expected: dict[str, str]) -> list[str]:
+    """Names of the files that are not the same in both."""
+    return sorted(name for name in found.keys() | expected.keys() if found.get(name) != expected.get(name))
+
+
+def ensemble(path: Path) -> str:
+    """All rows and attributes of an ensemble as one hash; says where a run is not done."""
+    import h5py
+
+    from tribo.simulate import read_stored
+
+    table = read_stored(path)
+    if not table["done"].all():
+        return "runs are missing"
+    with h5py.File(path) as file:
+        about = sorted((name, str(value)) for name, value in file.attrs.items())
+    return hashlib.sha256(f"{about}{table.to_csv()}".encode()).hexdigest()
+
+
+def thinned(kept: Path, copy: Path, rng: random.Random) -> None:
+    """Some of the kept results, so that a start has some of the work before it."""
+    copy.mkdir(parents=True)
+    for file in sorted(kept.iterdir()):
+        if file.suffix == ".nc" or rng.random() < 0.6:
+            shutil.copy(file, copy / file.name)
+
+
+def finished(name: str, record: dict[str, Any], failures: list[str]) -> int:
+    """Print the outcome as JSON; status 1 where something failed."""
+    print(json.dumps({"run": name, **record, "failures": failures}, indent=1))
+    return 1 if failures else 0

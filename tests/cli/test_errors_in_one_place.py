@@ -1,0 +1,119 @@
+"""Errors of the system and of tribo itself end a command with sentences and status 1; --debug shows the traceback."""
+
+from __future__ import annotations
+
+import errno
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from tribo.cli import main
+from tribo.cli.console import Console
+from tribo.cli.workflow_step import run_step
+from tribo.errors import Problem, TriboError
+
+
+@pytest.fixture(autouse=True)
+def _level_of_the_log_returns() -> Iterator[None]:
+    level = logging.getLogger("tribo").level
+    yield
+    logging.getLogger("tribo").setLevel(level)
+
+
+def run(*arguments: object) -> Result:
+    result = CliRunner().invoke(main, [str(a) for a in arguments])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
+
+
+FULL = OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_full_disk_is_named_with_the_file_that_was_being_written(
+    small_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(self: Path, content: bytes) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    result = run("ingest", small_campaign, "-o", tmp_path / "out")
+    assert result.exit_code == 1
+    assert f"{tmp_path / 'out' / 'tests.csv'}: no space left on device" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_a_folder_that_cannot_be_made_is_named(small_campaign: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    result = run("ingest", small_campaign, "-o", tmp_path / "file" / "out")
+    assert result.exit_code == 1
+    assert str(tmp_path / "file" / "out") in result.stderr
+    assert "not a directory" in result.stderr
+
+
+def test_a_name_that_is_too_long_is_named(small_campaign: Path, tmp_path: Path) -> None:
+    result = run("ingest", small_campaign, "-o", tmp_path / ("x" * 300))
+    assert result.exit_code == 1
+    assert "file name too long" in result.stderr
+
+
+def test_an_error_of_tribo_is_a_sentence_and_with_debug_a_traceback(
+    small_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise ValueError("Invalid \x1b[31m character")
+
+    monkeypatch.setattr("tribo.stages.study", broken)
+    result = run("fit", small_campaign, "-o", tmp_path / "out", "--debug")
+    assert result.exit_code == 1
+    assert "because of an error in tribo (ValueError: Invalid \\x1b[31m character)" in result.stderr
+    assert any(record.exc_info for record in caplog.records)
+    caplog.clear()
+    assert run("fit", small_campaign, "-o", tmp_path / "out").exit_code == 1
+    assert not caplog.records
+
+
+def test_nothing_that_a_terminal_obeys_reaches_it(capsys: pytest.CaptureFixture[str]) -> None:
+    Console().say("T\x1b[31m1\x9b\u202e: \ttab\nnext")
+    Console().result({}, "mean \x07of \x1b]0;title")
+    said = capsys.readouterr()
+    assert said.err == "T\\x1b[31m1\\x9b\\u202e: \ttab\nnext\n"
+    assert said.out == "mean \\x07of \\x1b]0;title\n"
+
+
+@pytest.mark.parametrize(("kind", "status", "recorded"), [("system", 1, False), ("no_load", 0, True)])
+def test_a_step_of_a_build_that_the_machine_failed_is_tried_again(
+    kind: str, status: int, recorded: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = {"problems": [{"kind": kind, "what": "x"}]}
+    monkeypatch.setattr("tribo.cli.workflow_step._run", lambda command: (1, said))
+    assert run_step(tmp_path / "fit.json", ["fit"], "digest") == status
+    assert (tmp_path / "fit.json").is_file() is recorded
+
+
+def test_a_diagnosis_that_fails_leaves_the_report_with_a_note(
+    small_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tribo import stages
+    from tribo.cli.commands import _diagnosed
+
+    def broken(*_: object, **__: object) -> None:
+        raise IndexError("index 3 is out of bounds")
+
+    monkeypatch.setattr("tribo.stages.diagnosis", broken)
+    from tribo.campaign import load_campaign
+
+    study = stages.study(load_campaign(small_campaign), until="fit")
+    noted, found = _diagnosed(study, stages.DEFAULTS, lambda *_: None)
+    assert found is None
+    assert any("no diagnosis: the diagnosis stopped because of an error in tribo (IndexError" in n for n in noted.notes)
+
+
+def test_problems_of_the_input_pass_through(small_campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tribo.cli.console import problems_of
+
+    mine = Problem("no_load", "the load is missing")
+    assert problems_of(TriboError(mine)) == (mine,)
+    assert problems_of(FULL)[0].kind == "system"

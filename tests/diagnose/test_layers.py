@@ -1,0 +1,99 @@
+"""The layers of a verdict: corrections of patterns, causes beside each other, and what follows no law."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from blind.direct import ingested
+from blind.tribometer import Design, hide
+
+from tribo.diagnose import examine
+from tribo.diagnose.diagnosis_record import Diagnosis
+from tribo.diagnose.statistics.fit import fit
+from tribo.diagnose.statistics.model import Setup, predict, setup
+from tribo.diagnose.statistics.observations import observe
+from tribo.diagnose.statistics.pattern_correction import pattern_corrections
+from tribo.diagnose.statistics.predictor import tabled_predictor
+
+from .known import acting, made
+
+FEW = (60, 25)
+EXACT = {"repeat_sd": (1e-6, 1e-6), "specimen_sd": 1e-9}
+QUIET = {"repeat_sd": (0.004, 0.004), "specimen_sd": 0.003}
+FOUR = Design(samples=("F", "A", "B", "C", "Sx"), masses_g=(5.0, 25.0, 90.0, 138.5), pattern_error=1.5)
+
+
+def three_effects(s: Setup) -> np.ndarray:
+    """Tilt, running-in and the temperature, each of a size that is found alone."""
+    return acting("tilt", 0.035)(s) + acting("run_in", 0.6, 6.0)(s) + acting("temperature", 0.05)(s)
+
+
+def wave(s: Setup) -> np.ndarray:
+    """A course over the series that no mechanism has: six turns of a sine."""
+    order = s.observations.conditions.run_order
+    return 0.25 * np.sin(2 * np.pi * 6 * order / order.max())[:, None] * np.ones(2)
+
+
+def with_running_in(s: Setup) -> np.ndarray:
+    return wave(s) + acting("run_in", 0.8, 6.0)(s)
+
+
+@pytest.fixture(scope="module")
+def beside() -> Diagnosis:
+    return examine(made(with_running_in, seed=4), replicates=FEW)
+
+
+def test_three_causes_at_once_are_all_named() -> None:
+    v = examine(made(three_effects, seed=1), replicates=FEW).verdict
+    assert {c.mechanism for c in v.causes} >= {"tilt", "run_in", "temperature"}
+    assert {layer.name for layer in v.layers if layer.kind == "cause"} == {"tilt", "run_in", "temperature"}
+
+
+def test_a_cause_is_certain_although_something_without_a_law_is_left(beside: Diagnosis) -> None:
+    v = beside.verdict
+    assert v.verdict == "partly"
+    assert [c.mechanism for c in v.causes] == ["run_in"]
+    left = [layer for layer in v.layers if layer.kind == "remainder"]
+    assert left
+    assert left[0].name == "run_order"
+    assert "A misfit remains beyond chance" in v.text
+
+
+def test_the_size_of_a_cause_beside_a_remainder_is_that_which_was_hidden(beside: Diagnosis) -> None:
+    layer = next(layer for layer in beside.verdict.layers if layer.kind == "cause")
+    assert layer.parameters["c"].low < 0.8 < layer.parameters["c"].high
+    assert layer.p_adjusted < 0.01
+    assert layer.gain is not None
+    assert layer.gain.difference > 0
+
+
+def test_a_wave_alone_is_a_remainder_and_no_cause() -> None:
+    v = examine(made(wave, seed=2), replicates=FEW).verdict
+    assert v.verdict == "unknown"
+    assert v.causes == ()
+    assert [layer.name for layer in v.layers if layer.kind == "remainder"][:1] == ["run_order"]
+
+
+def test_without_noise_the_corrections_are_the_errors_that_were_drawn() -> None:
+    """How often the intervals hold the drawn error under noise is counted by benchmarks/pattern_corrections.py."""
+    quiet, exact = hide(905, [], replace(FOUR, **QUIET)), hide(905, [], replace(FOUR, **EXACT))
+    o = observe(ingested(quiet, 905))
+    s = setup(o, tabled_predictor(o.patterns))
+    order = [list(exact.tests.test_id).index(name) for name in o.test_ids]
+    true = np.log(np.column_stack([exact.static, exact.sliding]))[order]
+    wrong_by = true - predict(s, np.array(exact.law), (), ())
+    found = pattern_corrections(fit(s))
+    drawn = [
+        100 * np.expm1(wrong_by[o.conditions.sample == c.sample, ("static", "sliding").index(c.regime)].mean())
+        for c in found
+    ]
+    assert np.abs(drawn).max() > 10
+    assert np.corrcoef([c.mean.value for c in found], drawn)[0, 1] > 0.95
+    assert [c.mean.value for c in found] == pytest.approx(drawn, abs=4)  # specimens are expected to differ by 5 %
+
+
+def test_every_patterned_sample_has_a_correction_in_each_regime_and_the_flat_one_has_none(beside: Diagnosis) -> None:
+    corrected = {(x.name, *x.regimes) for x in beside.verdict.layers if x.kind == "pattern_correction"}
+    assert corrected == {(name, regime) for name in "ABC" for regime in ("static", "sliding")}

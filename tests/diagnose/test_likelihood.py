@@ -1,0 +1,410 @@
+"""The likelihood of a campaign and its parts, against dense matrices written out from the model's definition.
+
+With very many degrees of freedom the t distribution is normal, Laplace's method is exact, and a campaign is one normal
+vector: covariance = repeats and readings of each test + random effects.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from tribo.diagnose.statistics.linearisation import (
+    Linear,
+    State,
+    begin,
+    penalised,
+    scored,
+    solved,
+    weights,
+    whitened,
+    with_noise_estimated,
+)
+from tribo.diagnose.statistics.model import FIXED, GAIN, PATTERN, SLOPE, Setup, Target, setup
+from tribo.diagnose.statistics.observations import observe
+from tribo.diagnose.statistics.predictor import tabled_predictor
+from tribo.diagnose.statistics.scatter import (
+    REPEAT_PRIOR,
+    SCATTER_SD,
+    SIZE_PRIORS,
+    SIZE_STEPS,
+    SMALLEST_SD,
+    Noise,
+    at_noise,
+    blurred,
+    first_noise,
+    fitted_sizes,
+    inverse_noise,
+    log_prior,
+    log_priors,
+    log_size_prior,
+    normal_equations,
+    prior_of_columns,
+    prior_sd,
+    products_of,
+    replicate_weights,
+    replicates_at,
+    solved_at_once,
+    updated_repeats,
+    updated_sizes,
+    whitener,
+)
+
+from .synthetic import Design, hidden
+
+NORMAL = 1e9  # degrees of freedom
+FEW = Design(samples=("F", "A", "B"), masses_g=(5.0, 40.0, 138.5), specimens=3, repeats=2)
+
+
+@cache
+def campaign() -> Setup:
+    """Readings that matter beside the repeats, and differ from test to test."""
+    o = observe(hidden(seed=5, design=FEW))
+    reading = 0.02 + 0.05 * np.random.default_rng(0).random((o.n, 2))
+    return setup(replace(o, reading=reading), tabled_predictor(o.patterns))
+
+
+def noise_of(s: Setup, tail: float = NORMAL) -> Noise:
+    """Sizes that all differ; repeats that are correlated, differ by sample and follow the force."""
+    repeat = np.array([[0.0081, 0.002], [0.002, 0.0049]])
+    scatter = np.array([0.3, -0.1, -0.2, -0.15])
+    assert len(scatter) == s.scatter.shape[1]
+    return Noise(repeat, np.array([0.06, 0.03]), np.array([0.02, 0.035]), 1.4, scatter, tail)
+
+
+def of_tests(s: Setup, noise: Noise) -> np.ndarray:
+    """Covariance of repeats and readings, (n, 2, 2), test by test."""
+    assert noise.scatter is not None
+    found = []
+    for k in range(s.observations.n):
+        times = np.exp(s.scatter[k] @ noise.scatter) ** 2
+        found.append(times * noise.repeat + np.diag(s.observations.reading[k] ** 2))
+    return np.array(found)
+
+
+def of_effects(s: Setup, noise: Noise) -> np.ndarray:
+    """Variance of every random effect, (q,)."""
+    sizes = {GAIN: noise.specimen[0], GAIN + 1: noise.specimen[1], SLOPE: noise.slope[0], SLOPE + 1: noise.slope[1]}
+    sizes |= {PATTERN: noise.pattern, FIXED: 1.0}
+    return np.array([(sizes[int(g)] * u) ** 2 for g, u in zip(s.group, s.unit, strict=True)])
+
+
+def dense(s: Setup, noise: Noise) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Covariance of all tests (2n, 2n), that without random effects, and the design of the effects (2n, q)."""
+    n = s.observations.n
+    alone = np.zeros((2 * n, 2 * n))
+    for k, own in enumerate(of_tests(s, noise)):
+        alone[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = own
+    random = s.random.reshape(2 * n, -1)
+    return alone + random @ np.diag(of_effects(s, noise)) @ random.T, alone, random
+
+
+def residual_of(s: Setup) -> np.ndarray:
+    return Target(s, ()).residual(s.first_law)
+
+
+def at_the_mode(s: Setup, noise: Noise) -> State:
+    """The random effects that are most likely given the tests."""
+    residual = residual_of(s)
+    whole, _, random = dense(s, noise)
+    effects = np.diag(of_effects(s, noise)) @ random.T @ np.linalg.solve(whole, residual.ravel())
+    return State(s.first_law, effects, residual, at_noise(s, noise))
+
+
+def test_the_score_is_the_log_density_of_one_normal_vector_and_that_of_the_sizes() -> None:
+    s = campaign()
+    noise = noise_of(s)
+    score, weight = scored(s, at_the_mode(s, noise))
+    n = s.observations.n
+    density = multivariate_normal(np.zeros(2 * n), dense(s, noise)[0]).logpdf(residual_of(s).ravel())
+    assert score == pytest.approx(density + n * np.log(2 * np.pi) + log_prior(s, noise), abs=1e-4)
+    assert weight == pytest.approx(1.0)
+
+
+def test_the_penalised_density_falls_by_the_tests_and_by_the_effects() -> None:
+    s, rng = campaign(), np.random.default_rng(2)
+    noise = noise_of(s, tail=6.0)
+    effects = 0.05 * rng.normal(size=len(s.group))
+    state = State(s.first_law, effects, residual_of(s), at_noise(s, noise))
+    left = (residual_of(s).ravel() - dense(s, noise)[2] @ effects).reshape(-1, 2)
+    distance = [x @ np.linalg.solve(v, x) for x, v in zip(left, of_tests(s, noise), strict=True)]
+    tests = -0.5 * (6.0 + 2.0) * np.sum(np.log1p(np.array(distance) / 6.0))
+    assert penalised(s, state) == pytest.approx(tests - 0.5 * np.sum(effects**2 / of_effects(s, noise)))
+    expected = 8.0 / (6.0 + np.array(distance))
+    assert weights(noise, state.at.factor, left) == pytest.approx(expected)
+
+
+def test_a_fit_begins_without_random_effects() -> None:
+    s = campaign()
+    state = begin(s, s.first_law, residual_of(s), first_noise())
+    assert not state.effects.any()
+    assert len(state.effects) == len(s.group)
+    assert state.at.noise.sizes == pytest.approx(SIZE_PRIORS[:, 0])
+    assert state.at.noise.repeat == pytest.approx(REPEAT_PRIOR[0] ** 2 * np.eye(2))
+
+
+def test_whitened_tests_have_unit_covariance() -> None:
+    s = campaign()
+    factor, cov = whitener(s, noise_of(s)), of_tests(s, noise_of(s))
+    assert factor @ cov @ factor.transpose(0, 2, 1) == pytest.approx(np.broadcast_to(np.eye(2), cov.shape), abs=1e-12)
+    assert not factor[:, 0, 1].any()
+    columns = np.random.default_rng(1).normal(size=(s.observations.n, 2, 3))
+    expected = np.einsum("nij,njk->ink", factor, columns).reshape(-1, 3)
+    assert whitened(factor, columns) == pytest.approx(expected)
+
+
+def test_a_step_is_that_of_generalised_least_squares() -> None:
+    s = campaign()
+    noise, target = noise_of(s), Target(s, ())
+    x = s.first_law
+    state = at_the_mode(s, noise)
+    jacobian = target.jacobian(x, target.predict(x))
+    found = solved(s, state, jacobian, target.bounds)
+    whole, flat = dense(s, noise)[0], jacobian.reshape(-1, 4)
+    information = flat.T @ np.linalg.solve(whole, flat)
+    step = np.linalg.solve(information, flat.T @ np.linalg.solve(whole, residual_of(s).ravel()))
+    assert found.solution[:4] == pytest.approx(step, rel=1e-4, abs=1e-7)
+    assert found.inverse[:4, :4] == pytest.approx(np.linalg.inv(information), rel=1e-4)
+    assert found.columns.shape == (s.observations.n, 2, 4 + len(s.group))
+    left = residual_of(s).ravel() - flat @ step
+    effects = np.diag(of_effects(s, noise)) @ dense(s, noise)[2].T @ np.linalg.solve(whole, left)
+    assert found.solution[4:] == pytest.approx(effects, rel=1e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_parameter_at_a_bound_that_would_leave_it_is_held_and_the_others_are_fitted_without_it(side: int) -> None:
+    s = campaign()
+    noise, target = noise_of(s), Target(s, ())
+    state = at_the_mode(s, noise)
+    jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
+    free = solved(s, state, jacobian, target.bounds).solution[:4]
+    outward = free < 0 if side == 0 else free > 0
+    held = int(np.flatnonzero(outward)[0])
+    bounds = tuple(b.copy() for b in target.bounds)
+    bounds[side][held] = s.first_law[held]
+    found = solved(s, state, jacobian, bounds)  # type: ignore[arg-type]
+    assert found.solution[held] == 0.0
+    assert not found.inverse[held].any()
+    others = [k for k in range(4) if k != held]
+    whole, flat = dense(s, noise)[0], jacobian.reshape(-1, 4)[:, others]
+    information = flat.T @ np.linalg.solve(whole, flat)
+    step = np.linalg.solve(information, flat.T @ np.linalg.solve(whole, residual_of(s).ravel()))
+    assert found.solution[others] == pytest.approx(step, rel=1e-4, abs=1e-7)
+    inward = bounds[1 - side].copy()
+    inward[held] = s.first_law[held]
+    kept = (target.bounds[0], inward) if side == 0 else (inward, target.bounds[1])
+    assert solved(s, state, jacobian, kept).solution[:4] == pytest.approx(free, rel=1e-6)
+
+
+def test_cleared_columns_have_the_informations_and_scores_of_the_marginal_model() -> None:
+    s, rng = campaign(), np.random.default_rng(3)
+    noise, target = noise_of(s), Target(s, ())
+    at = at_noise(s, noise)
+    jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
+    weight = 0.5 + rng.random(s.observations.n)
+    linear = Linear(jacobian, s.random, residual_of(s), at.factor, at.precision, weight)
+    columns = rng.normal(size=(s.observations.n, 2, 2))
+    left, cleared = linear.cleared(columns)
+    alone = np.zeros((2 * s.observations.n,) * 2)
+    for k, own in enumerate(of_tests(s, noise) / weight[:, None, None]):
+        alone[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = own
+    random = dense(s, noise)[2]
+    precision = np.linalg.inv(alone + random @ np.diag(of_effects(s, noise)) @ random.T)
+    flat, extra = jacobian.reshape(-1, 4), columns.reshape(-1, 2)
+    rest = precision - precision @ flat @ np.linalg.solve(flat.T @ precision @ flat, flat.T @ precision)
+    assert left.T @ left == pytest.approx(extra.T @ rest @ extra, rel=1e-4)
+    assert left.T @ cleared == pytest.approx(extra.T @ rest @ residual_of(s).ravel(), rel=1e-3, abs=1e-4)
+    beyond = linear.beyond_law(columns).reshape(-1, 2)
+    expected = extra - flat @ np.linalg.lstsq(flat, extra, rcond=None)[0]
+    assert beyond == pytest.approx(expected, abs=1e-9)
+
+
+def test_the_density_of_the_sizes_is_a_scaled_inverse_chi_of_each_and_an_inverse_wishart_of_the_repeats() -> None:
+    s = campaign()
+    noise = noise_of(s)
+    size, worth = REPEAT_PRIOR
+    expected = -0.5 * worth * (np.log(np.linalg.det(noise.repeat)) + size**2 * np.trace(np.linalg.inv(noise.repeat)))
+    for k, (wanted, weight) in enumerate(SIZE_PRIORS):
+        found = noise.sizes[k]
+        each = -weight * np.log(found) - 0.5 * weight * wanted**2 / found**2
+        assert log_size_prior(k, np.array(found)) == pytest.approx(each)
+        expected += each
+    assert noise.scatter is not None
+    expected -= 0.5 * np.sum(noise.scatter**2) / SCATTER_SD**2
+    assert log_prior(s, noise) == pytest.approx(expected)
+    alike = replace(noise, scatter=None)
+    assert log_prior(s, alike) == pytest.approx(expected + 0.5 * np.sum(noise.scatter**2) / SCATTER_SD**2)
+    fixed = replace(s, group=np.where(s.group == PATTERN, FIXED, s.group))
+    assert log_prior(fixed, noise) == pytest.approx(expected - float(log_size_prior(PATTERN, np.array(noise.pattern))))
+
+
+def test_the_sizes_of_a_noise_are_those_it_is_given() -> None:
+    noise = noise_of(campaign())
+    assert noise.sizes.tolist() == [0.06, 0.03, 0.02, 0.035, 1.4]
+    again = noise.with_sizes(np.array([1.0, 2.0, 3.0, 4.0, 5.0]))
+    assert (again.specimen.tolist(), again.slope.tolist(), again.pattern) == ([1.0, 2.0], [3.0, 4.0], 5.0)
+    s = campaign()
+    assert prior_sd(s, noise.sizes) ** 2 == pytest.approx(of_effects(s, noise))
+    both = prior_sd(s, np.array([noise.sizes, 2 * noise.sizes]))
+    assert both[1] == pytest.approx(2 * both[0])
+    assert noise.per_test(s) + s.observations.reading[:, :, None] ** 2 * np.eye(2) == pytest.approx(of_tests(s, noise))
+    alike = replace(noise, scatter=None).per_test(s)
+    assert alike == pytest.approx(np.broadcast_to(noise.repeat, alike.shape))
+
+
+def test_a_size_is_the_rms_of_its_effects_and_of_what_was_expected_before() -> None:
+    """Effects known exactly count as one each, unknown ones not at all, and the expectation as what it is worth."""
+    s = campaign()
+    sizes = noise_of(s).sizes
+    effects = np.arange(1.0, 1 + len(s.group)) * 0.01
+    known = updated_sizes(s, sizes, effects, np.zeros(len(s.group)))
+    unknown = updated_sizes(s, sizes, effects, prior_sd(s, sizes) ** 2)
+    for k, (wanted, worth) in enumerate(SIZE_PRIORS):
+        here = s.group == k
+        total = np.sum((effects[here] / s.unit[here]) ** 2) + worth * wanted**2
+        assert known[k] ** 2 == pytest.approx(total / (here.sum() + worth))
+        assert unknown[k] ** 2 == pytest.approx(total / worth)
+    without = replace(s, group=np.where(s.group == SLOPE, FIXED, s.group))
+    assert updated_sizes(without, sizes, effects, np.zeros(len(s.group)))[SLOPE] == sizes[SLOPE]
+
+
+def test_repeats_that_are_as_expected_stay_as_they_are() -> None:
+    """Squares of the size that the noise says: no step in the scatter, and a covariance that changes by its prior."""
+    s = campaign()
+    noise = noise_of(s)
+    assert noise.scatter is not None
+    quiet = replace(s, observations=replace(s.observations, reading=np.zeros((s.observations.n, 2))))
+    expected = of_tests(quiet, noise)
+    squares = np.array([expected[:, 0, 0], expected[:, 0, 1], expected[:, 1, 1]])
+    at_zero = np.zeros(4)
+    alike = replace(noise, scatter=at_zero)
+    level = of_tests(quiet, alike)
+    same = np.array([level[:, 0, 0], level[:, 0, 1], level[:, 1, 1]])
+    repeat, scatter = updated_repeats(quiet, (noise.repeat, at_zero), same, NORMAL)
+    size, worth = REPEAT_PRIOR
+    n = s.observations.n
+    assert scatter == pytest.approx(0.0, abs=1e-12)
+    assert repeat == pytest.approx((n * noise.repeat + worth * size**2 * np.eye(2)) / (n + worth))
+    # where the scatter is not zero the step goes towards zero by its prior alone, and keeps what is common at zero
+    _, moved = updated_repeats(quiet, (noise.repeat, noise.scatter), squares, NORMAL)
+    information = 4.0 * quiet.scatter.T @ quiet.scatter + np.eye(4) / SCATTER_SD**2
+    step = noise.scatter + np.linalg.solve(information, -noise.scatter / SCATTER_SD**2)
+    step[:3] -= step[:3].mean()
+    assert moved == pytest.approx(step)
+
+
+def test_a_sample_with_larger_squares_is_given_larger_repeats_by_one_scoring_step() -> None:
+    s = campaign()
+    quiet = replace(s, observations=replace(s.observations, reading=np.zeros((s.observations.n, 2))))
+    repeat = np.diag([0.0064, 0.0064])
+    squares = np.zeros((3, s.observations.n))
+    squares[0] = squares[2] = 0.0064
+    wide = s.observations.conditions.sample == "B"
+    squares[:, wide] *= 1.5
+    _, scatter = updated_repeats(quiet, (repeat, np.zeros(4)), squares, 8.0)
+    information = 4.0 * 8.0 / 12.0 * s.scatter.T @ s.scatter + np.eye(4) / SCATTER_SD**2
+    excess = np.where(wide, 1.0, 0.0)  # a squared distance of 3 where 2 are expected
+    step = np.linalg.solve(information, s.scatter.T @ excess)
+    step[:3] -= step[:3].mean()
+    assert scatter == pytest.approx(step)
+    assert scatter[1] > 0 > scatter[0]  # A, B, F
+    squares[:, wide] *= 1e4
+    _, far = updated_repeats(quiet, (repeat, np.zeros(4)), squares, 8.0)
+    assert far[1] - far[0] <= 1.0 + 1e-12  # a step of half in each at the most
+
+
+def test_what_the_readings_explain_is_not_ascribed_to_the_repeats() -> None:
+    """Readings as large as the repeats: half of what is left, and half of its square uncertain, is of the repeats."""
+    s = campaign()
+    n = s.observations.n
+    even = replace(s, observations=replace(s.observations, reading=np.full((n, 2), 0.08)))
+    squares = np.array([np.full(n, 2 * 0.0064), np.zeros(n), np.full(n, 2 * 0.0064)])
+    repeat, scatter = updated_repeats(even, (0.0064 * np.eye(2), np.zeros(4)), squares, NORMAL)
+    assert repeat == pytest.approx(0.0064 * np.eye(2), abs=1e-9)
+    assert scatter == pytest.approx(0.0, abs=1e-9)
+
+
+def test_repeats_are_never_smaller_than_the_best_of_readings() -> None:
+    s = campaign()
+    nothing = np.zeros((3, s.observations.n))
+    repeat, _ = updated_repeats(s, (1e-12 * np.eye(2), np.zeros(4)), nothing, 8.0)
+    assert np.sqrt(np.linalg.eigvalsh(repeat)).min() >= SMALLEST_SD
+
+
+def test_the_noise_is_estimated_from_what_is_left_and_from_how_uncertain_it_is() -> None:
+    s = campaign()
+    noise, target = replace(noise_of(s), tail=8.0), Target(s, ())
+    state = at_the_mode(s, noise)
+    jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
+    system = solved(s, state, jacobian, target.bounds)
+    after = with_noise_estimated(s, state, system).at.noise
+    left = residual_of(s) - s.random @ state.effects
+    spread = np.array([c @ system.inverse @ c.T for c in system.columns])
+    square = system.weight[:, None, None] * (left[:, :, None] * left[:, None, :] + spread)
+    squares = np.array([square[:, 0, 0], square[:, 0, 1], square[:, 1, 1]])
+    assert noise.scatter is not None
+    repeat, scatter = updated_repeats(s, (noise.repeat, noise.scatter), squares, 8.0)
+    sizes = updated_sizes(s, noise.sizes, state.effects, np.diag(system.inverse)[4:])
+    assert after.repeat == pytest.approx(repeat)
+    assert after.scatter == pytest.approx(scatter)
+    assert after.sizes == pytest.approx(sizes)
+
+
+def test_many_replicates_are_weighed_and_solved_as_each_by_dense_matrices() -> None:
+    s, rng = campaign(), np.random.default_rng(4)
+    noise, target = noise_of(s, tail=8.0), Target(s, ())
+    n = s.observations.n
+    sizes = fitted_sizes(s, noise, 2)
+    assert sizes.effects.tolist() == [noise.sizes.tolist()] * 2
+    assert sizes.precision == pytest.approx(np.array([1 / of_effects(s, noise)] * 2))
+    inverse = np.linalg.inv(of_tests(s, noise))
+    for found in (*sizes.inverse, inverse_noise(s, noise.repeat, np.asarray(noise.scatter))):
+        assert found == pytest.approx(np.array([inverse[:, 0, 0], inverse[:, 0, 1], inverse[:, 1, 1]]))
+    residual = 0.1 * rng.normal(size=(2, 2, n))
+    assert products_of(residual)[1] == pytest.approx(
+        np.array([residual[1, 0] ** 2, residual[1, 0] * residual[1, 1], residual[1, 1] ** 2])
+    )
+    weight = replicate_weights(sizes, residual, 8.0)
+    distance = np.einsum("ran,nab,rbn->rn", residual, inverse, residual)
+    assert weight == pytest.approx(10.0 / (8.0 + distance))
+    jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
+    along = np.concatenate([jacobian, s.random], axis=2).transpose(1, 0, 2).copy()
+    precision = sizes.inverse * weight[:, None]
+    prior = prior_of_columns(4, sizes)
+    assert prior[:, 4:] == pytest.approx(sizes.precision)
+    assert prior[:, :4].max() < 1e-9
+    spread, solution = solved_at_once(along, precision, residual, prior)
+    weighted, normal = normal_equations(along, precision)
+    for r in range(2):
+        whole = np.einsum("ank,n,nab,bnl->kl", along, weight[r], inverse, along)
+        assert normal[r] == pytest.approx(whole, rel=1e-9, abs=1e-9 * np.abs(whole).max())
+        right = np.einsum("ank,n,nab,bn->k", along, weight[r], inverse, residual[r])
+        assert weighted[r] @ residual[r].ravel() == pytest.approx(right, rel=1e-6, abs=1e-6)
+        expected = np.linalg.inv(whole + np.diag(prior[r]))
+        assert spread[r] == pytest.approx(expected, rel=1e-4, abs=1e-8)
+        assert solution[r] == pytest.approx(expected @ right, rel=1e-3, abs=1e-6)
+    moved = np.einsum("ank,rkl,bnl->rabn", along, spread, along)
+    assert blurred(along, spread) == pytest.approx(np.stack([moved[:, 0, 0], moved[:, 0, 1], moved[:, 1, 1]], axis=1))
+    ready = replicates_at(s, along, sizes, residual, 2 * residual, 8.0)
+    assert ready.precision == pytest.approx(precision)
+    assert ready.normal == pytest.approx(normal)
+    assert ready.prior == pytest.approx(prior)
+    assert ready.group.tolist() == [FIXED] * 4 + s.group.tolist()
+    assert ready.residual == pytest.approx(2 * residual)
+
+
+def test_steps_of_the_sizes_have_the_density_of_the_sizes_they_lead_to() -> None:
+    s = campaign()
+    sizes = fitted_sizes(s, noise_of(s), 3)
+    found = log_priors(s, sizes, SIZE_STEPS)
+    assert found.shape == (len(SIZE_STEPS), 3)
+    for step, row in zip(SIZE_STEPS, found, strict=True):
+        stepped = noise_of(s).sizes * np.exp(step)
+        assert row == pytest.approx(sum(float(log_size_prior(k, v)) for k, v in enumerate(stepped)))
+    only = replace(s, group=np.where(s.group == PATTERN, FIXED, s.group))
+    fewer = log_priors(only, sizes, SIZE_STEPS[:1])[0]
+    assert fewer == pytest.approx(found[0] - float(log_size_prior(PATTERN, noise_of(s).sizes[PATTERN])))

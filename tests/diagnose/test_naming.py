@@ -1,0 +1,180 @@
+"""What a mechanism earns, which are told apart, and what chance gives: every rule at the numbers where it turns."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tribo.diagnose.search import rivals, weighing
+from tribo.diagnose.search.naming import best_beyond_chance
+from tribo.diagnose.search.rivals import CLOSE, IN_COMMON, TIED, sort_rivals, weights_of
+from tribo.diagnose.search.screen import FEWEST, Screen, _decided as decided, _strongest as strongest, deviate
+from tribo.diagnose.search.weighing import CHOICES_FITTED, PER_PARAMETER, Candidate, judged
+from tribo.diagnose.statistics.model import Acting
+from tribo.mechanisms.table import MECHANISMS
+
+
+def candidate(gain: float, raw: float | None = None, name: str = "suction") -> Candidate:
+    fit: Any = None
+    return Candidate(Acting(MECHANISMS[name]), fit, gain, gain if raw is None else raw)
+
+
+def screened(chance: list[float], library: list[float]) -> Screen:
+    return Screen((), np.array([2.0, 5.0]), np.zeros(2), (), np.array(chance), np.array(library), np.zeros(2))
+
+
+def fitted(score: float, name: str, *values: float) -> Any:
+    return SimpleNamespace(score=score, acting=(Acting(MECHANISMS[name], "x"),), values=[np.array(values)])
+
+
+def test_a_fit_earns_its_score_less_one_for_every_further_parameter_and_the_logarithm_of_its_choices() -> None:
+    start: Any = SimpleNamespace(score=-100.0)
+    one = judged(start, fitted(-90.0, "suction", 5e3), choosing=0.0)
+    assert (one.raw, one.gain) == (10.0, 10.0)
+    three = judged(start, fitted(-90.0, "cavity_collapse", 0.5, 1e4, 0.3), choosing=np.log(7.0))
+    assert three.raw == 10.0 - 2 * PER_PARAMETER
+    assert three.gain == pytest.approx(8.0 - np.log(7.0))
+    assert three.values.tolist() == [0.5, 1e4, 0.3]
+
+
+def test_a_wrong_label_pays_for_being_less_or_more_than_whole() -> None:
+    """Two standard deviations, of 0.15, from the whole effect cost two units of log likelihood."""
+    start: Any = SimpleNamespace(score=-100.0)
+    for share in (0.7, 1.3):
+        found = judged(start, fitted(-90.0, "mislabelled_specimen", share), choosing=0.0)
+        assert found.raw == pytest.approx(10.0 - 2.0)
+    assert judged(start, fitted(-90.0, "mislabelled_specimen", 1.0), choosing=0.0).raw == 10.0
+
+
+def test_the_strength_of_a_candidate_is_that_of_a_normal_deviate_before_choices_are_paid_for() -> None:
+    assert candidate(gain=1.0, raw=8.0).strength == 4.0
+    assert candidate(gain=-9.0, raw=-8.0).strength == 0.0
+
+
+def test_the_first_that_chance_does_not_make_as_strong_is_the_best() -> None:
+    seen = screened([], [k / 50 for k in range(200)])  # chance reaches 3.98
+    weak, fair, strong = (candidate(g, raw=r) for g, r in ((20.0, 2.0), (15.0, 40.0), (10.0, 60.0)))
+    assert best_beyond_chance([weak, fair, strong], seen, 0.01) is fair
+    assert best_beyond_chance([weak], seen, 0.01) is None
+    assert best_beyond_chance([], seen, 0.01) is None
+
+
+def ranked_by(start_left: np.ndarray, target: np.ndarray, name: str) -> list[str]:
+    acting = tuple(Acting(MECHANISMS[name], str(k)) for k in range(start_left.shape[1]))
+    start: Any = SimpleNamespace(acting=acting, left=start_left, target=target)
+    return [a.choice for a in weighing._most_promising(start, list(range(len(acting))))]
+
+
+def test_of_many_choices_those_with_the_strongest_score_are_fitted_whatever_their_sign() -> None:
+    """The score of a column is its product with the residual over its own length."""
+    target = np.array([6.0, -5.0, 4.0, 0.5, 3.0, 0.1])
+    assert CHOICES_FITTED == 4
+    assert ranked_by(np.diag([1.0, 10.0, 1.0, 100.0, 1.0, 1.0]), target, "covariate") == ["0", "1", "2", "4"]
+    assert ranked_by(np.eye(6)[:, :4], target, "covariate") == ["0", "1", "2", "3"]  # few: all, in their order
+
+
+def test_of_wrong_labels_those_whose_whole_effect_explains_most_are_fitted() -> None:
+    """Log likelihood of the whole effect: product with the residual less half its squared length; 5.5, -17.5, ..."""
+    target = np.array([6.0, -5.0, 4.0, 0.5, 3.0, 0.1])
+    lengths = np.array([1.0, 5.0, 1.0, 1.0, 6.0, 1.0])
+    # whole effects: 5.5, -37.5, 3.5, 0, 0, -0.4
+    assert ranked_by(np.diag(lengths), target, "mislabelled_specimen")[:2] == ["0", "2"]
+    assert set(ranked_by(np.diag(lengths), target, "mislabelled_specimen")) == {"0", "2", "3", "4"}
+
+
+def sorted_by(
+    monkeypatch: pytest.MonkeyPatch, best: Candidate, others: dict[float, Candidate]
+) -> tuple[list[Candidate], list[Candidate]]:
+    """Those alike and the rivals, where each other candidate has a cosine with the best."""
+    cosines = {id(c): cosine for cosine, c in others.items()}
+    monkeypatch.setattr(rivals, "_likeness", lambda start, b, near: np.array([cosines[id(c)] for c in near]))
+    start: Any = None
+    alike, distinct = sort_rivals(start, best, [best, *others.values()])
+    assert alike[0] is best
+    return list(alike[1:]), list(distinct)
+
+
+def test_a_mechanism_is_told_apart_by_its_difference_or_by_having_little_in_common(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of a gain of 20, twice the tie of 3 must lie outside what is in common: a squared cosine below 0.7."""
+    assert TIED == (3.0, 0.08)
+    assert IN_COMMON == 0.5
+    best = candidate(20.0)
+    near, far = candidate(18.0), candidate(18.5)
+    assert sorted_by(monkeypatch, best, {0.84: near, 0.83: far}) == ([near], [far])  # 0.7056 and 0.6889
+    weak = candidate(9.0)  # the tie is never reached: only what is in common counts
+    half, less = candidate(8.0), candidate(8.5)
+    assert sorted_by(monkeypatch, weak, {0.71: half, 0.70: less}) == ([half], [less])
+    assert sorted_by(monkeypatch, weak, {-0.99: half}) == ([], [half])  # opposite effects have nothing in common
+
+
+def test_what_explains_less_by_the_tie_is_neither_alike_nor_a_rival(monkeypatch: pytest.MonkeyPatch) -> None:
+    best = candidate(20.0)
+    just, no = candidate(17.1), candidate(16.9)
+    assert sorted_by(monkeypatch, best, {0.99: just, 0.98: no}) == ([just], [])
+    assert sorted_by(monkeypatch, best, {0.3: just, 0.2: no}) == ([], [just])
+    strong = candidate(100.0)  # the tie grows to 8, what explains about equally stays within 3
+    tied, beyond, rival, none = (candidate(g) for g in (92.5, 91.5, 97.5, 96.5))
+    found = sorted_by(monkeypatch, strong, {0.99: tied, 0.98: beyond, 0.3: rival, 0.2: none})
+    assert found == ([tied], [rival])
+    assert CLOSE == 3.0
+
+
+def test_a_rival_explains_as_much_whether_or_not_choices_are_paid_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    best = candidate(20.0, raw=25.0)
+    many = candidate(19.0, raw=21.9)
+    assert sorted_by(monkeypatch, best, {0.3: many}) == ([], [])
+    few = candidate(19.0, raw=22.1)
+    assert sorted_by(monkeypatch, best, {0.3: few}) == ([], [few])
+
+
+def test_shares_go_by_likelihood_and_are_never_sharper_than_a_tie_is_wide() -> None:
+    assert weights_of([candidate(10.0), candidate(9.0)]) == pytest.approx([1 / (1 + np.exp(-1)), 1 / (1 + np.exp(1))])
+    strong = weights_of([candidate(300.0), candidate(292.0)])  # 8 % of 300 over the 3 that are close: units of 8
+    assert strong[0] / strong[1] == pytest.approx(np.e)
+
+
+def test_chance_is_the_share_of_replicates_as_strong_counting_the_campaign_itself() -> None:
+    seen = screened([1.0, 2.0, 3.0, 4.0] * 10, [0.0] * 30 + [6.0] * 10)
+    assert seen.p_adjusted(3.0) == pytest.approx(21 / 41)
+    assert seen.p_adjusted(0.5) == 1.0
+    assert seen.p_library(5.0) == pytest.approx(11 / 41)
+    assert np.isnan(screened([], []).p_adjusted())
+
+
+def test_far_beyond_the_replicates_chance_falls_as_a_gumbel_tail_of_their_mean_and_spread() -> None:
+    chance = np.random.default_rng(0).gumbel(3.0, 0.4, size=50)
+    few = [float(v) for v in chance]
+    scale = np.std(few) * np.sqrt(6) / np.pi
+    mode = np.mean(few) - np.euler_gamma * scale
+    assert screened(few, []).p_adjusted(8.0) == pytest.approx(-np.expm1(-np.exp(-(8.0 - mode) / scale)), rel=1e-9)
+    assert screened(few, []).p_adjusted() == screened(few, []).p_adjusted(5.0)  # of the strongest look
+    assert screened([2.0] * 50, []).p_adjusted(50.0) == 1e-12
+    assert screened(few, []).p_adjusted(max(few) + 0.01) <= 1 / 51
+
+
+def test_replicates_end_once_ten_are_as_strong_or_the_campaign_is_ten_deviations_beyond() -> None:
+    ramp = np.linspace(1.0, 3.0, FEWEST)
+    assert decided(ramp, float(ramp[-10]))
+    assert not decided(ramp, float(ramp[-9]))
+    beyond = float(ramp.mean() + 10 * ramp.std())
+    assert decided(ramp, beyond + 0.01)
+    assert not decided(ramp, beyond - 0.01)
+    assert not decided(ramp[:-1], 1.0)  # never on fewer
+
+
+def test_the_strongest_of_a_replicate_is_taken_over_all_looks_and_over_the_mechanisms() -> None:
+    strengths = np.array([[1.0, 5.0, 2.0], [4.0, 3.0, 0.0]])
+    assert strongest(strengths, np.array([True, False, True])).tolist() == [[5.0, 2.0], [4.0, 4.0]]
+    assert strongest(strengths, np.zeros(3, bool)).tolist() == [[5.0, -np.inf], [4.0, -np.inf]]
+
+
+def test_a_chi_squared_value_beyond_the_numbers_is_a_deviate_by_its_root() -> None:
+    found = deviate(np.array([4000.0, 4000.0, -1.0, 0.0]), np.array([1, 5, 1, 4]))
+    assert found[0] == pytest.approx(np.sqrt(4000.0))
+    assert found[1] == pytest.approx(np.sqrt(4000.0) - 0.5 * 2.0)
+    assert found[2:].tolist() == [0.0, 0.0]

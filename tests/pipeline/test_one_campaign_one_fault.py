@@ -1,0 +1,126 @@
+"""A campaign whose name, files or earlier results cannot be used costs no other campaign of a build."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from tribo.pipeline.build import BuildOptions, _configuration, _to_simulate
+from tribo.pipeline.history import CampaignRow, Law, history
+from tribo.pipeline.index_page import page, series_name, trend_csv, write_index
+from tribo.pipeline.scan import scan
+from tribo.pipeline.trend import change_points
+from tribo.report.provenance import read_record
+
+BAD_NAMES = (b"a{b}c", b"x" * 250, b"not-\xff-utf8", b"index.html", b"trend.csv", b"esc\x1b[31m", b"back\\slash")
+GOOD_NAMES = ("plain", "with space", "ümlaut", "-dash", "a'b\"c", "$HOME", "A|B", "100%")
+
+
+def drop_of(folder: Path, *names: str | bytes) -> Path:
+    for name in names:
+        place = os.path.join(os.fsencode(folder), name if isinstance(name, bytes) else name.encode())
+        os.makedirs(place)
+        with open(os.path.join(place, b"campaign.toml"), "w") as file:
+            file.write("x")
+    return folder
+
+
+def test_a_name_that_cannot_be_used_is_refused_with_its_reason_and_the_others_are_taken(tmp_path: Path) -> None:
+    found = scan(drop_of(tmp_path, *BAD_NAMES, *GOOD_NAMES), settle_s=0.0)
+    assert {c.name for c in found if c.is_ready} == set(GOOD_NAMES)
+    refused = [c for c in found if c.refused]
+    assert len(refused) == len(BAD_NAMES)
+    for campaign in refused:
+        assert "rename it" in campaign.refused[0]
+        campaign.name.encode()
+
+
+def test_a_file_of_a_name_that_is_not_utf8_is_listed_and_hashed(tmp_path: Path) -> None:
+    drop_of(tmp_path, "a")
+    with open(os.path.join(os.fsencode(tmp_path), b"a", b"pr\xfcfung.csv"), "w") as file:
+        file.write("1")
+    (found,) = scan(tmp_path, settle_s=0.0)
+    assert found.is_ready
+    assert len(found.digest) == 64
+    json.dumps(dict(found.files)).encode()
+
+
+def test_refused_campaigns_stand_in_the_index_with_their_reason(tmp_path: Path) -> None:
+    drop, state = drop_of(tmp_path / "drop", *BAD_NAMES), tmp_path / "site" / ".tribo"
+    _configuration(scan(drop, settle_s=0.0), state / "inputs", state, BuildOptions())
+    rows = history(tmp_path / "site")
+    assert {row.state for row in rows} == {"unusable"}
+    write_index(tmp_path / "site")
+    assert (tmp_path / "site" / "current" / "index.html").read_text(encoding="utf-8").count("rename it") == len(rows)
+
+
+def test_a_slash_or_a_brace_in_the_name_of_a_sample_reaches_no_path_of_the_workflow(tmp_path: Path) -> None:
+    drop = drop_of(tmp_path / "drop", "a")
+    names = ("F", "A/B", "{x}", "..", "$\\frac$")
+    patterns = "".join(f"[patterns.{json.dumps(n)}]\ncavity = 'none'\n" for n in names)
+    (drop / "a" / "campaign.toml").write_text(f'[campaign]\ntitle = "t"\nnominal_area_mm2 = 55.0\n{patterns}')
+    (drop / "a" / "raw").mkdir()
+    rows = ["test_id,file,sample,normal_load_N"]
+    for k, name in enumerate(names):
+        (drop / "a" / "raw" / f"{k}.csv").write_text("1,2\n")
+        rows.append(f"T{k},raw/{k}.csv,{name},{k + 1}")
+    (drop / "a" / "tests.csv").write_text("\n".join(rows) + "\n")
+    (campaign,) = scan(drop, settle_s=0.0)
+    samples, cells = _to_simulate(campaign)
+    assert samples == ["F", "A%2FB", "%7Bx%7D", "..", "%24%5Cfrac%24"]
+    assert len(cells) == 25
+    assert not any(set("/{}\\") & set(word) for word in (*samples, *cells))
+
+
+DAMAGED = (b"", b"{", b"[]", b"null", b"{}", b"[" * 100_000, b'{"status": 3}', b"\xff\xfe", b'{"status": "done"}',
+           b'{"status": "unusable", "digest": "", "files": {}, "problems": [3, {"x": 1}], "finished": ""}',
+           b"sample,regime\nF", b"\0" * 50, b"mu,mu\nx,y\n", b'test_id,"\n')  # fmt: skip
+
+
+RESULTS = ("verdict.json", "tests.csv", "fits.csv", "campaign.nc", "../../.tribo/steps/a/report.json")
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_damaged_results_of_one_campaign_leave_the_index(tmp_path: Path, name: str) -> None:
+    drop, state = drop_of(tmp_path / "drop", "a", "b"), tmp_path / "site" / ".tribo"
+    _configuration(scan(drop, settle_s=0.0), state / "inputs", state, BuildOptions())
+    place = (tmp_path / "site" / "current" / "a" / name).resolve()
+    place.parent.mkdir(parents=True)
+    for content in DAMAGED:
+        place.write_bytes(content)
+        write_index(tmp_path / "site")
+        assert "campaign" in (tmp_path / "site" / "current" / "index.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("content", [*DAMAGED, b'{"outputs": {}, "inputs": [], "inputs_sha256": "", "campaign": 7}'])
+def test_a_damaged_provenance_is_said_to_be_damaged(tmp_path: Path, content: bytes) -> None:
+    from click.testing import CliRunner
+
+    from tribo.cli import main
+
+    (tmp_path / "provenance.json").write_bytes(content)
+    assert read_record(tmp_path) is None
+    result = CliRunner().invoke(main, ["verify", str(tmp_path)])
+    assert result.exit_code == 1
+    assert "the record of inputs and outputs is damaged" in result.stderr
+
+
+def test_campaigns_are_in_the_order_of_their_times_and_not_of_their_texts(tmp_path: Path) -> None:
+    drop, state = drop_of(tmp_path / "drop", "later", "earlier"), tmp_path / "site" / ".tribo"
+    _configuration(scan(drop, settle_s=0.0), state / "inputs", state, BuildOptions())
+    for name, started in {"later": "2026-01-01T23:30:00-05:00", "earlier": "2026-01-02T01:00:00+01:00"}.items():
+        out = tmp_path / "site" / "current" / name
+        out.mkdir(parents=True)
+        (out / "tests.csv").write_text(f"test_id,set_aside,started_at\nT1,,{started}\nT2,,yesterday\n")
+    assert [row.name for row in history(tmp_path / "site")] == ["earlier", "later"]
+
+
+def test_a_sample_with_a_bar_in_its_name_has_its_trend() -> None:
+    law = [Law("A|B", "static", "mu", 4.0 + (k > 6), 3.9, 5.1) for k in range(12)]
+    rows = [CampaignRow(f'no "{k}"', "", "done", measured=f"2026-01-{k + 1:02d}", laws=(law[k],)) for k in range(12)]
+    changes = change_points({series_name(("A|B", "static", "mu")): [law_.value for law_ in law]})
+    assert "Static μ of A|B rises" in page(rows, changes)
+    assert '"no ""3""",2026-01-04,A|B,static,mu,4,3.9,5.1' in trend_csv(rows).splitlines()

@@ -1,0 +1,52 @@
+"""Whatever a user's file holds, it is read as what it says, or refused with sentences; the long run is a benchmark."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import hostile_inputs as hostile
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings, strategies as st
+
+from tribo import stages
+from tribo.campaign import load_campaign
+from tribo.records import Ingested
+
+QUICK = settings(
+    max_examples=60, derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck),
+    phases=[Phase.generate],
+)  # fmt: skip
+KINDS = {
+    "tests.csv": hostile.check_tests_csv,
+    "campaign.toml": hostile.check_campaign_toml,
+    "design": hostile.check_design,
+    "zip": hostile.check_zip,
+}
+
+
+@pytest.fixture(scope="module")
+def ingested(small_campaign: Path) -> Ingested:
+    return stages.ingest(load_campaign(small_campaign))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_hostile_input_is_read_as_it_is_or_refused(kind: str) -> None:
+    @QUICK
+    @given(st.data())
+    def check(data: Any) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            KINDS[kind](data.draw, Path(folder))
+
+    check()
+
+
+def test_hostile_decisions_by_hand_are_read_as_they_are_or_refused(ingested: Ingested) -> None:
+    @QUICK
+    @given(st.data())
+    def check(data: Any) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            hostile.check_overrides(data.draw, Path(folder), ingested)
+
+    check()

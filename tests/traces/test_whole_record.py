@@ -1,0 +1,231 @@
+"""Records of every shape: what each begins and ends with decides which forces are read from it, and from which zero."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tribo.errors import TraceError
+from tribo.records import Pull, Test, Trace
+from tribo.traces import read_pull, read_record
+from tribo.zeroing import zero_choice
+
+from .synthetic import Shape
+
+RATE = 50.0
+
+
+def a_test(zero: str = "", load_N: float = math.nan, **more: float) -> Test:
+    return Test("T1", "raw/T1.csv", "S", load_N, "S1", zero=zero_choice(zero), **more)  # type: ignore[arg-type]
+
+
+def noise(size: int, seed: int = 0, sd: float = 0.01) -> np.ndarray:
+    return sd * np.random.default_rng(seed).standard_normal(size)
+
+
+def slide_hold_slide(holds: tuple[float, ...], peaks: tuple[float, ...], seed: int = 0) -> Trace:
+    """A start from rest, then stops of the drive: the force relaxes to 80 % and each restart has a peak of its own."""
+    parts, speed = [np.zeros(100), np.linspace(0, 2.4, 60), 2 + 0.4 * np.exp(-np.arange(600) / 20)], [0.0, 1.0, 1.0]
+    for hold_s, peak in zip(holds, peaks, strict=True):
+        n = int(hold_s * RATE)
+        parts += [2 - 0.4 * (1 - np.exp(-np.arange(n) / (n / 3))), np.linspace(1.62, peak, 20)]
+        parts += [2 + (peak - 2) * np.exp(-np.arange(600) / 20)]
+        speed += [0.0, 1.0, 1.0]
+    force = np.concatenate(parts)
+    moving = np.concatenate([np.full(p.size, v) for p, v in zip(parts, speed, strict=True)])
+    time = np.arange(force.size) / RATE
+    return Trace("shs", time, force + noise(force.size, seed), columns={"speed_m_s": 2e-4 * moving})
+
+
+def with_a_stop(level: float = 2.0, zero: float = 0.0, at_stop: float = 0.0, seed: int = 0) -> Trace:
+    """A start from rest, a stop at which the force falls to ``at_stop``, and a restart; only the force is recorded."""
+    first = np.concatenate([np.full(100, zero), np.linspace(0, 1.25, 50) * level, np.full(800, level)])
+    stop = np.concatenate([np.linspace(level, at_stop, 10), np.full(120, at_stop)])
+    again = np.concatenate([np.linspace(at_stop, 1.1 * level, 50), level * (1 + 0.1 * np.exp(-np.arange(800) / 30))])
+    force = np.concatenate([first, stop, again])
+    return Trace("stop", np.arange(force.size) / RATE, force + noise(force.size, seed))
+
+
+def sawtooth(seed: int = 0, impulses: int = 0) -> Trace:
+    """Stick-slip of 1 N to 0.7 N every 2 s, loaded at 0.16 N/s for 1.9 s, with impulses of one sample."""
+    time = np.arange(60 * 500) / 500
+    phase = time % 2.0
+    force = np.where(phase < 1.9, 0.7 + 0.3 * phase / 1.9, 1.0 - 3.0 * (phase - 1.9)) + noise(time.size, seed, 1e-3)
+    rng = np.random.default_rng(seed + 1)
+    force[rng.choice(time.size, impulses, replace=False)] += rng.choice([-0.1, 0.1], impulses)
+    return Trace("saw", time, force)
+
+
+def rotary(seed: int = 0) -> Trace:
+    """Approach while turning, contact at 10 s, turning until 40 s, rest, lift-off: torque and load have offsets."""
+    time = np.arange(60 * 20) / 20
+    touching, turning = (time > 10) & (time < 45), time < 40
+    load = np.where(touching, 5.0, 0.0) - 0.13 + noise(time.size, seed)
+    force = np.where(touching & turning, 1.2, 0.0) + np.where(turning & ~touching, 0.3, 0.0) - 0.6
+    columns = {"normal_force_N": load, "speed_m_s": np.where(turning, 0.01, 0.0)}
+    return Trace("rotary", time, force + noise(time.size, seed + 1), columns=columns)
+
+
+def test_a_record_that_starts_from_rest_reads_as_its_pull() -> None:
+    trace = Shape(noise_N=0.01, offset_N=0.3).trace()
+    whole, pull = read_record(trace, test=a_test()), read_pull(trace)
+    assert (whole.static_N, whole.static_u_N, whole.sliding_N) == (pull.static_N, pull.static_u_N, pull.sliding_N)
+    assert [phase.name for phase in whole.phases] == ["rest", "rise", "slip", "steady sliding"]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_record_that_begins_while_sliding_has_a_mean_and_no_static_force_and_no_zero(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    force = 3.0 + 0.05 * np.cumsum(rng.standard_normal(2000)) / 40 + noise(2000, seed, 0.02)
+    pull = read_record(Trace("slides", np.arange(2000) / RATE, force), test=a_test())
+    assert math.isnan(pull.static_N)
+    assert pull.zero_N == 0.0
+    assert pull.sliding_N == pytest.approx(force.mean(), rel=0.01)
+
+
+def test_a_sliding_record_with_the_wrong_sign_says_so() -> None:
+    with pytest.raises(TraceError, match="sign may be reversed"):
+        read_record(Trace("slides", np.arange(500) / RATE, -3.0 + noise(500)), test=a_test())
+
+
+def test_a_record_in_which_nothing_pulls_is_not_taken_for_sliding() -> None:
+    with pytest.raises(TraceError, match="before the static peak"):
+        read_record(Trace("idle", np.arange(500) / RATE, noise(500)), test=a_test())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_each_hold_gives_a_static_force_with_its_time(seed: int) -> None:
+    holds, peaks = (5.0, 20.0, 60.0), (2.2, 2.35, 2.5)
+    pull = read_record(slide_hold_slide(holds, peaks, seed), test=a_test())
+    assert pull.static_N == pytest.approx(2.4, abs=0.03)
+    assert [r.hold_s for r in pull.restarts] == pytest.approx(holds, abs=0.5)
+    assert [r.static_N for r in pull.restarts] == pytest.approx(peaks, abs=0.03)
+    assert [p.name for p in pull.phases].count("hold") == 3
+
+
+def test_without_a_speed_the_relaxing_force_tells_of_a_hold() -> None:
+    trace = replace(slide_hold_slide((20.0, 60.0), (2.35, 2.5)), columns={})
+    pull = read_record(trace, test=a_test())
+    assert [r.static_N for r in pull.restarts] == pytest.approx((2.35, 2.5), abs=0.03)
+    assert [r.hold_s for r in pull.restarts] == pytest.approx((20.0, 60.0), rel=0.2)
+
+
+def test_the_peak_after_a_stop_is_a_force_of_its_own() -> None:
+    pull = read_record(with_a_stop(), test=a_test())
+    (again,) = pull.restarts
+    assert pull.static_N == pytest.approx(2.5, abs=0.05)
+    assert again.static_N == pytest.approx(2.2, abs=0.03)
+    assert again.hold_s == pytest.approx(130 / RATE, abs=0.3)
+
+
+def test_a_zero_that_a_stop_contradicts_is_said_and_its_size_is_in_the_uncertainty() -> None:
+    sure, unsure = (read_record(with_a_stop(zero=z, at_stop=0.0), test=a_test()) for z in (0.0, 0.4))
+    assert "zero_uncertain" not in sure.flags
+    assert "zero_uncertain" in unsure.flags
+    assert min(unsure.static_u_N, unsure.sliding_u_N, unsure.restarts[0].static_u_N) > 0.4 / 2
+    assert sure.sliding_u_N < 0.05
+
+
+@pytest.mark.parametrize(
+    ("zero", "expected"),
+    [("", 0.4), ("before contact", 0.4), ("none", 0.0), ("0.25", 0.25), ("-0.1 N", -0.1), ("at rest", 0.1)],
+)
+def test_a_zero_is_taken_as_chosen(zero: str, expected: float) -> None:
+    pull = read_record(with_a_stop(zero=0.4, at_stop=0.1), test=a_test(zero))
+    assert pull.zero_N == pytest.approx(expected, abs=0.01)
+    assert pull.sliding_N == pytest.approx(2.0 - expected, abs=0.02)
+
+
+def test_a_zero_is_read_over_a_chosen_time() -> None:
+    stop_s = 950 / RATE
+    pull = read_record(with_a_stop(zero=0.4, at_stop=0.1), test=a_test(f"[{stop_s + 0.5}, {stop_s + 2}]"))
+    assert pull.zero_N == pytest.approx(0.1, abs=0.01)
+
+
+def test_a_zero_at_rest_needs_a_rest() -> None:
+    with pytest.raises(TraceError, match="no rest"):
+        read_record(Trace("slides", np.arange(500) / RATE, 3.0 + noise(500)), test=a_test("at rest"))
+
+
+def test_approach_rest_and_lift_off_are_no_part_of_sliding() -> None:
+    pull = read_record(rotary(), test=a_test("at rest"))
+    assert pull.sliding_N == pytest.approx(1.2, abs=0.02)
+    assert pull.recorded_load_N == pytest.approx(5.0, abs=0.02)
+    names = [phase.name for phase in pull.phases]
+    assert names == ["approach", "contact", "steady sliding", "rest", "lift-off"]
+
+
+@pytest.mark.parametrize("impulses", [0, 100])
+def test_stick_slip_is_measured_cycle_by_cycle(impulses: int) -> None:
+    pull = read_record(sawtooth(impulses=impulses), test=a_test())
+    found = pull.oscillation
+    assert found is not None
+    assert (found.regime, found.cycles) == ("stick-slip", pytest.approx(26, abs=2))
+    assert found.peak_N == pytest.approx(1.0, abs=0.01)
+    assert found.trough_N == pytest.approx(0.7, abs=0.01)
+    assert found.drop_N == pytest.approx(0.3, abs=0.01)
+    assert found.period_s == pytest.approx(2.0, abs=0.02)
+    assert found.loading_N_per_s == pytest.approx(0.3 / 1.9, rel=0.02)
+    assert found.stuck_share == pytest.approx(0.95, abs=0.04)
+    assert found.period_u_s < 0.02
+
+
+def test_samples_of_a_slip_are_never_left_out() -> None:
+    trace = sawtooth(impulses=100)
+    pull = read_record(trace, test=a_test())
+    assert not pull.problems
+    assert pull.sliding_N == pytest.approx(trace.force_N[3000:].mean(), abs=1e-3)
+
+
+def test_a_sinusoid_is_an_inertial_oscillation_and_an_even_force_is_steady() -> None:
+    time = np.arange(5000) / 500
+    swing = Trace("sine", time, 1.0 + 0.2 * np.sin(2 * np.pi * time / 0.2) + noise(5000, 0, 5e-3))
+    even = Trace("even", time, 1.0 + noise(5000, 1, 5e-3))
+    regimes = [found.regime for t in (swing, even) if (found := read_record(t, test=a_test()).oscillation)]
+    assert regimes == ["inertial oscillation", "steady"]
+
+
+def test_irregular_bursts_have_no_regime_of_their_own() -> None:
+    rng = np.random.default_rng(3)
+    starts = np.cumsum(rng.pareto(0.8, 60) * 60 + 20).astype(int)
+    force = np.ones(12000)
+    for at in starts[starts < 11900]:
+        force[at : at + 40] += 0.5 * np.exp(-np.arange(40) / 10)
+    pull = read_record(Trace("bursts", np.arange(12000) / 500, force + noise(12000, 4, 3e-3)), test=a_test())
+    assert pull.oscillation is not None
+    assert pull.oscillation.regime == "irregular"
+
+
+@pytest.mark.parametrize("rate_Hz", [1.0, 2.0, 50.0])
+def test_no_static_force_lies_above_what_samples_and_noise_allow(rate_Hz: float) -> None:
+    time = np.arange(int(400 * rate_Hz)) / rate_Hz
+    force = np.where(time < 4, 0.1, np.minimum(9.0 * (time - 4) / 1.3, 16.0 - 8 * (1 - np.exp(-(time - 4) / 20))))
+    pull = read_record(Trace("coarse", time, force + noise(time.size, 2, 0.05)), test=a_test())
+    assert pull.static_N + pull.zero_N < force.max() + 5 * 0.05
+    assert pull.static_u_N > 0.02
+
+
+def test_a_shoulder_below_the_highest_force_is_in_the_uncertainty() -> None:
+    shoulder = np.concatenate([np.linspace(0, 2, 100), np.full(200, 2.0) + np.linspace(0, 0.02, 200)])
+    rise = np.concatenate([np.zeros(100), shoulder, np.linspace(2.02, 2.6, 300), np.linspace(2.6, 2.2, 400)])
+    trace = Trace("shoulder", np.arange(1100 + 600) / RATE, np.concatenate([rise, np.full(600, 2.2)]) + noise(1700))
+    first, highest = (read_record(trace, test=a_test(), rule=rule) for rule in ("seed", "highest"))
+    assert first.static_N == pytest.approx(2.0, abs=0.06)
+    assert highest.static_N == pytest.approx(2.6, abs=0.03)
+    assert first.highest_N == pytest.approx(2.6, abs=0.03)
+    assert first.static_u_N > 0.3
+    assert "peak_ambiguous" in first.flags
+
+
+def test_a_clear_peak_has_one_reading() -> None:
+    pull: Pull = read_record(Shape(noise_N=0.01).trace(), test=a_test())
+    assert pull.first_maximum_N == pull.highest_N == pull.first_drop_N == pull.static_N
+
+
+@pytest.mark.parametrize("text", ["before", "[3, 1]", "0.1 kN", "[1]", "yes"])
+def test_a_zero_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="before contact"):
+        zero_choice(text)

@@ -1,0 +1,119 @@
+"""The layers of a verdict: corrections of patterns, causes, and what follows a column without a law."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tribo.diagnose.search.naming import Named
+from tribo.diagnose.search.screen import Screen
+from tribo.diagnose.search.weighing import Candidate, judged, refitted
+from tribo.diagnose.sentences import misfit_of, p_text
+from tribo.diagnose.statistics.gain import gain
+from tribo.diagnose.statistics.interval import recovered
+from tribo.diagnose.statistics.linearisation import ModelFit
+from tribo.diagnose.statistics.model import effect_of
+from tribo.diagnose.statistics.pattern_correction import PatternCorrection, Percent, pattern_corrections
+from tribo.diagnose.verdict import Estimate, Gain, Layer
+from tribo.records import REGIMES, FloatArray
+
+SHARE = 0.1  # of the largest effect, above which a cause is said to act on a sample or in a regime
+
+
+def pattern_layers(model: ModelFit) -> list[Layer]:
+    """One layer per patterned sample and regime: how far the measurement is from the model, with its interval."""
+    return [_pattern_layer(c) for c in pattern_corrections(model)]
+
+
+def _pattern_layer(c: PatternCorrection) -> Layer:
+    parameters = {f"at {load:g} N": _estimate(percent) for load, percent in c.at_load.items()}
+    text = (
+        f"The measured {c.regime} friction of {c.sample} is {_signed(c.mean.value)} of the model, on average over "
+        f"its loads (90 % interval {c.mean.low:.0f} to {c.mean.high:.0f} %, adjusted p {p_text(c.p)})."
+    )
+    return Layer(
+        kind="pattern_correction", name=c.sample, samples=(c.sample,), regimes=(c.regime,), p_adjusted=c.p,
+        effect_percent=c.mean.value, low=c.mean.low, high=c.mean.high, parameters=parameters, text=text,
+    )  # fmt: skip
+
+
+def _signed(percent: float) -> str:
+    return f"{abs(percent):.0f} % {'above' if percent >= 0 else 'below'} that"
+
+
+def _estimate(percent: Percent) -> Estimate:
+    return Estimate(percent.value, percent.low, percent.high, "%")
+
+
+def cause_layers(named: Named, first: Screen, before: ModelFit, rng: np.random.Generator) -> list[Layer]:
+    """One layer per cause, each with what it adds beside the others."""
+    return [_cause_layer(named, k, first, before, rng) for k in range(len(named.causes))]
+
+
+def _cause_layer(named: Named, k: int, first: Screen, before: ModelFit, rng: np.random.Generator) -> Layer:
+    best, *tied = named.causes[k]
+    others = [alike[0].acting for j, alike in enumerate(named.causes) if j != k]
+    without = refitted(named.model, others) if others else before
+    beside = judged(without, refitted(without, [*others, best.acting]), 0.0)
+    change = effect_of(beside.fit.setup, beside.fit.law, best.acting, beside.values)
+    samples, regimes = _where(beside.fit, change)
+    value, low, high = _effect_percent(best, change)
+    m = best.acting.mechanism
+    parameters = _parameters(best)
+    gained: Gain | None = gain(without, beside.fit, rng)
+    text = (
+        f"{m.in_words[:1].upper()}{m.in_words[1:]} changes T by {value:+.0f} % (90 % interval {low:+.0f} to "
+        f"{high:+.0f} %) where it acts most."
+    )
+    return Layer(
+        kind="cause", name=best.name, samples=samples, regimes=regimes, p_adjusted=first.p_library(beside.strength),
+        effect_percent=value, low=low, high=high, parameters=parameters, formula=m.formula,
+        tied_with=tuple(c.name for c in tied), gain=gained, text=text,
+    )  # fmt: skip
+
+
+def _parameters(c: Candidate) -> dict[str, Estimate]:
+    values = recovered(c.fit, len(c.fit.acting) - 1)
+    return {
+        p.name: Estimate(value, low, high, p.unit)
+        for p, (value, low, high) in zip(c.acting.mechanism.parameters, values, strict=True)
+    }
+
+
+def _where(f: ModelFit, change: FloatArray) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The samples and regimes in which ln T changes by more than a tenth of the largest change."""
+    least = SHARE * np.abs(change).max()
+    sample = f.setup.observations.conditions.sample
+    samples = tuple(str(name) for name in np.unique(sample) if np.abs(change[sample == name]).max() > least)
+    return samples, tuple(r for k, r in enumerate(REGIMES) if np.abs(change[:, k]).max() > least)
+
+
+def _effect_percent(best: Candidate, change: FloatArray) -> tuple[float, float, float]:
+    """The largest change of T over the tests, signed, in percent; with the ends of the interval of the amplitude."""
+    f, index = best.fit, len(best.fit.acting) - 1
+    value, low, high = recovered(f, index)[0]
+    where = np.unravel_index(int(np.abs(change).argmax()), change.shape)
+
+    def at(amplitude: float) -> float:
+        values = np.array([amplitude, *best.values[1:]])
+        return 100.0 * float(np.expm1(effect_of(f.setup, f.law, best.acting, values)[where]))
+
+    ends = sorted((at(low), at(high)))
+    return at(value), ends[0], ends[1]
+
+
+def remainder_layers(named: Named) -> list[Layer]:
+    """What follows a recorded column, and no mechanism of the library."""
+    found = []
+    for r in named.remainders:
+        m = misfit_of(r.look, r.size, r.coefficients, r.p)
+        samples: Sequence[str] = (m.sample,) if m.sample else ()
+        regimes = (m.observable,) if m.observable in REGIMES else tuple(REGIMES)
+        nan = float("nan")
+        layer = Layer(
+            kind="remainder", name=m.covariate, samples=tuple(samples), regimes=regimes, p_adjusted=r.p,
+            effect_percent=m.effect_percent, low=nan, high=nan, text=m.text,
+        )  # fmt: skip
+        found.append(layer)
+    return found

@@ -1,0 +1,271 @@
+"""Zip archives that are not trusted: everything is checked by the list of entries, before any of them is unpacked."""
+
+from __future__ import annotations
+
+import re
+import stat
+import struct
+import unicodedata
+import zipfile
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from tribo.errors import CampaignError, Problem
+from tribo.limits import (
+    DEEPEST_PATH,
+    LARGEST_LISTING_BYTES,
+    LONGEST_ENTRY_NAME_BYTES,
+    LONGEST_PATH_PART_BYTES,
+    MOST_ENTRIES,
+    MOST_EXPANSION,
+    MOST_UNPACKED_BYTES,
+    SMALL_ENTRY_BYTES,
+)
+
+MOST_NAMED = 5
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+_CHUNK = 1 << 20
+_NOT_OF_THE_CAMPAIGN = "__MACOSX"
+_NOT_A_ZIP = (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, RuntimeError, ValueError, zlib.error)
+_END, _END_64, _END_64_PLACE = b"PK\5\6", b"PK\6\6", b"PK\6\7"  # APPNOTE.TXT 6.3.10, 4.3.14 to 4.3.16
+_END_BYTES = 1 << 16  # the longest comment after the record
+
+Fault = tuple[str, str, str]  # kind, sentence, what is allowed
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An entry of a zip: its path inside with "/" between its parts, and what the zip says about it."""
+
+    name: str
+    info: zipfile.ZipInfo
+
+    @property
+    def is_folder(self) -> bool:
+        return self.info.filename.endswith(("/", "\\"))
+
+
+@contextmanager
+def opened_zip(archive: Path) -> Iterator[tuple[zipfile.ZipFile, tuple[Entry, ...]]]:
+    """A zip and its entries, once all of them are found to be harmless.
+
+    Raises
+    ------
+    CampaignError
+        It is no zip; its entries are too many, too large, or compressed to an implausibly small size; or an entry is a
+        link, a device, encrypted, compressed by an unusual method, leads out of the folder, has an unusable name, or
+        would overwrite another one on this or another system.
+    """
+    opened, infos = _listing(archive)
+    with opened:
+        problems = size_problems(infos, archive.stat().st_size, archive.name, MOST_UNPACKED_BYTES)
+        if problems:
+            raise CampaignError(problems)
+        entries = [e for info in infos if (e := _entry(info)).name.split("/")[0] != _NOT_OF_THE_CAMPAIGN]
+        problems = _entry_problems(entries, archive.name)
+        if problems:
+            raise CampaignError(problems)
+        yield opened, tuple(entry for entry in entries if entry.name)
+
+
+def _listing(archive: Path) -> tuple[zipfile.ZipFile, list[zipfile.ZipInfo]]:
+    file = archive.name
+    try:
+        _check_listing(archive)
+        opened = zipfile.ZipFile(archive)
+    except UnicodeDecodeError as why:
+        name = bytes(why.object).decode("utf-8", errors="backslashreplace")
+        what = "the name of an entry is marked as UTF-8 but is not"
+        raise CampaignError(Problem("bad_entry_name", what, file=file, found=name)) from None
+    except _NOT_A_ZIP as why:
+        raise CampaignError(Problem("bad_zip", f"not a readable .zip ({why})", file=file)) from why
+    return opened, opened.infolist()
+
+
+def unpack(archive: Path, folder: Path) -> None:
+    """Unpack a zip into a folder.
+
+    Raises
+    ------
+    CampaignError
+        As :func:`opened_zip`; or an entry is longer than it says.
+    """
+    with opened_zip(archive) as (opened, entries):
+        for parent in {_parent(entry) for entry in entries}:
+            (folder / parent).mkdir(parents=True, exist_ok=True)
+        for entry in entries:
+            if not entry.is_folder:
+                with (folder / entry.name).open("wb") as out:
+                    out.writelines(pieces(opened, entry, archive.name))
+
+
+def pieces(opened: zipfile.ZipFile, entry: Entry, file: str) -> Iterator[bytes]:
+    """The contents of an entry in pieces of bounded size.
+
+    Raises
+    ------
+    CampaignError
+        It is longer than it says, or damaged.
+    """
+    left = entry.info.file_size
+    packed = _opened_entry(opened, entry, file)
+    with packed:
+        while piece := _read(packed, entry, file):
+            left -= len(piece)
+            if left < 0:
+                what = "an entry is longer than its declared size"
+                raise CampaignError(Problem("zip_bomb", what, file=file, found=entry.name))
+            yield piece
+
+
+def _opened_entry(opened: zipfile.ZipFile, entry: Entry, file: str) -> IO[bytes]:
+    try:
+        return opened.open(entry.info)
+    except _NOT_A_ZIP as why:
+        raise _damaged(why, entry, file) from why
+
+
+def _read(packed: IO[bytes], entry: Entry, file: str) -> bytes:
+    try:
+        return packed.read(_CHUNK)
+    except _NOT_A_ZIP as why:
+        raise _damaged(why, entry, file) from why
+
+
+def _damaged(why: Exception, entry: Entry, file: str) -> CampaignError:
+    return CampaignError(Problem("bad_zip", f"not a readable .zip ({why})", file=file, found=entry.name))
+
+
+def size_problems(
+    infos: Sequence[zipfile.ZipInfo], archive_bytes: int, file: str, most_bytes: int
+) -> list[Problem]:
+    """Why a zip must not be unpacked, by the number and the sizes of its entries."""
+    problems = []
+    total = sum(info.file_size for info in infos)
+    if total > most_bytes or len(infos) > MOST_ENTRIES:
+        found = f"{len(infos)} entries, {total} bytes"
+        what, allowed = "too large when unpacked", f"at most {MOST_ENTRIES} entries, {most_bytes} bytes"
+        problems.append(Problem("zip_bomb", what, file=file, found=found, allowed=allowed))
+    names = [i.filename for i in infos if _expands(i.file_size, i.compress_size)]
+    if names or _expands(total, archive_bytes):
+        what = "compressed to an implausibly small size"
+        found = _listed(names) if names else f"{total} bytes in a file of {archive_bytes}"
+        allowed = f"at most {MOST_EXPANSION} times its compressed size"
+        problems.append(Problem("zip_bomb", what, file=file, found=found, allowed=allowed))
+    return problems
+
+
+def _expands(size: int, packed: int) -> bool:
+    return size > SMALL_ENTRY_BYTES and size > MOST_EXPANSION * max(packed, 1)
+
+
+def _parent(entry: Entry) -> str:
+    return entry.name if entry.is_folder else entry.name.rpartition("/")[0]
+
+
+def _entry(info: zipfile.ZipInfo) -> Entry:
+    """Backslashes, doubled slashes and single dots mean what they mean as a path."""
+    parts = info.filename.replace("\\", "/").split("/")
+    return Entry("/".join(part for part in parts if part not in ("", ".")), info)
+
+
+def _entry_problems(entries: Sequence[Entry], file: str) -> list[Problem]:
+    """One problem for each kind of fault, with the entries it was found in."""
+    found: dict[Fault, list[str]] = {}
+    for entry in entries:
+        fault = _name_fault(entry) or _kind_fault(entry.info)
+        if fault:
+            found.setdefault(fault, []).append(entry.info.orig_filename)
+    if not found:
+        twice = list(_colliding(entries))
+        if twice:
+            what = "entries that overwrite each other, on this system or on one that takes their names for the same"
+            allowed = "names that differ in more than case, slashes or the coding of letters"
+            found["duplicate_entry", what, allowed] = twice
+    return [
+        Problem(kind, what, file=file, found=_listed(names), allowed=allowed or None)
+        for (kind, what, allowed), names in found.items()
+    ]
+
+
+def _listed(names: Iterable[str]) -> str:
+    names = list(names)
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(name[:LONGEST_PATH_PART_BYTES] for name in names[:MOST_NAMED]) + more
+
+
+def _name_fault(entry: Entry) -> Fault | None:
+    given = entry.info.orig_filename
+    parts = entry.name.split("/")
+    if not given.isprintable() and any(unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in given):
+        return "bad_entry_name", "the name of an entry contains a control character", ""
+    if given.startswith(("/", "\\")) or ".." in parts or re.match(r"[A-Za-z]:", given):
+        return "entry_outside", "the path of an entry leads outside the folder", ""
+    if len(parts) > DEEPEST_PATH or len(given.encode()) > LONGEST_ENTRY_NAME_BYTES:
+        return "bad_entry_name", "the path of an entry is too long", (
+            f"at most {DEEPEST_PATH} levels, {LONGEST_ENTRY_NAME_BYTES} bytes"
+        )
+    if any(len(part.encode()) > LONGEST_PATH_PART_BYTES for part in parts):
+        return "bad_entry_name", "the name of an entry is too long", f"at most {LONGEST_PATH_PART_BYTES} bytes"
+    if not entry.name and not entry.is_folder:
+        return "bad_entry_name", "an entry has no name", ""
+    return None
+
+
+def _kind_fault(info: zipfile.ZipInfo) -> Fault | None:
+    if stat.S_IFMT(info.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
+        return "link", "an entry is a link or a device", ""
+    if info.flag_bits & 1:
+        return "encrypted", "an entry is encrypted", ""
+    if info.compress_type not in _METHODS:
+        return "unusual_compression", "an entry is compressed by a method that is not supported", "Deflate"
+    return None
+
+
+def _colliding(entries: Sequence[Entry]) -> Iterator[str]:
+    """Entries whose place is taken by another one, and folders spelled in two ways."""
+    files: dict[str, str] = {}
+    folders: dict[str, str] = {}
+    for entry in entries:
+        for folder in _folders_of(entry):
+            if folders.setdefault(_alike(folder), folder) != folder:
+                yield entry.name
+        if not entry.is_folder:
+            if _alike(entry.name) in files:
+                yield entry.info.filename
+            files[_alike(entry.name)] = entry.name
+    yield from (name for key, name in files.items() if key in folders)
+
+
+def _folders_of(entry: Entry) -> Iterator[str]:
+    parts = _parent(entry).split("/")
+    return ("/".join(parts[: k + 1]) for k in range(len(parts)) if parts[k])
+
+
+def _alike(name: str) -> str:
+    """The same for names that some file system takes for one: case, coding of letters, dots and blanks at an end."""
+    parts = (part.rstrip(" .") for part in name.split("/"))
+    folded = unicodedata.normalize("NFD", "/".join(parts)).casefold()
+    return unicodedata.normalize("NFD", folded)
+
+
+def _check_listing(archive: Path) -> None:
+    """Refuse a zip whose list of entries is too long to be read, by the record at its end."""
+    size = archive.stat().st_size
+    with archive.open("rb") as stream:
+        stream.seek(max(0, size - _END_BYTES - 22 - 20 - 56))
+        tail = stream.read()
+    at = tail.rfind(_END)
+    if at < 0 or len(tail) < at + 22:
+        raise zipfile.BadZipFile("it does not end as a .zip does")
+    (listing,) = struct.unpack_from("<L", tail, at + 12)
+    if at >= 76 and tail[at - 20 : at - 16] == _END_64_PLACE and tail[at - 76 : at - 72] == _END_64:
+        (listing,) = struct.unpack_from("<Q", tail, at - 76 + 40)
+    if listing > LARGEST_LISTING_BYTES:
+        what, allowed = "the list of entries is too long", f"{LARGEST_LISTING_BYTES} bytes, {MOST_ENTRIES} entries"
+        found = f"{listing} bytes"
+        raise CampaignError(Problem("zip_bomb", what, file=archive.name, found=found, allowed=allowed))
