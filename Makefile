@@ -7,12 +7,13 @@
 #   make release the wheel and the source archive in dist/, tried outside of the checkout; see SECURITY.md
 #   make hashes  constraints-hashed.txt anew, after a change of constraints.txt; needs a connection
 #   make audit   the pinned versions against published advisories; needs a connection
+#   make torture faults, kills, damage and hostile input, tried until something is lost; hours; docs/results/torture.md
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint types pytest docs links bench blind mutants release hashes audit clean
+.PHONY: demo test lint types pytest docs links bench blind mutants release hashes audit torture clean
 
 $(VENV)/.run: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -81,6 +82,9 @@ hashes: $(VENV)/.release
 
 audit: $(VENV)/.release
 	$(BIN)/pip-audit --strict --disable-pip --require-hashes -r constraints-hashed.txt
+
+torture: $(VENV)/.dev
+	$(BIN)/python benchmarks/torture.py --out out/torture
 
 clean:
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache

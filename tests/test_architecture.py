@@ -20,7 +20,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("errors", set()),
     ("limits", set()),
     ("escaping", set()),
-    ("input_files", {"limits"}),
+    ("input_files", {"errors", "limits"}),
     ("quantities", {"errors"}),
     ("zeroing", set()),
     ("records", {"errors", "zeroing"}),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 _LOG = logging.getLogger("tribo")
@@ -82,10 +83,23 @@ class SimulationError(TriboError):
     """A simulation cannot be run, or produced a non-finite number."""
 
 
+@contextmanager
+def naming(path: object, also_for: object = None) -> Iterator[None]:
+    """Put ``path`` into errors of the system that name no file (a read, a write), or that name ``also_for``."""
+    try:
+        yield
+    except OSError as why:
+        if why.filename is None or why.filename == str(also_for):
+            why.filename, why.filename2 = str(path), None
+        raise
+
+
 def system_problem(why: OSError, file: str | None = None) -> Problem:
     """An error of the operating system with its path and cause."""
     place = next((str(part) for part in (why.filename2, why.filename) if part), None) or file
     cause = why.strerror or str(why) or type(why).__name__
+    if why.args and isinstance(why.args[0], list):  # shutil.Error: one (source, target, cause) for each file
+        _, place, cause = (str(part) for part in why.args[0][0])
     return Problem(_OF_THE_SYSTEM, cause[:1].lower() + cause[1:], file=place)
 
 

@@ -13,6 +13,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from tribo.errors import naming
 from tribo.limits import DEEPEST_NESTING
 
 MAPPED_BYTES = 64 << 20  # larger files are mapped and read in pieces, so that memory holds the numbers only
@@ -59,7 +60,7 @@ def read_input(path: Path, most_bytes: int) -> bytes:
 def read_or_map(path: Path, most_bytes: int, mapped_from: int = MAPPED_BYTES) -> bytes | mmap.mmap:
     """The same; a file larger than ``mapped_from`` bytes is mapped into memory."""
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-    with os.fdopen(descriptor, "rb") as stream:
+    with naming(path), os.fdopen(descriptor, "rb") as stream:
         status = os.fstat(stream.fileno())
         if not stat.S_ISREG(status.st_mode):
             raise NotRegularError(errno.EINVAL, "not a regular file", str(path))

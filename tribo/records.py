@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 Regime = Literal["static", "sliding"]
 REGIMES: tuple[Regime, ...] = ("static", "sliding")
+NO_AREA_M2 = 1.0  # stands for a nominal area that is not known: tau0 A in newton is then tau0 itself
 STANDARD_GRAVITY = 9.80665  # m/s2, CGPM 1901
 
 
@@ -64,8 +65,39 @@ class Pattern:
 
 
 @dataclass(frozen=True)
+class Correction:
+    """What a user states about the numbers of an export; applied once, at the end of reading.
+
+    The friction force is multiplied by ``sign`` (1 or -1) and ``gain``; a torque becomes a force over ``lever_arm_m``.
+    ``sampling_rate_Hz`` gives the time where the export has none, else ``speed_m_s`` does for a recorded path.
+    """
+
+    sign: float = 1.0
+    gain: float = 1.0
+    lever_arm_m: float | None = None
+    sampling_rate_Hz: float | None = None
+    speed_m_s: float | None = None
+
+
+UNCORRECTED = Correction()
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """Forces of one test that were evaluated elsewhere, with standard uncertainties; NaN where one is not given."""
+
+    static_N: float = float("nan")
+    static_u_N: float = float("nan")
+    sliding_N: float = float("nan")
+    sliding_u_N: float = float("nan")
+
+
+@dataclass(frozen=True)
 class Test:
-    """One row of tests.csv: one pull, its load and its covariates."""
+    """One row of tests.csv: one pull, its load and its covariates.
+
+    ``correction`` is what was stated about the numbers of its export; ``evaluated`` holds its forces where it has none.
+    """
 
     __test__ = False  # not a pytest class
 
@@ -87,27 +119,11 @@ class Test:
     exclude: str = ""
     covariates: Mapping[str, str] = field(default_factory=dict)
     row: int | None = None
+    correction: Correction = UNCORRECTED
+    evaluated: Evaluated | None = None
     zero: ZeroChoice = DEFAULT
     load_zero: ZeroChoice = DEFAULT
     stiffness_N_per_m: float | None = None  # of the spring, wire or beam through which the slider is pulled
-
-
-@dataclass(frozen=True)
-class Correction:
-    """What a user states about the numbers of an export; applied once, at the end of reading.
-
-    The friction force is multiplied by ``sign`` (1 or -1) and ``gain``; a torque becomes a force over ``lever_arm_m``.
-    ``sampling_rate_Hz`` gives the time where the export has none, else ``speed_m_s`` does for a recorded path.
-    """
-
-    sign: float = 1.0
-    gain: float = 1.0
-    lever_arm_m: float | None = None
-    sampling_rate_Hz: float | None = None
-    speed_m_s: float | None = None
-
-
-UNCORRECTED = Correction()
 
 
 @dataclass(frozen=True)
@@ -141,12 +157,19 @@ class Campaign:
     pull_speed_m_s: float | None = None
     set_aside: tuple[SetAside, ...] = ()
     problems: tuple[Problem, ...] = ()
-    columns: Mapping[str, str] = field(default_factory=dict)
+    columns: Mapping[str, str | list[str]] = field(default_factory=dict)
+    columns_by_file: Mapping[str, Mapping[str, str | list[str]]] = field(default_factory=dict)
     instrument: Mapping[str, float] = field(default_factory=dict)
     chosen_flat: str = ""
     zero: ZeroChoice = DEFAULT
     load_zero: ZeroChoice = DEFAULT
+    contact: str = "sled"
     inputs: Mapping[str, str] = field(default_factory=dict, compare=False)
+
+    @property
+    def has_area(self) -> bool:
+        """Whether a nominal area is known; without one forces are reported, and tau0 A as T0 in newton."""
+        return self.nominal_area_m2 != NO_AREA_M2
 
     @property
     def flat_samples(self) -> tuple[str, ...]:
@@ -317,6 +340,11 @@ class LawFit:
     specimens: Mapping[str, FloatArray] = field(default_factory=dict)  # specimen -> its own values
     notes: tuple[str, ...] = ()
 
+    @property
+    def has_area(self) -> bool:
+        """Whether a nominal area is known; without one, tau0_Pa stands for T0 in newton."""
+        return self.nominal_area_m2 != NO_AREA_M2
+
     def value(self, parameter: str) -> float:
         return float(self.values[self.parameters.index(parameter)])
 
@@ -423,6 +451,8 @@ class ByHand:
 class Ingested:
     """A campaign with its exports read: one trace and one pull per usable test, the rest set aside.
 
+    A test whose forces were evaluated elsewhere has a pull and no trace.
+
     ``by_hand`` holds every test with a decision made by hand: an excluded test is also in ``set_aside``; a moved one
     has its new result in ``pulls``.
     """
@@ -433,13 +463,22 @@ class Ingested:
     set_aside: tuple[SetAside, ...]
     by_hand: Mapping[str, ByHand] = field(default_factory=dict)
 
+    def _file_of(self, test_id: str) -> str:
+        """The export of a test; "" where its forces were evaluated elsewhere."""
+        trace = self.traces.get(test_id)
+        return trace.file if trace else ""
+
+    def _trace_problems(self, test_id: str) -> tuple[Problem, ...]:
+        trace = self.traces.get(test_id)
+        return trace.problems if trace else ()
+
     def doubts(self) -> tuple[SetAside, ...]:
         """Tests that were used although their row, export or pull is doubtful, for example because of a spike."""
         found = []
         for test_id, pull in self.pulls.items():
             problems = tuple(
-                replace(p, file=self.traces[test_id].file or p.file, test_id=test_id)
-                for p in dict.fromkeys((*self.traces[test_id].problems, *pull.problems))
+                replace(p, file=self._file_of(test_id) or p.file, test_id=test_id)
+                for p in dict.fromkeys((*self._trace_problems(test_id), *pull.problems))
             )
             problems += tuple(note for note in self.campaign.problems if note.test_id == test_id)
             if problems:
@@ -477,7 +516,8 @@ class Study:
     sliding_N. ``example_runs`` holds one full force trace of the model per sample. ``budget`` is the uncertainty
     budget of every fitted number, one row per component. ``power`` states the differences this campaign could detect,
     ``outlying`` the outlying pulls and specimens. ``differences`` holds the differences between samples measured on the
-    same specimens, one row per pair of samples, regime and number.
+    same specimens, one row per pair of samples, regime and number. ``laws`` compares the candidate laws of every sample
+    by held-out loads, ``dependence`` states how T/N changes with each recorded variable.
     """
 
     ingested: Ingested
@@ -490,4 +530,6 @@ class Study:
     power: tuple[str, ...] = ()
     outlying: tuple[str, ...] = ()
     differences: pd.DataFrame | None = None
+    laws: pd.DataFrame | None = None
+    dependence: pd.DataFrame | None = None
     notes: tuple[str, ...] = ()

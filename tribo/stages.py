@@ -11,6 +11,7 @@ import numpy as np
 
 from tribo.campaign.flat_sample import required_flat_sample, with_flat_sample
 from tribo.campaign.zeros import with_zeros
+from tribo.errors import FitError
 from tribo.records import (
     Campaign,
     Ingested,
@@ -45,6 +46,7 @@ class StudyOptions:
     weights: Weights = "relative"
     zero: str = ""  # of the force, for tests without their own
     load_zero: str = ""  # of the recorded normal load
+    no_model: bool = False  # report without the spring-block model
     flat: str = ""  # the sample that calibrates the model; empty: F, or the only flat sample
     runs: int = 4
     seed: int = 0
@@ -160,14 +162,40 @@ def compare(
 def study(
     campaign: Campaign, options: StudyOptions = DEFAULTS, *, until: Until = "report", progress: Progress = _silent
 ) -> Study:
-    """Run the stages up to ``until`` on one campaign."""
+    """Run the stages up to ``until`` on one campaign.
+
+    Without a pattern or a flat sample, or by choice, the spring-block model is left out; a note says why.
+    """
     chosen = with_zeros(with_flat_sample(campaign, options.flat), options.zero, options.load_zero)
     ingested = ingest(chosen, rule=options.rule, jobs=options.jobs, overrides=options.overrides, progress=progress)
     if until == "ingest":
         return Study(ingested)
-    fits = fit(ingested, weights=options.weights)
-    walked = Study(ingested, fits) if until == "fit" else compare(ingested, fits, options, progress=progress)
-    return assess(walked, options)
+    without = without_model(chosen, options) if until != "fit" else ""
+    fits: tuple[LawFit, ...] = ()
+    no_law = ""
+    try:
+        fits = fit(ingested, weights=options.weights)
+    except FitError as why:
+        if not without:
+            raise
+        no_law = f"No friction law over load was fitted: {why}."
+    if until == "fit" or without:
+        return assess(Study(ingested, fits, notes=tuple(filter(None, (without, no_law)))), options)
+    return assess(compare(ingested, fits, options, progress=progress), options)
+
+
+def without_model(campaign: Campaign, options: StudyOptions) -> str:
+    """Why the spring-block model is not run, as a sentence; empty where it is."""
+    if options.no_model:
+        return "The spring-block model was not run, as requested."
+    patterns = [campaign.samples[test.sample] for test in campaign.tests]
+    if all(pattern.is_flat for pattern in patterns):
+        return "No sample has a pattern, so the spring-block model has nothing to predict. It was not run."
+    if not campaign.flat_samples:
+        return "No flat sample was measured, so the spring-block model cannot be calibrated. It was not run."
+    if not campaign.has_area:
+        return "The nominal area is not given, so the spring-block model has no pressure to start from. It was not run."
+    return ""
 
 
 def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
@@ -233,7 +261,9 @@ def plan(campaign: Campaign, options: StudyOptions, until: Until) -> dict[str, A
         steps.append(f"take the normal load of {unknown} tests from their exports")
     if until != "ingest":
         steps.append(f"fit mu and tau0 of {len(samples)} samples ({', '.join(samples)}) with weights {options.weights}")
-    if until in ("compare", "report"):
+    if until in ("compare", "report") and (why := without_model(campaign, options)):
+        steps.append(f"report without the spring-block model. {why}")
+    elif until in ("compare", "report"):
         loads = loads_to_simulate(campaign)
         flat = required_flat_sample(campaign)
         runs = len(samples) * len(loads) * options.runs

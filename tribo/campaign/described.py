@@ -62,9 +62,14 @@ class CampaignTable(_Strict):
     title: Line
     material: Line = ""
     counterface: Line = ""
-    nominal_area_mm2: Positive
+    nominal_area_mm2: Positive | None = None
+    contact: Literal["sled", "pin_on_disc", "ball_on_disc", "ring_shear", "reciprocating", "rotary"] = "sled"
     slider_mass_g: NotNegative = 0.0
     pull_speed_mm_s: Positive | None = None
+    sign: Literal[1, -1] | None = None
+    gain: Positive | None = None
+    lever_arm_mm: Positive | None = None
+    sampling_rate_Hz: Positive | None = None
     zero: Zero = ""
     load_zero: Zero = ""
 
@@ -129,13 +134,23 @@ class InstrumentTable(_Strict):
     sampling_rate_Hz: Positive | None = None
 
 
-def _only_quantities(columns: dict[str, str]) -> dict[str, str]:
-    names = [name.replace(" ", "_") for name in QUANTITIES]
-    for key in columns:
-        if quantity_named(key) is None:
+Stated = dict[str, str | list[str] | dict[str, str | list[str]]]
+
+
+def _only_quantities(columns: Stated) -> Stated:
+    """[columns] holds quantities, "ignore" and "decimal", and tables of the same for a file or a glob of files."""
+    names = [*(name.replace(" ", "_") for name in QUANTITIES), "ignore", "decimal"]
+    for key, value in columns.items():
+        if isinstance(value, dict):
+            _only_quantities(dict(value))
+        elif key not in ("ignore", "decimal") and quantity_named(key) is None:
             near = difflib.get_close_matches(key, names, 1)
             hint = f"did you mean {near[0]}?" if near else f"known quantities: {', '.join(names)}"
             raise ValueError(f"{key} is not a known quantity; {hint}")
+        elif key != "ignore" and not isinstance(value, str):
+            raise ValueError(f"{key} must be one column, not a list; only ignore takes a list")
+        elif key == "decimal" and value not in (".", ","):
+            raise ValueError("decimal must be a point or a comma")
     return columns
 
 
@@ -144,7 +159,7 @@ class CampaignFile(_Strict):
 
     campaign: CampaignTable
     patterns: Annotated[dict[Name, PatternTable], Field(min_length=1)]
-    columns: Annotated[dict[str, str], AfterValidator(_only_quantities)] = {}
+    columns: Annotated[Stated, AfterValidator(_only_quantities)] = {}
     instrument: InstrumentTable = InstrumentTable()
 
 

@@ -13,12 +13,20 @@ from tribo.campaign.choice import overlap, split_choice
 from tribo.campaign.dates import ALLOWED as ALLOWED_DATES, order_of, parsed
 from tribo.campaign.described import CampaignFile, PatternTable, read_description
 from tribo.campaign.numbers import load_faults, number, number_faults
-from tribo.campaign.table import COUNTS, KNOWN, NUMBERS, ZEROS, TestRow, read_tests_table
+from tribo.campaign.stated import (
+    columns_by_file,
+    correction_of,
+    evaluated_forces,
+    force_faults,
+    has_forces,
+    stated_faults,
+)  # fmt: skip
+from tribo.campaign.table import COUNTS, KNOWN, LOADS, NUMBERS, ZEROS, TestRow, read_tests_table
 from tribo.errors import CampaignError, Problem, unexpected
 from tribo.escaping import well_formed
 from tribo.input_files import hashes_of_reads
 from tribo.links import LEADS_OUT, leads_out, paths_below
-from tribo.records import STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
+from tribo.records import NO_AREA_M2, STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
 from tribo.zeroing import ALLOWED, zero_choice
 
 _NOT_WORTH_A_NOTE = (".", "~$", "Thumbs.db")
@@ -62,12 +70,22 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     if not usable:
         nothing = Problem("no_usable_test", "no test of this campaign is usable", file=TESTS)
         raise CampaignError([*problems, nothing])
+    area_m2 = _area_m2(described, usable)
     problems += _unlisted(root, rows)
     problems += [note for row in usable if (note := _loads_disagree(row, described))]
     order = _date_order(rows)
-    tests = tuple(_test(row, described, order) for row in usable)
+    tests = tuple(_test(row, described, order, area_m2) for row in usable)
     campaign = _campaign(root, described, patterns, tests, set_aside, problems)
     return replace(campaign, inputs={Path(path).name: digest for path, digest in hashes.items()})
+
+
+def _area_m2(described: CampaignFile, rows: Sequence[TestRow]) -> float:
+    """The nominal area, NO_AREA_M2 where none is stated. Raises CampaignError where a normal stress needs it."""
+    area = described.campaign.nominal_area_mm2
+    if area is None and any(row.cells.get("normal_stress_Pa") for row in rows):
+        what, allowed = "a load given as normal stress needs the nominal area", "more than 0 mm2"
+        raise CampaignError(Problem("no_area", what, file=TOML, column="nominal_area_mm2", allowed=allowed))
+    return NO_AREA_M2 if area is None else area * _MM2
 
 
 def _date_order(rows: Sequence[TestRow]) -> str:
@@ -84,12 +102,14 @@ def _campaign(
     problems: Sequence[Problem],
 ) -> Campaign:
     general = described.campaign
+    columns, by_file = columns_by_file(described.columns)
     order = list(patterns)
     names = sorted({t.sample for t in tests}, key=lambda n: (order.index(_pattern_of(n, patterns)), n))
     return Campaign(
         title=general.title,
         root=root,
-        nominal_area_m2=general.nominal_area_mm2 * _MM2,
+        nominal_area_m2=_area_m2(described, ()),
+        contact=general.contact,
         tests=tests,
         samples={name: patterns[_pattern_of(name, patterns)] for name in names},
         material=general.material,
@@ -98,7 +118,8 @@ def _campaign(
         pull_speed_m_s=None if general.pull_speed_mm_s is None else general.pull_speed_mm_s * _MM,
         set_aside=set_aside,
         problems=tuple(problems),
-        columns=described.columns,
+        columns=columns,
+        columns_by_file=by_file,
         instrument=described.instrument.model_dump(exclude_none=True),
         zero=zero_choice(general.zero),
         load_zero=zero_choice(general.load_zero),
@@ -136,13 +157,14 @@ def _sort_rows(
         places.setdefault(row.test_id, []).append(row.row)
         path, choice = _export_of(row)
         users.setdefault(path, []).append((row.test_id, choice))
+    recorded = not any(row.cells.get(column) for row in rows for column in LOADS)  # by all exports
     usable, set_aside = [], []
     order = _date_order(rows)
     for row in rows:
         test_id = row.test_id
         if row.row != places[test_id][0]:
             continue
-        problems = _row_faults(root, row, patterns, measured) + _date_faults(row, order)
+        problems = _row_faults(root, row, patterns, measured, recorded) + _date_faults(row, order)
         if len(places[test_id]) > 1:
             problems.append(_duplicate(test_id, places[test_id]))
         path, choice = _export_of(row)
@@ -172,7 +194,9 @@ def _export_of(row: TestRow) -> tuple[str, str]:
     return str(_relative(path) or path) if path else "", choice
 
 
-def _row_faults(root: Path, row: TestRow, patterns: Mapping[str, Pattern], measured: bool) -> list[Problem]:
+def _row_faults(
+    root: Path, row: TestRow, patterns: Mapping[str, Pattern], measured: bool, recorded: bool
+) -> list[Problem]:
     if row.fault is not None:
         return [row.fault]
     problems = []
@@ -180,7 +204,10 @@ def _row_faults(root: Path, row: TestRow, patterns: Mapping[str, Pattern], measu
         problems.append(Problem("no_test_id", "test_id is missing", TESTS, row.row, "test_id"))
     problems += _sample_faults(row, patterns)
     problems += number_faults(row, TESTS) + _zero_faults(row)
-    problems += load_faults(row, TESTS, load_in_export=measured and bool(_export_of(row)[1]))
+    problems += stated_faults(row, TESTS)
+    problems += load_faults(row, TESTS, load_in_export=measured and (recorded or bool(_export_of(row)[1])))
+    if has_forces(row):
+        return [*problems, *force_faults(row, TESTS)]
     problems += [p for p in _file_faults(root, row) if measured or p.kind != "missing"]
     return problems
 
@@ -218,14 +245,14 @@ def _date_faults(row: TestRow, order: str) -> list[Problem]:
 
 
 def _file_faults(root: Path, row: TestRow) -> list[Problem]:
-    name = row.cells["file"]
+    name = row.cells.get("file", "")
     place = (TESTS, row.row, "file", name)
     path = _relative(name)
     try:
         if path is None or leads_out(root, root / path):
             what = "the path leads outside the campaign"
             return [Problem("path_outside_campaign", what, *place, "a path inside the campaign folder")]
-        if (root / path).is_file():
+        if (root / path).is_file() or _is_in_a_zip(root, path):
             return []
         if (root / path).exists() and name:
             return [Problem("not_a_file", "not a regular file", *place, "a file of the campaign")]
@@ -239,6 +266,11 @@ def _file_faults(root: Path, row: TestRow) -> list[Problem]:
     return [Problem("missing", "this file does not exist" if name else "no file is given", *place, hint)]
 
 
+def _is_in_a_zip(root: Path, path: PurePosixPath) -> bool:
+    """Whether a part of a path is a .zip of the campaign: the rest is an entry of it, which its reader looks for."""
+    return any(parent.suffix.lower() == ".zip" and (root / parent).is_file() for parent in path.parents)
+
+
 def _relative(name: str) -> PurePosixPath | None:
     """A path inside the campaign, "/" between its parts, a choice such as "#2" dropped; None if it leaves it."""
     path = PurePosixPath(split_choice(name)[0].replace("\\", "/"))
@@ -247,13 +279,15 @@ def _relative(name: str) -> PurePosixPath | None:
     return path
 
 
-def _test(row: TestRow, described: CampaignFile, order: str) -> Test:
+def _test(row: TestRow, described: CampaignFile, order: str, area_m2: float) -> Test:
     """A row without faults as a Test. N = normal_load_N, or (mass + slider mass) g; NaN where the export tells it."""
     cells = row.cells
     numbers = {column: number(row, column) for column in NUMBERS}
     counts = {c: None if (v := number(row, c)) is None else int(v) for c in COUNTS}
     speed = numbers["speed_mm_s"] if numbers["speed_mm_s"] is not None else described.campaign.pull_speed_mm_s
     load = numbers["normal_load_N"]
+    if load is None and numbers["normal_stress_Pa"] is not None:
+        load = numbers["normal_stress_Pa"] * area_m2
     if load is None and numbers["mass_g"] is None:
         load = math.nan
     if load is None:
@@ -278,6 +312,8 @@ def _test(row: TestRow, described: CampaignFile, order: str) -> Test:
         operator=cells.get("operator", ""),
         covariates={name: cell for name, cell in cells.items() if name and name not in KNOWN},
         row=row.row,
+        correction=correction_of(numbers, described.campaign, None if speed is None else speed * _MM),
+        evaluated=evaluated_forces(row, load),
         zero=zero_choice(cells.get("zero") or described.campaign.zero),
         load_zero=zero_choice(cells.get("load_zero") or described.campaign.load_zero),
         stiffness_N_per_m=numbers["stiffness_N_per_m"] or described.instrument.stiffness_N_per_m,

@@ -70,13 +70,18 @@ def _outside(column: str, value: float) -> str:
 def load_faults(row: TestRow, file: str, load_in_export: bool) -> list[Problem]:
     """normal_load_N must be positive; a sled may carry no mass of its own, but none may be negative.
 
-    A row that names a table or pulls within its export may leave the load to the normal force recorded there.
+    With ``load_in_export`` the load may be left to the normal force recorded there.
     """
     at, loads = (file, row.row), _loads(row)
     if not loads and not any(row.cells.get(column) for column in LOADS):
         if load_in_export:
             return []
-        return [Problem("no_load", "the load is missing", *at, " or ".join(LOADS), None, "mass_g or normal_load_N")]
+        allowed = "mass_g, normal_load_N or normal_stress_Pa"
+        return [Problem("no_load", "the load is missing", *at, " or ".join(LOADS[:2]), None, allowed)]
+    stress = loads.get("normal_stress_Pa")
+    if stress is not None and stress <= 0:
+        found, what = row.cells["normal_stress_Pa"], "a load must be positive"
+        return [Problem("load_not_positive", what, *at, "normal_stress_Pa", found, "more than 0 Pa")]
     load = loads.get("normal_load_N")
     if load is not None and load <= 0:
         found, what = row.cells["normal_load_N"], "a load must be positive"

@@ -15,10 +15,14 @@ from tribo.input_files import read_input
 from tribo.limits import LARGEST_TABLE_BYTES, LONGEST_CELL, MOST_COLUMNS, MOST_TABLE_ROWS
 
 REQUIRED = ("test_id", "file", "sample")
-LOADS = ("mass_g", "normal_load_N")
+LOADS = ("mass_g", "normal_load_N", "normal_stress_Pa")
 NUMBERS = (
-    "mass_g", "normal_load_N", "speed_mm_s", "hold_s", "temperature_C", "humidity_pct", "stiffness_N_per_m",
+    "mass_g", "normal_load_N", "normal_stress_Pa", "speed_mm_s", "hold_s", "temperature_C", "humidity_pct",
+    "stiffness_N_per_m",
+    "sign", "gain", "lever_arm_mm", "sampling_rate_Hz", "static_N", "static_u_N", "sliding_N", "sliding_u_N",
+    "static_mu", "static_mu_u", "sliding_mu", "sliding_mu_u", "coefficient", "coefficient_u",
 )  # fmt: skip
+EVALUATED = ("static_N", "sliding_N", "static_mu", "sliding_mu", "coefficient")
 COUNTS = ("repeat", "run_order", "specimen_run")
 TEXTS = ("specimen", "direction", "started_at", "operator", "exclude")
 ZEROS = ("zero", "load_zero")
@@ -170,9 +174,10 @@ def _header_faults(names: list[str], file: str, row: int) -> list[Problem]:
     unknown = [n for n in names if n not in KNOWN]
     for name in sorted({n for n in names if n and names.count(n) > 1}):
         problems.append(Problem("duplicate_column", "this column occurs twice", file, row, name))
-    wanted = [*(n for n in REQUIRED if n not in names)]
+    forces = any(n in names for n in EVALUATED)  # then no row needs an export
+    wanted = [n for n in REQUIRED if n not in names and not (forces and n == "file")]
     if not any(n in names for n in LOADS):
-        wanted.append(" or ".join(LOADS))
+        wanted.append(" or ".join(LOADS[:2]))
     for name in wanted:
         near = difflib.get_close_matches(name.split(" or ")[0], unknown, 1)
         found = f"{near[0]} (did you mean {name}?)" if near else ", ".join(names)

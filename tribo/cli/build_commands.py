@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tribo.cli.console import DONE, SOME_SET_ASIDE, Console, command_options
+from tribo.cli.given_paths import GivenPath
 from tribo.cli.output import FOLDER, FORCE
 
 if TYPE_CHECKING:
     from tribo.pipeline.build import Built
 
-DROP = click.argument("drop", type=click.Path(exists=True, file_okay=False, path_type=Path))
+DROP = click.argument("drop", type=GivenPath(file_okay=False))
 SITE = click.option("-o", "--site", type=FOLDER, required=True, help="Folder of the site.")
 KEEP = click.option(
     "--keep", type=click.IntRange(min=1), default=10, show_default=True, help="Number of dated builds to keep."

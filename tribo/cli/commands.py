@@ -11,33 +11,31 @@ import click
 from tribo import __version__
 from tribo.cli.build_commands import build, schedule
 from tribo.cli.console import Console, command_options, set_aside_record, status_of
+from tribo.cli.discover_command import discover
+from tribo.cli.given_paths import GivenPath
+from tribo.cli.init_command import init
 from tribo.cli.output import Output, output_options
+from tribo.cli.reading_options import corrected, reading_options, with_reading_options
+from tribo.cli.run_record import command_line, now, provenance_of_run
 from tribo.cli.simulate_command import simulate
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
     from tribo.diagnose.verdict import Verdict
-    from tribo.records import Campaign, Study
-    from tribo.report import Provenance
+    from tribo.records import Study
     from tribo.stages import Progress, StudyOptions, Until
 
-CAMPAIGN = click.argument("campaign", type=click.Path(exists=True, path_type=Path))
+CAMPAIGN = click.argument("campaign", type=GivenPath())
 OUT = output_options()
 SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler; its workers run the simulations.")
 DRY_RUN = click.option("--dry-run", is_flag=True, help="List the steps without running them.")
 
 
-COLUMNS = click.option(
-    "--columns",
-    default="",
-    help="Column of each quantity: QUANTITY=NAME [UNIT],... as in the [columns] table of campaign.toml. "
-    "#3 means the third column.",
-)
-
 FLAT = click.option(
     "--flat", default="", metavar="SAMPLE",
     help="Flat sample on which the model is calibrated. [default: F, or the only flat sample]",
 )  # fmt: skip
+
 
 def _a_zero(context: click.Context, parameter: click.Parameter, given: str) -> str:
     """The text of a zero as given, checked.
@@ -67,14 +65,20 @@ ZEROS = (
 
 OVERRIDES = click.option(
     "--overrides",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=GivenPath(dir_okay=False),
     help="overrides.csv as saved from the report page: pulls excluded by hand, static peaks and windows moved by hand.",
 )
 
 
+NO_MODEL = click.option(
+    "--no-model", is_flag=True,
+    help="Report without the spring-block model: friction, its laws and what it varies with.",
+)  # fmt: skip
+
+
 def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
-        COLUMNS,
+        reading_options,
         *ZEROS,
         OVERRIDES,
         click.option(
@@ -96,6 +100,7 @@ def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
 def _model_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         FLAT,
+        NO_MODEL,
         click.option("--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulations per load."),
         SCHEDULER,
     ):
@@ -116,24 +121,10 @@ def main() -> None:
 
 
 main.add_command(build)
+main.add_command(init)
 main.add_command(schedule)
 main.add_command(simulate)
-
-
-@main.command()
-@click.argument("folder", type=click.Path(path_type=Path))
-@command_options
-def init(console: Console, folder: Path, **_: Any) -> None:
-    """Create a campaign template in FOLDER.
-
-    Fill in campaign.toml and tests.csv, and copy the exports of the testing machine into raw/.
-    """
-    from tribo.campaign import write_template
-
-    write_template(folder)
-    console.result(
-        {"folder": str(folder)}, f"{folder}: fill in campaign.toml and tests.csv, and copy the exports into raw/"
-    )
+main.add_command(discover)
 
 
 @main.command()
@@ -185,13 +176,15 @@ def predict(console: Console, campaign: Path, out: Output, only: str, columns: s
     from tribo import stages
     from tribo.campaign import open_campaign
 
+    stated = options.pop("stated")
     chosen = stages.StudyOptions(kept=out.kept, **options)
     with (
         out.taken(campaign, shared=True),
         open_campaign(campaign) as described,
         console.progress() as progress,
     ):
-        ingested = stages.study(_with_columns(described, columns), chosen, until="ingest", progress=progress).ingested
+        stated_so = with_reading_options(described, columns, stated)
+        ingested = stages.study(stated_so, chosen, until="ingest", progress=progress).ingested
         cells = stages.simulate_cells(ingested, stages.fit(ingested, weights=chosen.weights), chosen, only, progress)
     names = [cell.name for cell in cells]
     console.result(
@@ -217,20 +210,26 @@ def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **opti
 
 
 @main.command()
-@click.argument("campaign", required=False, type=click.Path(exists=True, path_type=Path))
+@click.argument("campaign", required=False, type=GivenPath())
 @OUT
 @click.option("--published", type=click.Choice(["berardo2019"]), help="Diagnose a published table instead of CAMPAIGN.")
 @click.option(
     "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
 )
 @FLAT
-@COLUMNS
+@reading_options
 @ZEROS[0]
 @ZEROS[1]
 @OVERRIDES
 @command_options
 def diagnose(
-    console: Console, campaign: Path | None, out: Output, published: str | None, columns: str, **options: Any
+    console: Console,
+    campaign: Path | None,
+    out: Output,
+    published: str | None,
+    columns: str,
+    stated: dict[str, float],
+    **options: Any,
 ) -> int:
     """Find where the model fails, and the likely cause.
 
@@ -250,10 +249,10 @@ def diagnose(
 
     with out.taken(campaign), open_campaign(campaign) as opened, console.progress() as progress:
         chosen = stages.StudyOptions(kept=out.kept, **options)
-        study = stages.study(_with_columns(opened, columns), chosen, until="ingest", progress=progress)
+        study = stages.study(with_reading_options(opened, columns, stated), chosen, until="ingest", progress=progress)
         found = _diagnosis(study, chosen, progress)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
-        write_until(study, out.path, "ingest", drawing, _provenance(study, campaign, chosen), found)
+        write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found)
     verdict = found.verdict
     console.result(verdict.as_dict(), verdict_text(verdict))
     console.list_tests("set aside", study.ingested.set_aside, level=-1)
@@ -271,7 +270,7 @@ def _diagnose_published(console: Console, out: Output, seed: int) -> int:
     folder, tables = data_dir() / BERARDO2019, ("table2.csv", "table2_tribo.csv")
     with out.taken(folder), console.progress() as progress:
         found = diagnose_published(load_table2(), load_table2_simulated_anew(), seed=seed, progress=progress)
-        write_published(found, out.path, provenance_of_table(folder, tables, _command_line(), seed, _now()))
+        write_published(found, out.path, provenance_of_table(folder, tables, command_line(), seed, now()))
     console.result(found.verdict.as_dict(), verdict_text(found.verdict))
     return 0
 
@@ -293,9 +292,9 @@ def report(console: Console, campaign: Path, out: Output, dry_run: bool, **optio
 
 
 @main.command()
-@click.argument("out", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.argument("out", type=GivenPath(file_okay=False))
 @click.option(
-    "--campaign", type=click.Path(exists=True, path_type=Path), help="The campaign, if it has been moved since."
+    "--campaign", type=GivenPath(), help="The campaign, if it has been moved since."
 )
 @command_options
 def verify(console: Console, out: Path, campaign: Path | None, **_: Any) -> int:
@@ -347,19 +346,20 @@ def demo(console: Console, out: Output, **options: Any) -> int:
 
 
 @main.command()
-@click.argument("files", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@COLUMNS
+@click.argument("files", nargs=-1, required=True, type=GivenPath(dir_okay=False))
+@reading_options
 @command_options
-def inspect(console: Console, files: tuple[Path, ...], columns: str, **_: Any) -> int:
+def inspect(console: Console, files: tuple[Path, ...], columns: str, stated: dict[str, float], **_: Any) -> int:
     """Show how an export file is read.
 
     Lists its format, encoding, columns, units, time base and pulls, and anything doubtful.
     """
     from tribo.ingestion.exports import inspect_file
     from tribo.readers import columns_from_text
+    from tribo.records import UNCORRECTED
 
     given = columns_from_text(columns) if columns else None
-    found = [inspect_file(file, given) for file in files]
+    found = [inspect_file(file, given, corrected(UNCORRECTED, stated)) for file in files]
     console.result({"files": [f.record() for f in found]}, "\n\n".join(f.in_words() for f in found))
     return 1 if all(f.refused for f in found) else 0
 
@@ -367,7 +367,7 @@ def inspect(console: Console, files: tuple[Path, ...], columns: str, **_: Any) -
 @main.command()
 @click.option(
     "--campaign",
-    type=click.Path(exists=True, path_type=Path),
+    type=GivenPath(),
     help="Campaign whose exports are read.  [default: the bundled example]",
 )
 @click.option("--large", is_flag=True, help="Also time a lattice of 1000 x 1000 blocks; takes several minutes.")
@@ -410,43 +410,23 @@ def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool
     from tribo.report.drawings import Drawing
     from tribo.store.kept_results import Shelf
 
+    stated = options.pop("stated")
     chosen = stages.StudyOptions(kept=out.kept, **options)
     if dry_run:
         out.check(path)
         with open_campaign(path) as described:
-            planned = stages.plan(_with_columns(described, columns), chosen, until)
+            planned = stages.plan(with_reading_options(described, columns, stated), chosen, until)
             console.result(planned, _plan_text(planned, out.path))
             return status_of(described.set_aside)
     with out.taken(path), open_campaign(path) as described, console.progress() as progress:
-        study = stages.study(_with_columns(described, columns), chosen, until=until, progress=progress)
-        study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
+        study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
+        compared = until == "report" and study.comparison is not None
+        study, found = _diagnosed(study, chosen, progress) if compared else (study, None)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
-        write_until(study, out.path, until, drawing, _provenance(study, path, chosen), found)
+        write_until(study, out.path, until, drawing, provenance_of_run(study, path, chosen), found)
     return _conclude(console, study, out.path, found.verdict if found else None)
 
 
-def _provenance(study: Study, campaign: Path, chosen: StudyOptions) -> Provenance:
-    """Provenance of a study run by this command."""
-    from tribo.report import gather_provenance
-
-    return gather_provenance(
-        study,
-        command=_command_line(),
-        seed=chosen.seed,
-        started_at=_now(),
-        options={**chosen.as_words(), "flat": study.ingested.campaign.flat_sample},
-        campaign=campaign,
-        overrides=chosen.overrides,
-    )
-
-
-def _with_columns(campaign: Campaign, columns: str) -> Campaign:
-    """The campaign with the columns of the command line added to, or replacing, its own."""
-    from dataclasses import replace
-
-    from tribo.readers import columns_from_text
-
-    return replace(campaign, columns={**campaign.columns, **columns_from_text(columns)}) if columns else campaign
 
 
 def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[Study, Diagnosis | None]:
@@ -508,20 +488,3 @@ def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None
 def _plan_text(planned: dict[str, Any], out: Path) -> str:
     lines = [f"would {step}" for step in planned["steps"]]
     return "\n".join([*lines, f"would write into {out}", *(f"set aside: {s}" for s in planned["set_aside"])])
-
-
-def _command_line() -> str:
-    import shlex
-    import sys
-
-    return shlex.join(["tribo", *sys.argv[1:]])
-
-
-def _now() -> str:
-    """The time of this run, or that of SOURCE_DATE_EPOCH (reproducible-builds.org) where it is set."""
-    import os
-    from datetime import UTC, datetime
-
-    fixed = os.environ.get("SOURCE_DATE_EPOCH")
-    now = datetime.fromtimestamp(int(fixed), UTC) if fixed else datetime.now(UTC)
-    return now.isoformat(timespec="seconds")

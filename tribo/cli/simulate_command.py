@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tribo.cli.console import Console, command_options
+from tribo.cli.given_paths import GivenPath
 from tribo.cli.output import FORCE, WAIT
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def _described(command: Any) -> Any:
 @_described
 @click.option(
     "--design",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=GivenPath(dir_okay=False),
     help="TOML or JSON file that describes the runs: samples, pressures_kPa, angles_deg, repeats, seed, "
     "[parameters], [patterns.NAME].",
 )

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from tribo.fitting.load_levels import levels_of
 from tribo.records import FloatArray, LawFit, Pattern, Study
 
 LOAD_TOLERANCE = 0.02  # loads closer than this (relative) are repeats of one load
@@ -40,12 +41,4 @@ def fit_of(fits: Iterable[LawFit], sample: str, regime: str) -> LawFit | None:
 
 def load_levels(normal_load_N: FloatArray, tolerance: float = LOAD_TOLERANCE) -> FloatArray:
     """The mean load of the level each load belongs to: loads within ``tolerance`` are one level."""
-    loads = np.asarray(normal_load_N, float)
-    order = np.argsort(loads, kind="stable")
-    ordered = loads[order]
-    new_level = np.diff(ordered) > tolerance * np.abs(ordered[1:])
-    level = np.concatenate([[0], np.cumsum(new_level)]).astype(int)[: len(loads)]
-    means = np.bincount(level, ordered) / np.bincount(level) if len(loads) else ordered
-    levels = np.empty_like(loads)
-    levels[order] = means[level]
-    return levels
+    return levels_of(np.asarray(normal_load_N, float), tolerance)

@@ -24,6 +24,9 @@ def numbers(study: Study) -> pd.DataFrame:
     """mu and tau0 (kPa) of every sample with standard uncertainties, their line in AF, the AF prediction."""
     order = study_lookup.sample_numbers(study)
     simulated = study.comparison.simulated if study.comparison is not None else ()
+    fractions = {study.ingested.campaign.area_fraction(s) for s in order if s in study.ingested.campaign.samples}
+    if study.comparison is None and (len(fractions) < 2 or not study.ingested.campaign.has_area):
+        return pd.DataFrame(columns=COLUMNS)
     frames = []
     for regime in REGIMES:
         for parameter in PARAMETERS:

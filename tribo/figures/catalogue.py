@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tribo.comparison import agreement
+from tribo.comparison import agreement, friction_tables
 from tribo.figures import (
     area,
     detectable,
     evidence,
     extended,
     force,
+    friction_panels,
     measured_over_simulated,
     misfit,
     normalised_pulls,
@@ -88,6 +89,44 @@ FIGURES: dict[str, StudyFigure] = {
             "model by the force at a load, not by μ or τ₀ alone.",
             area.numbers,
             area.draw,
+        ),
+    )
+}
+
+# of a study made without the spring-block model
+FRICTION_FIGURES: dict[str, StudyFigure] = {
+    figure.name: figure
+    for figure in (
+        StudyFigure(
+            "dependence",
+            "T/N against recorded variables",
+            "T/N of every test against each recorded variable that varies, with the standard uncertainty of the "
+            "reading. Variables that vary together cannot be separated by looking at one panel.",
+            friction_tables.dependence_points,
+            friction_panels.draw_dependence,
+        ),
+        StudyFigure(
+            "records",
+            "T/N along each record",
+            "T/N against the distance slid, or against time where no speed is known: means of equal parts of each "
+            "record, zero subtracted. Running-in shows as a change along the record.",
+            friction_tables.within_records,
+            friction_panels.draw_records,
+        ),
+        StudyFigure(
+            "oscillations",
+            "Stick-slip and oscillation",
+            "Force lost in a slip over the normal load, and period, of every test whose sliding force oscillates: "
+            "medians over its cycles with standard uncertainties.",
+            friction_tables.oscillation_points,
+            friction_panels.draw_oscillations,
+        ),
+        StudyFigure(
+            "restarts",
+            "Static friction against the time of the hold",
+            "Peak after each stop of the drive over the normal load, against the time the drive stood still.",
+            friction_tables.restart_points,
+            friction_panels.draw_restarts,
         ),
     )
 }

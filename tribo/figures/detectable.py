@@ -86,6 +86,9 @@ def _sizes(ax: Axes, rows: pd.DataFrame) -> None:
     ax.set_yticks(places, [str(n).replace("_", " ") for n in rows["name"]])
     ax.set_ylim(len(rows) - 0.4, -0.6)
     ax.tick_params(axis="y", length=0)
+    if rows.empty:
+        style.panel_title(ax, "Detectable effects", "none that this design can test")
+        return
     ax.set_xscale("log")
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.xaxis.set_minor_locator(NullLocator())

@@ -29,7 +29,7 @@ CURVE_POINTS = 80
 def numbers(study: Study) -> pd.DataFrame:
     """Mean T/N and its standard deviation of the mean at each pressure (kPa), and the fitted curves."""
     table = study.ingested.table()
-    if table.empty:
+    if table.empty or not study.ingested.campaign.has_area:
         return pd.DataFrame(columns=COLUMNS)
     frames = []
     for sample, number in study_lookup.sample_numbers(study).items():

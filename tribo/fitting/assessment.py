@@ -10,6 +10,8 @@ import pandas as pd
 
 from tribo.errors import FitError
 from tribo.fitting.budget import campaign_budgets
+from tribo.fitting.dependence import dependence
+from tribo.fitting.law_choice import compared_laws
 from tribo.fitting.mixed import mixed_model
 from tribo.fitting.outlying import outlying_pulls, outlying_specimens
 from tribo.fitting.paired import differences_table, paired_differences
@@ -23,12 +25,15 @@ from tribo.records import REGIMES, Ingested, LawFit
 def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> dict[str, Any]:
     """The results that complete the fits of a study, by the name of their field in ``Study``."""
     table, area = ingested.table(), ingested.campaign.nominal_area_m2
-    budgets = campaign_budgets(ingested, fits, weights=weights)
+    has_area = ingested.campaign.has_area  # budget and power are stated at a pressure
+    budgets = campaign_budgets(ingested, fits, weights=weights) if fits and has_area else ()
     parts = [b.table().assign(sample=b.fit.sample, regime=b.fit.regime) for b in budgets]
     power: list[str] = []
     outlying: list[str] = []
     for regime in REGIMES:
         with suppress(FitError):
+            if not has_area:
+                break
             power += [p.text() for p in power_of_campaign(table, regime, area, weights=weights)]
         for look in (outlying_pulls, outlying_specimens):
             with suppress(FitError):
@@ -38,6 +43,8 @@ def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> di
         "budget": pd.concat(parts, ignore_index=True) if parts else None,
         "power": tuple(power),
         "outlying": tuple(outlying),
+        "laws": compared_laws(table),
+        "dependence": dependence(ingested),
         "differences": differences_table(paired) if (paired := paired_differences(fits)) else None,
     }
 

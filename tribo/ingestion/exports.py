@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.campaign.choice import is_chosen, names_pulls, split_choice
+from tribo.campaign.stated import Columns, columns_of
 from tribo.errors import Problem, TraceError, TriboError, unexpected
 from tribo.forked import each, may_fork
+from tribo.ingestion.evaluated import evaluated_pull
 from tribo.input_files import hashes_of_reads
 from tribo.limits import LARGEST_LOAD_N, SMALLEST_LOAD_N
-from tribo.records import Campaign, Pull, SetAside, Test, Trace
+from tribo.records import Campaign, Correction, Pull, SetAside, Test, Trace
 
 if TYPE_CHECKING:
     from tribo.readers import Inspection
@@ -27,7 +29,8 @@ _OFF_LOAD = 0.02  # share by which the recorded load may differ from that of the
 _OFF_SPEED = 0.2  # share by which the travel while sliding may differ from the speed of the test times the time
 _UNLOADED = 0.05  # share of the largest load of an export below which a piece of it carries none
 
-Outcome = tuple[Trace, Pull] | SetAside
+Outcome = tuple[Trace | None, Pull] | SetAside
+ColumnsFor = Callable[[str], Columns]  # the columns stated for an export, by its path in the campaign
 Outcomes = tuple[tuple[Test, Outcome], ...]
 
 
@@ -39,20 +42,23 @@ class RowRead:
     hashes: Mapping[str, str]
 
 
-def read_hashed(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> RowRead:
+def read_hashed(root: Path, columns: ColumnsFor, rule: str, test: Test) -> RowRead:
     """:func:`read_row` with the hashes of the bytes that were read, by their path in the campaign."""
     with hashes_of_reads() as found:
         outcomes = read_row(root, columns, rule, test)
     return RowRead(outcomes, {Path(p).relative_to(root).as_posix(): digest for p, digest in found.items()})
 
 
-def read_row(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> Outcomes:
+def read_row(root: Path, columns: ColumnsFor, rule: str, test: Test) -> Outcomes:
     """The tests of a row of tests.csv: usually one, or one per pull if the row selects pulls of its export.
 
     ``PATH#2/3`` is the third pull of the second table, ``PATH#2/*`` every pull of it, ``PATH#*`` every pull of every
     table; if a row selects several, each becomes a separate test called ``ID#2/3``. A row without a load uses
     the normal force recorded in the export.
     """
+    given = evaluated_pull(test)
+    if given is not None:
+        return ((test, (None, given)),)
     try:
         if names_pulls(split_choice(test.file)[1]):
             return _chosen_pulls(root, columns, rule, test)
@@ -63,15 +69,15 @@ def read_row(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> O
         return ((test, _set_aside(test, [unexpected(why, "this export cannot be evaluated", test.file)])),)
 
 
-def inspect_file(path: Path, columns: Mapping[str, str] | None = None) -> Inspection:
+def inspect_file(path: Path, columns: Columns | None = None, correction: Correction | None = None) -> Inspection:
     """Description of an export with its pulls, each by the text that selects it in tests.csv."""
     from tribo.readers import inspect_export, read_blocks
 
-    seen = inspect_export(path, columns=columns)
+    seen = inspect_export(path, columns=columns, correction=correction)
     if seen.refused or any(doubt.kind == "only_beginning" for doubt in seen.doubts):
         return seen
     try:
-        return replace(seen, pulls=_pulls_in_words(read_blocks(path, columns=columns)))
+        return replace(seen, pulls=_pulls_in_words(read_blocks(path, columns=columns, correction=correction)))
     except TriboError:
         return seen
 
@@ -97,19 +103,28 @@ def _set_aside(test: Test, found: Sequence[Problem]) -> SetAside:
     return SetAside(test.test_id, "; ".join(str(p) for p in problems), problems)
 
 
-def _whole(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> tuple[Test, Outcome]:
+def _whole(root: Path, columns: ColumnsFor, rule: str, test: Test) -> tuple[Test, Outcome]:
     """An export, or one table of it, as one pull."""
     from tribo.readers import read_export
     from tribo.traces import read_record
 
-    trace = read_export(root / test.file, columns=columns or None, name=test.test_id, file=test.file)
-    pull = read_record(trace, rule=rule, test=test)
+    trace = read_export(
+        root / test.file, columns=columns(test.file), correction=test.correction, name=test.test_id, file=test.file
+    )
+    pull = _without_rates(trace, read_record(trace, rule=rule, test=test))
     test = _with_load(test, pull.recorded_load_N)
     doubts = [d for d in (_several_pulls(trace), _off_speed(trace, pull, test), _other_load(pull, test)) if d]
     if doubts:
         flags, problems = (*trace.flags, *(d.kind for d in doubts)), (*trace.problems, *doubts)
         trace = replace(trace, flags=flags, problems=problems)
     return test, (trace, replace(pull, flags=tuple(dict.fromkeys((*trace.flags, *pull.flags)))))
+
+
+def _without_rates(trace: Trace, pull: Pull) -> Pull:
+    """The pull without what is counted per second, where path stands for time in its trace."""
+    if "no_time" not in trace.flags:
+        return pull
+    return replace(pull, rise_N_per_s=math.nan, stick_slip_period_s=math.nan, drift_N_per_s=math.nan)
 
 
 def _several_pulls(trace: Trace) -> Problem | None:
@@ -174,14 +189,16 @@ def _with_load(test: Test, load: float) -> Test:
     return replace(test, normal_load_N=load)
 
 
-def _chosen_pulls(root: Path, columns: Mapping[str, str], rule: str, test: Test) -> tuple[tuple[Test, Outcome], ...]:
+def _chosen_pulls(root: Path, columns: ColumnsFor, rule: str, test: Test) -> tuple[tuple[Test, Outcome], ...]:
     """Every pull that the choice of a test means, as a test of its own; all strokes of an export share one zero."""
     from tribo.readers import read_blocks
     from tribo.traces import orient_strokes, split_pulls
     from tribo.traces.strokes import read_pieces
 
     export, choice = split_choice(test.file)
-    tables = read_blocks(root / export, columns=columns or None, name=test.test_id, file=test.file)
+    tables = read_blocks(
+        root / export, columns=columns(test.file), correction=test.correction, name=test.test_id, file=test.file
+    )
     pieces = {f"{t}/{p}": piece for t, table in enumerate(tables, 1) for p, piece in enumerate(split_pulls(table), 1)}
     strokes = orient_strokes(list(pieces.values()))
     loaded = dict(zip(pieces, _carry_load(strokes.traces), strict=True))
@@ -213,6 +230,7 @@ def _one_of_several(test: Test, piece: Trace, zero_N: float, pull: Pull | TraceE
         return test, _set_aside(test, why.problems)
     trace = replace(piece, name=test.test_id, file=test.file, force_N=piece.force_N + zero_N)
     flags = tuple(dict.fromkeys((*trace.flags, *pull.flags)))
+    pull = _without_rates(trace, pull)
     return test, (trace, replace(pull, test_id=test.test_id, zero_N=zero_N or pull.zero_N, flags=flags))
 
 
@@ -224,6 +242,7 @@ def _with_note(found: tuple[tuple[Test, Outcome], ...], left_out: Sequence[str])
     test, outcome = found[first]
     assert not isinstance(outcome, SetAside)
     trace, pull = outcome
+    assert trace is not None
     doubt = Problem("unloaded", f"parts without normal load left out: {', '.join(left_out)}", test.file)
     trace = replace(trace, problems=(*trace.problems, doubt))
     return *found[:first], (test, (trace, pull)), *found[first + 1 :]
@@ -231,7 +250,8 @@ def _with_note(found: tuple[tuple[Test, Outcome], ...], left_out: Sequence[str])
 
 def read_all(campaign: Campaign, rule: str, jobs: int = 1) -> Iterator[RowRead]:
     """The tests of every row with their outcomes, in the order of the campaign."""
-    read = partial(read_hashed, campaign.root, dict(campaign.columns), rule)
+    columns = partial(columns_of, general=campaign.columns, by_file=campaign.columns_by_file)
+    read = partial(read_hashed, campaign.root, columns, rule)
     if jobs == 1 or len(campaign.tests) < FEWEST_FOR_PROCESSES or not may_fork():
         yield from map(read, campaign.tests)
         return

@@ -34,7 +34,9 @@ def ingest_campaign(campaign: Campaign, rule: str, jobs: int, progress: Progress
             if isinstance(outcome, SetAside):
                 set_aside.append(outcome)
             else:
-                traces[test.test_id], pulls[test.test_id] = outcome
+                trace, pulls[test.test_id] = outcome
+                if trace is not None:
+                    traces[test.test_id] = trace
         progress("reading exports", done, len(campaign.tests))
     ids = {test.test_id for test in tests} | {fault.test_id for fault in set_aside}
     for test_id, problem in under_the_wrong_test(traces, ids).items():

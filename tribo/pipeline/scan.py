@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from tribo.errors import CampaignError, Problem, system_problem
+from tribo.errors import CampaignError, Problem, naming, system_problem
 from tribo.escaping import is_control, well_formed
 from tribo.limits import LONGEST_NAME
 from tribo.links import LEADS_OUT, leads_out, paths_below
@@ -170,7 +170,7 @@ def _not_whole(file: Path, settle_s: float) -> str:
 def _hashed(file: Path) -> tuple[str, bool]:
     """SHA-256 of a file, and whether the file changed meanwhile."""
     digest = hashlib.sha256()
-    with file.open("rb") as stream:
+    with naming(file), file.open("rb") as stream:
         before = os.fstat(stream.fileno())
         while chunk := stream.read(_CHUNK):
             digest.update(chunk)

@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from tribo.errors import naming
+
 OF_A_REPORT = ("status", "digest", "problems", "finished")
 _TYPES: dict[str, type | tuple[type, ...]] = {
     "status": str, "digest": str, "finished": str, "files": dict, "problems": list, "samples": list, "cells": list,
@@ -13,10 +15,17 @@ _TYPES: dict[str, type | tuple[type, ...]] = {
 
 
 def read_record(path: Path, *keys: str) -> dict[str, Any] | None:
-    """The record of a finished step; None where there is none, or a damaged one that lacks any of ``keys``."""
+    """The record of a finished step; None where there is none, or a damaged one that lacks any of ``keys``.
+
+    Raises
+    ------
+    OSError
+        It is there and cannot be read.
+    """
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        with naming(path):
+            record = json.loads(path.read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
         return None
     whole = isinstance(record, dict) and all(isinstance(record.get(key), _TYPES[key]) for key in keys)
     return record if whole else None

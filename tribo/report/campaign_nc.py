@@ -15,7 +15,7 @@ import xarray as xr
 from tribo.records import Study, Trace
 from tribo.report import result_tables
 from tribo.report.provenance import Provenance
-from tribo.store.whole_files import whole_file
+from tribo.store.hdf5_files import whole_hdf5
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
@@ -94,8 +94,8 @@ def write_store(
     if keep_earlier:
         renewed = OF_DIAGNOSIS if diagnosis is not None else ()
         groups = {name: group for name, group in _earlier(path).items() if name not in renewed} | groups
-    with whole_file(path) as part:
-        xr.DataTree.from_dict(groups).to_netcdf(part, engine="h5netcdf")
+    with whole_hdf5(path) as file:
+        xr.DataTree.from_dict(groups).to_netcdf(file, engine="h5netcdf")
     return path
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from tribo import __version__
 from tribo.comparison import findings, study_lookup
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
-from tribo.records import REGIMES, Regime, Study
+from tribo.records import REGIMES, Campaign, Regime, Study
 from tribo.report.html.pull_cards import pull_cards
 from tribo.report.provenance import Provenance
 from tribo.report.result_tables import all_set_aside
@@ -18,6 +18,7 @@ from tribo.report.tribosystem import conditions
 from tribo.report.uncertainty import budget_origins, budget_tables, paired_sentences
 from tribo.report.verdict_file import verdict_in_words
 from tribo.report.words import wording
+from tribo.report.words.friction_words import friction_sentences
 from tribo.report.words.terminal_text import fit_cells
 
 LEAD_FIGURE = "agreement"
@@ -44,6 +45,9 @@ def content(study: Study, provenance: Provenance | None, verdict: Mapping[str, A
         "campaign": study.ingested.campaign,
         "verdict": verdict_in_words(verdict) if verdict is not None else None,
         "summary": _summary(study),
+        "friction": friction_sentences(study),
+        "has_area": study.ingested.campaign.has_area,
+        "about": about(study.ingested.campaign),
         "table2": _table2(study),
         "paired": paired_sentences(study),
         "budget": budget_tables(study),
@@ -58,6 +62,16 @@ def content(study: Study, provenance: Provenance | None, verdict: Mapping[str, A
         "provenance": provenance.in_words() if provenance is not None else None,
         "version": __version__,
     }
+
+
+def about(campaign: Campaign) -> str:
+    """The bodies, the nominal area and the speed, in one line."""
+    parts = [f"{campaign.material or 'sample'} on {campaign.counterface or 'counterface'}"]
+    if campaign.has_area:
+        parts.append(f"nominal area {campaign.nominal_area_m2 * 1e6:g} mm²")
+    if campaign.pull_speed_m_s:
+        parts.append(f"pulled at {campaign.pull_speed_m_s * 1e3:g} mm/s")
+    return ", ".join(parts)
 
 
 def figure_places(names: list[str]) -> dict[str, list[str]]:

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from tribo.errors import Problem, unexpected
 from tribo.escaping import printable
-from tribo.figures.catalogue import DIAGNOSIS_FIGURES, FIGURES
+from tribo.figures.catalogue import DIAGNOSIS_FIGURES, FIGURES, FRICTION_FIGURES
 from tribo.figures.record import FigureOf
 from tribo.figures.style import house_style
 from tribo.forked import each
@@ -119,7 +119,9 @@ Numbers = pd.DataFrame | Problem
 
 
 def _with_numbers(study: Study | None, diagnosis: Diagnosis | None) -> Iterator[tuple[str, Numbers]]:
-    made_of: list[tuple[Mapping[str, FigureOf[Any]], Any]] = [(FIGURES, study), (DIAGNOSIS_FIGURES, diagnosis)]
+    made_of: list[tuple[Mapping[str, FigureOf[Any]], Any]] = [
+        (FIGURES, study), (FRICTION_FIGURES, study), (DIAGNOSIS_FIGURES, diagnosis),
+    ]  # fmt: skip
     for figures, results in made_of:
         for name, figure in figures.items() if results is not None else ():
             try:
@@ -132,7 +134,7 @@ def _with_numbers(study: Study | None, diagnosis: Diagnosis | None) -> Iterator[
 
 
 def _record_of(name: str) -> FigureOf[Any]:
-    return FIGURES[name] if name in FIGURES else DIAGNOSIS_FIGURES[name]
+    return next(table[name] for table in (FIGURES, FRICTION_FIGURES, DIAGNOSIS_FIGURES) if name in table)
 
 
 def _drawn_or_said(origin: str, keep: Keep, todo: tuple[str, Numbers]) -> Drawn:

@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from tribo.errors import naming
 from tribo.escaping import well_formed
 from tribo.links import leads_out, paths_below
 from tribo.records import Study
@@ -136,7 +137,7 @@ def _versions() -> dict[str, str]:
 
 def file_hash(path: Path) -> str:
     """SHA-256 of a file."""
-    with path.open("rb") as stream:
+    with naming(path), path.open("rb") as stream:
         return file_digest(stream, "sha256").hexdigest()
 
 
@@ -164,10 +165,17 @@ def _from(out: Path, place: str) -> str:
 
 
 def read_record(out: Path) -> dict[str, Any] | None:
-    """The contents of provenance.json of a folder; None if there is none, or none of this kind."""
+    """The contents of provenance.json of a folder; None if there is none, or none of this kind.
+
+    Raises
+    ------
+    OSError
+        It is there and cannot be read.
+    """
     try:
-        record = json.loads((out / FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        with naming(out / FILE):
+            record = json.loads((out / FILE).read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
         return None
     return record if isinstance(record, dict) and _is_whole(record) else None
 

@@ -16,6 +16,7 @@ from tribo.store.whole_files import write_text
 
 FLOAT_FORMAT = "%.8g"
 PA_PER_KPA = 1e3
+_PER_AREA = ("tau0_kPa", "tau0_u_kPa", "cov", "tau0_low_kPa", "tau0_high_kPa")
 TESTS_COLUMNS = [
     "test_id", "static_N", "static_u_N", "sliding_N", "sliding_u_N", "rule", "window", "zero_N", "flags",
     "set_aside", "sample", "specimen", "normal_load_N", "peak_s", "onset_s", "window_start_s", "window_end_s",
@@ -33,7 +34,7 @@ RESTARTS_COLUMNS = [
 ]  # fmt: skip
 FITS_COLUMNS = [
     "sample", "regime", "mu", "mu_u", "tau0_kPa", "tau0_u_kPa", "cov", "n_specimens", "n_tests", "method",
-    "chi2_red", "law", "dof", "mu_low", "mu_high", "tau0_low_kPa", "tau0_high_kPa", "notes",
+    "chi2_red", "law", "dof", "mu_low", "mu_high", "tau0_low_kPa", "tau0_high_kPa", "notes", "T0_N", "T0_u_N",
 ]  # fmt: skip
 COMPARISON_COLUMNS = [
     "sample", "regime", "normal_load_N", "measured_N", "measured_u_N", "simulated_N", "simulated_u_N",
@@ -141,7 +142,8 @@ def _fit_row(fit: LawFit) -> dict[str, object]:
     mu, tau0 = fit.parameters.index("mu"), fit.parameters.index("tau0_Pa")
     mu_low, mu_high = fit.interval("mu")
     tau0_low, tau0_high = fit.interval("tau0_Pa")
-    return {
+    area = fit.nominal_area_m2
+    row = {
         "sample": fit.sample,
         "regime": fit.regime,
         "mu": fit.value("mu"),
@@ -160,7 +162,10 @@ def _fit_row(fit: LawFit) -> dict[str, object]:
         "tau0_low_kPa": tau0_low / PA_PER_KPA,
         "tau0_high_kPa": tau0_high / PA_PER_KPA,
         "notes": "; ".join(fit.notes),
+        "T0_N": fit.value("tau0_Pa") * area,
+        "T0_u_N": fit.standard_uncertainty("tau0_Pa") * area,
     }
+    return row if fit.has_area else row | dict.fromkeys(_PER_AREA, float("nan"))
 
 
 def other_fits_table(study: Study) -> pd.DataFrame:
@@ -220,6 +225,10 @@ def write_tables(study: Study, out: Path) -> list[Path]:
     if study.fits:
         tables["fits.csv"] = fits_table(study.fits)
         tables["other_fits.csv"] = other_fits_table(study)
+    if study.laws is not None and not study.laws.empty:
+        tables["laws.csv"] = study.laws
+    if study.dependence is not None and not study.dependence.empty:
+        tables["dependence.csv"] = study.dependence
     if study.budget is not None:
         tables["budget.csv"] = study.budget
     if study.differences is not None:

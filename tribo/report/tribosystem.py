@@ -67,13 +67,22 @@ def _geometry(pattern: Pattern) -> str:
     return f"{shape}, pitch {' × '.join(f'{v:g}' for v in steps)} µm{staggered}, AF = {pattern.area_fraction:.3f}"
 
 
+GEOMETRIES = {
+    "sled": "flat on flat, sled pulled over the counterface", "pin_on_disc": "pin on disc",
+    "ball_on_disc": "ball on disc", "ring_shear": "ring shear tester", "reciprocating": "reciprocating",
+    "rotary": "rotary",
+}  # fmt: skip
+
+
 def _contact(campaign: Campaign, tests: list[Test]) -> Iterator[Condition]:
     loads = np.array([t.normal_load_N for t in tests])
     area = campaign.nominal_area_m2
-    yield Condition("Test geometry", "flat on flat, sled pulled over the counterface")
-    yield Condition("Nominal contact area", f"{area * 1e6:g}", "mm²")
+    yield Condition("Test geometry", GEOMETRIES[campaign.contact])
+    if campaign.has_area:
+        yield Condition("Nominal contact area", f"{area * 1e6:g}", "mm²")
     yield Condition("Normal load", _range(loads), "N", "NormalLoadSetpoint")
-    yield Condition("Nominal pressure", _range(loads / area / PA_PER_KPA), "kPa")
+    if campaign.has_area:
+        yield Condition("Nominal pressure", _range(loads / area / PA_PER_KPA), "kPa")
     if campaign.slider_mass_kg:
         yield Condition("Load applied by", "dead weight", term="DeadWeightLoadApplication")
     yield Condition("Lubrication", "none", term="InterfacialMediumCategory")

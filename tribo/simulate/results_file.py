@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tribo.records import Run
+from tribo.store.hdf5_files import whole_hdf5
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -91,7 +90,9 @@ def write_run(run: Run, path: str | Path) -> Path:
             **versions(),
         },
     )
-    return written(path, lambda target: dataset.to_netcdf(target, engine="h5netcdf"))
+    with whole_hdf5(Path(path)) as file:
+        dataset.to_netcdf(file, engine="h5netcdf")
+    return Path(path)
 
 
 def write_ensemble(table: pd.DataFrame, path: str | Path, parameters: Mapping[str, Any] | None = None) -> Path:
@@ -105,7 +106,9 @@ def write_ensemble(table: pd.DataFrame, path: str | Path, parameters: Mapping[st
         },
         attrs={"title": ENSEMBLE, **attributes(parameters or {}), **versions()},
     )
-    return written(path, lambda target: dataset.to_netcdf(target, engine="h5netcdf"))
+    with whole_hdf5(Path(path)) as file:
+        dataset.to_netcdf(file, engine="h5netcdf")
+    return Path(path)
 
 
 def _column(values: Any) -> Any:
@@ -122,20 +125,3 @@ def kind_of(path: Path) -> str:
     except (OSError, ValueError, KeyError):
         return ""
     return next((kind for kind in (ONE_RUN, ENSEMBLE) if title.startswith(kind)), "")
-
-
-def written(path: str | Path, write: Callable[[Path], Any]) -> Path:
-    """Write beside ``path`` under another name, then rename: no half-written file bears the final name."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        write(temporary)
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-    return path

@@ -26,9 +26,10 @@ from tribo.errors import Problem, SimulationError
 from tribo.records import Run
 from tribo.simulate.config import SimConfig
 from tribo.simulate.ensemble import Progress, check_all, run_row
-from tribo.simulate.results_file import ENSEMBLE, attributes, unit_of, versions, written
+from tribo.simulate.results_file import ENSEMBLE, attributes, unit_of, versions
 from tribo.simulate.run import simulate
 from tribo.simulate.stored_rows import CHECKSUM, DONE, fault_of_store, read_stored as read_stored, row_checksum
+from tribo.store.hdf5_files import whole_hdf5
 from tribo.store.kept_results import DamagedResultWarning, sources
 from tribo.store.own_file import only_writer_of
 
@@ -191,18 +192,16 @@ def _create(design: Sequence[SimConfig], path: Path, work: Work) -> None:
     empty = dict.fromkeys(work.units, np.full(len(design), np.nan))
     marks = {DONE: np.zeros(len(design), np.uint8), CHECKSUM: np.zeros(len(design), np.uint64)}
 
-    def write(target: Path) -> None:
-        with h5py.File(target, "w", libver=("v108", "v108")) as file:  # from 1.8 on, HDF5 checks its own structure
-            for name, value in (_attributes(design, work) | identity(design, work)).items():
-                file.attrs[name] = value
-            run = file.create_dataset("run", data=np.arange(len(design)))
-            run.make_scale("run")
-            for name, values in (_given(design) | empty | marks).items():
-                column = file.create_dataset(name, data=values)
-                column.dims[0].attach_scale(run)
-                column.attrs["units"] = {**INPUTS, **work.units}.get(name) or unit_of(name)
-
-    written(path, write)
+    # from 1.8 on, HDF5 checks its own structure
+    with whole_hdf5(path) as held, h5py.File(held, "w", libver=("v108", "v108")) as file:
+        for name, value in (_attributes(design, work) | identity(design, work)).items():
+            file.attrs[name] = value
+        run = file.create_dataset("run", data=np.arange(len(design)))
+        run.make_scale("run")
+        for name, values in (_given(design) | empty | marks).items():
+            column = file.create_dataset(name, data=values)
+            column.dims[0].attach_scale(run)
+            column.attrs["units"] = {**INPUTS, **work.units}.get(name) or unit_of(name)
 
 
 def _as_stored(values: Any) -> Any:

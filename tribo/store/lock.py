@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from tribo.errors import Problem, TriboError
+from tribo.errors import Problem, TriboError, naming
 
 POLL_S = 0.2
 WAIT = "this one stops (use --wait SECONDS to wait for the other one)"
@@ -49,8 +49,9 @@ def only_writer(
     descriptor = _taken(path, time.monotonic() + wait_s, shared, said)
     _WORKERS_LET_GO.add(descriptor)
     try:
-        os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, _holder().encode(), 0)
+        with naming(path):
+            os.ftruncate(descriptor, 0)
+            os.pwrite(descriptor, _holder().encode(), 0)
         yield descriptor
     finally:
         if not lasting and _alone(descriptor):

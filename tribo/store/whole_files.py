@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from tribo.errors import naming
 
 
 @contextmanager
@@ -18,14 +20,13 @@ def whole_file(path: Path) -> Iterator[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        yield part
-        os.replace(part, path)
-    except OSError as why:
-        if why.filename is None and why.errno is not None:  # a full disk does not say what was being written
-            why.filename = str(path)
+        with naming(path, also_for=part):
+            yield part
+            os.replace(part, path)
+    except BaseException:
+        with suppress(OSError):  # the first error is the one to report
+            part.unlink(missing_ok=True)
         raise
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> Path:

@@ -25,6 +25,7 @@ _FALLEN = 0.5  # share of the sliding force below which a force has fallen, wher
 _AT_BOTTOM = 0.35  # share of the depth of a fall near its lowest force, in which a stop spends most of its time
 _SHORTEST_STOP = 0.005  # share of a record that a stop lasts at least, where nothing but the force tells of it
 _MOST_STOPS = 50
+_RESOLVED = 4  # samples of the middle half of a rise from which on its slope is told
 _AS_STEEP = 0.4  # a restart is at least this share as steep as the first rise
 _SLOW_FALL = 3.0  # a force relaxes while the drive stands still for at least this many times the time of the next rise
 _DWELLS = 0.05  # share of the samples of a fall that lie at a level at which the force dwells
@@ -170,24 +171,26 @@ def _relaxations(time_s: FloatArray, height: FloatArray, top: float, noise: floa
     peaks, troughs = turns
     if peaks.size < 2 or troughs.size == 0:
         return []
-    first_pace = _pace(time_s, height, 0, int(peaks[0]))
+    first_pace, resolved = _pace(time_s, height, 0, int(peaks[0]))
+    if not resolved:
+        return []
     found = []
     for peak, trough, after in zip(peaks, troughs, peaks[1:], strict=False):
         rise_s, fall_s = float(time_s[after] - time_s[trough]), float(time_s[trough] - time_s[peak])
-        steep = _pace(time_s, height, int(trough), int(after)) > _AS_STEEP * first_pace
-        if steep and fall_s > _SLOW_FALL * rise_s:
+        pace, resolved = _pace(time_s, height, int(trough), int(after))
+        if resolved and pace > _AS_STEEP * first_pace and fall_s > _SLOW_FALL * rise_s:
             found.append((_relaxes_from(height, int(peak), int(trough), noise), int(trough)))
     return found
 
 
-def _pace(time_s: FloatArray, height: FloatArray, start: int, end: int) -> float:
-    """Slope of the middle half of a rise."""
+def _pace(time_s: FloatArray, height: FloatArray, start: int, end: int) -> tuple[float, bool]:
+    """Slope of the middle half of a rise, and whether samples resolve it."""
     low = height[start] + 0.25 * (height[end] - height[start])
     high = height[start] + 0.75 * (height[end] - height[start])
     part = height[start : end + 1]
     a = start + int(np.flatnonzero(part <= low)[-1]) if (part <= low).any() else start
     b = start + int(np.argmax(part >= high))
-    return line(time_s[a : b + 1], height[a : b + 1])[0] if b > a else float("inf")
+    return (line(time_s[a : b + 1], height[a : b + 1])[0] if b > a else float("inf")), b - a >= _RESOLVED
 
 
 def _relaxes_from(height: FloatArray, peak: int, trough: int, noise: float) -> int:

@@ -183,10 +183,16 @@ def _fitting(hint: Hint, layout: Layout, given: Given) -> tuple[int, ...]:
             continue
         bare = split_unit(name)[0]
         wanted = any(split_unit(h.wanted)[0] in (name, bare, f"#{k + 1}") for h in others)
-        other = pattern == "*" and _quantity(name) not in ("", hint.quantity)
+        other = pattern == "*" and (_quantity(name) not in ("", hint.quantity) or _has_other_unit(layout, k, hint))
         if not wanted and not other and (fnmatchcase(bare, pattern) or fnmatchcase(name, pattern)):
             found.append(k)
     return tuple(found)
+
+
+def _has_other_unit(layout: Layout, k: int, hint: Hint) -> bool:
+    """Whether a column has a unit of its own that is none of the quantity a pattern stands for."""
+    unit = bare_unit(layout.units[k]) or split_unit(layout.names[k])[1]
+    return bool(unit) and not is_unit(unit or "", hint.quantity)
 
 
 def _fits_nothing(hint: Hint, layout: Layout) -> Problem:

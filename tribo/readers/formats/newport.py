@@ -1,7 +1,7 @@
 """Newport rotary rig: one tab-separated line of settings, then semicolon-separated numbers without names.
 
-Columns by the rig's own evaluation script: step time, time, force across the contact, torque, position, turns a
-second, sliding speed. The friction is a torque, so its lever must be given.
+Columns by the rig's own evaluation script: step time, time, force across the contact, torque, position of the vertical
+stage, turns a second, speed of that stage. The friction is a torque, so its lever must be given.
 """
 
 from __future__ import annotations
@@ -27,9 +27,12 @@ def hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
     return (
         Hint("time", "#2 [s]", reason),
         Hint("normal force", "#3 [N]", reason),
-        Hint("displacement", "#5 [um]", reason),
+        Hint("torque", "#4 [N m]", reason),
     )
 
 
-ADVICE = 'column 4 is the friction torque; give the lever arm: friction_force = "#4 [N m / LEVER mm]" in columns'
+ADVICE = (
+    "column 4 is the friction torque; give the lever arm: lever_arm_mm = 2.5 in campaign.toml, "
+    'or friction_force = "#4 [N m / 2.5 mm]" in columns'
+)
 NEWPORT = Family("newport", "Newport rotary rig, settings line and columns without names", recognises, hints, ADVICE)

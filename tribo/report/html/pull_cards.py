@@ -52,6 +52,7 @@ def pull_cards(study: Study) -> list[PullCard]:
     levels = load_labels(study)
     read = [t for t in ingested.campaign.tests if t.test_id in ingested.pulls or t.test_id in ingested.by_hand]
     points = int(np.clip(PICTURE_BYTES / (9 * max(len(read), 1)), 24, 160))
+    read = [t for t in read if t.test_id in study.ingested.traces or t.test_id in study.ingested.by_hand]
     cards = [_card(study, t, levels[t.test_id], standing.get(t.test_id), points) for t in read]
     return sorted(cards, key=lambda card: (-card.oddness, card.test_id))
 

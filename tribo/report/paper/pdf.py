@@ -17,6 +17,10 @@ from tribo.report.provenance import Provenance
 from tribo.report.words.numerals import significant, unbroken
 
 TEMPLATE = "report.typ"
+FRICTION = {
+    "samples": "Samples", "laws": "Law of friction against load", "dependence": "Dependence on recorded variables",
+    "oscillation": "Sliding regimes and restarts",
+}  # fmt: skip
 NOT_OF_THE_INPUTS = ("Command", "Started")  # differ from run to run, which the bytes of the PDF must not
 
 
@@ -60,10 +64,11 @@ def _last_day(study: Study) -> datetime:
 def _record(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str, Any]:
     """The content as plain strings and tables of strings."""
     verdict, summary, campaign, study = said["verdict"], said["summary"], said["campaign"], said["study"]
-    bodies = f"{campaign.material or 'sample'} on {campaign.counterface or 'counterface'}"
     record = {
         "title": campaign.title,
-        "about": f"{bodies}, nominal area {campaign.nominal_area_m2 * 1e6:g} mm²",
+        "about": said["about"],
+        "friction": [[title, said["friction"][key]] for key, title in FRICTION.items() if said["friction"][key]],
+        "law": "T = μN + τ₀A" if said["has_area"] else "T = μN + T₀",
         "verdict": verdict,
         "model": summary["model"],
         "flat": summary["flat"],
@@ -74,7 +79,7 @@ def _record(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str, 
         "tribosystem": [[c.name, c.in_words] for c in said["tribosystem"]],
         "load": significant(said["table2"]["load_N"]),
         "correlation": summary["correlation"],
-        "table2": _table2(said["table2"]),
+        "table2": _table2(said["table2"], "τ₀ (kPa)" if said["has_area"] else "T₀ (N)"),
         "paired": said["paired"],
         "agreement": [{"title": _title(p["regime"]), "rows": p["sentences"]} for p in said["agreement"]],
         "how_to_read": summary["how_to_read"],
@@ -98,8 +103,8 @@ def _title(regime: str) -> str:
     return f"{regime.capitalize()} friction"
 
 
-def _table2(table: Mapping[str, Any]) -> list[dict[str, Any]]:
-    head = ["Sample", "AF", "μ", "τ₀ (kPa)", "T (N)", "Specimens, tests"]
+def _table2(table: Mapping[str, Any], intercept: str) -> list[dict[str, Any]]:
+    head = ["Sample", "AF", "μ", intercept, "T (N)", "Specimens, tests"]
     if table["simulated"]:
         head[5:5] = ["μ simulated", "τ₀ simulated", "T simulated"]
     return [

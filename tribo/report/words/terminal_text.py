@@ -38,7 +38,8 @@ def _regime_block(study: Study, regime: Regime, load: float) -> str:
     if not rows:
         return ""
     if not simulated:
-        return "\n".join([regime.upper(), *_aligned([(*row[:4], *row[7:]) for row in (HEAD, *rows)])])
+        names = HEAD if study.ingested.campaign.has_area else tuple(h.replace("tau0 (kPa)", "T0 (N)") for h in HEAD)
+        return "\n".join([regime.upper(), *_aligned([(*row[:4], *row[7:]) for row in (names, *rows)])])
     lines = _aligned([HEAD, *rows])
     left, right = lines[0].index(" mu") + 1, lines[0].rindex(" mu") + 1
     head = f"{regime.upper():<{left}}measured"
@@ -59,12 +60,13 @@ def _line(row: tuple[str, ...], widths: list[int]) -> str:
 
 
 def fit_cells(fit: LawFit | None, load_N: float) -> tuple[str, str, str]:
-    """mu, tau0 in kPa and T at a load in newton, each with its standard uncertainty; dashes without a fit."""
+    """mu, tau0 in kPa (T0 in newton without an area) and T at a load, with uncertainties; dashes without a fit."""
     if fit is None:
         return "–", "–", "–"
+    unit = PA_PER_KPA if fit.has_area else 1.0  # without an area tau0_Pa stands for T0 in newton
     return (
         with_uncertainty(fit.value("mu"), fit.standard_uncertainty("mu")),
-        with_uncertainty(fit.value("tau0_Pa") / PA_PER_KPA, fit.standard_uncertainty("tau0_Pa") / PA_PER_KPA),
+        with_uncertainty(fit.value("tau0_Pa") / unit, fit.standard_uncertainty("tau0_Pa") / unit),
         with_uncertainty(float(fit.force_N(load_N)), float(fit.force_u_N(load_N))),
     )
 

@@ -41,11 +41,12 @@ def what_was_measured(study: Study) -> str:
     loads = np.array([t.normal_load_N for t in tests])
     levels = np.unique(study_lookup.load_levels(loads))
     lowest, highest = (significant(p / campaign.nominal_area_m2 / PA_PER_KPA) for p in (levels[0], levels[-1]))
+    pressure = f" (nominal pressure {lowest} to {highest} kPa)" if campaign.has_area else ""
     return (
         f"{counted(len(tests), 'pull')} of {counted(len(specimens), 'specimen')} of "
         f"{counted(len(samples), 'sample')} ({joined(samples)}) at {counted(len(levels), 'load')} from "
-        f"{significant(levels[0])} to {significant(levels[-1])} N (nominal pressure {lowest} to "
-        f"{highest} kPa). {_set_aside_clause(aside)}"
+        f"{significant(levels[0])} to {significant(levels[-1])} N{pressure}. "
+        f"{_set_aside_clause(aside)}"
     )
 
 
@@ -60,7 +61,8 @@ def flat_law(study: Study) -> list[str]:
     flat = study_lookup.flat_sample(study)
     fits = [(regime, study_lookup.fit_of(study.fits, flat, regime)) for regime in REGIMES]
     return [
-        f"The {regime} friction of the flat sample {flat} follows T = μN + τ₀A with {_law_values(fit)} "
+        f"The {regime} friction of the flat sample {flat} follows T = μN + {'τ₀A' if fit.has_area else 'T₀'} with "
+        f"{_law_values(fit)} "
         "(± standard uncertainty)."
         for regime, fit in fits
         if fit is not None
@@ -70,6 +72,8 @@ def flat_law(study: Study) -> list[str]:
 def _law_values(fit: LawFit) -> str:
     tau0, tau0_u = (v / PA_PER_KPA for v in (fit.value("tau0_Pa"), fit.standard_uncertainty("tau0_Pa")))
     mu = with_uncertainty(fit.value("mu"), fit.standard_uncertainty("mu"))
+    if not fit.has_area:
+        return f"μ = {mu} and T₀ = {with_uncertainty(fit.value('tau0_Pa'), fit.standard_uncertainty('tau0_Pa'))} N"
     return f"μ = {mu} and τ₀ = {with_uncertainty(tau0, tau0_u)} kPa"
 
 

@@ -1,0 +1,137 @@
+"""The missing law: found, written down, read again, and tested on another campaign."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tribo.diagnose.discovery.grammar import groups_of, shapes_of
+from tribo.diagnose.discovery.held import holds
+from tribo.diagnose.discovery.law_file import law_text, read_law
+from tribo.diagnose.discovery.law_words import discovery_text, law_layers
+from tribo.diagnose.discovery.search import Discovery, discover_laws
+from tribo.diagnose.discovery.written_law import Shape, WrittenLaw
+from tribo.diagnose.statistics.model import Setup
+from tribo.diagnose.verdict import Estimate
+from tribo.errors import CampaignError
+from tribo.mechanisms.record import Base, Conditions
+
+from .known import baseline, made
+
+
+def warm_is_best(s: Setup) -> np.ndarray:
+    """Friction is highest at 23 degrees and falls by 3 % per square degree away from it, in the sliding force alone."""
+    t = s.observations.conditions.temperature_C
+    return np.column_stack([np.zeros(len(t)), -0.03 * (t - 23.0) ** 2])
+
+
+def nothing(s: Setup) -> np.ndarray:
+    return np.zeros((s.observations.n, 2))
+
+
+@pytest.fixture(scope="module")
+def found() -> Discovery:
+    return discover_laws(baseline(made(warm_is_best, seed=5)), replicates=20)
+
+
+def test_the_column_the_form_the_regime_and_the_place_are_found(found: Discovery) -> None:
+    law = found.laws[0]
+    assert law.law.columns == ("temperature_C",)
+    assert law.law.shapes[0].kind in ("optimum", "hump")
+    assert law.law.regime == "sliding"
+    assert law.law.where == "all"
+    assert law.parameters["place"].low < 23.0 < law.parameters["place"].high
+    assert law.p < 0.01
+    assert law.gain is not None
+    assert law.gain.difference > 0
+
+
+def test_the_law_is_said_in_a_sentence_and_as_a_layer(found: Discovery) -> None:
+    text, layer = discovery_text(found), law_layers(found)[0]
+    assert "Sliding friction is higher by" in text
+    assert "near the temperature = 2" in text
+    assert (layer.kind, layer.regimes) == ("law", ("sliding",))
+    assert layer.low < layer.effect_percent < layer.high
+
+
+def test_nothing_is_written_where_nothing_is_hidden() -> None:
+    quiet = discover_laws(baseline(made(nothing, seed=102)), replicates=20)
+    assert quiet.laws == ()
+    assert "None of the" in discovery_text(quiet)
+
+
+def test_a_law_is_read_as_it_was_written(found: Discovery, tmp_path: Path) -> None:
+    law = found.laws[0]
+    path = tmp_path / "law.toml"
+    path.write_text(law_text(law.law, law.parameters, 'series "7"\n[x]'), encoding="utf-8")
+    again, parameters = read_law(path)
+    assert again == law.law or repr(again) == repr(law.law)
+    assert parameters == law.parameters
+
+
+def test_faults_of_a_law_are_named_all_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "law.toml"
+    path.write_text('schema = "tribo.law/1"\nacts_on = "N"\nregime = "both"\nwhere = "all"\n[[shape]]\nkind = "bend"\n')
+    with pytest.raises(CampaignError) as faults:
+        read_law(path)
+    assert {"acts_on", "shape.0.kind", "shape.0.column", "parameters"} <= {p.column for p in faults.value.problems}
+
+
+def test_a_law_holds_where_it_is_at_work_and_not_where_it_is_absent_or_of_other_size(found: Discovery) -> None:
+    law = found.laws[0]
+    same = baseline(made(warm_is_best, seed=21))
+    assert holds(same, law.law, law.parameters).answer == "held"
+    assert holds(baseline(made(nothing, seed=22)), law.law, law.parameters).answer == "not held"
+    turned = {**law.parameters, "a": Estimate(*(-x for x in _ends(law.parameters["a"])), "")}
+    assert holds(same, law.law, turned).answer == "not held"
+
+
+def test_a_law_whose_column_is_not_recorded_cannot_be_told(found: Discovery) -> None:
+    law = found.laws[0]
+    elsewhere = replace(law.law, shapes=(replace(law.law.shapes[0], column="lot"),))
+    answer = holds(baseline(made(nothing, seed=22)), elsewhere, law.parameters)
+    assert answer.answer == "cannot be told"
+    assert "lot is not recorded" in answer.text
+
+
+def _ends(e: Estimate) -> tuple[float, float, float]:
+    return e.value, e.high, e.low
+
+
+def conditions() -> Conditions:
+    return baseline(made(nothing, seed=1)).setup.observations.conditions
+
+
+def test_every_law_of_the_grammar_leaves_the_forces_alone_at_zero_amplitude() -> None:
+    c = conditions()
+    ones = np.ones(len(c.sample))
+    base = Base(4.0 * ones, 1e-3 * ones, 3.0 * ones, 5e-4 * ones)
+    before = base.forces(c.normal_load_N)
+    for shapes, _ in shapes_of(c)[::7]:
+        for group in groups_of(c)[::5]:
+            mechanism = group.law(shapes).mechanism()
+            after = mechanism.law(mechanism.zero(), base, c, "")
+            np.testing.assert_allclose(after.static_N, before.static_N, rtol=1e-12)
+            np.testing.assert_allclose(after.sliding_N, before.sliding_N, rtol=1e-12)
+
+
+def test_a_law_of_one_term_and_one_regime_changes_nothing_else() -> None:
+    c = conditions()
+    ones = np.ones(len(c.sample))
+    base = Base(4.0 * ones, 1e-3 * ones, 3.0 * ones, 5e-4 * ones)
+    law = WrittenLaw((Shape("linear", "temperature_C", 20.0, 26.0),), "adhesion term", "static", "sample B")
+    after = law.changed(base, c.normal_load_N, np.log(2.0) * law.weight(c))
+    assert after.static_N - base.forces(c.normal_load_N).static_N == pytest.approx((c.sample == "B") * 1e-3)
+    assert after.sliding_N == pytest.approx(base.forces(c.normal_load_N).sliding_N, rel=1e-12)
+
+
+def test_a_column_with_missing_values_is_used_where_it_is_there() -> None:
+    c = conditions()
+    gaps = replace(c, temperature_C=np.where(np.arange(len(c.sample)) % 5 == 0, np.nan, c.temperature_C))
+    shape = next(s for (s, *rest), _ in shapes_of(gaps) if s.column == "temperature_C" and not rest)
+    course = shape.of(gaps)[:, 0]
+    assert np.all(course[::5] == 0)
+    assert course.max() == pytest.approx(1.0)

@@ -1,0 +1,1 @@
+"""Faults injected at every file operation of a command."""

@@ -1,0 +1,229 @@
+"""The commands under test, each with the state of OUT that it starts from."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import json
+import os
+import pickle
+import shlex
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from faults.file_operations import real_listdir, real_open
+from faults.small_site import Place
+from faults.trial import Bench, Command, in_child, run_command
+
+RUNS = ("--runs", "2", "--jobs", "1")
+
+
+class RememberedPages:
+    """typst, with the pages that it has set before: setting them takes most of the time of a report.
+
+    The files for typst are written all the same; typst itself is asked only for pages that it has not set yet.
+    """
+
+    def __init__(self, file: Path):
+        import typst
+
+        self.file, self.real = file, typst.Compiler
+        self.known: dict[str, bytes] = pickle.loads(file.read_bytes()) if file.is_file() else {}
+        typst.Compiler = lambda root, **options: _Page(self, Path(root), options)  # type: ignore[misc, assignment]
+
+    def save(self) -> None:
+        self.file.write_bytes(pickle.dumps(self.known))
+
+
+class _Page:
+    def __init__(self, pages: RememberedPages, root: Path, options: dict[str, Any]):
+        self.pages, self.root, self.options = pages, root, options
+
+    def compile(self, source: Path, **options: Any) -> bytes:
+        key = hashlib.sha256(repr((source.name, sorted(options.items()))).encode())
+        for name in sorted(real_listdir(self.root)):
+            with real_open(self.root / name, "rb") as file:
+                key.update(name.encode() + b"\0" + file.read())
+        if (found := self.pages.known.get(key.hexdigest())) is None:
+            compiler: Any = self.pages.real(root=self.root, **self.options)
+            found = self.pages.known[key.hexdigest()] = bytes(compiler.compile(source, **options))
+        return found
+
+
+def prepared(place: Place, aside: Path, build: bool = True) -> dict[str, Command]:
+    """Every command by name. Runs what they have in common once, so that what is forked from here starts at once.
+
+    ``aside`` holds what trials start from; it lies outside the watched folder.
+    """
+    campaign, out = str(place.campaign), str(place.out)
+    report = ("report", campaign, "-o", out, *RUNS)
+    small_lattice()
+    complete, kept, partly, site = (aside / name for name in ("complete", "kept-only", "partly-kept", "site"))
+    pages = RememberedPages(aside / "pages.pickle")
+
+    def first() -> int:
+        status = run_command(report)
+        pages.save()
+        return status
+
+    ended = in_child(first, place)  # typst starts threads, which a process that forks must not have
+    assert ended.status == 0, ended
+    pages = RememberedPages(pages.file)
+    with _quiet(place):
+        assert run_command(report) == 0
+    shutil.copytree(out, complete)
+    for folder in (kept, partly, site / "current" / "monday"):
+        shutil.copytree(complete / "kept", folder / "kept")
+    next((partly / "kept").glob("B@*.nc")).unlink()
+    (site / ".tribo").mkdir()  # known as a site of tribo
+    runs = ("simulate", "--design", str(place.design), "-o", f"{out}/runs.nc", "--jobs", "1")
+    with _quiet(place):
+        run_command(runs)
+    found = [
+        Command("ingest", ("ingest", campaign, "-o", out, "--jobs", "1")),
+        Command("fit", ("fit", campaign, "-o", out, "--jobs", "1")),
+        Command("predict", ("predict", campaign, "-o", out, *RUNS), partly),
+        Command("diagnose", ("diagnose", campaign, "-o", out, "--jobs", "1"), kept),
+        Command("report", report, kept),
+        Command("report again", report, complete),
+        Command("verify", ("verify", out), complete),
+        Command("simulate one run", ("simulate", *_ONE, "-o", f"{out}/one.nc", "--jobs", "1")),
+        Command("simulate --design", runs),
+        *(_builds(place, aside, site) if build else ()),
+    ]
+    return {command.name: command for command in found}
+
+
+def _builds(place: Place, aside: Path, site: Path) -> list[Command]:
+    """tribo build with kept results at hand, and where only the index and the dated copy are missing."""
+    arguments = ("build", str(place.drop), "-o", str(place.out), "--settle", "0", *RUNS)
+    indexed = aside / "indexed-site"
+    shutil.rmtree(place.out)
+    shutil.copytree(site, place.out)
+    with _quiet(place) as said:
+        status = build_in_one_process(arguments)
+    assert status == 0, said.getvalue()
+    shutil.copytree(place.out, indexed, symlinks=True, ignore=shutil.ignore_patterns("builds", "latest", "index.json"))
+    return [
+        Command("build", arguments, site, build_in_one_process),
+        Command("build of the index", arguments, indexed, build_in_one_process),
+    ]
+
+
+def warm(place: Place, command: Command) -> Bench:
+    """A bench of a command whose modules and compiled code this process has loaded, so that its children have them."""
+    with _quiet(place):
+        (command.run or run_command)(command.arguments)
+    return Bench(place, command)
+
+
+def small_lattice() -> None:
+    """Simulations of 21 x 21 blocks unless a command says otherwise, for the rest of this process."""
+    from tribo.simulate import SimConfig
+
+    given = SimConfig.__init__.__defaults__
+    assert given is not None
+    SimConfig.__init__.__defaults__ = tuple((21, 21) if value == (85, 85) else value for value in given)
+
+
+_ONE = ("--sample", "F", "--pressure", "20", "--blocks", "10")
+
+
+@contextlib.contextmanager
+def _quiet(place: Place) -> Iterator[io.StringIO]:
+    """What is printed in this process; temporary files and times as in a trial."""
+    before, said = dict(os.environ), io.StringIO()
+    os.environ |= {"TMPDIR": str(place.temporary), "SOURCE_DATE_EPOCH": "1700000000"}
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            yield said
+    finally:
+        os.environ.clear()
+        os.environ |= before
+
+
+def build_in_one_process(arguments: Sequence[str]) -> int:
+    """tribo build with the steps of its workflow run one after another in this process, in place of Snakemake."""
+    from tribo.pipeline import build
+
+    build._snakemake = _steps_in_order  # type: ignore[assignment]
+    return run_command(arguments)
+
+
+def _steps_in_order(state: Path, config: Path, *_: Any) -> subprocess.CompletedProcess[str]:
+    with real_open(config, encoding="utf-8") as file:
+        described = json.load(file)
+    for name, campaign in described["ready"].items():
+        for step, words in _steps(name, campaign, described["options"]):
+            if not _step(state, name, step, words, described):
+                said = f"\nError in rule {step}:\n    log: log/{name}/{step}.log (check log file(s))\n"
+                _index(state, "-")
+                return subprocess.CompletedProcess([], 1, said)
+    return subprocess.CompletedProcess([], 0 if _index(state, "index.json") else 1, "")
+
+
+def _steps(name: str, campaign: dict[str, Any], options: dict[str, str]) -> list[tuple[str, str]]:
+    where = f"{shlex.quote(campaign['path'])} -o ../current/{shlex.quote(name)}"
+    return [
+        ("ingest", f"ingest {where} {options['fit']}"), ("fit", f"fit {where} {options['fit']}"),
+        ("calibrate", f"predict --only calibration --jobs 1 {where} {options['model']}"),
+        *((f"simulate-{s}", f"predict --only {s} --jobs 1 {where} {options['model']}") for s in campaign["samples"]),
+        ("diagnose", f"diagnose --jobs 1 {where} {options['diagnose']}"),
+        ("report", f"report --jobs 1 {where} {options['model']}"),
+    ]  # fmt: skip
+
+
+def _step(state: Path, name: str, step: str, words: str, described: dict[str, Any]) -> bool:
+    """Run one step unless its record says that it has been run on the same; whether it succeeded."""
+    from tribo.cli.workflow_step import main
+
+    campaign = described["ready"][name]
+    digest = f"{campaign['digest']} {described['sources']} {described['options']['words']}"
+    if _is_done(state / "steps" / name / f"{step}.json", digest):
+        return True
+    files = ["--files", campaign["files"]] if step == "report" else []
+    after = ["--after", f"steps/{name}/fit.json"] if step not in ("ingest", "fit") else []
+    given = [f"steps/{name}/{step}.json", "--digest", digest, *after, *files, "--", *shlex.split(words)]
+    return _logged(state, f"{name}/{step}.log", lambda: main(given))
+
+
+def _is_done(record: Path, digest: str) -> bool:
+    try:
+        with real_open(record, encoding="utf-8") as file:
+            return bool(json.load(file)["digest"] == digest)
+    except FileNotFoundError:
+        return False
+
+
+def _index(state: Path, target: str) -> bool:
+    from tribo.pipeline.index_page import main
+
+    return _logged(state, "index.log", lambda: main(["..", target]))
+
+
+def _logged(state: Path, log: str, work: Callable[[], int | None]) -> bool:
+    """Run a step as a shell would: in the folder of the workflow, what it prints in a file; whether it succeeded."""
+    import traceback
+
+    place, before = state / "log" / log, os.getcwd()
+    said = io.StringIO()
+    os.chdir(state)
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            try:
+                return not work()
+            except SystemExit as ended:
+                return not ended.code
+            except BaseException:
+                traceback.print_exc()
+                return False
+    finally:
+        os.chdir(before)
+        with contextlib.suppress(OSError):
+            subprocess.run(["mkdir", "-p", place.parent], check=True)
+            with real_open(place, "w", encoding="utf-8") as file:
+                file.write(said.getvalue())

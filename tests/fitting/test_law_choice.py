@@ -1,0 +1,87 @@
+"""The law of a sample is chosen by loads it was not fitted to; what T/N varies with, and what is inseparable."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tribo.fitting.dependence import dependence
+from tribo.fitting.law_choice import compared_laws
+from tribo.fitting.load_levels import levels_of, meant_to_be_one
+from tribo.records import Campaign, Ingested, Pattern, Pull, Test
+
+LOADS = np.repeat([1.0, 2.0, 4.0, 8.0, 16.0, 32.0], 3)
+TRUE = {
+    "constant": lambda n: 0.9 + 0 * n,
+    "proportional": lambda n: 0.6 * n,
+    "hertz": lambda n: 1.2 * n ** (2 / 3),
+    "linear": lambda n: 0.3 * n + 2.0,
+    "power": lambda n: 1.3 * n**0.8,
+}
+
+
+def table(force_N: np.ndarray, load_N: np.ndarray = LOADS) -> pd.DataFrame:
+    ids = [f"T{k}" for k in range(load_N.size)]
+    named = {"test_id": ids, "sample": "S", "specimen": "S1"}
+    return pd.DataFrame({**named, "normal_load_N": load_N, "static_N": math.nan, "sliding_N": force_N})
+
+
+@pytest.mark.parametrize("law", TRUE)
+@pytest.mark.parametrize("seed", range(4))
+def test_the_law_that_made_the_forces_is_chosen(law: str, seed: int) -> None:
+    scatter = np.exp(0.02 * np.random.default_rng(seed).standard_normal(LOADS.size))
+    found = compared_laws(table(TRUE[law](LOADS) * scatter))
+    (chosen,) = found[found["chosen"]].to_dict("records")
+    assert chosen["law"] == law
+    assert chosen["held_out_percent"] < 5
+
+
+def test_the_exponent_of_a_power_law_is_found_with_its_uncertainty() -> None:
+    scatter = np.exp(0.03 * np.random.default_rng(9).standard_normal(LOADS.size))
+    found = compared_laws(table(1.3 * LOADS**0.75 * scatter)).set_index("law").loc["power"]
+    assert abs(found["b"] - 0.75) < 3 * found["b_u"] < 0.1
+
+
+def test_loads_that_were_meant_to_be_one_give_no_law() -> None:
+    loads = 2.0 * (1 + 0.003 * np.random.default_rng(1).standard_normal(20))
+    assert meant_to_be_one(loads)
+    assert compared_laws(table(0.8 * loads, loads)).empty
+
+
+def test_closely_spaced_loads_do_not_run_together_into_one_level() -> None:
+    loads = np.arange(0.50, 0.71, 0.01)
+    assert np.unique(levels_of(loads)).size >= 10
+    assert np.unique(levels_of(np.array([1.0, 1.001, 0.999, 2.0]))).size == 2
+
+
+def ingested(order: np.ndarray, load: np.ndarray, ratio: np.ndarray) -> Ingested:
+    tests = tuple(
+        Test(f"T{k}", f"raw/T{k}.csv", "S", float(n), "S1", run_order=int(o), covariates={"cycle": str(k % 7)})
+        for k, (n, o) in enumerate(zip(load, order, strict=True))
+    )
+    pulls = {
+        t.test_id: Pull(t.test_id, "seed", math.nan, math.nan, float(r) * t.normal_load_N, 0.01, 0, 0, 0, 0, (0, 1))
+        for t, r in zip(tests, ratio, strict=True)
+    }
+    return Ingested(Campaign("made", Path(), 1.0, tests, {"S": Pattern("S")}), {}, pulls, ())
+
+
+def test_what_the_friction_varies_with_is_found_and_the_rest_is_not() -> None:
+    rng = np.random.default_rng(5)
+    order, load = rng.permutation(40), np.tile([1.0, 2.0, 4.0, 8.0], 10)
+    found = dependence(ingested(order, load, 0.5 * np.exp(0.01 * order) * np.exp(0.01 * rng.standard_normal(40))))
+    rows = found.set_index("variable")
+    assert rows.loc["run_order", "p_adjusted"] < 1e-6
+    assert rows.loc["run_order", "change_percent"] == pytest.approx(100 * (math.exp(0.39) - 1), rel=0.1)
+    assert min(rows.loc["normal_load_N", "p_adjusted"], rows.loc["cycle", "p_adjusted"]) > 0.05
+
+
+def test_load_and_run_order_that_rise_together_are_said_to_be_inseparable() -> None:
+    load = np.linspace(1, 8, 30)
+    rows = dependence(ingested(np.arange(30), load, 0.5 * load**-0.2)).set_index("variable")
+    assert rows.loc["normal_load_N", "inseparable_from"] == "run order"
+    assert rows.loc["cycle", "inseparable_from"] == ""

@@ -1,0 +1,25 @@
+"""Paths that a user gives and that must exist; one that cannot be looked at is not called missing."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+class GivenPath(click.Path):
+    """A path that exists. Errors of the system other than its absence are named as such, with exit status 1."""
+
+    def __init__(self, *, file_okay: bool = True, dir_okay: bool = True):
+        super().__init__(exists=True, file_okay=file_okay, dir_okay=dir_okay, path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        try:
+            os.stat(value)
+        except (FileNotFoundError, NotADirectoryError):
+            pass  # click says so
+        except OSError as why:
+            raise click.ClickException(f"{value}: {(why.strerror or str(why)).lower()}") from why
+        return super().convert(value, param, ctx)

@@ -1,0 +1,76 @@
+"""Whether a law of one campaign holds in another one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from tribo.diagnose.discovery.written_law import UNITS, WrittenLaw
+from tribo.diagnose.statistics.fit import fit
+from tribo.diagnose.statistics.interval import NORMAL_90, recovered
+from tribo.diagnose.statistics.linearisation import ModelFit
+from tribo.diagnose.statistics.model import Acting, effect_of
+from tribo.diagnose.verdict import Estimate
+from tribo.mechanisms.record import Conditions
+
+Answer = Literal["held", "not held", "cannot be told"]
+SURE = 2.58  # standard errors: both decisions are at 1 %
+SHOWS = 4.0  # standard errors that the effect must have for its absence to be certain
+
+
+@dataclass(frozen=True)
+class Held:
+    """The ``answer`` on one campaign, the amplitude found there beside the earlier one, and a sentence."""
+
+    answer: Answer
+    found: Estimate | None
+    earlier: Estimate
+    text: str
+
+
+def holds(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimate]) -> Held:
+    """Fit the amplitude of a law, its form as written, on a campaign that it was not made from.
+
+    It held if the amplitude is beyond chance (1 %) and differs from the earlier one by less than 2.58 standard errors
+    of the difference. Nothing can be told where a column is missing or does not vary, or the effect is below four
+    standard errors in this design.
+    """
+    c, a0 = model.setup.observations.conditions, earlier["a"]
+    if (why := _not_tested(c, law)) or not np.any(law.weight(c)):
+        return Held("cannot be told", None, a0, f"The law cannot be tested here: {why or 'no such sample'}.")
+    mechanism = law.mechanism()
+    start = np.array([e.value for e in earlier.values()])
+    if np.abs(effect_of(model.setup, model.law, Acting(mechanism), start)).max() < 1e-9:
+        return Held("cannot be told", None, a0, "The law changes nothing in this design.")
+    after = fit(model.setup, (*model.acting, Acting(mechanism)), start=model)
+    value, low, high = recovered(after, len(after.acting) - 1)[0]
+    found = Estimate(value, low, high, a0.unit)
+    error, before = (high - low) / (2 * NORMAL_90), (a0.high - a0.low) / (2 * NORMAL_90)
+    beyond = abs(value) > SURE * error and np.sign(value) == np.sign(a0.value)
+    alike = abs(value - a0.value) < SURE * np.hypot(error, before)
+    if beyond and alike:
+        return Held("held", found, a0, f"The law held: {_both(found, a0)}.")
+    if abs(a0.value) < SHOWS * error:
+        return Held("cannot be told", found, a0, f"This campaign is too small to test the law: {_both(found, a0)}.")
+    return Held("not held", found, a0, f"The law did not hold: {_both(found, a0)}.")
+
+
+def _both(found: Estimate, earlier: Estimate) -> str:
+    return (
+        f"a = {found.value:.3g} ({found.low:.3g} to {found.high:.3g}) here, {earlier.value:.3g} ({earlier.low:.3g} to "
+        f"{earlier.high:.3g}) before"
+    )
+
+
+def _not_tested(c: Conditions, law: WrittenLaw) -> str:
+    """Why the columns of a law do not allow a test; empty where they do."""
+    for name in law.columns:
+        if name not in UNITS and name not in c.columns:
+            return f"the column {name} is not recorded"
+    course = law.course(c)[law.weight(c) != 0]
+    if not len(course) or np.ptp(course) < 1e-9:
+        return f"{' and '.join(law.columns)} does not vary"
+    return ""

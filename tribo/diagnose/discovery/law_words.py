@@ -1,0 +1,118 @@
+"""Laws in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tribo.diagnose.discovery.search import Discovery, FoundLaw
+from tribo.diagnose.discovery.written_law import (
+    ALL,
+    BOTH,
+    CAVITY_SHARE,
+    ELONGATION,
+    FLAT,
+    PATTERNED,
+    RIM,
+    UNITS,
+    Shape,
+    T,
+    WrittenLaw,
+)
+from tribo.diagnose.sentences import p_text
+from tribo.diagnose.terms import in_words
+from tribo.diagnose.verdict import Estimate, Layer
+from tribo.records import REGIMES
+
+WHERE = {
+    ALL: "", PATTERNED: " of the patterned samples", FLAT: " of the flat sample",
+    CAVITY_SHARE: ", in proportion to the share of cavities,", RIM: ", in proportion to the rim length,",
+    ELONGATION: ", in proportion to the elongation along the pull,",
+}  # fmt: skip
+
+
+def law_sentence(found: FoundLaw) -> str:
+    """What follows what, where, in which regime and by how much."""
+    law = found.law
+    value, low, high = found.effect_percent
+    size = f"by {abs(value):.0f} % (90 % interval {_span(low, high)})"
+    if law.shapes[0].kind == "wave":
+        return f"{subject(law)} {_wave(law.shapes[0])}, {size} from lowest to highest (adjusted p {p_text(found.p)})."
+    rises = (found.parameters["a"].value > 0) == (value > 0) and value > 0
+    verb = "is higher" if rises else "is lower"
+    return f"{subject(law)} {verb} {size} {_where(law, found.parameters)} (adjusted p {p_text(found.p)})."
+
+
+def _span(low: float, high: float) -> str:
+    ends = sorted((abs(low), abs(high))) if low * high > 0 else [low, high]
+    return f"{ends[0]:.0f} to {ends[1]:.0f} %"
+
+
+def subject(law: WrittenLaw) -> str:
+    """The observable and the samples."""
+    regime = "Friction" if law.regime == BOTH else f"{law.regime.capitalize()} friction"
+    what = regime if law.acts_on == T else f"The {law.acts_on} of {regime.lower()}"
+    of = WHERE.get(law.where, f" of {law.where}")
+    return f"{what}{of}"
+
+
+def _where(law: WrittenLaw, parameters: dict[str, Estimate]) -> str:
+    if len(law.shapes) > 1:
+        names = " and ".join(_name(s) for s in law.shapes)
+        return f"where {names} are both at their highest than where one of them is at its lowest"
+    s = law.shapes[0]
+    if s.kind == "level":
+        return f"where {_name(s)} is {s.level}"
+    if s.kind == "step":
+        return f"where {_name(s)} is above {_value(s, s.place)}"
+    if s.kind in ("optimum", "hump"):
+        place = parameters["place"]
+        near = f"{_value(s, place.value)} (90 % interval {place.low:.4g} to {place.high:.4g})"
+        return f"near {_name(s)} = {near} than far from it"
+    how = {"log": ", in proportion to its logarithm", "saturating": ", approaching a limit"}.get(s.kind, "")
+    return f"at {_name(s)} = {_value(s, s.high)} than at {_value(s, s.low)}{how}"
+
+
+def _wave(s: Shape) -> str:
+    return f"varies periodically with {_name(s)}, period {s.width:.4g} {UNITS.get(s.column, '')}".rstrip()
+
+
+def _name(s: Shape) -> str:
+    return in_words(s.column)
+
+
+def _value(s: Shape, x: float) -> str:
+    return f"{x:.4g} {UNITS.get(s.column, '')}".rstrip()
+
+
+def discovery_text(d: Discovery) -> str:
+    """What was found, or that nothing was."""
+    if not d.laws:
+        return f"None of the {d.searched} laws that were tried explains more than chance does."
+    told = [f"{law_sentence(f)}{_tied(f.ties)}" for f in d.laws]
+    return " ".join(told) + f" {d.searched} laws were tried."
+
+
+def _tied(ties: Sequence[WrittenLaw]) -> str:
+    if not ties:
+        return ""
+    names = "; ".join(f"{tie.formula()} ({subject(tie)})" for tie in ties[:3])
+    return f" This design cannot distinguish it from: {names}."
+
+
+def law_layers(d: Discovery) -> list[Layer]:
+    """The laws as layers of a verdict."""
+    return [
+        Layer(
+            kind="law", name=" and ".join(f.law.columns), samples=_samples(f),
+            regimes=tuple(REGIMES) if f.law.regime == BOTH else (f.law.regime,), p_adjusted=f.p,
+            effect_percent=f.effect_percent[0], low=f.effect_percent[1], high=f.effect_percent[2],
+            parameters=f.parameters, formula=f.law.formula(), tied_with=tuple(t.formula() for t in f.ties),
+            gain=f.gain, text=law_sentence(f),
+        )
+        for f in d.laws
+    ]  # fmt: skip
+
+
+def _samples(f: FoundLaw) -> tuple[str, ...]:
+    c = f.model.setup.observations.conditions
+    return tuple(sorted({str(name) for name, w in zip(c.sample, f.law.weight(c), strict=True) if w != 0}))

@@ -1,0 +1,68 @@
+"""What tribo discover writes: laws, the table of scores, and the record of a test of a law."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tribo.diagnose.discovery.law_file import law_text
+from tribo.diagnose.discovery.law_words import discovery_text, law_layers, subject
+from tribo.report.provenance import Provenance, read_record, settle_outputs, write_provenance
+from tribo.report.result_tables import to_csv
+from tribo.store.whole_files import write_text
+
+if TYPE_CHECKING:
+    from tribo.diagnose.discovery.held import Held
+    from tribo.diagnose.discovery.search import Discovery
+
+SCHEMA, RECORD = "tribo.discovery/1", "discovery.json"
+
+
+@dataclass(frozen=True)
+class Written:
+    """What was written, as a record and in words."""
+
+    record: dict[str, Any]
+    text: str
+
+
+def write_discovery(d: Discovery, title: str, out: Path, provenance: Provenance) -> Written:
+    """law-1.toml and further laws, laws.csv (the best of all that were tried), discovery.json and provenance.json."""
+    import pandas as pd
+
+    text = discovery_text(d)
+    laws = {
+        f"law-{k}.toml": law_text(found.law, found.parameters, title) for k, found in enumerate(d.laws, start=1)
+    }
+    rows = [
+        {
+            "formula": s.law.formula(), "regime": s.law.regime, "where": s.law.where, "log_likelihood_gain": s.gain,
+            "net_of_choosing": s.net, "acts_on": subject(s.law),
+        }
+        for s in d.scored
+    ]  # fmt: skip
+    record: dict[str, Any] = {
+        "schema": SCHEMA, "text": text, "laws_tried": d.searched,
+        "layers": [asdict(layer) for layer in law_layers(d)], "ties": [f.n_ties for f in d.laws],
+    }  # fmt: skip
+    _write({**laws, "laws.csv": to_csv(pd.DataFrame(rows)), RECORD: _json(record)}, out, provenance)
+    return Written(record, text)
+
+
+def write_held(held: Held, out: Path, provenance: Provenance) -> Written:
+    """discovery.json of the test of one law, and provenance.json."""
+    record: dict[str, Any] = {"schema": SCHEMA, **asdict(held)}
+    _write({RECORD: _json(record)}, out, provenance)
+    return Written(record, held.text)
+
+
+def _json(record: dict[str, Any]) -> str:
+    return json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _write(texts: dict[str, str], out: Path, provenance: Provenance) -> None:
+    before = read_record(out)
+    written = [write_text(out / name, text) for name, text in texts.items()]
+    write_provenance(provenance, out, settle_outputs(out, before, provenance, written, complete=True))
