@@ -3,10 +3,11 @@
     python benchmarks/simulator_search.py runs FOLDER [VARIANT ...]
     python benchmarks/simulator_search.py table FOLDER docs/data
     python benchmarks/simulator_search.py rules docs/data
+    python benchmarks/simulator_search.py mesh docs/data
 
 ``runs`` keeps force against time of every run in FOLDER, at dt = 1e-7 s and with cavities resting below 1e-2, and goes
 on where it was stopped; ``table`` reads every window off them. ``rules`` runs the rules of rest of the reference engine
-on 12 x 12 blocks at the paper's time step.
+on 12 x 12 blocks at the paper's time step. ``mesh`` compares the found reading on half the mesh and on larger lattices.
 """
 
 from __future__ import annotations
@@ -54,7 +55,12 @@ RULES: dict[str, dict[str, Any]] = {
     "never": {"sticking": "never"},
     "slow 0.2 mm/s": {"sticking": "slow", "stick_speed_m_s": 2e-4},
     "slow 20 mm/s": {"sticking": "slow", "stick_speed_m_s": 2e-2},
+    "slow 2 mm/s": {"sticking": "slow", "stick_speed_m_s": 2e-3},
+    "slow 5 mm/s": {"sticking": "slow", "stick_speed_m_s": 5e-3},
+    "tested every 0.2 us": {"stick_interval_s": 2e-7},
+    "tested every 0.5 us": {"stick_interval_s": 5e-7},
     "tested every 1 us": {"stick_interval_s": 1e-6},
+    "tested every 2 us": {"stick_interval_s": 2e-6},
     "tested every 10 us": {"stick_interval_s": 1e-5},
 }
 
@@ -139,5 +145,22 @@ def rules(out: str) -> None:
     pd.DataFrame(rows).to_csv(Path(out) / "table2-rules.csv", index=False, float_format="%.3g")
 
 
+LATTICES = {"85, 5 um": (5e-6, 85), "170, 2.5 um": (2.5e-6, 170), "170, 5 um": (5e-6, 170), "340, 5 um": (5e-6, 340)}
+
+
+def mesh(out: str) -> None:
+    rows = []
+    for sample, (name, (spacing_m, blocks)) in product(NOMINAL, LATTICES.items()):
+        config = SimConfig(
+            sample=sample, pressure_Pa=3e3, angle_deg=NOMINAL[sample][0], seed=5, duration_peaks=1.5,
+            rest_tolerance=1e-2, sample_interval_s=2e-6, dt_s=0.01 * spacing_m,
+        )  # fmt: skip
+        run = simulate(config.of_reading("berardo2019").with_(spacing_m=spacing_m, blocks=(blocks, blocks)))
+        of = {"sample": sample, "lattice": name, "blocks": blocks, "spacing_um": 1e6 * spacing_m}
+        rows.append(of | {"static": run.static_friction, "sliding": run.sliding_friction})
+        print(rows[-1], flush=True)
+    pd.DataFrame(rows).to_csv(Path(out) / "table2-mesh.csv", index=False, float_format="%.5g")
+
+
 if __name__ == "__main__":
-    {"runs": runs, "table": table, "rules": rules}[sys.argv[1]](*sys.argv[2:])
+    {"runs": runs, "table": table, "rules": rules, "mesh": mesh}[sys.argv[1]](*sys.argv[2:])
