@@ -152,7 +152,8 @@ def test_a_forged_record_does_not_make_verify_read_outside_the_campaign(campaign
     names = ["../../elsewhere/secret-file.csv", str(elsewhere / "secret-file.csv"), "raw/link"]
     (campaign / "raw" / "link").symlink_to(elsewhere / "secret-file.csv")
     inputs = ", ".join(f'"{name}": "{digest}"' for name in names)
-    record = f'{{"campaign": "../drop/campaign", "inputs": {{{inputs}}}, "outputs": {{}}}}'
+    record = f'{{"campaign": "../drop/campaign", "inputs": {{{inputs}}}, "outputs": {{}}, "options": {{}}, '
+    record += '"versions": {}, "inputs_sha256": ""}'
     (out / "provenance.json").write_text(record)
     found = {d.file: d.status for d in verify(out).differences}
     assert {name: found.get(name) for name in names} == dict.fromkeys(names, "missing")

@@ -187,9 +187,10 @@ def test_a_plan_needs_the_loads_in_its_table(tmp_path: Path) -> None:
 
 
 def test_the_command_fits_a_log_of_strokes(tmp_path: Path) -> None:
-    write_campaign(tmp_path, [f"R{k},raw/F{k}.csv#*,F,F{k}," for k in (1, 2, 3)])
-    out = tmp_path / "out"
-    result = CliRunner().invoke(main, ["fit", str(tmp_path), "-o", str(out), "--rule", "middle_share", "--json"])
+    campaign, out = tmp_path / "campaign", tmp_path / "out"
+    campaign.mkdir()
+    write_campaign(campaign, [f"R{k},raw/F{k}.csv#*,F,F{k}," for k in (1, 2, 3)])
+    result = CliRunner().invoke(main, ["fit", str(campaign), "-o", str(out), "--rule", "middle_share", "--json"])
     assert result.exit_code == 0, result.stderr
     (sliding,) = (f for f in json.loads(result.stdout)["fits"] if f["regime"] == "sliding")
     assert sliding["mu"] == pytest.approx(MU, rel=0.02)

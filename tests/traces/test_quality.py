@@ -15,6 +15,7 @@ from tribo.errors import TraceError
 from tribo.records import Trace
 from tribo.traces import RULES, read_pull, read_pulls, split_pulls
 from tribo.traces.pull import _gap_at as gap_at
+from tribo.traces.whole_record import read_record
 
 from .synthetic import Shape, with_samples
 
@@ -216,3 +217,11 @@ def test_any_record_is_cut_into_pieces_in_order(force: list[float]) -> None:
     assert starts == sorted(starts)
     with suppress(TraceError):
         read_pulls(record)
+
+
+def test_a_record_whose_force_never_changes_is_a_dead_load_cell_and_not_steady_sliding() -> None:
+    trace = SHAPE.trace()
+    for force in (0.01, 2.0, -1.0):
+        with pytest.raises(TraceError) as faults:
+            read_record(replace(trace, force_N=np.full(trace.force_N.size, force)))
+        assert {p.kind for p in faults.value.problems} & {"stuck", "saturated", "stopped_before_peak"}

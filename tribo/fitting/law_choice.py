@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 HERTZ = 2.0 / 3.0  # exponent of a single elastic contact: T = tau A with A as N^(2/3)
 _FEWEST_LEVELS = 4
 _ROUNDS = 4
+_CONFIDENT = 1.96  # standard uncertainties of a 95 % interval
 _SMALLEST_SHARE = 0.05  # of the median force, below which no fitted force sets a weight or a ratio
 COLUMNS = ["sample", "regime", "law", "formula", "parameters", "a", "a_u", "b", "b_u", "held_out_percent", "se_percent",
            "loads", "chosen"]  # fmt: skip
@@ -98,9 +99,11 @@ def compared_laws(table: pd.DataFrame) -> pd.DataFrame:
 
     ``table`` is that of ``Ingested.table()``. The laws are fitted to the median force of each level, so that single
     odd tests do not decide. ``held_out_percent`` is the root mean square of ln T predicted over measured for the
-    levels left out one after another, ``se_percent`` its standard error over the levels. Chosen is the law with
-    the fewest parameters whose deviation lies within one standard error of the smallest (Breiman et al. 1984,
-    Classification and Regression Trees, section 3.4.3); of equally many parameters, the one that deviates less.
+    levels left out one after another, ``se_percent`` its standard error over the levels. Chosen is the law with the
+    fewest parameters that is worse than the best by no more than one standard error (after Breiman et al. 1984,
+    Classification and Regression Trees, section 3.4.3; here that of the difference, level by level); of equally many
+    parameters, the one that deviates less. A law that is a special case of the best one (an exponent of 2/3, no
+    intercept) is not chosen where the best one's own parameter excludes it with 95 % confidence.
     """
     import pandas as pd
 
@@ -113,14 +116,15 @@ def _compared(rows: Rows, regime: Regime) -> list[dict[str, object]]:
     load, force = _medians(rows)
     if load.size < _FEWEST_LEVELS or meant_to_be_one(load):
         return []
-    scores = {law.name: _held_out(law, load, force) for law in CANDIDATES}
-    chosen = choose(scores)
+    squares = {law.name: _held_out(law, load, force) for law in CANDIDATES}
+    excluded = {name for name in squares if _rejected(name, _best(squares), load, force)}
+    chosen = choose({name: found for name, found in squares.items() if name not in excluded})
     found = []
     for law in CANDIDATES:
         fitted = fit_candidate(law, load, force)
         a, b = (*fitted.values, math.nan)[:2]
         a_u, b_u = (*fitted.u, math.nan)[:2]
-        share, se = scores[law.name]
+        share, se = _root(squares[law.name])
         found.append(
             {"sample": rows.sample, "regime": regime, "law": law.name, "formula": law.formula,
              "parameters": law.parameters, "a": a, "a_u": a_u, "b": b, "b_u": b_u, "held_out_percent": 100 * share,
@@ -136,22 +140,49 @@ def _medians(rows: Rows) -> tuple[FloatArray, FloatArray]:
     return loads, np.array([float(np.median(rows.force_N[level == load])) for load in loads])
 
 
-def _held_out(law: Candidate, load_N: FloatArray, force_N: FloatArray) -> tuple[float, float]:
-    """Root mean square of ln T predicted over measured for the loads left out, and its standard error."""
+def _held_out(law: Candidate, load_N: FloatArray, force_N: FloatArray) -> FloatArray:
+    """Square of ln T predicted over measured for each load, the law fitted to the other loads."""
     squares = []
     for k in range(load_N.size):
         others = np.arange(load_N.size) != k
         predicted = float(fit_candidate(law, load_N[others], force_N[others]).force_N(load_N[k : k + 1])[0])
         squares.append(math.log(max(predicted / force_N[k], _SMALLEST_SHARE)) ** 2)
+    return np.array(squares)
+
+
+def _root(squares: FloatArray) -> tuple[float, float]:
+    """Root of the mean of squares, and its standard error."""
     root = math.sqrt(float(np.mean(squares)))
     spread = float(np.std(squares, ddof=1)) / math.sqrt(len(squares))
     return root, spread / (2.0 * root) if root > 0 else 0.0
 
 
-def choose(scores: dict[str, tuple[float, float]]) -> str:
-    """The simplest law within one standard error of the best."""
-    best = min(scores, key=lambda name: scores[name][0])
-    most = sum(scores[best])
+def _best(squares: dict[str, FloatArray]) -> str:
+    return min(squares, key=lambda name: float(squares[name].mean()))
+
+
+def _rejected(name: str, best: str, load_N: FloatArray, force_N: FloatArray) -> bool:
+    """Whether a law is the best one with a parameter at a value that the best one excludes with 95 % confidence."""
+    fixed = {("power", "constant"): (1, 0.0), ("power", "proportional"): (1, 1.0), ("power", "hertz"): (1, HERTZ),
+             ("linear", "proportional"): (1, 0.0), ("linear", "constant"): (0, 0.0)}.get((best, name))  # fmt: skip
+    if fixed is None:
+        return False
+    place, value = fixed
+    fitted = fit_candidate(next(law for law in CANDIDATES if law.name == best), load_N, force_N)
+    return abs(float(fitted.values[place]) - value) > _CONFIDENT * float(fitted.u[place])
+
+
+def choose(squares: dict[str, FloatArray]) -> str:
+    """The simplest law that predicts the loads left out no worse than the best by one standard error.
+
+    The standard error is that of the mean difference to the best law, level by level.
+    """
+    best = _best(squares)
     parameters = {law.name: law.parameters for law in CANDIDATES}
-    within = [name for name in scores if scores[name][0] <= most]
-    return min(within, key=lambda name: (parameters[name], scores[name][0]))
+
+    def no_worse(name: str) -> bool:
+        away = squares[name] - squares[best]
+        return float(away.mean()) <= float(away.std(ddof=1)) / math.sqrt(away.size)
+
+    within = [name for name in squares if no_worse(name)]
+    return min(within, key=lambda name: (parameters[name], float(squares[name].mean())))

@@ -25,7 +25,7 @@ FIGURES = "figures"
 CAMPAIGN_FILE = "campaign.toml"
 PRODUCTS = frozenset({
     "tests.csv", "fits.csv", "other_fits.csv", "budget.csv", "differences.csv", "comparison.csv", "campaign.nc",
-    "verdict.json", "report.html", "report.pdf", "ro-crate-metadata.json",
+    "verdict.json", "laws.csv", "dependence.csv", "restarts.csv", "discovery.json", "report.html", "report.pdf", "ro-crate-metadata.json",
 })  # fmt: skip
 OF_SYSTEMS = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 LEFTOVERS = (".part", ".lock")  # endings of hidden files that a killed process leaves

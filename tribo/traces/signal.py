@@ -18,7 +18,8 @@ SPIKE_OVER_NEIGHBOURS = 3.0
 SPIKE_RETURN = 0.5
 SPIKE_WIDTHS = (1, 2, 3)
 _NEIGHBOURS = 4
-_MOST_IMPULSES = 20  # more of them belong to the signal, as slips or as its own noise, and are left in it
+_MOST_LISTED = 20
+_MOST_IMPULSES = 20  # more of them belong to the signal, as slips or as its own noise, where they stay within its range
 _CHANCE_OF_FLAT_TOP = 1e-4
 _SHORTEST_FLAT_TOP = 4
 _SHORTEST_STANDSTILL = 20
@@ -32,8 +33,8 @@ _COARSE = 0.5  # share of equal neighbours from which on a resolution is too coa
 class Signal:
     """Force against time that can be read; arrays (n,) share the trace's samples.
 
-    No two samples share a time, and the force is free of impulses, which ``problems`` list; where there are many, they
-    belong to the signal and stay in it (``impulsive``). ``calm_N`` is the force
+    No two samples share a time, and the force is free of impulses, which ``problems`` list; where there are many within
+    the range of the force, they belong to the signal and stay in it (``impulsive``). ``calm_N`` is the force
     without what lasts one sample, ``smooth_N`` that smoothed, ``noise_N`` the noise of a sample. ``recorder_fault``
     says how the recorder failed, if it did. ``displacement_m`` is None where the trace has none.
     """
@@ -64,7 +65,7 @@ def signal_of(trace: Trace) -> Signal:
     raw = np.asarray(trace.force_N, float)
     noise = noise_of(raw)
     spikes = impulse_spikes(raw, noise)
-    if impulsive := bool(np.count_nonzero(spikes) > _MOST_IMPULSES):
+    if impulsive := belong_to_signal(raw, spikes):
         spikes = np.zeros(raw.size, bool)
     problems = spike_problems(trace, spikes)
     force = without_spikes(raw, spikes)
@@ -153,9 +154,9 @@ def _largest_beside(size: FloatArray, first: NDArray[np.int64], width: int) -> F
 
 
 def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ...]:
-    """One Problem of kind ``spike`` a spiked sample, with its row, time and value."""
+    """One Problem of kind ``spike`` a spiked sample, with its row and value; the last of many counts the rest."""
     at = np.flatnonzero(spikes)
-    return tuple(
+    problems = [
         Problem(
             "spike",
             f"a spike at {trace.time_s[k]:.6g} s; this data point is left out",
@@ -164,8 +165,24 @@ def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ..
             "force",
             f"{trace.force_N[k]:.6g} N",
         )
-        for k in at
-    )
+        for k in at[:_MOST_LISTED]
+    ]
+    if at.size > _MOST_LISTED:
+        what = f"{at.size - _MOST_LISTED} more spikes; these data points are left out"
+        problems.append(Problem("spike", what, trace.file or None, file_row(trace, int(at[_MOST_LISTED])), "force"))
+    return tuple(problems)
+
+
+def belong_to_signal(force: FloatArray, spikes: NDArray[np.bool_]) -> bool:
+    """Whether impulses are slips or noise of the contact: many, and most no larger than the force itself varies.
+
+    Friction cannot jump by more than its own range; a fault of the cable or the recorder can.
+    """
+    if np.count_nonzero(spikes) <= _MOST_IMPULSES:
+        return False
+    rest = without_spikes(force, spikes)
+    low, high = np.quantile(rest, (0.01, 0.99))
+    return bool(np.median(np.abs(force - rest)[spikes]) < high - low)
 
 
 def without_spikes(force: FloatArray, spikes: NDArray[np.bool_]) -> FloatArray:

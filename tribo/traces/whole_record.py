@@ -83,9 +83,9 @@ def read_record(
 def _read(trace: Trace, signal: Signal, course: Course, zero: Level | None, reading: Reading) -> Pull:
     whole = (0, signal.time_s.size)
     pieces = course.pieces
-    if course.slides_at_once:
+    if course.slides_at_once and pieces[0][1] - pieces[0][0] >= min(_FEWEST, signal.time_s.size):
         first = _sliding_from(signal, pieces[0], zero, reading)
-    elif pieces[0] == whole:
+    elif course.slides_at_once or pieces[0] == whole or pieces[0][1] < _FEWEST:
         first = pull_of(signal, reading.asked(zero))
     else:
         start = 0 if zero is None else course.contact[0]
@@ -105,9 +105,11 @@ def _sliding_from(signal: Signal, span: Range, zero: Level | None, reading: Read
     Raises
     ------
     TraceError
-        ``too_short``, ``sign_flipped``.
+        ``too_short``, ``sign_flipped``; ``stuck`` or ``saturated`` where the recorder failed.
     """
     first, last = span
+    if signal.recorder_fault is not None:
+        raise TraceError([signal.recorder_fault, *signal.problems])
     if last - first < _FEWEST:
         what = f"only {last - first} data points of sliding"
         raise TraceError(Problem("too_short", what, allowed=f"{_FEWEST} data points or more"))

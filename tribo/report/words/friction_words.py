@@ -62,7 +62,8 @@ def _laws(study: Study) -> Iterator[str]:
         yield (
             f"{str(regime).capitalize()} friction of {sample} is described best by {chosen['formula']} with "
             f"{_values(chosen)}: loads left out of the fit are predicted to within {_deviation(chosen)}. The other "
-            f"laws: {others}. Chosen is the law with the fewest parameters within one standard error of the best."
+            f"laws: {others}. Chosen is the law with the fewest parameters that is worse than the best by no more than "
+            "one standard error, and that the parameters of the best do not exclude."
         )
 
 
