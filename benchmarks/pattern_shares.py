@@ -61,6 +61,7 @@ def errors(data: str, out: str) -> None:
         "made by": f"{COMMAND} errors",
         "columns": "standard deviations of ln T; slope per e-fold of pressure, curve per squared e-fold",
         "left out": left_out,
+        "reading of the paper": "text, and the variants of it that docs/data/table2-study.csv holds",
     }
     table = pattern_error.sizes(found)
     write_table(table, Path(out) / "errors.csv", words, digits="%.4g")

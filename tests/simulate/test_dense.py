@@ -113,7 +113,7 @@ def test_loops_over_all_blocks_use_vector_instructions(loop):
     """Were sums not allowed to be reordered, or a branch to creep in, one block would be done at a time."""
     array, number = types.float64[::1], types.float64
     arrays = 8 if loop is dense.pushed else 10
-    rest = (number,) * 5 if loop is dense.pushed else (number, number, number, types.none)
+    rest = (number,) * 5 if loop is dense.pushed else (number, number, number, types.none, types.none)
     fresh = njit(error_model="numpy", **VECTOR_OPTIONS)(loop.py_func)
     fresh.compile((array,) * arrays + rest)
     assembly = next(iter(fresh.inspect_asm().values()))

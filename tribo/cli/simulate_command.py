@@ -43,6 +43,11 @@ _RUNS = (
         "--duration", "duration_ms", type=float, help="Duration of a run in ms.  [default: 3 x time of the peak]",
     ),
     click.option("--engine", help="Engine: fast, dense or reference.  [default: fast]"),
+    click.option(
+        "--reading", type=click.Choice(["text", "berardo2019"]),
+        help="Reading of the paper where its text leaves a choice: text, its letter; berardo2019, the one closest to "
+        "its simulated column of Table 2.  [default: text]",
+    ),
 )  # fmt: skip
 
 

@@ -11,11 +11,14 @@ from tribo.errors import Problem, SimulationError
 from tribo.limits import LARGEST_NUMBER, MOST_BLOCKS, MOST_STEPS, SMALLEST_NUMBER
 from tribo.records import Pattern
 from tribo.simulate.masks import contact_mask, pattern_of
+from tribo.simulate.readings import OPEN_CHOICES, READINGS, reading_of
 
 NormalForce = Literal["redistributed", "uniform"]
 Edges = Literal["free", "periodic"]
 Engine = Literal["fast", "dense", "reference"]
 Rotation = Literal["small", "finite"]
+Sticking = Literal["turned", "slow", "never"]
+BlockMass = Literal["layer", "cube"]
 
 
 @dataclass(frozen=True)
@@ -82,8 +85,17 @@ class SimConfig:
         Draws the local friction. Equal seeds give equal numbers on every sample.
     terms
         What changes the local friction during the run; nothing by default.
+    restrengthening
+        Share, 0 to 1, of the excess of static over sliding friction that a block regains once it has slipped: 1, it
+        sticks as firmly as before; 0, it keeps its sliding threshold.
+    sticking, stick_speed_m_s, stick_interval_s
+        When a sliding block comes to rest: "turned", once a step turns its velocity by more than 90 degrees; "slow",
+        once it is slower than ``stick_speed_m_s``; "never", friction follows the velocity at every stage of a step.
+        Tested every ``stick_interval_s``, at every step by default. Only the reference engine has others than "turned".
     blocks, spacing_m, thickness_m
         Blocks along x and y, their distance l, and the layer thickness l_z (l by default).
+    block_mass
+        "layer": rho l2 l_z; "cube": rho l3, as printed. They differ only where l_z is not l.
     shear_factor
         K_s over K_int (l / l_z)^2. The paper prints 1; G = 3/8 E would give 0.5.
     normal_force
@@ -114,9 +126,14 @@ class SimConfig:
     pattern: Pattern | None = None
     friction: LocalFriction = PAPER
     terms: FrictionTerms = NO_TERMS
+    restrengthening: float = 1.0
+    sticking: Sticking = "turned"
+    stick_speed_m_s: float = 2e-4
+    stick_interval_s: float | None = None
     blocks: tuple[int, int] = (85, 85)
     spacing_m: float = 5e-6
     thickness_m: float | None = None
+    block_mass: BlockMass = "layer"
     modulus_Pa: float = 0.8e6
     density_kg_m3: float = 1012.0
     damping_per_s: float = 5e5
@@ -142,6 +159,15 @@ class SimConfig:
         """A copy with some fields changed."""
         return replace(self, **changes)
 
+    def of_reading(self, name: str) -> SimConfig:
+        """A copy with every open choice as the named reading of the paper has it; KeyError for an unknown name."""
+        return replace(self, **(OPEN_CHOICES | READINGS[name]))
+
+    @property
+    def reading(self) -> str:
+        """Name of the reading of the paper that this configuration follows: text, berardo2019, or own."""
+        return reading_of({name: getattr(self, name) for name in OPEN_CHOICES})
+
     @property
     def cavities(self) -> Pattern:
         """The pattern of this run; raises SimulationError where neither pattern nor sample names one."""
@@ -166,7 +192,8 @@ class SimConfig:
 
     @property
     def mass_kg(self) -> float:
-        return self.density_kg_m3 * self.spacing_m**2 * self.layer_m
+        height_m = self.spacing_m if self.block_mass == "cube" else self.layer_m
+        return self.density_kg_m3 * self.spacing_m**2 * height_m
 
     @property
     def normal_load_N(self) -> float:
@@ -197,6 +224,7 @@ class SimConfig:
                 flat |= {f"{name}_{k}": v for k, v in value.items()}
             elif value is not None:
                 flat[name] = value
+        flat["reading"] = self.reading
         pattern = self.cavities
         flat["pattern"] = pattern.name
         flat["cavity"] = pattern.cavity
@@ -215,6 +243,7 @@ def _unknown_sample(sample: str) -> Problem:
 
 
 _POSITIVE = (
+    "stick_speed_m_s", "stick_interval_s",
     "pressure_Pa", "spacing_m", "thickness_m", "modulus_Pa", "density_kg_m3", "speed_m_s", "shear_factor", "dt_s",
     "duration_s", "sample_interval_s", "rest_tolerance",
 )  # fmt: skip
@@ -226,6 +255,8 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "rotation": ("small", "finite"),
     "engine": ("fast", "dense", "reference"),
     "peak_rule": ("highest", "first"),
+    "block_mass": ("layer", "cube"),
+    "sticking": ("turned", "slow", "never"),
 }
 _ABOVE = {"duration_peaks": 1.0, "window_start_peaks": 1.0, "window_end_peaks": 1.0}
 
@@ -242,6 +273,7 @@ def _problems(config: SimConfig) -> Iterator[Problem]:
         *_choice_problems(config),
         *_friction_problems(config.friction),
         *_term_problems(config),
+        *_sticking_problems(config),
     ]
     yield from faults
     faulty = {problem.column for problem in faults}
@@ -268,6 +300,18 @@ def _problems(config: SimConfig) -> Iterator[Problem]:
             "unsupported", "the fast engine requires linear forces", column="rotation",
             found="finite", allowed="rotation small, or engine dense or reference",
         )  # fmt: skip
+
+
+def _sticking_problems(config: SimConfig) -> Iterator[Problem]:
+    """Only the reference engine has rules of sticking other than the default."""
+    if config.engine == "reference":
+        return
+    for name, found in (("sticking", config.sticking), ("stick_interval_s", config.stick_interval_s)):
+        if found not in ("turned", None):
+            yield Problem(
+                "unsupported", f"the {config.engine} engine supports only the default", column=name,
+                found=str(found), allowed="the default, or engine reference",
+            )  # fmt: skip
 
 
 def _term_problems(config: SimConfig) -> Iterator[Problem]:
@@ -316,6 +360,10 @@ def _number_problems(config: SimConfig) -> Iterator[Problem]:
             )  # fmt: skip
     if not (isinstance(config.seed, int) and config.seed >= 0):
         yield Problem("seed", "not a seed", column="seed", found=str(config.seed), allowed="a whole number >= 0")
+    if not 0 <= config.restrengthening <= 1:
+        yield Problem(
+            "share", "not a fraction", column="restrengthening", found=f"{config.restrengthening:g}", allowed="0 to 1"
+        )
     if not 0 < config.peak_drop < 1:
         yield Problem("share", "not a fraction", column="peak_drop", found=f"{config.peak_drop:g}", allowed="0 to 1")
 

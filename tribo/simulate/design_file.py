@@ -4,9 +4,10 @@ A design is a table, in TOML or JSON::
 
     samples = ["F", "B", "G"]
     pressures_kPa = [3, 10, 25]
-    angles_deg = "midpoints"          # or "random" within strata, or a list of degrees
+    angles_deg = "midpoints"          # or "random" within strata, "nominal", or a list of degrees
     repeats = 4
     seed = 0
+    reading = "text"                  # of the paper, or "berardo2019", the one closest to its Table 2
 
     [parameters]                      # any field of SimConfig, LocalFriction or FrictionTerms, in SI units
     dt_s = 5e-8
@@ -28,7 +29,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator
 
@@ -39,7 +40,8 @@ from tribo.input_files import nests_too_deeply, read_input
 from tribo.limits import DEEPEST_NESTING, LARGEST_DESCRIPTION_BYTES, MOST_RUNS
 from tribo.records import Pattern
 from tribo.simulate.config import FrictionTerms, LocalFriction, SimConfig
-from tribo.simulate.ensemble import angle_range_deg, check_all, stratified_design
+from tribo.simulate.ensemble import AngleRule, angle_range_deg, check_all, middle_deg, stratified_design
+from tribo.simulate.readings import ANGLES
 from tribo.simulate.table2_column import PRESSURES_PA, SAMPLES
 
 DESIGNED = {"sample", "pattern", "pressure_Pa", "angle_deg", "seed", "friction", "terms"}
@@ -54,17 +56,19 @@ class DesignTable(BaseModel):
     samples: Annotated[list[str], Field(min_length=1, description="a list of names, at least one")]
     pressures_kPa: Annotated[list[float], Field(min_length=1, description="a list of numbers in kPa, at least one")]
     angles_deg: Annotated[
-        list[float] | str, Field(description="midpoints, random, or a list of degrees", union_mode="left_to_right")
-    ] = "midpoints"
+        list[float] | str | None,
+        Field(description="midpoints, random, nominal, or a list of degrees", union_mode="left_to_right"),
+    ] = None
     repeats: Annotated[int, Field(ge=1, description="a whole number, 1 or more")] = 4
     seed: Annotated[int, Field(ge=0, lt=2**63, description="a whole number, 0 or more, below 2^63")] = 0
+    reading: Annotated[Literal["text", "berardo2019"], Field(description="text or berardo2019")] = "text"
     parameters: Annotated[dict[str, Any], Field(description="a table of parameters")] = {}
     patterns: Annotated[dict[str, PatternTable], Field(description="tables as in campaign.toml")] = {}
 
     @field_validator("angles_deg")
     @classmethod
-    def _known_rule(cls, angles: list[float] | str) -> list[float] | str:
-        if angles not in ("midpoints", "random") and (isinstance(angles, str) or not angles):
+    def _known_rule(cls, angles: list[float] | str | None) -> list[float] | str | None:
+        if angles not in (*get_args(AngleRule), None) and (isinstance(angles, str) or not angles):
             raise ValueError("unknown rule for the angles")
         return angles
 
@@ -124,8 +128,8 @@ def runs_of_design(table: Mapping[str, Any], file: str | None = None) -> list[Si
             [1e3 * p for p in design.pressures_kPa],
             design.repeats,
             design.seed,
-            _with_parameters(SimConfig(), dict(zip(axes, combination, strict=True))),
-            design.angles_deg,  # type: ignore[arg-type]
+            _with_parameters(SimConfig().of_reading(design.reading), dict(zip(axes, combination, strict=True))),
+            design.angles_deg or ANGLES[design.reading],  # type: ignore[arg-type]
         )
     ]
     try:
@@ -158,11 +162,11 @@ def described_by_options(options: Mapping[str, Any], seed: int, table2: bool) ->
         parameters["duration_s"] = 1e-3 * options["duration_ms"]
     lists = [samples, pressures, options["angles_deg"], *(v for n, v in parameters.items() if is_axis(n, v))]
     one = not table2 and options["repeats"] is None and all(len(values) <= 1 for values in lists)
-    angles = list(options["angles_deg"]) or ([nominal_deg(samples[0])] if one else "midpoints")
+    angles = list(options["angles_deg"]) or ([middle_deg(angle_range_deg(samples[0]))] if one else None)
     repeats = (1 if one else 20 if table2 else 4) if options["repeats"] is None else options["repeats"]
     return one, {
         "samples": samples, "pressures_kPa": pressures, "angles_deg": angles, "repeats": repeats, "seed": seed,
-        "parameters": parameters,
+        "parameters": parameters, "reading": options.get("reading") or "text",
     }  # fmt: skip
 
 
@@ -170,12 +174,6 @@ def asked_runs(described: Mapping[str, Any], own_seed: int | None) -> list[SimCo
     """The runs of a described design; a single run has the given seed itself, not one derived from it."""
     runs = runs_of_design(described)
     return runs if own_seed is None else [run.with_(seed=own_seed) for run in runs]
-
-
-def nominal_deg(sample: str) -> float:
-    """The direction a sample is named after, 0 where it is named after none."""
-    low, high = angle_range_deg(sample)
-    return 0.0 if (low, high) == (0.0, 90.0) else (low + high) / 2
 
 
 def together(*parts: Callable[[], Any]) -> tuple[Any, ...]:

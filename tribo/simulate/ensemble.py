@@ -19,7 +19,7 @@ from tribo.simulate.run import simulate
 if TYPE_CHECKING:
     import pandas as pd
 
-AngleRule = Literal["midpoints", "random"]
+AngleRule = Literal["midpoints", "random", "nominal"]
 Angles = AngleRule | Sequence[float]
 Progress = Callable[[int, int], None]
 ANGLE_SPREAD_DEG = 10.0  # around the nominal direction of an anisotropic sample (Berardo 2019)
@@ -39,6 +39,12 @@ def angle_range_deg(sample: str, pattern: Pattern | None = None) -> tuple[float,
     return 0.0, 90.0
 
 
+def middle_deg(limits_deg: tuple[float, float]) -> float:
+    """The direction a sample is named after, from its range of angles; 0 where it is named after none."""
+    low, high = limits_deg
+    return 0.0 if (low, high) == (0.0, 90.0) else (low + high) / 2
+
+
 def run_seed(seed: int, sample: str, pressure_Pa: float, repeat: int) -> int:
     """Seed of one run, from what the run is and not from its place in the list."""
     case = zlib.crc32(f"{sample} {pressure_Pa:.9g}".encode())
@@ -56,8 +62,9 @@ def stratified_design(
     """Configurations of an ensemble: every sample at every pressure, ``repeats`` times.
 
     The angle range of a sample is cut into as many strata as there are repeats. Each stratum has one angle: its
-    midpoint, which gives the best average over the uniform distribution of the paper, or a random one. If angles are
-    given in degrees, each is simulated ``repeats`` times instead.
+    midpoint, which gives the best average over the uniform distribution of the paper, or a random one. With "nominal",
+    every run is pulled in the direction of the sample's name, or along x. If angles are given in degrees, each is
+    simulated ``repeats`` times instead.
 
     Parameters
     ----------
@@ -87,6 +94,8 @@ def _angles_deg(
     if not isinstance(angles, str):
         return [float(angle) for angle in angles for _ in range(repeats)]
     low, high = limits_deg
+    if angles == "nominal":
+        return [middle_deg(limits_deg)] * repeats
     within = [0.5 if angles == "midpoints" else np.random.default_rng([own, 1]).random() for own in seeds]
     return [float(low + (high - low) * (k + share) / repeats) for k, share in enumerate(within)]
 

@@ -81,6 +81,7 @@ def origin(design: Sequence[SimConfig], seed: int, sources: str) -> dict[str, st
     return {
         "runs": f"{len(design)}, {per_point} at each pressure for each sample",
         "seed": str(seed),
+        "reading of the paper": first.reading,
         "time step": f"{first.dt_s:g} s, cavity blocks rest below {first.rest_tolerance:g} of the sliding threshold",
         "blocks": f"{first.blocks[0]} x {first.blocks[1]}, {first.spacing_m / UM:g} um apart",
         "pressures": ", ".join(f"{p / 1e3:g}" for p in pressures) + " kPa",

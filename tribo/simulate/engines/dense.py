@@ -21,8 +21,9 @@ from tribo.simulate.engines.kernels import CODE, DENSE_STEPS, RUNNING, STEP, Num
 from tribo.simulate.engines.lattice import INNER, OFFSETS, Lattice
 from tribo.simulate.friction import sliding_threshold, static_threshold
 
-# rows of Field.planes: m v / dt and its amount (zero at rest), thresholds, time of the last stop
-PX, PY, PACE, FS, FD, SINCE, PLANES = range(7)
+# rows of Field.planes: m v / dt and its amount (zero at rest), thresholds (static now, sliding), time of the last
+# stop, static threshold after a slip
+PX, PY, PACE, FS, FD, SINCE, FA, PLANES = range(8)
 
 
 LINE, PAGE = 8, 512  # numbers in a cache line, and in the bytes after which cache sets repeat
@@ -71,7 +72,9 @@ def field_of(state: State, numerics: Numerics, lattice: Lattice, follow: FloatAr
     planes[PX : PY + 1, inside] = (cells[:, k.VX : k.VY + 1] + follow).T * (numerics.mass / numerics.dt)
     planes[PACE] = np.hypot(planes[PX], planes[PY])
     planes[FS] = np.inf
-    planes[FS, inside], planes[FD, inside], planes[SINCE, inside] = cells[:, [k.FS, k.FD, k.SINCE]].T
+    planes[FA] = np.inf
+    for row, column in ((FS, k.FS), (FD, k.FD), (SINCE, k.SINCE), (FA, k.FA)):
+        planes[row, inside] = cells[:, column]
     inner = numerics.stiffness * np.add(INNER, (lattice.shear, lattice.shear, 0.0))
     spare = inner - cells[:, k.KXX : k.KXY + 1]
     edge = np.flatnonzero(np.abs(spare).max(axis=1) > 1e-9 * numerics.stiffness)
@@ -121,6 +124,7 @@ def put_back(
         cells[:, k.QX : k.QY + 1] = newest[:, inside].T - follow * now
         cells[:, k.VX : k.VY + 1] = field.planes[PX : PY + 1, inside].T * (numerics.dt / numerics.mass) - follow
         cells[:, k.SINCE] = field.planes[SINCE, inside]
+        cells[:, k.FS] = field.planes[FS, inside]
         drag = -numerics.mass * numerics.damping * follow
         force = numerics.stiffness * lattice.spring_forces(cells[:, k.QX : k.QY + 1]) + drag
         cells[:, k.GX : k.GY + 1] = force
@@ -141,6 +145,7 @@ def integrate(f: Field, s: State, out: Samples, c: Numerics, until_step: int) ->
     first, last, width = f.layout.first, f.layout.last, f.layout.width
     p_x, p_y, pace = f.planes[PX, first:last], f.planes[PY, first:last], f.planes[PACE, first:last]
     fs, fd, since = f.planes[FS, first:last], f.planes[FD, first:last], f.planes[SINCE, first:last]
+    again = None if c.weakens is None else f.planes[FA, first:last]
     own = 12.0 + 4.0 * c.shear_stiffness / c.stiffness
     way = c.dt * c.dt / c.mass
     rest = c.rest_force * math.sqrt(c.mass / c.stiffness) / c.dt
@@ -162,7 +167,7 @@ def integrate(f: Field, s: State, out: Samples, c: Numerics, until_step: int) ->
             free_edges(f, x, y)
         sum_x, sum_y, squares, work = rubbed(
             x[first:last], y[first:last], f.positions[after, first:last], f.positions[after + 1, first:last],
-            p_x, p_y, pace, fs, fd, since, t, way, c.dt / c.mass, c.law,
+            p_x, p_y, pace, fs, fd, since, t, way, c.dt / c.mass, c.law, again,
         )  # fmt: skip
         swapped = not swapped
         s.totals[k.ALONG] += way * (sum_x * c.direction_x + sum_y * c.direction_y) - f.follow
@@ -272,6 +277,7 @@ def rubbed(
     way: float,
     speed_of: float,
     law: FloatArray | None,
+    again: FloatArray | None,
 ) -> tuple[float, float, float, float]:
     """Friction and displacement of all blocks: :func:`tribo.simulate.engines.kernels.kick` in N, without a branch.
 
@@ -315,6 +321,8 @@ def rubbed(
         p_y[i] = 0.0 if stops else b
         if law is not None:
             since[i] = t if stops else since[i]
+        if again is not None:
+            fs[i] = again[i] if rubs & (length > 0.0) else fs[i]
     return sum_x, sum_y, squares, work
 
 

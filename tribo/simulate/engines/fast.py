@@ -22,10 +22,14 @@ _DENSE_SHARE = 0.15  # share of active blocks from which integrating all of them
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Largest static and sliding friction force of every block in N; zero on cavities. Shape (n,)."""
+    """Largest static and sliding friction force of every block in N; zero on cavities. Shape (n,).
+
+    ``again_N`` is the static threshold of a block that has slipped before; None where it is ``static_N``.
+    """
 
     static_N: FloatArray
     sliding_N: FloatArray
+    again_N: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -83,10 +87,11 @@ def thresholds_of(config: SimConfig, lattice: Lattice) -> Thresholds:
         total = np.maximum(mean + sd * draw, 0.0) * normal + adhesion_Pa * area
         return np.where(lattice.contact, np.maximum(total, 0.0), 0.0)
 
-    return Thresholds(
-        force(f.mu_s, f.mu_s_sd, static, f.static_adhesion_Pa),
-        force(f.mu_d, f.mu_d_sd, sliding, f.sliding_adhesion_Pa),
-    )
+    holding = force(f.mu_s, f.mu_s_sd, static, f.static_adhesion_Pa)
+    rubbing = force(f.mu_d, f.mu_d_sd, sliding, f.sliding_adhesion_Pa)
+    if config.restrengthening == 1.0:
+        return Thresholds(holding, rubbing)
+    return Thresholds(holding, rubbing, rubbing + config.restrengthening * np.maximum(holding - rubbing, 0.0))
 
 
 def drive_of(config: SimConfig, lattice: Lattice) -> Drive:
@@ -187,6 +192,7 @@ def _numerics(
         peak_drop=config.peak_drop,
         dense_above=-1 if config.engine == "dense" else int(_DENSE_SHARE * n),
         law=packed(config.terms),
+        weakens=None if thresholds.again_N is None else 1,
     )
 
 
@@ -201,6 +207,7 @@ def _initial_state(
     cells[:n, k.RX : k.RY + 1] = drive.rate
     cells[:n, k.QX : k.QY + 1] = drive.lag
     cells[:n, k.FS], cells[:n, k.FD] = thresholds.static_N, thresholds.sliding_N
+    cells[:n, k.FA] = thresholds.static_N if thresholds.again_N is None else thresholds.again_N
     cells[:, k.KXX : k.KXY + 1] = config.stiffness_N_m * lattice.own
     cells[:, k.SINCE] = -config.terms.hold_s
     links = np.zeros((n + 1, k.LINKS), np.int64)

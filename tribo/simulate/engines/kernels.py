@@ -24,9 +24,9 @@ from tribo.simulate.friction import sliding_threshold, static_threshold
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-# columns of State.cells: force G, its rate R, displacement q, velocity, thresholds, own stiffness, time of the
-# last stop, whether it stops in this step
-GX, GY, RX, RY, QX, QY, VX, VY, FS, FD, KXX, KYY, KXY, SINCE, STOPS, WIDTH = range(16)
+# columns of State.cells: force G, its rate R, displacement q, velocity, thresholds (static now, sliding, static
+# after a slip), own stiffness, time of the last stop, whether it stops in this step
+GX, GY, RX, RY, QX, QY, VX, VY, FS, FD, KXX, KYY, KXY, SINCE, STOPS, FA, WIDTH = range(17)
 # columns of State.links: contact block or cavity, state, number of active neighbours, position in its list,
 # and the failure queue (bucket, the blocks before and after it there)
 CONTACT, STATUS, TOUCHED, PLACE, BUCKET, BEFORE, AFTER, LINKS = range(8)
@@ -84,6 +84,7 @@ class Numerics(NamedTuple):
     peak_drop: float  # the first peak is found once the force has fallen by this share
     dense_above: int  # active blocks above which all blocks are integrated
     law: FloatArray | None  # parameters of the friction terms; None compiles to a loop without them
+    weakens: int | None  # None if a block that has slipped holds as much as before
 
 
 @compiled
@@ -158,6 +159,7 @@ def activate(i: int, s: State) -> None:
     s.links[i, PLACE] = s.counts[N_ACTIVE]
     s.lists[0, s.counts[N_ACTIVE]] = i
     s.counts[N_ACTIVE] += 1
+    s.cells[i, FS] = s.cells[i, FA]
     if s.links[i, CONTACT] and s.counts[N_FAILED] < s.failed.shape[1]:
         s.failed[0, s.counts[N_FAILED]] = i
         s.failed[1, s.counts[N_FAILED]] = s.counts[STEP]

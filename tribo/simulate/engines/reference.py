@@ -10,7 +10,7 @@ the text gives no details, these choices were made:
   keeps that direction for the four stages. Taken anew at each stage it flips within the last step of a slip,
   averages out, and blocks hover instead of stopping; the energy balance then fails by a factor.
 - A sliding block comes to rest when a step turns its velocity by more than a right angle. Its position stays
-  that of the step; its velocity becomes zero.
+  that of the step; its velocity becomes zero. Other rules (``sticking``) replace this one on request.
 - Cavity blocks feel no friction and never stick.
 - A run starts at a given share of the first failure, the contact blocks unmoved and the cavities at their
   quasi-static displacement and velocity; what finite rotation adds to that dies out within microseconds.
@@ -48,6 +48,14 @@ class Model(NamedTuple):
     damping: float
     velocity: FloatArray  # (2,) of the slider
     finite: bool
+    again: FloatArray  # (n,): static threshold of a block that has slipped
+    rule: int  # when a sliding block comes to rest: TURNED, SLOW or NEVER
+    slow: float  # m/s, for SLOW
+    test_every: int  # steps between two tests for rest
+
+
+RULES = ("turned", "slow", "never")
+TURNED, SLOW, NEVER = range(len(RULES))
 
 
 class State(NamedTuple):
@@ -115,11 +123,23 @@ def driving_force(u: FloatArray, t: float, m: Model, out: FloatArray) -> None:
 
 
 @compiled
+def oppose(v: FloatArray, driving: FloatArray, m: Model, friction: FloatArray) -> None:
+    """Sliding friction of every block against its velocity, or against its driving force where it has none."""
+    for i in range(len(v)):
+        along = v[i] if v[i, 0] != 0.0 or v[i, 1] != 0.0 else driving[i]
+        amount = math.sqrt(along[0] * along[0] + along[1] * along[1])
+        for d in range(2):
+            friction[i, d] = -m.sliding[i] * (along[d] / amount if amount > 0.0 else 0.0)
+
+
+@compiled
 def acceleration(
     u: FloatArray, v: FloatArray, t: float, resting: NDArray[np.bool_], friction: FloatArray, m: Model, a: FloatArray
 ) -> None:
     """m a = F_mot + F_d + F_fr of every block; none for blocks at rest."""
     driving_force(u, t, m, a)
+    if m.rule == NEVER:
+        oppose(v, a, m, friction)
     for i in range(len(u)):
         for d in range(2):
             a[i, d] = 0.0 if resting[i] else (a[i, d] + friction[i, d]) / m.mass - m.damping * v[i, d]
@@ -135,6 +155,7 @@ def decide_friction(
         driving = math.sqrt(friction[i, 0] * friction[i, 0] + friction[i, 1] * friction[i, 1])
         if resting[i] and driving > m.static[i]:
             resting[i] = False
+            m.static[i] = m.again[i]
             n = int(rec.sums[N_FAILED])
             if n < len(rec.failed):
                 rec.failed[n] = i
@@ -178,15 +199,25 @@ def runge_kutta(
 
 
 @compiled
-def finish_step(state: State, t: float, dt: float, m: Model, new_v: FloatArray, rec: Record) -> None:
-    """Stop the blocks that turned round, and add up force, friction work and viscous work of the step."""
+def comes_to_rest(v: FloatArray, new_v: FloatArray, m: Model) -> bool:
+    """Whether a block of velocity v before and new_v after a step stops, by the rule of the run."""
+    if m.rule == NEVER:
+        return False
+    if m.rule == SLOW:
+        return new_v[0] * new_v[0] + new_v[1] * new_v[1] < m.slow * m.slow
+    return v[0] * new_v[0] + v[1] * new_v[1] < 0.0
+
+
+@compiled
+def finish_step(state: State, t: float, dt: float, m: Model, new_v: FloatArray, rec: Record, tested: bool) -> None:
+    """Stop blocks where ``tested``, and add up force, friction work and viscous work of the step."""
     u, v, resting = state.u, state.v, state.resting
     force_x = 0.0
     force_y = 0.0
     for i in range(len(u)):
         if not resting[i]:
             before = math.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
-            if m.contact[i] and v[i, 0] * new_v[i, 0] + v[i, 1] * new_v[i, 1] < 0.0:
+            if tested and m.contact[i] and comes_to_rest(v[i], new_v[i], m):
                 resting[i] = True
                 new_v[i, 0] = 0.0
                 new_v[i, 1] = 0.0
@@ -215,7 +246,7 @@ def integrate_all(state: State, steps: Steps, m: Model, w: FloatArray, rec: Reco
         t = steps.start + step * dt
         decide_friction(state.u, state.v, t, m, state.resting, w[9], rec)
         runge_kutta(state.u, state.v, t, dt, state.resting, m, w)
-        finish_step(state, t, dt, m, w[8], rec)
+        finish_step(state, t, dt, m, w[8], rec, (step + 1) % m.test_every == 0)
         if (step + 1) % steps.stride == 0:
             rec.time[samples] = t + dt
             rec.force[samples] = rec.sums[FORCE]
@@ -236,7 +267,7 @@ def reference_model(config: SimConfig, lattice: Lattice, thresholds: Thresholds)
         neighbours=lattice.neighbours,
         rest=config.spacing_m * np.column_stack([offsets, lengths]),
         springs=config.stiffness_N_m * np.where(lengths > 1.0, 0.5, 1.0),
-        static=thresholds.static_N,
+        static=thresholds.static_N.copy(),
         sliding=thresholds.sliding_N,
         contact=lattice.contact,
         shear_stiffness=config.shear_stiffness_N_m,
@@ -244,6 +275,10 @@ def reference_model(config: SimConfig, lattice: Lattice, thresholds: Thresholds)
         damping=config.damping_per_s,
         velocity=drive.velocity,
         finite=config.rotation == "finite",
+        again=thresholds.static_N if thresholds.again_N is None else thresholds.again_N,
+        rule=RULES.index(config.sticking),
+        slow=config.stick_speed_m_s,
+        test_every=max(1, round((config.stick_interval_s or 0.0) / config.dt_s)),
     )
 
 

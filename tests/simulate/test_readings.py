@@ -1,0 +1,57 @@
+"""Named readings of the paper: what they set, and that every file says which one it holds."""
+
+from __future__ import annotations
+
+import pytest
+
+from tribo.errors import SimulationError
+from tribo.simulate import SimConfig, stratified_design
+from tribo.simulate.design_file import runs_of_design
+from tribo.simulate.readings import ANGLES, OPEN_CHOICES, READINGS
+
+DESIGN = {"samples": ["A", "Sy"], "pressures_kPa": [5.0], "repeats": 2}
+
+
+def test_the_default_is_the_letter_of_the_text():
+    """The open choices of the reading "text" are the defaults of a configuration."""
+    assert {name: getattr(SimConfig(), name) for name in OPEN_CHOICES} == OPEN_CHOICES
+    assert SimConfig().reading == SimConfig().of_reading("text").reading == "text"
+
+
+def test_every_reading_is_named_in_the_parameters_of_its_runs():
+    """A change of any open choice makes the reading the user's own; other changes do not."""
+    assert ANGLES.keys() == READINGS.keys()
+    for name in READINGS:
+        config = SimConfig(sample="B", dt_s=2e-8).of_reading(name).check()
+        assert config.parameters()["reading"] == name
+        assert config.with_(seed=5, pressure_Pa=3e3).reading == name
+        assert config.with_(shear_factor=0.9).reading == "own"
+
+
+def test_a_reading_replaces_every_open_choice():
+    """What was set before does not remain."""
+    assert SimConfig(edges="periodic", restrengthening=0.7).of_reading("text") == SimConfig()
+
+
+def test_a_design_takes_choices_and_angles_of_its_reading():
+    """Parameters and angles that the design gives itself come first."""
+    runs = runs_of_design(DESIGN | {"reading": "berardo2019"})
+    assert {run.reading for run in runs} == {"berardo2019"}
+    assert [run.angle_deg for run in runs] == [0.0, 0.0, 90.0, 90.0]
+    own = runs_of_design(DESIGN | {"reading": "berardo2019", "angles_deg": [30.0], "parameters": {"edges": "periodic"},
+                                   "samples": ["F"]})  # fmt: skip
+    assert {(run.angle_deg, run.edges, run.reading) for run in own} == {(30.0, "periodic", "own")}
+    assert [run.angle_deg for run in runs_of_design(DESIGN)] == [22.5, 67.5, 85.0, 95.0]
+
+
+def test_an_unknown_reading_is_refused():
+    """The message lists the known ones."""
+    with pytest.raises(SimulationError, match="text or berardo2019"):
+        runs_of_design(DESIGN | {"reading": "mine"})
+
+
+def test_nominal_angles_are_the_direction_in_the_name_of_a_sample():
+    """Along x where the name has none; seeds differ all the same."""
+    design = stratified_design(["C", "Sx", "Sy"], [5e3], 2, angles="nominal")
+    assert [config.angle_deg for config in design] == [0.0, 0.0, 0.0, 0.0, 90.0, 90.0]
+    assert len({config.seed for config in design}) == 6
