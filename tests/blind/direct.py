@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tribo.records import Campaign, Ingested, Pattern, Pull, Test
+from tribo.records import Campaign, Correction, Ingested, Pattern, Pull, Test
 
 from .bench import AREA_MM2, Bench
 from .patterns import CAVITIES
@@ -37,7 +37,7 @@ def ingested(bench: Bench, seed: int = 0) -> Ingested:
         test = Test(
             row.test_id, f"raw/{row.test_id}.csv", row.sample, row.N, row.specimen, row.direction,
             row.speed_mm_s * 1e-3, row.hold_s, row.repeat, row.run_order, row.specimen_run, row.started_at,
-            row.temperature_C, row.humidity_pct, row.operator,
+            row.temperature_C, row.humidity_pct, row.operator, correction=Correction(speed_m_s=row.speed_mm_s * 1e-3),
         )  # fmt: skip
         tests.append(test)
         stiffness = float(bench.stiffness_N_per_mm[k]) * 1e3 * np.exp(0.05 * rng.normal())

@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 
 from tribo.cli import main
 from tribo.errors import FitError, Problem
-from tribo.records import Study
+from tribo.records import Comparison, Study
 
 
 def run(*arguments: object) -> Result:
@@ -142,7 +142,7 @@ def test_an_unusable_campaign_lists_every_fault_at_once_and_writes_nothing(spoil
     assert not (tmp_path / "out").exists()
 
 
-def test_a_campaign_without_a_flat_sample_cannot_calibrate_the_model(small_campaign: Path, tmp_path: Path) -> None:
+def test_a_campaign_without_a_flat_sample_is_evaluated_without_the_model(small_campaign: Path, tmp_path: Path) -> None:
     result = run("compare", small_campaign, "-o", tmp_path / "out", "--dry-run", "--flat", "B")
     assert result.exit_code == 1  # B has cavities
     assert "--flat F" in result.stderr
@@ -151,8 +151,9 @@ def test_a_campaign_without_a_flat_sample_cannot_calibrate_the_model(small_campa
     table = pd.read_csv(folder / "tests.csv")
     table[table["sample"] == "B"].to_csv(folder / "tests.csv", index=False)
     result = run("compare", folder, "-o", tmp_path / "out")
-    assert result.exit_code == 1
-    assert "flat sample" in result.stderr
+    assert result.exit_code == 0
+    assert "flat sample" in result.stdout + result.stderr
+    assert not (tmp_path / "out" / "comparison.csv").exists()
 
 
 def test_the_number_of_processes_reaches_the_diagnosis_of_a_report(
@@ -165,7 +166,10 @@ def test_the_number_of_processes_reaches_the_diagnosis_of_a_report(
         raise FitError(Problem("stopped", "the test has seen enough"))
 
     monkeypatch.setattr("tribo.stages.diagnosis", stop)
-    monkeypatch.setattr("tribo.stages.compare", lambda ingested, fits, *_, **__: Study(ingested, fits))
+    compared = Comparison("small", 55e-6, {}, (), (), ())
+    monkeypatch.setattr(
+        "tribo.stages.compare", lambda ingested, fits, *_, **__: Study(ingested, fits, comparison=compared)
+    )
     run("report", small_campaign, "-o", tmp_path / "out", "--jobs", "3")
     assert seen == [3]
 

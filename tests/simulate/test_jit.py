@@ -62,7 +62,7 @@ LOOP_BY_ITSELF = """
 import numpy as np
 from tribo.simulate.engines import dense
 block = [np.zeros(8) for _ in range(10)]
-dense.rubbed(*block, 0.0, 1.0, 1.0, None)
+dense.rubbed(*block, 0.0, 1.0, 1.0, None, None)
 """
 
 

@@ -480,6 +480,8 @@ def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None
     looks = ["\n".join(lines) for lines in (study.power, study.outlying) if lines]
     said = [verdict_text(verdict)] if verdict else []
     console.result(record, "\n\n".join([*words, summary_text(study), *said, *looks]))
+    for note in study.notes:
+        console.say(f"note: {note}", level=-1)
     console.list_tests("set aside", set_aside, level=-1)
     console.list_tests("used with doubts", doubts)
     return status_of(set_aside)

@@ -306,7 +306,7 @@ def _client(scheduler: str) -> Iterator[tuple[Any, Any]]:
             )
         ) from why
     try:
-        client = distributed.Client(scheduler, timeout=SCHEDULER_TIMEOUT_S)
+        client = distributed.Client(scheduler, timeout=SCHEDULER_TIMEOUT_S, set_as_default=False)
     except (OSError, ValueError) as why:
         raise SimulationError(
             Problem(

@@ -116,7 +116,8 @@ def _to_first_maximum(signal: Signal, zero: Zero, rise: Rise, noise: float) -> C
     end = _before_unloading(smooth, top)
     if end - top < 3 and end == smooth.size:
         raise TraceError([*_no_pull(signal, 0.0, None), *signal.problems])
-    return Climb(signal, zero, rise, depart, math.ceil(margin / per_sample) + 2, top, end)
+    reach = min(margin / per_sample, smooth.size) if per_sample > 0 else 0
+    return Climb(signal, zero, rise, depart, math.ceil(reach) + 2, top, end)
 
 
 def _no_pull(signal: Signal, start: float, rise: Rise | None) -> list[Problem]:

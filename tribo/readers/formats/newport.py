@@ -24,6 +24,8 @@ def recognises(source: Source) -> bool:
 
 def hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
     reason = "fixed column order of this rig"
+    if any(layout.names):  # of a file beside the export
+        return ()
     return (
         Hint("time", "#2 [s]", reason),
         Hint("normal force", "#3 [N]", reason),
