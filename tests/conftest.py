@@ -65,3 +65,17 @@ def small_campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     write_campaign(folder, SledDesign(laws, masses_g=(25.0, 138.5)), toml, seed=7)
     return folder
+
+
+LONG_FILES = ("pipeline", "test_spoiled_campaigns", "faults", "blind", "cli", "simulate", "diagnose")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files that take long come first, so that no process is left alone with one of them at the end."""
+    here = Path(__file__).parent
+
+    def place(item: pytest.Item) -> int:
+        name = item.path.relative_to(here).as_posix()
+        return next((k for k, start in enumerate(LONG_FILES) if name.startswith(start)), len(LONG_FILES))
+
+    items.sort(key=place)

@@ -314,5 +314,5 @@ def _client(scheduler: str) -> Iterator[tuple[Any, Any]]:
                 allowed="the address printed by a running dask scheduler, such as tcp://HOST:8786",
             )
         ) from why
-    with client:
+    with client, client.as_current():
         yield client, distributed.as_completed
