@@ -314,5 +314,8 @@ def _client(scheduler: str) -> Iterator[tuple[Any, Any]]:
                 allowed="the address printed by a running dask scheduler, such as tcp://HOST:8786",
             )
         ) from why
-    with client, client.as_current():
-        yield client, distributed.as_completed
+    try:
+        with client, client.as_current():
+            yield client, distributed.as_completed
+    finally:  # a client that ends leaves itself behind as the scheduler of whatever else uses dask in this process
+        import_module("dask").config.set(scheduler=None)
