@@ -12,7 +12,7 @@ import os, time
 from tribo.forked import each
 
 def sleep(item):
-    print(os.getpid(), flush=True)
+    os.write(1, f"{os.getpid()}\\n".encode())
     time.sleep(0.5)
 
 list(each(sleep, range(1000), 2))

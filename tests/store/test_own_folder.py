@@ -96,7 +96,7 @@ def test_forked_workers_do_not_hold_the_lock_of_a_killed_writer(tmp_path: Path) 
     process.wait()
     process.stdout.close()
     try:
-        with own_folder(tmp_path / "out"):
+        with own_folder(tmp_path / "out", (), Access(wait_s=20.0)):  # the worker may just be letting go
             pass
     finally:
         os.kill(worker, signal.SIGKILL)
