@@ -12,7 +12,6 @@ from tribo.diagnose.next_test import next_test_of
 from tribo.diagnose.search.naming import Named
 from tribo.diagnose.search.rivals import weights_of
 from tribo.diagnose.search.screen import Screen
-from tribo.diagnose.search.weighing import Candidate
 from tribo.diagnose.sentences import (
     NOT_TESTABLE,
     Weighed,
@@ -29,10 +28,10 @@ from tribo.diagnose.sentences import (
 )
 from tribo.diagnose.statistics.direct_evidence import TraceFindings, stated_evidence
 from tribo.diagnose.statistics.gain import gain, gain_of_zero
-from tribo.diagnose.statistics.interval import recovered
+from tribo.diagnose.statistics.interval import estimates
 from tribo.diagnose.statistics.linearisation import ModelFit, StartEffects
 from tribo.diagnose.statistics.pattern_excess import PatternExcess, pattern_excess
-from tribo.diagnose.verdict import CERTAIN_CAUSES, Estimate, Excluded, Gain, Layer, Outcome, Verdict
+from tribo.diagnose.verdict import CERTAIN_CAUSES, Excluded, Gain, Layer, Outcome, Verdict
 
 NEEDED = 3.7  # strength that chance reaches in one campaign of a hundred, where none was simulated
 
@@ -83,7 +82,7 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
         equivalent=equivalent,
         excluded=tuple(e for e in excluded if not e.reason.startswith(NOT_TESTABLE)),
         not_testable=tuple(e for e in excluded if e.reason.startswith(NOT_TESTABLE)),
-        layers=_layers(found, rng),
+        layers=_layers(found, shown, rng),
         gain=gained,
         set_aside=baseline.setup.observations.set_aside,
         next_test=next_test_of(named, outcome, misfits, baseline.setup.observations.conditions),
@@ -92,12 +91,12 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
     )
 
 
-def _layers(found: Findings, rng: np.random.Generator) -> tuple[Layer, ...]:
-    """Of the final model: pattern corrections, causes, and what is left."""
+def _layers(found: Findings, shown: Sequence[Weighed], rng: np.random.Generator) -> tuple[Layer, ...]:
+    """Of the final model: pattern corrections, causes with the parameters ``shown``, and what is left."""
     named, baseline = found.named, found.baseline
     if named is None:
         return tuple(pattern_layers(baseline))
-    causes = cause_layers(named, found.screened, baseline, rng)
+    causes = cause_layers(named, shown, found.screened, baseline, rng)
     return (*pattern_layers(named.model), *causes, *remainder_layers(named))
 
 
@@ -133,17 +132,9 @@ def _shown(named: Named | None) -> list[Weighed]:
     found: list[Weighed] = []
     for k, alike in enumerate(named.causes):
         shown = [*alike, *(named.rivals if k == len(named.causes) - 1 else ())]
-        found += [(c, float(w), _estimates(c)) for c, w in zip(shown, weights_of(shown), strict=True)]
+        sizes = [estimates(c.fit, len(c.fit.acting) - 1) for c in shown]
+        found += zip(shown, map(float, weights_of(shown)), sizes, strict=True)
     return found
-
-
-def _estimates(candidate: Candidate) -> dict[str, Estimate]:
-    """Parameters of a weighed mechanism with their 90 % intervals."""
-    parameters = candidate.acting.mechanism.parameters
-    values = recovered(candidate.fit, len(candidate.fit.acting) - 1)
-    return {
-        p.name: Estimate(value, low, high, p.unit) for p, (value, low, high) in zip(parameters, values, strict=True)
-    }
 
 
 def _smallest_effects(found: Findings) -> dict[str, float]:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from tribo.diagnose.search.naming import Named
 from tribo.diagnose.search.screen import Screen
 from tribo.diagnose.search.weighing import Candidate, judged, refitted
-from tribo.diagnose.sentences import misfit_of, p_text
+from tribo.diagnose.sentences import Weighed, misfit_of, p_text, sentence_case
 from tribo.diagnose.statistics.gain import gain
-from tribo.diagnose.statistics.interval import recovered
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import effect_of
 from tribo.diagnose.statistics.pattern_correction import PatternCorrection, Percent, pattern_corrections
@@ -46,24 +45,28 @@ def _estimate(percent: Percent) -> Estimate:
     return Estimate(percent.value, percent.low, percent.high, "%")
 
 
-def cause_layers(named: Named, first: Screen, before: ModelFit, rng: np.random.Generator) -> list[Layer]:
-    """One layer per cause, each with what it adds beside the others."""
-    return [_cause_layer(named, k, first, before, rng) for k in range(len(named.causes))]
+def cause_layers(
+    named: Named, shown: Sequence[Weighed], first: Screen, before: ModelFit, rng: np.random.Generator
+) -> list[Layer]:
+    """One layer per cause, each with what it adds beside the others; ``shown`` holds the parameters of each."""
+    parameters = [next(p for c, _, p in shown if c is alike[0]) for alike in named.causes]
+    return [_cause_layer(named, k, p, first, before, rng) for k, p in enumerate(parameters)]
 
 
-def _cause_layer(named: Named, k: int, first: Screen, before: ModelFit, rng: np.random.Generator) -> Layer:
+def _cause_layer(
+    named: Named, k: int, parameters: Mapping[str, Estimate], first: Screen, before: ModelFit, rng: np.random.Generator
+) -> Layer:
     best, *tied = named.causes[k]
     others = [alike[0].acting for j, alike in enumerate(named.causes) if j != k]
     without = refitted(named.model, others) if others else before
     beside = judged(without, refitted(without, [*others, best.acting]), 0.0)
     change = effect_of(beside.fit.setup, beside.fit.law, best.acting, beside.values)
     samples, regimes = _where(beside.fit, change)
-    value, low, high = _effect_percent(best, change)
     m = best.acting.mechanism
-    parameters = _parameters(best)
+    value, low, high = _effect_percent(best, parameters[m.amplitude.name], change)
     gained: Gain | None = gain(without, beside.fit, rng)
     text = (
-        f"{m.in_words[:1].upper()}{m.in_words[1:]} changes T by {value:+.0f} % (90 % interval {low:+.0f} to "
+        f"{sentence_case(m.in_words)} changes T by {value:+.0f} % (90 % interval {low:+.0f} to "
         f"{high:+.0f} %) where it acts most."
     )
     return Layer(
@@ -71,14 +74,6 @@ def _cause_layer(named: Named, k: int, first: Screen, before: ModelFit, rng: np.
         effect_percent=value, low=low, high=high, parameters=parameters, formula=m.formula,
         tied_with=tuple(c.name for c in tied), gain=gained, text=text,
     )  # fmt: skip
-
-
-def _parameters(c: Candidate) -> dict[str, Estimate]:
-    values = recovered(c.fit, len(c.fit.acting) - 1)
-    return {
-        p.name: Estimate(value, low, high, p.unit)
-        for p, (value, low, high) in zip(c.acting.mechanism.parameters, values, strict=True)
-    }
 
 
 def _where(f: ModelFit, change: FloatArray) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -89,18 +84,17 @@ def _where(f: ModelFit, change: FloatArray) -> tuple[tuple[str, ...], tuple[str,
     return samples, tuple(r for k, r in enumerate(REGIMES) if np.abs(change[:, k]).max() > least)
 
 
-def _effect_percent(best: Candidate, change: FloatArray) -> tuple[float, float, float]:
+def _effect_percent(best: Candidate, amplitude: Estimate, change: FloatArray) -> tuple[float, float, float]:
     """The largest change of T over the tests, signed, in percent; with the ends of the interval of the amplitude."""
-    f, index = best.fit, len(best.fit.acting) - 1
-    value, low, high = recovered(f, index)[0]
+    f = best.fit
     where = np.unravel_index(int(np.abs(change).argmax()), change.shape)
 
-    def at(amplitude: float) -> float:
-        values = np.array([amplitude, *best.values[1:]])
+    def at(size: float) -> float:
+        values = np.array([size, *best.values[1:]])
         return 100.0 * float(np.expm1(effect_of(f.setup, f.law, best.acting, values)[where]))
 
-    ends = sorted((at(low), at(high)))
-    return at(value), ends[0], ends[1]
+    ends = sorted((at(amplitude.low), at(amplitude.high)))
+    return at(amplitude.value), ends[0], ends[1]
 
 
 def remainder_layers(named: Named) -> list[Layer]:

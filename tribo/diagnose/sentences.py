@@ -305,7 +305,7 @@ def misfits_of_patterns(excess: PatternExcess) -> list[Misfit]:
     for sample, both in excess.percent.items():
         for observable, percent in zip(("static", "sliding"), both, strict=True):
             side = "above" if percent > 0 else "below"
-            what = f"{WHAT[observable][0].upper()}{WHAT[observable][1:]} of {sample}"
+            what = f"{sentence_case(WHAT[observable])} of {sample}"
             text = f"{what} is on average {abs(percent):.0f} % {side} the model (adjusted p {p_text(excess.p)})."
             found.append(Misfit(observable, sample, "sample", percent, excess.p, text))
     return sorted(found, key=lambda m: -abs(m.effect_percent))

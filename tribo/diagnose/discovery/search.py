@@ -9,11 +9,11 @@ import numpy as np
 
 from tribo.diagnose.discovery.grammar import Group, groups_of, shapes_of
 from tribo.diagnose.discovery.written_law import ADHESION_TERM, LOAD_TERM, Shape, WrittenLaw
-from tribo.diagnose.search.screen import columns_in, scores
+from tribo.diagnose.search.screen import columns_in, scores, share_beyond
 from tribo.diagnose.statistics.chance import as_measured, drawn_residuals, refit
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.gain import gain
-from tribo.diagnose.statistics.interval import recovered
+from tribo.diagnose.statistics.interval import estimates
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting, log_forces
 from tribo.diagnose.statistics.scatter import Replicates
@@ -95,7 +95,7 @@ def discover_laws(
         used = {name for law in found for name in law.law.columns}
         scored, chance = _searched(model, used, replicates, rng, progress)
         table, searched = table or tuple(scored[:SHOWN]), len(scored)
-        p = _tail(chance, scored[0].net) if scored else 1.0
+        p = share_beyond(chance, scored[0].net) if scored else 1.0
         if p >= level:
             break
         law = _settled(model, scored, p, rng)
@@ -169,15 +169,6 @@ def _columns(
     return laws, np.concatenate(columns, axis=2) if columns else np.zeros((0, 2, 0)), spans, np.array(cost)
 
 
-def _tail(chance: FloatArray, value: float) -> float:
-    """Share of simulated campaigns at or above, beyond the last one by a fitted Gumbel distribution."""
-    counted = (1 + np.sum(chance >= value)) / (1 + len(chance))
-    scale = max(float(np.std(chance)) * np.sqrt(6) / np.pi, 1e-3)
-    above_mode = (value - float(np.mean(chance))) / scale + np.euler_gamma
-    fitted = float(-np.expm1(-np.exp(-above_mode)))
-    return float(counted) if counted > 5.0 / len(chance) else min(float(counted), max(fitted, 1e-12))
-
-
 def _settled(model: ModelFit, scored: Sequence[Scored], p: float, rng: np.random.Generator) -> FoundLaw:
     """The best forms fitted in full, the best of them with its parameters, and what cannot be told apart."""
     forms: dict[tuple[object, ...], Scored] = {}
@@ -193,11 +184,7 @@ def _settled(model: ModelFit, scored: Sequence[Scored], p: float, rng: np.random
     ties = [s.law for s, f in ranked[1:] if f.score - (s.gain - s.net) > net - CLOSE]
     n_ties = sum(s.net > leading[0].net - CLOSE for s in forms.values()) - 1
     law = first.law.with_values(after.values[-1])
-    values = recovered(after, len(after.acting) - 1)
-    parameters = {
-        q.name: Estimate(value, low, high, q.unit)
-        for q, (value, low, high) in zip(after.acting[-1].mechanism.parameters, values, strict=True)
-    }
+    parameters = estimates(after, len(after.acting) - 1)
     return FoundLaw(
         law, parameters, _percent(law, after, parameters), p, gain(model, after, rng), tuple(ties),
         max(n_ties, len(ties)), after,

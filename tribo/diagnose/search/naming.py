@@ -24,9 +24,11 @@ MAX_LAYERS = 8
 
 @dataclass(frozen=True)
 class Remainder:
-    """A look that no mechanism explains, with its peak-to-peak ``size`` in ln T and its adjusted p value."""
+    """A look that no mechanism explains: its ``strength`` as a normal deviate, its peak-to-peak ``size`` in ln T and
+    its adjusted p value."""
 
     look: Look
+    strength: float
     coefficients: np.ndarray
     size: float
     p: float
@@ -116,7 +118,7 @@ def strongest_beside_mechanisms(seen: Screen, level: float, flat: str) -> Remain
         if p >= level:
             return None
         if look.kind != "mechanism" and not look.is_taken_up(flat):
-            return Remainder(look, seen.coefficients[k], float(seen.size[k]), p)
+            return Remainder(look, float(seen.strength[k]), seen.coefficients[k], float(seen.size[k]), p)
     return None
 
 
@@ -124,7 +126,7 @@ def _grown(layers: Layers, ranked: Sequence[Candidate], seen: Screen, level: flo
     """One layer more: the best mechanism, unless a free course of a column explains far more; None without either."""
     best = best_beyond_chance(ranked, seen, level)
     other = strongest_beside_mechanisms(seen, level, layers.model.setup.observations.flat)
-    if best is not None and (other is None or best.raw > 0.5 * _strength(seen, other) ** 2 - CLOSE):
+    if best is not None and (other is None or best.raw > 0.5 * other.strength**2 - CLOSE):
         alike, rivals = sort_rivals(layers.model, best, ranked)
         return replace(layers, model=best.fit, causes=(*layers.causes, alike), rivals=rivals)
     if other is None:
@@ -132,10 +134,6 @@ def _grown(layers: Layers, ranked: Sequence[Candidate], seen: Screen, level: flo
     wider = with_free_columns(layers.model.setup, other.look.columns, other.coefficients)
     model = fit(wider, layers.model.acting, start=layers.model)
     return replace(layers, model=model, remainders=(*layers.remainders, other))
-
-
-def _strength(seen: Screen, other: Remainder) -> float:
-    return float(seen.strength[next(k for k, look in enumerate(seen.looks) if look is other.look)])
 
 
 def _misfit_in_own_column(cause: Candidate, left: Screen, level: float) -> bool:

@@ -45,15 +45,15 @@ class Screen:
     def p_adjusted(self, strength: float | None = None) -> float:
         """Chance that some look is at least this strong (default: the strongest) with nothing hidden."""
         value = float(self.strength.max()) if strength is None else strength
-        return _tail(self.chance, value)
+        return share_beyond(self.chance, value)
 
     def p_library(self, strength: float) -> float:
         """Chance that some mechanism is at least this strong with nothing hidden."""
-        return _tail(self.chance_library, strength)
+        return share_beyond(self.chance_library, strength)
 
 
-def _tail(chance: FloatArray, value: float) -> float:
-    """Share of replicates at or above, beyond the last one by a fitted Gumbel tail."""
+def share_beyond(chance: FloatArray, value: float) -> float:
+    """Share of replicates (r,) at or above a value, beyond the last one by a fitted Gumbel tail; NaN without any."""
     if not len(chance):
         return float("nan")
     counted = (1 + np.sum(chance >= value)) / (1 + len(chance))
@@ -93,7 +93,7 @@ def screen(
             progress("diagnose", len(chance), replicates)
         if _decided(chance[:, 0], float(strength.max())):
             break
-    p = np.array([_tail(chance[:, 0], float(value)) for value in strength])
+    p = np.array([share_beyond(chance[:, 0], float(value)) for value in strength])
     return Screen(tuple(looks), strength, size, tuple(coefficients), chance[:, 0], chance[:, 1], p)
 
 

@@ -15,6 +15,7 @@ from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import FIXED, N_LAW, PATTERN
 from tribo.diagnose.statistics.scatter import Noise, log_size_prior
+from tribo.diagnose.verdict import Estimate
 from tribo.mechanisms.record import Mechanism
 from tribo.records import FloatArray
 
@@ -41,6 +42,12 @@ def recovered(f: ModelFit, index: int) -> list[tuple[float, float, float]]:
         _averaged(weight, values[:, k], ends[:, k], wider[k], (p.low, p.high))
         for k, p in enumerate(f.acting[index].mechanism.parameters)
     ]
+
+
+def estimates(f: ModelFit, index: int) -> dict[str, Estimate]:
+    """The same, by the name of the parameter."""
+    parameters = f.acting[index].mechanism.parameters
+    return {p.name: Estimate(*found, p.unit) for p, found in zip(parameters, recovered(f, index), strict=True)}
 
 
 def understated(f: ModelFit, index: int) -> FloatArray:
