@@ -73,15 +73,15 @@ class Constant:
     on_clean: bool = False
 
 
-NAMING, SCREEN = f"{SEARCH}.naming", f"{SEARCH}.screen"
+RIVALS, NAMING, SCREEN, WEIGHING = (f"{SEARCH}.{m}" for m in ("rivals", "naming", "screen", "weighing"))
 NOISE, EVIDENCE = f"{STATISTICS}.scatter", f"{STATISTICS}.direct_evidence"
 CONSTANTS = {
-    "TIED (log likelihood)": Constant((NAMING,), "TIED", _first),
-    "TIED (share of the gain)": Constant((NAMING,), "TIED", _second),
-    "CLOSE": Constant((NAMING,), "CLOSE"),
-    "IN_COMMON": Constant((NAMING,), "IN_COMMON"),
+    "TIED (log likelihood)": Constant((RIVALS,), "TIED", _first),
+    "TIED (share of the gain)": Constant((RIVALS,), "TIED", _second),
+    "CLOSE": Constant((RIVALS, NAMING), "CLOSE"),
+    "IN_COMMON": Constant((RIVALS,), "IN_COMMON"),
     "FORM": Constant((SCREEN,), "FORM"),
-    "PER_PARAMETER": Constant((NAMING,), "PER_PARAMETER"),
+    "PER_PARAMETER": Constant((WEIGHING,), "PER_PARAMETER"),
     "CERTAIN": Constant((EVIDENCE,), "CERTAIN", on_clean=True),
     "specimen gain, expected": Constant((NOISE,), "SIZE_PRIORS", _row(0, 0), on_clean=True),
     "specimen slope, expected": Constant((NOISE,), "SIZE_PRIORS", _row(2, 0), on_clean=True),

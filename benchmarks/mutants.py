@@ -39,6 +39,7 @@ ROOMS = {
     "diagnose: search": "tribo/diagnose/search",
     "mechanisms": "tribo/mechanisms",
     "readers: reading": "tribo/readers/core/reading.py",
+    "readers: wide tables": "tribo/readers/core/wide.py",
 }
 TESTS = ("traces", "fitting", "diagnose", "mechanisms", "mechanisms_in_model", "readers", "ingestion")
 LIMIT_S = 12.0  # of processor time for the tests of one mutant, as they take without it
