@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
 GROUND = {
     "errors", "limits", "escaping", "input_files", "quantities", "zeroing", "records", "published", "zips", "links",
-    "forked",
+    "forked", "nearest", "sheets",
 }  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
     ("errors", set()),
@@ -28,6 +28,8 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("zips", {"errors", "limits"}),
     ("links", set()),
     ("forked", set()),
+    ("nearest", set()),
+    ("sheets", {"errors", "limits", "zips"}),
     ("store", GROUND),
     ("campaign", GROUND),
     ("readers", GROUND),
@@ -36,6 +38,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("virtual_tribometer", GROUND),
     ("ingestion", GROUND | {"campaign", "readers", "traces"}),
     ("fitting", GROUND | {"laws"}),
+    ("plausibility", GROUND),
     ("simulate", GROUND | {"campaign", "laws", "store"}),
     ("mechanisms", GROUND | {"laws"}),
     ("mechanisms_in_model", GROUND | {"mechanisms", "simulate", "virtual_tribometer"}),

@@ -169,7 +169,7 @@ def study(
     chosen = with_zeros(with_flat_sample(campaign, options.flat), options.zero, options.load_zero)
     ingested = ingest(chosen, rule=options.rule, jobs=options.jobs, overrides=options.overrides, progress=progress)
     if until == "ingest":
-        return Study(ingested)
+        return with_doubts(Study(ingested))
     without = without_model(chosen, options) if until != "fit" else ""
     fits: tuple[LawFit, ...] = ()
     no_law = ""
@@ -180,8 +180,15 @@ def study(
             raise
         no_law = f"No friction law over load was fitted: {why}."
     if until == "fit" or without:
-        return assess(Study(ingested, fits, notes=tuple(filter(None, (without, no_law)))), options)
-    return assess(compare(ingested, fits, options, progress=progress), options)
+        return assess(with_doubts(Study(ingested, fits, notes=tuple(filter(None, (without, no_law))))), options)
+    return assess(with_doubts(compare(ingested, fits, options, progress=progress)), options)
+
+
+def with_doubts(walked: Study) -> Study:
+    """The study with the numbers that lie outside their broad physical bounds."""
+    from tribo.plausibility.doubts import doubts_of
+
+    return replace(walked, doubts=doubts_of(walked.ingested.campaign, walked.ingested, walked.fits))
 
 
 def without_model(campaign: Campaign, options: StudyOptions) -> str:

@@ -147,6 +147,7 @@ def diagnose(
         write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found)
     verdict = found.verdict
     console.result(verdict.as_dict(), verdict_text(verdict))
+    console.list_doubts(study.doubts)
     console.list_tests("set aside", study.ingested.set_aside, level=-1)
     return status_of(study.ingested.set_aside)
 
@@ -263,6 +264,7 @@ def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None
         "used_with_doubts": set_aside_record(doubts),
         "problems": [asdict(p) for p in study.ingested.campaign.problems],
         "notes": list(study.notes),
+        "doubts": [asdict(doubt) for doubt in study.doubts],
         "fits": fits.where(fits.notna(), None).to_dict("records"),
         "power": list(study.power),
         "outlying": list(study.outlying),
@@ -273,6 +275,7 @@ def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None
     looks = ["\n".join(lines) for lines in (study.power, study.outlying) if lines]
     said = [verdict_text(verdict)] if verdict else []
     console.result(record, "\n\n".join([*words, summary_text(study), *said, *looks]))
+    console.list_doubts(study.doubts)
     for note in study.notes:
         console.say(f"note: {note}", level=-1)
     console.list_tests("set aside", set_aside, level=-1)
