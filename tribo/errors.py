@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 _LOG = logging.getLogger("tribo")
+_QUESTION = "did you mean"
 _OF_THE_SYSTEM = "system"  # kind of a problem that another try may not have: disk full, no permission
 
 
@@ -47,7 +48,7 @@ class Problem:
         if self.found is not None:
             parts.append(f"; found {self.found!r}")
         if self.allowed is not None:
-            parts.append(f"; allowed: {self.allowed}")
+            parts.append(f"; {self.allowed if self.allowed.startswith(_QUESTION) else f'allowed: {self.allowed}'}")
         return "".join(parts)
 
     def at(self, *, file: str | None = None, test_id: str | None = None) -> Problem:

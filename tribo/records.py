@@ -156,9 +156,12 @@ class Doubt:
     material_class: str = ""
 
     def __str__(self) -> str:
-        kind = f" for the material class {self.material_class}" if self.material_class else ""
-        slip = f". {self.slip[:1].upper()}{self.slip[1:]}" if self.slip else ""
-        return f"{self.name} is {self.found}; plausible{kind}: {self.plausible} ({self.place}){slip}"
+        return f"{self.without_slip()}. Likely slip: {self.slip}" if self.slip else self.without_slip()
+
+    def without_slip(self) -> str:
+        """The number, its bounds and its place as a sentence."""
+        kind = f" ({self.material_class})" if self.material_class else ""
+        return f"{self.name} is {self.found}; plausible{kind}: {self.plausible}; see {self.place}"
 
 
 @dataclass(frozen=True)

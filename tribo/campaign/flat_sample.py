@@ -21,7 +21,7 @@ def with_flat_sample(campaign: Campaign, wanted: str = "") -> Campaign:
     if wanted not in campaign.flat_samples:
         measured = {test.sample for test in campaign.tests}
         what = "this sample has cavities" if wanted in measured else "no test of this campaign has this sample"
-        raise CampaignError(_problem(campaign, f"--flat: {what}", wanted))
+        raise CampaignError(replace(_problem(campaign, what, wanted), file="--flat", column=None))
     return replace(campaign, chosen_flat=wanted)
 
 

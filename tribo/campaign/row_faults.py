@@ -44,7 +44,8 @@ def _sample_faults(row: TestRow, patterns: Mapping[str, Pattern]) -> list[Proble
         return []
     directed = [f"{name}{axis}" for name in patterns for axis in "xy"]
     hint = did_you_mean(sample, [*patterns, *directed])
-    allowed = f"{', '.join(patterns)}, or one of these names followed by x or y{f'; {hint}' if hint else ''}"
+    hint = hint or f"or state its geometry in a table [patterns.{sample}] of campaign.toml"
+    allowed = f"{', '.join(patterns)}, or one of these names followed by x or y; {hint}"
     return [Problem("unknown_sample", "no pattern has this name", row.file, row.row, "sample", sample, allowed)]
 
 

@@ -119,8 +119,11 @@ def read_table(path: Path, file: str) -> Table | None:
     if first is None:
         return None
     delimiter = "\t" if is_workbook else max(",;\t|", key=lines[first].count)
-    quoting = csv.QUOTE_NONE if is_workbook else csv.QUOTE_MINIMAL
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, quoting=quoting)
+    lines_of_text = io.StringIO(text, newline="")
+    if is_workbook:
+        reader = csv.reader(lines_of_text, delimiter=delimiter, quoting=csv.QUOTE_NONE)
+    else:
+        reader = csv.reader(lines_of_text, delimiter=delimiter)
     names: list[str] = []
     header_row, rows = 0, []
     try:

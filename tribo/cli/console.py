@@ -18,7 +18,7 @@ from typing import Any
 
 import click
 
-from tribo.cli.grouped_faults import faults_text, set_aside_text
+from tribo.cli.grouped_faults import doubts_text, faults_text, set_aside_text
 from tribo.cli.interruption import damage_said, ended_by_terminate
 from tribo.errors import Problem, TriboError, system_problem, unexpected
 from tribo.escaping import printable
@@ -51,8 +51,8 @@ class Console:
     def list_doubts(self, doubts: Sequence[Doubt]) -> None:
         """Numbers outside their broad physical bounds; shown even with -q, nothing where there are none."""
         if doubts:
-            lines = "\n".join(f"  {doubt}" for doubt in doubts)
-            self.say(f"{len(doubts)} doubtful number{'s' if len(doubts) != 1 else ''}:\n{lines}", level=-1)
+            number = f"{len(doubts)} doubtful number{'s' if len(doubts) != 1 else ''}"
+            self.say(f"{number}:\n{doubts_text(doubts)}", level=-1)
 
     def result(self, record: dict[str, Any], text: str) -> None:
         """The result itself: JSON where asked for, else ``text``."""

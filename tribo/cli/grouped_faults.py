@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from tribo.errors import Problem
-from tribo.records import SetAside
+from tribo.records import Doubt, SetAside
 
 FEWEST_GROUPED = 3  # equal faults fewer than this are listed one by one
 LONGEST_LIST = 160  # characters of the tests listed below an example
@@ -21,6 +21,18 @@ def faults_text(problems: Sequence[Problem], *, all_of_them: bool = False) -> st
             lines += [f"  {_full(problem)}" for problem in group]
         else:
             lines += [f"  {len(group)} times, for example {_full(group[0])}", f"    also {_others(group[1:])}"]
+    return "\n".join(lines)
+
+
+def doubts_text(doubts: Sequence[Doubt]) -> str:
+    """Doubtful numbers, those that one slip explains together with it."""
+    by_slip: dict[str, list[Doubt]] = {}
+    for doubt in doubts:
+        by_slip.setdefault(doubt.slip, []).append(doubt)
+    lines = []
+    for slip, together in by_slip.items():
+        lines += [f"  {doubt.without_slip()}" for doubt in together]
+        lines += [f"    likely slip: {slip}"] if slip else []
     return "\n".join(lines)
 
 
@@ -51,7 +63,8 @@ def _groups(problems: Sequence[Problem]) -> list[list[Problem]]:
 
 
 def _key(problem: Problem) -> tuple[object, ...]:
-    return problem.kind, problem.column, re.sub(r"\d+", "#", problem.what)[:_SAME_BEGINNING]
+    what = re.sub(r"^sample [^:]*: ", "", problem.what)
+    return problem.kind, problem.column, re.sub(r"\d+", "#", what)[:_SAME_BEGINNING]
 
 
 def _full(problem: Problem) -> str:
@@ -63,7 +76,7 @@ def _others(problems: Sequence[Problem]) -> str:
         return _listed([str(p.test_id) for p in problems])
     if all(p.row is not None for p in problems):
         return "in rows " + _listed([str(p.row) for p in problems])
-    return _listed([str(p.file or p.column or p.found) for p in problems])
+    return _listed([str(p.file or p.column or p.found or p.what.partition(":")[0]) for p in problems])
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tribo.cli.console import Console, command_options, set_aside_record, status_of
+from tribo.cli.console import UNUSABLE, Console, command_options, set_aside_record, status_of
 from tribo.cli.given_paths import GivenPath
 from tribo.cli.output import Output, output_options
 from tribo.cli.reading_options import reading_options, with_reading_options
@@ -17,7 +18,8 @@ from tribo.cli.study_options import CAMPAIGN, DRY_RUN, FLAT, OUT, OVERRIDES, RUL
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
     from tribo.diagnose.verdict import Verdict
-    from tribo.records import Study
+    from tribo.dry_run import Until as DryUntil
+    from tribo.records import Campaign, Study
     from tribo.stages import Progress, StudyOptions, Until
 
 
@@ -113,12 +115,14 @@ def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **opti
 @ZEROS[0]
 @ZEROS[1]
 @OVERRIDES
+@DRY_RUN
 @command_options
 def diagnose(
     console: Console,
     campaign: Path | None,
     out: Output,
     published: str | None,
+    dry_run: bool,
     columns: str,
     stated: dict[str, float],
     **options: Any,
@@ -139,8 +143,10 @@ def diagnose(
     from tribo.report.words.verdict_text import verdict_text
     from tribo.store.kept_results import Shelf
 
+    chosen = stages.StudyOptions(kept=out.kept, **options)
+    if dry_run:
+        return _checked(console, campaign, out, "diagnose", chosen, lambda c: with_reading_options(c, columns, stated))
     with out.taken(campaign), open_campaign(campaign) as opened, console.progress() as progress:
-        chosen = stages.StudyOptions(kept=out.kept, **options)
         study = stages.study(with_reading_options(opened, columns, stated), chosen, until="ingest", progress=progress)
         found = _diagnosis(study, chosen, progress)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
@@ -209,11 +215,7 @@ def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool
     stated = options.pop("stated")
     chosen = stages.StudyOptions(kept=out.kept, **options)
     if dry_run:
-        out.check(path)
-        with open_campaign(path) as described:
-            planned = stages.plan(with_reading_options(described, columns, stated), chosen, until)
-            console.result(planned, _plan_text(planned, out.path))
-            return status_of(described.set_aside)
+        return _checked(console, path, out, until, chosen, lambda c: with_reading_options(c, columns, stated))
     with out.taken(path), open_campaign(path) as described, console.progress() as progress:
         study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
         compared = until == "report" and study.comparison is not None
@@ -283,6 +285,22 @@ def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None
     return status_of(set_aside)
 
 
-def _plan_text(planned: dict[str, Any], out: Path) -> str:
-    lines = [f"would {step}" for step in planned["steps"]]
-    return "\n".join([*lines, f"would write into {out}", *(f"set aside: {s}" for s in planned["set_aside"])])
+def _checked(
+    console: Console, path: Path, out: Output, until: DryUntil, chosen: StudyOptions,
+    prepared: Callable[[Campaign], Campaign],
+) -> int:  # fmt: skip
+    """Print everything that a study of a campaign would meet, and the status it would end with."""
+    from dataclasses import replace
+
+    from tribo.cli.dry_run_text import dry_run_text
+    from tribo.dry_run import check
+    from tribo.errors import TriboError
+
+    with console.progress() as progress:
+        found = check(path, chosen, until, prepared, progress)
+    try:
+        out.check(path)
+    except TriboError as why:
+        found = replace(found, faults=(*why.problems, *found.faults))
+    console.result(found.as_record(), dry_run_text(found, out.path, all_of_them=console.verbosity > 0))
+    return UNUSABLE if found.faults else status_of(found.set_aside)

@@ -14,7 +14,7 @@ from tribo.cli.reading_options import reading_options
 CAMPAIGN = click.argument("campaign", type=GivenPath())
 OUT = output_options()
 SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler; its workers run the simulations.")
-DRY_RUN = click.option("--dry-run", is_flag=True, help="List the steps without running them.")
+DRY_RUN = click.option("--dry-run", is_flag=True, help="Check everything and list the steps, without results.")
 
 RULE = click.option(
     "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."

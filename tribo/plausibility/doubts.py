@@ -10,14 +10,13 @@ import numpy as np
 
 from tribo.plausibility import bounds
 from tribo.plausibility.bounds import Bound, bound_of, material_class
-from tribo.plausibility.slips import likely_slips
+from tribo.plausibility.slips import Numbers, likely_slips
 from tribo.records import Campaign, Doubt, Ingested, LawFit, Pattern
 
 _MM2, _KPA, _MM, _UM, _KELVIN = 1e6, 1e-3, 1e3, 1e6, 273.15
 _TABLE, _TOML = "tests.csv", "campaign.toml"
 _COVERAGE = 2.0  # standard uncertainties by which a fitted number must lie outside
 _MOST_SHOWN = 3
-Numbers = dict[str, dict[str, float]]  # quantity -> what it is of -> its value
 
 
 def doubts_of(
@@ -27,16 +26,21 @@ def doubts_of(
     if ingested is not None:
         campaign = ingested.campaign
     numbers = _measured(campaign, ingested, fits)
-    slip = likely_slips(campaign, {q: tuple(by.values()) for q, by in numbers.items()})
+    slip = likely_slips(campaign, numbers)
     found = [
         doubt for q, by in numbers.items() if (doubt := _outside(campaign, q, by, _PLACES[q], slip)) is not None
     ]
-    return (*found, *_stated(campaign), *_geometry(campaign), *_load_span(campaign))
+    if not slip:  # one that explains the loads or the area explains these as well
+        found += [*_wide_pitches(campaign), *_load_span(campaign)]
+    return (*found, *_stated(campaign), *_geometry(campaign))
 
 
 def _measured(campaign: Campaign, ingested: Ingested | None, fits: Sequence[LawFit]) -> Numbers:
     """Numbers that hang together: a wrong load, force or area moves several of them."""
-    found: Numbers = {"mu": {}, "friction_ratio": {}, "tau0_kPa": {}, "pressure_kPa": {}, "area_mm2": {}}
+    masses = {f"test {t.test_id}": t.mass_kg * 1e3 for t in campaign.tests if t.mass_kg and t.load_from == "mass_g"}
+    found: dict[str, dict[str, float]] = {
+        "mu": {}, "friction_ratio": {}, "tau0_kPa": {}, "pressure_kPa": {}, "area_mm2": {}, "mass_g": masses,
+    }  # fmt: skip
     for fit in fits:
         of = f"{fit.sample}, {fit.regime}"
         found["mu"] |= _if_resolved(fit, "mu", of, bound_of("mu", campaign), 1.0)
@@ -83,23 +87,22 @@ def _outside(campaign: Campaign, quantity: str, by: Mapping[str, float], place: 
     if not wrong:
         return None
     kind = material_class(campaign)
-    shown = [f"{value:.3g} ({of})" for of, value in wrong.items()][:_MOST_SHOWN]
-    more = f" and {len(wrong) - _MOST_SHOWN} more" if len(wrong) > _MOST_SHOWN else ""
-    return Doubt(
-        quantity, _NAMES[quantity], ", ".join(shown) + more, f"{bound.low:g} to {bound.high:g}", place, slip,
-        bound.source, kind,
-    )  # fmt: skip
+    found = _listed([f"{value:.3g} ({of})" for of, value in wrong.items()])
+    allowed = f"{bound.low:g} to {bound.high:g}"
+    return Doubt(quantity, _NAMES[quantity], found, allowed, place, slip, bound.source, kind)
+
+
+def _listed(values: Sequence[str]) -> str:
+    more = f" and {len(values) - _MOST_SHOWN} more" if len(values) > _MOST_SHOWN else ""
+    return ", ".join(values[:_MOST_SHOWN]) + more
 
 
 def _stated(campaign: Campaign) -> Iterator[Doubt]:
-    """Masses, speeds, temperatures and humidities as typed."""
-    masses = {f"test {t.test_id}": t.mass_kg * 1e3 for t in campaign.tests if t.mass_kg}
+    """Speeds, temperatures and humidities as typed."""
     speeds = {f"test {t.test_id}": t.speed_m_s * _MM for t in campaign.tests if t.speed_m_s}
     warmth = {f"test {t.test_id}": t.temperature_C for t in campaign.tests if t.temperature_C is not None}
     damp = {f"test {t.test_id}": t.humidity_pct for t in campaign.tests if t.humidity_pct is not None}
-    high = bound_of("mass_g", campaign).high
     rules = (
-        ("mass_g", masses, lambda v: "divide by 1000, it looks like milligrams" if v > high else _KILOGRAMS),
         ("speed_mm_s", speeds, lambda v: _SPEEDS[0] if v < 1.0 else _SPEEDS[1]),
         ("temperature_C", warmth, lambda v: "it looks like kelvin: subtract 273.15" if 200 < v < 500 else ""),
         ("humidity_pct", damp, lambda v: ""),
@@ -110,8 +113,8 @@ def _stated(campaign: Campaign) -> Iterator[Doubt]:
             yield doubt
     if damp and 0 < max(damp.values()) <= 1:
         found = f"at most {max(damp.values()):g}"
-        slip = "humidity_pct looks like a fraction: multiply by 100?"
-        yield Doubt("humidity_pct", "humidity", found, "1 to 100 %", _PLACES["humidity_pct"], slip)
+        fraction = "humidity_pct looks like a fraction: multiply by 100?"
+        yield Doubt("humidity_pct", _NAMES["humidity_pct"], found, "1 to 100", _PLACES["humidity_pct"], fraction)
 
 
 def _plausible(campaign: Campaign, quantity: str, value: float) -> bool:
@@ -119,18 +122,26 @@ def _plausible(campaign: Campaign, quantity: str, value: float) -> bool:
     return bound.low <= value <= bound.high
 
 
+def _wide_pitches(campaign: Campaign) -> Iterator[Doubt]:
+    """Patterns of which the sample would hold hardly one cavity."""
+    if not campaign.has_area:
+        return
+    side_um = math.sqrt(campaign.nominal_area_m2) * _UM
+    most_um = side_um / bounds.FEWEST_CAVITIES_ACROSS
+    pitches = {p.name: max(p.pitch_m) * _UM for p in campaign.samples.values() if p.pitch_m is not None}
+    wide = [f"{pitch:.4g} um ({name})" for name, pitch in pitches.items() if pitch > most_um]
+    if wide:
+        slip = "pitch_um looks like nanometres: divide by 1000? Or nominal_area_mm2 like cm2: multiply by 100?"
+        allowed = f"at most {most_um:.3g} um on a sample {side_um:.3g} um wide"
+        yield Doubt("pitch_um", "pitch", _listed(wide), allowed, f"{_TOML}, pitch_um and nominal_area_mm2", slip)
+
+
 def _geometry(campaign: Campaign) -> Iterator[Doubt]:
-    """Patterns that do not fit on the sample, cavities smaller than can be made, area fractions off the geometry."""
-    side_um = math.sqrt(campaign.nominal_area_m2) * _UM if campaign.has_area else math.inf
+    """Cavities smaller than can be made, area fractions off the geometry."""
     for name, pattern in {p.name: p for p in campaign.samples.values()}.items():
-        if pattern.size_m is None or pattern.pitch_m is None:
+        if pattern.size_m is None:
             continue
-        place = f"{_TOML}, patterns.{name}"
-        pitch, size = max(pattern.pitch_m) * _UM, min(pattern.size_m) * _UM
-        if bounds.FEWEST_CAVITIES_ACROSS * pitch > side_um:
-            allowed = f"at most {side_um / bounds.FEWEST_CAVITIES_ACROSS:.3g} um on a sample {side_um:.3g} um wide"
-            slip = "pitch_um looks like nanometres: divide by 1000? Or nominal_area_mm2 is too small?"
-            yield Doubt("pitch_um", f"pitch of pattern {name}", f"{pitch:.4g} um", allowed, place, slip)
+        place, size = f"{_TOML}, patterns.{name}", min(pattern.size_m) * _UM
         if size < bounds.SMALLEST_CAVITY_UM:
             allowed = f"{bounds.SMALLEST_CAVITY_UM:g} um or more"
             slip = "the lengths look like millimetres: multiply by 1000?"
@@ -164,14 +175,12 @@ def _load_span(campaign: Campaign) -> Iterator[Doubt]:
     }
     if not close:
         return
-    found = ", ".join(f"{span:.2g} % ({s})" for s, span in list(close.items())[:_MOST_SHOWN])
-    more = f" and {len(close) - _MOST_SHOWN} more" if len(close) > _MOST_SHOWN else ""
+    found = _listed([f"{span:.2g} % ({s})" for s, span in close.items()])
     low = 100 * (bounds.SMALLEST_LOAD_SPAN - 1)
     slip = "loads this close determine neither mu nor tau0: measure at loads that differ by a factor of two or more"
-    yield Doubt("load_span", "range of the loads of a sample", found + more, f"{low:.0f} % or more", _TABLE, slip)
+    yield Doubt("load_span", "range of the loads of a sample", found, f"{low:.0f} % or more", _TABLE, slip)
 
 
-_KILOGRAMS = "mass_g looks like kilograms: multiply by 1000"
 _SPEEDS = ("the speed looks like m/s: multiply by 1000", "the speed looks like um/s: divide by 1000")
 _NAMES = {
     "mu": "mu", "friction_ratio": "T/N", "tau0_kPa": "tau0 in kPa", "pressure_kPa": "nominal pressure in kPa",

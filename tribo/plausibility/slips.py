@@ -10,50 +10,58 @@ import numpy as np
 from tribo.plausibility.bounds import bound_of
 from tribo.records import STANDARD_GRAVITY, Campaign
 
-_GRAM = 1e-3
+_GRAM, _KPA = 1e-3, 1e-3
+Numbers = Mapping[str, dict[str, float]]  # quantity -> what it is of -> its value
 MOST_NAMED = 2
 
 
 @dataclass(frozen=True)
 class Slip:
-    """A wrong unit: its question, and the factors by which loads, their differences, forces and the area change."""
+    """A wrong unit: its question, and the factors by which loads, their differences, forces, masses and area change.
+
+    A load N becomes ``difference`` (N - ``offset_N``): the mass of the slider may be right where the others are wrong.
+    """
 
     question: str
     load: float = 1.0
     difference: float = 1.0
+    offset_N: float = 0.0
     force: float = 1.0
+    mass: float = 1.0
     area: float = 1.0
 
-    def corrected(self, quantity: str, value: float) -> float:
-        """A number as it would be without the slip."""
+    def corrected(self, numbers: Numbers, area_m2: float) -> Numbers:
+        """The numbers as they would be without the slip."""
         factors = {
             "mu": self.force / self.difference,
             "friction_ratio": self.force / self.load,
             "tau0_kPa": self.force / self.area,
             "pressure_kPa": self.load / self.area,
             "area_mm2": self.area,
+            "mass_g": self.mass,
         }
-        return value * factors.get(quantity, 1.0)
+        found = {q: {of: value * factors[q] for of, value in by.items()} for q, by in numbers.items()}
+        for of, mu in numbers.get("mu", {}).items():  # the intercept moves where loads move by more than a factor
+            if of in found.get("tau0_kPa", {}):
+                found["tau0_kPa"][of] += factors["tau0_kPa"] * mu * self.offset_N / area_m2 * _KPA
+        return found
 
 
-def likely_slips(campaign: Campaign, numbers: Mapping[str, tuple[float, ...]]) -> str:
+def likely_slips(campaign: Campaign, numbers: Numbers) -> str:
     """The slips that bring every number into its bounds, as a question; empty where none does, or nothing is outside.
 
-    ``numbers`` are the values of each quantity (mu, friction_ratio, tau0_kPa, pressure_kPa, area_mm2).
+    ``numbers`` holds mu, friction_ratio, tau0_kPa, pressure_kPa, area_mm2 and mass_g by what they are of.
     """
-    if all(_inside(campaign, quantity, values) for quantity, values in numbers.items()):
+    if _all_inside(campaign, numbers):
         return ""
-    found = [
-        slip.question
-        for slip in _candidates(campaign)
-        if all(_inside(campaign, q, tuple(slip.corrected(q, v) for v in values)) for q, values in numbers.items())
-    ]
+    area_m2 = campaign.nominal_area_m2
+    found = [s.question for s in _candidates(campaign) if _all_inside(campaign, s.corrected(numbers, area_m2))]
     return "? Or ".join(found[:MOST_NAMED]) + "?" if found else ""
 
 
-def _inside(campaign: Campaign, quantity: str, values: tuple[float, ...]) -> bool:
-    bound = bound_of(quantity, campaign)
-    return all(bound.low <= value <= bound.high for value in values)
+def _all_inside(campaign: Campaign, numbers: Numbers) -> bool:
+    bounds = {quantity: bound_of(quantity, campaign) for quantity in numbers}
+    return all(bounds[q].low <= value <= bounds[q].high for q, by in numbers.items() for value in by.values())
 
 
 def _candidates(campaign: Campaign) -> Iterator[Slip]:
@@ -82,7 +90,8 @@ def _of_loads(campaign: Campaign, question: str, change: Callable[[np.ndarray, f
     other = change(loads, slider)
     usual = float(np.median(other / loads))
     span = float(np.ptp(loads))
-    return Slip(question, load=usual, difference=float(np.ptp(other)) / span if span > 0 else usual)
+    steeper = float(np.ptp(other)) / span if span > 0 else usual
+    return Slip(question, usual, steeper, float(np.median(loads - other / steeper)), mass=steeper)
 
 
 def _loads(campaign: Campaign) -> np.ndarray:
