@@ -19,8 +19,8 @@ from tribo.diagnose import examine
 from tribo.display import displayed, exact_text, in_short
 
 MOST_LINES, MOST_LETTERS = 40, 120
-FACES = ("tribo", "tribo.records", "tribo.errors", "tribo.simulate", "tribo.diagnose", "tribo.report", "tribo.fitting",
-         "tribo.traces", "tribo.readers", "tribo.mechanisms.record", "tribo.laws.record", "tribo.figures.record")  # fmt: skip
+FACES = ("tribo", "tribo.records", "tribo.errors", "tribo.simulate", "tribo.diagnose", "tribo.report",
+         "tribo.fitting", "tribo.traces", "tribo.readers", "tribo.mechanisms.record", "tribo.laws.record", "tribo.figures.record")  # fmt: skip
 
 
 def within(value: object, seen: set[int]) -> Iterator[Any]:
