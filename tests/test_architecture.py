@@ -43,6 +43,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("comparison", GROUND | {"fitting", "laws", "simulate", "store"}),
     ("diagnose", GROUND | {"laws", "fitting", "simulate", "mechanisms", "mechanisms_in_model"}),
     ("figures", GROUND | {"laws", "comparison", "diagnose"}),
+    ("plot", GROUND | {"diagnose", "figures"}),
     ("report", GROUND | {"laws", "store", "comparison", "diagnose", "figures"}),
 )
 MAY_IMPORT = dict(STREET)

@@ -14,13 +14,15 @@ from diagnose.synthetic import hidden
 from report.synthetic import make_study
 
 import tribo
-from tribo import records
+from tribo import errors, records
 from tribo.diagnose import examine
 from tribo.display import displayed, exact_text, in_short
 
 MOST_LINES, MOST_LETTERS = 40, 120
-FACES = ("tribo", "tribo.records", "tribo.errors", "tribo.simulate", "tribo.diagnose", "tribo.report",
-         "tribo.fitting", "tribo.traces", "tribo.readers", "tribo.mechanisms.record", "tribo.laws.record", "tribo.figures.record")  # fmt: skip
+FACES = (
+    "tribo", "tribo.records", "tribo.errors", "tribo.simulate", "tribo.diagnose", "tribo.report", "tribo.fitting",
+    "tribo.traces", "tribo.readers", "tribo.mechanisms.record", "tribo.laws.record", "tribo.figures.record",
+)  # fmt: skip
 
 
 def within(value: object, seen: set[int]) -> Iterator[Any]:
@@ -94,6 +96,12 @@ def test_a_display_leaves_out_what_is_empty_and_names_what_is_there() -> None:
 class Plain:
     values: Any = None
     name: str = ""
+
+
+def test_a_problem_and_a_fit_say_what_they_are_in_the_first_line() -> None:
+    fit = make_study().fits[0]
+    assert repr(errors.Problem("slug", "no unit", file="a.csv", row=3)).startswith("Problem: a.csv, row 3: no unit\n")
+    assert repr(fit).startswith(f"LawFit: {fit.sample}, {fit.regime}: mu = {fit.value('mu'):.4g} ± ")
 
 
 def test_a_record_of_very_many_fields_says_how_many_are_left_out() -> None:

@@ -27,9 +27,9 @@ def displayed(headline: Callable[[Any], str] | None = None) -> Callable[[R], R]:
     """
 
     def dressed(record_class: R) -> R:
-        record_class._headline = headline or _first_plain  # type: ignore[attr-defined]
-        record_class.__repr__ = _text  # type: ignore[method-assign]
-        record_class._repr_html_ = _table  # type: ignore[attr-defined]
+        own = headline or _first_plain
+        for name, method in {"_headline": lambda record: own(record), "__repr__": _text, "_repr_html_": _table}.items():
+            setattr(record_class, name, method)
         return record_class
 
     return dressed
@@ -90,8 +90,8 @@ def in_short(value: object) -> str:
         return "" if value is None or value != value else f"{value:.6g}"
     if isinstance(value, str):
         return _cut(value)
-    if hasattr(value, "columns") and hasattr(value, "iloc"):
-        return _cut(f"table of {_count(len(value), 'row')}: {', '.join(map(str, value.columns))}")
+    if hasattr(value, "columns") and hasattr(value, "index"):
+        return _cut(f"table of {_count(len(value.index), 'row')}: {', '.join(map(str, value.columns))}")
     if hasattr(value, "shape") and hasattr(value, "dtype"):
         return _array_in_short(value)
     if isinstance(value, Mapping):
