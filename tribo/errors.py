@@ -8,11 +8,14 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
+from tribo.display import displayed
+
 _LOG = logging.getLogger("tribo")
 _QUESTION = "did you mean"
 _OF_THE_SYSTEM = "system"  # kind of a problem that another try may not have: disk full, no permission
 
 
+@displayed(str)
 @dataclass(frozen=True)
 class Problem:
     """One error, described so that a user can correct it.

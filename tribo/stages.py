@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from tribo.campaign.flat_sample import required_flat_sample, with_flat_sample
 from tribo.campaign.zeros import with_zeros
+from tribo.display import displayed
 from tribo.errors import FitError
 from tribo.records import (
     Campaign,
@@ -37,6 +38,7 @@ def _silent(stage: str, done: int, total: int) -> None:
     """Report nothing."""
 
 
+@displayed()
 @dataclass(frozen=True)
 class StudyOptions:
     """Options of a study; each is recorded with the results."""
