@@ -143,7 +143,7 @@ class SetAside:
     problems: tuple[Problem, ...] = ()
 
 
-@displayed(lambda c: f"{c.title}, {len(c.tests)} tests of {len(c.samples)} samples")
+@displayed(lambda d: f"{d.name}: {d.found}")
 @dataclass(frozen=True)
 class Doubt:
     """A number outside its broad physical bounds, or a design that cannot give the number it is for.
@@ -171,6 +171,7 @@ class Doubt:
         return f"{self.name} is {self.found}; plausible{kind}: {self.plausible}; see {self.place}"
 
 
+@displayed(lambda c: f"{c.title}, {len(c.tests)} tests of {len(c.samples)} samples")
 @dataclass(frozen=True)
 class Campaign:
     """A campaign as described by campaign.toml and tests.csv; the exports in raw/ are not read yet.

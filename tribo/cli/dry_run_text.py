@@ -13,6 +13,16 @@ def dry_run_text(found: Checked, out: Path, *, all_of_them: bool) -> str:
     parts = [f"would {step}" for step in found.steps]
     if not found.faults:
         parts.append(f"would write into {out}")
+    parts += [text for text in (findings_text(found, all_of_them=all_of_them),) if text]
+    if not found.faults:
+        clean = not (found.set_aside or found.doubts or found.used_with_doubts)
+        parts.append(f"checked: {found.tests} tests can be used{'; nothing is doubtful' if clean else ''}")
+    return "\n".join(parts)
+
+
+def findings_text(found: Checked, *, all_of_them: bool) -> str:
+    """Faults, doubtful numbers, tests set aside or used with doubts, and notes; empty where there is nothing to say."""
+    parts = []
     groups = (
         ("fault", "", faults_text(found.faults, all_of_them=all_of_them), found.faults),
         ("doubtful number", "", doubts_text(found.doubts), found.doubts),
@@ -25,7 +35,4 @@ def dry_run_text(found: Checked, out: Path, *, all_of_them: bool) -> str:
         if items:
             number = f"{len(items)} {noun}{'s' if len(items) != 1 else ''}"
             parts.append(f"{number}{f' {what}' if what and noun == 'test' else ''}:\n{text}")
-    if not found.faults:
-        clean = not (found.set_aside or found.doubts or found.used_with_doubts)
-        parts.append(f"checked: {found.tests} tests can be used{'; nothing is doubtful' if clean else ''}")
     return "\n".join(parts)

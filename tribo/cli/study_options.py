@@ -19,6 +19,14 @@ DRY_RUN = click.option("--dry-run", is_flag=True, help="Check everything and lis
 RULE = click.option(
     "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
 )
+WEIGHTS = click.option(
+    "--weights",
+    type=click.Choice(["relative", "ratio", "force", "repeats"]),
+    default="relative",
+    show_default=True,
+    help="Scatter assumed equal at all loads: of T in percent (relative), of T/N (ratio) or of T (force); or "
+    "estimated from repeated tests (repeats).",
+)
 FLAT = click.option(
     "--flat", default="", metavar="SAMPLE",
     help="Flat sample on which the model is calibrated. [default: F, or the only flat sample]",
@@ -70,14 +78,7 @@ def fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
         *ZEROS,
         OVERRIDES,
         RULE,
-        click.option(
-            "--weights",
-            type=click.Choice(["relative", "ratio", "force", "repeats"]),
-            default="relative",
-            show_default=True,
-            help="Scatter assumed equal at all loads: of T in percent (relative), of T/N (ratio) or of T (force); or "
-            "estimated from repeated tests (repeats).",
-        ),
+        WEIGHTS,
     ):
         function = option(function)
     return function

@@ -85,10 +85,14 @@ def _copy(current: Path, builds: Path, now: float | None) -> Path:
     def skipped(folder: str, names: list[str]) -> set[str]:
         return {n for n in names if n.startswith(".") or n in NOT_COPIED}
 
-    shutil.copytree(current, part, ignore=skipped)
-    number = max((_order(copy)[0] for copy in dated(builds)), default=0) + 1
-    (part / NUMBER).write_text(f"{number}\n", encoding="utf-8")
-    part.rename(builds / name)
+    try:
+        shutil.copytree(current, part, ignore=skipped)
+        number = max((_order(copy)[0] for copy in dated(builds)), default=0) + 1
+        (part / NUMBER).write_text(f"{number}\n", encoding="utf-8")
+        part.rename(builds / name)
+    except BaseException:
+        shutil.rmtree(part, ignore_errors=True)
+        raise
     return builds / name
 
 
