@@ -45,7 +45,7 @@ class Checked:
             "steps": list(self.steps), "tests": self.tests, "faults": [asdict(p) for p in self.faults],
             "set_aside": [f"{s.test_id}: {s.reason}" for s in self.set_aside],
             "used_with_doubts": [f"{s.test_id}: {s.reason}" for s in self.used_with_doubts],
-            "doubts": [asdict(d) for d in self.doubts], "problems": [asdict(p) for p in self.notes],
+            "doubts": [asdict(d) for d in self.doubts], "problems": [asdict(p) for p in (*self.faults, *self.notes)],
         }  # fmt: skip
 
 

@@ -139,7 +139,7 @@ def test_a_dry_run_lists_faults_of_options_table_and_output_at_once(campaign: Pa
     result = run("report", campaign, "-o", campaign, "--rule", "sead", "--flat", "Q", "--dry-run")
     assert result.exit_code == 1
     for said in ("did you mean seed?", "--flat", "outside of every campaign", "did you mean 25?"):
-        assert said in result.stdout or said.replace("25", "138.5") in result.stdout
+        assert said in result.output or said.replace("25", "138.5") in result.output
 
 
 def test_forty_mistakes_are_tried() -> None:

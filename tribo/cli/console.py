@@ -48,6 +48,12 @@ class Console:
             lines = set_aside_text(tests, all_of_them=self.verbosity > 0)
             self.say(f"{len(tests)} test{'s' if len(tests) != 1 else ''} {what}:\n{lines}", level=level)
 
+    def list_problems(self, problems: Sequence[Problem]) -> None:
+        """What stands in the way, equal ones grouped; shown even with -q, nothing where there is none."""
+        if problems:
+            lines = faults_text(problems, all_of_them=self.verbosity > 0)
+            self.say(f"{len(problems)} problem{'s' if len(problems) != 1 else ''}:\n{lines}", level=-1)
+
     def list_doubts(self, doubts: Sequence[Doubt]) -> None:
         """Numbers outside their broad physical bounds; shown even with -q, nothing where there are none."""
         if doubts:
@@ -193,8 +199,7 @@ def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
 
 def _report_faults(console: Console, why: Exception) -> None:
     problems = problems_of(why)
-    lines = faults_text(problems, all_of_them=console.verbosity > 0)
-    console.say(f"{len(problems)} problem{'s' if len(problems) != 1 else ''}:\n{lines}", level=-1)
+    console.list_problems(problems)
     if console.as_json:
         click.echo(json.dumps({"problems": [asdict(p) for p in problems]}, indent=1, default=str))
 

@@ -1,7 +1,8 @@
-"""What a dry run found, in lines: the steps, then faults, tests set aside, doubts and notes."""
+"""What a dry run found, in lines: the steps, then tests set aside, doubts and notes."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from tribo.cli.grouped_faults import doubts_text, faults_text, set_aside_text
@@ -9,11 +10,12 @@ from tribo.dry_run import Checked
 
 
 def dry_run_text(found: Checked, out: Path, *, all_of_them: bool) -> str:
-    """The whole result of a dry run; equal faults are grouped unless ``all_of_them`` are asked for."""
+    """The result of a dry run but for the faults; equal ones are grouped unless ``all_of_them`` are asked for."""
     parts = [f"would {step}" for step in found.steps]
     if not found.faults:
         parts.append(f"would write into {out}")
-    parts += [text for text in (findings_text(found, all_of_them=all_of_them),) if text]
+    findings = findings_text(replace(found, faults=()), all_of_them=all_of_them)
+    parts += [findings] if findings else []
     if not found.faults:
         clean = not (found.set_aside or found.doubts or found.used_with_doubts)
         parts.append(f"checked: {found.tests} tests can be used{'; nothing is doubtful' if clean else ''}")

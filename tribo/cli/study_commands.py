@@ -303,4 +303,5 @@ def _checked(
     except TriboError as why:
         found = replace(found, faults=(*why.problems, *found.faults))
     console.result(found.as_record(), dry_run_text(found, out.path, all_of_them=console.verbosity > 0))
+    console.list_problems(found.faults)
     return UNUSABLE if found.faults else status_of(found.set_aside)
