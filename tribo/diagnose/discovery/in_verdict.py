@@ -2,40 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from tribo.diagnose.diagnosis_record import Diagnosis
+from tribo.diagnose.discovery.contested import without_wrong_forms
 from tribo.diagnose.discovery.law_words import law_layers, laws_text
 from tribo.diagnose.discovery.parting import parting_test
 from tribo.diagnose.discovery.search import Discovery, Progress, discover_laws
 from tribo.diagnose.layers import pattern_layers
 from tribo.diagnose.search.screen import Screen, screen_left
+from tribo.diagnose.sentences import summary
 from tribo.diagnose.statistics.linearisation import ModelFit
-from tribo.diagnose.verdict import CERTAIN_CAUSES, Layer, Verdict
+from tribo.diagnose.verdict import CERTAIN_CAUSES, Excluded, Layer, Outcome, Verdict
 
 REPLICATES_LEFT = 60
 
 
 def with_laws(d: Diagnosis, *, seed: int = 0, level: float = 0.01, progress: Progress | None = None) -> Diagnosis:
-    """The same diagnosis with the laws of what its causes leave as further layers; unchanged where nothing is left."""
-    if not _is_left(d, level):
+    """The same diagnosis with the laws of what its causes leave as further layers; unchanged where nothing is left.
+
+    A cause that loses against a law of its own column is no longer a cause.
+    """
+    model, lost = explained(d)
+    if not (lost or _is_left(d, level)):
         return d
     rng = np.random.default_rng(seed)
-    found = discover_laws(explained(d), level=level, rng=rng, progress=progress)
+    found = discover_laws(model, level=level, rng=rng, progress=progress)
     if not found.laws:
         return replace(d, laws=found)
     model = found.laws[-1].model
     left = screen_left(model, replicates=REPLICATES_LEFT, rng=rng, progress=progress)
-    return replace(d, laws=found, verdict=_extended(d.verdict, found, model, (left, level)))
+    return replace(d, laws=found, verdict=_extended(without_causes(d.verdict, lost), found, model, (left, level)))
 
 
-def explained(d: Diagnosis) -> ModelFit:
-    """The model with the causes that are certain."""
+def explained(d: Diagnosis) -> tuple[ModelFit, dict[str, float]]:
+    """The model with the causes that are certain, and those of them that a law of the same column replaces, each with
+    the log likelihood by which that law is better."""
     certain = d.named is not None and d.named.causes and d.verdict.verdict in CERTAIN_CAUSES
-    return d.named.model if d.named is not None and certain else d.baseline
+    return without_wrong_forms(d.named.model) if d.named is not None and certain else (d.baseline, {})
 
 
 def _is_left(d: Diagnosis, level: float) -> bool:
@@ -43,6 +50,25 @@ def _is_left(d: Diagnosis, level: float) -> bool:
     if d.named is None:
         return False
     return not d.named.causes or bool(d.named.remainders) or d.named.p_left < level
+
+
+def without_causes(v: Verdict, lost: Mapping[str, float]) -> Verdict:
+    """The verdict without the causes that a law replaces; they are excluded with the reason."""
+    if not lost:
+        return v
+    gone = set(lost) | {n for names in v.equivalent if set(names) & set(lost) for n in names}
+    causes = tuple(c for c in v.causes if c.mechanism not in gone)
+    outcome: Outcome = "partly" if causes else "unknown"
+    equivalent = tuple(names for names in v.equivalent if not set(names) & gone)
+    excluded = [
+        Excluded(name, f"a law of the same column explains the campaign better: log likelihood higher by {by:.1f}")
+        for name, by in lost.items()
+    ]
+    layers = tuple(layer for layer in v.layers if not (layer.kind == "cause" and layer.name in gone))
+    return replace(
+        v, verdict=outcome, causes=causes, equivalent=equivalent, excluded=(*v.excluded, *excluded), layers=layers,
+        gain=v.gain if causes else None, text=summary(outcome, causes, equivalent, v.misfits, dict(v.smallest_effects)),
+    )  # fmt: skip
 
 
 def _extended(v: Verdict, found: Discovery, model: ModelFit, left: tuple[Screen, float]) -> Verdict:

@@ -70,7 +70,7 @@ def discover_laws(
         p = share_beyond(_chance(model, grammar, scored[0].net, (replicates, rng), progress), scored[0].net)
         if p >= level:
             break
-        law = settled(model, Searched(grammar.courses, grammar.groups, scored[0].law, p), rng)
+        law = settled(model, Searched(grammar.courses, grammar.groups, p), scored[0].law, rng)
         found.append(law)
         model = law.model
     return Discovery(tuple(found), table, searched)
