@@ -31,6 +31,10 @@ SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler; its w
 DRY_RUN = click.option("--dry-run", is_flag=True, help="List the steps without running them.")
 
 
+LAWS = click.option(
+    "--laws", type=click.Path(exists=True, file_okay=False, path_type=Path), metavar="DIR",
+    help="Folder with laws of earlier campaigns (law*.toml). Each is tested; one that holds is a layer of the verdict.",
+)  # fmt: skip
 FLAT = click.option(
     "--flat", default="", metavar="SAMPLE",
     help="Flat sample on which the model is calibrated. [default: F, or the only flat sample]",
@@ -217,6 +221,7 @@ def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **opti
     "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
 )
 @FLAT
+@LAWS
 @reading_options
 @ZEROS[0]
 @ZEROS[1]
@@ -281,6 +286,7 @@ def _diagnose_published(console: Console, out: Output, seed: int) -> int:
 @DRY_RUN
 @_fit_options
 @_model_options
+@LAWS
 @command_options
 def report(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
     """Run every stage and write the report.
@@ -312,8 +318,12 @@ def verify(console: Console, out: Path, campaign: Path | None, **_: Any) -> int:
 
 @main.command()
 @CAMPAIGN
+@click.option(
+    "--with", "law_file", type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="LAW.TOML",
+    help="State whether the design would show this law of an earlier campaign.",
+)
 @command_options
-def plan(console: Console, campaign: Path, **_: Any) -> None:
+def plan(console: Console, campaign: Path, law_file: Path | None, **_: Any) -> None:
     """Assess a test plan before measuring.
 
     States which effects the tests listed in CAMPAIGN could detect and which they could not distinguish. The exports
@@ -323,12 +333,18 @@ def plan(console: Console, campaign: Path, **_: Any) -> None:
 
     from tribo.campaign import open_campaign
     from tribo.diagnose import plan_design
+    from tribo.diagnose.discovery.law_file import read_law
+    from tribo.diagnose.discovery.planned_law import plan_law
     from tribo.report.words.verdict_text import plan_text
 
+    law = read_law(law_file) if law_file is not None else None
     with open_campaign(campaign, measured=False) as opened:
         planned = plan_design(opened)
+        shown = plan_law(opened, *law) if law is not None else None
     record = {"tests": planned.n_tests, "findings": [asdict(f) for f in planned.findings], "tied": planned.tied}
-    console.result(record, plan_text(planned))
+    if shown is not None:
+        record["law"] = asdict(shown)
+    console.result(record, "\n".join([*([shown.text] if shown is not None else []), plan_text(planned)]))
 
 
 @main.command()
@@ -449,7 +465,9 @@ def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[
 def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis:
     from tribo.stages import diagnosis
 
-    return diagnosis(study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, progress=progress)
+    return diagnosis(
+        study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, laws=chosen.laws, progress=progress
+    )
 
 
 def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None = None) -> int:

@@ -22,11 +22,12 @@ def with_law(
 
     ``columns`` are values of recorded columns that the model does not know. A law on T or on a term of it is a gain of
     coefficients and adhesion, so that it can act on every block; one that acts in static friction alone changes the
-    static thresholds and leaves the sliding ones.
+    static thresholds and leaves the sliding ones. Where it changes nothing, the configuration is the same to the bit.
     """
     mechanism, values = law
     conditions = conditions_under(config, recorded, columns)
-    return config.with_(friction=by_law_under(config.friction, mechanism, values, conditions))
+    changed, same = (by_law_under(config.friction, mechanism, v, conditions) for v in (values, mechanism.zero()))
+    return config if changed == same else config.with_(friction=changed)
 
 
 def conditions_under(config: SimConfig, recorded: Mapping[str, float], columns: Mapping[str, str]) -> Conditions:

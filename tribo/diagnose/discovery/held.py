@@ -39,7 +39,7 @@ def holds(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimate], tri
     missing or does not vary, or the effect is below four standard errors in this design.
     """
     c, a0 = model.setup.observations.conditions, earlier["a"]
-    if (why := _not_tested(c, law)) or not np.any(law.weight(c)):
+    if (why := not_tested(c, law)) or not np.any(law.weight(c)):
         return Held("cannot be told", None, a0, f"The law cannot be tested here: {why or 'no such sample'}.")
     acting = Acting(law.mechanism())
     names = [p.name for p in acting.mechanism.parameters]
@@ -78,7 +78,7 @@ def _both(name: str, found: Estimate, earlier: Estimate) -> str:
     )
 
 
-def _not_tested(c: Conditions, law: WrittenLaw) -> str:
+def not_tested(c: Conditions, law: WrittenLaw) -> str:
     """Why the columns of a law do not allow a test; empty where they do."""
     for name in law.columns:
         if name not in UNITS and name not in c.columns:

@@ -62,7 +62,8 @@ def read_laws(folder: Path) -> tuple[KnownLaw, ...]:
     CampaignError
         A file is no law, or there is none: every fault of every file.
     """
-    found, problems = [], []
+    found: list[KnownLaw] = []
+    problems: list[Problem] = []
     for path in sorted(folder.rglob("law*.toml")):
         try:
             law, parameters = read_law(path)
@@ -77,7 +78,7 @@ def read_laws(folder: Path) -> tuple[KnownLaw, ...]:
     return tuple(found)
 
 
-def tested_laws(model: ModelFit, known: Sequence[KnownLaw], rng: np.random.Generator) -> Tested:
+def try_laws(model: ModelFit, known: Sequence[KnownLaw], rng: np.random.Generator) -> Tested:
     """Test every law on a fitted campaign; those that held are added, the surest first, while they hold beside the
     others. A column has one law."""
     answers = {k.name: holds(model, k.law, k.parameters, len(known)) for k in known}

@@ -171,14 +171,13 @@ def _forms(state: State, found: Searched) -> list[Form]:
     worth = {key: leading[key][0] - np.log(len(each)) for key, each in coarse.items()}
     ranked = sorted(worth, key=lambda key: -worth[key])[:LOOKED_AT]
     near = [key for key in ranked if worth[key] > worth[ranked[0]] - IN_REACH]
-    shapes = {key: leading[key][1] for key in near}
-    forms = [_on_fine_grid(state, found.groups[key[0]], shapes[key], _pairs(found, shapes[key])) for key in near]
+    forms = [_on_fine_grid(state, found.groups[key[0]], *_priced(found, leading[key][1])) for key in near]
     return sorted(forms, key=lambda f: -f.evidence)
 
 
-def _pairs(found: Searched, shapes: tuple[Shape, ...]) -> float:
-    """What a product of two columns costs."""
-    return float(found.courses.cost[found.courses.shapes.index(shapes)]) if len(shapes) > 1 else 0.0
+def _priced(found: Searched, shapes: tuple[Shape, ...]) -> tuple[tuple[Shape, ...], float]:
+    """The shapes of a form, with what a product of two columns costs."""
+    return shapes, float(found.courses.cost[found.courses.shapes.index(shapes)]) if len(shapes) > 1 else 0.0
 
 
 def _on_fine_grid(state: State, group: Group, shapes: tuple[Shape, ...], cost: float) -> Form:
