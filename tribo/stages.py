@@ -11,6 +11,7 @@ import numpy as np
 
 from tribo.campaign.flat_sample import required_flat_sample, with_flat_sample
 from tribo.campaign.zeros import with_zeros
+from tribo.display import displayed
 from tribo.errors import FitError
 from tribo.records import (
     Campaign,
@@ -38,6 +39,7 @@ def _silent(stage: str, done: int, total: int) -> None:
     """Report nothing."""
 
 
+@displayed()
 @dataclass(frozen=True)
 class StudyOptions:
     """Options of a study; each is recorded with the results."""

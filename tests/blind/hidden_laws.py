@@ -28,6 +28,9 @@ SERIES = frozenset({"run_order", "elapsed_s"})  # one pull every seven minutes: 
 STATIC, SLIDING, BOTH = (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)
 
 
+Course = Callable[[pd.DataFrame, np.ndarray, pd.DataFrame], np.ndarray]
+
+
 @dataclass(frozen=True)
 class Truth:
     """What is right to say of a hidden law: sets of columns that are the same, regimes, samples and kinds of shape."""
@@ -53,7 +56,7 @@ class Form:
 
     columns: tuple[frozenset[str] | str, ...]
     kinds: frozenset[str]
-    course: Callable[[pd.DataFrame, np.ndarray], np.ndarray]
+    course: Course
     regimes: tuple[float, float] = BOTH
     where: str = "all"  # all, patterned, share (of the cavities), one
     term: str = ""  # mu or tau where a part of T alone changes
@@ -63,8 +66,8 @@ def _x(name: str) -> Callable[[pd.DataFrame], np.ndarray]:
     return lambda t: t[name].to_numpy(float)
 
 
-def _x_of(name: str) -> Callable[[pd.DataFrame, np.ndarray], np.ndarray]:
-    return lambda t, u: _x(name)(t)
+def _x_of(name: str) -> Course:
+    return lambda t, u, r: _x(name)(t)
 
 
 def _place(x: np.ndarray, u: float) -> float:
@@ -72,79 +75,77 @@ def _place(x: np.ndarray, u: float) -> float:
     return float(np.quantile(x, 0.3 + 0.4 * u))
 
 
-def _over(name: str) -> Callable[[pd.DataFrame, np.ndarray], np.ndarray]:
-    return lambda t, u: (_x(name)(t) > _place(_x(name)(t), u[0])) * 1.0
+def _over(name: str) -> Course:
+    return lambda t, u, r: (_x(name)(t) > _place(_x(name)(r), u[0])) * 1.0
 
 
-def _soft(t: pd.DataFrame, u: np.ndarray) -> np.ndarray:
-    x = _x("film_um")(t)
-    return np.tanh((x - _place(x, u[0])) / 0.23)
+def _soft(t: pd.DataFrame, u: np.ndarray, r: pd.DataFrame) -> np.ndarray:
+    return np.tanh((_x("film_um")(t) - _place(_x("film_um")(r), u[0])) / 0.23)
 
 
-def _hinge(t: pd.DataFrame, u: np.ndarray) -> np.ndarray:
-    x = _x("humidity_pct")(t)
-    return np.clip(x - _place(x, u[0]), 0.0, None)
+def _hinge(t: pd.DataFrame, u: np.ndarray, r: pd.DataFrame) -> np.ndarray:
+    return np.clip(_x("humidity_pct")(t) - _place(_x("humidity_pct")(r), u[0]), 0.0, None)
 
 
-def _best(name: str) -> Callable[[pd.DataFrame, np.ndarray], np.ndarray]:
-    return lambda t, u: -((_x(name)(t) - _place(_x(name)(t), u[0])) ** 2)
+def _best(name: str) -> Course:
+    return lambda t, u, r: -((_x(name)(t) - _place(_x(name)(r), u[0])) ** 2)
 
 
-def _tent(t: pd.DataFrame, u: np.ndarray) -> np.ndarray:
-    x = _x("film_um")(t)
-    return -np.abs(x - _place(x, u[0]))
+def _tent(t: pd.DataFrame, u: np.ndarray, r: pd.DataFrame) -> np.ndarray:
+    return -np.abs(_x("film_um")(t) - _place(_x("film_um")(r), u[0]))
 
 
-def _bell(name: str) -> Callable[[pd.DataFrame, np.ndarray], np.ndarray]:
-    def course(t: pd.DataFrame, u: np.ndarray) -> np.ndarray:
-        x = _x(name)(t)
-        return np.exp(-(((x - _place(x, u[0])) / (0.19 * np.ptp(x))) ** 2))
+def _bell(name: str) -> Course:
+    def course(t: pd.DataFrame, u: np.ndarray, r: pd.DataFrame) -> np.ndarray:
+        known = _x(name)(r)
+        return np.exp(-(((_x(name)(t) - _place(known, u[0])) / (0.19 * np.ptp(known))) ** 2))
 
     return course
 
 
-def _fading(name: str, reach: float) -> Callable[[pd.DataFrame, np.ndarray], np.ndarray]:
-    def course(t: pd.DataFrame, u: np.ndarray) -> np.ndarray:
-        x = _x(name)(t)
-        return np.exp(-(x - x.min()) / (reach * (0.8 + 0.4 * u[0]) * np.ptp(x)))
+def _fading(name: str, reach: float) -> Course:
+    def course(t: pd.DataFrame, u: np.ndarray, r: pd.DataFrame) -> np.ndarray:
+        known = _x(name)(r)
+        return np.exp(-(_x(name)(t) - known.min()) / (reach * (0.8 + 0.4 * u[0]) * np.ptp(known)))
 
     return course
 
 
-def _rest_under_load(t: pd.DataFrame, u: np.ndarray) -> np.ndarray:
+def _rest_under_load(t: pd.DataFrame, u: np.ndarray, r: pd.DataFrame) -> np.ndarray:
     return np.log1p(_x("hold_s")(t) / 2.3) * _x("N")(t) ** (0.5 + 0.4 * u[0])
 
 
-def _warm_and_damp(t: pd.DataFrame, u: np.ndarray) -> np.ndarray:
-    warm, damp = (x - np.quantile(x, 0.1 + 0.1 * u[0]) for x in (_x("temperature_C")(t), _x("humidity_pct")(t)))
+def _warm_and_damp(t: pd.DataFrame, u: np.ndarray, r: pd.DataFrame) -> np.ndarray:
+    names, low = ("temperature_C", "humidity_pct"), 0.1 + 0.1 * u[0]
+    warm, damp = (_x(name)(t) - np.quantile(_x(name)(r), low) for name in names)
     return np.clip(warm, 0.0, None) * np.clip(damp, 0.0, None)
 
 
-def _film_and_speed(t: pd.DataFrame, u: np.ndarray) -> np.ndarray:
+def _film_and_speed(t: pd.DataFrame, u: np.ndarray, r: pd.DataFrame) -> np.ndarray:
     return _x("film_um")(t) * np.log(_x("speed_mm_s")(t) / 0.05)
 
 
-def _from_to(t: pd.DataFrame, u: np.ndarray) -> np.ndarray:
-    x = _x("run_order")(t) / len(t)
+def _from_to(t: pd.DataFrame, u: np.ndarray, r: pd.DataFrame) -> np.ndarray:
+    x = _x("run_order")(t) / len(r)
     begin = 0.15 + 0.4 * u[0]
     return ((x > begin) & (x < begin + 0.19 + 0.12 * u[1])) * 1.0
 
 
-def _after_change(t: pd.DataFrame, u: np.ndarray) -> np.ndarray:
+def _after_change(t: pd.DataFrame, u: np.ndarray, r: pd.DataFrame) -> np.ndarray:
     x = _x("run_order")(t)
-    return (x > len(t) * (0.25 + 0.5 * u[0])) * 1.0
+    return (x > len(r) * (0.25 + 0.5 * u[0])) * 1.0
 
 
-def _swing(t: pd.DataFrame, u: np.ndarray) -> np.ndarray:
+def _swing(t: pd.DataFrame, u: np.ndarray, r: pd.DataFrame) -> np.ndarray:
     turns = 2.3 + 5.1 * u[0]
-    return np.sin(2 * np.pi * (turns * _x("run_order")(t) / len(t) + u[1]))
+    return np.sin(2 * np.pi * (turns * _x("run_order")(t) / len(r) + u[1]))
 
 
-def _middle_speed(t: pd.DataFrame, u: np.ndarray) -> np.ndarray:
+def _middle_speed(t: pd.DataFrame, u: np.ndarray, r: pd.DataFrame) -> np.ndarray:
     return -(np.log(_x("speed_mm_s")(t) / (0.16 + 0.1 * u[0])) ** 2)
 
 
-def _named(t: pd.DataFrame, u: np.ndarray) -> np.ndarray:
+def _named(t: pd.DataFrame, u: np.ndarray, r: pd.DataFrame) -> np.ndarray:
     return (t["lot"] == "q7").to_numpy() * 1.0
 
 
@@ -161,7 +162,7 @@ FORMS: dict[str, Form] = {
     "tent of film": Form(("film_um",), PEAK, _tent),
     "bell of humidity, static": Form(("humidity_pct",), PEAK, _bell("humidity_pct"), STATIC),
     "line of film, static": Form(("film_um",), LINE, _x_of("film_um"), STATIC),
-    "power of film, sliding": Form(("film_um",), FADE, lambda t, u: np.log(_x("film_um")(t)), SLIDING),
+    "power of film, sliding": Form(("film_um",), FADE, lambda t, u, r: np.log(_x("film_um")(t)), SLIDING),
     "decay with film": Form(("film_um",), FADE, _fading("film_um", 0.2)),
     "hold times pressure, static": Form(("hold_s", frozenset({"pressure_Pa", "contact_pressure_Pa"})), TIMES,
                                         _rest_under_load, STATIC),
@@ -174,7 +175,7 @@ FORMS: dict[str, Form] = {
     "line of temperature, one sample": Form(("temperature_C",), LINE, _x_of("temperature_C"), where="one"),
     "threshold of film, one sample, static": Form(("film_um",), STEP, _over("film_um"), STATIC, "one"),
     "bell of humidity, patterned": Form(("humidity_pct",), PEAK, _bell("humidity_pct"), where="patterned"),
-    "power of hold, sliding": Form(("hold_s",), POWER, lambda t, u: np.log(_x("hold_s")(t)), SLIDING),
+    "power of hold, sliding": Form(("hold_s",), POWER, lambda t, u, r: np.log(_x("hold_s")(t)), SLIDING),
     "optimum of speed": Form(("speed_m_s",), PEAK, _middle_speed),
     "line of film, by cavities": Form(("film_um",), LINE, _x_of("film_um"), where="share"),
     "lot, patterned": Form(("lot",), frozenset({"level"}), _named, where="patterned"),
@@ -196,33 +197,45 @@ def law_design(seed: int) -> Design:
 
 
 def hide_law(seed: int, form: str, law: int | None = None, strength: float = STRENGTH) -> Hidden:
-    """A campaign from ``seed`` with a law of this form, its places drawn from ``law`` (default: the same seed).
+    """A campaign from ``seed`` with a law of this form. An empty form hides nothing; the columns are the same.
 
-    An empty form hides nothing; the columns are the same.
+    Places and amplitude are those of the campaign ``law`` where one is given: the same law in another campaign, whose
+    samples are those of the first.
     """
-    design = law_design(seed)
+    design = law_design(seed) if law is None else replace(law_design(seed), samples=law_design(law).samples)
+    bench = _bench(seed, design)
+    if not form:
+        nothing = Truth((), (0.0, 0.0), frozenset(), frozenset())
+        return Hidden(bench, np.zeros((len(bench.tests), 2)), nothing)
+    first = bench if law is None else _bench(law, law_design(law))
+    number = seed if law is None else law
+    size = strength / _strength(_change(first, first.tests, FORMS[form], number)[0], first, law_design(number))
+    change, truth = _change(bench, first.tests, FORMS[form], number)
+    change = size * change
+    bench.static, bench.sliding = bench.static * np.exp(change[:, 0]), bench.sliding * np.exp(change[:, 1])
+    return Hidden(bench, change, truth)
+
+
+def _bench(seed: int, design: Design) -> Bench:
+    """A campaign without any effect, with further columns that nothing follows."""
     bench = hide(seed, [], design)
     rng = np.random.default_rng([seed, 72])
     bench.tests["film_um"] = rng.uniform(0.7, 6.4, len(bench.tests)).round(2)
     bench.tests["lot"] = rng.choice(["q3", "q5", "q7"], len(bench.tests))
     bench.tests["wear_um"] = rng.normal(12.0, 3.1, len(bench.tests)).round(1)
-    if not form:
-        nothing = Truth((), (0.0, 0.0), frozenset(), frozenset())
-        return Hidden(bench, np.zeros((len(bench.tests), 2)), nothing)
-    change, truth = _change(bench, design, FORMS[form], seed if law is None else law)
-    change = change * strength / _strength(change, bench, design)
-    bench.static, bench.sliding = bench.static * np.exp(change[:, 0]), bench.sliding * np.exp(change[:, 1])
-    return Hidden(bench, change, truth)
+    return bench
 
 
-def _change(bench: Bench, design: Design, form: Form, law: int) -> tuple[np.ndarray, Truth]:
+def _change(bench: Bench, first: pd.DataFrame, form: Form, law: int) -> tuple[np.ndarray, Truth]:
+    """The change of ln T (n, 2) by the law at size one, its places from the table of the ``first`` campaign."""
     rng = np.random.default_rng([law, 73])
     places, up = rng.uniform(size=2), rng.choice([-1.0, 1.0])
-    patterned = [s for s in design.samples if s != "F"]
-    chosen = {"all": list(design.samples), "one": [str(rng.choice(patterned))]}.get(form.where, patterned)
+    samples = sorted(set(bench.column("sample")))
+    patterned = [s for s in samples if s != "F"]
+    chosen = {"all": samples, "one": [str(rng.choice(patterned))]}.get(form.where, patterned)
     weight = bench.of_sample(open_share) if form.where == "share" else np.isin(bench.column("sample"), chosen) * 1.0
-    course = form.course(bench.tests, places)
-    change = (up * (course - course.mean()) * weight)[:, None] * np.array(form.regimes)
+    course = form.course(bench.tests, places, first)
+    change = (up * (course - form.course(first, places, first).mean()) * weight)[:, None] * np.array(form.regimes)
     columns = tuple(c if isinstance(c, frozenset) else frozenset({c}) for c in form.columns)
     truth = Truth(columns, form.regimes, frozenset(chosen), form.kinds)
     if form.term:

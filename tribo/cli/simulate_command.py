@@ -188,11 +188,13 @@ def _work(added: Added) -> Work:
     """What is done for each run of an ensemble: the run itself, with what is added to the model."""
     from functools import partial
 
+    from tribo.display import exact_text
     from tribo.simulate.resume import FRICTION, Work
 
     if not added.acting and not added.laws:
         return FRICTION
-    label = repr((added.acting, added.conditions)) + (repr((added.laws, added.columns)) if added.laws else "")
+    label = exact_text((added.acting, added.conditions))
+    label += exact_text((added.laws, added.columns)) if added.laws else ""
     return Work(partial(pulled, added=added), label=label)
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Choosing, Conditions, Forces, Mechanism, Parameter, Values, amplitude
+from tribo.display import displayed
+from tribo.mechanisms.record import Base, Choosing, Conditions, Forces, Mechanism, Values, amplitude
 from tribo.records import REGIMES, FloatArray
 
 T, LOAD_TERM, ADHESION_TERM = "T", "load term", "adhesion term"
@@ -19,6 +20,7 @@ UNITS = {
 LARGEST = 3.0  # of an amplitude in ln T
 
 
+@displayed()
 @dataclass(frozen=True)
 class Shape:
     """A function of one column x, about one in size.
@@ -72,6 +74,7 @@ class Shape:
         return np.column_stack([np.sin(turns), np.cos(turns)])
 
 
+@displayed()
 @dataclass(frozen=True)
 class WrittenLaw:
     """One law: the product of one or two shapes, acting on T or on one term of it, in a regime, on some samples.
@@ -120,7 +123,7 @@ class WrittenLaw:
         """The law as a mechanism: its amplitude is free (two of a wave), its places and widths are as written."""
         first = amplitude("a", "", -LARGEST, LARGEST, 0.1, "change of ln T at 1 of the shape")
         d = 2 if self.shapes[0].kind == "wave" else 1
-        parameters = [first, *(Parameter("b", "", -LARGEST, LARGEST, 0.1, "of the cosine") for _ in range(d - 1))]
+        parameters = [first, *(amplitude("b", "", -LARGEST, LARGEST, 0.1, "of the cosine") for _ in range(d - 1))]
 
         def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
             change = self.course(conditions) @ values[:d] * self.weight(conditions)
