@@ -8,6 +8,7 @@ import numpy as np
 
 from tribo.diagnose.diagnosis_record import Diagnosis
 from tribo.diagnose.search.rivals import weights_of
+from tribo.diagnose.statistics.percent import percent
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ def residual_table(d: Diagnosis) -> pd.DataFrame:
 
     Columns: test_id, sample, specimen, regime, normal_load_N, run_order, specimen_run, temperature_C,
     humidity_pct, speed_m_s, hold_s, measured_N, baseline_N, extended_N, residual_percent and
-    residual_extended_percent (100 ln of measured over modelled). Without a named mechanism the extended
+    residual_extended_percent: 100 (measured / modelled - 1). Without a named mechanism the extended
     columns repeat the baseline. Where the extended model was run in the simulator itself, simulated_N is what it says.
     """
     import pandas as pd
@@ -38,8 +39,8 @@ def residual_table(d: Diagnosis) -> pd.DataFrame:
                     "normal_load_N": c.normal_load_N, "run_order": c.run_order, "specimen_run": c.specimen_run,
                     "temperature_C": c.temperature_C, "humidity_pct": c.humidity_pct, "speed_m_s": c.speed_m_s,
                     "hold_s": c.hold_s, "measured_N": np.exp(measured), "baseline_N": np.exp(before),
-                    "extended_N": np.exp(after), "residual_percent": 100 * (measured - before),
-                    "residual_extended_percent": 100 * (measured - after),
+                    "extended_N": np.exp(after), "residual_percent": percent(measured - before),
+                    "residual_extended_percent": percent(measured - after),
                 }
                 | simulated
             )
@@ -67,7 +68,7 @@ def misfit_map(d: Diagnosis) -> pd.DataFrame:
 
 
 def look_table(d: Diagnosis) -> pd.DataFrame:
-    """Every look at the baseline: its strength in standard deviations, adjusted p and size, strongest first."""
+    """Every look at the baseline: its strength in standard deviations, adjusted p and peak-to-peak size."""
     import pandas as pd
 
     s = d.screened
@@ -75,7 +76,7 @@ def look_table(d: Diagnosis) -> pd.DataFrame:
         {
             "kind": look.kind, "observable": look.observable, "covariate": look.covariate, "sample": look.sample,
             "choice": look.acting.choice if look.acting else "", "strength": strength,
-            "p_adjusted": s.p_adjusted(float(strength)), "effect_percent": 100 * float(np.expm1(min(size, 5.0))),
+            "p_adjusted": s.p_adjusted(float(strength)), "peak_to_peak_percent": float(percent(min(size, 5.0))),
         }
         for look, strength, size in zip(s.looks, s.strength, s.size, strict=True)
     ]  # fmt: skip
