@@ -9,22 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from on_the_command_line import run
 
 from tribo import stages
 from tribo.campaign import load_campaign
-from tribo.cli import main
 from tribo.errors import CampaignError
 from tribo.ingestion.draft import started_at
 from tribo.ingestion.file_names import name_pattern, proposed_patterns, read_names
 
 NAMES = "{sample}_{normal_load_N}N_{speed_rpm}RPM_{repeat}"
-
-
-def run(*arguments: object) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
 
 
 def pull(sign: float = 1.0, seed: int = 1) -> str:

@@ -23,6 +23,11 @@ OUTCOMES = {
     "partly": "A cause was identified, and a misfit remains that it does not explain.",
     "unknown": "The model does not fit the data, and no known mechanism explains the misfit.",
 }
+TIED = {
+    "named": "The model does not fit the data; the cause is one of several that this campaign cannot distinguish.",
+    "partly": "The model does not fit the data; the cause is one of several that this campaign cannot distinguish, and a "
+    "misfit remains that none of them explains.",
+}
 
 
 def write_verdict(verdict: Mapping[str, Any], out: Path) -> Path:
@@ -33,7 +38,7 @@ def write_verdict(verdict: Mapping[str, Any], out: Path) -> Path:
 def verdict_in_words(verdict: Mapping[str, Any]) -> dict[str, Any]:
     """The parts of a verdict as text for the report; empty where the verdict has none."""
     return {
-        "outcome": OUTCOMES.get(str(verdict["verdict"]), str(verdict["verdict"])),
+        "outcome": _outcome(verdict),
         "text": str(verdict.get("text") or ""),
         "equivalent": [_tie(names) for names in verdict.get("equivalent") or () if len(names) > 1],
         "causes": [_cause(cause) for cause in verdict.get("causes") or ()],
@@ -44,6 +49,14 @@ def verdict_in_words(verdict: Mapping[str, Any]) -> dict[str, Any]:
         "not_testable": [(_plain(e["mechanism"]), _why(e["reason"])) for e in verdict.get("not_testable") or ()],
         "corrections": [_correction(x) for x in verdict.get("layers") or () if x["kind"] == "pattern_correction"],
     }
+
+
+def _outcome(verdict: Mapping[str, Any]) -> str:
+    """The outcome as a sentence; causes that the data cannot tell apart are not called identified."""
+    outcome = str(verdict["verdict"])
+    if outcome in TIED and any(len(names) > 1 for names in verdict.get("equivalent") or ()):
+        return TIED[outcome]
+    return OUTCOMES.get(outcome, outcome)
 
 
 def _why(reason: str) -> str:
