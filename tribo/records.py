@@ -377,8 +377,8 @@ class CombinedFit(LawFit):
     """A fitted law with its combined uncertainty (GUM): ``covariance`` is ``type_a`` plus what all pulls share.
 
     ``type_a`` is the covariance of the mean over specimens and ``dof`` its degrees of freedom; what all pulls share
-    (type B: gain, zero, load, area, angle) counts as known. ``largest`` holds, for mu, tau0_Pa and T, the component with
-    the largest share of the variance and that share in percent.
+    (type B: gain, zero, load, area, angle) counts as known. ``largest`` holds, for mu, tau0_Pa and T, the component
+    with the largest share of the variance and that share in percent.
     """
 
     type_a: FloatArray = field(default_factory=lambda: np.zeros((2, 2)))
@@ -537,15 +537,15 @@ class Ingested:
 class Study:
     """One campaign with the results of all stages.
 
-    ``fits`` holds the measured law of every sample and regime (T = mu N + tau0 A, the default weights), ``combined`` the
-    same with the combined uncertainty, which is what the report states,
-    ``other_fits`` the same under other weights or laws. ``simulated`` is the ensemble, one row per run: sample,
-    pressure_Pa, normal_load_N (p times the nominal area of the campaign), angle_deg, seed, static_N,
-    sliding_N. ``example_runs`` holds one full force trace of the model per sample. ``budget`` is the uncertainty
-    budget of every fitted number, one row per component. ``power`` states the differences this campaign could detect,
-    ``outlying`` the outlying pulls and specimens. ``differences`` holds the differences between samples measured on the
-    same specimens, one row per pair of samples, regime and number. ``laws`` compares the candidate laws of every sample
-    by held-out loads, ``dependence`` states how T/N changes with each recorded variable.
+    ``fits`` holds the measured law of every sample and regime (T = mu N + tau0 A, the default weights), ``combined``
+    the same with the combined uncertainty, which is what the report states, ``other_fits`` the same under other weights
+    or laws. ``simulated`` is the ensemble, one row per run: sample, pressure_Pa, normal_load_N (p times the nominal
+    area of the campaign), angle_deg, seed, static_N, sliding_N. ``example_runs`` holds one full force trace of the
+    model per sample. ``budget`` is the uncertainty budget of every fitted number, one row per component. ``power``
+    states the differences this campaign could detect, ``outlying`` the outlying pulls and specimens. ``differences``
+    holds the differences between samples measured on the same specimens, one row per pair of samples, regime and
+    number. ``laws`` compares the candidate laws of every sample by held-out loads, ``dependence`` states how T/N
+    changes with each recorded variable.
     """
 
     ingested: Ingested

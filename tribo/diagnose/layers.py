@@ -31,8 +31,8 @@ def _pattern_layer(c: PatternCorrection) -> Layer:
     parameters = {f"at {load:g} N": _estimate(percent) for load, percent in c.at_load.items()}
     text = (
         f"{sentence_case(c.regime)} friction of {c.sample}: measured over modelled T, less one, is "
-        f"{c.mean.value:+.0f} % (geometric mean over its tests; 90 % interval {c.mean.low:+.0f} to {c.mean.high:+.0f} %; "
-        f"adjusted p {p_text(c.p)})."
+        f"{c.mean.value:+.0f} % (geometric mean over its tests; 90 % interval {c.mean.low:+.0f} to {c.mean.high:+.0f} "
+        f"%; adjusted p {p_text(c.p)})."
     )
     return Layer(
         kind="pattern_correction", name=c.sample, samples=(c.sample,), regimes=(c.regime,), p_adjusted=c.p,
@@ -62,7 +62,8 @@ def _cause_layer(
     change = effect_of(beside.fit.setup, beside.fit.law, best.acting, beside.values)
     samples, regimes = _where(beside.fit, change)
     m = best.acting.mechanism
-    where = np.unravel_index(int(np.abs(change).argmax()), change.shape)
+    test, regime = np.unravel_index(int(np.abs(change).argmax()), change.shape)
+    where = int(test), int(regime)
     value, low, high = _effect_percent(best, parameters[m.amplitude.name], where)
     gained: Gain | None = gain(without, beside.fit, rng)
     text = (
@@ -91,7 +92,7 @@ def _place(f: ModelFit, where: tuple[int, int]) -> str:
 
 
 def _effect_percent(best: Candidate, amplitude: Estimate, where: tuple[int, int]) -> tuple[float, float, float]:
-    """The change of T at the test and regime ``where``, signed, in percent; with the ends of the amplitude's interval."""
+    """The change of T (percent) at the test and regime ``where``, with the ends of the amplitude's interval."""
     f = best.fit
 
     def at(size: float) -> float:

@@ -14,8 +14,8 @@ from tribo.diagnose.search.weighing import Candidate
 from tribo.diagnose.statistics.direct_evidence import Evidence, stated_evidence
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting
-from tribo.diagnose.statistics.percent import percent
 from tribo.diagnose.statistics.pattern_excess import WITHIN, PatternExcess
+from tribo.diagnose.statistics.percent import percent
 from tribo.diagnose.terms import ABSORBED, in_words, not_varied
 from tribo.diagnose.verdict import Cause, Estimate, Excluded, Layer, Misfit, Outcome
 from tribo.mechanisms.direct_estimates import TraceEvidence

@@ -19,8 +19,8 @@ from tribo.diagnose.diagnosis_record import Diagnosis, NotSimulated, SimulatedEx
 from tribo.diagnose.sentences import name_in_words
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import effect_of
-from tribo.diagnose.statistics.percent import rms_percent
 from tribo.diagnose.statistics.pattern_table import flat_law
+from tribo.diagnose.statistics.percent import rms_percent
 from tribo.diagnose.verdict import CERTAIN_CAUSES
 from tribo.errors import SimulationError
 from tribo.mechanisms.record import Conditions, Values
@@ -263,8 +263,9 @@ def _reported(d: Diagnosis, found: SimulatedExtension | NotSimulated) -> tuple[s
     }  # fmt: skip
     sentence = (
         f"With {names} in the simulator itself ({len(found.table)} pairs of runs), the effect is {found.ratio:.3f} +- "
-        f"{found.ratio_u:.3f} times that of its law. The root mean square of measured over modelled T, less one, is {before:.1f} % for the calibrated "
-        f"model, {after:.1f} % with the simulated effect and {quick:.1f} % with the law."
+        f"{found.ratio_u:.3f} times that of its law. The root mean square of measured over modelled T, less one, is "
+        f"{before:.1f} % for the calibrated model, {after:.1f} % with the simulated effect and {quick:.1f} % with the "
+        "law."
     )
     return "simulated", record, sentence
 

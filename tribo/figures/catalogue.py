@@ -84,8 +84,8 @@ FIGURES: dict[str, StudyFigure] = {
         StudyFigure(
             "fig8",
             "μ and τ₀ against contact area fraction",
-            "Fitted μ and τ₀ with their combined standard uncertainties, and a straight line in AF through the measured "
-            "values (equal weights). Points that would overlap are shifted slightly. Simulated points are "
+            "Fitted μ and τ₀ with their combined standard uncertainties, and a straight line in AF through the "
+            "measured values (equal weights). Points that would overlap are shifted slightly. Simulated points are "
             "plotted at the area fraction of the model lattice. μ and τ₀ of a fit are correlated: judge the "
             "model by the force at a load, not by μ or τ₀ alone.",
             area.numbers,
@@ -148,12 +148,13 @@ DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
             "misfit",
             "Where the calibrated model fails",
             "Change of measured over modelled friction, in percent, from the low to the high end of each recorded "
-            "variable (5 to 95 % of its range), for each sample. Column “mean”: mean over the sample of 100 (measured / "
-            "model − 1). Column “bend with load”: height of the ends of the load range above its middle. Strong colours and asterisks (** p < 0.01, * p < 0.05) mark "
-            "statistically significant deviations. The p values are adjusted for all comparisons: each is compared "
-            "with the strongest deviation in simulated campaigns of the calibrated model. Pale cells are not "
-            "significant. Last rows: change of the zero of the force (in percent of the median sliding force), of the slope "
-            "of the rise and of the stick-slip amplitude; their p values are those of rank correlations.",
+            "variable (5 to 95 % of its range), for each sample. Column “mean”: mean over the sample of 100 (measured "
+            "/ model − 1). Column “bend with load”: height of the ends of the load range above its middle. Strong "
+            "colours and asterisks (** p < 0.01, * p < 0.05) mark statistically significant deviations. The p values "
+            "are adjusted for all comparisons: each is compared with the strongest deviation in simulated campaigns "
+            "of the calibrated model. Pale cells are not significant. Last rows: change of the zero of the force (in "
+            "percent of the median sliding force), of the slope of the rise and of the stick-slip amplitude; their p "
+            "values are those of rank correlations.",
             misfit.numbers,
             misfit.draw,
         ),
@@ -161,10 +162,10 @@ DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
             "residuals",
             "The strongest deviations",
             "100 (measured / model − 1) against the recorded variable with which it varies most strongly; if no "
-            "deviation is significant, against the three variables that come closest. Small points: tests; black: means "
-            "with twice their standard error. Grey band: range of 95 % of such means if the model were right, given the "
-            "scatter of repeats and specimens and the error of the model. Red line: contribution of the identified "
-            "mechanism.",
+            "deviation is significant, against the three variables that come closest. Small points: tests; black: "
+            "means with twice their standard error. Grey band: range of 95 % of such means if the model were right, "
+            "given the scatter of repeats and specimens and the error of the model. Red line: contribution of the "
+            "identified mechanism.",
             residuals.numbers,
             residuals.draw,
         ),

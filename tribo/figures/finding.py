@@ -103,7 +103,7 @@ def draw(numbers: pd.DataFrame) -> Figure:
 
 def _draw_panel(ax: Axes, part: pd.DataFrame) -> None:
     tests, mean = part[part["mark"] == "test"], part[part["mark"] == "mean"]
-    named = tests["x_name"].any()
+    named = bool(tests["x_name"].any())
     band, curve = (part[part["mark"] == mark].sort_values("x").astype({"x": float}) for mark in ("band", "curve"))
     if named:
         ax.bar(band["x"], band["y_high"] - band["y_low"], 0.8, band["y_low"], color="0.75", alpha=0.45, lw=0)

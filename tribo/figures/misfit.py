@@ -38,10 +38,10 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     """Change of measured / modelled T from the low to the high end of each covariate, for each sample and observable.
 
     The model is the one calibrated on the flat sample alone. The column "mean" is the mean over a sample of
-    100 (measured / model - 1); the flat sample has neither a mean nor a change with load, since the calibration absorbs both.
-    ``strength`` is the signed score in standard deviations once the flat law, the model's own error of a sample and the
-    specimens are taken out; ``p_adjusted`` sets it against the strongest of all looks at simulated campaigns. The
-    observable "trace" has the change of the zero (of the median sliding force), of the slope of the rise and of the
+    100 (measured / model - 1); the flat sample has neither a mean nor a change with load, since the calibration absorbs
+    both. ``strength`` is the signed score in standard deviations once the flat law, the model's own error of a sample
+    and the specimens are taken out; ``p_adjusted`` sets it against the strongest of all looks at simulated campaigns.
+    The observable "trace" has the change of the zero (of the median sliding force), of the slope of the rise and of the
     stick-slip amplitude, with the p value of a rank correlation, adjusted for the number of cells.
     """
     from tribo.diagnose.statistics.fit import residual_on_flat

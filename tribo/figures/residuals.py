@@ -139,7 +139,7 @@ def added_by_causes(d: Diagnosis, residual: FloatArray, weight: FloatArray) -> F
 def summaries(
     d: Diagnosis, column: Covariate, here: np.ndarray, y: FloatArray, weight: FloatArray, added: FloatArray | None
 ) -> list[dict[str, Any]]:
-    """Mean of ``y`` (n,) with its standard error, noise band and curve of the named mechanism, bin by bin of a column."""
+    """Mean of ``y`` (n,) with its error, noise band and what the named mechanism adds, bin by bin of a column."""
     x = column.values
     found: list[dict[str, Any]] = []
     for rows in _bins(x, here, column):

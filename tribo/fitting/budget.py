@@ -2,7 +2,8 @@
 
 The interval of :func:`tribo.fitting.fit_samples` contains the differences between specimens and between pulls
 (type A); in a campaign the scatter of specimens is partly pooled over the samples, against the luck of few specimens
-(:mod:`tribo.fitting.partial_pooling`). Errors common to all pulls, such as those of the load cell or the height of the wire, do not show in repeats.
+(:mod:`tribo.fitting.partial_pooling`).
+Errors common to all pulls, such as those of the load cell or the height of the wire, do not show in repeats.
 They are taken from ``[instrument]`` of campaign.toml or from the stated defaults (type B) and are added here.
 """
 
@@ -107,13 +108,12 @@ class Budget:
 
     def combined(self) -> CombinedFit:
         """The fit with the combined covariance, and the component that dominates each number."""
-        fit, names = self.fit, {"mu": "mu", "tau0_kPa": "tau0_Pa", "T_N": "T"}
-        largest = {key: self.dominant(number) for number, key in names.items()}
-        return CombinedFit(
-            **{f.name: getattr(fit, f.name) for f in fields(fit)} | {"covariance": self.covariance},
-            type_a=fit.covariance,
-            largest={key: (c.name, self.share_pct(c, n)) for (n, key), c in zip(names.items(), largest.values(), strict=True)},
-        )
+        largest = {}
+        for number, key in {"mu": "mu", "tau0_kPa": "tau0_Pa", "T_N": "T"}.items():
+            top = self.dominant(number)
+            largest[key] = (top.name, self.share_pct(top, number))
+        own = {f.name: getattr(self.fit, f.name) for f in fields(self.fit)}
+        return CombinedFit(**own | {"covariance": self.covariance}, type_a=self.fit.covariance, largest=largest)
 
     def table(self) -> pd.DataFrame:
         """One row per component and a last one "combined": type, dof, origin, u_NUMBER, share_pct_NUMBER."""

@@ -16,7 +16,7 @@ import numpy as np
 from tribo.comparison import study_lookup
 from tribo.records import REGIMES, CombinedFit, LawFit, Study
 from tribo.report.result_tables import PA_PER_KPA, all_set_aside
-from tribo.report.words import finding
+from tribo.report.words import card_sentences
 from tribo.report.words.numerals import counted, joined, significant, with_uncertainty
 from tribo.report.words.wording import specimens_of, uncertainty_kind
 from tribo.store.whole_files import write_text
@@ -77,8 +77,8 @@ def card_of(study: Study, verdict: Mapping[str, Any] | None) -> Card:
     aside, specimens = len(all_set_aside(study)), len(specimens_of(campaign, tests))
     fits = [fit for s in study_lookup.sample_numbers(study) for r in REGIMES if (fit := _law(study, s, r)) is not None]
     return Card(
-        sentence=finding.sentence(study, verdict),
-        meanings=finding.meanings(verdict),
+        sentence=card_sentences.sentence(study, verdict),
+        meanings=card_sentences.meanings(verdict),
         used=len(tests),
         set_aside=aside,
         specimens=specimens,
@@ -86,7 +86,7 @@ def card_of(study: Study, verdict: Mapping[str, Any] | None) -> Card:
         intercept="τ₀ (kPa)" if campaign.has_area else "T₀ (N)",
         laws=tuple(card_law(fit) for fit in fits),
         uncertainty=uncertainty_kind(study),
-        to_know=tuple(finding.to_know(study, verdict)),
+        to_know=tuple(card_sentences.to_know(study, verdict)),
         next_test=_next(verdict),
     )
 
@@ -143,4 +143,4 @@ def _next(verdict: Mapping[str, Any] | None) -> NextStep | None:
     if not found:
         return None
     hours = (found.get("design") or {}).get("hours")
-    return NextStep(str(found["text"]), finding.why_next(verdict or {}), None if hours is None else float(hours))
+    return NextStep(str(found["text"]), card_sentences.why_next(verdict or {}), None if hours is None else float(hours))

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from tribo.diagnose.sentences import name_in_words, sentence_case
 from tribo.figures.covariates import LABELS
 from tribo.report.words.numerals import joined, significant
 from tribo.store.whole_files import write_text
@@ -25,8 +26,8 @@ OUTCOMES = {
 }
 TIED = {
     "named": "The model does not fit the data; the cause is one of several that this campaign cannot distinguish.",
-    "partly": "The model does not fit the data; the cause is one of several that this campaign cannot distinguish, and a "
-    "misfit remains that none of them explains.",
+    "partly": "The model does not fit the data; the cause is one of several that this campaign cannot distinguish, and "
+    "a misfit remains that none of them explains.",
 }
 
 
@@ -45,8 +46,8 @@ def verdict_in_words(verdict: Mapping[str, Any]) -> dict[str, Any]:
         "gain": _gain(verdict.get("gain")),
         "next_test": str((verdict.get("next_test") or {}).get("text") or ""),
         "misfits": [_misfit(misfit) for misfit in verdict.get("misfits") or ()],
-        "excluded": [(_plain(e["mechanism"]), e["reason"]) for e in verdict.get("excluded") or ()],
-        "not_testable": [(_plain(e["mechanism"]), _why(e["reason"])) for e in verdict.get("not_testable") or ()],
+        "excluded": [(_named(e["mechanism"]), e["reason"]) for e in verdict.get("excluded") or ()],
+        "not_testable": [(_named(e["mechanism"]), _why(e["reason"])) for e in verdict.get("not_testable") or ()],
         "corrections": [_correction(x) for x in verdict.get("layers") or () if x["kind"] == "pattern_correction"],
     }
 
@@ -76,8 +77,16 @@ def _plain(mechanism: str) -> str:
     return mechanism.replace("_", " ")
 
 
+def _named(mechanism: str) -> str:
+    """The plain name of a mechanism; of one that the library does not know, the name with spaces."""
+    try:
+        return name_in_words(mechanism)
+    except KeyError:
+        return _plain(mechanism)
+
+
 def _tie(names: list[str]) -> str:
-    return f"This campaign cannot distinguish between {joined([_plain(n) for n in names])}."
+    return f"This campaign cannot distinguish between {joined([_named(n) for n in names])}."
 
 
 def _cause(cause: Mapping[str, Any]) -> dict[str, Any]:
@@ -87,7 +96,8 @@ def _cause(cause: Mapping[str, Any]) -> dict[str, Any]:
         for name, e in (cause.get("parameters") or {}).items()
     ]
     weight = f"{_number(cause['weight']):.2f}"
-    return {"mechanism": _plain(cause["mechanism"]), "weight": weight, "sizes": sizes, "text": cause.get("text", "")}
+    name = sentence_case(_named(cause["mechanism"]))
+    return {"mechanism": name, "weight": weight, "sizes": sizes, "text": cause.get("text", "")}
 
 
 def _misfit(misfit: Mapping[str, Any]) -> dict[str, str]:

@@ -40,9 +40,10 @@ def write_until(
     """Write the results of all stages up to ``until`` (ingest, fit, compare or report).
 
     Tables and campaign.nc always, as far as the study went; verdict.json and its figures where there is a
-    ``diagnosis``; card.json where a ``card`` is given, and of a report always; the figures of the study from ``compare`` on; then page, PDF and crate. Every file is whole or
-    absent: it is written under a temporary name and renamed. Last comes provenance.json with the hash of each; files of
-    an earlier run that are no longer valid are removed.
+    ``diagnosis``; card.json where a ``card`` is given, and of a report always; the figures of the study from
+    ``compare`` on; then page, PDF and crate. Every file is whole or absent: it is written under a temporary name and
+    renamed. Last comes provenance.json with the hash of each; files of an earlier run that are no longer valid are
+    removed.
     """
     before = read_record(out)
     made_by = provenance if provenance is not None else gather_provenance(study)

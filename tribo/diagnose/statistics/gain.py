@@ -10,8 +10,8 @@ from scipy.special import gammaln
 from tribo.diagnose.statistics.fit import fit_without
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting, Setup, Target
-from tribo.diagnose.statistics.percent import rms_percent
 from tribo.diagnose.statistics.observations import Observations
+from tribo.diagnose.statistics.percent import rms_percent
 from tribo.diagnose.verdict import Gain
 from tribo.records import FloatArray
 
@@ -19,7 +19,7 @@ RESAMPLES = 400
 
 
 def gain(before: ModelFit, after: ModelFit, rng: np.random.Generator) -> Gain | None:
-    """Log score and root mean square of 100 (measured / predicted - 1) of ``after`` against ``before`` on whole samples, specimens or loads left out.
+    """What ``after`` gains over ``before`` on whole samples, specimens or loads left out.
 
     Both are fitted anew without the held-out tests, noise included. A mechanism whose choice cannot be learned
     from other specimens (a wrong label, a wrong pattern) has whole loads left out; otherwise whole samples are

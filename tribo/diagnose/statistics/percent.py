@@ -42,7 +42,7 @@ def bend_percent(score: FloatArray, line: FloatArray, log_ratio: FloatArray) -> 
 
 
 def contrast_percent(inside: FloatArray, outside: FloatArray) -> float:
-    """The geometric mean of measured / model ``inside`` over that ``outside``, less one; both as ln(measured / model)."""
+    """The geometric mean of measured / model ``inside`` over that ``outside``, less one; both as logarithms."""
     return float(percent(inside.mean() - outside.mean()))
 
 

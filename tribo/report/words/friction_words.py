@@ -77,9 +77,9 @@ def _laws(study: Study) -> Iterator[str]:
         others = joined([f"{law['formula']} {_deviation(law)}" for law in laws if not law["chosen"]])
         yield (
             f"{str(regime).capitalize()} friction of {sample} is described best by {chosen['formula']} with "
-            f"{_values(chosen)}: loads left out of the fit are predicted to within {_deviation(chosen)} (root mean square of ln T). The other "
-            f"laws: {others}. Chosen is the law with the fewest parameters that is worse than the best by no more than "
-            "one standard error, and that the parameters of the best do not exclude."
+            f"{_values(chosen)}: loads left out of the fit are predicted to within {_deviation(chosen)} (root mean "
+            f"square of ln T). The other laws: {others}. Chosen is the law with the fewest parameters that is worse "
+            "than the best by no more than one standard error, and that the parameters of the best do not exclude."
         )
 
 

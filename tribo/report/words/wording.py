@@ -23,10 +23,10 @@ FLAGS = {
 }  # fmt: skip
 SIDE: dict[Verdict, str] = {"model too high": "too high", "model too low": "too low"}
 HOW_TO_READ = (
-    "The ratio is the measured friction force divided by the simulated one, with its 95 % interval. Percentages are this "
-    "ratio less one: −20 % means that the measured force is 20 % below the simulated one. The interval contains the "
-    "scatter of specimens and repeats and the error of the calibration; errors of the load cell and of the wire angle act "
-    "on both sides alike. The model "
+    "The ratio is the measured friction force divided by the simulated one, with its 95 % interval. Percentages are "
+    "this ratio less one: −20 % means that the measured force is 20 % below the simulated one. The interval contains "
+    "the scatter of specimens and repeats and the error of the calibration; an error of the load cell's gain changes "
+    "the measurement and the calibrated model alike, so it is not in the interval. The model "
     "agrees at a load if the interval contains 1 and its limits are within a factor of 1.2 of the ratio. If the "
     "interval contains 1 but is wider, the result at this load is inconclusive. The overall result for a sample "
     "is the result found at half or more of its loads. The loads of a sample share the same specimens, so their "
@@ -151,8 +151,8 @@ def agreement_sentence(agreement: Agreement) -> str:
     if agreement.verdict in ("model too high", "model too low", "mixed"):
         worst = agreement.worst
         parts.append(
-            f"Averaged over the loads, measured T differs from simulated T by {deviation(agreement.mean_deviation)}; the "
-            f"largest difference is {deviation(worst.deviation)}, at {significant(worst.normal_load_N)} N."
+            f"Averaged over the loads, measured T differs from simulated T by {deviation(agreement.mean_deviation)}; "
+            f"the largest difference is {deviation(worst.deviation)}, at {significant(worst.normal_load_N)} N."
         )
     if agreement.calibrated:
         parts.append("The model was calibrated on this sample, so agreement here does not test the model.")

@@ -168,15 +168,23 @@ def _named(verdict: Mapping[str, Any], layer: Mapping[str, Any]) -> str:
 
 
 def _direct(verdict: Mapping[str, Any]) -> str:
-    """A cause that the traces show, with its size."""
+    """A cause without a layer, such as one that the traces show besides the forces, with the size of its parameter."""
     cause = verdict["causes"][0]
-    name, e = next(iter(cause["parameters"].items()))
-    interval = f"{significant(e['low'])} to {significant(e['high'])}"
-    size = f"{significant(e['value'])} {e['unit']}".rstrip()
-    return (
-        f"The recorded traces show {name_in_words(cause['mechanism'])}: {meaning_in_words(cause['mechanism'])} "
-        f"({name} = {size}, 90 % interval {interval})."
-    )
+    sizes = [
+        f"{name.replace('_', ' ')} = {significant(_number(e['value']))} {e['unit']}".rstrip()
+        + f" (90 % interval {significant(_number(e['low']))} to {significant(_number(e['high']))})"
+        for name, e in cause["parameters"].items()
+    ]
+    ties: list[str] = next((names for names in verdict.get("equivalent") or () if cause["mechanism"] in names), [])
+    others = [name_in_words(name) for name in ties if name != cause["mechanism"]]
+    or_else = f"; {joined(others)} would explain the data equally well" if others else ""
+    size = f": {joined(sizes)}" if sizes else ""
+    name = str(cause["mechanism"])
+    return f"{sentence_case(meaning_in_words(name))} ({name_in_words(name)}){size}{or_else}."
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else float(value)
 
 
 def _unknown(verdict: Mapping[str, Any]) -> str:
