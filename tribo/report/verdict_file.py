@@ -48,16 +48,34 @@ def verdict_in_words(verdict: Mapping[str, Any]) -> dict[str, Any]:
         "misfits": [_misfit(misfit) for misfit in verdict.get("misfits") or ()],
         "excluded": [(_named(e["mechanism"]), e["reason"]) for e in verdict.get("excluded") or ()],
         "not_testable": [(_named(e["mechanism"]), _why(e["reason"])) for e in verdict.get("not_testable") or ()],
-        "corrections": [_correction(x) for x in verdict.get("layers") or () if x["kind"] == "pattern_correction"],
+        "corrections": [_correction(x) for x in _layers(verdict, "pattern_correction")],
+        "laws": [_law(x) for x in _layers(verdict, "law")],
     }
 
 
+def _layers(verdict: Mapping[str, Any], kind: str) -> list[Mapping[str, Any]]:
+    return [layer for layer in verdict.get("layers") or () if layer["kind"] == kind]
+
+
 def _outcome(verdict: Mapping[str, Any]) -> str:
-    """The outcome as a sentence; causes that the data cannot tell apart are not called identified."""
-    outcome = str(verdict["verdict"])
-    if outcome in TIED and any(len(names) > 1 for names in verdict.get("equivalent") or ()):
-        return TIED[outcome]
-    return OUTCOMES.get(outcome, outcome)
+    """The verdict in one sentence, and that it has laws; causes that cannot be told apart are not called identified."""
+    outcome, laws = str(verdict["verdict"]), _layers(verdict, "law")
+    tied = any(len(names) > 1 for names in verdict.get("equivalent") or ())
+    found = TIED[outcome] if tied and outcome in TIED else OUTCOMES.get(outcome, outcome)
+    if not laws:
+        return found
+    return f"{found} {'A law was' if len(laws) == 1 else f'{len(laws)} laws were'} found that it follows."
+
+
+def _law(layer: Mapping[str, Any]) -> dict[str, str]:
+    """A law: the formula, what it says with its size, the laws that the design cannot tell apart from it, its gain."""
+    gain = layer.get("gain")
+    ties = layer.get("tied_with") or ()
+    return {
+        "formula": "; ".join([str(layer["formula"]), *_sizes(layer)]), "text": str(layer["text"]),
+        "ties": "; ".join(ties) or "none",
+        "gain": _gain(gain) if gain else "not tested",
+    }  # fmt: skip
 
 
 def _why(reason: str) -> str:
@@ -90,14 +108,18 @@ def _tie(names: list[str]) -> str:
 
 
 def _cause(cause: Mapping[str, Any]) -> dict[str, Any]:
-    sizes = [
+    weight, text = f"{_number(cause['weight']):.2f}", cause.get("text", "")
+    name = sentence_case(_named(cause["mechanism"]))
+    return {"mechanism": name, "weight": weight, "sizes": _sizes(cause), "text": text}
+
+
+def _sizes(named: Mapping[str, Any]) -> list[str]:
+    """The parameters of a cause or a law with their intervals."""
+    return [
         f"{_plain(name)} = {significant(_number(e['value']))} ({significant(_number(e['low']))} to "
         f"{significant(_number(e['high']))}) {e.get('unit', '')}".rstrip()
-        for name, e in (cause.get("parameters") or {}).items()
+        for name, e in (named.get("parameters") or {}).items()
     ]
-    weight = f"{_number(cause['weight']):.2f}"
-    name = sentence_case(_named(cause["mechanism"]))
-    return {"mechanism": name, "weight": weight, "sizes": sizes, "text": cause.get("text", "")}
 
 
 def _misfit(misfit: Mapping[str, Any]) -> dict[str, str]:
