@@ -391,7 +391,7 @@ class LawFit:
         return np.asarray(np.sqrt(c[0, 0] * n**2 + 2 * c[0, 1] * n * a + c[1, 1] * a**2))
 
 
-@displayed(lambda r: f"{r.sample} at {r.pressure_Pa / 1e3:.4g} kPa, seed {r.seed}")
+@displayed(lambda fit: f"{fit.sample}, {fit.regime}: {fit.in_numbers()}")
 @dataclass(frozen=True)
 class CombinedFit(LawFit):
     """A fitted law with its combined uncertainty (GUM): ``covariance`` is ``type_a`` plus what all pulls share.
@@ -419,6 +419,7 @@ class CombinedFit(LawFit):
         return self.value(parameter) - half, self.value(parameter) + half
 
 
+@displayed(lambda r: f"{r.sample} at {r.pressure_Pa / 1e3:.4g} kPa, seed {r.seed}")
 @dataclass(frozen=True)
 class Run:
     """One run of the spring-block model: force of the slider along the pull, with static and sliding friction.

@@ -209,7 +209,7 @@ def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
     return replace(walked, **looks)
 
 
-def with_laws(read: Study, weights: Weights = "relative") -> Study:
+def with_fits(read: Study, weights: Weights = "relative") -> Study:
     """The study with its fits and their combined uncertainties; as it is where no law can be fitted."""
     from tribo.fitting.assessment import budgets_of
 

@@ -148,7 +148,7 @@ def diagnose(
         found = _diagnosis(study, chosen, progress)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
         verdict = found.verdict
-        card = card_of(stages.with_laws(study), verdict.as_dict())
+        card = card_of(stages.with_fits(study), verdict.as_dict())
         write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found, card)
     console.result(verdict.as_dict() | {"card": card.as_dict()}, f"{card_text(card)}\n\n{verdict_text(verdict)}")
     console.list_tests("set aside", study.ingested.set_aside, level=-1)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from tribo.comparison import study_lookup
+from tribo.display import displayed
 from tribo.records import REGIMES, CombinedFit, LawFit, Study
 from tribo.report.result_tables import PA_PER_KPA, all_set_aside
 from tribo.report.words import card_sentences
@@ -44,6 +45,7 @@ class NextStep:
     hours: float | None
 
 
+@displayed(lambda card: card.counts)
 @dataclass(frozen=True)
 class Card:
     """What someone must know who reads nothing else.

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from tribo.comparison import findings, study_lookup
-from tribo.diagnose.sentences import meaning_in_words, name_in_words, sentence_case
+from tribo.diagnose.sentences import meaning_in_words, name_in_words as plain_name, sentence_case
 from tribo.diagnose.terms import in_words
 from tribo.records import Study
 from tribo.report.words.numerals import counted, joined, significant
@@ -18,6 +18,14 @@ OBSERVABLES = {
     "zero": "the force before contact",
 }  # fmt: skip
 MOST_SAMPLES = 3
+
+
+def name_in_words(name: str) -> str:
+    """The plain name of a mechanism; a law, which has none, by its formula."""
+    try:
+        return plain_name(name)
+    except KeyError:
+        return name
 
 
 def sentence(study: Study, verdict: Mapping[str, Any] | None) -> str:
@@ -46,7 +54,9 @@ def meanings(verdict: Mapping[str, Any] | None) -> tuple[tuple[str, str], ...]:
 def why_next(verdict: Mapping[str, Any]) -> str:
     """Why the next test is the one to make."""
     separates = [str(name) for name in verdict["next_test"].get("separates") or ()]
-    if verdict["verdict"] == "unknown":
+    if not separates:
+        return "it is the most informative test"
+    if verdict["verdict"] == "unknown" and not _layers(verdict, "law"):
         return f"to see whether friction follows {joined([in_words(s) for s in separates])} when nothing else changes"
     names = [name_in_words(s) for s in separates]
     if verdict["verdict"] == "no_misfit":
@@ -146,6 +156,7 @@ def _caused(study: Study, verdict: Mapping[str, Any], layers: Sequence[Mapping[s
     most = f", most in {first['at']}" if first.get("at") else ""
     said = f"{_named(verdict, first)} {_where(study, first)} by up to {size_in_words(first)}{most}"
     also = [f"{_names(verdict, layer)} ({size_in_words(layer)})" for layer in others]
+    also += [f"a change with {in_words(law['name'])} ({size_in_words(law)})" for law in _layers(verdict, "law")]
     said += f"; in addition, {joined(also)}" if also else ""
     left = "; part of the difference from the model remains unexplained" if verdict["verdict"] == "partly" else ""
     return f"{said}{left}."
