@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from tribo.records import Study
 from tribo.report.campaign_nc import write_store
 from tribo.report.card import Card, card_of, write_card
+from tribo.report.diagnosis_csv import write_diagnosis_tables
 from tribo.report.drawings import DRAWING, Drawing, Progress, write_figures
 from tribo.report.provenance import (
     Provenance,
@@ -54,6 +55,8 @@ def write_until(
     written = [*write_tables(study, out), write_store(study, out, made_by, diagnosis, keep_earlier)]
     if verdict is not None:
         written.append(write_verdict(verdict, out))
+    if diagnosis is not None:
+        written += write_diagnosis_tables(diagnosis, out)
     if until in ("compare", "report") or diagnosis is not None:
         shown = study if until in ("compare", "report") else None
         drawn = write_figures(shown, out, diagnosis, made_by.origin, drawing)
