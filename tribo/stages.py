@@ -211,6 +211,18 @@ def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
     return replace(walked, **looks)
 
 
+def with_fits(read: Study, weights: Weights = "relative") -> Study:
+    """The study with its fits and their combined uncertainties; as it is where no law can be fitted."""
+    from tribo.fitting.assessment import budgets_of
+
+    try:
+        fits = fit(read.ingested, weights=weights)
+    except FitError:
+        return read
+    budgets = budgets_of(read.ingested, fits, weights)
+    return replace(read, fits=fits, combined=tuple(b.combined() for b in budgets))
+
+
 def diagnosis(
     ingested: Ingested,
     *,
@@ -233,6 +245,7 @@ def diagnosis(
         Fewer than twelve usable tests.
     """
     from tribo.diagnose import examine, with_simulation
+    from tribo.diagnose.discovery.across_verdict import with_law_across
     from tribo.diagnose.discovery.in_verdict import with_laws
     from tribo.diagnose.discovery.known_laws import read_laws
     from tribo.diagnose.statistics import pattern_table
@@ -242,7 +255,7 @@ def diagnosis(
 
     def found() -> Diagnosis:
         examined = examine(ingested, seed=seed, predictor=predictor, progress=progress)
-        examined = with_laws(examined, known, seed=seed, progress=progress)
+        examined = with_law_across(with_laws(examined, known, seed=seed, progress=progress), seed=seed)
         return with_simulation(examined, seed=seed, jobs=jobs, progress=progress)
 
     made_from = (ingested, seed, predictor, pattern_table.record(), known)
