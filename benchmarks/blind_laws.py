@@ -27,7 +27,7 @@ from blind.hidden_laws import FORMS, Hidden, as_ingested, hide_law  # isort: ski
 
 from tribo.diagnose.diagnosis import examine
 from tribo.diagnose.discovery.held import holds
-from tribo.diagnose.discovery.in_verdict import explained
+from tribo.diagnose.discovery.in_verdict import uncontested
 from tribo.diagnose.discovery.on_campaign import searched_laws
 from tribo.diagnose.discovery.scoring import terms_of
 from tribo.diagnose.discovery.search import Discovery
@@ -168,7 +168,7 @@ def _pair(piece: Piece) -> dict[str, Any]:
     later = hide_law(seed, piece.second, piece.seed if same else None)
     kept = later.bench.column("repeat") <= KEPT
     d = examine(as_ingested(later.bench, seed, kept), seed=seed)
-    held = holds(explained(d)[0], found.laws[0].law, found.laws[0].parameters)
+    held = holds(uncontested(d)[0], found.laws[0].law, found.laws[0].parameters)
     return {"answer": held.answer, "second": piece.second, "text": held.text, "verdict": d.verdict.verdict}
 
 

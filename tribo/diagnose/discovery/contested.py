@@ -17,7 +17,7 @@ from tribo.diagnose.statistics.model import Acting, effect_of
 from tribo.mechanisms.record import Conditions
 
 # Log likelihood by which a law has to be better than mechanisms of the library: odds of 400 to 1. With 3, one of seven
-# effects of the library hidden by other formulas (benchmarks/blind_cases.py, seed 7000) lost against a law; none with 6.
+# effects of the library (benchmarks/blind_cases.py, seed 7000, three times the half-found size) lost; none with 6.
 MARGIN = 2.0 * CLOSE
 SAME = {"speed_mm_s": "speed_m_s", "started_at": "elapsed_s"}  # columns of mechanisms by their names in the grammar
 

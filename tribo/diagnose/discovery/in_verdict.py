@@ -35,7 +35,7 @@ def with_laws(
     A cause that loses against a law of its own column is no longer a cause. Where nothing is left, nothing is searched.
     """
     rng = np.random.default_rng(seed)
-    model, lost = explained(d)
+    model, lost = uncontested(d)
     tested = try_laws(model, known, rng)
     d = replace(d, verdict=with_tested(d.verdict, tested))
     searched = _is_left(d, level)
@@ -64,11 +64,19 @@ def with_tested(v: Verdict, tested: Tested) -> Verdict:
     return replace(v, model={**v.model, "known_laws": answers}, text=f"{v.text} {tested.text}")
 
 
-def explained(d: Diagnosis) -> tuple[ModelFit, dict[str, float]]:
-    """The model with the causes that are certain, and those of them that a law of the same column replaces, each with
-    the log likelihood by which that law is better."""
+def explained(d: Diagnosis) -> ModelFit:
+    """The model with the causes that are certain, and with the laws of what they leave where these were searched."""
+    if d.laws is not None and d.laws.laws:
+        return d.laws.laws[-1].model
     certain = d.named is not None and d.named.causes and d.verdict.verdict in CERTAIN_CAUSES
-    return without_wrong_forms(d.named.model) if d.named is not None and certain else (d.baseline, {})
+    return d.named.model if d.named is not None and certain else d.baseline
+
+
+def uncontested(d: Diagnosis) -> tuple[ModelFit, dict[str, float]]:
+    """The model with the causes that no law of their own columns replaces, and those that are replaced, each with the
+    log likelihood by which a law is better."""
+    model = explained(d)
+    return without_wrong_forms(model) if model.acting else (model, {})
 
 
 def _is_left(d: Diagnosis, level: float) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 from tribo.diagnose.diagnosis import examine
 from tribo.diagnose.diagnosis_record import Diagnosis
 from tribo.diagnose.discovery.held import Held, holds
-from tribo.diagnose.discovery.in_verdict import explained
+from tribo.diagnose.discovery.in_verdict import uncontested
 from tribo.diagnose.discovery.search import Discovery, Progress, discover_laws
 from tribo.diagnose.discovery.written_law import WrittenLaw
 from tribo.diagnose.verdict import Estimate
@@ -32,11 +32,11 @@ def searched_laws(d: Diagnosis, *, seed: int = 0, level: float = 0.01, progress:
     Where it found no misfit, a law has to be beyond chance at a tenth of the level.
     """
     strict = level if d.named is not None else WITHOUT_MISFIT * level
-    return discover_laws(explained(d)[0], level=strict, rng=np.random.default_rng(seed), progress=progress)
+    return discover_laws(uncontested(d)[0], level=strict, rng=np.random.default_rng(seed), progress=progress)
 
 
 def hold_law_against(
     ingested: Ingested, law: WrittenLaw, parameters: Mapping[str, Estimate], *, seed: int = 0, level: float = 0.01
 ) -> Held:
     """Whether a law of another campaign holds in this one, its own causes taken into account."""
-    return holds(explained(examine(ingested, seed=seed, level=level))[0], law, parameters)
+    return holds(uncontested(examine(ingested, seed=seed, level=level))[0], law, parameters)
