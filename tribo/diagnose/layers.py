@@ -87,7 +87,8 @@ def _where(f: ModelFit, change: FloatArray) -> tuple[tuple[str, ...], tuple[str,
 def _effect_percent(best: Candidate, amplitude: Estimate, change: FloatArray) -> tuple[float, float, float]:
     """The largest change of T over the tests, signed, in percent; with the ends of the interval of the amplitude."""
     f = best.fit
-    where = np.unravel_index(int(np.abs(change).argmax()), change.shape)
+    # of two specimens that were swapped, one changes up as far as the other down: the first is taken
+    where = np.unravel_index(int(np.abs(change).round(9).argmax()), change.shape)
 
     def at(size: float) -> float:
         values = np.array([size, *best.values[1:]])

@@ -9,7 +9,7 @@ import numpy as np
 
 from tribo.diagnose.discovery.grammar import Group, groups_of, shapes_of
 from tribo.diagnose.discovery.written_law import ADHESION_TERM, LOAD_TERM, Shape, WrittenLaw
-from tribo.diagnose.search.screen import columns_in, scores, share_beyond
+from tribo.diagnose.search.screen import share_beyond
 from tribo.diagnose.statistics.chance import as_measured, drawn_residuals, refit
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.gain import gain
@@ -17,6 +17,7 @@ from tribo.diagnose.statistics.interval import estimates
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting, log_forces
 from tribo.diagnose.statistics.scatter import Replicates
+from tribo.diagnose.statistics.scores import columns_in, scores
 from tribo.diagnose.verdict import Estimate, Gain
 from tribo.records import REGIMES, FloatArray
 
