@@ -90,7 +90,7 @@ def screen(
         chance = np.concatenate([chance, _strongest(strengths, library)])
         if progress is not None:
             progress("diagnose", len(chance), replicates)
-        if _decided(chance[:, 0], float(strength.max())):
+        if decided(chance[:, 0], float(strength.max())):
             break
     shown = _shown(looks, strength)
     looks, strength, coefficients = [looks[k] for k in shown], strength[shown], [coefficients[k] for k in shown]
@@ -126,7 +126,7 @@ def _strongest(strengths: FloatArray, library: NDArray[np.bool_]) -> FloatArray:
     return np.column_stack([strengths.max(axis=1), alone])
 
 
-def _decided(chance: FloatArray, strongest: float) -> bool:
+def decided(chance: FloatArray, strongest: float) -> bool:
     """Whether further replicates could not change the decision at one percent: a sequential Monte Carlo test.
 
     Ten replicates as strong say "within chance" (Besag and Clifford 1991); ten standard deviations beyond

@@ -55,8 +55,8 @@ def _folds(s: Setup, acting: Sequence[Acting]) -> tuple[str, np.ndarray]:
         return "loads", np.round(c.normal_load_N, 4).astype(str)
     if len(np.unique(c.sample)) >= 4:
         return "samples", c.sample
-    code = np.unique(c.specimen, return_inverse=True)[1]
-    return "specimens", (code % MOST_FOLDS).astype(str)
+    names, code = np.unique(c.specimen, return_inverse=True)
+    return "specimens", names[code % MOST_FOLDS]
 
 
 def _held_out(model: ModelFit, out: np.ndarray) -> tuple[FloatArray, FloatArray]:

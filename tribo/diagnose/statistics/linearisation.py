@@ -13,6 +13,7 @@ import numpy as np
 from tribo.diagnose.statistics.bordered import (
     Inverse,
     ModelColumns,
+    Normal,
     Sides,
     Weighted,
     model_columns,
@@ -164,9 +165,19 @@ class Linear:
         return weighted_columns(self.columns, precision_of(self.factor, self.weight)[None])
 
     @property
+    def normal(self) -> Normal:
+        """The normal matrix with the prior of the random effects."""
+        return normal_of(self.weighted).with_prior(*prior_of(self.columns, self.precision))
+
+    @property
+    def right(self) -> Sides:
+        """Products of the columns with the residual."""
+        return self.weighted.with_residual(self.residual.T[None])
+
+    @property
     def inverse(self) -> Inverse:
         """Of the normal matrix."""
-        return normal_of(self.weighted).with_prior(*prior_of(self.columns, self.precision)).inverse()
+        return self.normal.inverse()
 
     def cleared(self, stacked: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Columns (n, 2, k) and the residual, whitened, with law, mechanisms and random effects taken out.

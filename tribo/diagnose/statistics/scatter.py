@@ -7,7 +7,8 @@ Functions with ``...`` in a shape take one campaign or a batch of replicates.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -288,6 +289,18 @@ class Replicates:
     sizes: Sizes
     group: NDArray[np.int64]
     log_priors: FloatArray
+
+    def one(self, k: int) -> Replicates:
+        """One of them, as a batch of one."""
+        sizes, normal, weighted = (_cut(part, k) for part in (self.sizes, self.normal, self.weighted))
+        precision, residual = self.precision[k : k + 1], self.residual[k : k + 1]
+        return Replicates(precision, residual, weighted, normal, sizes, self.group, self.log_priors[:, k : k + 1])
+
+
+def _cut(batch: Any, k: int) -> Any:
+    """One of a batch: what is not an array is common to all."""
+    arrays = {f.name: v[k : k + 1] for f in fields(batch) if isinstance(v := getattr(batch, f.name), np.ndarray)}
+    return replace(batch, **arrays)
 
 
 def replicates_at(
