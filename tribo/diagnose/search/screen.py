@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,10 @@ class Screen:
     chance: FloatArray
     chance_library: FloatArray
     p: FloatArray
+
+    def without_columns(self) -> Screen:
+        """The same without the columns of the looks, which are large."""
+        return replace(self, looks=tuple(replace(look, courses=()) for look in self.looks))
 
     def p_adjusted(self, strength: float | None = None) -> float:
         """Chance that some look is at least this strong (default: the strongest) with nothing hidden."""

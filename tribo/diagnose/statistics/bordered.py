@@ -77,7 +77,7 @@ class Weighted:
     def times(self, other: FloatArray) -> Sides:
         """Products with other columns (n, 2, k): (r, S, 4, k) and (r, m, k)."""
         blocks = [self.own_times(tests, other[tests]) for tests in self.columns.tests_of]
-        return np.stack(blocks, axis=1), self.flat_border @ other.reshape(-1, other.shape[2])
+        return np.stack(blocks, axis=1), self.flat_border @ other.reshape(2 * len(other), other.shape[2])
 
     @property
     def flat_border(self) -> FloatArray:
@@ -89,13 +89,13 @@ class Weighted:
         """Of one specimen, its tests given: products of its own columns with others (its tests, 2, k), (r, 4, k)."""
         r, k = len(self.own), other.shape[2]
         own = self.own[:, tests].reshape(r, 2 * len(tests), 4).transpose(0, 2, 1).reshape(4 * r, -1)
-        return np.asarray((own @ other.reshape(-1, k)).reshape(r, 4, k))
+        return np.asarray((own @ other.reshape(2 * len(tests), k)).reshape(r, 4, k))
 
     def border_times(self, tests: NDArray[np.int64], other: FloatArray) -> FloatArray:
         """The same of the border, (r, m, k)."""
         r, k = len(self.own), other.shape[2]
         border = self.border[:, tests].reshape(r, 2 * len(tests), self.border.shape[3])
-        return np.asarray(border.transpose(0, 2, 1) @ other.reshape(-1, k))
+        return np.asarray(border.transpose(0, 2, 1) @ other.reshape(2 * len(tests), k))
 
     def with_residual(self, residual: FloatArray) -> Sides:
         """Products with the residual (r, 2, n) of each replicate: (r, S, 4) and (r, m)."""

@@ -242,9 +242,9 @@ def _at_step(fitted: Replicates, right: Sides, index: int) -> tuple[Cleared, Flo
 
 
 def _wide_products(fitted: Replicates, wide: Wide) -> Crossed:
-    r = len(fitted.precision)
-    pull = _weighted_residual(fitted).reshape(r, -1) @ wide.columns.reshape(-1, wide.columns.shape[2])
-    whole = fitted.precision.reshape(r, -1) @ wide.products.reshape(-1, wide.products.shape[2])
+    r, (n, _, k) = len(fitted.precision), wide.columns.shape
+    pull = _weighted_residual(fitted).reshape(r, 2 * n) @ wide.columns.reshape(2 * n, k)
+    whole = fitted.precision.reshape(r, 3 * n) @ wide.products.reshape(3 * n, wide.products.shape[2])
     return Crossed(fitted.weighted.times(wide.columns), pull, whole)
 
 
