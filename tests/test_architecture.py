@@ -13,17 +13,18 @@ PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
 GROUND = {
-    "errors", "limits", "escaping", "input_files", "quantities", "zeroing", "records", "published", "zips", "links",
-    "forked",
+    "display", "errors", "limits", "escaping", "input_files", "quantities", "zeroing", "records", "published", "zips",
+    "links", "forked",
 }  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
-    ("errors", set()),
-    ("limits", set()),
     ("escaping", set()),
+    ("display", {"escaping"}),
+    ("errors", {"display"}),
+    ("limits", set()),
     ("input_files", {"errors", "limits"}),
     ("quantities", {"errors"}),
-    ("zeroing", set()),
-    ("records", {"errors", "zeroing"}),
+    ("zeroing", {"display"}),
+    ("records", {"display", "errors", "zeroing"}),
     ("published", set()),
     ("zips", {"errors", "limits"}),
     ("links", set()),
@@ -42,6 +43,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("comparison", GROUND | {"fitting", "laws", "simulate", "store"}),
     ("diagnose", GROUND | {"laws", "fitting", "simulate", "mechanisms", "mechanisms_in_model"}),
     ("figures", GROUND | {"laws", "comparison", "diagnose"}),
+    ("plot", GROUND | {"diagnose", "figures"}),
     ("report", GROUND | {"laws", "store", "comparison", "diagnose", "figures"}),
 )
 MAY_IMPORT = dict(STREET)

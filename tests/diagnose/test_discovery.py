@@ -21,6 +21,7 @@ from tribo.diagnose.discovery.written_law import Shape, WrittenLaw
 from tribo.diagnose.statistics.chance import drawn_residuals, refit
 from tribo.diagnose.statistics.model import Setup
 from tribo.diagnose.verdict import Estimate
+from tribo.display import exact_text
 from tribo.errors import CampaignError
 from tribo.mechanisms.record import Base, Conditions
 from tribo.report.verdict_file import verdict_in_words
@@ -120,7 +121,7 @@ def test_a_law_is_read_as_it_was_written(found: Discovery, tmp_path: Path) -> No
     path = tmp_path / "law.toml"
     path.write_text(law_text(law.law, law.parameters, 'series "7"\n[x]'), encoding="utf-8")
     again, parameters = read_law(path)
-    assert again == law.law or repr(again) == repr(law.law)
+    assert again == law.law or exact_text(again) == exact_text(law.law)
     assert parameters == law.parameters
 
 

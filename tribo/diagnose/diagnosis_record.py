@@ -11,6 +11,7 @@ from tribo.diagnose.search.naming import Named
 from tribo.diagnose.search.screen import Screen
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.verdict import Verdict
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from tribo.diagnose.discovery.search import Discovery
 
 
+@displayed(lambda s: ", ".join(s.mechanisms))
 @dataclass(frozen=True)
 class SimulatedExtension:
     """What the spring-block model itself gives with the named mechanisms in it.
@@ -44,6 +46,7 @@ class SimulatedExtension:
         return float(100 * np.sqrt(np.mean((left - right) ** 2)))
 
 
+@displayed(lambda s: ", ".join(s.mechanisms))
 @dataclass(frozen=True)
 class NotSimulated:
     """Named mechanisms that could not be simulated, and why."""
@@ -52,6 +55,7 @@ class NotSimulated:
     reason: str
 
 
+@displayed(lambda d: d.verdict.verdict)
 @dataclass(frozen=True)
 class Diagnosis:
     """A verdict with what it rests on, for figures and tables.

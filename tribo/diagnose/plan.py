@@ -15,6 +15,7 @@ from tribo.diagnose.statistics.predictor import Predictor, tabled_predictor
 from tribo.diagnose.statistics.scatter import Noise
 from tribo.diagnose.statistics.start_effects import StartEffects, start_effects
 from tribo.diagnose.terms import ABSORBED, not_varied
+from tribo.display import displayed
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray
 
@@ -42,6 +43,7 @@ class Finding:
     separates: str
 
 
+@displayed()
 @dataclass(frozen=True)
 class Plan:
     """What a design can show of each mechanism, the easiest first."""

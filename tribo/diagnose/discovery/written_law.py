@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tribo.display import displayed
 from tribo.mechanisms.record import Base, Choosing, Conditions, Forces, Mechanism, Parameter, Values, amplitude
 from tribo.records import REGIMES, FloatArray
 
@@ -19,6 +20,7 @@ UNITS = {
 LARGEST = 3.0  # of an amplitude in ln T
 
 
+@displayed()
 @dataclass(frozen=True)
 class Shape:
     """A function of one column x, about one in size.
@@ -70,6 +72,7 @@ class Shape:
         return np.column_stack([np.sin(turns), np.cos(turns)])
 
 
+@displayed()
 @dataclass(frozen=True)
 class WrittenLaw:
     """One law: the product of one or two shapes, acting on T or on one term of it, in a regime, on some samples.

@@ -9,6 +9,7 @@ import numpy as np
 
 from tribo.diagnose.statistics.courses import Course, added, course
 from tribo.diagnose.statistics.model import Acting, Setup, StartChanges
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 OBSERVABLES = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (1.0, 1.0), "drop": (1.0, -1.0)}
@@ -19,6 +20,7 @@ MOST_LEVELS = 200  # names of a text column: the work grows with their cube
 CYCLES = 24  # periods down to a twenty-fourth of the series
 
 
+@displayed()
 @dataclass(frozen=True)
 class Look:
     """One look: which observable against which covariate, and the columns it would follow: those of one course, or of

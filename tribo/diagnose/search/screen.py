@@ -17,6 +17,7 @@ from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import start_changes, with_form_error
 from tribo.diagnose.statistics.scatter import Replicates
 from tribo.diagnose.statistics.scores import Columns, columns_of, scores
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 Progress = Callable[[str, int, int], None]
@@ -25,6 +26,7 @@ FEWEST = 40
 FORM = 0.12  # by how much of its own effect a law may be wrong in form, sample by sample
 
 
+@displayed()
 @dataclass(frozen=True)
 class Screen:
     """Strength of every look as a standard normal deviate, and what chance gives.

@@ -24,9 +24,11 @@ from tribo.diagnose.statistics.courses import in_batches
 from tribo.diagnose.statistics.model import Acting, Setup
 from tribo.diagnose.statistics.random_effects import RandomEffects
 from tribo.diagnose.statistics.scatter import AtNoise, Noise, at_estimated_noise, at_noise
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 
+@displayed()
 @dataclass(frozen=True)
 class State:
     """Where a fit has got to: parameters, random effects (q,), residual (n, 2) without them, and the noise."""
@@ -37,6 +39,7 @@ class State:
     at: AtNoise
 
 
+@displayed()
 @dataclass(frozen=True)
 class System:
     """The normal equations of one iteration solved: the inverse of their matrix and the step (p + q,).
@@ -138,6 +141,7 @@ def scored(s: Setup, state: State) -> tuple[float, FloatArray]:
     return float(penalised(s, state) + scale + prior - 0.5 * curvature), weight
 
 
+@displayed()
 @dataclass(frozen=True)
 class Linear:
     """A fitted model linear about its parameters, with the noise at which it was fitted.
@@ -210,6 +214,7 @@ class Linear:
         return np.concatenate([np.zeros(0), *each])
 
 
+@displayed()
 @dataclass(frozen=True)
 class ModelFit:
     """A fitted model. ``residual`` (n, 2) is ln T measured minus the law without random effects.

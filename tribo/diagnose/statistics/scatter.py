@@ -23,6 +23,7 @@ from tribo.diagnose.statistics.bordered import (
     weighted_columns,
 )
 from tribo.diagnose.statistics.model import GAIN, PATTERN, SLOPE, Setup
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 # Expected size, and how many effects that is worth: specimen gains and slopes, pattern factor
@@ -36,6 +37,7 @@ SMALLEST_SD = 0.003  # of ln T: no reading repeats better
 SIZE_STEPS = np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, -0.7], [-0.7, -0.7, -0.7, -0.7, 0.0]])
 
 
+@displayed()
 @dataclass(frozen=True)
 class Noise:
     """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance; specimen gains (2,) and
@@ -75,6 +77,7 @@ def first_noise() -> Noise:
     return Noise(np.diag([REPEAT_PRIOR[0] ** 2] * 2), np.zeros(2)).with_sizes(SIZE_PRIORS[:, 0])
 
 
+@displayed()
 @dataclass(frozen=True)
 class AtNoise:
     """What the tests and random effects of a campaign are weighed with at one noise.
@@ -206,6 +209,7 @@ def log_size_prior(group: int, size: FloatArray) -> FloatArray:
     return np.asarray(-worth * (np.log(size) + 0.5 * (expected / size) ** 2))
 
 
+@displayed()
 @dataclass(frozen=True)
 class Sizes:
     """The noise of every replicate: ``repeat`` (r, 2, 2), what the repeats depend on, ``scatter`` (r, k), and sizes of
@@ -274,6 +278,7 @@ def solved_at_once(
     return inverse, inverse.solution(*found.with_residual(residual))
 
 
+@displayed()
 @dataclass(frozen=True)
 class Replicates:
     """Fitted replicates: ``precision`` (r, 3, n) of every test, robust weight included, as static, mixed, sliding;
