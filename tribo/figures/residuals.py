@@ -155,7 +155,7 @@ def _variance(d: Diagnosis, weight: FloatArray) -> FloatArray:
     f = d.baseline
     repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup), weight)
     repeats += f.setup.observations.reading**2 @ weight**2
-    effects = np.einsum("nrq,r->nq", f.setup.random, weight) ** 2 @ (1.0 / f.linear.precision)
+    effects = f.setup.random_effects.variance(weight, f.linear.precision)
     return np.asarray(repeats + effects)
 
 

@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.diagnose.statistics.random_effects import RandomEffects
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 ROUNDING = 1e-9  # of a diagonal of one: the ridge of normal matrices
 Sides = tuple[FloatArray, FloatArray]  # of specimens (r, S, 4, ...) and of the border (r, m, ...)
 
 
+@displayed()
 @dataclass(frozen=True)
 class ModelColumns:
     """The columns of a model: ``own`` (n, 2, 4) of the specimen of each test, ``border`` (n, 2, m) of all tests: those
@@ -66,6 +68,7 @@ def weighted(precision: FloatArray, columns: FloatArray) -> FloatArray:
     return found
 
 
+@displayed()
 @dataclass(frozen=True)
 class Weighted:
     """The columns of a model times the precision of every test: ``own`` (r, n, 2, 4) and ``border`` (r, n, 2, m)."""
@@ -110,6 +113,7 @@ def weighted_columns(columns: ModelColumns, precision: FloatArray) -> Weighted:
     return Weighted(columns, weighted(precision, columns.own), weighted(precision, columns.border))
 
 
+@displayed()
 @dataclass(frozen=True)
 class Normal:
     """A normal matrix by blocks: ``own`` (r, S, 4, 4), ``across`` (r, S, 4, m) and ``border`` (r, m, m)."""
@@ -174,6 +178,7 @@ def normal_of(found: Weighted) -> Normal:
     return Normal(own[..., :4], own[..., 4:], found.flat_border @ columns.border.reshape(2 * n, m))
 
 
+@displayed()
 @dataclass(frozen=True)
 class Inverse:
     """The inverse of a normal matrix: ``own`` (r, S, 4, 4) of the blocks alone, ``across`` (r, S, 4, m) what a block

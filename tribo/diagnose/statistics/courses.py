@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.diagnose.statistics.random_effects import RandomEffects
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 EVERY = -1  # in place of a specimen: all tests
@@ -17,6 +18,7 @@ AT_ONCE = 100  # courses that are written out at the same time
 MOST_PAIRS = 2000  # courses of two specimens that are written out at all
 
 
+@displayed()
 @dataclass(frozen=True)
 class Course:
     """Columns of ln T, ``values`` (t, 2, d) on the ``tests`` (t,) of one ``specimen``, by its number, or of EVERY one;

@@ -8,11 +8,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 OF_A_SPECIMEN = 4  # gain and slope, alike in both regimes and apart
 
 
+@displayed()
 @dataclass(frozen=True)
 class RandomEffects:
     """The design of the random effects, without the zeros of all specimens that a test was not made on.
@@ -62,6 +64,12 @@ class RandomEffects:
             np.einsum("nrk,...nk->...nr", self.own, own[..., self.specimen, :])
             + np.tensordot(shared, self.shared, axes=(-1, 2))
         )
+
+    def variance(self, weight: FloatArray, precision: FloatArray) -> FloatArray:
+        """Variance (n,) of the regimes of every test added with ``weight`` (2,), for effects of ``precision`` (q,)."""
+        own, shared = self.parts(1.0 / precision)
+        on_specimens = np.einsum("nrk,r->nk", self.own, weight) ** 2 * own[self.specimen]
+        return np.asarray(on_specimens.sum(axis=1) + np.einsum("nrk,r->nk", self.shared, weight) ** 2 @ shared)
 
     def take(self, keep: np.ndarray) -> RandomEffects:
         """The same for the tests picked by a mask or by indices."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tribo.diagnose.statistics.bordered import ROUNDING, Normal, Sides
 from tribo.diagnose.statistics.courses import EVERY, Course, added
 from tribo.diagnose.statistics.scatter import SIZE_STEPS, Replicates
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 AS_FITTED = 1  # of the steps of the sizes, the first
@@ -22,6 +23,7 @@ TAKEN_UP = 1e-6  # share of a column's information below which nothing of it is 
 Index = NDArray[np.int64]
 
 
+@displayed()
 @dataclass(frozen=True)
 class Wide:
     """Columns (n, 2, k) of several specimens, each look at one of ``spans``, and the products its information needs.
@@ -37,6 +39,7 @@ class Wide:
     places: tuple[tuple[Index, Index], ...]
 
 
+@displayed()
 @dataclass(frozen=True)
 class Local:
     """Single columns (t, 2, k) that the ``tests`` (t,) of one ``specimen`` alone show, and their products (3, t, k)."""
@@ -47,6 +50,7 @@ class Local:
     products: FloatArray
 
 
+@displayed()
 @dataclass(frozen=True)
 class Columns:
     """All looks, made ready for many replicates: those at ``wide_at`` of several specimens, those at ``local_at`` of
@@ -142,6 +146,7 @@ def _products(columns: FloatArray, first: Index, second: Index) -> FloatArray:
     return found
 
 
+@displayed()
 @dataclass(frozen=True)
 class Crossed:
     """Products of the looks with specimens and border, whatever the random sizes are: ``crossed`` with wide columns
@@ -153,6 +158,7 @@ class Crossed:
     whole: FloatArray
 
 
+@displayed()
 @dataclass(frozen=True)
 class Cleared:
     """A normal matrix by its roots: ``own`` (r, S, 4, 4) and ``border`` (r, m, m) clear columns of it, ``across``
@@ -268,6 +274,7 @@ def _weighted_residual(fitted: Replicates) -> FloatArray:
     return np.stack([static * first + mixed * second, mixed * first + sliding * second], axis=2)
 
 
+@displayed()
 @dataclass(frozen=True)
 class Single:
     """Scores of looks of one column each, (r, k): the score beyond the model, and the information left and whole."""

@@ -11,11 +11,13 @@ from tribo.diagnose.statistics.courses import MOST_PAIRS, added
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting, StartChanges, start_changes
 from tribo.diagnose.statistics.scores import columns_of, informations
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 SEEN = 1e-3  # share of a mechanism's effect that must be left once the flat law is free
 
 
+@displayed()
 @dataclass(frozen=True)
 class StartEffects:
     """The effects of all candidates at their start values, made once for a fitted ``model``.
