@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import logging
 import re
@@ -9,6 +10,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +38,7 @@ Progress = Callable[[str, int, int], None]
 Keep = Callable[[str, object, Callable[[], Any], Iterable[str]], Any]
 STAGE = "drawing figures"
 DRAWN_BY = ("figures", "report/drawings", "report/html/hover")
+SET_BY = ("report/drawings", "report/paper/typeset")
 THEME = {
     "#ffffff": "var(--paper)",
     "#000000": "currentColor",
@@ -108,11 +111,23 @@ def draw_all(
     found = {}
     for done, figure in enumerate(each(partial(_drawn_or_said, origin, drawing.keep), todo, drawing.jobs), start=1):
         # not in the other processes: typst keeps threads of its own, which do not survive a fork
-        rest = figure_files(figure.files["svg"], figure.title, origin)
+        rest = _other_files(figure, origin, drawing.keep)
         found[figure.name] = replace(figure, files={**figure.files, **rest})
         if drawing.progress is not None:
             drawing.progress(STAGE, done, len(todo))
     return found
+
+
+def _other_files(figure: Drawn, origin: str, keep: Keep) -> dict[str, bytes]:
+    """The PDF and the PNG of a figure; what is kept of them is text."""
+
+    def made() -> dict[str, str]:
+        files = figure_files(figure.files["svg"], figure.title, origin)
+        return {ending: base64.b64encode(content).decode("ascii") for ending, content in files.items()}
+
+    made_from = (figure.svg, figure.title, origin, metadata.version("typst"))
+    kept = keep(f"figure-{figure.name}-files", made_from, made, SET_BY)
+    return {ending: base64.b64decode(text) for ending, text in kept.items()}
 
 
 Numbers = pd.DataFrame | Problem
