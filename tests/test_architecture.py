@@ -211,3 +211,20 @@ def test_the_command_line_starts_without_the_heavy_libraries() -> None:
 def test_units_are_converted_in_one_place_only() -> None:
     users = {room_of(m) for m in ROOMS if "import pint" in m.read_text(encoding="utf-8")}
     assert users <= {"quantities", "stages", "console"}
+
+
+def open_records(source: str) -> list[str]:
+    """Data classes whose fields can be set after they were made."""
+    classes = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ClassDef)]
+    decorators = [(c.name, ast.unparse(d)) for c in classes for d in c.decorator_list]
+    return [name for name, text in decorators if text.startswith("dataclass") and "frozen=True" not in text]
+
+
+def test_the_records_that_stages_exchange_are_frozen() -> None:
+    found = {name for module in ROOMS for name in open_records(module.read_text("utf-8"))}
+    assert found == {"Draft"}  # filled step by step by one function, handed to none
+
+
+def test_a_record_that_is_not_frozen_is_seen() -> None:
+    assert open_records("@dataclass\nclass A: ...\n@dataclass(frozen=False)\nclass B: ...") == ["A", "B"]
+    assert open_records("@dataclass(frozen=True)\nclass A: ...") == []

@@ -223,12 +223,14 @@ def diagnosis(
         Fewer than twelve usable tests.
     """
     from tribo.diagnose import examine, with_simulation
+    from tribo.diagnose.discovery.in_verdict import with_laws
     from tribo.diagnose.statistics import pattern_table
 
     predictor = own_predictor(ingested.campaign, kept)
 
     def found() -> Diagnosis:
         examined = examine(ingested, seed=seed, predictor=predictor, progress=progress)
+        examined = with_laws(examined, seed=seed, progress=progress)
         return with_simulation(examined, seed=seed, jobs=jobs, progress=progress)
 
     return Shelf(kept).take("diagnosis", (ingested, seed, predictor, pattern_table.record()), found, DIAGNOSED_BY)

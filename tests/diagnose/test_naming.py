@@ -11,7 +11,7 @@ import pytest
 from tribo.diagnose.search import rivals, weighing
 from tribo.diagnose.search.naming import best_beyond_chance
 from tribo.diagnose.search.rivals import CLOSE, IN_COMMON, TIED, sort_rivals, weights_of
-from tribo.diagnose.search.screen import FEWEST, Screen, _decided as decided, _strongest as strongest, deviate
+from tribo.diagnose.search.screen import FEWEST, Screen, _strongest as strongest, decided, deviate
 from tribo.diagnose.search.weighing import CHOICES_FITTED, PER_PARAMETER, Candidate, judged
 from tribo.diagnose.statistics.model import Acting
 from tribo.mechanisms.table import MECHANISMS

@@ -229,3 +229,22 @@ def test_a_clear_peak_has_one_reading() -> None:
 def test_a_zero_that_is_none_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="before contact"):
         zero_choice(text)
+
+
+@pytest.mark.parametrize("stiffness", [80.0, 400.0])
+def test_a_slider_that_is_loaded_as_the_drive_demands_sticks_and_one_that_lags_swings(stiffness: float) -> None:
+    """The sawtooth rises by 0.16 N/s: the rate of the drive with 80 N/m at 2 mm/s, a fifth of it with 400 N/m."""
+    pull = read_record(sawtooth(), test=a_test(load_N=2.0, speed_m_s=2e-3, stiffness_N_per_m=stiffness))
+    assert pull.oscillation is not None
+    assert pull.oscillation.regime == ("stick-slip" if stiffness == 80.0 else "inertial oscillation")
+
+
+def test_sliding_before_a_stop_counts_where_it_is_settled_however_even_the_sliding_after_it() -> None:
+    first, after = 2.0, 1.6
+    start = np.concatenate([np.zeros(100), np.linspace(0, 1.25, 50) * first, np.full(800, first)])
+    stop = np.concatenate([np.linspace(first, 0, 10), np.zeros(120)])
+    again = np.concatenate([np.linspace(0, 1.25 * after, 50), np.full(3000, after)])
+    force = np.concatenate([start + noise(start.size), stop, again + noise(again.size, 1, 1e-3)])
+    pull = read_record(Trace("stop", np.arange(force.size) / RATE, force), test=a_test())
+    assert len(pull.restarts) == 1
+    assert pull.sliding_N == pytest.approx(first, abs=0.01)

@@ -17,6 +17,8 @@ from tribo.records import FloatArray
 if TYPE_CHECKING:
     import pandas as pd
 
+    from tribo.diagnose.discovery.search import Discovery
+
 
 @displayed(lambda s: ", ".join(s.mechanisms))
 @dataclass(frozen=True)
@@ -58,7 +60,8 @@ class NotSimulated:
 class Diagnosis:
     """A verdict with what it rests on, for figures and tables.
 
-    ``simulated`` is the extended model run in the simulator itself, where that was asked for and possible.
+    ``simulated`` is the extended model run in the simulator itself, where that was asked for and possible; ``laws`` is
+    the search for the laws of what the causes leave, where something was left.
     """
 
     verdict: Verdict
@@ -66,3 +69,4 @@ class Diagnosis:
     screened: Screen
     named: Named | None
     simulated: SimulatedExtension | None = None
+    laws: Discovery | None = None

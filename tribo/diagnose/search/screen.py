@@ -93,7 +93,7 @@ def screen(
         chance = np.concatenate([chance, _strongest(strengths, library)])
         if progress is not None:
             progress("diagnose", len(chance), replicates)
-        if _decided(chance[:, 0], float(strength.max())):
+        if decided(chance[:, 0], float(strength.max())):
             break
     p = np.array([share_beyond(chance[:, 0], float(value)) for value in strength])
     return Screen(tuple(looks), strength, size, tuple(coefficients), chance[:, 0], chance[:, 1], p)
@@ -115,7 +115,7 @@ def _strongest(strengths: FloatArray, library: NDArray[np.bool_]) -> FloatArray:
     return np.column_stack([strengths.max(axis=1), alone])
 
 
-def _decided(chance: FloatArray, strongest: float) -> bool:
+def decided(chance: FloatArray, strongest: float) -> bool:
     """Whether further replicates could not change the decision at one percent: a sequential Monte Carlo test.
 
     Ten replicates as strong say "within chance" (Besag and Clifford 1991); ten standard deviations beyond
