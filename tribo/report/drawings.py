@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import io
 import logging
 import re
 import textwrap
@@ -16,14 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import pandas as pd
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from tribo.errors import Problem, unexpected
 from tribo.escaping import printable
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES, FIGURES, FRICTION_FIGURES
 from tribo.figures.record import FigureOf
-from tribo.figures.style import house_style
+from tribo.figures.style import as_svg, house_style
 from tribo.forked import each
 from tribo.records import Study
 from tribo.report.html.hover import Series, series_of
@@ -191,11 +189,8 @@ def _svg_and_series(record: FigureOf[Any], numbers: pd.DataFrame, origin: str) -
 
 def svg_text(figure: Figure, title: str = "", origin: str = "") -> str:
     """A figure as SVG without a date and without random names; its layout is settled on the way."""
-    buffer = io.StringIO()
-    about = {"Date": None, "Creator": "tribo", "Title": title or None, "Description": origin or None}
-    with house_style():  # the canvas is called directly: Figure.savefig draws every figure once more than it needs to
-        FigureCanvasSVG(figure).print_svg(buffer, metadata={k: v for k, v in about.items() if v or k == "Date"})
-    return buffer.getvalue()
+    about = {"Creator": "tribo", "Title": title, "Description": origin}
+    return as_svg(figure, {name: text for name, text in about.items() if text})
 
 
 def inline_svg(svg: str, name: str, label: str) -> str:
