@@ -223,6 +223,7 @@ def diagnosis(
         Fewer than twelve usable tests.
     """
     from tribo.diagnose import examine, with_simulation
+    from tribo.diagnose.discovery.across_verdict import with_law_across
     from tribo.diagnose.discovery.in_verdict import with_laws
     from tribo.diagnose.statistics import pattern_table
 
@@ -230,7 +231,7 @@ def diagnosis(
 
     def found() -> Diagnosis:
         examined = examine(ingested, seed=seed, predictor=predictor, progress=progress)
-        examined = with_laws(examined, seed=seed, progress=progress)
+        examined = with_law_across(with_laws(examined, seed=seed, progress=progress), seed=seed)
         return with_simulation(examined, seed=seed, jobs=jobs, progress=progress)
 
     return Shelf(kept).take("diagnosis", (ingested, seed, predictor, pattern_table.record()), found, DIAGNOSED_BY)

@@ -6,6 +6,7 @@ import numpy as np
 
 from tribo.diagnose.conclusion import Findings, conclude
 from tribo.diagnose.diagnosis_record import Diagnosis
+from tribo.diagnose.discovery.across_verdict import with_law_across
 from tribo.diagnose.discovery.in_verdict import with_laws
 from tribo.diagnose.search.looks import all_looks
 from tribo.diagnose.search.naming import Rules, name_causes
@@ -53,7 +54,7 @@ def diagnose(
         The record behind verdict.json.
     """
     examined = examine(ingested, seed=seed, level=level, predictor=predictor, progress=progress)
-    return with_laws(examined, seed=seed, level=level, progress=progress).verdict
+    return with_law_across(with_laws(examined, seed=seed, level=level, progress=progress), seed=seed).verdict
 
 
 def examine(
