@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -146,7 +147,7 @@ def _points(ax: Axes, pulls: pd.DataFrame) -> None:
         )  # fmt: skip
 
 
-def _specimen_look(number: int) -> dict[str, str]:
+def _specimen_look(number: int) -> dict[str, Any]:
     return {
         "marker": SPECIMEN_MARKERS[number % len(SPECIMEN_MARKERS)],
         "color": SPECIMEN_COLOURS[number % len(SPECIMEN_COLOURS)],

@@ -84,7 +84,8 @@ def _centres(pattern: pd.Series, width: float, height: float) -> FloatArray:
 def draw_mesh(ax: Axes) -> None:
     """Blocks on a square lattice, each joined by springs to its eight neighbours."""
     nx, ny = 4, 3
-    springs, links = [], []
+    springs: list[FloatArray] = []
+    links: list[FloatArray] = []
     for x in range(nx):
         for y in range(ny):
             here = np.array([x, y]) * GAP
@@ -129,13 +130,13 @@ def draw_side_view(ax: Axes) -> None:
 
 
 def _arrow(ax: Axes, start: FloatArray, end: FloatArray) -> None:
-    ax.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": style.VERMILLION, "lw": 1.4})
+    ax.annotate("", tuple(end), tuple(start), arrowprops={"arrowstyle": "-|>", "color": style.VERMILLION, "lw": 1.4})
 
 
 def _add_blocks(ax: Axes, centres: list[tuple[float, float]], colour: str) -> None:
     corners = 0.5 * BLOCK * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     squares = np.array(centres)[:, None, :] + corners
-    blocks = PolyCollection(squares, facecolors=colour, edgecolors="black", linewidths=0.7, zorder=3)
+    blocks = PolyCollection(list(squares), facecolors=colour, edgecolors="black", linewidths=0.7, zorder=3)
     ax.add_collection(blocks, autolim=False)
 
 

@@ -49,7 +49,7 @@ def draw(numbers: pd.DataFrame) -> Figure:
     runs = style.by_sample(numbers)
     rows, legend_rows = -(-len(runs) // PATTERNS_ACROSS), -(-len(runs) // LEGEND_COLUMNS)
     height = MODEL_MM + rows * PATTERN_MM + TRACES_MM + FOOT_MM + LEGEND_ROW_MM * legend_rows
-    figure = style.page_figure(height, layout="none")
+    figure = style.page_figure(height, fixed=True)
     model_drawing.draw_mesh(_axes(figure, 0, 5, 84, MODEL_MM - 6))
     model_drawing.draw_side_view(_axes(figure, 88, 5, 102, MODEL_MM - 6))
     for k, (_, run) in enumerate(runs):

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
 from importlib.resources import as_file, files
-from typing import Any, Literal, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -93,9 +93,12 @@ def in_house_style(draw: Callable[P, R]) -> Callable[P, R]:
     return drawn
 
 
-def page_figure(height_mm: float, layout: Literal["constrained", "none"] = "constrained") -> PageFigure:
-    """An empty figure as wide as the page."""
-    return PageFigure(figsize=(COLUMN_WIDTH_MM / MM_PER_INCH, height_mm / MM_PER_INCH), layout=layout)
+def page_figure(height_mm: float, fixed: bool = False) -> PageFigure:
+    """An empty figure as wide as the page; ``fixed`` leaves axes where they are put."""
+    figure = PageFigure(figsize=(COLUMN_WIDTH_MM / MM_PER_INCH, height_mm / MM_PER_INCH), layout="constrained")
+    if fixed:
+        figure.set_layout_engine("none")
+    return figure
 
 
 def panel_grid(
