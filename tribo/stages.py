@@ -209,6 +209,18 @@ def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
     return replace(walked, **looks)
 
 
+def with_fits(read: Study, weights: Weights = "relative") -> Study:
+    """The study with its fits and their combined uncertainties; as it is where no law can be fitted."""
+    from tribo.fitting.assessment import budgets_of
+
+    try:
+        fits = fit(read.ingested, weights=weights)
+    except FitError:
+        return read
+    budgets = budgets_of(read.ingested, fits, weights)
+    return replace(read, fits=fits, combined=tuple(b.combined() for b in budgets))
+
+
 def diagnosis(
     ingested: Ingested, *, seed: int = 0, jobs: int = 2, kept: Path | None = None, progress: Progress = _silent
 ) -> Diagnosis:
