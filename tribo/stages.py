@@ -256,7 +256,7 @@ def diagnosis(
     def found() -> Diagnosis:
         examined = examine(ingested, seed=seed, predictor=predictor, progress=progress)
         examined = with_law_across(with_laws(examined, known, seed=seed, progress=progress), seed=seed)
-        return with_simulation(examined, seed=seed, jobs=jobs, progress=progress)
+        return with_simulation(examined, seed=seed, jobs=jobs, progress=progress).without_columns()
 
     made_from = (ingested, seed, predictor, pattern_table.record(), known)
     return Shelf(kept).take("diagnosis", made_from, found, DIAGNOSED_BY)
