@@ -13,13 +13,25 @@ from tribo.cli.given_paths import GivenPath
 from tribo.cli.output import Output, output_options
 from tribo.cli.reading_options import reading_options, with_reading_options
 from tribo.cli.run_record import command_line, now, provenance_of_run
-from tribo.cli.study_options import CAMPAIGN, DRY_RUN, FLAT, OUT, OVERRIDES, RULE, ZEROS, fit_options, model_options
+from tribo.cli.study_options import (
+    CAMPAIGN,
+    DRY_RUN,
+    FLAT,
+    LAWS,
+    OUT,
+    OVERRIDES,
+    RULE,
+    ZEROS,
+    fit_options,
+    model_options,
+)
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
     from tribo.diagnose.verdict import Verdict
     from tribo.dry_run import Until as DryUntil
     from tribo.records import Campaign, Study
+    from tribo.report.card import Card
     from tribo.stages import Progress, StudyOptions, Until
 
 
@@ -111,6 +123,7 @@ def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **opti
 @click.option("--published", type=click.Choice(["berardo2019"]), help="Diagnose a published table instead of CAMPAIGN.")
 @RULE
 @FLAT
+@LAWS
 @reading_options
 @ZEROS[0]
 @ZEROS[1]
@@ -139,7 +152,9 @@ def diagnose(
     from tribo import stages
     from tribo.campaign import open_campaign
     from tribo.report import write_until
+    from tribo.report.card import card_of
     from tribo.report.drawings import Drawing
+    from tribo.report.words.card_text import card_text
     from tribo.report.words.verdict_text import verdict_text
     from tribo.store.kept_results import Shelf
 
@@ -150,9 +165,10 @@ def diagnose(
         study = stages.study(with_reading_options(opened, columns, stated), chosen, until="ingest", progress=progress)
         found = _diagnosis(study, chosen, progress)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
-        write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found)
-    verdict = found.verdict
-    console.result(verdict.as_dict(), verdict_text(verdict))
+        verdict = found.verdict
+        card = card_of(stages.with_fits(study), verdict.as_dict())
+        write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found, card)
+    console.result(verdict.as_dict() | {"card": card.as_dict()}, f"{card_text(card)}\n\n{verdict_text(verdict)}")
     console.list_doubts(study.doubts)
     console.list_tests("set aside", study.ingested.set_aside, level=-1)
     return status_of(study.ingested.set_aside)
@@ -160,7 +176,8 @@ def diagnose(
 
 def _diagnose_published(console: Console, out: Output, seed: int) -> int:
     """The verdict on Table 2 of Berardo et al. (2019), for every interpretation of what it leaves open."""
-    from tribo.diagnose.from_table.published_diagnosis import diagnose_published
+    from tribo.diagnose.discovery.across_words import record_of, sentence
+    from tribo.diagnose.from_table.published_diagnosis import across_published, diagnose_published
     from tribo.published import BERARDO2019, data_dir, load_table2, load_table2_simulated_anew
     from tribo.report.provenance import provenance_of_table
     from tribo.report.table_report import write_published
@@ -169,8 +186,10 @@ def _diagnose_published(console: Console, out: Output, seed: int) -> int:
     folder, tables = data_dir() / BERARDO2019, ("table2.csv", "table2_tribo.csv")
     with out.taken(folder), console.progress() as progress:
         found = diagnose_published(load_table2(), load_table2_simulated_anew(), seed=seed, progress=progress)
-        write_published(found, out.path, provenance_of_table(folder, tables, command_line(), seed, now()))
-    console.result(found.verdict.as_dict(), verdict_text(found.verdict))
+        across = across_published(found, seed=seed)
+        write_published(found, across, out.path, provenance_of_table(folder, tables, command_line(), seed, now()))
+    record = {**found.verdict.as_dict(), "across_patterns": record_of(across)}
+    console.result(record, f"{verdict_text(found.verdict)}\n{sentence(across)}")
     return 0
 
 
@@ -180,6 +199,7 @@ def _diagnose_published(console: Console, out: Output, seed: int) -> int:
 @DRY_RUN
 @fit_options
 @model_options
+@LAWS
 @command_options
 def report(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
     """Run every stage and write the report.
@@ -221,8 +241,15 @@ def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool
         compared = until == "report" and study.comparison is not None
         study, found = _diagnosed(study, chosen, progress) if compared else (study, None)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
-        write_until(study, out.path, until, drawing, provenance_of_run(study, path, chosen), found)
-    return _conclude(console, study, out.path, found.verdict if found else None)
+        card = _card(study, found) if until == "report" else None
+        write_until(study, out.path, until, drawing, provenance_of_run(study, path, chosen), found, card)
+    return _conclude(console, study, out.path, found.verdict if found else None, card)
+
+
+def _card(study: Study, found: Diagnosis | None) -> Card:
+    from tribo.report.card import card_of
+
+    return card_of(study, found.verdict.as_dict() if found is not None else None)
 
 
 def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[Study, Diagnosis | None]:
@@ -245,20 +272,25 @@ def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[
 def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis:
     from tribo.stages import diagnosis
 
-    return diagnosis(study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, progress=progress)
+    return diagnosis(
+        study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, laws=chosen.laws, progress=progress
+    )
 
 
-def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None = None) -> int:
+def _conclude(
+    console: Console, study: Study, out: Path, verdict: Verdict | None = None, card: Card | None = None
+) -> int:
     """Print the results and the tests set aside; return the exit status."""
     from dataclasses import asdict
 
     from tribo.report import summary_text, table2_text
     from tribo.report.result_tables import fits_table
+    from tribo.report.words.card_text import card_text
     from tribo.report.words.verdict_text import verdict_text
 
     set_aside = study.ingested.set_aside
     doubts = study.ingested.doubts()
-    fits = fits_table(study.fits).astype(object)
+    fits = fits_table(study.fits, study.combined).astype(object)
     record = {
         "out": str(out),
         "tests": len(study.ingested.pulls),
@@ -272,8 +304,10 @@ def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None
         "outlying": list(study.outlying),
         "differences": [] if study.differences is None else study.differences.to_dict("records"),
         "verdict": verdict.verdict if verdict else None,
+        "card": card.as_dict() if card else None,
     }
-    words = [table2_text(study)] if study.fits else []
+    words = [card_text(card)] if card else []
+    words += [table2_text(study)] if study.fits else []
     looks = ["\n".join(lines) for lines in (study.power, study.outlying) if lines]
     said = [verdict_text(verdict)] if verdict else []
     console.result(record, "\n\n".join([*words, summary_text(study), *said, *looks]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import click
@@ -27,6 +28,10 @@ WEIGHTS = click.option(
     help="Scatter assumed equal at all loads: of T in percent (relative), of T/N (ratio) or of T (force); or "
     "estimated from repeated tests (repeats).",
 )
+LAWS = click.option(
+    "--laws", type=click.Path(exists=True, file_okay=False, path_type=Path), metavar="DIR",
+    help="Folder with laws of earlier campaigns (law*.toml). Each is tested; one that holds is a layer of the verdict.",
+)  # fmt: skip
 FLAT = click.option(
     "--flat", default="", metavar="SAMPLE",
     help="Flat sample on which the model is calibrated. [default: F, or the only flat sample]",

@@ -6,6 +6,7 @@ import numpy as np
 
 from tribo.diagnose.conclusion import Findings, conclude
 from tribo.diagnose.diagnosis_record import Diagnosis
+from tribo.diagnose.discovery.across_verdict import with_law_across
 from tribo.diagnose.discovery.in_verdict import with_laws
 from tribo.diagnose.search.looks import all_looks
 from tribo.diagnose.search.naming import Rules, name_causes
@@ -13,10 +14,10 @@ from tribo.diagnose.search.screen import Progress, screen
 from tribo.diagnose.sentences import exclusions
 from tribo.diagnose.statistics.direct_evidence import trace_findings
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linearisation import start_effects
 from tribo.diagnose.statistics.model import setup
 from tribo.diagnose.statistics.observations import enough, observe
 from tribo.diagnose.statistics.predictor import Predictor, tabled_predictor
+from tribo.diagnose.statistics.start_effects import start_effects
 from tribo.diagnose.verdict import Misfit, Verdict
 from tribo.records import Ingested
 
@@ -53,7 +54,7 @@ def diagnose(
         The record behind verdict.json.
     """
     examined = examine(ingested, seed=seed, level=level, predictor=predictor, progress=progress)
-    return with_laws(examined, seed=seed, level=level, progress=progress).verdict
+    return with_law_across(with_laws(examined, seed=seed, level=level, progress=progress), seed=seed).verdict
 
 
 def examine(
