@@ -1,6 +1,6 @@
 """A fault at every file operation of every command, as SQLite is tested.
 
-    python benchmarks/torture_faults.py [--out out/torture] [--only COMMAND] [--every N] [--seed N]
+    python benchmarks/torture_faults.py [--out out/torture] [--only COMMAND] [--every N] [--distinct] [--seed N]
 
 Each command runs once undisturbed, on a campaign of 12 pulls, to count its file operations: to open, read, write,
 rename, list, delete. Each of them then has two trials: once it fails, with an error number that it can give (the
@@ -23,6 +23,7 @@ import argparse
 import csv
 import itertools
 import os
+import re
 import sys
 import tempfile
 import time
@@ -36,7 +37,7 @@ from faults.branches import branch_trials, can_branch
 from faults.commands import prepared
 from faults.file_operations import KILL, KINDS, Fault, Operation, errors_of
 from faults.small_site import write_inputs
-from faults.trial import Bench, Outcome
+from faults.trial import Bench, Outcome, masked
 
 IN_MEMORY = Path("/dev/shm")
 COLUMNS = ("what", "tried", "held", "failed", "seed")
@@ -45,21 +46,45 @@ COLUMNS = ("what", "tried", "held", "failed", "seed")
 Trial = tuple[str, Outcome, list[str]]
 
 
-def wanted(every: int, seed: int) -> Callable[[int, Operation], list[str]]:
-    """An error and a kill at each operation, or at each ``every``-th; the errors that one can give take turns."""
+def wanted(every: int, seed: int, distinct: bool) -> Callable[[int, Operation], list[str]]:
+    """An error and a kill at each operation, or at each ``every``-th; the errors that one can give take turns.
+
+    With ``distinct`` operations of one kind, from the same lines of tribo, on files of one kind in folders of one kind
+    are tried once.
+    """
     turns = {kind: itertools.count(seed) for kind in KINDS}
+    tried: set[tuple[object, ...]] = set()
 
     def names(at: int, operation: Operation) -> list[str]:
+        if at % every != seed % every:
+            return []
+        if distinct:
+            like = (operation.kind, *kind_of_file(operation.path), *lines_of_tribo())
+            if like in tried:
+                return []
+            tried.add(like)
         possible = errors_of(operation.kind)
-        name = possible[next(turns[operation.kind]) % len(possible)]
-        return [name, KILL] if at % every == seed % every else []
+        return [possible[next(turns[operation.kind]) % len(possible)], KILL]
 
     return names
 
 
-def faults(bench: Bench, every: int, seed: int, aside: Path) -> Iterator[Trial]:
+def kind_of_file(path: str) -> tuple[str, str, bool]:
+    """The folder of a file without its numbers and random names, the ending, and whether it is hidden."""
+    place = Path(masked(path))
+    return re.sub(r"\d+", "", str(place.parent)), place.suffix, place.name.startswith(".")
+
+
+def lines_of_tribo() -> Iterator[tuple[str, int]]:
+    """The lines of tribo that are being executed, from the innermost outwards."""
+    frame = sys._getframe()
+    while (frame := frame.f_back) is not None:  # type: ignore[assignment]
+        if frame.f_globals.get("__name__", "").startswith("tribo"):
+            yield frame.f_code.co_filename, frame.f_lineno
+
+
+def faults(bench: Bench, names: Callable[[int, Operation], list[str]], aside: Path) -> Iterator[Trial]:
     """All faults at the file operations of a command."""
-    names = wanted(every, seed)
     if can_branch():
         trials: Iterable[tuple[Fault, Outcome, list[str]]] = branch_trials(bench, names, aside)
     else:
@@ -72,7 +97,7 @@ def faults(bench: Bench, every: int, seed: int, aside: Path) -> Iterator[Trial]:
 
 def sizes(bench: Bench) -> Iterator[Trial]:
     """Limits of the size of a file, and file systems that are too small; a few of them for commands that take long."""
-    few = 4 if bench.command.name.startswith("build") else 12
+    few = 12 if len(bench.operations) < 600 else 4
     for k in range(few):
         limit = int(bench.written_bytes / 2 ** (k + 1)) if k else 0
         outcome, wrong = bench.with_largest_file(limit)
@@ -115,7 +140,7 @@ def torture(bench: Bench, table: Table, given: argparse.Namespace, aside: Path) 
     """All trials of one command."""
     name = bench.command.name
     started = time.monotonic(), sum(os.times()[:4])
-    for trial in faults(bench, given.every, given.seed, aside):
+    for trial in faults(bench, wanted(given.every, given.seed, given.distinct), aside):
         table.add(trial, name)
     if name not in ("verify", "report again"):
         for trial in sizes(bench):
@@ -133,6 +158,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out/torture"))
     parser.add_argument("--only", action="append", help="name of a command; several may be given")
     parser.add_argument("--every", type=int, default=1, help="only each so manieth operation")
+    parser.add_argument("--distinct", action="store_true", help="operations that are alike only once; see wanted()")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -160,6 +160,18 @@ def state_of(out: Path) -> dict[str, str]:
 def masked(name: str) -> str:
     """A path without times, process numbers and the random names of temporary folders."""
     return RANDOM.sub("", TIMES.sub("TIME", name))
+
+
+def files_read(seen: Iterable[Operation]) -> set[str]:
+    """The files, by masked path, that were read as they were at the start: not after they had been removed."""
+    found, gone = set(), set()
+    for operation in seen:
+        name = masked(operation.path)
+        if operation.kind in ("delete", "rename"):
+            gone.add(name)
+        elif operation.kind in ("open to read", "read") and name not in gone:
+            found.add(name)
+    return found
 
 
 def leftovers(place: Place) -> list[str]:
@@ -316,8 +328,9 @@ class Bench:
         known = next((mended for mended in self.mended if mended.tells(state)), None)
         if known is None:
             again = self._run(None)
-            after, read = self._state(), {masked(o.path) for o in again.seen if o.kind in ("open to read", "read")}
-            unread = frozenset(name for name in state.keys() - read if after.get(name) != state[name])
+            after = self._state()
+            replaced = {name for name, digest in state.items() if after.get(name) != digest}
+            unread = frozenset(replaced - files_read(again.seen))
             known = Mended(state, unread, self._not_mended(again))
             self.mended.append(known)
         return known.wrong
