@@ -8,6 +8,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
+from tribo.display import displayed
+
 _LOG = logging.getLogger("tribo")
 LONGEST_FOUND = 2000  # characters of what was found that a problem holds
 _OF_THE_SYSTEM = "system"  # kind of a problem that another try may not have: disk full, no permission
@@ -18,6 +20,7 @@ def _without_middle(text: str) -> str:
     return text if len(text) <= LONGEST_FOUND else f"{text[:half]} ... {text[-half:]}"
 
 
+@displayed(str)
 @dataclass(frozen=True)
 class Problem:
     """One error, described so that a user can correct it.
