@@ -12,7 +12,18 @@ from tribo.cli.given_paths import GivenPath
 from tribo.cli.output import Output, output_options
 from tribo.cli.reading_options import reading_options, with_reading_options
 from tribo.cli.run_record import command_line, now, provenance_of_run
-from tribo.cli.study_options import CAMPAIGN, DRY_RUN, FLAT, OUT, OVERRIDES, RULE, ZEROS, fit_options, model_options
+from tribo.cli.study_options import (
+    CAMPAIGN,
+    DRY_RUN,
+    FLAT,
+    LAWS,
+    OUT,
+    OVERRIDES,
+    RULE,
+    ZEROS,
+    fit_options,
+    model_options,
+)
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
@@ -110,6 +121,7 @@ def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **opti
 @click.option("--published", type=click.Choice(["berardo2019"]), help="Diagnose a published table instead of CAMPAIGN.")
 @RULE
 @FLAT
+@LAWS
 @reading_options
 @ZEROS[0]
 @ZEROS[1]
@@ -180,6 +192,7 @@ def _diagnose_published(console: Console, out: Output, seed: int) -> int:
 @DRY_RUN
 @fit_options
 @model_options
+@LAWS
 @command_options
 def report(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
     """Run every stage and write the report.
@@ -256,7 +269,9 @@ def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[
 def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis:
     from tribo.stages import diagnosis
 
-    return diagnosis(study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, progress=progress)
+    return diagnosis(
+        study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, laws=chosen.laws, progress=progress
+    )
 
 
 def _conclude(

@@ -10,6 +10,7 @@ from tribo.records import Study
 from tribo.report.campaign_nc import write_store
 from tribo.report.card import Card, card_of, write_card
 from tribo.report.diagnosis_csv import write_diagnosis_tables
+from tribo.report.discovery_files import law_texts
 from tribo.report.drawings import DRAWING, Drawing, Progress, write_figures
 from tribo.report.provenance import (
     Provenance,
@@ -55,6 +56,9 @@ def write_until(
     written = [*write_tables(study, out), write_store(study, out, made_by, diagnosis, keep_earlier)]
     if verdict is not None:
         written.append(write_verdict(verdict, out))
+    if diagnosis is not None and diagnosis.laws is not None:
+        laws = law_texts(diagnosis.laws, study.ingested.campaign.title)
+        written += [write_text(out / name, text) for name, text in laws.items()]
     if diagnosis is not None:
         written += write_diagnosis_tables(diagnosis, out)
     if until in ("compare", "report") or diagnosis is not None:
@@ -68,11 +72,11 @@ def write_until(
     if until == "report":
         from tribo.report.content import content
         from tribo.report.crate import write_crate
-        from tribo.report.html.page import page_of
+        from tribo.report.html.page import pages_of
         from tribo.report.paper.pdf import pdf_of
 
         said = content(study, made_by, verdict, card)
-        written.append(write_text(out / "report.html", page_of(said, drawn)))
+        written += [write_text(out / name, page) for name, page in pages_of(said, drawn).items()]
         written.append(write_bytes(out / "report.pdf", pdf_of(said, drawn, made_by.origin)))
         written.append(write_crate(study, out, made_by, written))
     write_provenance(made_by, out, settle_outputs(out, before, made_by, written, complete=until == "report"))
