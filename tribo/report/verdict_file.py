@@ -23,6 +23,20 @@ OUTCOMES = {
     "partly": "A cause was identified, and a misfit remains that it does not explain.",
     "unknown": "The model does not fit the data, and no known mechanism explains the misfit.",
 }
+WITHOUT_MODEL = {
+    "no_misfit": "Nothing beyond the law of each sample was found.",
+    "named": "Friction varies with more than the load.",
+}
+HEADINGS = {
+    "fails": "Where the model fails", "misfits": "Significant misfits", "none": "No statistically significant misfit.",
+    "cause": "Cause", "causes": "Possible causes, in order of weight", "excluded": "Mechanisms ruled out, and why",
+    "not_testable": "Mechanisms that this design cannot test",
+}  # fmt: skip
+HEADINGS_WITHOUT_MODEL = {
+    **HEADINGS, "fails": "What friction varies with", "misfits": "Significant dependences",
+    "none": "No statistically significant dependence beyond the law of each sample.", "cause": "What this names",
+    "causes": "What friction varies with, with its size", "not_testable": "What this design cannot test",
+}  # fmt: skip
 
 
 def write_verdict(verdict: Mapping[str, Any], out: Path) -> Path:
@@ -32,8 +46,12 @@ def write_verdict(verdict: Mapping[str, Any], out: Path) -> Path:
 
 def verdict_in_words(verdict: Mapping[str, Any]) -> dict[str, Any]:
     """The parts of a verdict as text for the report; empty where the verdict has none."""
+    alone = "baseline" in (verdict.get("model") or {})
+    outcomes = OUTCOMES | WITHOUT_MODEL if alone else OUTCOMES
     return {
-        "outcome": OUTCOMES.get(str(verdict["verdict"]), str(verdict["verdict"])),
+        "headings": HEADINGS_WITHOUT_MODEL if alone else HEADINGS,
+        "laws": [str(x["text"]) for x in verdict.get("layers") or () if x["kind"] == "law" and alone],
+        "outcome": outcomes.get(str(verdict["verdict"]), str(verdict["verdict"])),
         "text": str(verdict.get("text") or ""),
         "equivalent": [_tie(names) for names in verdict.get("equivalent") or () if len(names) > 1],
         "causes": [_cause(cause) for cause in verdict.get("causes") or ()],

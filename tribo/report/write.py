@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from tribo.diagnose.diagnosis_record import Alone, Diagnosis
 from tribo.records import Study
 from tribo.report.campaign_nc import write_store
 from tribo.report.drawings import DRAWING, Drawing, Progress, write_figures
@@ -23,9 +24,6 @@ from tribo.report.verdict_file import write_verdict
 from tribo.store.own_folder import own_folder
 from tribo.store.whole_files import write_bytes, write_text
 
-if TYPE_CHECKING:
-    from tribo.diagnose import Diagnosis
-
 
 def write_until(
     study: Study,
@@ -33,7 +31,7 @@ def write_until(
     until: str = "report",
     drawing: Drawing = DRAWING,
     provenance: Provenance | None = None,
-    diagnosis: Diagnosis | None = None,
+    diagnosis: Diagnosis | Alone | None = None,
 ) -> None:
     """Write the results of all stages up to ``until`` (ingest, fit, compare or report).
 
@@ -48,12 +46,13 @@ def write_until(
     keep_earlier = before is not None and until != "report" and same_origin(before, made_by) and _is_as_recorded(
         out / "campaign.nc", before
     )
-    written = [*write_tables(study, out), write_store(study, out, made_by, diagnosis, keep_earlier)]
+    modelled = diagnosis if isinstance(diagnosis, Diagnosis) else None
+    written = [*write_tables(study, out), write_store(study, out, made_by, modelled, keep_earlier)]
     if verdict is not None:
         written.append(write_verdict(verdict, out))
     if until in ("compare", "report") or diagnosis is not None:
         shown = study if until in ("compare", "report") else None
-        drawn = write_figures(shown, out, diagnosis, made_by.origin, drawing)
+        drawn = write_figures(shown, out, modelled, made_by.origin, drawing)
         written += [out / "figures" / f"{f.name}.{ending}" for f in drawn.values() for ending in f.files]
     if until == "report":
         from tribo.report.content import content
@@ -78,7 +77,7 @@ def write_report(
     out: Path | str,
     progress: Progress | None = None,
     provenance: Provenance | None = None,
-    diagnosis: Diagnosis | None = None,
+    diagnosis: Diagnosis | Alone | None = None,
     jobs: int = 1,
 ) -> None:
     """All of OUT: tables, campaign.nc, figures, verdict.json where there is a diagnosis, page, PDF and crate.
