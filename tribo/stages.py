@@ -11,6 +11,7 @@ import numpy as np
 
 from tribo.campaign.flat_sample import required_flat_sample, with_flat_sample
 from tribo.campaign.zeros import with_zeros
+from tribo.display import displayed
 from tribo.errors import FitError
 from tribo.records import (
     Campaign,
@@ -39,6 +40,7 @@ def _silent(stage: str, done: int, total: int) -> None:
     """Report nothing."""
 
 
+@displayed()
 @dataclass(frozen=True)
 class StudyOptions:
     """Options of a study; each is recorded with the results."""
@@ -222,12 +224,15 @@ def diagnosis(
         Fewer than twelve usable tests.
     """
     from tribo.diagnose import examine, with_simulation
+    from tribo.diagnose.discovery.across_verdict import with_law_across
+    from tribo.diagnose.discovery.in_verdict import with_laws
     from tribo.diagnose.statistics import pattern_table
 
     predictor = own_predictor(ingested.campaign, kept)
 
     def found() -> Diagnosis:
         examined = examine(ingested, seed=seed, predictor=predictor, progress=progress)
+        examined = with_law_across(with_laws(examined, seed=seed, progress=progress), seed=seed)
         return with_simulation(examined, seed=seed, jobs=jobs, progress=progress)
 
     return Shelf(kept).take("diagnosis", (ingested, seed, predictor, pattern_table.record()), found, DIAGNOSED_BY)

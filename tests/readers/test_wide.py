@@ -142,3 +142,21 @@ def test_the_quartz_sand_as_published_is_ten_records(shared: Path) -> None:
     assert len(traces) == 10
     for k, trace in enumerate(traces):
         np.testing.assert_array_equal(trace.force_N, raw[np.isfinite(raw[:, k + 1]), k + 1])
+
+
+def test_a_column_with_a_unit_of_another_quantity_is_no_record_of_a_pattern(tmp_path: Path) -> None:
+    rows = [[*row, "0.3"] for row in forces()]
+    path = saved(tmp_path, "Time [s]\tsteel [N]\tbronze [N]\tglass [N]\tgauge [mm]", rows)
+    assert records_in(path, columns={"time": "Time [s]", "force": "* [N]"}) == RECORDS
+
+
+@pytest.mark.parametrize("left_out", [2, 3, 4])
+def test_a_record_left_out_by_its_position_leaves_the_others(tmp_path: Path, left_out: int) -> None:
+    path = saved(tmp_path, "Time [s]\tF1 [N]\tF2 [N]\tF3 [N]", forces())
+    found = records_in(path, columns={"time": "Time [s]", "force": "F* [N]", "ignore": f"#{left_out}"})
+    assert found == [record for j, record in enumerate(RECORDS) if j + 2 != left_out]
+
+
+def test_a_column_given_by_its_position_serves_every_record(tmp_path: Path) -> None:
+    path = saved(tmp_path, "clock\tF1 [N]\tF2 [N]\tF3 [N]", forces())
+    assert records_in(path, columns={"time": "#1 [s]", "force": "F* [N]"}) == RECORDS

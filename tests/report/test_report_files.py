@@ -95,6 +95,18 @@ def test_xarray_reads_every_trace_back_to_the_same_bits(store: Path, study: Stud
         assert int(traces["row_size"].sum()) == traces.sizes["sample"]
 
 
+def test_xarray_opens_the_file_as_a_dataset_of_tests_and_every_group_as_before(store: Path, study: Study) -> None:
+    with xr.open_dataset(store) as tests, xr.open_datatree(store, engine="h5netcdf") as tree:
+        assert tests.attrs["title"] == study.ingested.campaign.title
+        assert set(tests.coords) == {"test_id", "sample", "specimen", "normal_load_N"}
+        assert set(tests.variables) == set(tree["tests"].to_dataset(inherit=False).variables)
+        found = tests.set_index(test="test_id").sel(test="T0001")
+        assert float(found["static_N"]) == pytest.approx(study.ingested.pulls["T0001"].static_N, rel=1e-7)
+        assert tests["static_N"].attrs["units"] == "N"
+        assert tests.sizes["test"] > tree["traces"].sizes["trace"]  # two tests are set aside
+        assert {"tests", "traces", "fits", "comparison", "simulated"} <= set(tree.children)
+
+
 def test_plain_h5py_reads_names_numbers_and_units(store: Path, study: Study) -> None:
     with h5py.File(store) as file:
         assert file["traces/force_N"].attrs["units"] in ("N", b"N")

@@ -153,11 +153,12 @@ def _work(acting: Mapping[str, Any], conditions: Mapping[str, float]) -> Work:
     """What is done for each run of an ensemble: the run itself, with the mechanisms at work."""
     from functools import partial
 
+    from tribo.display import exact_text
     from tribo.simulate.resume import FRICTION, Work
 
     if not acting:
         return FRICTION
-    return Work(partial(pulled, acting=acting, conditions=conditions), label=repr((acting, conditions)))
+    return Work(partial(pulled, acting=acting, conditions=conditions), label=exact_text((acting, conditions)))
 
 
 def _say_ensemble(console: Console, table: pd.DataFrame, out: Path, table2: bool) -> None:

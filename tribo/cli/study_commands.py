@@ -168,7 +168,8 @@ def diagnose(
 
 def _diagnose_published(console: Console, out: Output, seed: int) -> int:
     """The verdict on Table 2 of Berardo et al. (2019), for every interpretation of what it leaves open."""
-    from tribo.diagnose.from_table.published_diagnosis import diagnose_published
+    from tribo.diagnose.discovery.across_words import record_of, sentence
+    from tribo.diagnose.from_table.published_diagnosis import across_published, diagnose_published
     from tribo.published import BERARDO2019, data_dir, load_table2, load_table2_simulated_anew
     from tribo.report.provenance import provenance_of_table
     from tribo.report.table_report import write_published
@@ -177,8 +178,10 @@ def _diagnose_published(console: Console, out: Output, seed: int) -> int:
     folder, tables = data_dir() / BERARDO2019, ("table2.csv", "table2_tribo.csv")
     with out.taken(folder), console.progress() as progress:
         found = diagnose_published(load_table2(), load_table2_simulated_anew(), seed=seed, progress=progress)
-        write_published(found, out.path, provenance_of_table(folder, tables, command_line(), seed, now()))
-    console.result(found.verdict.as_dict(), verdict_text(found.verdict))
+        across = across_published(found, seed=seed)
+        write_published(found, across, out.path, provenance_of_table(folder, tables, command_line(), seed, now()))
+    record = {**found.verdict.as_dict(), "across_patterns": record_of(across)}
+    console.result(record, f"{verdict_text(found.verdict)}\n{sentence(across)}")
     return 0
 
 

@@ -11,12 +11,16 @@ from tribo.diagnose.search.naming import Named
 from tribo.diagnose.search.screen import Screen
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.verdict import Verdict
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from tribo.diagnose.discovery.search import Discovery
 
+
+@displayed(lambda s: ", ".join(s.mechanisms))
 @dataclass(frozen=True)
 class SimulatedExtension:
     """What the spring-block model itself gives with the named mechanisms in it.
@@ -42,6 +46,7 @@ class SimulatedExtension:
         return float(100 * np.sqrt(np.mean((left - right) ** 2)))
 
 
+@displayed(lambda s: ", ".join(s.mechanisms))
 @dataclass(frozen=True)
 class NotSimulated:
     """Named mechanisms that could not be simulated, and why."""
@@ -50,6 +55,7 @@ class NotSimulated:
     reason: str
 
 
+@displayed(lambda d: d.verdict.verdict)
 @dataclass(frozen=True)
 class Alone:
     """A verdict without the spring-block model: what friction varies with beside the law of each sample."""
@@ -61,7 +67,8 @@ class Alone:
 class Diagnosis:
     """A verdict with what it rests on, for figures and tables.
 
-    ``simulated`` is the extended model run in the simulator itself, where that was asked for and possible.
+    ``simulated`` is the extended model run in the simulator itself, where that was asked for and possible; ``laws`` is
+    the search for the laws of what the causes leave, where something was left.
     """
 
     verdict: Verdict
@@ -69,3 +76,4 @@ class Diagnosis:
     screened: Screen
     named: Named | None
     simulated: SimulatedExtension | None = None
+    laws: Discovery | None = None

@@ -13,6 +13,7 @@ from tribo.diagnose.statistics.observations import NO_FLAT, Observations, condit
 from tribo.diagnose.statistics.predictor import Predictor, tabled_predictor
 from tribo.diagnose.statistics.scatter import Noise
 from tribo.diagnose.terms import ABSORBED, not_varied
+from tribo.display import displayed
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray
 
@@ -40,6 +41,7 @@ class Finding:
     separates: str
 
 
+@displayed()
 @dataclass(frozen=True)
 class Plan:
     """What a design can show of each mechanism, the easiest first."""

@@ -8,14 +8,16 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
+from tribo.display import displayed
 from tribo.records import SetAside
 
 SCHEMA = "tribo.verdict/2"
 Outcome = Literal["no_misfit", "named", "undetermined", "partly", "unknown"]
-LayerKind = Literal["pattern_correction", "cause", "law", "remainder"]
+LayerKind = Literal["pattern_correction", "cause", "law", "remainder", "baseline"]
 CERTAIN_CAUSES: tuple[Outcome, ...] = ("named", "undetermined", "partly")  # verdicts that hold causes
 
 
+@displayed()
 @dataclass(frozen=True)
 class Misfit:
     """Where the model fails: which observable follows which covariate, the size, and the adjusted p value."""
@@ -28,6 +30,7 @@ class Misfit:
     text: str
 
 
+@displayed()
 @dataclass(frozen=True)
 class Estimate:
     """A recovered parameter with its 90 % interval."""
@@ -38,6 +41,7 @@ class Estimate:
     unit: str
 
 
+@displayed()
 @dataclass(frozen=True)
 class Cause:
     """A mechanism that explains the misfit. ``weight`` is its share among all that were weighed."""
@@ -48,6 +52,7 @@ class Cause:
     text: str
 
 
+@displayed()
 @dataclass(frozen=True)
 class Excluded:
     """A mechanism that was left out of the weighing or lost, and why."""
@@ -56,6 +61,7 @@ class Excluded:
     reason: str
 
 
+@displayed()
 @dataclass(frozen=True)
 class Gain:
     """What the extended model gains on tests it has not seen: log scores per test, and RMSE of ln T."""
@@ -69,6 +75,7 @@ class Gain:
     rmse_percent_after: float
 
 
+@displayed()
 @dataclass(frozen=True)
 class Layer:
     """One part of what explains a campaign, with its evidence beside all other layers.
@@ -93,6 +100,7 @@ class Layer:
     text: str = ""
 
 
+@displayed()
 @dataclass(frozen=True)
 class NextTest:
     """The test that best distinguishes mechanisms that explain a campaign about equally."""
@@ -103,6 +111,7 @@ class NextTest:
     expected_bits: float
 
 
+@displayed()
 @dataclass(frozen=True)
 class Verdict:
     """The outcome of a diagnosis."""

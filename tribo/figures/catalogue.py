@@ -92,8 +92,8 @@ FIGURES: dict[str, StudyFigure] = {
         ),
     )
 }
+"""The figures of a study by name."""
 
-# of a study made without the spring-block model
 FRICTION_FIGURES: dict[str, StudyFigure] = {
     figure.name: figure
     for figure in (
@@ -130,6 +130,7 @@ FRICTION_FIGURES: dict[str, StudyFigure] = {
         ),
     )
 }
+"""Figures of the measured friction by itself, by name."""
 
 DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
     figure.name: figure
@@ -189,6 +190,7 @@ DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
         ),
     )
 }
+"""The figures of a diagnosis by name."""
 
 PUBLISHED_FIGURES: dict[str, FigureOf[PublishedDiagnosis]] = {
     figure.name: figure
@@ -216,3 +218,4 @@ PUBLISHED_FIGURES: dict[str, FigureOf[PublishedDiagnosis]] = {
         ),
     )
 }
+"""The figures of the diagnosis of a published table by name."""

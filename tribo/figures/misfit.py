@@ -154,8 +154,7 @@ def draw(numbers: pd.DataFrame) -> Figure:
     panels = [(name, part) for name in TITLES if len(part := numbers[numbers["observable"] == name])]
     labels = numbers.drop_duplicates("covariate").set_index("covariate")["label"]
     heights = [part["row"].nunique() for _, part in panels]
-    size_mm = (style.COLUMN_WIDTH_MM, CELL_MM * sum(heights) + HEAD_MM * len(panels) + FOOT_MM)
-    figure = Figure(figsize=(size_mm[0] / style.MM_PER_INCH, size_mm[1] / style.MM_PER_INCH), layout="constrained")
+    figure = style.page_figure(CELL_MM * sum(heights) + HEAD_MM * len(panels) + FOOT_MM)
     axes = np.atleast_1d(figure.subplots(len(panels), 1, height_ratios=heights, squeeze=True))
     reach = float(np.clip(numbers["effect_percent"].abs().quantile(0.98), LEAST_PERCENT, MOST_PERCENT))
     norm = TwoSlopeNorm(0.0, -reach, reach)

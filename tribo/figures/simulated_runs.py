@@ -18,11 +18,12 @@ def numbers(study: Study) -> pd.DataFrame:
     order = study_lookup.sample_numbers(study)
     first_runs = {run.sample: run for run in reversed(study.example_runs)}
     known = sorted(first_runs, key=lambda s: order.get(s, len(order)))
-    frames = [_one_run(order.get(s, len(order) + k), first_runs[s]) for k, s in enumerate(known)]
+    frames = [of_one_run(first_runs[s], order.get(s, len(order) + k)) for k, s in enumerate(known)]
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=COLUMNS)
 
 
-def _one_run(number: int, run: Run) -> pd.DataFrame:
+def of_one_run(run: Run, number: int = 0) -> pd.DataFrame:
+    """The numbers of one run, drawn as sample ``number`` of the campaign."""
     time_s, ratio = thin_trace(run.time_s, run.force_N / run.normal_load_N)
     marks = [("trace", t * 1e3, f) for t, f in zip(time_s, ratio, strict=True)]
     marks.append(("peak", run.peak_s * 1e3, run.static_friction))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ import pandas as pd
 from matplotlib import style
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 from matplotlib.transforms import ScaledTranslation, Transform
@@ -47,6 +49,16 @@ def sample_mark(sample_number: int) -> SampleMark:
     )
 
 
+class PageFigure(Figure):
+    """A figure that also shows itself in a notebook; no pyplot is needed."""
+
+    def _repr_svg_(self) -> str:
+        buffer = io.StringIO()
+        with house_style():
+            FigureCanvasSVG(self).print_svg(buffer, metadata={"Date": None})
+        return buffer.getvalue()
+
+
 @contextmanager
 def house_style() -> Iterator[None]:
     """The style sheet for drawing and for rendering; matplotlib's own settings return afterwards."""
@@ -65,6 +77,11 @@ def in_house_style(draw: Callable[P, R]) -> Callable[P, R]:
     return drawn
 
 
+def page_figure(height_mm: float) -> PageFigure:
+    """An empty figure as wide as the page."""
+    return PageFigure(figsize=(COLUMN_WIDTH_MM / MM_PER_INCH, height_mm / MM_PER_INCH), layout="constrained")
+
+
 def panel_grid(
     n_panels: int, panel_height_mm: float, columns: int | None = None, **subplots: Any
 ) -> tuple[Figure, list[Axes]]:
@@ -72,8 +89,7 @@ def panel_grid(
     columns = columns or _columns_for(n_panels)
     rows = -(-n_panels // columns)
     legend_mm = 12.0
-    size = (COLUMN_WIDTH_MM / MM_PER_INCH, (rows * panel_height_mm + legend_mm) / MM_PER_INCH)
-    figure = Figure(figsize=size, layout="constrained")
+    figure = page_figure(rows * panel_height_mm + legend_mm)
     axes = list(figure.subplots(rows, columns, squeeze=False, **subplots).flat)
     for empty in axes[n_panels:]:
         empty.remove()

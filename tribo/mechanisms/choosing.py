@@ -6,9 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from tribo.display import displayed
 from tribo.mechanisms.conditions import Base, Conditions, Values
 
 
+@displayed()
 @dataclass(frozen=True)
 class OnTest:
     """How a mechanism acts on one test: its values there, and the sample that takes the place of the labelled one."""
@@ -37,6 +39,7 @@ def unnamed(choice: str) -> str:
     return ""
 
 
+@displayed()
 @dataclass(frozen=True)
 class Choosing:
     """What the choices of a mechanism mean.

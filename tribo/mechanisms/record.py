@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from tribo.display import displayed
 from tribo.mechanisms.choosing import NO_CHOICE, Choosing, OnTest, no_choice
 from tribo.mechanisms.conditions import (
     REFERENCE_HOLD_S,
@@ -29,6 +30,7 @@ Law = Callable[[Values, Base, Conditions, str], Forces]
 Rise = Callable[[Values, FloatArray, Conditions], FloatArray]
 
 
+@displayed()
 @dataclass(frozen=True)
 class Parameter:
     """One number of a mechanism. ``zero`` is where the mechanism is absent (amplitudes only)."""
@@ -44,6 +46,7 @@ class Parameter:
     tries: tuple[float, ...] = ()  # further values a fit starts from
 
 
+@displayed()
 @dataclass(frozen=True)
 class Mechanism:
     """One reason why a measured campaign may differ from the baseline model.

@@ -50,8 +50,8 @@ def verdict_in_words(verdict: Mapping[str, Any]) -> dict[str, Any]:
     outcomes = OUTCOMES | WITHOUT_MODEL if alone else OUTCOMES
     return {
         "headings": HEADINGS_WITHOUT_MODEL if alone else HEADINGS,
-        "laws": [str(x["text"]) for x in verdict.get("layers") or () if x["kind"] == "law" and alone],
-        "outcome": outcomes.get(str(verdict["verdict"]), str(verdict["verdict"])),
+        "own_laws": [str(layer["text"]) for layer in _layers(verdict, "baseline")],
+        "outcome": _outcome(outcomes, str(verdict["verdict"]), _layers(verdict, "law")),
         "text": str(verdict.get("text") or ""),
         "equivalent": [_tie(names) for names in verdict.get("equivalent") or () if len(names) > 1],
         "causes": [_cause(cause) for cause in verdict.get("causes") or ()],
@@ -60,8 +60,32 @@ def verdict_in_words(verdict: Mapping[str, Any]) -> dict[str, Any]:
         "misfits": [_misfit(misfit) for misfit in verdict.get("misfits") or ()],
         "excluded": [(_plain(e["mechanism"]), e["reason"]) for e in verdict.get("excluded") or ()],
         "not_testable": [(_plain(e["mechanism"]), _why(e["reason"])) for e in verdict.get("not_testable") or ()],
-        "corrections": [_correction(x) for x in verdict.get("layers") or () if x["kind"] == "pattern_correction"],
+        "corrections": [_correction(x) for x in _layers(verdict, "pattern_correction")],
+        "laws": [_law(x) for x in _layers(verdict, "law")],
     }
+
+
+def _layers(verdict: Mapping[str, Any], kind: str) -> list[Mapping[str, Any]]:
+    return [layer for layer in verdict.get("layers") or () if layer["kind"] == kind]
+
+
+def _outcome(outcomes: Mapping[str, str], outcome: str, laws: list[Mapping[str, Any]]) -> str:
+    """The verdict in one sentence, and that it has laws."""
+    found = outcomes.get(outcome, outcome)
+    if not laws:
+        return found
+    return f"{found} {'A law was' if len(laws) == 1 else f'{len(laws)} laws were'} found that it follows."
+
+
+def _law(layer: Mapping[str, Any]) -> dict[str, str]:
+    """A law: the formula, what it says with its size, the laws that the design cannot tell apart from it, its gain."""
+    gain = layer.get("gain")
+    ties = layer.get("tied_with") or ()
+    return {
+        "formula": "; ".join([str(layer["formula"]), *_sizes(layer)]), "text": str(layer["text"]),
+        "ties": "; ".join(ties) or "none",
+        "gain": _gain(gain) if gain else "not tested",
+    }  # fmt: skip
 
 
 def _why(reason: str) -> str:
@@ -86,13 +110,17 @@ def _tie(names: list[str]) -> str:
 
 
 def _cause(cause: Mapping[str, Any]) -> dict[str, Any]:
-    sizes = [
+    weight, text = f"{_number(cause['weight']):.2f}", cause.get("text", "")
+    return {"mechanism": _plain(cause["mechanism"]), "weight": weight, "sizes": _sizes(cause), "text": text}
+
+
+def _sizes(named: Mapping[str, Any]) -> list[str]:
+    """The parameters of a cause or a law with their intervals."""
+    return [
         f"{_plain(name)} = {significant(_number(e['value']))} ({significant(_number(e['low']))} to "
         f"{significant(_number(e['high']))}) {e.get('unit', '')}".rstrip()
-        for name, e in (cause.get("parameters") or {}).items()
+        for name, e in (named.get("parameters") or {}).items()
     ]
-    weight = f"{_number(cause['weight']):.2f}"
-    return {"mechanism": _plain(cause["mechanism"]), "weight": weight, "sizes": sizes, "text": cause.get("text", "")}
 
 
 def _misfit(misfit: Mapping[str, Any]) -> dict[str, str]:

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tribo.display import exact_text
 from tribo.errors import Problem, SimulationError
 from tribo.records import Run
 from tribo.simulate.config import SimConfig
@@ -156,7 +157,7 @@ def fingerprint(design: Iterable[SimConfig], work: Work = FRICTION) -> str:
     """Hash of every field of every configuration, in order, and of what is done with them."""
     digest = hashlib.sha256(repr((list(work.units), work.label)).encode())
     for config in design:
-        digest.update(repr(config).encode())
+        digest.update(exact_text(config).encode())
     return digest.hexdigest()
 
 

@@ -24,7 +24,7 @@ class _Strict(BaseModel):
 class ShapeTable(_Strict):
     """[[shape]]: a function of one column."""
 
-    kind: Literal["linear", "log", "step", "optimum", "hump", "saturating", "wave", "level"]
+    kind: Literal["linear", "log", "step", "optimum", "hump", "saturating", "ramp", "window", "wave", "level"]
     column: str
     low: Finite = 0.0
     high: Finite = 1.0

@@ -23,6 +23,7 @@ from tribo.diagnose.terms import in_words
 from tribo.diagnose.verdict import Estimate, Layer
 from tribo.records import REGIMES
 
+NAMED = 3  # tied laws that are written out in a sentence
 WHERE = {
     ALL: "", PATTERNED: " of the patterned samples", FLAT: " of the flat sample",
     CAVITY_SHARE: ", in proportion to the share of cavities,", RIM: ", in proportion to the rim length,",
@@ -60,6 +61,11 @@ def _where(law: WrittenLaw, parameters: dict[str, Estimate]) -> str:
         names = " and ".join(_name(s) for s in law.shapes)
         return f"where {names} are both at their highest than where one of them is at its lowest"
     s = law.shapes[0]
+    if s.kind == "window":
+        return f"for {_name(s)} from {_value(s, s.place)} to {_value(s, s.place + s.width)} than elsewhere"
+    if s.kind == "ramp":
+        side = "above" if s.high > s.place else "below"
+        return f"at {_name(s)} = {_value(s, s.high)}, growing {side} {_value(s, s.place)}"
     if s.kind == "level":
         return f"where {_name(s)} is {s.level}"
     if s.kind == "step":
@@ -88,15 +94,20 @@ def discovery_text(d: Discovery) -> str:
     """What was found, or that nothing was."""
     if not d.laws:
         return f"None of the {d.searched} laws that were tried explains more than chance does."
-    told = [f"{law_sentence(f)}{_tied(f.ties)}" for f in d.laws]
-    return " ".join(told) + f" {d.searched} laws were tried."
+    return f"{laws_text(d)} {d.searched} laws were tried."
+
+
+def laws_text(d: Discovery) -> str:
+    """The laws, each with those that the design cannot distinguish from it."""
+    return " ".join(f"{law_sentence(f)}{_tied(f.ties)}" for f in d.laws)
 
 
 def _tied(ties: Sequence[WrittenLaw]) -> str:
     if not ties:
         return ""
-    names = "; ".join(f"{tie.formula()} ({subject(tie)})" for tie in ties[:3])
-    return f" This design cannot distinguish it from: {names}."
+    names = "; ".join(f"{tie.formula()} ({subject(tie)})" for tie in ties[:NAMED])
+    more = f"; and {len(ties) - NAMED} more" if len(ties) > NAMED else ""
+    return f" This design cannot distinguish it from: {names}{more}."
 
 
 def law_layers(d: Discovery) -> list[Layer]:

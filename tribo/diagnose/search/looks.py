@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribo.diagnose.statistics.model import Acting, Setup, StartChanges
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 OBSERVABLES = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (1.0, 1.0), "drop": (1.0, -1.0)}
@@ -17,6 +18,7 @@ BENT = ", bend"  # what a look at the curve of a sample adds to its column
 CYCLES = 24  # periods down to a twenty-fourth of the series
 
 
+@displayed()
 @dataclass(frozen=True)
 class Look:
     """One look: which observable against which covariate, and the columns (n, 2, d) it would follow."""

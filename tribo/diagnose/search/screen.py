@@ -15,6 +15,7 @@ from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import start_changes, with_form_error
 from tribo.diagnose.statistics.scatter import ROUNDING, SIZE_STEPS, Replicates
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 Progress = Callable[[str, int, int], None]
@@ -25,6 +26,7 @@ AS_FITTED = 1  # of the steps of the sizes, the first
 TAKEN_UP = 1e-6  # share of a column's information below which nothing of it is left to see
 
 
+@displayed()
 @dataclass(frozen=True)
 class Screen:
     """Strength of every look as a standard normal deviate, and what chance gives.
@@ -91,7 +93,7 @@ def screen(
         chance = np.concatenate([chance, _strongest(strengths, library)])
         if progress is not None:
             progress("diagnose", len(chance), replicates)
-        if _decided(chance[:, 0], float(strength.max())):
+        if decided(chance[:, 0], float(strength.max())):
             break
     p = np.array([share_beyond(chance[:, 0], float(value)) for value in strength])
     return Screen(tuple(looks), strength, size, tuple(coefficients), chance[:, 0], chance[:, 1], p)
@@ -113,7 +115,7 @@ def _strongest(strengths: FloatArray, library: NDArray[np.bool_]) -> FloatArray:
     return np.column_stack([strengths.max(axis=1), alone])
 
 
-def _decided(chance: FloatArray, strongest: float) -> bool:
+def decided(chance: FloatArray, strongest: float) -> bool:
     """Whether further replicates could not change the decision at one percent: a sequential Monte Carlo test.
 
     Ten replicates as strong say "within chance" (Besag and Clifford 1991); ten standard deviations beyond
@@ -140,6 +142,7 @@ def deviate(chi2: FloatArray, freedom: FloatArray) -> FloatArray:
     return np.where(freedom == 1, np.sqrt(chi2), np.where(p > 1e-14, near, far))
 
 
+@displayed()
 @dataclass(frozen=True)
 class Columns:
     """The columns of all looks, (2, n, k) regime by regime, and the products that their informations need.
@@ -183,6 +186,7 @@ def _products(columns: FloatArray, first: NDArray[np.int64], second: NDArray[np.
     return np.stack([static[:, first] * static[:, second], mixed, sliding[:, first] * sliding[:, second]])
 
 
+@displayed()
 @dataclass(frozen=True)
 class Products:
     """Products of the model's columns, the looks and the residual of every replicate, whatever the random sizes are."""

@@ -10,6 +10,7 @@ import numpy as np
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.linearisation import ModelFit, StartEffects, start_effects
 from tribo.diagnose.statistics.model import Acting
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 PER_PARAMETER = 1.0  # log likelihood that a further parameter has to earn
@@ -17,6 +18,7 @@ CHOICES_FITTED = 4  # of a mechanism with many choices, how many are fitted in f
 IN_REACH, CLOSE_BY = 0.5, 3.0  # share of the best first gain, less so much, from which a mechanism is fitted to the end
 
 
+@displayed()
 @dataclass(frozen=True)
 class Candidate:
     """A mechanism fitted on top of a model; ``gain`` is the log likelihood it earns net of its freedom, ``raw``

@@ -10,11 +10,13 @@ import numpy as np
 
 from tribo.diagnose.statistics.model import Acting, Setup, StartChanges, start_changes
 from tribo.diagnose.statistics.scatter import AtNoise, Noise, at_estimated_noise, at_noise
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 SEEN = 1e-3  # share of a mechanism's effect that must be left once the flat law is free
 
 
+@displayed()
 @dataclass(frozen=True)
 class State:
     """Where a fit has got to: parameters, random effects (q,), residual (n, 2) without them, and the noise."""
@@ -25,6 +27,7 @@ class State:
     at: AtNoise
 
 
+@displayed()
 @dataclass(frozen=True)
 class System:
     """The normal equations of one iteration solved: the inverse of their matrix (p + q, p + q) and the step.
@@ -131,6 +134,7 @@ def scored(s: Setup, state: State) -> tuple[float, FloatArray]:
     return float(penalised(s, state) + scale + prior - 0.5 * curvature), weight
 
 
+@displayed()
 @dataclass(frozen=True)
 class Linear:
     """A fitted model linear about its parameters, with the noise at which it was fitted.
@@ -175,6 +179,7 @@ class Linear:
         return np.asarray((rows - q @ (q.T @ rows)).reshape(columns.shape))
 
 
+@displayed()
 @dataclass(frozen=True)
 class ModelFit:
     """A fitted model. ``residual`` (n, 2) is ln T measured minus the law without random effects.
@@ -205,6 +210,7 @@ class ModelFit:
         return self.setup.observations.log_force - self.residual
 
 
+@displayed()
 @dataclass(frozen=True)
 class StartEffects:
     """The effects of all candidates at their start values, made once for a fitted ``model``.

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tribo.diagnose.statistics.observations import Observations
 from tribo.diagnose.statistics.predictor import Predictor
+from tribo.display import displayed
 from tribo.mechanisms.record import Base, Forces, Mechanism
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray
@@ -31,6 +32,7 @@ ALIKE_IN_BOTH, APART = np.array([1.0, 1.0]) / np.sqrt(2.0), np.array([1.0, -1.0]
 FIXED = -1  # the group of effects whose size is not estimated
 
 
+@displayed()
 @dataclass(frozen=True)
 class Acting:
     """A mechanism that takes part in a model, with its choice (which specimen, which column)."""
@@ -49,6 +51,7 @@ class Acting:
         return self.mechanism.start()
 
 
+@displayed()
 @dataclass(frozen=True)
 class Setup:
     """What every model of one campaign shares: shares, random-effect design, groups.
@@ -223,6 +226,7 @@ def candidates(s: Setup, law: FloatArray) -> list[Acting]:
     return found
 
 
+@displayed()
 @dataclass(frozen=True)
 class StartChanges:
     """What every candidate changes before it is fitted.
@@ -254,6 +258,7 @@ def start_changes(s: Setup, law: FloatArray) -> StartChanges:
     return StartChanges(tuple(acting), np.stack(columns, axis=2), every, adhesion)
 
 
+@displayed()
 @dataclass(frozen=True)
 class Target:
     """What is being fitted: a campaign, the mechanisms on top of the flat law, and their bounds."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.diagnose.statistics.model import FIXED, GAIN, PATTERN, SLOPE, Setup
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 # Expected size, and how many effects that is worth: specimen gains and slopes, pattern factor
@@ -27,6 +28,7 @@ SMALLEST_SD = 0.003  # of ln T: no reading repeats better
 SIZE_STEPS = np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, -0.7], [-0.7, -0.7, -0.7, -0.7, 0.0]])
 
 
+@displayed()
 @dataclass(frozen=True)
 class Noise:
     """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance; specimen gains (2,) and
@@ -66,6 +68,7 @@ def first_noise() -> Noise:
     return Noise(np.diag([REPEAT_PRIOR[0] ** 2] * 2), np.zeros(2)).with_sizes(SIZE_PRIORS[:, 0])
 
 
+@displayed()
 @dataclass(frozen=True)
 class AtNoise:
     """What the tests and random effects of a campaign are weighed with at one noise.
@@ -197,6 +200,7 @@ def log_size_prior(group: int, size: FloatArray) -> FloatArray:
     return np.asarray(-worth * (np.log(size) + 0.5 * (expected / size) ** 2))
 
 
+@displayed()
 @dataclass(frozen=True)
 class Sizes:
     """The noise of every replicate: ``repeat`` (r, 2, 2), what the repeats depend on, ``scatter`` (r, k), and sizes of
@@ -285,6 +289,7 @@ def blurred(along: FloatArray, spread: FloatArray) -> FloatArray:
     return np.stack([np.einsum("rnk,nk->rn", moved[:, a], along[b]) for a, b in pairs], axis=1)
 
 
+@displayed()
 @dataclass(frozen=True)
 class Replicates:
     """Fitted replicates: ``precision`` (r, 3, n) of every test, robust weight included, as static, mixed, sliding;

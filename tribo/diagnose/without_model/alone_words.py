@@ -97,7 +97,7 @@ def summary(
     too_few: str,
 ) -> str:
     """The verdict in a few sentences: the laws, what friction varies with, what cannot be told."""
-    laws = [layer.text for layer in layers if layer.kind == "law"]
+    laws = [layer.text for layer in layers if layer.kind == "baseline"]
     said = laws[:_MOST_SAID]
     said += [f"The laws of {len(laws) - _MOST_SAID} more are listed below."] if len(laws) > _MOST_SAID else []
     if causes:

@@ -64,7 +64,7 @@ def _of_law(row: Mapping[str, Any], line: Mapping[str, Any] | None, loads: np.nd
     if row["law"] in ("power", "linear", "constant", "three_term", "hertz") and line is not None:
         text += f" {_constant_part(line, loads)}"
     return Layer(
-        kind="law", name="normal_load_N", samples=(sample,), regimes=(regime,), p_adjusted=float("nan"),
+        kind="baseline", name="normal_load_N", samples=(sample,), regimes=(regime,), p_adjusted=float("nan"),
         effect_percent=float("nan"), low=float("nan"), high=float("nan"), parameters=parameters,
         formula=str(row["formula"]), text=text,
     )  # fmt: skip
@@ -88,7 +88,7 @@ def _of_mean(sample: str, regime: str, ratio: np.ndarray) -> Layer:
     mean = _estimate(float(ratio.mean()), u, "", ratio.size - 1)
     text = f"Mean {regime} T/N of {sample}: {_sized(mean)}; the loads do not determine a law."
     return Layer(
-        kind="law", name="normal_load_N", samples=(sample,), regimes=(regime,), p_adjusted=float("nan"),
+        kind="baseline", name="normal_load_N", samples=(sample,), regimes=(regime,), p_adjusted=float("nan"),
         effect_percent=float("nan"), low=float("nan"), high=float("nan"), parameters={"T/N": mean}, formula="T = μ N",
         text=text,
     )  # fmt: skip

@@ -123,13 +123,14 @@ def _table2(table: Mapping[str, Any], intercept: str) -> list[dict[str, Any]]:
 
 def _diagnosis_tables(verdict: Mapping[str, Any] | None) -> dict[str, list[Any]]:
     if verdict is None:
-        return {"misfits": [], "causes": [], "excluded": [], "not_testable": [], "corrections": []}
+        return {"misfits": [], "causes": [], "excluded": [], "not_testable": [], "corrections": [], "laws": []}
     return {
         "misfits": [[m["observable"], m["p"], m["sample"], m["covariate"], m["text"]] for m in verdict["misfits"]],
         "causes": [[c["mechanism"], c["weight"], "; ".join(c["sizes"]), c["text"]] for c in verdict["causes"]],
         "excluded": verdict["excluded"],
         "not_testable": verdict["not_testable"],
         "corrections": verdict["corrections"],
+        "laws": [[law["formula"], law["text"], law["ties"]] for law in verdict["laws"]],
     }
 
 
