@@ -210,6 +210,18 @@ def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
     return replace(walked, **looks)
 
 
+def with_fits(read: Study, weights: Weights = "relative") -> Study:
+    """The study with its fits and their combined uncertainties; as it is where no law can be fitted."""
+    from tribo.fitting.assessment import budgets_of
+
+    try:
+        fits = fit(read.ingested, weights=weights)
+    except FitError:
+        return read
+    budgets = budgets_of(read.ingested, fits, weights)
+    return replace(read, fits=fits, combined=tuple(b.combined() for b in budgets))
+
+
 def diagnosis(
     ingested: Ingested, *, seed: int = 0, jobs: int = 2, kept: Path | None = None, progress: Progress = _silent
 ) -> Diagnosis:
@@ -233,7 +245,7 @@ def diagnosis(
     def found() -> Diagnosis:
         examined = examine(ingested, seed=seed, predictor=predictor, progress=progress)
         examined = with_law_across(with_laws(examined, seed=seed, progress=progress), seed=seed)
-        return with_simulation(examined, seed=seed, jobs=jobs, progress=progress)
+        return with_simulation(examined, seed=seed, jobs=jobs, progress=progress).without_columns()
 
     return Shelf(kept).take("diagnosis", (ingested, seed, predictor, pattern_table.record()), found, DIAGNOSED_BY)
 

@@ -104,10 +104,13 @@ def run_stored(
     check_all(design)
     with only_writer_of(path, wait_s):
         _open_store(design, path, work)
-        missing = [k for k, done in enumerate(read_stored(path)[DONE]) if not done]
+        table = read_stored(path)
+        missing = [k for k, done in enumerate(table[DONE]) if not done]
         finished = len(design) - len(missing)
         if progress is not None:
             progress(finished, len(design))
+        if not missing:
+            return table
         given = _given(design)
         made_from = " ".join(identity(design, work).values())
         with _columns(path, work) as columns:
