@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as t_distribution
 
-from tribo.records import FloatArray, Ingested, Pull, Test, Trace
+from tribo.records import CLOSED_TRACK_M, FloatArray, Ingested, Pull, Test, Trace
 
-CLOSED_TRACK_M = 10.0  # a slide longer than this runs over the same track again and again; no sled track is so long
 BLOCKS = 20  # of equal distance; the first is compared with those of the second half
 _FEWEST_IN_BLOCK = 5
 
