@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +11,7 @@ from tribo.campaign.table import RAW, TABLES
 from tribo.errors import CampaignError, Problem
 from tribo.nearest import did_you_mean, nearest
 from tribo.records import Campaign
+from tribo.temporary import temporary_folder
 from tribo.zips import unpack
 
 _TABLES_OF_EXPORTS = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".xls", ".ods", ".tra", ".mat", ".tdms")
@@ -34,9 +34,9 @@ def open_campaign(path: Path | str, *, measured: bool = True) -> Iterator[Campai
         yield load_campaign(_campaign_folder(path, path.name), measured=measured)
     elif path.is_file():
         _refuse_a_file_of_a_campaign(path)
-        with tempfile.TemporaryDirectory(prefix="tribo-", ignore_cleanup_errors=True) as folder:
-            unpack(path, Path(folder))
-            yield load_campaign(_campaign_folder(Path(folder), path.name), measured=measured)
+        with temporary_folder() as folder:
+            unpack(path, folder)
+            yield load_campaign(_campaign_folder(folder, path.name), measured=measured)
     else:
         beside = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
         allowed = did_you_mean(path.name, beside) or None

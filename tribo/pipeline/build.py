@@ -21,7 +21,7 @@ from typing import Any
 from tribo.dry_run import Checked, check
 from tribo.errors import CampaignError, Problem, TriboError, unexpected
 from tribo.escaping import well_formed
-from tribo.pipeline.dated_copies import date_build
+from tribo.pipeline.dated_copies import CURRENT, clear_unfinished, date_build
 from tribo.pipeline.live import Progress
 from tribo.pipeline.scan import Dropped, difference, scan
 from tribo.pipeline.step_record import OF_A_REPORT, read_record
@@ -29,11 +29,10 @@ from tribo.pipeline.workflow_run import run_workflow
 from tribo.stages import StudyOptions, Weights
 from tribo.store.kept_results import package_sources
 from tribo.store.lock import WAIT, only_writer
-from tribo.store.own_folder import STATE, check_site
+from tribo.store.own_folder import STATE, check_site, is_leftover
 from tribo.store.whole_files import write_text
 from tribo.traces.pull import named_rule
 
-CURRENT = "current"
 GONE = "report.html has been deleted"
 PROFILES = ("local", "slurm")
 _BLOCKS = re.compile(r"(?m)^(?=\[|\s*$)")  # Snakemake says one thing after a blank line or a date in brackets
@@ -147,7 +146,17 @@ def build_site(
         return _planned(drop, state, options, watch)
     busy = Problem("busy", f"another build of this site is running; {WAIT}", file=str(site))
     with only_writer(state / "lock", options.wait_s, lasting=True, busy=busy) as descriptor:
+        _clear_leftovers(state)
         return _built(drop, state, options, watch, descriptor)
+
+
+def _clear_leftovers(state: Path) -> None:
+    """Remove what a killed build has left; the folders of reports are cleared by the steps that write into them."""
+    site = state.parent
+    for path in (*state.rglob(".*"), *site.glob(".*"), *(site / CURRENT).glob(".*")):
+        if is_leftover(path.name) and path.is_file():
+            path.unlink()
+    clear_unfinished(site)
 
 
 def _planned(drop: Path, state: Path, options: BuildOptions, watch: Watch) -> Built:
