@@ -26,6 +26,7 @@ from tribo.errors import CampaignError
 from tribo.figures import law as law_figure
 from tribo.mechanisms.record import Base, Conditions
 from tribo.report.verdict_file import verdict_in_words
+from tribo.store.kept_results import decoded, encoded
 
 from .known import baseline, made
 
@@ -99,6 +100,13 @@ def test_the_figure_shows_the_law_over_its_column(diagnosed: Diagnosis) -> None:
 
 def test_a_campaign_without_laws_has_no_figure_of_them() -> None:
     assert law_figure.numbers_of(Discovery((), (), 0)).empty
+
+
+def test_a_diagnosis_with_a_law_can_be_kept(diagnosed: Diagnosis) -> None:
+    kept = decoded(encoded(diagnosed.without_columns()))
+    assert kept.verdict == diagnosed.verdict or repr(kept.verdict) == repr(diagnosed.verdict)
+    law = kept.laws.laws[0].model.acting[-1].mechanism.law
+    assert law == diagnosed.laws.laws[0].model.acting[-1].mechanism.law
 
 
 def test_the_report_shows_a_law_with_its_size(diagnosed: Diagnosis) -> None:

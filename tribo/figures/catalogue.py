@@ -189,9 +189,8 @@ DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
             "Laws that the remaining misfit follows",
             "Change of T over the column of each law that was found. Grey points: what the model without the law "
             "leaves of each test; black: means over stretches of the column with twice their standard error. Red: the "
-            "law with its 90 % band, averaged over all forms in proportion to their evidence. What the flat law and "
-            "the patterns can absorb is taken out of both. Of a product of two columns, the horizontal axis is the "
-            "product of its two shapes.",
+            "law with its 90 % band, which is averaged over all forms in proportion to their evidence. Both are about "
+            "the mean of the law. Of a product of two columns, the horizontal axis is the product of its two shapes.",
             law.numbers,
             law.draw,
         ),

@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from tribo.diagnose.discovery.written_law import UNITS, WrittenLaw, column_values
+from tribo.diagnose.statistics.model import effect_of
 from tribo.diagnose.statistics.percent import percent
 from tribo.diagnose.terms import in_words
 from tribo.figures import style
@@ -38,8 +39,8 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
 def numbers_of(found: Discovery) -> pd.DataFrame:
     """One row per law, regime and test that the law acts on, in percent of T.
 
-    ``partial_percent`` is what the model without the law leaves of a test, ``law_percent`` the law with its 90 % band;
-    from both, what flat law and patterns can absorb is taken out. ``x`` is the column of the law, or the product of
+    ``partial_percent`` is what the model without the law leaves of a test, ``law_percent`` the law with its 90 % band,
+    both about the mean of the law over these tests. ``x`` is the column of the law, or the product of
     its two shapes; ``x_name`` the name in a column of names.
     """
     parts = [_of_law(number, law) for number, law in enumerate(found.laws, start=1)]
@@ -50,21 +51,20 @@ def _of_law(number: int, found: FoundLaw) -> pd.DataFrame:
     s, law = found.model.setup, found.law
     c = s.observations.conditions
     left = found.model.residual - s.random_effects.on_tests(found.model.effects)
+    change = effect_of(s, found.model.law, found.model.acting[-1], found.model.values[-1])
+    half = 0.5 * (found.band.high - found.band.low)
     x, names = _abscissa(law, c)
     acts = law.weight(c) != 0
-    parts = [
-        pd.DataFrame(
-            {
-                "law_number": number, "formula": law.formula(), "regime": regime, "sample": c.sample[acts],
-                "covariate": _label(law), "x": x[acts], "x_name": names[acts],
-                "partial_percent": percent((left + found.band.value)[acts, k]),
-                "law_percent": percent(found.band.value[acts, k]), "low_percent": percent(found.band.low[acts, k]),
-                "high_percent": percent(found.band.high[acts, k]),
-            }
-        )
-        for k, regime in enumerate(REGIMES)
-        if law.regime in (regime, "both")
-    ]  # fmt: skip
+    parts = []
+    for k in (k for k, regime in enumerate(REGIMES) if law.regime in (regime, "both")):
+        course = change[acts, k] - change[acts, k].mean()
+        part = {
+            "law_number": number, "formula": law.formula(), "regime": REGIMES[k], "sample": c.sample[acts],
+            "covariate": _label(law), "x": x[acts], "x_name": names[acts],
+            "partial_percent": percent(left[acts, k] + course), "law_percent": percent(course),
+            "low_percent": percent(course - half[acts, k]), "high_percent": percent(course + half[acts, k]),
+        }  # fmt: skip
+        parts.append(pd.DataFrame(part))
     return pd.concat(parts, ignore_index=True)[COLUMNS]
 
 
