@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
     from tribo.diagnose.discovery.search import Discovery
     from tribo.diagnose.discovery.settling import FoundLaw
-    from tribo.mechanisms.record import Conditions
 
 COLUMNS = [
     "law_number", "formula", "regime", "sample", "covariate", "x", "x_name", "partial_percent", "law_percent",
@@ -53,7 +52,7 @@ def _of_law(number: int, found: FoundLaw) -> pd.DataFrame:
     left = found.model.residual - s.random_effects.on_tests(found.model.effects)
     change = effect_of(s, found.model.law, found.model.acting[-1], found.model.values[-1])
     half = 0.5 * (found.band.high - found.band.low)
-    x, names = _abscissa(law, c)
+    x, names = _abscissa(found)
     acts = law.weight(c) != 0
     parts = []
     for k in (k for k, regime in enumerate(REGIMES) if law.regime in (regime, "both")):
@@ -68,8 +67,9 @@ def _of_law(number: int, found: FoundLaw) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)[COLUMNS]
 
 
-def _abscissa(law: WrittenLaw, c: Conditions) -> tuple[np.ndarray, np.ndarray]:
+def _abscissa(found: FoundLaw) -> tuple[np.ndarray, np.ndarray]:
     """Numbers to draw a law over, (n,), and their names where the column holds names."""
+    law, c = found.law, found.model.setup.observations.conditions
     nameless = np.full(len(c.sample), "")
     if len(law.shapes) > 1:
         return law.course(c)[:, 0], nameless
@@ -81,9 +81,13 @@ def _abscissa(law: WrittenLaw, c: Conditions) -> tuple[np.ndarray, np.ndarray]:
 
 def _label(law: WrittenLaw) -> str:
     if len(law.shapes) > 1:
-        return f"{' × '.join(in_words(name) for name in law.columns)} (1: both at their highest)"
+        return f"{' × '.join(map(_name, law.columns))} (1: both at their highest)"
     unit = UNITS.get(law.columns[0], "")
-    return in_words(law.columns[0]) + (f" ({unit})" if unit else "")
+    return _name(law.columns[0]) + (f" ({unit})" if unit else "")
+
+
+def _name(column: str) -> str:
+    return in_words(column).removeprefix("the ").capitalize() if in_words(column) != column else column
 
 
 @style.in_house_style
