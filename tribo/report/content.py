@@ -24,7 +24,7 @@ from tribo.report.words.terminal_text import fit_cells
 
 LEAD_FIGURES = ("finding", "agreement", "fig4", "dependence")  # the first that there is shows what the card says
 MISFIT_FIGURES = ("misfit", "residuals")
-CAUSE_FIGURES = ("extended", "evidence")
+CAUSE_FIGURES = ("law", "extended", "evidence")
 CALIBRATED = {
     "mu_s": "Static friction coefficient of a block, mean",
     "mu_s_sd": "Static friction coefficient of a block, standard deviation",
