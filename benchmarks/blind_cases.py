@@ -242,7 +242,7 @@ def gain_of_the_best(d: Diagnosis, seed: int) -> list[float]:
     """What the mechanism that fits best by chance gains on samples left out: mean log score, standard error."""
     from tribo.diagnose.search.weighing import weigh
     from tribo.diagnose.statistics.gain import gain
-    from tribo.diagnose.statistics.linearisation import start_effects
+    from tribo.diagnose.statistics.start_effects import start_effects
 
     found = gain(d.baseline, weigh(start_effects(d.baseline))[0].fit, np.random.default_rng(seed))
     return [round(found.difference, 5), round(found.se, 5)] if found is not None else []

@@ -244,7 +244,7 @@ def diagnosis(
     def found() -> Diagnosis:
         examined = examine(ingested, seed=seed, predictor=predictor, progress=progress)
         examined = with_law_across(with_laws(examined, seed=seed, progress=progress), seed=seed)
-        return with_simulation(examined, seed=seed, jobs=jobs, progress=progress)
+        return with_simulation(examined, seed=seed, jobs=jobs, progress=progress).without_columns()
 
     return Shelf(kept).take("diagnosis", (ingested, seed, predictor, pattern_table.record()), found, DIAGNOSED_BY)
 

@@ -64,7 +64,8 @@ def test_the_first_that_chance_does_not_make_as_strong_is_the_best() -> None:
 
 def ranked_by(start_left: np.ndarray, target: np.ndarray, name: str) -> list[str]:
     acting = tuple(Acting(MECHANISMS[name], str(k)) for k in range(start_left.shape[1]))
-    start: Any = SimpleNamespace(acting=acting, left=start_left, target=target)
+    pull, length = start_left.T @ target, np.sqrt(np.sum(start_left**2, axis=0))
+    start: Any = SimpleNamespace(acting=acting, pull=pull, length=length)
     return [a.choice for a in weighing._most_promising(start, list(range(len(acting))))]
 
 

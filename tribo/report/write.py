@@ -68,11 +68,11 @@ def write_until(
     if until == "report":
         from tribo.report.content import content
         from tribo.report.crate import write_crate
-        from tribo.report.html.page import page_of
+        from tribo.report.html.page import pages_of
         from tribo.report.paper.pdf import pdf_of
 
         said = content(study, made_by, verdict, card)
-        written.append(write_text(out / "report.html", page_of(said, drawn)))
+        written += [write_text(out / name, page) for name, page in pages_of(said, drawn).items()]
         written.append(write_bytes(out / "report.pdf", pdf_of(said, drawn, made_by.origin)))
         written.append(write_crate(study, out, made_by, written))
     write_provenance(made_by, out, settle_outputs(out, before, made_by, written, complete=until == "report"))

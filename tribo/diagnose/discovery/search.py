@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from tribo.diagnose.discovery.grammar import Group, groups_of, shapes_of
 from tribo.diagnose.discovery.scoring import Courses, Projection, Scored, acts_of, courses_of, terms_of
 from tribo.diagnose.discovery.settling import FoundLaw, Searched, settled
-from tribo.diagnose.search.screen import columns_in, decided, scores, share_beyond
+from tribo.diagnose.search.screen import decided, share_beyond
 from tribo.diagnose.statistics.chance import as_measured, drawn_residuals, refit
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.scatter import Replicates
+from tribo.diagnose.statistics.scores import columns_in, scores
 from tribo.records import FloatArray
 
 Progress = Callable[[str, int, int], None]
@@ -149,7 +150,7 @@ def _chance(
         nets = grammar.net(Projection(model.linear, drawn.transpose(0, 2, 1)))
         for k, net in enumerate(nets):
             index = best_of(net, RESCORED)
-            chance.append(float((grammar.gains(one_of(made, k), index)[0] - grammar.cost(index)).max()))
+            chance.append(float((grammar.gains(made.one(k), index)[0] - grammar.cost(index)).max()))
         if progress is not None:
             progress("discover", len(chance), replicates)
         if decided(np.array(chance), strongest):
@@ -160,12 +161,6 @@ def _chance(
 def best_of(net: FloatArray, n: int) -> NDArray[np.int64]:
     n = min(n, len(net))
     return np.asarray(np.argpartition(-net, n - 1)[:n])
-
-
-def one_of(made: Replicates, k: int) -> Replicates:
-    """One of many replicates."""
-    each = {f.name: getattr(made, f.name)[k : k + 1] for f in fields(made) if f.name not in ("group", "log_priors")}
-    return replace(made, **each, log_priors=made.log_priors[:, k : k + 1])
 
 
 __all__ = ["Discovery", "FoundLaw", "Scored", "discover_laws"]
