@@ -77,7 +77,8 @@ def settle(figure: Figure) -> None:
     """Lay a figure out for good: drawing it again changes nothing."""
     engine = figure.get_layout_engine()
     if engine is not None:
-        engine.execute(figure)
+        if figure.axes:
+            engine.execute(figure)
         figure.set_layout_engine("none")
 
 
