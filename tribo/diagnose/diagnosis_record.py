@@ -57,6 +57,13 @@ class NotSimulated:
 
 @displayed(lambda d: d.verdict.verdict)
 @dataclass(frozen=True)
+class Alone:
+    """A verdict without the spring-block model: what friction varies with beside the law of each sample."""
+
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """A verdict with what it rests on, for figures and tables.
 
