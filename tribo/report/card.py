@@ -52,7 +52,8 @@ class Card:
 
     ``sentence`` says what happens to friction, how much, where and what it is called; ``meanings`` are the names used
     in it, each with one sentence. ``used`` and ``set_aside``
-    count tests; ``specimens`` counts each one once, also if it was pulled in two directions.
+    count tests; ``specimens`` counts each one once, also if it was pulled in two directions. ``doubts`` are the numbers
+    outside their physical bounds, one sentence each.
     """
 
     sentence: str
@@ -66,6 +67,7 @@ class Card:
     uncertainty: str
     to_know: tuple[str, ...]
     next_test: NextStep | None
+    doubts: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """The card as plain types."""
@@ -90,6 +92,7 @@ def card_of(study: Study, verdict: Mapping[str, Any] | None) -> Card:
         uncertainty=uncertainty_kind(study),
         to_know=tuple(card_sentences.to_know(study, verdict)),
         next_test=_next(verdict),
+        doubts=tuple(map(str, study.doubts)),
     )
 
 
@@ -137,7 +140,8 @@ def _counts(study: Study, used: int, aside: int, specimens: int) -> str:
         f"{counted(len(levels), 'load')} from {significant(levels[0])} to {significant(levels[-1])} N" if used else ""
     )
     left_out = f"{counted(aside, 'test')} set aside" if aside else "no test set aside"
-    return f"{counted(used, 'test')} used, {left_out}; {where}{f'; {loads}' if loads else ''}."
+    doubts = f", {counted(len(study.doubts), 'doubtful number')}" if study.doubts else ""
+    return f"{counted(used, 'test')} used, {left_out}{doubts}; {where}{f'; {loads}' if loads else ''}."
 
 
 def _next(verdict: Mapping[str, Any] | None) -> NextStep | None:
