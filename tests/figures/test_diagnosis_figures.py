@@ -15,6 +15,7 @@ from matplotlib.text import Text
 from tribo.diagnose import examine
 from tribo.diagnose.diagnosis import Diagnosis
 from tribo.diagnose.statistics.fit import fit, residual_on_flat
+from tribo.diagnose.statistics.model import PATTERN
 from tribo.figures import detectable, extended, misfit, residuals
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
 from tribo.figures.style import house_style
@@ -87,6 +88,20 @@ def test_the_grey_band_is_that_of_the_means_beside_it(nothing: Diagnosis) -> Non
     weight, every = np.array([1.0, 0.0]), np.arange(nothing.baseline.setup.observations.n)
     single = np.mean([residuals.variance_of_mean(nothing, weight, every[k : k + 1]) for k in every])
     assert residuals.variance_of_mean(nothing, weight, every) < single / 3
+
+
+def test_what_is_expected_of_a_right_model_does_not_grow_with_how_wrong_the_campaign_shows_it_to_be(
+    nothing: Diagnosis,
+) -> None:
+    f = nothing.baseline
+    patterned = f.setup.group == PATTERN
+    sample = np.flatnonzero(f.setup.observations.conditions.area_fraction < 1.0)
+    found = []
+    for factor in (1.0, 10.0):
+        linear = replace(f.linear, precision=np.where(patterned, factor**-2.0, f.linear.precision))
+        wrong = replace(f, noise=replace(f.noise, pattern=factor), linear=linear)
+        found.append(residuals.variance_of_mean(replace(nothing, baseline=wrong), np.array([1.0, 0.0]), sample))
+    assert found[1] == pytest.approx(found[0])
 
 
 def test_a_point_of_a_residual_is_measured_over_model_less_one(temperature: Diagnosis) -> None:

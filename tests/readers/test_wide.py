@@ -155,3 +155,8 @@ def test_a_record_left_out_by_its_position_leaves_the_others(tmp_path: Path, lef
     path = saved(tmp_path, "Time [s]\tF1 [N]\tF2 [N]\tF3 [N]", forces())
     found = records_in(path, columns={"time": "Time [s]", "force": "F* [N]", "ignore": f"#{left_out}"})
     assert found == [record for j, record in enumerate(RECORDS) if j + 2 != left_out]
+
+
+def test_a_column_given_by_its_position_serves_every_record(tmp_path: Path) -> None:
+    path = saved(tmp_path, "clock\tF1 [N]\tF2 [N]\tF3 [N]", forces())
+    assert records_in(path, columns={"time": "#1 [s]", "force": "F* [N]"}) == RECORDS

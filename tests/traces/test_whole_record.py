@@ -11,6 +11,9 @@ import pytest
 from tribo.errors import TraceError
 from tribo.records import Pull, Test, Trace
 from tribo.traces import read_pull, read_record
+from tribo.traces.oscillation import oscillation_of
+from tribo.traces.rules import RULES
+from tribo.traces.whole_record import Reading
 from tribo.zeroing import zero_choice
 
 from .synthetic import Shape
@@ -248,3 +251,18 @@ def test_sliding_before_a_stop_counts_where_it_is_settled_however_even_the_slidi
     pull = read_record(Trace("stop", np.arange(force.size) / RATE, force), test=a_test())
     assert len(pull.restarts) == 1
     assert pull.sliding_N == pytest.approx(first, abs=0.01)
+
+
+def test_the_free_period_is_that_of_the_loaded_mass_on_its_spring() -> None:
+    """A load of two kilograms on 80 N/m swings in 2 pi sqrt(2/80) s; at 2 mm/s the spring is loaded by 0.16 N/s."""
+    with_spring = Reading(RULES["seed"], a_test(speed_m_s=2e-3, stiffness_N_per_m=80.0)).drive(2 * 9.80665)
+    assert with_spring["free_period_s"] == pytest.approx(2 * math.pi * math.sqrt(2 / 80))
+    assert with_spring["drive_N_per_s"] == pytest.approx(0.16)
+    assert all(math.isnan(v) for v in Reading(RULES["seed"], a_test(speed_m_s=2e-3)).drive(20.0).values())
+
+
+@pytest.mark.parametrize("peaks", [2, 3, 4])
+def test_a_few_peaks_have_one_cycle_less(peaks: int) -> None:
+    time = np.arange(500 * peaks + 50) / 500
+    force = 1.0 + 0.2 * (time % 1.0)
+    assert oscillation_of(time, force + noise(time.size, 0, 1e-4)).cycles == peaks - 1

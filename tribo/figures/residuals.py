@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from tribo.diagnose.statistics.model import PATTERN
 from tribo.diagnose.statistics.percent import percent
 from tribo.figures import style
 from tribo.figures.covariates import LOGARITHMIC, Covariate, covariate
@@ -158,13 +159,15 @@ def summaries(
 def variance_of_mean(d: Diagnosis, weight: FloatArray, rows: np.ndarray) -> float:
     """Variance of the mean residual of ``rows`` by the fitted noise: repeats, reading, specimens, error of the sample.
 
-    The tests of a specimen, or of a sample, share its deviation, so that more of them do not reduce it.
+    The tests of a specimen, or of a sample, share its deviation, so that more of them do not reduce it. The error of
+    the model counts with the size that is stated for it, however far the campaign lies from the model.
     """
     f = d.baseline
+    stated = np.where(f.setup.group == PATTERN, max(f.noise.pattern, 1.0), 1.0)
     repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup)[rows], weight)
     repeats += f.setup.observations.reading[rows] ** 2 @ weight**2
     shared = np.einsum("nrq,r->q", f.setup.random[rows], weight) / len(rows)
-    return float(repeats.sum() / len(rows) ** 2 + shared**2 @ (1.0 / f.linear.precision))
+    return float(repeats.sum() / len(rows) ** 2 + shared**2 @ (1.0 / (stated**2 * f.linear.precision)))
 
 
 def _bins(x: FloatArray, here: np.ndarray, column: Covariate) -> list[np.ndarray]:
