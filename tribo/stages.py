@@ -24,6 +24,7 @@ from tribo.store.kept_results import Shelf
 if TYPE_CHECKING:
     from tribo.comparison.prediction_runs import Cell, ModelRuns
     from tribo.diagnose import Diagnosis
+    from tribo.diagnose.diagnosis_record import Alone
     from tribo.diagnose.statistics.predictor import Predictor
 
 Progress = Callable[[str, int, int], None]
@@ -53,6 +54,7 @@ class StudyOptions:
     runs: int = 4
     seed: int = 0
     jobs: int = 2
+    laws: Path | None = None  # folder with laws of earlier campaigns
     overrides: Path | None = None  # table of decisions made by hand about single pulls
     kept: Path | None = None  # folder of finished simulations and diagnosis, used again by the next start
     scheduler: str | None = None  # address of a dask scheduler that runs the simulations
@@ -66,8 +68,9 @@ class StudyOptions:
 
     def as_words(self) -> dict[str, str]:
         """The options as text, for the provenance."""
+        laws = {"laws": str(self.laws)} if self.laws is not None else {}
         zeros = {name: text for name, text in (("zero", self.zero), ("load_zero", self.load_zero)) if text}
-        return {"rule": self.rule, "weights": self.weights, "flat": self.flat, "runs": str(self.runs), **zeros}
+        return {"rule": self.rule, "weights": self.weights, "flat": self.flat, "runs": str(self.runs), **zeros, **laws}
 
 
 DEFAULTS = StudyOptions()
@@ -222,9 +225,17 @@ def with_fits(read: Study, weights: Weights = "relative") -> Study:
 
 
 def diagnosis(
-    ingested: Ingested, *, seed: int = 0, jobs: int = 2, kept: Path | None = None, progress: Progress = _silent
+    ingested: Ingested,
+    *,
+    seed: int = 0,
+    jobs: int = 2,
+    kept: Path | None = None,
+    laws: Path | None = None,
+    progress: Progress = _silent,
 ) -> Diagnosis:
     """Where the calibrated model fails and why, with the evidence; taken from ``kept`` if it is there.
+
+    Laws of earlier campaigns in the folder ``laws`` are tested. What no mechanism explains is searched for its law.
 
     The model's prediction for each pattern comes from the simulations of the campaign if ``kept`` holds them, else from
     tabulated ones. A mechanism that is named is then simulated as part of the spring-block model.
@@ -237,16 +248,32 @@ def diagnosis(
     from tribo.diagnose import examine, with_simulation
     from tribo.diagnose.discovery.across_verdict import with_law_across
     from tribo.diagnose.discovery.in_verdict import with_laws
+    from tribo.diagnose.discovery.known_laws import read_laws
     from tribo.diagnose.statistics import pattern_table
 
     predictor = own_predictor(ingested.campaign, kept)
+    known = read_laws(laws) if laws is not None else ()
 
     def found() -> Diagnosis:
         examined = examine(ingested, seed=seed, predictor=predictor, progress=progress)
-        examined = with_law_across(with_laws(examined, seed=seed, progress=progress), seed=seed)
-        return with_simulation(examined, seed=seed, jobs=jobs, progress=progress)
+        examined = with_law_across(with_laws(examined, known, seed=seed, progress=progress), seed=seed)
+        return with_simulation(examined, seed=seed, jobs=jobs, progress=progress).without_columns()
 
-    return Shelf(kept).take("diagnosis", (ingested, seed, predictor, pattern_table.record()), found, DIAGNOSED_BY)
+    made_from = (ingested, seed, predictor, pattern_table.record(), known)
+    return Shelf(kept).take("diagnosis", made_from, found, DIAGNOSED_BY)
+
+
+def diagnosis_without_model(study: Study, *, seed: int = 0, kept: Path | None = None) -> Alone:
+    """What friction varies with beyond the law of each sample over load; taken from ``kept`` if it is there.
+
+    ``study`` holds the laws of its samples (:func:`assess`), as that of :func:`study` does where the spring-block model
+    was not run.
+    """
+    from tribo.diagnose.diagnosis_record import Alone
+    from tribo.diagnose.without_model.alone import diagnose_alone
+
+    made_from = (study.ingested, study.laws, seed)
+    return Shelf(kept).take("alone", made_from, lambda: Alone(diagnose_alone(study, seed=seed)), DIAGNOSED_BY)
 
 
 def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:

@@ -16,7 +16,7 @@ from tribo.diagnose.discovery.in_verdict import with_laws
 from tribo.diagnose.discovery.law_file import law_text, read_law
 from tribo.diagnose.discovery.law_words import discovery_text, law_layers
 from tribo.diagnose.discovery.scoring import Projection
-from tribo.diagnose.discovery.search import RESCORED, Discovery, Grammar, best_of, discover_laws, one_of
+from tribo.diagnose.discovery.search import RESCORED, Discovery, Grammar, best_of, discover_laws
 from tribo.diagnose.discovery.written_law import Shape, WrittenLaw
 from tribo.diagnose.statistics.chance import drawn_residuals, refit
 from tribo.diagnose.statistics.model import Setup
@@ -105,7 +105,7 @@ def test_the_best_law_by_the_fitted_noise_is_among_those_scored_anew() -> None:
     for k, net in enumerate(nets):
         best = best_of(net, RESCORED)
         exact = np.concatenate(
-            [laws.gains(one_of(made_again, k), part)[0] - laws.cost(part) for part in np.array_split(every, 12)]
+            [laws.gains(made_again.one(k), part)[0] - laws.cost(part) for part in np.array_split(every, 12)]
         )
         assert exact[best].max() == pytest.approx(exact.max(), abs=0.05)
 

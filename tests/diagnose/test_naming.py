@@ -64,7 +64,8 @@ def test_the_first_that_chance_does_not_make_as_strong_is_the_best() -> None:
 
 def ranked_by(start_left: np.ndarray, target: np.ndarray, name: str) -> list[str]:
     acting = tuple(Acting(MECHANISMS[name], str(k)) for k in range(start_left.shape[1]))
-    start: Any = SimpleNamespace(acting=acting, left=start_left, target=target)
+    pull, length = start_left.T @ target, np.sqrt(np.sum(start_left**2, axis=0))
+    start: Any = SimpleNamespace(acting=acting, pull=pull, length=length)
     return [a.choice for a in weighing._most_promising(start, list(range(len(acting))))]
 
 
@@ -228,3 +229,9 @@ def test_of_several_causes_the_newest_is_left_out_where_its_own_column_is_still_
     found = naming.name_causes(start, left, rules)
     assert [[c.acting.name for c in alike] for alike in found.causes] == [["suction"]]
     assert offered == [set(), set(), {"run_in"}]
+
+
+def test_what_explains_as_much_only_before_choices_are_paid_for_is_no_rival(monkeypatch: pytest.MonkeyPatch) -> None:
+    best = candidate(100.0, raw=100.0)
+    many, few = candidate(96.5, raw=99.5), candidate(97.5, raw=99.5)
+    assert sorted_by(monkeypatch, best, {0.3: many, 0.2: few}) == ([], [few])

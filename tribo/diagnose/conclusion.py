@@ -31,8 +31,9 @@ from tribo.diagnose.statistics.direct_evidence import TraceFindings, stated_evid
 from tribo.diagnose.statistics.fit import residual_on_flat
 from tribo.diagnose.statistics.gain import gain, gain_of_zero
 from tribo.diagnose.statistics.interval import estimates
-from tribo.diagnose.statistics.linearisation import ModelFit, StartEffects
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.pattern_excess import PatternExcess, pattern_excess
+from tribo.diagnose.statistics.start_effects import StartEffects
 from tribo.diagnose.verdict import CERTAIN_CAUSES, Excluded, Gain, Layer, Outcome, Verdict
 
 NEEDED = 3.7  # strength that chance reaches in one campaign of a hundred, where none was simulated

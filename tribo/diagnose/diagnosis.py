@@ -14,10 +14,10 @@ from tribo.diagnose.search.screen import Progress, screen
 from tribo.diagnose.sentences import exclusions
 from tribo.diagnose.statistics.direct_evidence import trace_findings
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linearisation import start_effects
 from tribo.diagnose.statistics.model import setup
 from tribo.diagnose.statistics.observations import enough, observe
 from tribo.diagnose.statistics.predictor import Predictor, tabled_predictor
+from tribo.diagnose.statistics.start_effects import start_effects
 from tribo.diagnose.verdict import Misfit, Verdict
 from tribo.records import Ingested
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,6 +57,13 @@ class NotSimulated:
 
 @displayed(lambda d: d.verdict.verdict)
 @dataclass(frozen=True)
+class Alone:
+    """A verdict without the spring-block model: what friction varies with beside the law of each sample."""
+
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """A verdict with what it rests on, for figures and tables.
 
@@ -70,3 +77,8 @@ class Diagnosis:
     named: Named | None
     simulated: SimulatedExtension | None = None
     laws: Discovery | None = None
+
+    def without_columns(self) -> Diagnosis:
+        """The same without the columns of the looks, which nothing needs once the verdict stands."""
+        named = self.named and replace(self.named, left=self.named.left.without_columns())
+        return replace(self, screened=self.screened.without_columns(), named=named)

@@ -62,7 +62,8 @@ def _cause_layer(
     change = effect_of(beside.fit.setup, beside.fit.law, best.acting, beside.values)
     samples, regimes = _where(beside.fit, change)
     m = best.acting.mechanism
-    test, regime = np.unravel_index(int(np.abs(change).argmax()), change.shape)
+    # of two specimens that were swapped, one changes up as far as the other down: the first is taken
+    test, regime = np.unravel_index(int(np.abs(change).round(9).argmax()), change.shape)
     where = int(test), int(regime)
     value, low, high = _effect_percent(best, parameters[m.amplitude.name], where)
     gained: Gain | None = gain(without, beside.fit, rng)

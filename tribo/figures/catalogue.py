@@ -59,9 +59,11 @@ FIGURES: dict[str, StudyFigure] = {
         ),
         StudyFigure(
             "fig5",
-            "Simulated friction against time",
-            "Friction force divided by normal load in one run of the spring-block model for each sample. Filled "
-            "marker: static peak. Dotted line: mean over the sliding window.",
+            "Model, patterns and simulated friction",
+            "Top: the spring-block model. Blocks on a square lattice are joined by springs to their eight neighbours "
+            "and by shear springs to a slider that moves at a constant speed. Middle: the simulated part of each "
+            "sample at scale, cavities grey, with the direction of the pull. Bottom: friction force divided by load in "
+            "one run for each sample. Filled marker: static peak. Dotted line: mean over the sliding window.",
             simulated_runs.numbers,
             simulated_runs.draw,
         ),

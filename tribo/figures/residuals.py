@@ -166,7 +166,7 @@ def variance_of_mean(d: Diagnosis, weight: FloatArray, rows: np.ndarray) -> floa
     stated = np.where(f.setup.group == PATTERN, max(f.noise.pattern, 1.0), 1.0)
     repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup)[rows], weight)
     repeats += f.setup.observations.reading[rows] ** 2 @ weight**2
-    shared = np.einsum("nrq,r->q", f.setup.random[rows], weight) / len(rows)
+    shared = f.setup.random_effects.take(rows).summed(weight) / len(rows)
     return float(repeats.sum() / len(rows) ** 2 + shared**2 @ (1.0 / (stated**2 * f.linear.precision)))
 
 

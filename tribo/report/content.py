@@ -109,7 +109,7 @@ def _summary(study: Study) -> dict[str, Any]:
     agreements = findings.agreements(study)
     return {
         "measured": wording.what_was_measured(study),
-        "flat": wording.flat_law(study),
+        "flat": wording.flat_law(study) if study.comparison is not None else [],
         "model": wording.in_short(agreements, study_lookup.flat_sample(study)),
         "order": [wording.ranking_sentence(r) for r in findings.rankings(study)],
         "directions": wording.direction_sentences(findings.direction_ratios(study)),

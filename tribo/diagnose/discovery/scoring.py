@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array, diags_array
 
 from tribo.diagnose.discovery.grammar import Group
 from tribo.diagnose.discovery.written_law import ADHESION_TERM, LOAD_TERM, Shape, WrittenLaw
-from tribo.diagnose.search.screen import TAKEN_UP
 from tribo.diagnose.statistics.linearisation import Linear, ModelFit, whitened
 from tribo.diagnose.statistics.model import log_forces
-from tribo.diagnose.statistics.scatter import ROUNDING
+from tribo.diagnose.statistics.scores import TAKEN_UP, cleared
 from tribo.mechanisms.record import Conditions
 from tribo.records import REGIMES, FloatArray
 
@@ -92,16 +92,25 @@ class Projection:
 
     def __init__(self, linear: Linear, residual: FloatArray) -> None:
         self.factor = linear.factor * np.sqrt(linear.weight)[:, None, None]
-        model = np.concatenate([linear.jacobian, linear.random], axis=2)
-        white = whitened(self.factor, model)
-        prior = np.concatenate([np.full(linear.jacobian.shape[2], 1e-12), linear.precision])
-        normal = white.T @ white + np.diag(prior)
-        scale = 1.0 / np.sqrt(np.diag(normal))
-        root = np.linalg.cholesky(normal * scale[:, None] * scale[None, :] + ROUNDING * np.eye(len(normal)))
         self.n = len(linear.residual)
-        self.basis = np.linalg.solve(root, (white * scale).T)  # (p + q, 2n): its products with a column are absorbed
+        self.own, self.border = self._bases(linear)
         right = whitened(self.factor, residual.transpose(1, 2, 0))
-        self.left = (right - self.basis.T @ (self.basis @ right)).T  # (r, 2n)
+        absorbed = self.own.T @ (self.own @ right) + self.border.T @ (self.border @ right)
+        self.left = (right - absorbed).T  # (r, 2n)
+
+    def _bases(self, linear: Linear) -> tuple[csr_array, FloatArray]:
+        """Rows whose products with a whitened column are what the model absorbs: of the specimens (4 S, 2n), each on
+        its own tests, and of the columns that tests share (m, 2n)."""
+        found = cleared(linear.normal, linear.right)
+        specimen = np.tile(linear.random_effects.specimen, 2)
+        white = whitened(self.factor, linear.columns.own)
+        own = np.einsum("nab,nb->na", found.own[0, specimen], white)
+        taken = np.einsum("na,nam->nm", own, found.across[0, specimen])
+        border = found.border[0] @ (whitened(self.factor, linear.columns.border) - taken).T
+        rows = 4 * specimen[:, None] + np.arange(4)
+        tests = np.repeat(np.arange(2 * self.n), 4)
+        shape = (4 * linear.random_effects.specimens, 2 * self.n)
+        return csr_array((own.ravel(), (rows.ravel(), tests)), shape), border
 
     def gains(self, courses: Courses, acts: FloatArray) -> FloatArray:
         """Log likelihood gained by each course times ``acts`` (n, 2) at its best amplitude, (r, k)."""
@@ -116,10 +125,20 @@ class Projection:
         static = self.factor[:, 0, 0] * acts[:, 0]
         sliding = self.factor[:, 1, 0] * acts[:, 0] + self.factor[:, 1, 1] * acts[:, 1]
         whole = (static**2 + sliding**2) @ course**2
-        absorbed = self._onto(self.basis, static, sliding) @ course
+        both = np.concatenate([static, sliding])
+        own_rows = self.own @ diags_array(both)
+        own_part = (own_rows[:, : self.n] + own_rows[:, self.n :]) @ course
+        absorbed = np.concatenate([own_part, self._onto(self.border, static, sliding) @ course])
         own = whole - np.sum(absorbed**2, axis=0)
         pull = self._onto(self.left, static, sliding) @ course
         return np.where(own > TAKEN_UP * whole + 1e-12, own, np.inf), pull, absorbed
+
+    def joint_gain(self, columns: FloatArray) -> float:
+        """Log likelihood gained by columns (n, 2, k) together at their best amplitudes."""
+        white = whitened(self.factor, columns)
+        absorbed, pull = np.concatenate([self.own @ white, self.border @ white]), (self.left @ white)[0]
+        own = white.T @ white - absorbed.T @ absorbed
+        return float(0.5 * pull @ np.linalg.lstsq(own, pull, rcond=1e-9)[0])
 
     def _onto(self, rows: FloatArray, static: FloatArray, sliding: FloatArray) -> FloatArray:
         return np.asarray(rows[:, : self.n] * static + rows[:, self.n :] * sliding)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from tribo.diagnose.discovery.grammar import Group, groups_of, shapes_of
 from tribo.diagnose.discovery.scoring import Courses, Projection, Scored, acts_of, courses_of, terms_of
 from tribo.diagnose.discovery.settling import FoundLaw, Searched, settled
-from tribo.diagnose.search.screen import columns_in, decided, scores, share_beyond
+from tribo.diagnose.search.screen import decided, share_beyond
 from tribo.diagnose.statistics.chance import as_measured, drawn_residuals, refit
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.scatter import Replicates
+from tribo.diagnose.statistics.scores import columns_in, scores
 from tribo.records import FloatArray
 
 Progress = Callable[[str, int, int], None]
@@ -40,6 +41,7 @@ def discover_laws(
     replicates: int = 60,
     rng: np.random.Generator | None = None,
     progress: Progress | None = None,
+    without: Collection[str] = (),
 ) -> Discovery:
     """Add the best law of the grammar while it is beyond what chance gives the best of all laws.
 
@@ -55,13 +57,15 @@ def discover_laws(
         Simulated campaigns at most, each searched in the same way.
     rng : numpy Generator, optional
         Of the simulated campaigns and the resamples behind the error of the gain.
+    without : collection of str
+        Columns that have a law already.
     """
     rng = rng or np.random.default_rng(0)
     found: list[FoundLaw] = []
     table: tuple[Scored, ...] = ()
     searched = 0
     while len(found) < MOST_LAWS:
-        used = {name for law in found for name in law.law.columns}
+        used = {*without, *(name for law in found for name in law.law.columns)}
         grammar = Grammar.of(model, used)
         if not grammar.courses.shapes:
             break
@@ -70,7 +74,7 @@ def discover_laws(
         p = share_beyond(_chance(model, grammar, scored[0].net, (replicates, rng), progress), scored[0].net)
         if p >= level:
             break
-        law = settled(model, Searched(grammar.courses, grammar.groups, scored[0].law, p), rng)
+        law = settled(model, Searched(grammar.courses, grammar.groups, p), scored[0].law, rng)
         found.append(law)
         model = law.model
     return Discovery(tuple(found), table, searched)
@@ -149,7 +153,7 @@ def _chance(
         nets = grammar.net(Projection(model.linear, drawn.transpose(0, 2, 1)))
         for k, net in enumerate(nets):
             index = best_of(net, RESCORED)
-            chance.append(float((grammar.gains(one_of(made, k), index)[0] - grammar.cost(index)).max()))
+            chance.append(float((grammar.gains(made.one(k), index)[0] - grammar.cost(index)).max()))
         if progress is not None:
             progress("discover", len(chance), replicates)
         if decided(np.array(chance), strongest):
@@ -160,12 +164,6 @@ def _chance(
 def best_of(net: FloatArray, n: int) -> NDArray[np.int64]:
     n = min(n, len(net))
     return np.asarray(np.argpartition(-net, n - 1)[:n])
-
-
-def one_of(made: Replicates, k: int) -> Replicates:
-    """One of many replicates."""
-    each = {f.name: getattr(made, f.name)[k : k + 1] for f in fields(made) if f.name not in ("group", "log_priors")}
-    return replace(made, **each, log_priors=made.log_priors[:, k : k + 1])
 
 
 __all__ = ["Discovery", "FoundLaw", "Scored", "discover_laws"]

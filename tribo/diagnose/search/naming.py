@@ -16,8 +16,9 @@ from tribo.diagnose.search.rivals import CLOSE, sort_rivals
 from tribo.diagnose.search.screen import Progress, Screen, screen_left
 from tribo.diagnose.search.weighing import Candidate, judged, refitted, weigh, weigh_beside
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linearisation import ModelFit, StartEffects
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Setup, with_free_columns
+from tribo.diagnose.statistics.start_effects import StartEffects
 from tribo.display import displayed
 
 MAX_LAYERS = 8

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linearisation import ModelFit, StartEffects, start_effects
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting
+from tribo.diagnose.statistics.start_effects import StartEffects, start_effects
 from tribo.display import displayed
 from tribo.records import FloatArray
 
@@ -71,11 +72,10 @@ def _most_promising(start: StartEffects, group: list[int]) -> list[Acting]:
     acting = [start.acting[k] for k in group]
     if len(group) <= CHOICES_FITTED:
         return acting
-    left = start.left[:, group]
-    pull = left.T @ start.target
+    pull, left = start.pull[group], start.length[group] ** 2
     # log likelihood of the whole effect, for what is present as a whole or absent
-    whole = pull - 0.5 * np.sum(left**2, axis=0)
-    small = 0.5 * pull * np.abs(pull) / (np.sum(left**2, axis=0) + 1e-12)
+    whole = pull - 0.5 * left
+    small = 0.5 * pull * np.abs(pull) / (left + 1e-12)
     whole_or_absent = acting[0].mechanism.choosing.all_or_nothing_sd is not None
     rank = whole if whole_or_absent else np.abs(small)
     return [acting[i] for i in np.argsort(-rank)[:CHOICES_FITTED]]
