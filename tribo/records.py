@@ -22,6 +22,7 @@ Regime = Literal["static", "sliding"]
 REGIMES: tuple[Regime, ...] = ("static", "sliding")
 NO_AREA_M2 = 1.0  # stands for a nominal area that is not known: tau0 A in newton is then tau0 itself
 STANDARD_GRAVITY = 9.80665  # m/s2, CGPM 1901
+CLOSED_TRACK_M = 10.0  # a longer slide runs over its own track again and again; no sled has so long a track
 
 
 @displayed(lambda p: f"{p.name}, {'flat' if p.is_flat else p.cavity}")

@@ -24,6 +24,7 @@ from tribo.store.kept_results import Shelf
 if TYPE_CHECKING:
     from tribo.comparison.prediction_runs import Cell, ModelRuns
     from tribo.diagnose import Diagnosis
+    from tribo.diagnose.diagnosis_record import Alone
     from tribo.diagnose.statistics.predictor import Predictor
 
 Progress = Callable[[str, int, int], None]
@@ -260,6 +261,19 @@ def diagnosis(
 
     made_from = (ingested, seed, predictor, pattern_table.record(), known)
     return Shelf(kept).take("diagnosis", made_from, found, DIAGNOSED_BY)
+
+
+def diagnosis_without_model(study: Study, *, seed: int = 0, kept: Path | None = None) -> Alone:
+    """What friction varies with beyond the law of each sample over load; taken from ``kept`` if it is there.
+
+    ``study`` holds the laws of its samples (:func:`assess`), as that of :func:`study` does where the spring-block model
+    was not run.
+    """
+    from tribo.diagnose.diagnosis_record import Alone
+    from tribo.diagnose.without_model.alone import diagnose_alone
+
+    made_from = (study.ingested, study.laws, seed)
+    return Shelf(kept).take("alone", made_from, lambda: Alone(diagnose_alone(study, seed=seed)), DIAGNOSED_BY)
 
 
 def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:

@@ -17,6 +17,7 @@ from tribo.cli.study_options import (
     DRY_RUN,
     FLAT,
     LAWS,
+    NO_MODEL,
     OUT,
     OVERRIDES,
     RULE,
@@ -27,6 +28,7 @@ from tribo.cli.study_options import (
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
+    from tribo.diagnose.diagnosis_record import Alone
     from tribo.diagnose.verdict import Verdict
     from tribo.records import Study
     from tribo.report.card import Card
@@ -122,6 +124,7 @@ def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **opti
 @RULE
 @FLAT
 @LAWS
+@NO_MODEL
 @reading_options
 @ZEROS[0]
 @ZEROS[1]
@@ -156,7 +159,9 @@ def diagnose(
 
     with out.taken(campaign), open_campaign(campaign) as opened, console.progress() as progress:
         chosen = stages.StudyOptions(kept=out.kept, **options)
-        study = stages.study(with_reading_options(opened, columns, stated), chosen, until="ingest", progress=progress)
+        stated_so = with_reading_options(opened, columns, stated)
+        until: Until = "compare" if stages.without_model(stated_so, chosen) else "ingest"
+        study = stages.study(stated_so, chosen, until=until, progress=progress)
         found = _diagnosis(study, chosen, progress)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
         verdict = found.verdict
@@ -235,21 +240,20 @@ def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool
             return status_of(described.set_aside)
     with out.taken(path), open_campaign(path) as described, console.progress() as progress:
         study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
-        compared = until == "report" and study.comparison is not None
-        study, found = _diagnosed(study, chosen, progress) if compared else (study, None)
+        study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
         card = _card(study, found) if until == "report" else None
         write_until(study, out.path, until, drawing, provenance_of_run(study, path, chosen), found, card)
     return _conclude(console, study, out.path, found.verdict if found else None, card)
 
 
-def _card(study: Study, found: Diagnosis | None) -> Card:
+def _card(study: Study, found: Diagnosis | Alone | None) -> Card:
     from tribo.report.card import card_of
 
     return card_of(study, found.verdict.as_dict() if found is not None else None)
 
 
-def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[Study, Diagnosis | None]:
+def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[Study, Diagnosis | Alone | None]:
     """The diagnosis of a study; a note instead where there is too little to diagnose."""
     from dataclasses import replace
 
@@ -266,9 +270,12 @@ def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[
         return replace(study, notes=(*study.notes, f"no diagnosis: {problem}")), None
 
 
-def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis:
-    from tribo.stages import diagnosis
+def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis | Alone:
+    """With the spring-block model, or, where a study was made without it, without."""
+    from tribo.stages import diagnosis, diagnosis_without_model, without_model
 
+    if without_model(study.ingested.campaign, chosen):
+        return diagnosis_without_model(study, seed=chosen.seed, kept=chosen.kept)
     return diagnosis(
         study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, laws=chosen.laws, progress=progress
     )

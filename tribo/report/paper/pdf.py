@@ -9,7 +9,7 @@ from importlib.resources import files
 from typing import Any
 
 from tribo.records import Study
-from tribo.report.content import content, figure_places
+from tribo.report.content import content, figure_numbers, figure_places
 from tribo.report.drawings import Drawn, draw_all
 from tribo.report.html.pull_cards import PullCard
 from tribo.report.paper.typeset import document
@@ -94,9 +94,12 @@ def _record(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str, 
         **_diagnosis_tables(verdict),
     }
     spaced: dict[str, Any] = _spaced(record)
+    numbers = figure_numbers(list(figures))
     return spaced | {
         "places": figure_places(list(figures)),
-        "figures": {f.name: {"title": f.title, "caption": f.caption} for f in figures.values()},
+        "figures": {
+            f.name: {"title": f.title, "caption": f.caption, "number": str(numbers[f.name])} for f in figures.values()
+        },
     }
 
 
