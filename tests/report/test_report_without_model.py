@@ -47,7 +47,7 @@ def test_a_campaign_of_flat_samples_is_reported_without_the_model(tmp_path: Path
     assert laws.loc[("sliding", "proportional"), "chosen"]
     assert "is described best by" in page
     assert "No sample has a pattern" in page.replace("\u00a0", " ")
-    assert {p.stem for p in (tmp_path / "out" / "figures").glob("*.svg")} >= {"dependence", "records", "fig7"}
+    assert {p.stem for p in (tmp_path / "out" / "figures").glob("*.svg")} >= {"dependence", "records", "forces"}
     assert not (tmp_path / "out" / "comparison.csv").exists()
 
 

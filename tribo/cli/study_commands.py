@@ -16,6 +16,7 @@ from tribo.cli.study_options import (
     CAMPAIGN,
     DRY_RUN,
     FLAT,
+    LAWS,
     NO_MODEL,
     OUT,
     OVERRIDES,
@@ -123,6 +124,7 @@ def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **opti
 @RULE
 @FLAT
 @NO_MODEL
+@LAWS
 @reading_options
 @ZEROS[0]
 @ZEROS[1]
@@ -195,6 +197,7 @@ def _diagnose_published(console: Console, out: Output, seed: int) -> int:
 @DRY_RUN
 @fit_options
 @model_options
+@LAWS
 @command_options
 def report(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
     """Run every stage and write the report.
@@ -273,7 +276,9 @@ def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagno
 
     if without_model(study.ingested.campaign, chosen):
         return diagnosis_without_model(study, seed=chosen.seed, kept=chosen.kept)
-    return diagnosis(study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, progress=progress)
+    return diagnosis(
+        study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, laws=chosen.laws, progress=progress
+    )
 
 
 def _conclude(

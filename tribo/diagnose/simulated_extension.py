@@ -237,7 +237,7 @@ def with_simulation(
     The text and the ``model`` record of its verdict say where the predictions come from and what the simulation gave,
     or why there is none.
     """
-    model: dict[str, object] = {"shares_from": d.baseline.setup.predictor.source}
+    model: dict[str, object] = {**d.verdict.model, "shares_from": d.baseline.setup.predictor.source}
     words = [d.verdict.text, f"The predictions for the patterned samples are based on {model['shares_from']}."]
     found = None
     if d.named is not None and d.named.causes and d.verdict.verdict in CERTAIN_CAUSES:

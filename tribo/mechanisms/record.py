@@ -139,7 +139,7 @@ class Mechanism:
 
     def zero(self) -> Values:
         """Parameter values at which the mechanism is absent."""
-        return np.array([self.amplitude.zero, *(p.start for p in self.parameters[1:])])
+        return np.array([self.amplitude.zero, *(p.zero if p.amplitude else p.start for p in self.parameters[1:])])
 
     def start(self) -> Values:
         """Parameter values from which a fit starts: a clear effect."""

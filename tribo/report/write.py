@@ -11,6 +11,7 @@ from tribo.records import Study
 from tribo.report.campaign_nc import write_store
 from tribo.report.card import Card, card_of, write_card
 from tribo.report.diagnosis_csv import write_diagnosis_tables
+from tribo.report.discovery_files import law_texts
 from tribo.report.drawings import DRAWING, Drawing, Progress, write_figures
 from tribo.report.provenance import (
     Provenance,
@@ -54,6 +55,9 @@ def write_until(
     written = [*write_tables(study, out), write_store(study, out, made_by, modelled, keep_earlier)]
     if verdict is not None:
         written.append(write_verdict(verdict, out))
+    if modelled is not None and modelled.laws is not None:
+        laws = law_texts(modelled.laws, study.ingested.campaign.title)
+        written += [write_text(out / name, text) for name, text in laws.items()]
     if modelled is not None:
         written += write_diagnosis_tables(modelled, out)
     if until in ("compare", "report") or diagnosis is not None:
