@@ -59,9 +59,9 @@ def law_points(study: Study) -> pd.DataFrame:
         said = {"sample_number": number, "sample": sample, "regime": regime}
         load = part["normal_load_N"].to_numpy(float)
         frames.append(pd.DataFrame({**said, "mark": "measured", "normal_load_N": load, "T_N": part[f"{regime}_N"]}))
-        chosen = None if laws is None else laws[(laws["sample"] == sample) & (laws["regime"] == regime) & laws["chosen"]]
-        if chosen is not None and len(chosen) and len(load):
-            law = chosen.iloc[0]
+        own = None if laws is None else laws[(laws["sample"] == sample) & (laws["regime"] == regime) & laws["chosen"]]
+        if own is not None and len(own) and len(load):
+            law = own.iloc[0]
             grid = np.geomspace(load.min(), load.max(), _LAW_POINTS)
             force = force_N(str(law["law"]), float(law["a"]), float(law["b"]), grid)
             frames.append(pd.DataFrame({**said, "mark": str(law["formula"]), "normal_load_N": grid, "T_N": force}))

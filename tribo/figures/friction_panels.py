@@ -43,7 +43,8 @@ def draw_forces(numbers: pd.DataFrame) -> Figure:
         for number, points in style.by_sample(part):
             mark = style.sample_mark(number)
             measured = points[points["mark"] == "measured"]
-            ax.plot(measured["normal_load_N"], measured["T_N"], mark.marker, ms=3, color=mark.colour, mfc="none", mew=0.6)
+            load, force = measured["normal_load_N"], measured["T_N"]
+            ax.plot(load, force, mark.marker, ms=3, color=mark.colour, mfc="none", mew=0.6)
             for formula, line in points[points["mark"] != "measured"].groupby("mark"):
                 ax.plot(line["normal_load_N"], line["T_N"], color=mark.colour, lw=1.1)
                 end = line.iloc[-1]

@@ -37,8 +37,8 @@ def diagnose_alone(study: Study, *, seed: int = 0, level: float = 0.01) -> Verdi
     layers = [*law_layers(study), *_column_layers(found), *_record_layers(records), *_offset_layers(apart)]
     causes = [*_column_causes(found), *_record_causes(records), *_offset_causes(apart)]
     inseparable = _inseparable(study, found)
-    equivalent = tuple(dict.fromkeys((words.name_of_column(f.name), *map(words.name_of_column, f.alike))
-                                     for s in found for f in s.follows if f.alike))  # fmt: skip
+    tied = ((f.name, *f.alike) for s in found for f in s.follows if f.alike)
+    equivalent = tuple(dict.fromkeys(tuple(map(words.name_of_column, names)) for names in tied))
     outcome: Outcome = "named" if causes else "no_misfit"
     return Verdict(
         verdict=outcome,

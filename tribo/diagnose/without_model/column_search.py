@@ -111,7 +111,7 @@ def searched(t: Tested, regimes: int, level: float, rng: np.random.Generator) ->
         rivals = [c for c in t.columns if c.name not in {k.name for k in taken}]
         p = min(_chances(beside, [column, *rivals], rng).get(0, 1.0) * regimes, 1.0)
         if p < level:
-            found.append(_described(beside, column, p))
+            found.append(_described(beside, _first_alike(beside, column), p))
     names = tuple(dict.fromkeys(c.name for c in t.columns))
     scatter = 100.0 * float(np.expm1(np.sqrt(_fit(t, taken).variance)))
     return Searched(t.regime, tuple(found), names, t.untold, p_first, scatter, t.n)
@@ -236,6 +236,14 @@ def _described(f: _Fitted, column: Column, p: float) -> Follows:
     low, middle, high = (100.0 * float(np.expm1(value + k * half)) for k in (-1, 0, 1))
     alike = _alike(f, column, white @ size)
     return Follows(column.name, column.kind, f.tested.regime, p, middle, low, high, where, alike)
+
+
+def _first_alike(f: _Fitted, column: Column) -> Column:
+    """Of the columns that this design cannot tell apart, the first: the same one in both regimes."""
+    alike = {column.name, *_described(f, column, 1.0).alike}
+    first = next(c.name for c in f.tested.columns if c.name in alike)
+    same = [c for c in f.tested.columns if c.name == first and c.kind == column.kind]
+    return same[0] if same else column
 
 
 def _ends(column: Column, size: FloatArray) -> tuple[FloatArray, FloatArray, tuple[str, str]]:
