@@ -104,7 +104,7 @@ FRICTION_FIGURES: dict[str, StudyFigure] = {
             "forces",
             "Friction force against load",
             "Friction force of every test and the law chosen for each sample by loads left out of the fit. Both axes "
-            "are logarithmic where the loads span more than a decade: a power law is then a straight line.",
+            "are logarithmic where the forces span more than a decade: a power law is then a straight line.",
             friction_tables.law_points,
             friction_panels.draw_forces,
         ),

@@ -50,13 +50,15 @@ def draw_forces(numbers: pd.DataFrame) -> Figure:
                 end = line.iloc[-1]
                 ax.annotate(str(formula), (end["normal_load_N"], end["T_N"]), textcoords="offset points",
                             xytext=(-4, 6), ha="right", color=mark.colour, fontsize=7)  # fmt: skip
-        style.panel_title(ax, f"{regime} friction")
+        style.panel_title(ax, _sentence(f"{regime} friction"))
         ax.set_xlabel("Normal load N (N)")
         ax.set_ylabel("Friction force T (N)")
-        _spread(ax, part["normal_load_N"])
-        if ax.get_xscale() == "log" and float(part["T_N"].min()) > 0:
+        if _over_a_decade(part["T_N"]):
+            _spread(ax, part["normal_load_N"])
             ax.set_yscale("log")
             style.plain_log_axis(ax.yaxis, part["T_N"])
+        else:  # from zero, so that what does not depend on the load is seen
+            ax.set(xlim=(0.0, None), ylim=(0.0, None))
     style.legend_below(figure, _samples(numbers), columns=8)
     return figure
 
@@ -116,9 +118,13 @@ def draw_restarts(numbers: pd.DataFrame) -> Figure:
     return figure
 
 
+def _over_a_decade(values: pd.Series) -> bool:
+    return float(values.min()) > 0 and float(values.max()) > 10 * float(values.min())
+
+
 def _spread(ax: Axes, values: pd.Series) -> None:
     """A logarithmic axis for positive values over more than a decade."""
-    if float(values.min()) > 0 and float(values.max()) > 10 * float(values.min()):
+    if _over_a_decade(values):
         ax.set_xscale("log")
         style.plain_log_axis(ax.xaxis, values)
 
