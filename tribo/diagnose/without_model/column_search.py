@@ -253,8 +253,7 @@ def _ends(column: Column, size: FloatArray) -> tuple[FloatArray, FloatArray, tup
     levels = np.vstack([np.zeros(len(size)), np.eye(len(size))])
     heights = levels @ size
     first, last = int(np.argmin(heights)), int(np.argmax(heights))
-    names = column.levels or tuple(f"part {k + 1} of {len(levels)} of its range" for k in range(len(levels)))
-    return levels[first], levels[last], (names[first], names[last])
+    return levels[first], levels[last], (column.levels[first], column.levels[last])
 
 
 def _alike(f: _Fitted, column: Column, effect: FloatArray) -> tuple[str, ...]:
