@@ -55,7 +55,7 @@ class NotSimulated:
     reason: str
 
 
-@displayed(lambda d: d.verdict.verdict)
+@displayed()
 @dataclass(frozen=True)
 class Alone:
     """A verdict without the spring-block model: what friction varies with beside the law of each sample."""
@@ -63,6 +63,7 @@ class Alone:
     verdict: Verdict
 
 
+@displayed(lambda d: d.verdict.verdict)
 @dataclass(frozen=True)
 class Diagnosis:
     """A verdict with what it rests on, for figures and tables.

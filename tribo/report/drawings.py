@@ -42,6 +42,7 @@ THEME = {
     "#000000": "currentColor",
     "#0072b2": "var(--blue)",
     r"#([2-8][0-9a-f])\2\2": "var(--soft)",  # greys of lettering
+    r"#([c-e][0-9a-f])\2\2": "var(--line)",
 }
 
 
