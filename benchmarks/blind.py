@@ -1,6 +1,7 @@
 """The blind test in full: campaigns with hidden effects, and how often the diagnosis is right, wrong or undecided.
 
     python benchmarks/blind.py half   docs/data/blind-half.jsonl             the size of each effect found half the time
+    python benchmarks/blind.py half   FILE --pattern-error 1.5 --specimen-slope 0.04       the same with larger errors
     python benchmarks/blind.py run    out/blind.jsonl                        all campaigns; goes on where it was stopped
     python benchmarks/blind.py run    out/blind.jsonl --only promised        only the parts that promises are made of
     python benchmarks/blind.py tables out/blind.jsonl                        the tables, printed
@@ -16,8 +17,9 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,14 +41,14 @@ PARTS: dict[str, Callable[[str], bool]] = {
 }
 
 
-def half_of(name: str) -> dict[str, Any]:
+def half_of(name: str, errors: Mapping[str, float]) -> dict[str, Any]:
     """Size at which a misfit is seen half the time: a staircase, up after a miss and down after a hit."""
     size, step, seen_before = 0.4 * min(LARGEST.get(name, 1.0), 1.0), 1.6, None
     trials: list[tuple[float, bool]] = []
     turns = 0
     for k in range(TRIALS):
         number = HALF_SEED + 1000 * sorted(EFFECTS).index(name) + k
-        seen = is_seen(Case("half", number, ((name, size),), design_for(name)))
+        seen = is_seen(Case("half", number, ((name, size),), design_for(name, **errors)))
         trials.append((round(size, 5), seen))
         turns += seen_before is not None and seen != seen_before
         size = min(size / step if seen else size * step, LARGEST.get(name, np.inf))
@@ -84,9 +86,10 @@ def work_off(todo: Iterable[Any], work: Callable[[Any], dict[str, Any]], path: P
             print(f"{done}/{len(todo)}, {left / 60:.0f} min left: {name}: {what}", flush=True)
 
 
-def find_half(path: Path, jobs: int) -> None:
+def find_half(path: Path, errors: Mapping[str, float], jobs: int) -> None:
     known = {row["effect"] for row in read_rows(path)}
-    work_off([n for n in EFFECTS if n not in known and n not in UNSEEN + ALL_OR_NOTHING], half_of, path, jobs)
+    rest = [n for n in EFFECTS if n not in known and n not in UNSEEN + ALL_OR_NOTHING]
+    work_off(rest, partial(half_of, errors=errors), path, jobs)
 
 
 def planned(options: argparse.Namespace) -> list[Case]:
@@ -126,6 +129,8 @@ def main() -> None:
     parser.add_argument("what", choices=("half", "run", "tables", "page"))
     parser.add_argument("path", type=Path, help="JSON lines, one a campaign")
     parser.add_argument("--half", type=Path, default=DOCS / "data" / "blind-half.jsonl")
+    parser.add_argument("--pattern-error", type=float, default=1.0, help="of the campaigns of half")
+    parser.add_argument("--specimen-slope", type=float, default=0.0, help="the same")
     parser.add_argument("--only", choices=sorted(PARTS), default="all", help="which part of a run")
     parser.add_argument("--campaigns", type=int, default=20, help="per cell with something hidden")
     parser.add_argument("--points", type=int, default=10, help="per point of a curve and effect")
@@ -135,7 +140,8 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
     if options.what == "half":
-        find_half(options.path, options.jobs)
+        errors = {"pattern_error": options.pattern_error, "specimen_slope": options.specimen_slope}
+        find_half(options.path, errors, options.jobs)
         return
     if options.what == "run":
         run(planned(options), options.path, options.jobs)

@@ -10,6 +10,7 @@ import numpy as np
 
 from tribo import stages
 from tribo.campaign import load_campaign
+from tribo.display import exact_text
 
 Practice = Callable[[str], Path]
 
@@ -31,5 +32,5 @@ def test_every_spoiled_test_is_named_with_its_damage_and_healthy_ones_are_read_t
     assert len(spoiled.pulls) == 324 - 14
     for test_id, pull in spoiled.pulls.items():
         if test_id not in damaged:
-            assert repr(pull) == repr(clean.pulls[test_id])
+            assert exact_text(pull) == exact_text(clean.pulls[test_id])
             assert np.array_equal(spoiled.traces[test_id].force_N, clean.traces[test_id].force_N)

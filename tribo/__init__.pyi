@@ -1,3 +1,4 @@
+from . import plot as plot
 from .campaign import load_campaign as load_campaign, open_campaign as open_campaign, write_template as write_template
 from .diagnose import plan_design as plan_design
 from .errors import Problem as Problem, TriboError as TriboError

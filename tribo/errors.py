@@ -8,10 +8,13 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
+from tribo.display import displayed
+
 _LOG = logging.getLogger("tribo")
 _OF_THE_SYSTEM = "system"  # kind of a problem that another try may not have: disk full, no permission
 
 
+@displayed(str)
 @dataclass(frozen=True)
 class Problem:
     """One error, described so that a user can correct it.

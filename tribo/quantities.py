@@ -392,6 +392,24 @@ _ALIASES = {
         すべり速度
         속도
     """,
+    "rotation speed": """
+        rotation speed
+        rotational speed
+        rotary speed
+        spindle speed
+        rotational velocity
+        rotation rate
+        revolution speed
+        rpm
+        drehzahl
+        vitesse de rotation
+        velocidad de giro
+        velocita di rotazione
+        toerental
+        转速
+        回転数
+        회전수
+    """,
 }
 
 
@@ -412,6 +430,7 @@ QUANTITIES: dict[str, Quantity] = {
         _quantity("temperature", "theta", "degC", "temperature_C"),
         _quantity("humidity", "RH", "percent", "humidity_pct"),
         _quantity("speed", "v", "m/s", "speed_m_s"),
+        _quantity("rotation speed", "n", "revolution/s", "rotation_rev_per_s"),
     )
 }
 
@@ -489,6 +508,11 @@ _CASE_MATTERS = {
     "Ncm": "newton * centimeter",
     "Nmm": "newton * millimeter",
 }
+_TURNS = {
+    "rps": "revolution/s", "rev/s": "revolution/s", "r/s": "revolution/s", "1/s": "revolution/s", "hz": "revolution/s",
+    "rpm": "revolution/minute", "rev/min": "revolution/minute", "r/min": "revolution/minute",
+    "1/min": "revolution/minute", "min-1": "revolution/minute", "u/min": "revolution/minute",
+}  # fmt: skip
 _MASSES_AS_FORCES = {"g": "gram_force", "kg": "kilogram_force"}
 _NO_UNIT = {"", "-", "1"}
 _LONGEST_UNIT = 40
@@ -559,6 +583,8 @@ def _in_unit(value: float, text: str, quantity: str, target: str) -> float:
     """``value`` times the unit ``text``, in ``target``."""
     if target == "dimensionless" and text in _NO_UNIT:
         return value
+    if quantity == "rotation speed":
+        text = _TURNS.get(text.lower(), text)
     ureg = _registry()
     name = _spelled_out(text, quantity)
     if re.fullmatch(r"\w+", name):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from tribo.display import displayed
 from tribo.errors import Problem
 from tribo.zeroing import DEFAULT, ZeroChoice
 
@@ -23,6 +24,7 @@ NO_AREA_M2 = 1.0  # stands for a nominal area that is not known: tau0 A in newto
 STANDARD_GRAVITY = 9.80665  # m/s2, CGPM 1901
 
 
+@displayed(lambda p: f"{p.name}, {'flat' if p.is_flat else p.cavity}")
 @dataclass(frozen=True)
 class Pattern:
     """Geometry of one cavity pattern, lengths in metres; ``cavity`` is none, circle, square or rectangle.
@@ -64,6 +66,7 @@ class Pattern:
         return float(rim / (self.pitch_m[0] * self.pitch_m[1]))
 
 
+@displayed()
 @dataclass(frozen=True)
 class Correction:
     """What a user states about the numbers of an export; applied once, at the end of reading.
@@ -82,6 +85,7 @@ class Correction:
 UNCORRECTED = Correction()
 
 
+@displayed()
 @dataclass(frozen=True)
 class Evaluated:
     """Forces of one test that were evaluated elsewhere, with standard uncertainties; NaN where one is not given."""
@@ -92,6 +96,7 @@ class Evaluated:
     sliding_u_N: float = float("nan")
 
 
+@displayed(lambda t: f"{t.test_id}, {t.sample}, {t.normal_load_N:.4g} N")
 @dataclass(frozen=True)
 class Test:
     """One row of tests.csv: one pull, its load and its covariates.
@@ -126,6 +131,7 @@ class Test:
     stiffness_N_per_m: float | None = None  # of the spring, wire or beam through which the slider is pulled
 
 
+@displayed(lambda s: f"{s.test_id}: {s.reason}")
 @dataclass(frozen=True)
 class SetAside:
     """A test that is not used in the results, with the reason."""
@@ -135,6 +141,7 @@ class SetAside:
     problems: tuple[Problem, ...] = ()
 
 
+@displayed(lambda c: f"{c.title}, {len(c.tests)} tests of {len(c.samples)} samples")
 @dataclass(frozen=True)
 class Campaign:
     """A campaign as described by campaign.toml and tests.csv; the exports in raw/ are not read yet.
@@ -194,6 +201,7 @@ class Campaign:
         return normal_load_N / self.nominal_area_m2
 
 
+@displayed()
 @dataclass(frozen=True)
 class ExportFormat:
     """How an export was read, in enough detail to read it again by hand."""
@@ -207,6 +215,7 @@ class ExportFormat:
     reasons: Mapping[str, str] = field(default_factory=dict)  # quantity -> why that column
 
 
+@displayed(lambda t: f"{t.name}, {len(t.time_s)} points")
 @dataclass(frozen=True)
 class Trace:
     """Force against time of one export, in SI units, as recorded (never resampled).
@@ -229,6 +238,7 @@ class Trace:
     first_row: int = 1
 
 
+@displayed(lambda p: f"{p.name}, {p.start_s:.4g} to {p.end_s:.4g} s")
 @dataclass(frozen=True)
 class Phase:
     """A part of a record by what the rig did, from ``start_s`` to ``end_s`` on the clock of the trace."""
@@ -238,6 +248,7 @@ class Phase:
     end_s: float
 
 
+@displayed(lambda r: f"hold {r.hold_s:.4g} s, static {r.static_N:.4g} N")
 @dataclass(frozen=True)
 class Restart:
     """The static friction of one restart: the peak after the drive stood still for ``hold_s``."""
@@ -251,6 +262,7 @@ class Restart:
     sliding_u_N: float
 
 
+@displayed()
 @dataclass(frozen=True)
 class Oscillation:
     """How the force varies while sliding: its regime, and its cycles where it has any.
@@ -277,6 +289,7 @@ class Oscillation:
     stuck_share_u: float = float("nan")
 
 
+@displayed(lambda p: f"{p.test_id}, static {p.static_N:.4g} N, sliding {p.sliding_N:.4g} N")
 @dataclass(frozen=True)
 class Pull:
     """Static peak and mean sliding force of one trace, by a named rule. Times as recorded in the trace.
@@ -317,6 +330,7 @@ class Pull:
     phases: tuple[Phase, ...] = ()
 
 
+@displayed(lambda fit: f"{fit.sample}, {fit.regime}: {fit.in_numbers()}")
 @dataclass(frozen=True)
 class LawFit:
     """A friction law fitted to one sample in one regime, with the full covariance of its parameters.
@@ -352,6 +366,11 @@ class LawFit:
         k = self.parameters.index(parameter)
         return float(np.sqrt(self.covariance[k, k]))
 
+    def in_numbers(self) -> str:
+        """Every parameter with its standard uncertainty, in a line."""
+        found = ((name, self.value(name), self.standard_uncertainty(name)) for name in self.parameters)
+        return ", ".join(f"{name} = {value:.4g} ± {u:.2g}" for name, value, u in found)
+
     def interval(self, parameter: str, level: float = 0.95) -> tuple[float, float]:
         """Two-sided t interval at ``level``."""
         from scipy.stats import t
@@ -372,6 +391,35 @@ class LawFit:
         return np.asarray(np.sqrt(c[0, 0] * n**2 + 2 * c[0, 1] * n * a + c[1, 1] * a**2))
 
 
+@displayed(lambda fit: f"{fit.sample}, {fit.regime}: {fit.in_numbers()}")
+@dataclass(frozen=True)
+class CombinedFit(LawFit):
+    """A fitted law with its combined uncertainty (GUM): ``covariance`` is ``type_a`` plus what all pulls share.
+
+    ``type_a`` is the covariance of the mean over specimens and ``dof`` its degrees of freedom; what all pulls share
+    (type B: gain, zero, load, area, angle) counts as known. ``largest`` holds, for mu, tau0_Pa and T, the component
+    with the largest share of the variance and that share in percent.
+    """
+
+    type_a: FloatArray = field(default_factory=lambda: np.zeros((2, 2)))
+    largest: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+
+    def effective_dof(self, by: FloatArray) -> float:
+        """Degrees of freedom of a combination ``by`` (2,) of both parameters, by Welch and Satterthwaite (GUM, G.4)."""
+        type_a = float(by @ self.type_a @ by)
+        return self.dof * (float(by @ self.covariance @ by) / type_a) ** 2 if type_a > 0 else float("inf")
+
+    def interval(self, parameter: str, level: float = 0.95) -> tuple[float, float]:
+        """Two-sided t interval at ``level`` of the combined uncertainty."""
+        from scipy.stats import t
+
+        k = self.parameters.index(parameter)
+        factor = float(t.ppf(0.5 + level / 2, self.effective_dof(np.eye(2)[k])))
+        half = factor * self.standard_uncertainty(parameter)
+        return self.value(parameter) - half, self.value(parameter) + half
+
+
+@displayed(lambda r: f"{r.sample} at {r.pressure_Pa / 1e3:.4g} kPa, seed {r.seed}")
 @dataclass(frozen=True)
 class Run:
     """One run of the spring-block model: force of the slider along the pull, with static and sliding friction.
@@ -396,6 +444,7 @@ class Run:
     parameters: Mapping[str, Any] = field(default_factory=dict)
 
 
+@displayed(lambda r: f"{r.sample}, {r.regime}, {r.normal_load_N:.4g} N")
 @dataclass(frozen=True)
 class ComparisonRow:
     """Measured and simulated friction force of one sample at one load, with standard uncertainties."""
@@ -409,6 +458,7 @@ class ComparisonRow:
     simulated_u_N: float
 
 
+@displayed(lambda c: c.campaign_title)
 @dataclass(frozen=True)
 class Comparison:
     """Comparison of experiment and model: fits of both, and the forces at each measured load."""
@@ -423,6 +473,7 @@ class Comparison:
     flat: str = "F"
 
 
+@displayed(lambda o: f"{o.test_id}: {o.action}")
 @dataclass(frozen=True)
 class Override:
     """A decision made by hand about one test: exclude it, or move its static peak or sliding window.
@@ -438,6 +489,7 @@ class Override:
     row: int | None = None
 
 
+@displayed(lambda b: f"{b.override.test_id}: {b.override.action}")
 @dataclass(frozen=True)
 class ByHand:
     """A test with a decision made by hand, its trace and its automatic result."""
@@ -447,6 +499,7 @@ class ByHand:
     automatic: Pull
 
 
+@displayed(lambda i: f"{i.campaign.title}, {len(i.pulls)} pulls, {len(i.set_aside)} tests set aside")
 @dataclass(frozen=True)
 class Ingested:
     """A campaign with its exports read: one trace and one pull per usable test, the rest set aside.
@@ -506,18 +559,20 @@ class Ingested:
         return pd.DataFrame(rows)
 
 
+@displayed(lambda s: f"{s.ingested.campaign.title}, {len(s.ingested.pulls)} pulls, {len(s.fits)} fits")
 @dataclass(frozen=True)
 class Study:
     """One campaign with the results of all stages.
 
-    ``fits`` holds the measured law of every sample and regime (T = mu N + tau0 A, the default weights),
-    ``other_fits`` the same under other weights or laws. ``simulated`` is the ensemble, one row per run: sample,
-    pressure_Pa, normal_load_N (p times the nominal area of the campaign), angle_deg, seed, static_N,
-    sliding_N. ``example_runs`` holds one full force trace of the model per sample. ``budget`` is the uncertainty
-    budget of every fitted number, one row per component. ``power`` states the differences this campaign could detect,
-    ``outlying`` the outlying pulls and specimens. ``differences`` holds the differences between samples measured on the
-    same specimens, one row per pair of samples, regime and number. ``laws`` compares the candidate laws of every sample
-    by held-out loads, ``dependence`` states how T/N changes with each recorded variable.
+    ``fits`` holds the measured law of every sample and regime (T = mu N + tau0 A, the default weights), ``combined``
+    the same with the combined uncertainty, which is what the report states, ``other_fits`` the same under other weights
+    or laws. ``simulated`` is the ensemble, one row per run: sample, pressure_Pa, normal_load_N (p times the nominal
+    area of the campaign), angle_deg, seed, static_N, sliding_N. ``example_runs`` holds one full force trace of the
+    model per sample. ``budget`` is the uncertainty budget of every fitted number, one row per component. ``power``
+    states the differences this campaign could detect, ``outlying`` the outlying pulls and specimens. ``differences``
+    holds the differences between samples measured on the same specimens, one row per pair of samples, regime and
+    number. ``laws`` compares the candidate laws of every sample by held-out loads, ``dependence`` states how T/N
+    changes with each recorded variable.
     """
 
     ingested: Ingested
@@ -533,3 +588,4 @@ class Study:
     laws: pd.DataFrame | None = None
     dependence: pd.DataFrame | None = None
     notes: tuple[str, ...] = ()
+    combined: tuple[CombinedFit, ...] = ()

@@ -7,6 +7,8 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
+from tribo.display import displayed
+
 ZeroKind = Literal["default", "before contact", "at rest", "none", "value", "interval"]
 ALLOWED = '"before contact", "at rest", "none", a number in newton, or [from, to] in seconds'
 _WORDS: dict[str, ZeroKind] = {"before contact": "before contact", "at rest": "at rest", "none": "none"}
@@ -15,6 +17,7 @@ _VALUE = re.compile(rf"({_NUMBER})(?:\s*N)?")
 _INTERVAL = re.compile(rf"\[?\s*({_NUMBER})\s*(?:[,;]|to)\s*({_NUMBER})\s*\]?(?:\s*s)?")
 
 
+@displayed()
 @dataclass(frozen=True)
 class ZeroChoice:
     """Where the zero of a force or load comes from.

@@ -2,31 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 from pathlib import Path
 
 import pandas as pd
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
+from on_the_command_line import digest, run
 
-from tribo.cli import main
 from tribo.errors import FitError, Problem
 from tribo.records import Comparison, Study
-
-
-def run(*arguments: object) -> Result:
-    """One command, with its standard output and standard error apart."""
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
-
-
-def digest(folder: Path) -> dict[str, str]:
-    """Every file of a folder and what is in it."""
-    files = sorted(p for p in folder.rglob("*") if p.is_file())
-    return {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
 
 
 @pytest.fixture

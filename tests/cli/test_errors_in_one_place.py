@@ -8,9 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from on_the_command_line import run
 
-from tribo.cli import main
 from tribo.cli.console import Console
 from tribo.cli.workflow_step import run_step
 from tribo.errors import Problem, TriboError
@@ -21,12 +20,6 @@ def _level_of_the_log_returns() -> Iterator[None]:
     level = logging.getLogger("tribo").level
     yield
     logging.getLogger("tribo").setLevel(level)
-
-
-def run(*arguments: object) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
 
 
 FULL = OSError(errno.ENOSPC, "No space left on device")
@@ -97,7 +90,7 @@ def test_a_diagnosis_that_fails_leaves_the_report_with_a_note(
     small_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from tribo import stages
-    from tribo.cli.commands import _diagnosed
+    from tribo.cli.study_commands import _diagnosed
 
     def broken(*_: object, **__: object) -> None:
         raise IndexError("index 3 is out of bounds")

@@ -2,33 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from on_the_command_line import digest, run
 
 import tribo
-from tribo.cli import main
 from tribo.errors import CampaignError
 
 COMMANDS = ("ingest", "fit", "predict", "compare", "diagnose", "report")
 QUICK = ("--blocks", 45, "--dt", 1e-7, "--set", "rest_tolerance=0.01", "--set", "duration_peaks=1.5")
-
-
-def run(*arguments: object) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
-
-
-def digest(folder: Path) -> dict[str, str]:
-    """Every file of a folder, hidden ones included, and what is in it."""
-    files = sorted(p for p in folder.rglob("*") if p.is_file())
-    return {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
 
 
 @pytest.fixture

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 
+import on_the_command_line
 import pytest
 import xarray as xr
-from click.testing import CliRunner, Result
 
-from tribo.cli import main
 from tribo.published import load_table2
 from tribo.simulate import SimConfig, simulate as library_run
 
 QUICK = ("--blocks", 45, "--dt", 1e-7, "--set", "rest_tolerance=0.01", "--set", "duration_peaks=1.5")
 
 
-def run(*arguments: object) -> Result:
-    result = CliRunner().invoke(main, ["simulate", *map(str, arguments)])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
+run = partial(on_the_command_line.run, "simulate")
 
 
 def test_several_samples_are_an_ensemble_that_goes_on(tmp_path: Path):

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose.search.screen import columns_in, scores, screen
+from tribo.diagnose.search.screen import screen
 from tribo.diagnose.statistics.chance import as_measured, drawn_residuals, refit, refit_sizes, standardised
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.model import setup
 from tribo.diagnose.statistics.observations import observe
 from tribo.diagnose.statistics.predictor import tabled_predictor
+from tribo.diagnose.statistics.scores import columns_in, scores
 
 from .known import looks_at
 from .synthetic import SMALL, hidden
@@ -84,8 +85,6 @@ def test_the_campaign_itself_as_a_replicate_has_the_weights_and_the_residual_of_
     inverse = np.linalg.inv(f.noise.per_test(f.setup) + f.setup.observations.reading[:, :, None] ** 2 * np.eye(2))
     entries = np.array([inverse[:, 0, 0], inverse[:, 0, 1], inverse[:, 1, 1]])
     assert r.precision[0] == pytest.approx(entries * f.weight)
-    along = np.concatenate([f.linear.jacobian, f.linear.random], axis=2).reshape(-1, r.normal.shape[1])
-    assert r.weighted[0].shape == along.T.shape
 
 
 def test_the_campaign_refitted_as_a_replicate_keeps_its_law_and_its_noise() -> None:

@@ -10,8 +10,8 @@ import pytest
 from tribo.diagnose import examine
 from tribo.diagnose.search.naming import best_beyond_chance
 from tribo.diagnose.search.weighing import weigh
-from tribo.diagnose.statistics.linearisation import start_effects
 from tribo.diagnose.statistics.model import Setup
+from tribo.diagnose.statistics.start_effects import start_effects
 
 from .known import acting, baseline, made
 

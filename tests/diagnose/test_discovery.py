@@ -8,16 +8,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tribo.diagnose.diagnosis import examine
+from tribo.diagnose.diagnosis_record import Diagnosis
 from tribo.diagnose.discovery.grammar import groups_of, shapes_of
 from tribo.diagnose.discovery.held import holds
+from tribo.diagnose.discovery.in_verdict import with_laws
 from tribo.diagnose.discovery.law_file import law_text, read_law
 from tribo.diagnose.discovery.law_words import discovery_text, law_layers
-from tribo.diagnose.discovery.search import Discovery, discover_laws
+from tribo.diagnose.discovery.scoring import Projection
+from tribo.diagnose.discovery.search import RESCORED, Discovery, Grammar, best_of, discover_laws
 from tribo.diagnose.discovery.written_law import Shape, WrittenLaw
+from tribo.diagnose.statistics.chance import drawn_residuals, refit
 from tribo.diagnose.statistics.model import Setup
 from tribo.diagnose.verdict import Estimate
+from tribo.display import exact_text
 from tribo.errors import CampaignError
 from tribo.mechanisms.record import Base, Conditions
+from tribo.report.verdict_file import verdict_in_words
 
 from .known import baseline, made
 
@@ -57,6 +64,52 @@ def test_the_law_is_said_in_a_sentence_and_as_a_layer(found: Discovery) -> None:
     assert layer.low < layer.effect_percent < layer.high
 
 
+@pytest.fixture(scope="module")
+def diagnosed() -> Diagnosis:
+    return with_laws(examine(made(lambda s: 2.0 * warm_is_best(s), seed=5), replicates=(40, 40)))
+
+
+def test_a_diagnosis_adds_the_law_of_what_no_mechanism_explains(diagnosed: Diagnosis) -> None:
+    layers = {layer.kind: layer for layer in diagnosed.verdict.layers}
+    assert diagnosed.verdict.verdict == "unknown"
+    assert layers["law"].name == "temperature_C"
+    assert "remainder" not in layers
+    assert layers["law"].text in diagnosed.verdict.text
+    assert "the remaining differences are within chance" in diagnosed.verdict.text
+
+
+def test_a_campaign_without_misfit_is_not_searched_for_laws() -> None:
+    quiet = with_laws(examine(made(nothing, seed=102), replicates=(40, 40)))
+    assert quiet.verdict.verdict == "no_misfit"
+    assert quiet.laws is None
+    assert all(layer.kind == "pattern_correction" for layer in quiet.verdict.layers)
+
+
+def test_the_report_shows_a_law_with_its_size(diagnosed: Diagnosis) -> None:
+    words = verdict_in_words(diagnosed.verdict.as_dict())
+    assert words["outcome"].endswith("A law was found that it follows.")
+    assert words["laws"][0]["formula"].startswith("T * exp(a ")
+    assert "a = " in words["laws"][0]["formula"]
+    assert "samples" in words["laws"][0]["gain"]
+
+
+def test_the_best_law_by_the_fitted_noise_is_among_those_scored_anew() -> None:
+    """Each simulated campaign is searched at the noise of the fit; only its best laws are scored at its own noise."""
+    model = baseline(made(nothing, seed=7))
+    rng = np.random.default_rng(3)
+    drawn = drawn_residuals(model, rng, 1)
+    laws = Grammar.of(model, ())
+    nets = laws.net(Projection(model.linear, drawn.transpose(0, 2, 1)))
+    every = np.arange(laws.size)
+    made_again = refit(model, drawn)
+    for k, net in enumerate(nets):
+        best = best_of(net, RESCORED)
+        exact = np.concatenate(
+            [laws.gains(made_again.one(k), part)[0] - laws.cost(part) for part in np.array_split(every, 12)]
+        )
+        assert exact[best].max() == pytest.approx(exact.max(), abs=0.05)
+
+
 def test_nothing_is_written_where_nothing_is_hidden() -> None:
     quiet = discover_laws(baseline(made(nothing, seed=102)), replicates=20)
     assert quiet.laws == ()
@@ -68,7 +121,7 @@ def test_a_law_is_read_as_it_was_written(found: Discovery, tmp_path: Path) -> No
     path = tmp_path / "law.toml"
     path.write_text(law_text(law.law, law.parameters, 'series "7"\n[x]'), encoding="utf-8")
     again, parameters = read_law(path)
-    assert again == law.law or repr(again) == repr(law.law)
+    assert again == law.law or exact_text(again) == exact_text(law.law)
     assert parameters == law.parameters
 
 

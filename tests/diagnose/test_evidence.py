@@ -238,3 +238,12 @@ def test_stiffening_needs_ten_rises_at_speeds_a_tenth_of_an_e_fold_apart(good: i
 def test_a_p_value_has_a_least_and_is_never_above_one() -> None:
     assert Evidence(9.0, 0.1, True, "N").p_adjusted(3) == 1e-12
     assert Evidence(0.0, 1.0, False, "N").p_adjusted(1) == 1.0
+
+
+def test_a_rise_that_falls_is_left_out_of_the_stiffening() -> None:
+    speeds = np.where(np.arange(20) % 2, 2e-4, 8e-4)
+    rise = 6e3 * np.exp(0.03 * np.log(speeds / 4e-4))
+    rise[4] = -0.5
+    found = rise_stiffening(series(conditions=replace(series().conditions, speed_m_s=speeds), rise_N_per_m=rise))
+    assert found is not None
+    assert found.value == pytest.approx(0.03, abs=0.003)

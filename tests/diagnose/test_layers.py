@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from blind.direct import ingested
 from blind.tribometer import Design, hide
+from scipy.stats import norm
 
 from tribo.diagnose import examine
 from tribo.diagnose.diagnosis_record import Diagnosis
@@ -97,3 +98,14 @@ def test_without_noise_the_corrections_are_the_errors_that_were_drawn() -> None:
 def test_every_patterned_sample_has_a_correction_in_each_regime_and_the_flat_one_has_none(beside: Diagnosis) -> None:
     corrected = {(x.name, *x.regimes) for x in beside.verdict.layers if x.kind == "pattern_correction"}
     assert corrected == {(name, regime) for name in "ABC" for regime in ("static", "sliding")}
+
+
+def test_the_chance_of_a_correction_is_that_of_its_interval_times_the_number_of_corrections(beside: Diagnosis) -> None:
+    found = pattern_corrections(beside.baseline)
+    assert len(found) == 6
+    for c in found:
+        assert c.mean.low < c.mean.value < c.mean.high
+        low, value, high = np.log1p(np.array([c.mean.low, c.mean.value, c.mean.high]) / 100)
+        assert high - value == pytest.approx(value - low)
+        two_sided = 2 * norm.sf(abs(value) / ((high - low) / (2 * 1.645)))
+        assert c.p == pytest.approx(min(6 * two_sided, 1.0))

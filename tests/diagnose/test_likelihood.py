@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from tribo.diagnose.statistics.bordered import model_columns, normal_of, weighted_columns
 from tribo.diagnose.statistics.linearisation import (
     Linear,
     State,
@@ -35,15 +36,12 @@ from tribo.diagnose.statistics.scatter import (
     SMALLEST_SD,
     Noise,
     at_noise,
-    blurred,
     first_noise,
     fitted_sizes,
     inverse_noise,
     log_prior,
     log_priors,
     log_size_prior,
-    normal_equations,
-    prior_of_columns,
     prior_sd,
     products_of,
     replicate_weights,
@@ -168,8 +166,8 @@ def test_a_step_is_that_of_generalised_least_squares() -> None:
     information = flat.T @ np.linalg.solve(whole, flat)
     step = np.linalg.solve(information, flat.T @ np.linalg.solve(whole, residual_of(s).ravel()))
     assert found.solution[:4] == pytest.approx(step, rel=1e-4, abs=1e-7)
-    assert found.inverse[:4, :4] == pytest.approx(np.linalg.inv(information), rel=1e-4)
-    assert found.columns.shape == (s.observations.n, 2, 4 + len(s.group))
+    assert found.inverse.dense(found.columns)[0, :4, :4] == pytest.approx(np.linalg.inv(information), rel=1e-4)
+    assert found.inverse.border[0, :4, :4] == pytest.approx(np.linalg.inv(information), rel=1e-4)
     left = residual_of(s).ravel() - flat @ step
     effects = np.diag(of_effects(s, noise)) @ dense(s, noise)[2].T @ np.linalg.solve(whole, left)
     assert found.solution[4:] == pytest.approx(effects, rel=1e-3, abs=1e-6)
@@ -188,7 +186,7 @@ def test_a_parameter_at_a_bound_that_would_leave_it_is_held_and_the_others_are_f
     bounds[side][held] = s.first_law[held]
     found = solved(s, state, jacobian, bounds)  # type: ignore[arg-type]
     assert found.solution[held] == 0.0
-    assert not found.inverse[held].any()
+    assert not found.inverse.dense(found.columns)[0, held].any()
     others = [k for k in range(4) if k != held]
     whole, flat = dense(s, noise)[0], jacobian.reshape(-1, 4)[:, others]
     information = flat.T @ np.linalg.solve(whole, flat)
@@ -206,7 +204,7 @@ def test_cleared_columns_have_the_informations_and_scores_of_the_marginal_model(
     at = at_noise(s, noise)
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
     weight = 0.5 + rng.random(s.observations.n)
-    linear = Linear(jacobian, s.random, residual_of(s), at.factor, at.precision, weight)
+    linear = Linear(jacobian, s.random_effects, residual_of(s), at.factor, at.precision, weight)
     columns = rng.normal(size=(s.observations.n, 2, 2))
     left, cleared = linear.cleared(columns)
     alone = np.zeros((2 * s.observations.n,) * 2)
@@ -343,12 +341,13 @@ def test_the_noise_is_estimated_from_what_is_left_and_from_how_uncertain_it_is()
     system = solved(s, state, jacobian, target.bounds)
     after = with_noise_estimated(s, state, system).at.noise
     left = residual_of(s) - s.random @ state.effects
-    spread = np.array([c @ system.inverse @ c.T for c in system.columns])
+    inverse = system.inverse.dense(system.columns)[0]
+    spread = np.array([c @ inverse @ c.T for c in np.concatenate([jacobian, s.random], axis=2)])
     square = system.weight[:, None, None] * (left[:, :, None] * left[:, None, :] + spread)
     squares = np.array([square[:, 0, 0], square[:, 0, 1], square[:, 1, 1]])
     assert noise.scatter is not None
     repeat, scatter = updated_repeats(s, (noise.repeat, noise.scatter), squares, 8.0)
-    sizes = updated_sizes(s, noise.sizes, state.effects, np.diag(system.inverse)[4:])
+    sizes = updated_sizes(s, noise.sizes, state.effects, np.diag(inverse)[4:])
     assert after.repeat == pytest.approx(repeat)
     assert after.scatter == pytest.approx(scatter)
     assert after.sizes == pytest.approx(sizes)
@@ -373,28 +372,78 @@ def test_many_replicates_are_weighed_and_solved_as_each_by_dense_matrices() -> N
     assert weight == pytest.approx(10.0 / (8.0 + distance))
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
     along = np.concatenate([jacobian, s.random], axis=2).transpose(1, 0, 2).copy()
+    columns = model_columns(jacobian, s.random_effects)
     precision = sizes.inverse * weight[:, None]
-    prior = prior_of_columns(4, sizes)
-    assert prior[:, 4:] == pytest.approx(sizes.precision)
-    assert prior[:, :4].max() < 1e-9
-    spread, solution = solved_at_once(along, precision, residual, prior)
-    weighted, normal = normal_equations(along, precision)
+    inverted, (own, border) = solved_at_once(columns, precision, residual, sizes)
+    spread, solution = inverted.dense(columns), columns.vector(own, border)
     for r in range(2):
         whole = np.einsum("ank,n,nab,bnl->kl", along, weight[r], inverse, along)
-        assert normal[r] == pytest.approx(whole, rel=1e-9, abs=1e-9 * np.abs(whole).max())
         right = np.einsum("ank,n,nab,bn->k", along, weight[r], inverse, residual[r])
-        assert weighted[r] @ residual[r].ravel() == pytest.approx(right, rel=1e-6, abs=1e-6)
-        expected = np.linalg.inv(whole + np.diag(prior[r]))
+        prior = np.concatenate([np.full(4, 1e-12), 1 / of_effects(s, noise)])
+        expected = np.linalg.inv(whole + np.diag(prior))
         assert spread[r] == pytest.approx(expected, rel=1e-4, abs=1e-8)
         assert solution[r] == pytest.approx(expected @ right, rel=1e-3, abs=1e-6)
+    assert columns.vector(*inverted.variances) == pytest.approx(np.diagonal(spread, axis1=1, axis2=2))
+    added = np.einsum("ank,rk->ran", along, solution)
+    assert columns.on_tests(own, border) == pytest.approx(added)
     moved = np.einsum("ank,rkl,bnl->rabn", along, spread, along)
-    assert blurred(along, spread) == pytest.approx(np.stack([moved[:, 0, 0], moved[:, 0, 1], moved[:, 1, 1]], axis=1))
-    ready = replicates_at(s, along, sizes, residual, 2 * residual, 8.0)
+    expected = np.stack([moved[:, 0, 0], moved[:, 0, 1], moved[:, 1, 1]], axis=1)
+    assert inverted.spread(columns) == pytest.approx(expected, rel=1e-6)
+    ready = replicates_at(s, columns, sizes, residual, 2 * residual, 8.0)
     assert ready.precision == pytest.approx(precision)
-    assert ready.normal == pytest.approx(normal)
-    assert ready.prior == pytest.approx(prior)
-    assert ready.group.tolist() == [FIXED] * 4 + s.group.tolist()
+    assert ready.group.tolist() == s.group.tolist()
     assert ready.residual == pytest.approx(2 * residual)
+
+
+def test_the_normal_matrix_by_blocks_is_the_dense_one() -> None:
+    s, rng = campaign(), np.random.default_rng(6)
+    target = Target(s, ())
+    jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
+    columns = model_columns(jacobian, s.random_effects)
+    weight = 0.5 + rng.random(s.observations.n)
+    inverse = np.linalg.inv(of_tests(s, noise_of(s))) * weight[:, None, None]
+    precision = np.array([[inverse[:, 0, 0], inverse[:, 0, 1], inverse[:, 1, 1]]])
+    along = np.concatenate([jacobian, s.random], axis=2)
+    whole = np.einsum("nak,nab,nbl->kl", along, inverse, along)
+    found = weighted_columns(columns, precision)
+    normal = normal_of(found)
+    specimens = s.random_effects.specimens
+    here = np.arange(4, 4 + 4 * specimens).reshape(specimens, 4)
+    border = np.concatenate([np.arange(4), np.arange(4 + 4 * specimens, whole.shape[0])])
+    for k, own in enumerate(here):
+        assert normal.own[0, k] == pytest.approx(whole[np.ix_(own, own)])
+        assert normal.across[0, k] == pytest.approx(whole[np.ix_(own, border)])
+        for other in here[k + 1 :]:
+            assert not whole[np.ix_(own, other)].any()
+    assert normal.border[0] == pytest.approx(whole[np.ix_(border, border)])
+    prior = columns.sides(np.linspace(1.0, 2.0, len(whole))[None])
+    raised = whole + np.diag(np.linspace(1.0, 2.0, len(whole)))
+    assert normal.with_prior(*prior).log_determinant()[0] == pytest.approx(np.linalg.slogdet(raised)[1])
+    other = rng.normal(size=(s.observations.n, 2, 3))
+    products = np.einsum("nak,nab,nbl->kl", along, inverse, other)
+    own, shared = found.times(other)
+    assert own[0] == pytest.approx(products[here])
+    assert shared[0] == pytest.approx(products[border])
+    residual = rng.normal(size=(s.observations.n, 2))
+    right = np.einsum("nak,nab,nb->k", along, inverse, residual)
+    assert columns.vector(*found.with_residual(residual.T[None]))[0] == pytest.approx(right)
+
+
+def test_the_covariance_of_predictions_is_that_of_the_whole_matrix_and_random_effects_lie_on_their_own_tests() -> None:
+    s, rng = campaign(), np.random.default_rng(7)
+    effects = s.random_effects
+    values = rng.normal(size=(2, effects.count))
+    assert effects.on_tests(values) == pytest.approx(np.einsum("nak,rk->rna", s.random, values))
+    weight = np.array([1.0, -0.5])
+    assert effects.summed(weight) == pytest.approx(np.einsum("nrq,r->q", s.random, weight))
+    target = Target(s, ())
+    state = at_the_mode(s, noise_of(s))
+    system = solved(s, state, target.jacobian(s.first_law, target.predict(s.first_law)), target.bounds)
+    rows = np.array([0, 5, 6, 20])
+    some = model_columns(np.zeros((len(rows), 2, 4)), effects.take(rows))
+    flat = np.concatenate([np.zeros((len(rows), 2, 4)), s.random[rows]], axis=2).reshape(2 * len(rows), -1)
+    expected = flat @ system.inverse.dense(system.columns)[0] @ flat.T
+    assert system.inverse.between(some, effects.specimen[rows]) == pytest.approx(expected)
 
 
 def test_steps_of_the_sizes_have_the_density_of_the_sizes_they_lead_to() -> None:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tribo.diagnose.search import rivals, weighing
-from tribo.diagnose.search.naming import best_beyond_chance
+from tribo.diagnose.search import naming, rivals, weighing
+from tribo.diagnose.search.naming import Layers, best_beyond_chance
 from tribo.diagnose.search.rivals import CLOSE, IN_COMMON, TIED, sort_rivals, weights_of
-from tribo.diagnose.search.screen import FEWEST, Screen, _decided as decided, _strongest as strongest, deviate
+from tribo.diagnose.search.screen import FEWEST, Screen, _strongest as strongest, decided, deviate
 from tribo.diagnose.search.weighing import CHOICES_FITTED, PER_PARAMETER, Candidate, judged
 from tribo.diagnose.statistics.model import Acting
 from tribo.mechanisms.table import MECHANISMS
@@ -64,7 +64,8 @@ def test_the_first_that_chance_does_not_make_as_strong_is_the_best() -> None:
 
 def ranked_by(start_left: np.ndarray, target: np.ndarray, name: str) -> list[str]:
     acting = tuple(Acting(MECHANISMS[name], str(k)) for k in range(start_left.shape[1]))
-    start: Any = SimpleNamespace(acting=acting, left=start_left, target=target)
+    pull, length = start_left.T @ target, np.sqrt(np.sum(start_left**2, axis=0))
+    start: Any = SimpleNamespace(acting=acting, pull=pull, length=length)
     return [a.choice for a in weighing._most_promising(start, list(range(len(acting))))]
 
 
@@ -178,3 +179,59 @@ def test_a_chi_squared_value_beyond_the_numbers_is_a_deviate_by_its_root() -> No
     assert found[0] == pytest.approx(np.sqrt(4000.0))
     assert found[1] == pytest.approx(np.sqrt(4000.0) - 0.5 * 2.0)
     assert found[2:].tolist() == [0.0, 0.0]
+
+
+def layered(*names: str) -> Any:
+    """Layers of one cause each, on a model that is the tuple of what acts in it."""
+    causes = tuple((candidate(10.0, name=name),) for name in names)
+    return Layers(tuple(names), causes)  # type: ignore[arg-type]
+
+
+def test_each_cause_but_the_last_is_picked_again_beside_all_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    beside: list[tuple[str, ...]] = []
+
+    def refitted(model: Any, acting: list[Acting]) -> tuple[str, ...]:
+        beside.append(tuple(a.mechanism.name for a in acting))
+        return beside[-1]
+
+    def weighed_beside(alone: tuple[str, ...], barred: Any) -> list[Candidate]:
+        return [candidate(12.0, name="tilt" if len(beside) == 1 else "temperature")]
+
+    monkeypatch.setattr(naming, "refitted", refitted)
+    monkeypatch.setattr(naming, "weigh_beside", weighed_beside)
+    monkeypatch.setattr(naming, "sort_rivals", lambda model, best, ranked: ((best,), ()))
+    rules: Any = SimpleNamespace(excluded=())
+    found = naming._picked_again(layered("suction", "run_in", "humidity"), rules)
+    assert [[c.acting.name for c in alike] for alike in found.causes] == [["tilt"], ["temperature"], ["humidity"]]
+    assert beside == [("run_in", "humidity"), ("tilt", "humidity")]
+
+
+def test_of_several_causes_the_newest_is_left_out_where_its_own_column_is_still_wrong(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    start: Any = SimpleNamespace(model=SimpleNamespace(setup=None))
+    one, two = layered("suction"), layered("suction", "run_in")
+    offered: list[set[str]] = []
+
+    def grown(layers: Any, *_: Any) -> Any:
+        offered.append(set(layers.wrong_in_form))
+        return {0: one, 1: None if layers.wrong_in_form else two}[len(layers.causes)]
+
+    left: Any = SimpleNamespace(p=np.array([0.001]))
+    monkeypatch.setattr(naming, "weigh", lambda *_: [])
+    monkeypatch.setattr(naming, "weigh_beside", lambda *_: [])
+    monkeypatch.setattr(naming, "_grown", grown)
+    monkeypatch.setattr(naming, "_screen_left", lambda *_: left)
+    monkeypatch.setattr(naming, "_misfit_in_own_column", lambda cause, *_: cause.acting.name == "run_in")
+    monkeypatch.setattr(naming, "_picked_again", lambda layers, *_: layers)
+    monkeypatch.setattr(naming, "_standing", lambda layers, *_: layers)
+    rules: Any = SimpleNamespace(excluded=(), level=0.01)
+    found = naming.name_causes(start, left, rules)
+    assert [[c.acting.name for c in alike] for alike in found.causes] == [["suction"]]
+    assert offered == [set(), set(), {"run_in"}]
+
+
+def test_what_explains_as_much_only_before_choices_are_paid_for_is_no_rival(monkeypatch: pytest.MonkeyPatch) -> None:
+    best = candidate(100.0, raw=100.0)
+    many, few = candidate(96.5, raw=99.5), candidate(97.5, raw=99.5)
+    assert sorted_by(monkeypatch, best, {0.3: many, 0.2: few}) == ([], [few])

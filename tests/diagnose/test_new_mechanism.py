@@ -10,7 +10,7 @@ import pytest
 from tribo.diagnose import examine, plan_design
 from tribo.diagnose.diagnosis_record import Diagnosis
 from tribo.diagnose.search.weighing import weigh
-from tribo.diagnose.statistics.linearisation import start_effects
+from tribo.diagnose.statistics.start_effects import start_effects
 from tribo.mechanisms.record import (
     Base,
     Conditions,

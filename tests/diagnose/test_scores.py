@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from tribo.diagnose.search.screen import AS_FITTED, columns_in, scores
+from tribo.diagnose.statistics.bordered import model_columns
+from tribo.diagnose.statistics.courses import EVERY, Course, added, course
 from tribo.diagnose.statistics.model import Setup, Target
 from tribo.diagnose.statistics.scatter import (
     SIZE_STEPS,
@@ -17,6 +16,7 @@ from tribo.diagnose.statistics.scatter import (
     log_size_prior,
     replicates_at,
 )
+from tribo.diagnose.statistics.scores import AS_FITTED, columns_in, columns_of, informations, scores
 
 from .test_likelihood import campaign, dense, noise_of, residual_of
 
@@ -32,7 +32,7 @@ def one_replicate(s: Setup, noise: Noise) -> tuple[Replicates, np.ndarray]:
     """The campaign as one replicate of normal noise, and the columns of its law."""
     target = Target(s, ())
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
-    along = np.concatenate([jacobian, s.random], axis=2).transpose(1, 0, 2).copy()
+    along = model_columns(jacobian, s.random_effects)
     residual = residual_of(s).T[None]
     return replicates_at(s, along, fitted_sizes(s, noise, 1), residual, residual, noise.tail), jacobian.reshape(-1, 4)
 
@@ -103,11 +103,71 @@ def test_a_campaign_of_two_replicates_is_scored_one_by_one() -> None:
     s = campaign()
     noise = noise_of(s)
     replicate, _ = one_replicate(s, noise)
-    names = ("precision", "residual", "weighted", "normal", "prior")
-    twice = {name: np.repeat(getattr(replicate, name), 2, axis=0) for name in names}
-    twice["residual"][1] *= 0.5
-    both = replace(replicate, **twice, log_priors=np.repeat(replicate.log_priors, 2, axis=1))
+    target = Target(s, ())
+    along = model_columns(target.jacobian(s.first_law, target.predict(s.first_law)), s.random_effects)
+    residual = np.repeat(residual_of(s).T[None], 2, axis=0)
+    both = replicates_at(s, along, fitted_sizes(s, noise, 2), residual, residual * np.array([1.0, 0.5])[:, None, None],
+                         noise.tail)  # fmt: skip
     ready = columns_in(columns(s), SPANS)
     found, _ = scores(both, ready, steps=AS_FITTED)
     assert found[1] == pytest.approx(0.25 * found[0])
     assert found[0] == pytest.approx(scores(replicate, ready, steps=AS_FITTED)[0][0])
+
+
+def local_courses(s: Setup) -> list[Course]:
+    """Columns that one specimen each shows, two of them on the first."""
+    effects, rng = s.random_effects, np.random.default_rng(9)
+    found = []
+    for specimen in (0, 0, 3, 5):
+        values = np.zeros((s.observations.n, 2, 1))
+        values[effects.tests_of[specimen]] = rng.normal(size=(len(effects.tests_of[specimen]), 2, 1))
+        found.append(course(values, effects))
+    return found
+
+
+def test_a_course_of_one_specimen_is_kept_on_its_tests_and_gives_its_columns_back() -> None:
+    s = campaign()
+    wide = course(columns(s), s.random_effects)
+    assert wide.specimen == EVERY
+    assert np.array_equal(wide.columns, columns(s))
+    for found, specimen in zip(local_courses(s), (0, 0, 3, 5), strict=True):
+        assert found.specimen == specimen
+        assert found.tests.tolist() == np.flatnonzero(s.random_effects.specimen == specimen).tolist()
+        assert np.any(found.columns, axis=(1, 2)).sum() == len(found.values)
+        assert found.shows
+    assert not course(np.zeros((s.observations.n, 2, 1)), s.random_effects).shows
+    assert not course(np.full((s.observations.n, 2, 1), np.nan), s.random_effects).shows
+
+
+def test_looks_at_one_specimen_and_at_two_score_as_the_same_columns_written_out() -> None:
+    """Beside a look at all tests, at free sizes and at sizes known to be one."""
+    s = campaign()
+    replicate, _ = one_replicate(s, noise_of(s))
+    alone = local_courses(s)
+    wide = course(columns(s)[:, :, :2], s.random_effects)
+    looks = [(alone[2],), (wide,), (alone[0],), (alone[0], alone[2]), (alone[1],), (alone[3],), (alone[1], alone[3])]
+    stacked = np.concatenate([added(look) for look in looks], axis=2)
+    ends = np.cumsum([look[0].freedom for look in looks])
+    spans = [slice(int(e) - look[0].freedom, int(e)) for e, look in zip(ends, looks, strict=True)]
+    for whole in (np.zeros(len(looks)), np.where(np.arange(len(looks)) == 1, 0.0, 25.0)):
+        found, coefficients = scores(replicate, columns_of(looks, whole, s.observations.n))
+        expected, written_out = scores(replicate, columns_in(stacked, spans, whole))
+        assert found == pytest.approx(expected, rel=1e-6, abs=1e-9)
+        for a, b in zip(coefficients, written_out, strict=True):
+            assert a == pytest.approx(b, rel=1e-6)
+
+
+def test_the_information_and_the_score_of_candidates_are_those_of_the_marginal_model() -> None:
+    s = campaign()
+    noise = noise_of(s)
+    replicate, flat = one_replicate(s, noise)
+    alone = local_courses(s)
+    wide = course(columns(s)[:, :, :1], s.random_effects)
+    looks = [(alone[2],), (wide,), (alone[0],), (alone[0], alone[2]), (alone[0], alone[3])]
+    left, pull = informations(replicate, columns_of(looks, np.zeros(5), s.observations.n))
+    inverse = np.linalg.inv(dense(s, noise)[0])
+    rest = inverse - inverse @ flat @ np.linalg.solve(flat.T @ inverse @ flat, flat.T @ inverse)
+    for k, look in enumerate(looks):
+        column = added(look).ravel()
+        assert left[0, k] == pytest.approx(column @ rest @ column, rel=1e-4)
+        assert pull[0, k] == pytest.approx(column @ rest @ residual_of(s).ravel(), rel=1e-3, abs=1e-4)

@@ -83,3 +83,10 @@ def test_a_fit_of_a_campaign_carries_the_difference_of_its_directions(
         if row.number == "mu":
             apart = fits["Sx", row.regime].value("mu") - fits["Sy", row.regime].value("mu")
             assert row.difference == pytest.approx(apart)
+
+
+def test_the_table_of_differences_has_every_number_of_the_record() -> None:
+    found = list(differences(0).values())
+    table = differences_table(found)
+    for name in ("regime", "number", "pressure_Pa", "difference", "u", "unpaired_u", "dof", "low", "high", "p"):
+        assert table[name].tolist() == [getattr(d, name) for d in found]

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from tribo.errors import FitError
-from tribo.fitting import fit_power_law, fit_samples, pool_specimen_scatter
+from tribo.fitting import fit_power_law, fit_samples, pool_specimen_scatter, repeat_scatter
 from tribo.fitting.rows import sample_rows
 from tribo.fitting.weighting import weights_of
 from tribo.records import LawFit
@@ -85,3 +85,17 @@ def test_weights_of_t_over_n_are_refused_at_zero_load() -> None:
     (rows,) = sample_rows(table, "static")
     with pytest.raises(FitError, match="zero load"):
         weights_of(rows, AREA, "ratio")
+
+
+def test_the_scatter_of_repeats_is_a_share_of_the_force_in_any_unit() -> None:
+    rng = np.random.default_rng(3)
+    load = np.repeat([1.0, 2.0, 4.0], 20)
+    force = 3.0 * load * (1 + 0.05 * rng.standard_normal(load.size))
+    found = []
+    for scale in (1.0, 1e-12):
+        table = pd.DataFrame({"sample": "F", "specimen": "F1", "normal_load_N": load, "static_N": scale * force})
+        scatter = repeat_scatter(sample_rows(table, "static"))
+        assert scatter is not None
+        found.append(scatter.variance(np.array([6.0 * scale]))[0] / scale**2)
+    assert found[1] == pytest.approx(found[0])
+    assert np.sqrt(found[0]) / 6.0 == pytest.approx(0.05, rel=0.25)

@@ -51,3 +51,9 @@ def test_one_sample_at_one_load_leaves_the_others_their_laws() -> None:
     assert np.isfinite(fits["F"].values).all()
     assert np.isnan(fits["B"].values).all()
     assert "does not determine a slope" in fits["B"].notes[-1]
+
+
+@pytest.mark.parametrize(("spread", "said"), [(0.005, "0.5 %"), (0.001, "0.1 %")])
+def test_the_span_of_the_loads_is_said_in_percent(spread: float, said: str) -> None:
+    with pytest.raises(FitError, match=f"the loads span only {said}"):
+        fit_samples(campaign(spread, 0), "static", AREA_M2)

@@ -9,22 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from on_the_command_line import run
 
 from tribo import stages
 from tribo.campaign import load_campaign
-from tribo.cli import main
 from tribo.errors import CampaignError
 from tribo.ingestion.draft import started_at
 from tribo.ingestion.file_names import name_pattern, proposed_patterns, read_names
 
 NAMES = "{sample}_{normal_load_N}N_{speed_rpm}RPM_{repeat}"
-
-
-def run(*arguments: object) -> Result:
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
 
 
 def pull(sign: float = 1.0, seed: int = 1) -> str:
@@ -200,15 +193,15 @@ def test_exports_already_in_raw_of_the_campaign_stay_where_they_are(tmp_path: Pa
 def test_a_table_of_evaluated_forces_becomes_tests(tmp_path: Path) -> None:
     table = tmp_path / "cof.csv"
     table.write_text(
-        'Load,CoF,Material,Label,Constant\n10,0.5,A,"10\nmN",x\n20,0.4,A,"20\nmN",x\n40,0.3,B,"40\nmN",x\n',
+        'Load,CoF,Material,Label,Constant\n10,0.5,A,"10\nmN",x\n20,0.4,A,"20\nmN",x\n40,0.3,B,"day\n2",x\n40,0.3,B,"day\n3",x\n',
         encoding="utf-8",
     )
     mapping = "sample=Material,normal_load_mN=Load,coefficient=CoF"
     done = run("init", tmp_path / "c", "--from", table, "--table", mapping, "--area-mm2", 16, "--json")
     assert json.loads(done.stdout)["rows"][0]["normal_load_N"] == "0.01"
     found = stages.ingest(load_campaign(tmp_path / "c"))
-    assert [p.sliding_N for p in found.pulls.values()] == pytest.approx([0.005, 0.008, 0.012])
-    assert found.campaign.tests[2].covariates == {"Label": "40 mN"}
+    assert [p.sliding_N for p in found.pulls.values()] == pytest.approx([0.005, 0.008, 0.012, 0.012])
+    assert found.campaign.tests[2].covariates == {"Label": "day 2"}
     wrong = run("init", tmp_path / "d", "--from", table, "--table", "sample=Material,coefficient=COF")
     assert wrong.exit_code == 1
     assert "no such column for coefficient" in wrong.output
@@ -225,3 +218,47 @@ def test_a_recorded_load_is_left_to_the_record_and_the_one_in_the_name_is_kept(t
     assert (row["normal_load_N"], row["nominal_load_N"]) == ("", "5")
     (test,) = stages.ingest(load_campaign(tmp_path / "c")).campaign.tests
     assert test.normal_load_N == pytest.approx(5.1)
+
+
+def test_a_table_of_evaluated_forces_is_recognised_by_its_columns_and_the_unit_in_its_labels(tmp_path: Path) -> None:
+    rows = [f"silicone,{n},{n / 40:g} kPa,{n} mN,{2 / n:.3f},0.1,{c}" for n in (10, 20, 40) for c in (3, 4)]
+    text = "Material,NominalLoad,Pressure,NominalLoad.label,CoF.mean,CoF.sd,CycleID\n" + "\n".join(rows) + "\n"
+    raw = raw_folder(tmp_path / "raw", {"cycles.csv": text})
+    done = run("init", tmp_path / "c", "--from", raw)
+    assert 'columns "sample=Material,normal_load_mN=NominalLoad,coefficient=CoF.mean" (proposed' in done.output
+    first = rows_of(tmp_path / "c")[0]
+    assert first == {"test_id": "T1", "sample": "silicone", "normal_load_N": "0.01", "coefficient": "0.200",
+                     "CycleID": "3"}  # fmt: skip
+    assert not (tmp_path / "c" / "raw").exists()
+
+
+def test_a_table_whose_load_has_no_unit_is_not_guessed(tmp_path: Path) -> None:
+    raw = raw_folder(tmp_path / "raw", {"cycles.csv": "Material,Load,CoF\nsilicone,10,0.2\nrubber,20,0.1\n"})
+    run("init", tmp_path / "c", "--from", raw)
+    assert "coefficient" not in rows_of(tmp_path / "c")[0]
+
+
+def test_columns_filled_for_all_tests_leave_what_a_name_says(tmp_path: Path) -> None:
+    raw = raw_folder(tmp_path / "raw", {"A_5N.txt": pull(), "B.txt": pull()})
+    names = ("--names", "{sample}_{normal_load_N}N", "--names", "{sample}")
+    run("init", tmp_path / "c", "--from", raw, *names, "--fill", "normal_load_N=2,operator=Ann")
+    assert [(r["normal_load_N"], r["operator"]) for r in rows_of(tmp_path / "c")] == [("5", "Ann"), ("2", "Ann")]
+
+
+def rotary(rest_N: float) -> str:
+    """A rotary record of 1 N friction on a lever arm of 2.5 mm, ``rest_N`` at rest, with the turns of the drive."""
+    time = np.arange(0, 40, 0.1)
+    turns = np.where((time > 2) & (time < 30), 60.0, 0.0)
+    torque = (rest_N + (turns > 0)) * 2.5e-3 + np.random.default_rng(3).normal(0, 2e-6, time.size)
+    rows = [f"{t:.1f}\t{m:.7f}\t{n:.0f}" for t, m, n in zip(time, torque, turns, strict=True)]
+    return "Time [s]\tTorque [N m]\tDrehzahl [1/min]\n" + "\n".join(rows) + "\n"
+
+
+def test_the_zero_is_taken_at_rest_where_the_drive_shows_the_rest(tmp_path: Path) -> None:
+    raw = raw_folder(tmp_path / "raw", {"oil_5N.txt": rotary(-0.5)})
+    names = ("--names", "{sample}_{normal_load_N}N", "--set", "lever_arm_mm=2.5")
+    done = run("init", tmp_path / "c", "--from", raw, *names)
+    assert 'zero = "at rest" was written' in done.output
+    (pull,) = stages.ingest(load_campaign(tmp_path / "c")).pulls.values()
+    assert pull.sliding_N == pytest.approx(1.0, rel=0.01)
+    assert rows_of(tmp_path / "c")[0]["speed_mm_s"] == "15.7"  # 2 pi 2.5 mm at one turn a second

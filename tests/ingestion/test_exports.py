@@ -10,6 +10,7 @@ import pytest
 
 from tribo import stages
 from tribo.campaign import load_campaign
+from tribo.display import exact_text
 from tribo.ingestion import exports
 from tribo.records import SetAside
 
@@ -32,7 +33,7 @@ def test_two_processes_read_the_same_bits_as_one(monkeypatch) -> None:  # type: 
     assert list(one.pulls) == list(two.pulls)
     for test_id, trace in one.traces.items():
         assert np.array_equal(trace.force_N, two.traces[test_id].force_N)
-        assert repr(one.pulls[test_id]) == repr(two.pulls[test_id])
+        assert exact_text(one.pulls[test_id]) == exact_text(two.pulls[test_id])
 
 
 def test_faults_come_back_from_the_processes_too(monkeypatch, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]

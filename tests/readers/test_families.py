@@ -9,7 +9,7 @@ import pytest
 
 from tribo.errors import ReadError
 from tribo.readers import READERS, inspect_export, read_blocks, read_export
-from tribo.records import Trace
+from tribo.records import Correction, Trace
 
 GRAM_FORCE = 9.80665e-3
 
@@ -554,3 +554,24 @@ def test_damage_in_one_of_several_tables_is_named_with_its_row(tmp_path: Path) -
 def test_every_family_has_a_sample_here() -> None:
     tested = {family for _, family, _, _ in SAMPLES.values()} | {"trapezium", "te67", "csm", "newport", "matlab"}
     assert tested | {"tdms"} == set(READERS)
+
+
+def with_speed(radius_mm: float) -> list[str]:
+    """The TE67 sample with a sliding velocity of 0.15 m/s at 65 turns a minute, and a radius beside it."""
+    start = TE67.index(TE67_NAMES)
+    cells = f"0,150\t65\t{radius_mm:g}\t"
+    rows = [line + (cells if line.startswith("\t20:32:") else "") for line in TE67[start + 1 :]]
+    return [*TE67[:start], TE67_NAMES + "Sliding Velocity\tSpeed\tRadius\t", *rows]
+
+
+def test_the_te67_proves_the_unit_of_its_speed_by_radius_and_turns(tmp_path: Path) -> None:
+    trace = read_export(saved(tmp_path, with_speed(22.0)))
+    np.testing.assert_allclose(trace.columns["speed_m_s"], 0.15)
+    assert "speed_m_s" not in read_export(saved(tmp_path, with_speed(14.0))).columns
+
+
+def test_turns_of_a_drive_become_a_speed_with_the_lever_arm(tmp_path: Path) -> None:
+    lines = ["Time [s]\tTorque [N m]\tSpindle speed [rpm]", *(f"{0.1 * k:.1f}\t{1e-3 * k:.4f}\t30" for k in range(40))]
+    trace = read_export(saved(tmp_path, lines), correction=Correction(lever_arm_m=0.02))
+    np.testing.assert_allclose(trace.columns["rotation_rev_per_s"], 0.5)
+    np.testing.assert_allclose(trace.columns["speed_m_s"], np.pi * 0.02)

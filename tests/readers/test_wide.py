@@ -31,20 +31,22 @@ def forces(nothing: str = "NaN", time_ends: int = 12) -> list[list[str]]:
     ]
 
 
-def are_the_records(path: Path, **options: object) -> None:
+Record = list[tuple[float, float]]
+RECORDS: list[Record] = [[(round(0.1 * k, 9), 0.5 * (j + 1) * k) for k in range(end)] for j, end in enumerate(ENDS)]
+
+
+def records_in(path: Path, **options: object) -> list[Record]:
+    """Time and force of every record of a table, row by row; none of them may be doubtful."""
     traces = read_blocks(path, **options)  # type: ignore[arg-type]
-    assert len(traces) == 3
-    for j, (trace, end) in enumerate(zip(traces, ENDS, strict=True)):
-        np.testing.assert_allclose(trace.force_N, 0.5 * (j + 1) * K[:end])
-        np.testing.assert_allclose(trace.time_s, 0.1 * K[:end])
-        assert trace.problems == ()
+    assert [t.problems for t in traces] == [()] * len(traces)
+    return [list(zip(t.time_s.round(9).tolist(), t.force_N.round(9).tolist(), strict=True)) for t in traces]
 
 
 @pytest.mark.parametrize("nothing", ["NaN", ""])
 def test_one_time_and_many_forces_headed_by_loads_are_a_record_each(tmp_path: Path, nothing: str) -> None:
     path = saved(tmp_path, "Time\t250\t250\t500", forces(nothing))
     columns = {"time": "Time [s]", "friction_force": "* [N]"}
-    are_the_records(path, columns=columns)
+    assert records_in(path, columns=columns) == RECORDS
     third = read_export(f"{path}#3", columns=columns)
     assert third.metadata["record"] == "500"
     np.testing.assert_allclose(third.force_N, 1.5 * K[:11])
@@ -69,12 +71,12 @@ def test_a_sampling_rate_carries_records_past_the_end_of_a_short_time_column(tmp
     "header", ["Time [s]\tF 1 [N]\tF 2 [N]\tF 3 [N]", "Time [s]\tForce\tForce.1\tForce.2\ns\tN\tN\tN"]
 )
 def test_forces_of_numbered_names_are_records(tmp_path: Path, header: str) -> None:
-    are_the_records(saved(tmp_path, header, forces()))
+    assert records_in(saved(tmp_path, header, forces())) == RECORDS
 
 
 def test_columns_with_a_unit_of_force_beside_a_time_are_records_whatever_their_names(tmp_path: Path) -> None:
     path = saved(tmp_path, "Time [s]\tsteel [N]\tbronze [N]\tglass [N]", forces())
-    are_the_records(path)
+    assert records_in(path) == RECORDS
     assert [t.label for t in inspect_export(path).tables] == ["steel", "bronze", "glass"] or [
         t.label for t in inspect_export(path).tables
     ] == ["steel [N]", "bronze [N]", "glass [N]"]
@@ -140,3 +142,21 @@ def test_the_quartz_sand_as_published_is_ten_records(shared: Path) -> None:
     assert len(traces) == 10
     for k, trace in enumerate(traces):
         np.testing.assert_array_equal(trace.force_N, raw[np.isfinite(raw[:, k + 1]), k + 1])
+
+
+def test_a_column_with_a_unit_of_another_quantity_is_no_record_of_a_pattern(tmp_path: Path) -> None:
+    rows = [[*row, "0.3"] for row in forces()]
+    path = saved(tmp_path, "Time [s]\tsteel [N]\tbronze [N]\tglass [N]\tgauge [mm]", rows)
+    assert records_in(path, columns={"time": "Time [s]", "force": "* [N]"}) == RECORDS
+
+
+@pytest.mark.parametrize("left_out", [2, 3, 4])
+def test_a_record_left_out_by_its_position_leaves_the_others(tmp_path: Path, left_out: int) -> None:
+    path = saved(tmp_path, "Time [s]\tF1 [N]\tF2 [N]\tF3 [N]", forces())
+    found = records_in(path, columns={"time": "Time [s]", "force": "F* [N]", "ignore": f"#{left_out}"})
+    assert found == [record for j, record in enumerate(RECORDS) if j + 2 != left_out]
+
+
+def test_a_column_given_by_its_position_serves_every_record(tmp_path: Path) -> None:
+    path = saved(tmp_path, "clock\tF1 [N]\tF2 [N]\tF3 [N]", forces())
+    assert records_in(path, columns={"time": "#1 [s]", "force": "F* [N]"}) == RECORDS

@@ -26,7 +26,7 @@ def test_out_holds_the_agreed_files(written: Written) -> None:
     figures = {f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "pdf", "png", "csv")}
     tables = {"tests.csv", "fits.csv", "other_fits.csv", "comparison.csv"}
     assert found == figures | tables | {
-        "campaign.nc", "report.html", "report.pdf", "provenance.json", "ro-crate-metadata.json",
+        "campaign.nc", "card.json", "report.html", "report.pdf", "provenance.json", "ro-crate-metadata.json",
     }  # fmt: skip
 
 
@@ -93,6 +93,18 @@ def test_xarray_reads_every_trace_back_to_the_same_bits(store: Path, study: Stud
             assert (traces["force_N"].values[part] == study.ingested.traces[test_id].force_N).all()
             assert (traces["time_s"].values[part] == study.ingested.traces[test_id].time_s).all()
         assert int(traces["row_size"].sum()) == traces.sizes["sample"]
+
+
+def test_xarray_opens_the_file_as_a_dataset_of_tests_and_every_group_as_before(store: Path, study: Study) -> None:
+    with xr.open_dataset(store) as tests, xr.open_datatree(store, engine="h5netcdf") as tree:
+        assert tests.attrs["title"] == study.ingested.campaign.title
+        assert set(tests.coords) == {"test_id", "sample", "specimen", "normal_load_N"}
+        assert set(tests.variables) == set(tree["tests"].to_dataset(inherit=False).variables)
+        found = tests.set_index(test="test_id").sel(test="T0001")
+        assert float(found["static_N"]) == pytest.approx(study.ingested.pulls["T0001"].static_N, rel=1e-7)
+        assert tests["static_N"].attrs["units"] == "N"
+        assert tests.sizes["test"] > tree["traces"].sizes["trace"]  # two tests are set aside
+        assert {"tests", "traces", "fits", "comparison", "simulated"} <= set(tree.children)
 
 
 def test_plain_h5py_reads_names_numbers_and_units(store: Path, study: Study) -> None:

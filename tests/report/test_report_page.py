@@ -14,7 +14,8 @@ import pytest
 
 from report.conftest import Written
 from tribo.records import Study
-from tribo.report.html.page import html
+from tribo.report.content import content
+from tribo.report.html.page import html, pages_of
 from tribo.report.html.pull_cards import trace_picture
 
 VOID = {"meta", "br", "link", "img", "hr", "input"}
@@ -152,3 +153,23 @@ def test_a_sample_that_could_not_be_fitted_leaves_dashes(study: Study) -> None:
     words = re.sub(r"<(svg|style|script)\b.*?</\1>", "", broken_page, flags=re.DOTALL)
     assert not re.search(r"\b(nan|inf)\b", words)
     assert "<td>–</td>" in words
+
+
+def test_many_pulls_are_spread_over_pages_that_link_each_other(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tribo.report.html.pull_cards.PULLS_A_PAGE", 40)
+    pages = pages_of(content(study, None, None), {})
+    read = {t.test_id for t in study.ingested.campaign.tests if t.test_id in study.ingested.traces}
+    read |= set(study.ingested.by_hand)
+    shown = {name: re.findall(r'data-id="([^"]*)"', page) for name, page in pages.items()}
+    assert list(pages) == ["report.html", *(f"pulls-{k}.html" for k in range(2, -(-len(read) // 40) + 1))]
+    assert sorted(i for ids in shown.values() for i in ids) == sorted(read)
+    assert set(study.ingested.by_hand) <= set(shown["report.html"])
+    for name, page in pages.items():
+        parser = Outline()
+        parser.feed(page)
+        assert parser.open == []
+        assert {f"{other}#pulls" for other in pages if other != name} <= set(parser.targets)
+        assert f"shows {len(shown[name])} of {len(read)} pulls" in page
+        (script,) = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+        digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+        assert f"script-src 'sha256-{digest}'" in page

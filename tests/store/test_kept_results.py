@@ -170,3 +170,14 @@ def test_the_digest_of_the_package_changes_with_the_table_of_pattern_shares(
         seen.add(package_sources())
     package_sources.cache_clear()
     assert len(seen) == 2
+
+
+def test_what_is_at_several_places_is_written_once_and_comes_back_as_one() -> None:
+    shared = np.arange(1000.0)
+    value = {"first": [shared, FIT, {"deep": (FIT, shared)}], "table": pd.DataFrame({"x": shared}), "last": FIT}
+    text = json.dumps(encoded(value))
+    back = decoded(json.loads(text))
+    assert len(text) < 1.2 * len(json.dumps([encoded(shared), encoded(FIT), encoded(shared.copy())]))
+    assert back["last"] is back["first"][1] is back["first"][2]["deep"][0]
+    assert back["first"][0] is back["first"][2]["deep"][1]
+    assert fingerprint(back) == fingerprint(value)

@@ -15,6 +15,7 @@ from tribo.errors import TraceError
 from tribo.records import Trace
 from tribo.traces import RULES, read_pull, read_pulls, split_pulls
 from tribo.traces.pull import _gap_at as gap_at
+from tribo.traces.signal import _beyond_chance as beyond_chance
 from tribo.traces.whole_record import read_record
 
 from .synthetic import Shape, with_samples
@@ -225,3 +226,11 @@ def test_a_record_whose_force_never_changes_is_a_dead_load_cell_and_not_steady_s
         with pytest.raises(TraceError) as faults:
             read_record(replace(trace, force_N=np.full(trace.force_N.size, force)))
         assert {p.kind for p in faults.value.problems} & {"stuck", "saturated", "stopped_before_peak"}
+
+
+@pytest.mark.parametrize(("run", "beyond"), [(4, False), (5, True)])
+def test_a_flat_top_needs_one_more_sample_than_chance_gives(run: int, beyond: bool) -> None:
+    """One pair of a hundred is equal by chance; a run of n samples is n - 1 pairs, and may begin at 1000 places."""
+    pairs = np.arange(98) < 0
+    assert (1000 * 0.01 ** (run - 1) <= 1e-4) == beyond
+    assert beyond_chance(run, pairs, 1000) == beyond

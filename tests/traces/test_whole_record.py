@@ -11,6 +11,10 @@ import pytest
 from tribo.errors import TraceError
 from tribo.records import Pull, Test, Trace
 from tribo.traces import read_pull, read_record
+from tribo.traces.oscillation import oscillation_of
+from tribo.traces.rules import RULES
+from tribo.traces.sliding import settled
+from tribo.traces.whole_record import Reading
 from tribo.zeroing import zero_choice
 
 from .synthetic import Shape
@@ -229,3 +233,55 @@ def test_a_clear_peak_has_one_reading() -> None:
 def test_a_zero_that_is_none_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="before contact"):
         zero_choice(text)
+
+
+@pytest.mark.parametrize("stiffness", [80.0, 400.0])
+def test_a_slider_that_is_loaded_as_the_drive_demands_sticks_and_one_that_lags_swings(stiffness: float) -> None:
+    """The sawtooth rises by 0.16 N/s: the rate of the drive with 80 N/m at 2 mm/s, a fifth of it with 400 N/m."""
+    pull = read_record(sawtooth(), test=a_test(load_N=2.0, speed_m_s=2e-3, stiffness_N_per_m=stiffness))
+    assert pull.oscillation is not None
+    assert pull.oscillation.regime == ("stick-slip" if stiffness == 80.0 else "inertial oscillation")
+
+
+def test_sliding_before_a_stop_counts_where_it_is_settled_however_even_the_sliding_after_it() -> None:
+    first, after = 2.0, 1.6
+    start = np.concatenate([np.zeros(100), np.linspace(0, 1.25, 50) * first, np.full(800, first)])
+    stop = np.concatenate([np.linspace(first, 0, 10), np.zeros(120)])
+    again = np.concatenate([np.linspace(0, 1.25 * after, 50), np.full(3000, after)])
+    force = np.concatenate([start + noise(start.size), stop, again + noise(again.size, 1, 1e-3)])
+    pull = read_record(Trace("stop", np.arange(force.size) / RATE, force), test=a_test())
+    assert len(pull.restarts) == 1
+    assert pull.sliding_N == pytest.approx(first, abs=0.01)
+
+
+def test_the_free_period_is_that_of_the_loaded_mass_on_its_spring() -> None:
+    """A load of two kilograms on 80 N/m swings in 2 pi sqrt(2/80) s; at 2 mm/s the spring is loaded by 0.16 N/s."""
+    with_spring = Reading(RULES["seed"], a_test(speed_m_s=2e-3, stiffness_N_per_m=80.0)).drive(2 * 9.80665)
+    assert with_spring["free_period_s"] == pytest.approx(2 * math.pi * math.sqrt(2 / 80))
+    assert with_spring["drive_N_per_s"] == pytest.approx(0.16)
+    assert all(math.isnan(v) for v in Reading(RULES["seed"], a_test(speed_m_s=2e-3)).drive(20.0).values())
+
+
+@pytest.mark.parametrize("peaks", [2, 3, 4])
+def test_a_few_peaks_have_one_cycle_less(peaks: int) -> None:
+    time = np.arange(500 * peaks + 50) / 500
+    force = 1.0 + 0.2 * (time % 1.0)
+    assert oscillation_of(time, force + noise(time.size, 0, 1e-4)).cycles == peaks - 1
+
+
+def test_where_sliding_before_a_stop_drifts_the_steadiest_slide_after_it_counts() -> None:
+    start = np.concatenate([np.zeros(100), np.linspace(0, 3.0, 50), np.linspace(2.6, 1.6, 800)])
+    force = start
+    for level, drift in ((1.6, 0.8), (1.5, 0.0), (1.4, 0.6)):
+        stop = np.concatenate([np.linspace(force[-1], 0, 10), np.zeros(120)])
+        slide = np.linspace(level + drift, level, 800)
+        force = np.concatenate([force, stop, np.linspace(0, 1.25 * slide[0], 50), slide])
+    pull = read_record(Trace("stops", np.arange(force.size) / RATE, force + noise(force.size)), test=a_test())
+    assert len(pull.restarts) == 3
+    assert pull.sliding_N == pytest.approx(1.5, abs=0.02)
+
+
+@pytest.mark.parametrize("size", [12, 15, 17, 19, 20, 23, 41])
+def test_a_force_has_settled_within_the_first_half_of_its_samples(size: int) -> None:
+    force = 1.0 + np.exp(-np.arange(size) / (size / 6))
+    assert 0 < settled(force) <= size // 2 + 1

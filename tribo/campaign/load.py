@@ -70,7 +70,8 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     if not usable:
         nothing = Problem("no_usable_test", "no test of this campaign is usable", file=TESTS)
         raise CampaignError([*problems, nothing])
-    area_m2 = _area_m2(described, usable)
+    _require_area(described, usable)
+    area_m2 = _area_m2(described)
     problems += _unlisted(root, rows)
     problems += [note for row in usable if (note := _loads_disagree(row, described))]
     order = _date_order(rows)
@@ -79,12 +80,16 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     return replace(campaign, inputs={Path(path).name: digest for path, digest in hashes.items()})
 
 
-def _area_m2(described: CampaignFile, rows: Sequence[TestRow]) -> float:
-    """The nominal area, NO_AREA_M2 where none is stated. Raises CampaignError where a normal stress needs it."""
-    area = described.campaign.nominal_area_mm2
-    if area is None and any(row.cells.get("normal_stress_Pa") for row in rows):
+def _require_area(described: CampaignFile, rows: Sequence[TestRow]) -> None:
+    """Raises CampaignError where a load is given as normal stress and no nominal area is stated."""
+    if described.campaign.nominal_area_mm2 is None and any(row.cells.get("normal_stress_Pa") for row in rows):
         what, allowed = "a load given as normal stress needs the nominal area", "more than 0 mm2"
         raise CampaignError(Problem("no_area", what, file=TOML, column="nominal_area_mm2", allowed=allowed))
+
+
+def _area_m2(described: CampaignFile) -> float:
+    """The nominal area, NO_AREA_M2 where none is stated."""
+    area = described.campaign.nominal_area_mm2
     return NO_AREA_M2 if area is None else area * _MM2
 
 
@@ -108,7 +113,7 @@ def _campaign(
     return Campaign(
         title=general.title,
         root=root,
-        nominal_area_m2=_area_m2(described, ()),
+        nominal_area_m2=_area_m2(described),
         contact=general.contact,
         tests=tests,
         samples={name: patterns[_pattern_of(name, patterns)] for name in names},

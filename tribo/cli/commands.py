@@ -2,110 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from tribo import __version__
 from tribo.cli.build_commands import build, schedule
-from tribo.cli.console import Console, command_options, set_aside_record, status_of
+from tribo.cli.console import Console, command_options
 from tribo.cli.discover_command import discover
 from tribo.cli.given_paths import GivenPath
 from tribo.cli.init_command import init
-from tribo.cli.output import Output, output_options
-from tribo.cli.reading_options import corrected, reading_options, with_reading_options
-from tribo.cli.run_record import command_line, now, provenance_of_run
+from tribo.cli.reading_options import corrected, reading_options
 from tribo.cli.simulate_command import simulate
-
-if TYPE_CHECKING:
-    from tribo.diagnose import Diagnosis
-    from tribo.diagnose.verdict import Verdict
-    from tribo.records import Study
-    from tribo.stages import Progress, StudyOptions, Until
-
-CAMPAIGN = click.argument("campaign", type=GivenPath())
-OUT = output_options()
-SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler; its workers run the simulations.")
-DRY_RUN = click.option("--dry-run", is_flag=True, help="List the steps without running them.")
-
-
-FLAT = click.option(
-    "--flat", default="", metavar="SAMPLE",
-    help="Flat sample on which the model is calibrated. [default: F, or the only flat sample]",
-)  # fmt: skip
-
-
-def _a_zero(context: click.Context, parameter: click.Parameter, given: str) -> str:
-    """The text of a zero as given, checked.
-
-    Raises click.BadParameter.
-    """
-    from tribo.zeroing import zero_choice
-
-    try:
-        zero_choice(given)
-    except ValueError as why:
-        raise click.BadParameter(str(why)) from None
-    return given
-
-
-ZEROS = (
-    click.option(
-        "--zero", default="", metavar="ZERO", callback=_a_zero,
-        help='Zero of the force for tests without their own: "before contact", "at rest", "none", a number of newtons, '
-        "or [from, to] in seconds.",
-    ),
-    click.option(
-        "--load-zero", default="", metavar="ZERO", callback=_a_zero,
-        help="Zero of the recorded normal load, in the same form.",
-    ),
-)  # fmt: skip
-
-OVERRIDES = click.option(
-    "--overrides",
-    type=GivenPath(dir_okay=False),
-    help="overrides.csv as saved from the report page: pulls excluded by hand, static peaks and windows moved by hand.",
-)
-
-
-NO_MODEL = click.option(
-    "--no-model", is_flag=True,
-    help="Report without the spring-block model: friction, its laws and what it varies with.",
-)  # fmt: skip
-
-
-def _fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    for option in (
-        reading_options,
-        *ZEROS,
-        OVERRIDES,
-        click.option(
-            "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
-        ),
-        click.option(
-            "--weights",
-            type=click.Choice(["relative", "ratio", "force", "repeats"]),
-            default="relative",
-            show_default=True,
-            help="Scatter assumed equal at all loads: of T in percent (relative), of T/N (ratio) or of T (force); or "
-            "estimated from repeated tests (repeats).",
-        ),
-    ):
-        function = option(function)
-    return function
-
-
-def _model_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    for option in (
-        FLAT,
-        NO_MODEL,
-        click.option("--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulations per load."),
-        SCHEDULER,
-    ):
-        function = option(function)
-    return function
+from tribo.cli.study_commands import compare, demo, diagnose, fit, ingest, predict, report
+from tribo.cli.study_options import CAMPAIGN
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -120,175 +31,10 @@ def main() -> None:
     """
 
 
-main.add_command(build)
-main.add_command(init)
-main.add_command(schedule)
-main.add_command(simulate)
-main.add_command(discover)
-
-
-@main.command()
-@CAMPAIGN
-@OUT
-@DRY_RUN
-@_fit_options
-@command_options
-def ingest(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
-    """Read the exports of CAMPAIGN.
-
-    Determines the static peak and the mean sliding force of each pull. Writes tests.csv and campaign.nc.
-    """
-    return _walk(console, campaign, out, "ingest", dry_run, **options)
-
-
-@main.command()
-@CAMPAIGN
-@OUT
-@DRY_RUN
-@_fit_options
-@command_options
-def fit(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
-    """Fit mu and tau0 of every sample.
-
-    Writes fits.csv, with the uncertainties of both parameters, in addition to the files of tribo ingest.
-    """
-    return _walk(console, campaign, out, "fit", dry_run, **options)
-
-
-@main.command()
-@CAMPAIGN
-@OUT
-@click.option(
-    "--only",
-    default="",
-    help="Run only this part: calibration, the name of a sample, or SAMPLE@PRESSUREPa (named as in OUT/kept). "
-    "Default: all parts.",
-)
-@_fit_options
-@_model_options
-@command_options
-def predict(console: Console, campaign: Path, out: Output, only: str, columns: str, **options: Any) -> int:
-    """Run the simulations of CAMPAIGN only.
-
-    Calibrates the model on the flat sample, runs it for every sample and stores the results in OUT/kept, where
-    tribo compare and tribo report find them.
-    """
-    from tribo import stages
-    from tribo.campaign import open_campaign
-
-    stated = options.pop("stated")
-    chosen = stages.StudyOptions(kept=out.kept, **options)
-    with (
-        out.taken(campaign, shared=True),
-        open_campaign(campaign) as described,
-        console.progress() as progress,
-    ):
-        stated_so = with_reading_options(described, columns, stated)
-        ingested = stages.study(stated_so, chosen, until="ingest", progress=progress).ingested
-        cells = stages.simulate_cells(ingested, stages.fit(ingested, weights=chosen.weights), chosen, only, progress)
-    names = [cell.name for cell in cells]
-    console.result(
-        {"out": str(out.path), "cells": names}, f"model calibrated; simulations run: {', '.join(names) or 'none'}"
-    )
-    return status_of(ingested.set_aside)
-
-
-@main.command()
-@CAMPAIGN
-@OUT
-@DRY_RUN
-@_fit_options
-@_model_options
-@command_options
-def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
-    """Compare the measurements with the model.
-
-    The model is calibrated on the flat sample alone. Writes comparison.csv and the figures in addition to the files
-    of tribo fit.
-    """
-    return _walk(console, campaign, out, "compare", dry_run, **options)
-
-
-@main.command()
-@click.argument("campaign", required=False, type=GivenPath())
-@OUT
-@click.option("--published", type=click.Choice(["berardo2019"]), help="Diagnose a published table instead of CAMPAIGN.")
-@click.option(
-    "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
-)
-@FLAT
-@reading_options
-@ZEROS[0]
-@ZEROS[1]
-@OVERRIDES
-@command_options
-def diagnose(
-    console: Console,
-    campaign: Path | None,
-    out: Output,
-    published: str | None,
-    columns: str,
-    stated: dict[str, float],
-    **options: Any,
-) -> int:
-    """Find where the model fails, and the likely cause.
-
-    Writes verdict.json and the figures of the diagnosis. Where the data do not allow a conclusion, the verdict says
-    so.
-    """
-    if (campaign is None) == (published is None):
-        raise click.UsageError("give either a CAMPAIGN or --published with the name of a table")
-    if campaign is None:
-        return _diagnose_published(console, out, options["seed"])
-    from tribo import stages
-    from tribo.campaign import open_campaign
-    from tribo.report import write_until
-    from tribo.report.drawings import Drawing
-    from tribo.report.words.verdict_text import verdict_text
-    from tribo.store.kept_results import Shelf
-
-    with out.taken(campaign), open_campaign(campaign) as opened, console.progress() as progress:
-        chosen = stages.StudyOptions(kept=out.kept, **options)
-        study = stages.study(with_reading_options(opened, columns, stated), chosen, until="ingest", progress=progress)
-        found = _diagnosis(study, chosen, progress)
-        drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
-        write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found)
-    verdict = found.verdict
-    console.result(verdict.as_dict(), verdict_text(verdict))
-    console.list_tests("set aside", study.ingested.set_aside, level=-1)
-    return status_of(study.ingested.set_aside)
-
-
-def _diagnose_published(console: Console, out: Output, seed: int) -> int:
-    """The verdict on Table 2 of Berardo et al. (2019), for every interpretation of what it leaves open."""
-    from tribo.diagnose.from_table.published_diagnosis import diagnose_published
-    from tribo.published import BERARDO2019, data_dir, load_table2, load_table2_simulated_anew
-    from tribo.report.provenance import provenance_of_table
-    from tribo.report.table_report import write_published
-    from tribo.report.words.verdict_text import verdict_text
-
-    folder, tables = data_dir() / BERARDO2019, ("table2.csv", "table2_tribo.csv")
-    with out.taken(folder), console.progress() as progress:
-        found = diagnose_published(load_table2(), load_table2_simulated_anew(), seed=seed, progress=progress)
-        write_published(found, out.path, provenance_of_table(folder, tables, command_line(), seed, now()))
-    console.result(found.verdict.as_dict(), verdict_text(found.verdict))
-    return 0
-
-
-@main.command()
-@CAMPAIGN
-@OUT
-@DRY_RUN
-@_fit_options
-@_model_options
-@command_options
-def report(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
-    """Run every stage and write the report.
-
-    Runs ingest, fit, compare and diagnose on CAMPAIGN. Writes their files, report.html, report.pdf and
-    ro-crate-metadata.json.
-    """
-    return _walk(console, campaign, out, "report", dry_run, **options)
+for command in (
+    build, init, schedule, simulate, discover, ingest, fit, predict, compare, diagnose, report, demo,
+):  # fmt: skip
+    main.add_command(command)
 
 
 @main.command()
@@ -312,8 +58,12 @@ def verify(console: Console, out: Path, campaign: Path | None, **_: Any) -> int:
 
 @main.command()
 @CAMPAIGN
+@click.option(
+    "--with", "law_file", type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="LAW.TOML",
+    help="State whether the design would show this law of an earlier campaign.",
+)
 @command_options
-def plan(console: Console, campaign: Path, **_: Any) -> None:
+def plan(console: Console, campaign: Path, law_file: Path | None, **_: Any) -> None:
     """Assess a test plan before measuring.
 
     States which effects the tests listed in CAMPAIGN could detect and which they could not distinguish. The exports
@@ -323,26 +73,18 @@ def plan(console: Console, campaign: Path, **_: Any) -> None:
 
     from tribo.campaign import open_campaign
     from tribo.diagnose import plan_design
+    from tribo.diagnose.discovery.law_file import read_law
+    from tribo.diagnose.discovery.planned_law import plan_law
     from tribo.report.words.verdict_text import plan_text
 
+    law = read_law(law_file) if law_file is not None else None
     with open_campaign(campaign, measured=False) as opened:
         planned = plan_design(opened)
+        shown = plan_law(opened, *law) if law is not None else None
     record = {"tests": planned.n_tests, "findings": [asdict(f) for f in planned.findings], "tied": planned.tied}
-    console.result(record, plan_text(planned))
-
-
-@main.command()
-@output_options("out/demo")
-@_fit_options
-@_model_options
-@command_options
-def demo(console: Console, out: Output, **options: Any) -> int:
-    """Write the report on the bundled example."""
-    from tribo.published import data_dir
-
-    status = _walk(console, data_dir() / "example", out, "report", False, **options)
-    console.say(f"open {out.path / 'report.html'}")
-    return status
+    if shown is not None:
+        record["law"] = asdict(shown)
+    console.result(record, "\n".join([*([shown.text] if shown is not None else []), plan_text(planned)]))
 
 
 @main.command()
@@ -400,93 +142,3 @@ def doctor(console: Console, **_: Any) -> int:
     found = examine()
     console.result(found, in_words(found))
     return 0 if found["healthy"] else 1
-
-
-def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool, columns: str, **options: Any) -> int:
-    """Run the stages up to ``until`` on one campaign and write their results."""
-    from tribo import stages
-    from tribo.campaign import open_campaign
-    from tribo.report import write_until
-    from tribo.report.drawings import Drawing
-    from tribo.store.kept_results import Shelf
-
-    stated = options.pop("stated")
-    chosen = stages.StudyOptions(kept=out.kept, **options)
-    if dry_run:
-        out.check(path)
-        with open_campaign(path) as described:
-            planned = stages.plan(with_reading_options(described, columns, stated), chosen, until)
-            console.result(planned, _plan_text(planned, out.path))
-            return status_of(described.set_aside)
-    with out.taken(path), open_campaign(path) as described, console.progress() as progress:
-        study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
-        compared = until == "report" and study.comparison is not None
-        study, found = _diagnosed(study, chosen, progress) if compared else (study, None)
-        drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
-        write_until(study, out.path, until, drawing, provenance_of_run(study, path, chosen), found)
-    return _conclude(console, study, out.path, found.verdict if found else None)
-
-
-
-
-def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[Study, Diagnosis | None]:
-    """The diagnosis of a study; a note instead where there is too little to diagnose."""
-    from dataclasses import replace
-
-    from tribo.errors import FitError, TriboError, unexpected
-
-    try:
-        return study, _diagnosis(study, chosen, progress)
-    except FitError as why:
-        return replace(study, notes=(*study.notes, f"no diagnosis: {why}")), None
-    except (TriboError, OSError):
-        raise
-    except Exception as why:  # the other results stand without it
-        problem = unexpected(why, "the diagnosis stopped")
-        return replace(study, notes=(*study.notes, f"no diagnosis: {problem}")), None
-
-
-def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis:
-    from tribo.stages import diagnosis
-
-    return diagnosis(study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, progress=progress)
-
-
-def _conclude(console: Console, study: Study, out: Path, verdict: Verdict | None = None) -> int:
-    """Print the results and the tests set aside; return the exit status."""
-    from dataclasses import asdict
-
-    from tribo.report import summary_text, table2_text
-    from tribo.report.result_tables import fits_table
-    from tribo.report.words.verdict_text import verdict_text
-
-    set_aside = study.ingested.set_aside
-    doubts = study.ingested.doubts()
-    fits = fits_table(study.fits).astype(object)
-    record = {
-        "out": str(out),
-        "tests": len(study.ingested.pulls),
-        "set_aside": set_aside_record(set_aside),
-        "used_with_doubts": set_aside_record(doubts),
-        "problems": [asdict(p) for p in study.ingested.campaign.problems],
-        "notes": list(study.notes),
-        "fits": fits.where(fits.notna(), None).to_dict("records"),
-        "power": list(study.power),
-        "outlying": list(study.outlying),
-        "differences": [] if study.differences is None else study.differences.to_dict("records"),
-        "verdict": verdict.verdict if verdict else None,
-    }
-    words = [table2_text(study)] if study.fits else []
-    looks = ["\n".join(lines) for lines in (study.power, study.outlying) if lines]
-    said = [verdict_text(verdict)] if verdict else []
-    console.result(record, "\n\n".join([*words, summary_text(study), *said, *looks]))
-    for note in study.notes:
-        console.say(f"note: {note}", level=-1)
-    console.list_tests("set aside", set_aside, level=-1)
-    console.list_tests("used with doubts", doubts)
-    return status_of(set_aside)
-
-
-def _plan_text(planned: dict[str, Any], out: Path) -> str:
-    lines = [f"would {step}" for step in planned["steps"]]
-    return "\n".join([*lines, f"would write into {out}", *(f"set aside: {s}" for s in planned["set_aside"])])

@@ -9,9 +9,12 @@ import click
 
 from tribo.cli.console import Console, command_options
 from tribo.cli.reading_options import corrected, reading_options
+from tribo.errors import Problem
 
 if TYPE_CHECKING:
-    from tribo.ingestion.draft import Draft
+    from tribo.ingestion.draft import Draft, Stated
+
+_TABLE = "--table sample=COLUMN,normal_load_N=COLUMN,coefficient=COLUMN"
 
 
 @click.command()
@@ -32,7 +35,12 @@ if TYPE_CHECKING:
 @click.option(
     "--table", default="", metavar="COLUMN=NAME,...",
     help="The file given by --from is a table of evaluated forces, one row a test: its column for each column of "
-    "tests.csv, such as sample=Material,normal_load_mN=Load,coefficient=CoF.",
+    "tests.csv, such as sample=Material,normal_load_mN=Load,coefficient=CoF. [default: proposed where the file is no "
+    "export]",
+)  # fmt: skip
+@click.option(
+    "--fill", default="", metavar="COLUMN=VALUE,...",
+    help="Columns of tests.csv with one value for all tests that do not say otherwise, such as mass_g=30.7.",
 )  # fmt: skip
 @click.option("--area-mm2", type=click.FloatRange(min=0, min_open=True), help="Nominal contact area.")
 @click.option("--dry-run", is_flag=True, help="Show both files without writing anything.")
@@ -47,14 +55,13 @@ def init(console: Console, folder: Path, raw: Path | None, dry_run: bool, **opti
     """
     if raw is None:
         return _template(console, folder)
-    from tribo.ingestion.draft import draft_campaign
     from tribo.ingestion.draft_files import texts, write_draft
 
     stated = _stated(options)
-    draft = _from_table(raw, options["table"]) if options["table"] else draft_campaign(raw, stated)
+    draft = _from_table(raw, options["table"]) if options["table"] else _from_exports(raw, stated)
     contents = texts(folder, draft, stated, options["area_mm2"])
     if not dry_run:
-        write_draft(folder, contents, None if options["table"] else raw)
+        write_draft(folder, contents, raw if draft.of_exports else None)
     record = {
         "folder": str(folder), "rows": draft.rows, "found": draft.found, "missing": draft.missing,
         "not_read": draft.not_read, "files": {path.name: text for path, text in contents.items()},
@@ -80,7 +87,24 @@ def _from_table(path: Path, mapping: str) -> Draft:
     return draft_from_table(path, columns_from_text(mapping))
 
 
-def _stated(options: dict[str, Any]) -> Any:
+def _from_exports(raw: Path, stated: Stated) -> Draft:
+    """The draft of a folder of exports; of one table of evaluated forces where the columns say that it is one."""
+    from tribo.errors import CampaignError
+    from tribo.ingestion.draft import draft_campaign, exports_in
+    from tribo.ingestion.draft_table import draft_from_table, is_table_of_forces
+
+    (file, *more) = exports_in(raw).values()
+    if not more and is_table_of_forces(file):
+        return draft_from_table(file, {})
+    try:
+        return draft_campaign(raw, stated)
+    except CampaignError as why:
+        what = "a table of forces that were evaluated elsewhere is read with --table"
+        hints = [] if more else [Problem("no_export", what, allowed=_TABLE)]
+        raise CampaignError([*why.problems, *hints]) from None
+
+
+def _stated(options: dict[str, Any]) -> Stated:
     from tribo.ingestion.draft import Stated
     from tribo.ingestion.file_names import name_pattern
     from tribo.readers import columns_from_text
@@ -91,6 +115,7 @@ def _stated(options: dict[str, Any]) -> Any:
         records=name_pattern(options["records"]) if options["records"] else None,
         columns=columns_from_text(options["columns"]) if options["columns"] else {},
         correction=corrected(UNCORRECTED, options["stated"]),
+        filled=columns_from_text(options["fill"]) if options["fill"] else {},
     )
 
 

@@ -6,16 +6,18 @@ import numpy as np
 
 from tribo.diagnose.conclusion import Findings, conclude
 from tribo.diagnose.diagnosis_record import Diagnosis
+from tribo.diagnose.discovery.across_verdict import with_law_across
+from tribo.diagnose.discovery.in_verdict import with_laws
 from tribo.diagnose.search.looks import all_looks
 from tribo.diagnose.search.naming import Rules, name_causes
 from tribo.diagnose.search.screen import Progress, screen
 from tribo.diagnose.sentences import exclusions
 from tribo.diagnose.statistics.direct_evidence import trace_findings
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linearisation import start_effects
 from tribo.diagnose.statistics.model import setup
 from tribo.diagnose.statistics.observations import enough, observe
 from tribo.diagnose.statistics.predictor import Predictor, tabled_predictor
+from tribo.diagnose.statistics.start_effects import start_effects
 from tribo.diagnose.verdict import Misfit, Verdict
 from tribo.records import Ingested
 
@@ -31,7 +33,7 @@ def diagnose(
     predictor: Predictor | None = None,
     progress: Progress | None = None,
 ) -> Verdict:
-    """Find out whether the calibrated model fails on a campaign beyond chance, and which mechanism explains it.
+    """Find out whether the calibrated model fails on a campaign beyond chance, and which mechanism or law explains it.
 
     Parameters
     ----------
@@ -51,7 +53,8 @@ def diagnose(
     Verdict
         The record behind verdict.json.
     """
-    return examine(ingested, seed=seed, level=level, predictor=predictor, progress=progress).verdict
+    examined = examine(ingested, seed=seed, level=level, predictor=predictor, progress=progress)
+    return with_law_across(with_laws(examined, seed=seed, level=level, progress=progress), seed=seed).verdict
 
 
 def examine(
@@ -63,7 +66,7 @@ def examine(
     progress: Progress | None = None,
     replicates: tuple[int, int] = (REPLICATES, REPLICATES_LEFT),
 ) -> Diagnosis:
-    """:func:`diagnose`, with the fitted models and screens kept. Raises FitError below twelve usable tests."""
+    """:func:`diagnose` without laws, with the fitted models and screens kept. Raises FitError below twelve tests."""
     rng = np.random.default_rng(seed)
     observations = enough(observe(ingested))
     s = setup(observations, predictor or tabled_predictor(observations.patterns))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,12 +11,16 @@ from tribo.diagnose.search.naming import Named
 from tribo.diagnose.search.screen import Screen
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.verdict import Verdict
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from tribo.diagnose.discovery.search import Discovery
 
+
+@displayed(lambda s: ", ".join(s.mechanisms))
 @dataclass(frozen=True)
 class SimulatedExtension:
     """What the spring-block model itself gives with the named mechanisms in it.
@@ -42,6 +46,7 @@ class SimulatedExtension:
         return float(100 * np.sqrt(np.mean((left - right) ** 2)))
 
 
+@displayed(lambda s: ", ".join(s.mechanisms))
 @dataclass(frozen=True)
 class NotSimulated:
     """Named mechanisms that could not be simulated, and why."""
@@ -50,11 +55,13 @@ class NotSimulated:
     reason: str
 
 
+@displayed(lambda d: d.verdict.verdict)
 @dataclass(frozen=True)
 class Diagnosis:
     """A verdict with what it rests on, for figures and tables.
 
-    ``simulated`` is the extended model run in the simulator itself, where that was asked for and possible.
+    ``simulated`` is the extended model run in the simulator itself, where that was asked for and possible; ``laws`` is
+    the search for the laws of what the causes leave, where something was left.
     """
 
     verdict: Verdict
@@ -62,3 +69,9 @@ class Diagnosis:
     screened: Screen
     named: Named | None
     simulated: SimulatedExtension | None = None
+    laws: Discovery | None = None
+
+    def without_columns(self) -> Diagnosis:
+        """The same without the columns of the looks, which nothing needs once the verdict stands."""
+        named = self.named and replace(self.named, left=self.named.left.without_columns())
+        return replace(self, screened=self.screened.without_columns(), named=named)

@@ -10,6 +10,7 @@ import numpy as np
 
 from tribo.diagnose.search.naming import Named
 from tribo.diagnose.search.weighing import Candidate
+from tribo.diagnose.statistics.bordered import model_columns
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import effect_of, log_forces
 from tribo.diagnose.terms import in_words
@@ -153,8 +154,8 @@ def _distance2(f: ModelFit, difference: FloatArray, rows: np.ndarray) -> float:
 
     s = f.setup
     noise = block_diag(*f.noise.per_test(s)[rows])
-    flat = s.random[rows].reshape(-1, s.random.shape[2])
-    q = s.random.shape[2]
-    total = noise + flat @ f.covariance[-q:, -q:] @ flat.T
+    effects = s.random_effects.take(rows)
+    without_law = np.zeros((len(rows), 2, f.linear.columns.parameters))
+    total = noise + f.inverse.between(model_columns(without_law, effects), effects.specimen)
     vector = difference.ravel()
     return float(vector @ np.linalg.solve(total, vector))

@@ -7,12 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tribo.diagnose.search.rivals import ALIKE
-from tribo.diagnose.statistics.linearisation import Linear, ModelFit, StartEffects, begin, scored, start_effects
+from tribo.diagnose.statistics.courses import added
+from tribo.diagnose.statistics.linearisation import Linear, ModelFit, begin, scored
 from tribo.diagnose.statistics.model import Acting, Setup, Target, predict, setup
 from tribo.diagnose.statistics.observations import NO_FLAT, Observations, conditions_of
 from tribo.diagnose.statistics.predictor import Predictor, tabled_predictor
 from tribo.diagnose.statistics.scatter import Noise
+from tribo.diagnose.statistics.start_effects import StartEffects, start_effects
 from tribo.diagnose.terms import ABSORBED, not_varied
+from tribo.display import displayed
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray
 
@@ -40,6 +43,7 @@ class Finding:
     separates: str
 
 
+@displayed()
 @dataclass(frozen=True)
 class Plan:
     """What a design can show of each mechanism, the easiest first."""
@@ -68,10 +72,11 @@ def plan_design(
     law : array (4,)
         Expected flat law: mu and tau0 in kPa, static then sliding.
     """
-    f = _expected(campaign, noise, law, predictor)
+    f = expected_fit(campaign, noise, law, predictor)
     effects = start_effects(f)
     first = _one_each(effects)
-    acting, columns = [effects.acting[k] for k in first], effects.changes.columns[:, :, first]
+    acting = [effects.acting[k] for k in first]
+    columns = np.concatenate([added(effects.changes.courses[k]) for k in first], axis=2)
     left = f.linear.cleared(columns)[0]
     size = np.sqrt(np.sum(left**2, axis=0))
     cosine = (left.T @ left) / np.maximum(size[:, None] * size[None, :], 1e-12)
@@ -81,7 +86,7 @@ def plan_design(
     return Plan(f.setup.observations.n, (*found, *_not_applying(f.setup)))
 
 
-def _expected(campaign: Campaign, noise: Noise, law: FloatArray, predictor: Predictor | None) -> ModelFit:
+def expected_fit(campaign: Campaign, noise: Noise, law: FloatArray, predictor: Predictor | None) -> ModelFit:
     """The model as it would be fitted if the campaign came out exactly as expected."""
     tests = list(campaign.tests)
     n, patterns = len(tests), dict(campaign.samples)
@@ -95,13 +100,12 @@ def _expected(campaign: Campaign, noise: Noise, law: FloatArray, predictor: Pred
         flat=campaign.flat_sample or NO_FLAT,
     )  # fmt: skip
     s = setup(o, predictor or tabled_predictor(patterns))
-    q = s.random.shape[2]
     s = replace(s, observations=replace(o, log_force=predict(s, law, (), ())))
     state = begin(s, law, np.zeros((n, 2)), noise)
     jacobian = Target(s, ()).jacobian(law, s.observations.log_force - state.residual)
     score, weight = scored(s, state)
-    linear = Linear(jacobian, s.random, state.residual, state.at.factor, state.at.precision, weight)
-    return ModelFit(s, (), law, (), noise, state.effects, state.residual, score, np.zeros((4 + q, 4 + q)), linear)
+    linear = Linear(jacobian, s.random_effects, state.residual, state.at.factor, state.at.precision, weight)
+    return ModelFit(s, (), law, (), noise, state.effects, state.residual, score, linear.inverse, linear)
 
 
 def _one_each(effects: StartEffects) -> list[int]:

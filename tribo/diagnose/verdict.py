@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
+from tribo.display import displayed
 from tribo.records import SetAside
 
 SCHEMA = "tribo.verdict/2"
@@ -16,9 +17,14 @@ LayerKind = Literal["pattern_correction", "cause", "law", "remainder"]
 CERTAIN_CAUSES: tuple[Outcome, ...] = ("named", "undetermined", "partly")  # verdicts that hold causes
 
 
+@displayed()
 @dataclass(frozen=True)
 class Misfit:
-    """Where the model fails: which observable follows which covariate, the size, and the adjusted p value."""
+    """Where the model fails: which observable follows which covariate, the size, and the adjusted p value.
+
+    ``effect_percent`` is 100 (measured / model - 1), or the change of measured / model from one end of the covariate to
+    the other, as ``text`` says, with its 90 % interval.
+    """
 
     observable: str
     sample: str
@@ -26,8 +32,11 @@ class Misfit:
     effect_percent: float
     p_adjusted: float
     text: str
+    low: float = math.nan
+    high: float = math.nan
 
 
+@displayed()
 @dataclass(frozen=True)
 class Estimate:
     """A recovered parameter with its 90 % interval."""
@@ -38,6 +47,7 @@ class Estimate:
     unit: str
 
 
+@displayed()
 @dataclass(frozen=True)
 class Cause:
     """A mechanism that explains the misfit. ``weight`` is its share among all that were weighed."""
@@ -48,6 +58,7 @@ class Cause:
     text: str
 
 
+@displayed()
 @dataclass(frozen=True)
 class Excluded:
     """A mechanism that was left out of the weighing or lost, and why."""
@@ -56,9 +67,11 @@ class Excluded:
     reason: str
 
 
+@displayed()
 @dataclass(frozen=True)
 class Gain:
-    """What the extended model gains on tests it has not seen: log scores per test, and RMSE of ln T."""
+    """What the extended model gains on tests it has not seen: log scores per test, and the root mean square of
+    100 (measured / predicted - 1)."""
 
     held_out: str
     log_score_baseline: float
@@ -69,13 +82,15 @@ class Gain:
     rmse_percent_after: float
 
 
+@displayed()
 @dataclass(frozen=True)
 class Layer:
     """One part of what explains a campaign, with its evidence beside all other layers.
 
     ``effect_percent`` is 100 (measured / model - 1) of a pattern correction, and the largest signed change of T by a
     cause, with a 90 % interval from ``low`` to ``high``; of a remainder it is the peak-to-peak effect. ``tied_with``
-    are mechanisms that the design cannot distinguish from it, ``gain`` what the layer gains on tests left out.
+    are mechanisms that the design cannot distinguish from it, ``gain`` what the layer gains on tests left out, ``at``
+    the sample, regime and load at which a cause acts most.
     """
 
     kind: LayerKind
@@ -91,8 +106,10 @@ class Layer:
     tied_with: tuple[str, ...] = ()
     gain: Gain | None = None
     text: str = ""
+    at: str = ""
 
 
+@displayed()
 @dataclass(frozen=True)
 class NextTest:
     """The test that best distinguishes mechanisms that explain a campaign about equally."""
@@ -103,6 +120,7 @@ class NextTest:
     expected_bits: float
 
 
+@displayed()
 @dataclass(frozen=True)
 class Verdict:
     """The outcome of a diagnosis."""

@@ -48,8 +48,7 @@ def draw(numbers: pd.DataFrame) -> Figure:
     """Left the size of what was seen, right the power for what may be hidden."""
     rows = numbers[numbers["mark"] == "mechanism"].reset_index(drop=True)
     height_mm = max(ROW_MM * len(rows), 34.0) + FRAME_MM
-    figure = Figure(figsize=(style.COLUMN_WIDTH_MM / style.MM_PER_INCH, height_mm / style.MM_PER_INCH),
-                    layout="constrained")  # fmt: skip
+    figure = style.page_figure(height_mm)
     left, right = figure.subplots(1, 2, width_ratios=(1, 1.5))
     _chance(left, numbers)
     _sizes(right, rows)

@@ -64,8 +64,7 @@ def _status(d: Diagnosis) -> dict[str, str]:
 def draw(numbers: pd.DataFrame) -> Figure:
     """Bars for what was weighed, the best first; below, in words, what could not be."""
     height_mm = ROW_MM * len(numbers) + FRAME_MM
-    figure = Figure(figsize=(style.COLUMN_WIDTH_MM / style.MM_PER_INCH, height_mm / style.MM_PER_INCH),
-                    layout="constrained")  # fmt: skip
+    figure = style.page_figure(height_mm)
     ax = figure.subplots()
     rows = numbers.reset_index(drop=True)
     weighed = rows[rows["status"] != "out"]

@@ -135,8 +135,7 @@ def draw_readings(numbers: pd.DataFrame) -> Figure:
     mechanisms = list(order.sort_values(["other", "gain"], ascending=[True, False]).index)
     grid = numbers.pivot_table(index="reading", columns="mechanism", values="gain").loc[readings["reading"], mechanisms]
     height_mm = 5.2 * len(readings) + 48
-    figure = Figure(figsize=(style.COLUMN_WIDTH_MM / style.MM_PER_INCH, height_mm / style.MM_PER_INCH),
-                    layout="constrained")  # fmt: skip
+    figure = style.page_figure(height_mm)
     ax = figure.subplots()
     colours = LinearSegmentedColormap.from_list("gain", ["#FFFFFF", style.BLUE])
     values = grid.to_numpy(float)

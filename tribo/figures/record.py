@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+from tribo.display import displayed
 from tribo.records import Study
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 Of = TypeVar("Of")
 
 
+@displayed()
 @dataclass(frozen=True)
 class FigureOf(Generic[Of]):
     """One figure of a record of type ``Of``.

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tribo.display import displayed
 from tribo.fitting.budget import NUMBERS, PRESSURE_PA, label, sensitivities
 from tribo.records import LawFit, Regime
 
@@ -25,6 +26,7 @@ _LEVEL = 0.95
 _UNITS = {"mu": "", "tau0_kPa": " kPa", "T_N": " N"}
 
 
+@displayed()
 @dataclass(frozen=True)
 class PairedDifference:
     """One number ("mu", "tau0_kPa", "T_N" at ``pressure_Pa``) of ``sample`` minus that of ``other``, same specimens.

@@ -14,7 +14,7 @@ from tribo.campaign.stated import Columns
 from tribo.errors import CampaignError, Problem, ReadError, TriboError
 from tribo.ingestion.file_names import NamePattern, proposed_patterns, read_names
 from tribo.quantities import unit_factor
-from tribo.records import Correction, Trace
+from tribo.records import Correction, Test, Trace
 
 _NOT_LOOKED_AT = (".", "~$", "Thumbs.db")
 _NAMES_OR_UNITS = {
@@ -52,6 +52,8 @@ class Draft:
     missing: list[str] = field(default_factory=list)
     not_read: list[str] = field(default_factory=list)
     negative: bool = False  # the friction force is negative in every record
+    zero: str = ""  # of the force, where the exports show which is meant
+    of_exports: bool = True  # not of a table of evaluated forces
 
     @property
     def samples(self) -> list[str]:
@@ -67,6 +69,7 @@ class Stated:
     records: NamePattern | None = None
     columns: Columns = field(default_factory=dict)
     correction: Correction = field(default_factory=Correction)
+    filled: Mapping[str, str] = field(default_factory=dict)  # columns of tests.csv with one value for all tests
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,7 @@ def draft_campaign(raw: Path, stated: Stated) -> Draft:
         raise CampaignError([p for one in looked for p in one.problems[:1]])
     named = _named(used, stated.patterns, draft)
     for one in used:
-        draft.rows += _rows_of(one, named.get(one.file, {}), stated)
+        draft.rows += [_filled(row, stated.filled) for row in _rows_of(one, named.get(one.file, {}), stated)]
     _choose_records(draft.rows)
     _number_rows(draft.rows, raw.stem)
     _say_what_is_missing(draft, used, speed_given=stated.correction.speed_m_s is not None)
@@ -210,7 +213,7 @@ def _recorded(record: Trace) -> dict[str, str]:
     speed = record.columns.get("speed_m_s")
     if speed is not None and np.abs(speed).max() > 0:
         size = np.abs(speed)
-        found["speed_mm_s"] = f"{np.median(size[size >= 0.5 * size.max()]) * 1e3:.4g}"
+        found["speed_mm_s"] = f"{np.median(size[size >= 0.5 * size.max()]) * 1e3:.3g}"
     return {key: text for key, text in found.items() if float(text) > 0}
 
 
@@ -247,6 +250,11 @@ def started_at(metadata: Mapping[str, str]) -> str:
 
 def _month(word: str) -> int:
     return _MONTHS.index(word.lower()) + 1 if word.lower() in _MONTHS else 0
+
+
+def _filled(row: dict[str, str], given: Mapping[str, str]) -> dict[str, str]:
+    """A row with the given values in the columns that it leaves empty."""
+    return row | {column: value for column, value in given.items() if not row.get(column)}
 
 
 def _choose_records(rows: Sequence[dict[str, str]]) -> None:
@@ -297,7 +305,13 @@ def _signs(draft: Draft, readable: Sequence[_Looked]) -> None:
     if draft.negative:
         draft.found.append("the friction force is negative in every record: sign = -1 was written")
     mixed = [one.file for one in readable if len(one.records) == 1 and _takes_both_signs(one.records[0])]
-    if mixed:
+    if mixed and all(map(_positive_over_rest, records)):
+        draft.zero = "at rest"
+        draft.found.append(
+            f"the force takes both signs within {len(mixed)} records, and is positive against the level at which the "
+            'drive rests: zero = "at rest" was written'
+        )
+    elif mixed:
         draft.missing.append(
             f"the force takes both signs within {len(mixed)} records: state its zero in campaign.toml, and "
             f"sign = -1 if friction is negative ({_listed(mixed)})"
@@ -318,6 +332,18 @@ def _is_negative(record: Trace) -> bool:
 def _takes_both_signs(record: Trace) -> bool:
     low, high = _range(record)
     return low < 0 < high and min(-low, high) > _BOTH_SIGNS * max(-low, high)
+
+
+def _positive_over_rest(record: Trace) -> bool:
+    """Whether the force while sliding lies above the level at which nothing pulls, by the recorded drive or load."""
+    from tribo.traces import read_record
+    from tribo.zeroing import zero_choice
+
+    test = Test(record.name, record.file, "", math.nan, "", zero=zero_choice("at rest"))
+    try:
+        return read_record(record, test=test).sliding_N > 0
+    except TriboError:
+        return False
 
 
 def _listed(names: Iterable[str]) -> str:

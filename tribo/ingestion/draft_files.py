@@ -46,7 +46,8 @@ def _campaign_toml(name: str, draft: Draft, stated: Stated, area_mm2: float | No
     return _TOML.format(
         title=json.dumps(name, ensure_ascii=False),
         area=area,
-        stated="".join(f"{key} = {value:g}\n" for key, value in _corrections(draft, stated).items()),
+        stated="".join(f"{key} = {value:g}\n" for key, value in _corrections(draft, stated).items())
+        + (f"zero = {json.dumps(draft.zero)}\n" if draft.zero else ""),
         columns=_columns(stated),
         patterns="\n".join(f'[patterns.{json.dumps(s, ensure_ascii=False)}]\ncavity = "none"\n' for s in draft.samples),
     )

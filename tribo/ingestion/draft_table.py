@@ -9,6 +9,7 @@ from tribo.campaign.table import KNOWN, Table, read_table
 from tribo.errors import CampaignError, Problem
 from tribo.ingestion.draft import Draft
 from tribo.ingestion.file_names import as_column
+from tribo.ingestion.table_columns import proposed_mapping, repeated_or_derived
 
 _FORCES = ("static_N", "sliding_N", "static_mu", "sliding_mu", "coefficient")
 _LOADS = ("normal_load_N", "mass_g", "normal_stress_Pa")
@@ -17,8 +18,9 @@ _LOADS = ("normal_load_N", "mass_g", "normal_stress_Pa")
 def draft_from_table(path: Path, mapping: Mapping[str, str]) -> Draft:
     """The rows of tests.csv from a table; ``mapping`` gives its column for each column of tests.csv.
 
-    A column of tests.csv may carry another unit of its quantity: ``normal_load_mN``. Columns not mapped are kept
-    as covariates, unless every row has the same in them.
+    A column of tests.csv may carry another unit of its quantity: ``normal_load_mN``. Without a mapping one is proposed
+    from the names of the columns. Columns not mapped are kept as covariates, unless every row has the same in them,
+    they repeat a mapped column, or they are further figures of the evaluation.
 
     Raises
     ------
@@ -28,11 +30,14 @@ def draft_from_table(path: Path, mapping: Mapping[str, str]) -> Draft:
     table = read_table(path, path.name)
     if table is None or not table.rows:
         raise CampaignError(Problem("empty", "the table has no rows", file=path.name))
+    draft = Draft(of_exports=False)
+    if not mapping and (mapping := proposed_mapping(table)):
+        text = ",".join(f"{field}={name}" for field, name in mapping.items())
+        draft.found.append(f'columns "{text}" (proposed; give --table to read them otherwise)')
     if problems := _faults(table, mapping, path.name):
         raise CampaignError(problems)
-    draft = Draft()
-    taken = set(mapping.values())
-    kept = [n for n in table.names if n and n not in taken and n not in KNOWN and _varies(table, n)]
+    left_out = set(mapping.values()) | repeated_or_derived(table, dict(mapping))
+    kept = [n for n in table.names if n and n not in left_out and n not in KNOWN and _varies(table, n)]
     width = len(str(len(table.rows)))
     for k, row in enumerate(table.rows, start=1):
         stated = dict(as_column((field, _number(row.cells.get(name, "")))) for field, name in mapping.items())
@@ -42,6 +47,15 @@ def draft_from_table(path: Path, mapping: Mapping[str, str]) -> Draft:
         f"{len(table.rows)} rows with {', '.join(mapping)}; kept as covariates: {', '.join(kept) or 'none'}"
     )
     return draft
+
+
+def is_table_of_forces(path: Path) -> bool:
+    """Whether the columns of a file name a load and a friction, both with units, and no time."""
+    try:
+        table = read_table(path, path.name)
+    except (CampaignError, OSError):
+        return False
+    return table is not None and bool(proposed_mapping(table))
 
 
 def _varies(table: Table, name: str) -> bool:

@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 
+@displayed()
 @dataclass(frozen=True)
 class Variable:
     """A condition under which a law is evaluated: its argument name and SI unit ("" where dimensionless)."""
@@ -20,6 +22,7 @@ class Variable:
     unit: str
 
 
+@displayed()
 @dataclass(frozen=True)
 class Parameter:
     """A parameter of a law. ``low`` and ``high`` are the physical limits, not bounds of a fit."""
@@ -32,6 +35,7 @@ class Parameter:
     high: float = math.inf
 
 
+@displayed()
 @dataclass(frozen=True)
 class Law:
     """One friction law T(conditions; parameters), T in newton.

@@ -6,9 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from tribo.display import displayed
 from tribo.mechanisms.conditions import Base, Conditions, Values
 
 
+@displayed()
 @dataclass(frozen=True)
 class OnTest:
     """How a mechanism acts on one test: its values there, and the sample that takes the place of the labelled one."""
@@ -37,6 +39,12 @@ def unnamed(choice: str) -> str:
     return ""
 
 
+def one_part(choice: str) -> tuple[str, ...]:
+    """A choice stands for itself."""
+    return (choice,)
+
+
+@displayed()
 @dataclass(frozen=True)
 class Choosing:
     """What the choices of a mechanism mean.
@@ -54,6 +62,9 @@ class Choosing:
     held_out
         What cross-validation leaves out. "samples": whole samples, or specimens where there are fewer than four
         samples. "loads": whole loads, for a choice that cannot be learned from other samples or specimens.
+    parts
+        The choices whose changes of ln T, each on tests of its own, add up to that of a choice; the choice itself by
+        default.
     all_or_nothing_sd
         Standard deviation of the amplitude around its start value, where the effect is present as a whole or absent.
     """
@@ -63,6 +74,7 @@ class Choosing:
     on_test: Callable[[Values, str, Conditions, int], OnTest | None] = same_on_every_test
     in_one_run: Callable[[Conditions], str] = nothing_to_choose
     held_out: Literal["samples", "loads"] = "samples"
+    parts: Callable[[str], tuple[str, ...]] = one_part
     all_or_nothing_sd: float | None = None
 
 

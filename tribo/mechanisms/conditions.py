@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 StringArray = NDArray[np.str_]
@@ -17,6 +18,7 @@ REFERENCE_HOLD_S = 1.0
 REFERENCE_PRESSURE_PA = 1e4
 
 
+@displayed()
 @dataclass(frozen=True)
 class Forces:
     """Static and sliding friction force of every test, N, shape (n,)."""
@@ -25,6 +27,7 @@ class Forces:
     sliding_N: FloatArray
 
 
+@displayed()
 @dataclass(frozen=True)
 class Base:
     """The baseline law of every test, T = mu N + tau0 A, as arrays of shape (n,).
@@ -60,6 +63,7 @@ class Base:
         )
 
 
+@displayed()
 @dataclass(frozen=True)
 class Conditions:
     """What is recorded about every test, arrays of shape (n,); NaN where a column is not recorded.

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from tribo.display import displayed
+
 Quantity = Literal["zero", "zero drift", "rise"]
 
 
+@displayed()
 @dataclass(frozen=True)
 class TraceEvidence:
     """A quantity of the traces that equals the amplitude of a mechanism.
@@ -37,6 +40,7 @@ class TraceEvidence:
     contains: tuple[str, ...] = ()
 
 
+@displayed()
 @dataclass(frozen=True)
 class DirectMeasurement:
     """A measurement of the amplitude, with a standard uncertainty in the unit of the amplitude, and its duration."""
@@ -46,6 +50,7 @@ class DirectMeasurement:
     hours: float
 
 
+@displayed()
 @dataclass(frozen=True)
 class Variation:
     """A condition to vary so that a mechanism could show: in words, its column in tests.csv, and values."""

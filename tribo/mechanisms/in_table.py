@@ -6,7 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from tribo.display import displayed
 
+
+@displayed()
 @dataclass(frozen=True)
 class Readings:
     """A mechanism over all readings of the table that are possible for a line fit.
@@ -21,6 +24,7 @@ class Readings:
     flat_traction_Pa: float
 
 
+@displayed()
 @dataclass(frozen=True)
 class BenchTest:
     """A test at the bench that would decide what the table leaves open, and the mechanisms it separates."""
@@ -30,6 +34,7 @@ class BenchTest:
     design: Mapping[str, Any] = field(default_factory=dict)
 
 
+@displayed()
 @dataclass(frozen=True)
 class InTable:
     """A mechanism in the diagnosis of a published table.

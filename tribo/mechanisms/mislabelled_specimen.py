@@ -92,6 +92,16 @@ def _whole(made: list[tuple[str, str]]) -> list[tuple[str, list[str]]]:
     return sorted(labels.items(), key=lambda item: (-len(item[1]), item[0]))
 
 
+def parts(choice: str) -> tuple[str, ...]:
+    """Of two specimens that were swapped, what each of them behaves as; two labels of one specimen stay together."""
+    if BEHAVES in choice:
+        return (choice,)
+    (first, a), (second, b) = (_who(who) for who in choice.split(SWAPPED))
+    if first == second:
+        return (choice,)
+    return (f"{first} of {AND.join(sorted(a))}{BEHAVES}{b[0]}", f"{second} of {AND.join(sorted(b))}{BEHAVES}{a[0]}")
+
+
 def on_test(values: Values, choice: str, conditions: Conditions, test: int) -> OnTest | None:
     """The sample that the specimen of a test really is; None where its label is right."""
     here = (str(conditions.specimen[test]), str(conditions.sample[test]))
@@ -114,7 +124,8 @@ MECHANISM = Mechanism(
     silenced_by=("look at the specimen under a microscope",),
     choices=choices,
     plain="a mislabelled specimen",
-    choosing=Choosing(column="specimen", on_test=on_test, held_out="loads", all_or_nothing_sd=0.15),
+    meaning="a specimen rubs like another sample than the one on its label",
+    choosing=Choosing(column="specimen", on_test=on_test, held_out="loads", parts=parts, all_or_nothing_sd=0.15),
     placement=Placement(other_sample=True),
     measurement=DirectMeasurement("Look at the specimens under a microscope.", 0.1, 0.5),
     in_table=InTable(missing="no specimens are printed"),

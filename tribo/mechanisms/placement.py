@@ -8,10 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from tribo.display import displayed
 from tribo.mechanisms.conditions import Conditions, Values
 from tribo.records import FloatArray
 
 
+@displayed()
 @dataclass(frozen=True)
 class Contact:
     """The sample in the model: pressure and area fraction, and its own T/N so far, static and sliding."""
@@ -26,6 +28,7 @@ Gains = Callable[[Values, Contact], tuple[float, float]]  # static and sliding
 Profile = Callable[[Values, float, FloatArray], tuple[FloatArray, FloatArray]]
 
 
+@displayed()
 @dataclass(frozen=True)
 class Placement:
     """What a mechanism changes in the model; a field that is not given changes nothing. Gains are 1 at zero amplitude.

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from tribo.display import displayed
 from tribo.mechanisms.choosing import NO_CHOICE, Choosing, OnTest, no_choice
 from tribo.mechanisms.conditions import (
     REFERENCE_HOLD_S,
@@ -29,6 +30,7 @@ Law = Callable[[Values, Base, Conditions, str], Forces]
 Rise = Callable[[Values, FloatArray, Conditions], FloatArray]
 
 
+@displayed()
 @dataclass(frozen=True)
 class Parameter:
     """One number of a mechanism. ``zero`` is where the mechanism is absent (amplitudes only)."""
@@ -44,14 +46,16 @@ class Parameter:
     tries: tuple[float, ...] = ()  # further values a fit starts from
 
 
+@displayed()
 @dataclass(frozen=True)
 class Mechanism:
     """One reason why a measured campaign may differ from the baseline model.
 
     Parameters
     ----------
-    name, plain, kind
-        The name in a verdict; what it is called in a sentence (without one, the name with spaces); what it belongs to.
+    name, plain, meaning, kind
+        The name in a verdict; what it is called in a sentence (without one, the name with spaces); what that means, as
+        a clause; what it belongs to.
     formula, law, parameters
         ``parameters[0]`` is the amplitude: at its ``zero`` the law returns the baseline to the bit.
     sign
@@ -97,6 +101,7 @@ class Mechanism:
     rise: Rise | None = None
     choices: Callable[[Base, Conditions], tuple[str, ...]] = no_choice
     plain: str = ""
+    meaning: str = ""
     choosing: Choosing = NO_CHOICE
     placement: Placement = BY_LAW
     evidence: TraceEvidence | None = None
@@ -134,7 +139,7 @@ class Mechanism:
 
     def zero(self) -> Values:
         """Parameter values at which the mechanism is absent."""
-        return np.array([self.amplitude.zero, *(p.start for p in self.parameters[1:])])
+        return np.array([self.amplitude.zero, *(p.zero if p.amplitude else p.start for p in self.parameters[1:])])
 
     def start(self) -> Values:
         """Parameter values from which a fit starts: a clear effect."""

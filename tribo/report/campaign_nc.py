@@ -28,6 +28,7 @@ UNIT_ENDINGS = {
     "_percent": "percent",
 }  # fmt: skip
 OF_DIAGNOSIS = ("/residuals", "/extended_runs")  # groups that a diagnosis rewrites or leaves out as a whole
+OF_A_TEST = ("test_id", "sample", "specimen", "normal_load_N")  # what identifies a test in the dataset at the root
 _PLAIN_NUMBER = re.compile(r"-?(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d{1,2})?")  # 001 is a name
 UNITLESS = {"mu": "1", "mu_u": "1", "ratio": "1", "ratio_low": "1", "ratio_high": "1", "cov": "kPa"}
 
@@ -54,6 +55,8 @@ def write_store(
 ) -> Path:
     """Write out/campaign.nc, a DataTree with the groups tests, fits, comparison, simulated and traces.
 
+    The root holds the table of tests as well, so that ``xarray.open_dataset`` gives it without a word on groups.
+
     With a ``diagnosis`` also residuals, one row per test and regime under the calibrated and the extended model, and
     extended_runs, pairs of simulated runs without and with the named mechanisms.
 
@@ -61,7 +64,7 @@ def write_store(
     run of more stages on the same inputs wrote and that this study does not have.
 
     ``traces`` is a contiguous ragged array (CF conventions 9.3.3): the samples of all traces end to end, with
-    ``row_size`` samples and the first at ``row_start`` for each test. Times in s, forces in N as recorded
+    ``row_size`` samples and the first at ``row_start`` for each trace. Times in s, forces in N as recorded
     (the zero is not subtracted; it is ``zero_N`` in tests).
     """
     campaign = study.ingested.campaign
@@ -76,10 +79,11 @@ def write_store(
         about |= {"source": provenance.origin, "history": f"{provenance.started_at} {provenance.command}".strip()}
         about["provenance"] = json.dumps(provenance.as_record(), ensure_ascii=False, default=str)
     tests, own = result_tables.tests_table(study), result_tables.covariates(study)
-    groups = {"/": xr.Dataset(attrs=about), "/tests": _table(tests, "test", own)}
+    table = _table(tests, "test", own)
+    groups = {"/": table.set_coords(OF_A_TEST).assign_attrs(about), "/tests": table}
     groups["/traces"] = _ragged(study)
     if study.fits:
-        groups["/fits"] = _table(result_tables.fits_table(study.fits), "fit")
+        groups["/fits"] = _table(result_tables.fits_table(study.fits, study.combined), "fit")
         groups["/other_fits"] = _table(result_tables.other_fits_table(study), "parameter_row")
     if study.budget is not None:
         groups["/budget"] = _table(study.budget, "budget_row")
@@ -103,7 +107,7 @@ def _earlier(path: Path) -> dict[str, xr.Dataset]:
     """The groups of a file that is there, but the root; none where it cannot be read."""
     try:
         with xr.open_datatree(path, engine="h5netcdf") as tree:
-            return {f"/{node.name}": node.to_dataset().load() for node in tree.children.values()}
+            return {f"/{node.name}": node.to_dataset(inherit=False).load() for node in tree.children.values()}
     except (OSError, ValueError):
         return {}
 
@@ -157,10 +161,10 @@ def _ragged(study: Study) -> xr.Dataset:
     variables = {name: ("sample", values, _units(name)) for name, values in data.items()}
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64) if len(sizes) else sizes
     per_test = {
-        "test_id": ("test", np.array(list(traces), object), {"cf_role": "timeseries_id"}),
-        "file": ("test", np.array([t.file for t in traces.values()], object), {}),
-        "row_size": ("test", sizes, {"sample_dimension": "sample"}),
-        "row_start": ("test", starts, {}),
+        "test_id": ("trace", np.array(list(traces), object), {"cf_role": "timeseries_id"}),
+        "file": ("trace", np.array([t.file for t in traces.values()], object), {}),
+        "row_size": ("trace", sizes, {"sample_dimension": "sample"}),
+        "row_start": ("trace", starts, {}),
     }
     return xr.Dataset({**per_test, **variables}, attrs={"featureType": "timeSeries"})
 

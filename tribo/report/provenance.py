@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from tribo.display import displayed
 from tribo.errors import naming
 from tribo.escaping import well_formed
 from tribo.links import leads_out, paths_below
@@ -29,6 +30,7 @@ OVERRIDES = "--overrides"  # the table of manual decisions, among the inputs of 
 OPTIONS = {"rule": "Rule", "weights": "Weights", "flat": "Flat sample", "runs": "Simulations per load"}
 
 
+@displayed()
 @dataclass(frozen=True)
 class Provenance:
     """How a report was made. ``inputs`` maps each file of the campaign, by its path in it, to its SHA-256.

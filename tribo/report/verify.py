@@ -9,6 +9,7 @@ from html import unescape
 from pathlib import Path
 from typing import Any, Literal
 
+from tribo.display import displayed
 from tribo.errors import CampaignError, Problem
 from tribo.escaping import well_formed
 from tribo.links import leads_out
@@ -30,6 +31,7 @@ class Difference:
     file: str
 
 
+@displayed()
 @dataclass(frozen=True)
 class Verification:
     """What was compared, and all differences."""

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from tribo.display import displayed
 from tribo.records import FloatArray
 from tribo.simulate.config import PAPER, LocalFriction, SimConfig
 from tribo.simulate.ensemble import Progress, run_ensemble, stratified_design
@@ -41,6 +42,7 @@ def static_calibration(law: Law, blocks: int, spread: float = PAPER.mu_s_sd / PA
     return mean, spread * mean, tau0_Pa
 
 
+@displayed()
 @dataclass(frozen=True)
 class CalibrationRuns:
     """The runs that a calibration compares with the measured sliding law, ``iterations`` times over.

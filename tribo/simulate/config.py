@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal
 
+from tribo.display import displayed
 from tribo.errors import Problem, SimulationError
 from tribo.limits import LARGEST_NUMBER, MOST_BLOCKS, MOST_STEPS, SMALLEST_NUMBER
 from tribo.records import Pattern
@@ -21,6 +22,7 @@ Sticking = Literal["turned", "slow", "never"]
 BlockMass = Literal["layer", "cube"]
 
 
+@displayed()
 @dataclass(frozen=True)
 class LocalFriction:
     """Friction of single blocks: Gaussian coefficients and adhesion per area (Berardo 2019, Model parameters).
@@ -41,6 +43,7 @@ PAPER = LocalFriction()
 """The local friction of Berardo 2019, fitted there to the flat sample."""
 
 
+@displayed()
 @dataclass(frozen=True)
 class FrictionTerms:
     """Local friction that changes during a run; amplitudes of zero, the default, leave the baseline unchanged.
@@ -71,6 +74,7 @@ class FrictionTerms:
 NO_TERMS = FrictionTerms()
 
 
+@displayed(lambda c: f"{c.sample} at {c.pressure_Pa / 1e3:.4g} kPa, seed {c.seed}")
 @dataclass(frozen=True)
 class SimConfig:
     """One run. Lengths, times and pressures in SI units; the defaults are the baseline of Berardo 2019.

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tribo.display import exact_text
 from tribo.errors import Problem, SimulationError
 from tribo.records import Run
 from tribo.simulate.config import SimConfig
@@ -103,10 +104,13 @@ def run_stored(
     check_all(design)
     with only_writer_of(path, wait_s):
         _open_store(design, path, work)
-        missing = [k for k, done in enumerate(read_stored(path)[DONE]) if not done]
+        table = read_stored(path)
+        missing = [k for k, done in enumerate(table[DONE]) if not done]
         finished = len(design) - len(missing)
         if progress is not None:
             progress(finished, len(design))
+        if not missing:
+            return table
         given = _given(design)
         made_from = " ".join(identity(design, work).values())
         with _columns(path, work) as columns:
@@ -156,7 +160,7 @@ def fingerprint(design: Iterable[SimConfig], work: Work = FRICTION) -> str:
     """Hash of every field of every configuration, in order, and of what is done with them."""
     digest = hashlib.sha256(repr((list(work.units), work.label)).encode())
     for config in design:
-        digest.update(repr(config).encode())
+        digest.update(exact_text(config).encode())
     return digest.hexdigest()
 
 

@@ -164,62 +164,95 @@ def _parts(value: object) -> Iterable[object] | None:
 
 
 def encoded(value: Any) -> Any:
-    """A value as JSON can hold it, such that :func:`decoded` gives an equal one.
+    """A value as JSON can hold it, such that :func:`decoded` gives an equal one. A record or an array that is at
+    several places of the value is written once.
 
     Raises
     ------
     TypeError
         It holds something that is no record or function of tribo, array, table or plain value.
     """
-    if value is None or isinstance(value, str | bool):
-        return value
-    if isinstance(value, int | float | np.generic):
-        return value.item() if isinstance(value, np.generic) else value
-    if isinstance(value, np.ndarray) and value.dtype.kind != "O":
-        data = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode("ascii")
-        return {"array": data, "dtype": value.dtype.str, "shape": list(value.shape)}
-    if isinstance(value, list | np.ndarray):
-        return [encoded(part) for part in value]
-    if isinstance(value, tuple):
-        return {"tuple": [encoded(part) for part in value]}
-    if isinstance(value, Mapping):
-        return {"mapping": [[encoded(key), encoded(part)] for key, part in value.items()]}
-    if hasattr(value, "columns") and hasattr(value, "to_numpy"):
-        return {"table": [[str(name), encoded(value[name].to_numpy())] for name in value.columns]}
-    if is_dataclass(value) and type(value).__module__.startswith("tribo."):
-        values = [[field.name, encoded(getattr(value, field.name))] for field in fields(value) if field.init]
-        return {"record": f"{type(value).__module__}:{type(value).__qualname__}", "fields": values}
-    if isinstance(value, FunctionType) and _named(place := f"{value.__module__}:{value.__qualname__}") is value:
-        return {"function": place}
-    raise TypeError(f"a {type(value).__qualname__} cannot be kept")
+    return _Encoder().encoded(value)
+
+
+class _Encoder:
+    def __init__(self) -> None:
+        self.places: dict[int, int] = {}  # number of a record or array, by its identity
+        self.alive: list[object] = []  # so that no identity is given twice
+
+    def encoded(self, value: Any) -> Any:
+        if value is None or isinstance(value, str | bool):
+            return value
+        if isinstance(value, int | float | np.generic):
+            return value.item() if isinstance(value, np.generic) else value
+        if id(value) in self.places:
+            return {"again": self.places[id(value)]}
+        if isinstance(value, np.ndarray) and value.dtype.kind != "O":
+            data = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode("ascii")
+            return self._numbered(value, {"array": data, "dtype": value.dtype.str, "shape": list(value.shape)})
+        if isinstance(value, list | np.ndarray):
+            return [self.encoded(part) for part in value]
+        if isinstance(value, tuple):
+            return {"tuple": [self.encoded(part) for part in value]}
+        if isinstance(value, Mapping):
+            return {"mapping": [[self.encoded(key), self.encoded(part)] for key, part in value.items()]}
+        if hasattr(value, "columns") and hasattr(value, "to_numpy"):
+            return {"table": [[str(name), self.encoded(value[name].to_numpy())] for name in value.columns]}
+        if is_dataclass(value) and type(value).__module__.startswith("tribo."):
+            parts = [[field.name, self.encoded(getattr(value, field.name))] for field in fields(value) if field.init]
+            place = f"{type(value).__module__}:{type(value).__qualname__}"
+            return self._numbered(value, {"record": place, "fields": parts})
+        if isinstance(value, FunctionType) and _named(place := f"{value.__module__}:{value.__qualname__}") is value:
+            return {"function": place}
+        raise TypeError(f"a {type(value).__qualname__} cannot be kept")
+
+    def _numbered(self, value: object, record: dict[str, Any]) -> dict[str, Any]:
+        """Numbers are given in the order in which :class:`_Decoder` completes its records and arrays."""
+        self.places[id(value)] = len(self.alive)
+        self.alive.append(value)
+        return record
 
 
 def decoded(value: Any) -> Any:
     """The value that :func:`encoded` was given. Only records of tribo are ever constructed, and nothing is called."""
-    if isinstance(value, list):
-        return [decoded(part) for part in value]
-    if not isinstance(value, dict):
-        return value
-    if "array" in value:
-        flat = np.frombuffer(base64.b64decode(value["array"]), np.dtype(value["dtype"]))
-        return flat.reshape(value["shape"]).copy()
-    if "tuple" in value:
-        return tuple(decoded(part) for part in value["tuple"])
-    if "mapping" in value:
-        return {decoded(key): decoded(part) for key, part in value["mapping"]}
-    if "table" in value:
-        import pandas as pd
+    return _Decoder().decoded(value)
 
-        return pd.DataFrame({name: decoded(column) for name, column in value["table"]})
-    if "function" in value:
-        function = _named(value["function"])
-        if not isinstance(function, FunctionType):
-            raise TypeError(f"{value['function']} is no function of tribo")
-        return function
-    record = _named(value["record"])
-    if not (isinstance(record, type) and is_dataclass(record)):
-        raise TypeError(f"{value['record']} is no record of tribo")
-    return record(**{name: decoded(part) for name, part in value["fields"]})
+
+class _Decoder:
+    def __init__(self) -> None:
+        self.done: list[Any] = []
+
+    def decoded(self, value: Any) -> Any:
+        if isinstance(value, list):
+            return [self.decoded(part) for part in value]
+        if not isinstance(value, dict):
+            return value
+        if "again" in value:
+            return self.done[value["again"]]
+        if "array" in value:
+            flat = np.frombuffer(base64.b64decode(value["array"]), np.dtype(value["dtype"]))
+            return self._numbered(flat.reshape(value["shape"]).copy())
+        if "tuple" in value:
+            return tuple(self.decoded(part) for part in value["tuple"])
+        if "mapping" in value:
+            return {self.decoded(key): self.decoded(part) for key, part in value["mapping"]}
+        if "table" in value:
+            import pandas as pd
+
+            return pd.DataFrame({name: self.decoded(column) for name, column in value["table"]})
+        if "function" in value:
+            function = _named(value["function"])
+            if not isinstance(function, FunctionType):
+                raise TypeError(f"{value['function']} is no function of tribo")
+            return function
+        record = _named(value["record"])
+        if not (isinstance(record, type) and is_dataclass(record)):
+            raise TypeError(f"{value['record']} is no record of tribo")
+        return self._numbered(record(**{name: self.decoded(part) for name, part in value["fields"]}))
+
+    def _numbered(self, value: Any) -> Any:
+        self.done.append(value)
+        return value
 
 
 def _named(place: str) -> object:

@@ -28,6 +28,7 @@ PRODUCTS = frozenset({
     "verdict.json", "laws.csv", "dependence.csv", "restarts.csv", "discovery.json", "report.html", "report.pdf",
     "ro-crate-metadata.json",
 })  # fmt: skip
+PULL_PAGES = "pulls-*.html"  # of reports of many pulls
 OF_SYSTEMS = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 LEFTOVERS = (".part", ".lock")  # endings of hidden files that a killed process leaves
 MOST_NAMED = 5
@@ -173,7 +174,8 @@ def foreign_files(out: Path) -> list[str]:
     written = recorded_outputs(out)
     if written is not None:
         figures = [f"{FIGURES}/{p.name}" for p in (out / FIGURES).iterdir()] if (out / FIGURES).is_dir() else []
-        there = {*(name for name in PRODUCTS if (out / name).exists()), *figures}
+        pages = [path.name for path in out.glob(PULL_PAGES)]
+        there = {*(name for name in PRODUCTS if (out / name).exists()), *figures, *pages}
         return sorted(name for name in there - written if not is_leftover(name.rpartition("/")[2]))
     return sorted(path.name for path in out.iterdir() if not (_of_system(path) or _holds_kept_results(path)))
 

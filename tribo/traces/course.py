@@ -103,8 +103,8 @@ def _contact(load: FloatArray | None, samples: int) -> Range:
 
 
 def _moving(trace: Trace) -> Mask | None:
-    """Where the drive moves, by a recorded speed, else by a displacement that goes one way; None without either."""
-    speed = trace.columns.get("speed_m_s")
+    """Where the drive moves, by a recorded speed or rotation, else by a displacement that goes one way; else None."""
+    speed = trace.columns.get("speed_m_s", trace.columns.get("rotation_rev_per_s"))
     if speed is not None and np.isfinite(speed).all() and np.any(speed):
         pace = np.abs(median_of_three(speed))
         return pace > _AT_REST * float(np.percentile(pace, 95))

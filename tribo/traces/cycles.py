@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from tribo.display import displayed
 from tribo.errors import Problem, TraceError
 from tribo.records import FloatArray, Trace
 from tribo.traces.noise import condense, line
@@ -17,6 +18,7 @@ _LOADING = (0.5, 0.95)  # share of a loading in which its slope is taken: after 
 _SPIKE_SAMPLES = 5  # width of the median filter; impulses of up to two samples are taken out
 
 
+@displayed()
 @dataclass(frozen=True)
 class StickSlip:
     """Stick-slip cycles: K sticks that end at ``peak_s`` with ``peak_N``, and K - 1 slips and loadings between them.

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tribo.display import displayed
 from tribo.errors import Problem, TraceError
 from tribo.traces.apex import Apex, rounded_apex
 from tribo.traces.sliding import Motion, Window, settled
@@ -15,6 +16,7 @@ from tribo.traces.sliding import Motion, Window, settled
 Parameters = Mapping[str, float]
 
 
+@displayed()
 @dataclass(frozen=True)
 class Rule:
     """A rule: how it defines static and sliding friction, as text and as functions, and its source.

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tribo.display import displayed
 from tribo.errors import Problem, TraceError
 from tribo.records import FloatArray, Trace
 from tribo.traces.noise import median_of_three, running_mean, sample_noise, wander
@@ -22,6 +23,7 @@ _FRAGMENT = 0.2  # share of the median piece below which a piece is what a cut l
 _MIDDLE = (0.3, 0.7)  # share of a stroke in which its force is taken to tell its direction and zero
 
 
+@displayed()
 @dataclass(frozen=True)
 class Strokes:
     """Strokes with a common zero: each trace has positive friction and its zero subtracted.

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass
-from itertools import combinations
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, product
 
 import numpy as np
 
@@ -31,6 +31,15 @@ DAY_S = 86400.0
 WIDE = 3.0  # ratio of the largest to the smallest value above which a logarithm differs from a line
 LEVELS = 12  # names of a column that may each have an effect of its own
 CYCLES = 12  # of a wave over the series
+TENTHS = 10  # of the series: ends of its stretches
+WIDTHS = (30.0, 22.0, 16.0, 12.0, 9.0, 7.0, 5.5, 4.0)  # of humps, by how much less than the range
+SOFT = (120.0, 60.0, 40.0, 28.0, 20.0, 14.0, 10.0)  # the same of soft steps
+ZEROS = (-1.0, -0.4, 0.0, 0.15, 0.3, 0.5)  # of a factor, from the lowest value in shares of the range
+FINE = 41  # places of a shape that is looked at closely
+# Columns that say the same in another unit or count, so that their product is no law of two columns.
+ALIKE = (
+    frozenset({"pressure_Pa", "contact_pressure_Pa"}), frozenset({"run_order", "specimen_run", "elapsed_s"}),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -62,19 +71,19 @@ def shapes_of(c: Conditions, without: Collection[str] = ()) -> list[tuple[tuple[
     """Shapes of one column and products of two, each with what its choice costs; ``without`` some columns."""
     columns = {name: values for name, values in numeric_columns(c).items() if name not in without}
     found: list[tuple[tuple[Shape, ...], float]] = []
-    monotone = {}
+    monotone: dict[str, list[Shape]] = {}
     for name, values in columns.items():
         each = list(_of_column(name, values[np.isfinite(values)]))
-        monotone[name] = next(s for s in reversed(each) if s.kind in ("linear", "log"))
+        monotone[name] = [s for s in each if s.kind in ("linear", "log")]
         kinds = [s.kind for s in each]
         found += [((s,), float(np.log(kinds.count(s.kind)))) for s in each]
     for name, names in _named_columns(c).items():
         if name in without:
             continue
         found += [((Shape("level", name, level=level),), float(np.log(len(names)))) for level in names]
-    pairs = [p for p in combinations(columns, 2) if not all(name.endswith("pressure_Pa") for name in p)]
-    found += [((monotone[a], monotone[b]), float(np.log(len(pairs)))) for a, b in pairs]
-    return found
+    pairs = [p for p in combinations(columns, 2) if not any(set(p) <= alike for alike in ALIKE)]
+    products = [(one, other) for a, b in pairs for one in monotone[a] for other in monotone[b]]
+    return found + [(both, float(np.log(len(products)))) for both in products]
 
 
 def _of_column(name: str, x: FloatArray) -> Iterator[Shape]:
@@ -89,14 +98,97 @@ def _of_column(name: str, x: FloatArray) -> Iterator[Shape]:
     if len(distinct) > 4:
         for p in np.quantile(x, (0.2, 0.35, 0.5, 0.65, 0.8)):
             yield Shape("optimum", name, low, high, place=float(p))
-        yield from (Shape("saturating", name, low, high, width=(high - low) / k) for k in (20, 8, 3))
+        yield from _saturating(name, low, high, (20.0, 8.0, 3.0))
     if len(distinct) > 7:
+        yield from _ramps(name, x, (0.25, 0.5, 0.75))
+        for p in np.quantile(x, (0.2, 0.35, 0.5, 0.65, 0.8)):
+            yield from (Shape("soft step", name, low, high, place=float(p), width=(high - low) / k) for k in (40, 15))
         for p in np.quantile(x, np.arange(1, 8) / 8):
             yield from (Shape("hump", name, low, high, place=float(p), width=(high - low) / k) for k in (16, 8, 4))
     if name == "run_order" and len(distinct) > 18:
-        yield from (Shape("wave", name, low, high, width=(high - low + 1) / k) for k in range(1, CYCLES + 1))
+        yield from (Shape("wave", name, low, high, width=(high - low + 1) / k) for k in np.arange(1.0, CYCLES, 0.5))
+        yield from _windows(name, low, high, TENTHS)
     if name == "elapsed_s" and high - low > DAY_S:
         yield from (Shape("wave", name, low, high, width=DAY_S / k) for k in (1, 2, 3))
+
+
+def _saturating(name: str, low: float, high: float, times: Sequence[float]) -> Iterator[Shape]:
+    """From either end, with widths of so many times less than the range."""
+    for k in times:
+        yield Shape("saturating", name, low, high, width=(high - low) / k)
+        yield Shape("saturating", name, high, low, width=(low - high) / k)
+
+
+def _ramps(name: str, x: FloatArray, quantiles: Sequence[float]) -> Iterator[Shape]:
+    """Upwards and downwards from these quantiles."""
+    for p in np.quantile(x, quantiles):
+        for low, high in ((x.min(), x.max()), (x.max(), x.min())):
+            if p != high:
+                yield Shape("ramp", name, float(low), float(high), place=float(p))
+
+
+def _windows(name: str, low: float, high: float, parts: int) -> Iterator[Shape]:
+    """Stretches of whole parts of the range, of up to half of it, that touch neither end."""
+    step = (high - low) / parts
+    for first in range(1, parts):
+        for n in range(1, min(parts // 2, parts - 1 - first) + 1):
+            yield Shape("window", name, low, high, place=low + first * step, width=n * step)
+
+
+def fine_shapes(s: Shape, c: Conditions) -> list[Shape]:
+    """The shapes of the same kind on the same column with places and widths on a fine grid."""
+    if s.kind in ("linear", "log", "level"):
+        return [s]
+    values = column_values(c, s.column)
+    x = values[np.isfinite(values)]
+    low, high, distinct = float(x.min()), float(x.max()), np.unique(x)
+    reach = high - low
+    if s.kind == "step":
+        between = 0.5 * (distinct[1:] + distinct[:-1])
+        places = between if len(between) <= FINE else np.unique(np.quantile(between, np.linspace(0.04, 0.96, FINE)))
+        return [Shape("step", s.column, low, high, place=float(p)) for p in places]
+    if s.kind == "ramp":
+        return list(_ramps(s.column, x, tuple(np.linspace(0.05, 0.95, 19))))
+    if s.kind == "saturating":
+        return list(_saturating(s.column, low, high, (40.0, 25.0, 16.0, 10.0, 7.0, 5.0, 3.5, 2.5, 1.7, 1.2)))
+    if s.kind == "optimum":
+        return [Shape("optimum", s.column, low, high, place=float(p)) for p in np.linspace(low, high, FINE)]
+    if s.kind == "window":
+        return list(_windows(s.column, low, high, 2 * TENTHS))
+    if s.kind == "wave":
+        return [replace(s, width=s.width / (1.0 + k)) for k in np.linspace(-0.25, 0.25, FINE) * s.width / reach]
+    places = np.linspace(low, high, FINE)[1:-1]
+    widths = [reach / k for k in (WIDTHS if s.kind == "hump" else SOFT)]
+    return [Shape(s.kind, s.column, low, high, place=float(p), width=w) for p in places for w in widths]
+
+
+def fine_products(shapes: tuple[Shape, ...]) -> list[tuple[Shape, ...]]:
+    """Products of the same two shapes with the zero of each at several places."""
+    return list(product(*([_from_zero(s, share) for share in ZEROS] for s in shapes)))
+
+
+def _from_zero(s: Shape, share: float) -> Shape:
+    """A line or logarithm whose zero lies at a share of the way from ``low`` to ``high``."""
+    if s.kind == "log":
+        return replace(s, low=s.low * (s.high / s.low) ** share)
+    return replace(s, low=s.low + share * (s.high - s.low))
+
+
+def refined_shapes(s: Shape, c: Conditions) -> list[Shape]:
+    """Shapes about one of the fine grid, with places between its neighbours; none where the grid says all there is."""
+    if s.kind not in ("step", "ramp", "optimum", "hump", "soft step"):
+        return []
+    values = column_values(c, s.column)
+    x = np.unique(values[np.isfinite(values)])
+    near = 2.0 * float(np.ptp(x)) / (FINE - 1)
+    if s.kind == "step":
+        between = 0.5 * (x[1:] + x[:-1])
+        near = max(near, 3.0 * float(np.min(np.abs(np.diff(between)))) if len(between) > 1 else 0.0)
+        chosen = between[np.abs(between - s.place) <= near]
+        return [replace(s, place=float(p)) for p in chosen] if len(x) > FINE else []
+    places = np.clip(np.linspace(s.place - near, s.place + near, 21), x[0], x[-1])
+    widths = [s.width * k for k in (0.7, 0.85, 1.0, 1.2, 1.45)] if s.kind in ("hump", "soft step") else [s.width]
+    return [replace(s, place=float(p), width=w) for p in np.unique(places) for w in widths if p != s.high]
 
 
 def _named_columns(c: Conditions) -> dict[str, list[str]]:

@@ -7,31 +7,36 @@ from collections.abc import Mapping
 import numpy as np
 
 from tribo.diagnose.diagnosis import examine
+from tribo.diagnose.diagnosis_record import Diagnosis
 from tribo.diagnose.discovery.held import Held, holds
+from tribo.diagnose.discovery.in_verdict import uncontested
 from tribo.diagnose.discovery.search import Discovery, Progress, discover_laws
 from tribo.diagnose.discovery.written_law import WrittenLaw
-from tribo.diagnose.statistics.linearisation import ModelFit
-from tribo.diagnose.verdict import CERTAIN_CAUSES, Estimate
+from tribo.diagnose.verdict import Estimate
 from tribo.records import Ingested
+
+WITHOUT_MISFIT = 0.1  # of the level: the diagnosis did not ask for a law
 
 
 def discover_in(
     ingested: Ingested, *, seed: int = 0, level: float = 0.01, progress: Progress | None = None
 ) -> Discovery:
     """Search for the laws of what the causes of a campaign leave unexplained."""
-    model = _explained(ingested, seed, level, progress)
-    return discover_laws(model, level=level, rng=np.random.default_rng(seed), progress=progress)
+    d = examine(ingested, seed=seed, level=level, progress=progress)
+    return searched_laws(d, seed=seed, level=level, progress=progress)
+
+
+def searched_laws(d: Diagnosis, *, seed: int = 0, level: float = 0.01, progress: Progress | None = None) -> Discovery:
+    """The laws of what the causes of a diagnosis leave unexplained.
+
+    Where it found no misfit, a law has to be beyond chance at a tenth of the level.
+    """
+    strict = level if d.named is not None else WITHOUT_MISFIT * level
+    return discover_laws(uncontested(d)[0], level=strict, rng=np.random.default_rng(seed), progress=progress)
 
 
 def hold_law_against(
     ingested: Ingested, law: WrittenLaw, parameters: Mapping[str, Estimate], *, seed: int = 0, level: float = 0.01
 ) -> Held:
     """Whether a law of another campaign holds in this one, its own causes taken into account."""
-    return holds(_explained(ingested, seed, level, None), law, parameters)
-
-
-def _explained(ingested: Ingested, seed: int, level: float, progress: Progress | None) -> ModelFit:
-    """The model with the causes that are certain."""
-    d = examine(ingested, seed=seed, level=level, progress=progress)
-    certain = d.named is not None and d.named.causes and d.verdict.verdict in CERTAIN_CAUSES
-    return d.named.model if d.named is not None and certain else d.baseline
+    return holds(uncontested(examine(ingested, seed=seed, level=level))[0], law, parameters)

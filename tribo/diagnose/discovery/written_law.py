@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Choosing, Conditions, Forces, Mechanism, Parameter, Values, amplitude
+from tribo.display import displayed
+from tribo.mechanisms.record import Base, Choosing, Conditions, Forces, Mechanism, Values, amplitude
 from tribo.records import REGIMES, FloatArray
 
 T, LOAD_TERM, ADHESION_TERM = "T", "load term", "adhesion term"
@@ -19,14 +20,17 @@ UNITS = {
 LARGEST = 3.0  # of an amplitude in ln T
 
 
+@displayed()
 @dataclass(frozen=True)
 class Shape:
     """A function of one column x, about one in size.
 
-    ``linear`` and ``log`` run from 0 at ``low`` to 1 at ``high``; ``step`` is 1 above ``place``; ``optimum`` is a
-    parabola with 1 at ``place`` and 0 at the farther end; ``hump`` is a Gaussian of standard deviation ``width`` at
-    ``place``; ``saturating`` is 1 - exp(-(x - low) / width); ``wave`` is sin and cos of the period ``width``; ``level``
-    is 1 where a column of names has the value ``level``.
+    ``linear`` and ``log`` run from 0 at ``low`` to 1 at ``high``; ``step`` is 1 above ``place``; ``soft step`` is a
+    logistic function of the scale ``width`` about it; ``ramp`` is 0 up to ``place`` and runs to 1 at ``high``, which
+    may lie on either side; ``optimum`` is a parabola with 1 at ``place`` and 0 at the farther end; ``hump`` is a
+    Gaussian of standard deviation ``width`` at ``place``; ``saturating`` is 1 - exp(-(x - low) / width), from ``low``
+    upwards or, with a negative ``width``, downwards; ``window`` is 1 from ``place`` to ``place`` + ``width``; ``wave``
+    is sin and cos of the period ``width``; ``level`` is 1 where a column of names has the value ``level``.
     """
 
     kind: str
@@ -42,9 +46,10 @@ class Shape:
         if self.kind == "level":
             return np.asarray(c.columns[self.column] == self.level, float)[:, None]
         x = column_values(c, self.column)
-        return np.nan_to_num(self._of_numbers(x), nan=0.0)
+        return np.nan_to_num(self.of_numbers(x), nan=0.0)
 
-    def _of_numbers(self, x: FloatArray) -> FloatArray:
+    def of_numbers(self, x: FloatArray) -> FloatArray:
+        """Values at numbers x (n,), NaN where x is."""
         if self.kind == "linear":
             return ((x - self.low) / (self.high - self.low))[:, None]
         if self.kind == "log":
@@ -57,11 +62,19 @@ class Shape:
         if self.kind == "hump":
             return np.exp(-0.5 * ((x - self.place) / self.width) ** 2)[:, None]
         if self.kind == "saturating":
-            return (1.0 - np.exp(-np.maximum(x - self.low, 0.0) / self.width))[:, None]
+            return (1.0 - np.exp(-np.maximum((x - self.low) / self.width, 0.0)))[:, None]
+        if self.kind == "ramp":
+            return np.maximum((x - self.place) / (self.high - self.place), 0.0)[:, None]
+        if self.kind == "soft step":
+            return 1.0 / (1.0 + np.exp(-(x - self.place) / self.width))[:, None]
+        if self.kind == "window":
+            inside = (x >= self.place) & (x <= self.place + self.width)
+            return np.where(np.isnan(x), np.nan, inside * 1.0)[:, None]
         turns = 2.0 * np.pi * x / self.width
         return np.column_stack([np.sin(turns), np.cos(turns)])
 
 
+@displayed()
 @dataclass(frozen=True)
 class WrittenLaw:
     """One law: the product of one or two shapes, acting on T or on one term of it, in a regime, on some samples.
@@ -107,23 +120,14 @@ class WrittenLaw:
         )  # fmt: skip
 
     def mechanism(self) -> Mechanism:
-        """The law as a mechanism with amplitudes (and a place, where the shape has one)."""
-        d = 2 if self.shapes[0].kind == "wave" else 1
+        """The law as a mechanism: its amplitude is free (two of a wave), its places and widths are as written."""
         first = amplitude("a", "", -LARGEST, LARGEST, 0.1, "change of ln T at 1 of the shape")
-        parameters = [first, *(Parameter("b", "", -LARGEST, LARGEST, 0.0, "of the cosine") for _ in range(d - 1))]
-        moving = self._moving()
-        if moving is not None:
-            s = self.shapes[moving]
-            text = f"place of the {s.kind} on {s.column}"
-            unit, reach = UNITS.get(s.column, ""), s.high - s.low
-            parameters.append(Parameter("place", unit, s.low, s.high, s.place, text))
-            if s.kind == "hump":
-                parameters.append(Parameter("width", unit, 0.02 * reach, reach, s.width, "standard deviation"))
+        d = 2 if self.shapes[0].kind == "wave" else 1
+        parameters = [first, *(amplitude("b", "", -LARGEST, LARGEST, 0.1, "of the cosine") for _ in range(d - 1))]
 
         def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
-            here = self if moving is None else self._placed(moving, values[d:])
-            change = here.course(conditions) @ values[:d] * here.weight(conditions)
-            return here.changed(base, conditions.normal_load_N, change)
+            change = self.course(conditions) @ values[:d] * self.weight(conditions)
+            return self.changed(base, conditions.normal_load_N, change)
 
         needs = tuple(name for name in self.columns if name in UNITS and not name.endswith("pressure_Pa"))
         return Mechanism(
@@ -133,22 +137,6 @@ class WrittenLaw:
             enters="the friction forces", shows="", confused_with="", separates="", needs=needs,
             choosing=Choosing(held_out="loads" if self.where.startswith("sample ") else "samples"),
         )  # fmt: skip
-
-    def _moving(self) -> int | None:
-        """The shape whose place is fitted: of an optimum or a hump that stands alone."""
-        return 0 if len(self.shapes) == 1 and self.shapes[0].kind in ("optimum", "hump") else None
-
-    def _placed(self, index: int, fitted: FloatArray) -> WrittenLaw:
-        shapes = list(self.shapes)
-        shapes[index] = replace(shapes[index], place=float(fitted[0]))
-        if shapes[index].kind == "hump":
-            shapes[index] = replace(shapes[index], width=float(fitted[1]))
-        return replace(self, shapes=tuple(shapes))
-
-    def with_values(self, values: Values) -> WrittenLaw:
-        """The same law at the place that a fit found."""
-        moving = self._moving()
-        return self if moving is None else self._placed(moving, values[1:])
 
     def changed(self, base: Base, load_N: FloatArray, change: FloatArray) -> Forces:
         """The forces with ``change`` (n,) of ln T, or of the logarithm of the term it acts on."""
@@ -188,7 +176,15 @@ def _formula(s: Shape) -> str:
     if s.kind == "hump":
         return f"exp(-(({x} - {s.place:.4g}) / {s.width:.4g})^2 / 2)"
     if s.kind == "saturating":
-        return f"(1 - exp(-({x} - {s.low:.4g}) / {s.width:.4g}))"
+        from_low = f"{x} - {s.low:.4g}" if s.width > 0 else f"{s.low:.4g} - {x}"
+        return f"(1 - exp(-({from_low}) / {abs(s.width):.4g}))"
+    if s.kind == "ramp":
+        beyond = f"{x} - {s.place:.4g}" if s.high > s.place else f"{s.place:.4g} - {x}"
+        return f"max(0, {beyond}) / {abs(s.high - s.place):.4g}"
+    if s.kind == "soft step":
+        return f"1 / (1 + exp(-({x} - {s.place:.4g}) / {s.width:.4g}))"
+    if s.kind == "window":
+        return f"[{s.place:.4g} <= {x} <= {s.place + s.width:.4g}]"
     return f"[{x} = {s.level}]"
 
 

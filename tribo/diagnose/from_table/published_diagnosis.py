@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tribo.diagnose.discovery.across_patterns import AcrossPatterns, across_patterns
+from tribo.diagnose.from_table.table_across import table_deviations
 from tribo.diagnose.from_table.table_diagnosis import gain_on_samples, look_at, readings
 from tribo.diagnose.from_table.table_observations import read_table
 from tribo.diagnose.from_table.table_outlook import Outlook
@@ -59,3 +61,14 @@ def diagnose_published(
     rng = np.random.default_rng(seed)
     gain = gain_on_samples(found[0].baseline, found[0].weighed[0], rng)
     return PublishedDiagnosis("berardo2019", verdict_of(found, gain), tuple(found))
+
+
+def across_published(d: PublishedDiagnosis, *, seed: int = 0) -> AcrossPatterns:
+    """Laws of up to three terms across the patterns of the table, in the main reading.
+
+    Readings differ in the correlation and the number of specimens, which this search does not use, and in the model.
+    """
+    found = across_patterns(table_deviations(d.main.table), most_terms=3, seed=seed)
+    if found is None:
+        raise ValueError("a law across patterns needs at least four patterns")
+    return found

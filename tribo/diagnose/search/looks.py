@@ -7,26 +7,36 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tribo.diagnose.statistics.courses import Course, added, course
 from tribo.diagnose.statistics.model import Acting, Setup, StartChanges
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 OBSERVABLES = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (1.0, 1.0), "drop": (1.0, -1.0)}
 BINS = 6
 TENTHS = 10
 BENT = ", bend"  # what a look at the curve of a sample adds to its column
+MOST_LEVELS = 200  # names of a text column: the work grows with their cube
 CYCLES = 24  # periods down to a twenty-fourth of the series
 
 
+@displayed()
 @dataclass(frozen=True)
 class Look:
-    """One look: which observable against which covariate, and the columns (n, 2, d) it would follow."""
+    """One look: which observable against which covariate, and the columns it would follow: those of one course, or of
+    two that add up, on different specimens."""
 
     kind: str  # mechanism, trend, shape, level, sample, specimen, period, block
     observable: str
     covariate: str
     sample: str
-    columns: FloatArray
+    courses: tuple[Course, ...]
     acting: Acting | None = None
+
+    @property
+    def columns(self) -> FloatArray:
+        """(n, 2, d)."""
+        return added(self.courses)
 
     def is_taken_up(self, flat: str) -> bool:
         """Whether calibrating on the sample ``flat`` removes this: the level of its force, and its slope with load."""
@@ -40,20 +50,24 @@ class Look:
 
     @property
     def freedom(self) -> int:
-        return int(self.columns.shape[2])
+        return self.courses[0].freedom
 
 
 def all_looks(s: Setup, changes: StartChanges) -> list[Look]:
     """Every look that this design allows, ``changes`` being those of the candidates."""
     recorded = [*_covariates(s), *_levels(s), *_samples(s), *_specimens(s), *_periods(s), *_blocks(s)]
-    looks = [*_mechanisms(changes), *recorded]
-    return [look for look in looks if np.isfinite(look.columns).all() and np.ptp(look.columns) > 0]
+    looks = [*_mechanisms(s, changes), *recorded]
+    return [look for look in looks if all(c.shows for c in look.courses)]
 
 
-def _mechanisms(changes: StartChanges) -> Iterator[Look]:
-    for k, acting in enumerate(changes.acting):
-        yield Look("mechanism", "both", acting.name, "", changes.columns[:, :, k : k + 1], acting)
-    yield Look("trend", "both", "tau0", "", changes.adhesion[:, :, None])
+def _mechanisms(s: Setup, changes: StartChanges) -> Iterator[Look]:
+    for acting, courses in zip(changes.acting, changes.courses, strict=True):
+        yield Look("mechanism", "both", acting.name, "", courses, acting)
+    yield Look("trend", "both", "tau0", "", _course(s, changes.adhesion[:, :, None]))
+
+
+def _course(s: Setup, columns: FloatArray) -> tuple[Course]:
+    return (course(columns, s.random_effects),)
 
 
 def numeric_covariates(s: Setup) -> dict[str, FloatArray]:
@@ -93,11 +107,11 @@ def _spread(values: FloatArray, observable: str) -> FloatArray:
 def _covariates(s: Setup) -> Iterator[Look]:
     for name, values in numeric_covariates(s).items():
         for observable in OBSERVABLES:
-            yield Look("trend", observable, name, "", _spread(values[:, None], observable))
+            yield Look("trend", observable, name, "", _course(s, _spread(values[:, None], observable)))
         bins = _bins(values)
         if bins.shape[1] > 1:
             for observable in ("static", "sliding", "both"):
-                yield Look("shape", observable, name, "", _spread(bins, observable))
+                yield Look("shape", observable, name, "", _course(s, _spread(bins, observable)))
 
 
 def _bins(values: FloatArray) -> FloatArray:
@@ -112,10 +126,10 @@ def _levels(s: Setup) -> Iterator[Look]:
     """Text columns: one gain per name."""
     for name, column in s.observations.conditions.columns.items():
         names = np.unique(column)
-        if 1 < len(names) <= s.observations.n // 8:
+        if 1 < len(names) <= min(s.observations.n // 8, MOST_LEVELS):
             levels = np.column_stack([column == level for level in names[1:]]).astype(float)
             for observable in ("static", "sliding", "both"):
-                yield Look("level", observable, name, "", _spread(levels, observable))
+                yield Look("level", observable, name, "", _course(s, _spread(levels, observable)))
 
 
 def _samples(s: Setup) -> Iterator[Look]:
@@ -127,18 +141,20 @@ def _samples(s: Setup) -> Iterator[Look]:
         for observable in OBSERVABLES:
             for name, shape in shapes.items():
                 covariate = {"offset": "sample", "slope": "normal_load_N"}.get(name, f"normal_load_N{BENT}")
-                yield Look("sample", observable, covariate, str(sample), _spread((here * shape)[:, None], observable))
+                columns = _spread((here * shape)[:, None], observable)
+                yield Look("sample", observable, covariate, str(sample), _course(s, columns))
 
 
 def _specimens(s: Setup) -> Iterator[Look]:
     """Each specimen's offset against its siblings, and its slope against ln p."""
-    c, p = s.observations.conditions, s.log_pressure
-    for specimen in np.unique(c.specimen):
-        here = (c.specimen == specimen).astype(float)
-        where = "/".join(sorted(set(c.sample[c.specimen == specimen])))
-        for observable in ("static", "sliding", "both"):
-            yield Look("specimen", observable, f"specimen {specimen}", where, _spread(here[:, None], observable))
-        yield Look("specimen", "both", f"specimen {specimen} by load", where, _spread((here * p)[:, None], "both"))
+    c = s.observations.conditions
+    for number, tests in enumerate(s.random_effects.tests_of):
+        name, where = f"specimen {c.specimen[tests[0]]}", "/".join(sorted(set(c.sample[tests])))
+        ones, load = np.ones((len(tests), 1)), s.log_pressure[tests, None]
+        seen = [(observable, name, ones) for observable in ("static", "sliding", "both")]
+        for observable, covariate, shape in (*seen, ("both", f"{name} by load", load)):
+            along = Course(s.observations.n, number, tests, _spread(shape, observable))
+            yield Look("specimen", observable, covariate, where, (along,))
 
 
 def _periods(s: Setup) -> Iterator[Look]:
@@ -148,11 +164,11 @@ def _periods(s: Setup) -> Iterator[Look]:
         rank = np.argsort(np.argsort(c.run_order)) / s.observations.n
         for k in range(1, min(CYCLES, s.observations.n // 4) + 1):
             period = f"run_order, period {s.observations.n / k:.3g}"
-            yield Look("period", "both", period, "", _spread(_wave(k * rank), "both"))
+            yield Look("period", "both", period, "", _course(s, _spread(_wave(k * rank), "both")))
     hours = s.observations.clock_h
     if np.isfinite(hours).all() and np.ptp(hours) > 2:
         for k in (1, 2, 3):
-            yield Look("period", "both", "time of day", "", _spread(_wave(k * hours / 24.0), "both"))
+            yield Look("period", "both", "time of day", "", _course(s, _spread(_wave(k * hours / 24.0), "both")))
 
 
 def _blocks(s: Setup) -> Iterator[Look]:
@@ -166,7 +182,7 @@ def _blocks(s: Setup) -> Iterator[Look]:
         for last in range(first + 1, min(first + TENTHS // 2, TENTHS)):
             inside = ((tenth >= first) & (tenth <= last)).astype(float)
             where = f"run_order, from {order[inside > 0].min():.0f} to {order[inside > 0].max():.0f}"
-            yield Look("block", "both", where, "", _spread(inside[:, None], "both"))
+            yield Look("block", "both", where, "", _course(s, _spread(inside[:, None], "both")))
 
 
 def _wave(turns: FloatArray) -> FloatArray:

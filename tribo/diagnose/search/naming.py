@@ -16,12 +16,15 @@ from tribo.diagnose.search.rivals import CLOSE, sort_rivals
 from tribo.diagnose.search.screen import Progress, Screen, screen_left
 from tribo.diagnose.search.weighing import Candidate, judged, refitted, weigh, weigh_beside
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linearisation import ModelFit, StartEffects
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Setup, with_free_columns
+from tribo.diagnose.statistics.start_effects import StartEffects
+from tribo.display import displayed
 
 MAX_LAYERS = 8
 
 
+@displayed()
 @dataclass(frozen=True)
 class Remainder:
     """A look that no mechanism explains: its ``strength`` as a normal deviate, its peak-to-peak ``size`` in ln T and
@@ -34,6 +37,7 @@ class Remainder:
     p: float
 
 
+@displayed()
 @dataclass(frozen=True)
 class Named:
     """What explains the campaign: one set of candidates per cause, the best first in each.
@@ -52,6 +56,7 @@ class Named:
     remainders: tuple[Remainder, ...] = ()
 
 
+@displayed()
 @dataclass(frozen=True)
 class Rules:
     """How layers are decided on: mechanisms that are ``excluded``, the ``level``, and the simulated campaigns."""
@@ -63,6 +68,7 @@ class Rules:
     progress: Progress | None = None
 
 
+@displayed()
 @dataclass(frozen=True)
 class Layers:
     """The layers so far, and the model fitted with them. ``wrong_in_form`` are mechanisms that left a misfit in the

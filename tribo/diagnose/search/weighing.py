@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linearisation import ModelFit, StartEffects, start_effects
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting
+from tribo.diagnose.statistics.start_effects import StartEffects, start_effects
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 PER_PARAMETER = 1.0  # log likelihood that a further parameter has to earn
@@ -17,6 +19,7 @@ CHOICES_FITTED = 4  # of a mechanism with many choices, how many are fitted in f
 IN_REACH, CLOSE_BY = 0.5, 3.0  # share of the best first gain, less so much, from which a mechanism is fitted to the end
 
 
+@displayed()
 @dataclass(frozen=True)
 class Candidate:
     """A mechanism fitted on top of a model; ``gain`` is the log likelihood it earns net of its freedom, ``raw``
@@ -69,11 +72,10 @@ def _most_promising(start: StartEffects, group: list[int]) -> list[Acting]:
     acting = [start.acting[k] for k in group]
     if len(group) <= CHOICES_FITTED:
         return acting
-    left = start.left[:, group]
-    pull = left.T @ start.target
+    pull, left = start.pull[group], start.length[group] ** 2
     # log likelihood of the whole effect, for what is present as a whole or absent
-    whole = pull - 0.5 * np.sum(left**2, axis=0)
-    small = 0.5 * pull * np.abs(pull) / (np.sum(left**2, axis=0) + 1e-12)
+    whole = pull - 0.5 * left
+    small = 0.5 * pull * np.abs(pull) / (left + 1e-12)
     whole_or_absent = acting[0].mechanism.choosing.all_or_nothing_sd is not None
     rank = whole if whole_or_absent else np.abs(small)
     return [acting[i] for i in np.argsort(-rank)[:CHOICES_FITTED]]

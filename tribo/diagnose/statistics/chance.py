@@ -15,9 +15,7 @@ from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.scatter import (
     Replicates,
     Sizes,
-    blurred,
     fitted_sizes,
-    prior_of_columns,
     products_of,
     replicate_weights,
     replicates_at,
@@ -31,24 +29,19 @@ STEPS = 4
 
 def as_measured(f: ModelFit) -> Replicates:
     """The fitted campaign itself, as if it were one replicate."""
-    left = (f.residual - f.setup.random @ f.effects).T[None]
+    left = (f.residual - f.setup.random_effects.on_tests(f.effects)).T[None]
     sizes = fitted_sizes(f.setup, f.noise, 1)
-    return replicates_at(f.setup, _along_of(f), sizes, left, f.residual.T[None], f.noise.tail)
-
-
-def _along_of(f: ModelFit) -> FloatArray:
-    """The model's columns, (2, n, p + q)."""
-    return np.ascontiguousarray(np.concatenate([f.linear.jacobian, f.linear.random], axis=2).transpose(1, 0, 2))
+    return replicates_at(f.setup, f.linear.columns, sizes, left, f.residual.T[None], f.noise.tail)
 
 
 def drawn_residuals(f: ModelFit, rng: np.random.Generator, replicates: int) -> FloatArray:
     """ln T less what the fit predicts, (replicates, 2, n): new specimens and pattern errors, repeats resampled."""
     s = f.setup
     n = s.observations.n
-    effects = rng.normal(size=(replicates, s.random.shape[2])) / np.sqrt(f.linear.precision)
+    effects = rng.normal(size=(replicates, s.random_effects.count)) / np.sqrt(f.linear.precision)
     left = standardised(f)
     noise = np.linalg.solve(f.linear.factor, left[rng.integers(0, n, (replicates, n))][..., None])[..., 0]
-    return np.asarray(noise.transpose(0, 2, 1) + np.tensordot(effects, s.random, axes=(1, 2)).transpose(0, 2, 1))
+    return np.asarray((noise + s.random_effects.on_tests(effects)).transpose(0, 2, 1))
 
 
 def standardised(f: ModelFit) -> FloatArray:
@@ -57,7 +50,7 @@ def standardised(f: ModelFit) -> FloatArray:
     The random effects follow the tests, so that what is left is smaller than the noise: it is scaled to the noise that
     the fit states, to a weighted covariance of one.
     """
-    left = np.einsum("nij,nj->ni", f.linear.factor, f.residual - f.setup.random @ f.effects)
+    left = np.einsum("nij,nj->ni", f.linear.factor, f.residual - f.setup.random_effects.on_tests(f.effects))
     left = left - left.mean(axis=0)
     for _ in range(3):
         weight = (f.noise.tail + 2.0) / (f.noise.tail + np.sum(left**2, axis=1))
@@ -68,20 +61,20 @@ def standardised(f: ModelFit) -> FloatArray:
 
 @dataclass(frozen=True)
 class Refits:
-    """Campaigns fitted again: the noise of each, the coefficients (r, p + q) of the model's columns with their
-    covariance (r, p + q, p + q), and what is left of every test, (r, 2, n)."""
+    """Campaigns fitted again: the noise of each, the coefficients (r, p) of law and mechanisms with their ``variance``
+    (r, p), what is left of every test, (r, 2, n), and the same ``without`` the random effects taken out."""
 
     sizes: Sizes
     solution: FloatArray
-    covariance: FloatArray
+    variance: FloatArray
     left: FloatArray
+    without: FloatArray
 
 
 def refit(f: ModelFit, residual: FloatArray) -> Replicates:
     """Law, random effects, weights and noise sizes of campaigns that differ from ``f`` by ``residual`` (r, 2, n)."""
-    found, along, p = refits(f, residual), _along_of(f), f.linear.jacobian.shape[2]
-    without = found.left + np.tensordot(found.solution[:, p:], along[:, :, p:], axes=(1, 2))
-    return replicates_at(f.setup, along, found.sizes, found.left, without, f.noise.tail)
+    found = refits(f, residual)
+    return replicates_at(f.setup, f.linear.columns, found.sizes, found.left, found.without, f.noise.tail)
 
 
 def refit_sizes(f: ModelFit, residual: FloatArray) -> Sizes:
@@ -91,15 +84,16 @@ def refit_sizes(f: ModelFit, residual: FloatArray) -> Sizes:
 
 def refits(f: ModelFit, residual: FloatArray) -> Refits:
     """Each of these campaigns fitted, linear about ``f``."""
-    s, along, tail = f.setup, _along_of(f), f.noise.tail
-    p = f.linear.jacobian.shape[2]
+    s, columns, tail = f.setup, f.linear.columns, f.noise.tail
+    p = columns.parameters
     sizes, left = fitted_sizes(s, f.noise, len(residual)), residual
-    spread, solution = np.zeros(0), np.zeros((len(residual), along.shape[2]))
     for _ in range(STEPS):
         weight = replicate_weights(sizes, left, tail)
-        spread, solution = solved_at_once(along, sizes.inverse * weight[:, None], residual, prior_of_columns(p, sizes))
-        left = residual - np.tensordot(solution, along, axes=(1, 2))
-        squares = weight[:, None] * (products_of(left) + blurred(along, spread))
-        found = solution[:, p:], np.diagonal(spread, axis1=1, axis2=2)[:, p:]
-        sizes = sizes_updated(s, sizes, found, squares, tail)
-    return Refits(sizes, solution, spread, left)
+        inverse, (own, border) = solved_at_once(columns, sizes.inverse * weight[:, None], residual, sizes)
+        left = residual - columns.on_tests(own, border)
+        squares = weight[:, None] * (products_of(left) + inverse.spread(columns))
+        effects, variances = (columns.vector(*sides)[:, p:] for sides in ((own, border), inverse.variances))
+        sizes = sizes_updated(s, sizes, (effects, variances), squares, tail)
+    law = np.tensordot(border[:, :p], columns.border[:, :, :p], axes=(1, 2)).transpose(0, 2, 1)
+    variance = np.diagonal(inverse.border, axis1=1, axis2=2)[:, :p]
+    return Refits(sizes, border[:, :p], variance, left, residual - law)

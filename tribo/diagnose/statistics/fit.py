@@ -107,7 +107,8 @@ def _fitted(target: Target, x: FloatArray, noise: Noise, estimate: bool, until: 
             if penalised(s, trial) >= least:
                 state = trial
                 break
-        moved = float(np.max(np.abs(state.x - before.x) / np.sqrt(np.diag(system.inverse)[:p] + 1e-300)))
+        variance = np.diag(system.inverse.border[0])[:p]
+        moved = float(np.max(np.abs(state.x - before.x) / np.sqrt(variance + 1e-300)))
         state = with_noise_estimated(s, state, system) if estimate else state
         last, (score, weight) = score, scored(s, state)
         if abs(score - last) < least_gain:
@@ -117,5 +118,6 @@ def _fitted(target: Target, x: FloatArray, noise: Noise, estimate: bool, until: 
     jacobian = target.jacobian(state.x, log_force - state.residual)
     return ModelFit(
         s, target.acting, state.x[:N_LAW], target.values(state.x), state.at.noise, state.effects, state.residual, score,
-        system.inverse, Linear(jacobian, s.random, state.residual, state.at.factor, state.at.precision, weight),
+        system.inverse,
+        Linear(jacobian, s.random_effects, state.residual, state.at.factor, state.at.precision, weight),
     )  # fmt: skip

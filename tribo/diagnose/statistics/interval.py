@@ -59,7 +59,7 @@ def understated(f: ModelFit, index: int) -> FloatArray:
     made = refits(f, drawn_residuals(f, np.random.default_rng(0), REPLICATES))
     first = N_LAW + sum(len(v) for v in f.values[:index])
     here = slice(first, first + len(f.values[index]))
-    variance = np.diagonal(made.covariance, axis1=1, axis2=2)[:, here] / informed_share(f.noise)
+    variance = made.variance[:, here] / informed_share(f.noise)
     squares = made.solution[:, here] ** 2 / np.maximum(variance, 1e-300)
     return np.asarray(np.clip(np.sqrt(np.mean(squares, axis=0)), 1.0, WIDEST))
 

@@ -14,8 +14,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tribo.diagnose.statistics.courses import Course, added, course
 from tribo.diagnose.statistics.observations import Observations
 from tribo.diagnose.statistics.predictor import Predictor
+from tribo.diagnose.statistics.random_effects import RandomEffects
+from tribo.display import displayed
 from tribo.mechanisms.record import Base, Forces, Mechanism
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray
@@ -31,6 +34,7 @@ ALIKE_IN_BOTH, APART = np.array([1.0, 1.0]) / np.sqrt(2.0), np.array([1.0, -1.0]
 FIXED = -1  # the group of effects whose size is not estimated
 
 
+@displayed()
 @dataclass(frozen=True)
 class Acting:
     """A mechanism that takes part in a model, with its choice (which specimen, which column)."""
@@ -49,11 +53,12 @@ class Acting:
         return self.mechanism.start()
 
 
+@displayed()
 @dataclass(frozen=True)
 class Setup:
     """What every model of one campaign shares: shares, random-effect design, groups.
 
-    ``random`` has shape (n, 2, q). The standard deviation of effect j is ``unit[j]`` times the size of its ``group[j]``
+    There are q ``random_effects``. The standard deviation of effect j is ``unit[j]`` times the size of its ``group[j]``
     (GAIN and SLOPE, plus one for the difference of the regimes; PATTERN), or ``unit[j]`` itself where the group is
     FIXED. ``scatter`` (n, k) holds what the repeats may depend on: the sample, and the logarithm of the force.
     ``first_law`` (4,) is a first guess of the flat law.
@@ -62,18 +67,24 @@ class Setup:
     observations: Observations
     predictor: Predictor
     shares: FloatArray
-    random: FloatArray
+    random_effects: RandomEffects
     unit: FloatArray
     group: NDArray[np.int64]
     log_pressure: FloatArray
     scatter: FloatArray
     first_law: FloatArray
 
+    @property
+    def random(self) -> FloatArray:
+        """The whole design of the random effects, (n, 2, q): large where there are many specimens."""
+        return self.random_effects.dense
+
     def take(self, keep: NDArray[np.bool_]) -> Setup:
         """The same for the tests that ``keep`` (n,) marks."""
         return replace(
-            self, observations=self.observations.take(keep), shares=self.shares[keep], random=self.random[keep],
-            log_pressure=self.log_pressure[keep], scatter=self.scatter[keep],
+            self, observations=self.observations.take(keep), shares=self.shares[keep],
+            random_effects=self.random_effects.take(keep), log_pressure=self.log_pressure[keep],
+            scatter=self.scatter[keep],
         )  # fmt: skip
 
     def base(self, law: FloatArray) -> Base:
@@ -96,25 +107,26 @@ def setup(observations: Observations, predictor: Predictor) -> Setup:
     o, c = observations, observations.conditions
     log_p = np.log(c.pressure_Pa)
     log_p = log_p - log_p.mean()
-    columns, units, groups = [], [], []
-    for specimen in np.unique(c.specimen):
-        for k, regimes in enumerate((ALIKE_IN_BOTH, APART)):
-            for group, shape in ((GAIN, np.ones(o.n)), (SLOPE, log_p)):
-                columns.append(((c.specimen == specimen) * shape)[:, None] * regimes)
-                units.append(1.0)
-                groups.append(group + k)
+    names, specimen = np.unique(c.specimen, return_inverse=True)
+    shapes = [(np.ones(o.n), GAIN), (log_p, SLOPE)]
+    kinds = [(shape[:, None] * r, group + k) for k, r in enumerate((ALIKE_IN_BOTH, APART)) for shape, group in shapes]
+    own = np.stack([column for column, _ in kinds], axis=2)
+    columns: list[FloatArray] = []
+    units, groups = [1.0] * (len(kinds) * len(names)), [group for _, group in kinds] * len(names)
     for sample in np.unique(c.sample):
         for regime in (0, 1):
             known = (predictor.offset, predictor.slope, predictor.curve)
             offset, slope, curve = (error[sample][regime] for error in known)
-            shapes = ((offset, np.ones(o.n)), (slope, log_p), (curve, log_p**2 - np.mean(log_p**2)))
-            for size, shape in shapes if offset > 0 else ():
+            sized = ((offset, np.ones(o.n)), (slope, log_p), (curve, log_p**2 - np.mean(log_p**2)))
+            for size, shape in sized if offset > 0 else ():
                 columns.append(_column((c.sample == sample) * shape, regime))
                 units.append(size)
                 groups.append(PATTERN)
+    shared = np.stack(columns, axis=2) if columns else np.zeros((o.n, 2, 0))
+    effects = RandomEffects(specimen, len(names), own, shared)
     bare = Setup(
-        o, predictor, predictor.table(c.sample),
-        np.stack(columns, axis=2), np.array(units), np.array(groups), log_p, np.zeros((o.n, 0)), np.zeros(N_LAW),
+        o, predictor, predictor.table(c.sample), effects, np.array(units), np.array(groups), log_p,
+        np.zeros((o.n, 0)), np.zeros(N_LAW),
     )  # fmt: skip
     law = _first_law(bare)
     return replace(bare, first_law=law, scatter=_scatter(bare, law))
@@ -195,7 +207,7 @@ def with_form_error(
         return s
     return replace(
         s,
-        random=np.concatenate([s.random, np.stack(columns, axis=2)], axis=2),
+        random_effects=s.random_effects.with_shared(np.stack(columns, axis=2)),
         unit=np.concatenate([s.unit, np.array(sizes)]),
         group=np.concatenate([s.group, np.full(len(sizes), FIXED)]),
     )
@@ -206,7 +218,7 @@ def with_free_columns(s: Setup, columns: FloatArray, coefficients: FloatArray) -
     freedom = np.maximum(2.0 * np.abs(coefficients), 0.5 * np.abs(coefficients).max())
     return replace(
         s,
-        random=np.concatenate([s.random, columns], axis=2),
+        random_effects=s.random_effects.with_shared(columns),
         unit=np.concatenate([s.unit, freedom]),
         group=np.concatenate([s.group, np.full(len(freedom), FIXED)]),
     )
@@ -223,37 +235,49 @@ def candidates(s: Setup, law: FloatArray) -> list[Acting]:
     return found
 
 
+@displayed()
 @dataclass(frozen=True)
 class StartChanges:
     """What every candidate changes before it is fitted.
 
-    ``columns`` (n, 2, k) are the changes of ln T at the start values of ``acting`` (k,); ``every_start`` holds the
-    changes at all sizes that a fit would start from, (n, 2, sizes), of the mechanisms without a choice, by name.
-    ``adhesion`` (n, 2) is the share of adhesion in T by the law alone.
+    ``courses`` (k,) are the changes of ln T at the start values of ``acting`` (k,): one each, or two that add up, each
+    that of another candidate. ``every_start`` holds the changes at all sizes that a fit would start from,
+    (n, 2, sizes), of the mechanisms without a choice, by name. ``adhesion`` (n, 2) is the share of adhesion in T by the
+    law alone.
     """
 
     acting: tuple[Acting, ...]
-    columns: FloatArray
+    courses: tuple[tuple[Course, ...], ...]
     every_start: Mapping[str, FloatArray]
     adhesion: FloatArray
+
+    @property
+    def columns(self) -> FloatArray:
+        """The changes of all candidates, (n, 2, k): large where there are many specimens."""
+        return np.concatenate([added(courses) for courses in self.courses], axis=2)
 
 
 def start_changes(s: Setup, law: FloatArray) -> StartChanges:
     """The changes of all candidates on top of the flat law ``law``, mechanisms of a model left out."""
     acting = candidates(s, law)
     before = predict(s, law, (), ())
-    columns, every = [], {}
+    found: dict[tuple[str, str], Course] = {}
+    every = {}
     for a in acting:
-        start = a.start
-        columns.append(predict(s, law, (a,), (start,)) - before)
+        if len(a.mechanism.choosing.parts(a.choice)) > 1:
+            continue
+        column = effect_of(s, law, a, a.start)
+        found[a.mechanism.name, a.choice] = course(column[:, :, None], s.random_effects)
         if not a.choice:
-            further = [np.array([size, *start[1:]]) for size in a.mechanism.amplitude.tries]
-            changes = [columns[-1], *(predict(s, law, (a,), (v,)) - before for v in further)]
-            every[a.name] = np.stack(changes, axis=2)
+            further = [np.array([size, *a.start[1:]]) for size in a.mechanism.amplitude.tries]
+            every[a.name] = np.stack([column, *(effect_of(s, law, a, v) for v in further)], axis=2)
     adhesion = np.exp(log_forces(s.base(law).forces(np.zeros(s.observations.n))) - before)
-    return StartChanges(tuple(acting), np.stack(columns, axis=2), every, adhesion)
+    names = [(a.mechanism.name, a.mechanism.choosing.parts(a.choice)) for a in acting]
+    courses = tuple(tuple(found[name, part] for part in parts) for name, parts in names)
+    return StartChanges(tuple(acting), courses, every, adhesion)
 
 
+@displayed()
 @dataclass(frozen=True)
 class Target:
     """What is being fitted: a campaign, the mechanisms on top of the flat law, and their bounds."""

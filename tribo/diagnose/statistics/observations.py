@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from tribo.display import displayed
 from tribo.errors import FitError, Problem
 from tribo.mechanisms.record import Conditions, StringArray
 from tribo.records import Campaign, FloatArray, Ingested, Pattern, Pull, SetAside, Test, Trace
@@ -17,6 +18,7 @@ FEWEST_TESTS = 12
 NO_FLAT = "flat"  # stands for the flat law where no flat sample was measured or chosen
 
 
+@displayed()
 @dataclass(frozen=True)
 class Observations:
     """Every usable test: ln T, shape (n, 2) with static first, and what else its trace showed, shape (n,).

@@ -44,11 +44,11 @@ def pattern_corrections(f: ModelFit) -> list[PatternCorrection]:
     is learnt from all samples together, and the estimates are averaged over how large it may be.
     """
     s = f.setup
-    patterns = np.flatnonzero(s.group == PATTERN)
+    patterns = np.flatnonzero(s.group[s.random_effects.of_specimens :] == PATTERN)
     if not len(patterns):
         return []
     effects, spread = _averaged(f, patterns)
-    columns = s.random[:, :, patterns]
+    columns = s.random_effects.shared[:, :, patterns]
     sample, load = s.observations.conditions.sample, s.observations.conditions.normal_load_N
     there = [str(name) for name in np.unique(sample) if np.any(columns[sample == name])]
     found = []
@@ -66,13 +66,13 @@ def pattern_corrections(f: ModelFit) -> list[PatternCorrection]:
 
 
 def _averaged(f: ModelFit, patterns: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
-    """Effects and their covariance over the sizes that the pattern error may have."""
+    """Shared effects and their covariance over the sizes that the pattern error may have."""
     weight, fits = over_pattern_error(f)
-    effects = np.array([g.effects[patterns] for g in fits])
+    effects = np.array([f.setup.random_effects.parts(g.effects)[1][patterns] for g in fits])
     mean = weight @ effects
     apart = np.einsum("i,ip,iq->pq", weight, effects - mean, effects - mean)
-    q = f.setup.random.shape[2]
-    within = [g.covariance[-q:, -q:][np.ix_(patterns, patterns)] / informed_share(g.noise) for g in fits]
+    here = f.linear.columns.parameters + patterns
+    within = [g.inverse.border[0][np.ix_(here, here)] / informed_share(g.noise) for g in fits]
     return mean, np.tensordot(weight, np.array(within), axes=1) + apart
 
 

@@ -31,11 +31,11 @@ class PatternExcess:
 def pattern_excess(f: ModelFit) -> PatternExcess | None:
     """Likelihood ratio of the estimated factor against WITHIN, one-sided; None where the factor is not larger."""
     s = f.setup
-    patterns = s.group == PATTERN
+    patterns = s.group[s.random_effects.of_specimens :] == PATTERN
     if not patterns.any() or f.noise.pattern <= WITHIN:
         return None
     ratio = 2.0 * (f.score - with_pattern_error(f, WITHIN).score)
-    correction = s.random[:, :, patterns] @ f.effects[patterns]
+    correction = s.random_effects.shared[:, :, patterns] @ s.random_effects.parts(f.effects)[1][patterns]
     sample = s.observations.conditions.sample
     percent = {
         str(name): (float(mean[0]), float(mean[1]))

@@ -21,6 +21,7 @@ from tribo.diagnose.statistics.pattern_table import (
     error_sizes,
     simulated_patterns,
 )
+from tribo.display import displayed
 from tribo.records import FloatArray, Pattern
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ LEAST_SPREAD = 2.0  # largest over smallest load from which mu and tau0 part
 ALIKE = 0.02  # by which the lengths of a pattern may differ from those of a simulated one
 
 
+@displayed()
 @dataclass(frozen=True)
 class Predictor:
     """Shares of the flat law per sample and the model's own error, as standard deviations of ln T.

@@ -7,12 +7,23 @@ Functions with ``...`` in a shape take one campaign or a batch of replicates.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.diagnose.statistics.model import FIXED, GAIN, PATTERN, SLOPE, Setup
+from tribo.diagnose.statistics.bordered import (
+    Inverse,
+    ModelColumns,
+    Normal,
+    Sides,
+    Weighted,
+    normal_of,
+    weighted_columns,
+)
+from tribo.diagnose.statistics.model import GAIN, PATTERN, SLOPE, Setup
+from tribo.display import displayed
 from tribo.records import FloatArray
 
 # Expected size, and how many effects that is worth: specimen gains and slopes, pattern factor
@@ -20,13 +31,13 @@ SPECIMEN_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR = (0.05, 4.0), (0.01, 2.0), (1.0, 1.0
 SIZE_PRIORS = np.array([SPECIMEN_PRIOR, SPECIMEN_PRIOR, SLOPE_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR])
 REPEAT_PRIOR = (0.08, 4.0)
 SCATTER_SD = 0.5  # of ln of the ratio of repeats between samples, and of the power of the force they follow
-ROUNDING = 1e-9  # of a diagonal of one: the ridge of normal matrices
 SMALLEST_SD = 0.003  # of ln T: no reading repeats better
 # Of the logarithms of the sizes (GAIN, SLOPE: two each; PATTERN): what a look explains of the patterns makes their
 # error smaller, and what it explains of a specimen makes the spread of the specimens smaller.
 SIZE_STEPS = np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, -0.7], [-0.7, -0.7, -0.7, -0.7, 0.0]])
 
 
+@displayed()
 @dataclass(frozen=True)
 class Noise:
     """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance; specimen gains (2,) and
@@ -66,6 +77,7 @@ def first_noise() -> Noise:
     return Noise(np.diag([REPEAT_PRIOR[0] ** 2] * 2), np.zeros(2)).with_sizes(SIZE_PRIORS[:, 0])
 
 
+@displayed()
 @dataclass(frozen=True)
 class AtNoise:
     """What the tests and random effects of a campaign are weighed with at one noise.
@@ -197,6 +209,7 @@ def log_size_prior(group: int, size: FloatArray) -> FloatArray:
     return np.asarray(-worth * (np.log(size) + 0.5 * (expected / size) ** 2))
 
 
+@displayed()
 @dataclass(frozen=True)
 class Sizes:
     """The noise of every replicate: ``repeat`` (r, 2, 2), what the repeats depend on, ``scatter`` (r, k), and sizes of
@@ -250,72 +263,57 @@ def log_priors(s: Setup, sizes: Sizes, steps: FloatArray) -> FloatArray:
     return np.array(each).reshape(len(steps), -1)
 
 
-def weighted_columns(precision: FloatArray, columns: FloatArray) -> FloatArray:
-    """Columns (2, n, k) times the precision of every replicate, (r, 2, n, k)."""
-    static, mixed, sliding = (precision[:, i, :, None] for i in range(3))
-    return np.stack([static * columns[0] + mixed * columns[1], mixed * columns[0] + sliding * columns[1]], axis=1)
-
-
-def normal_equations(along: FloatArray, precision: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Weighted columns (r, p, 2n) and the normal matrices (r, p, p) without the prior."""
-    r, k = len(precision), along.shape[2]
-    weighted = np.ascontiguousarray(weighted_columns(precision, along).reshape(r, -1, k).transpose(0, 2, 1))
-    normal = (weighted.reshape(r * k, -1) @ along.reshape(-1, k)).reshape(r, k, k)
-    return weighted, normal
+def precision_of_prior(columns: ModelColumns, sizes: Sizes) -> Sides:
+    """Precision of the coefficients of a model, (r, S, 4) and (r, m): next to none for law and mechanisms."""
+    known = np.full((len(sizes.effects), columns.parameters), 1e-12)
+    return columns.sides(np.concatenate([known, sizes.precision], axis=1))
 
 
 def solved_at_once(
-    along: FloatArray, precision: FloatArray, residual: FloatArray, prior: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Inverse normal matrices (r, p, p) and solutions (r, p), the diagonal scaled to one."""
-    weighted, normal = normal_equations(along, precision)
-    normal[:, np.arange(along.shape[2]), np.arange(along.shape[2])] += prior
-    scale = 1.0 / np.sqrt(np.diagonal(normal, axis1=1, axis2=2))
-    both = scale[:, :, None] * scale[:, None, :]
-    inverse = np.linalg.inv(normal * both + ROUNDING * np.eye(along.shape[2])) * both
-    right = np.einsum("rpm,rm->rp", weighted, residual.reshape(len(residual), -1))
-    return inverse, np.einsum("rpq,rq->rp", inverse, right)
+    columns: ModelColumns, precision: FloatArray, residual: FloatArray, sizes: Sizes
+) -> tuple[Inverse, Sides]:
+    """Inverse normal matrices and solutions for the residuals (r, 2, n) at the precision (r, 3, n) of every test."""
+    found = weighted_columns(columns, precision)
+    inverse = normal_of(found).with_prior(*precision_of_prior(columns, sizes)).inverse()
+    return inverse, inverse.solution(*found.with_residual(residual))
 
 
-def blurred(along: FloatArray, spread: FloatArray) -> FloatArray:
-    """The same products expected from the uncertainty ``spread`` (r, k, k) of the coefficients, (r, 3, n)."""
-    n, k = along.shape[1:]
-    moved = (along.reshape(-1, k) @ spread).reshape(len(spread), 2, n, k)
-    pairs = ((0, 0), (0, 1), (1, 1))
-    return np.stack([np.einsum("rnk,nk->rn", moved[:, a], along[b]) for a, b in pairs], axis=1)
-
-
+@displayed()
 @dataclass(frozen=True)
 class Replicates:
     """Fitted replicates: ``precision`` (r, 3, n) of every test, robust weight included, as static, mixed, sliding;
-    ``residual`` (r, 2, n) of ln T. ``weighted`` (r, p + q, 2n) are the model's columns times that precision, and
-    ``normal`` (r, p + q, p + q) their products without the prior. ``prior`` (r, p + q) is the precision of these
-    columns, ``group`` (p + q,) that of the size of each, FIXED where there is none, and ``log_priors`` (steps, r)
-    the log density of the sizes after each of SIZE_STEPS.
+    ``residual`` (r, 2, n) of ln T. ``weighted`` are the model's columns times that precision, and ``normal`` their
+    products without the prior. ``sizes`` holds the precision of the random effects, ``group`` (q,) the group of the
+    size of each, and ``log_priors`` (steps, r) the log density of the sizes after each of SIZE_STEPS.
     """
 
     precision: FloatArray
     residual: FloatArray
-    weighted: FloatArray
-    normal: FloatArray
-    prior: FloatArray
+    weighted: Weighted
+    normal: Normal
+    sizes: Sizes
     group: NDArray[np.int64]
     log_priors: FloatArray
 
+    def one(self, k: int) -> Replicates:
+        """One of them, as a batch of one."""
+        sizes, normal, weighted = (_cut(part, k) for part in (self.sizes, self.normal, self.weighted))
+        precision, residual = self.precision[k : k + 1], self.residual[k : k + 1]
+        return Replicates(precision, residual, weighted, normal, sizes, self.group, self.log_priors[:, k : k + 1])
+
+
+def _cut(batch: Any, k: int) -> Any:
+    """One of a batch: what is not an array is common to all."""
+    arrays = {f.name: v[k : k + 1] for f in fields(batch) if isinstance(v := getattr(batch, f.name), np.ndarray)}
+    return replace(batch, **arrays)
+
 
 def replicates_at(
-    s: Setup, along: FloatArray, sizes: Sizes, left: FloatArray, residual: FloatArray, tail: float
+    s: Setup, columns: ModelColumns, sizes: Sizes, left: FloatArray, residual: FloatArray, tail: float
 ) -> Replicates:
-    """Replicates fitted with the columns ``along`` (2, n, p + q) at given sizes; ``left`` (r, 2, n) is what is left of
-    every test and ``residual`` the same with the random effects."""
-    p = along.shape[2] - len(s.group)
+    """Replicates fitted with the ``columns`` of a model at given sizes; ``left`` (r, 2, n) is what is left of every
+    test and ``residual`` the same with the random effects."""
     precision = sizes.inverse * replicate_weights(sizes, left, tail)[:, None]
-    weighted, normal = normal_equations(along, precision)
-    group = np.concatenate([np.full(p, FIXED), s.group])
+    found = weighted_columns(columns, precision)
     priors = log_priors(s, sizes, SIZE_STEPS)
-    return Replicates(precision, residual, weighted, normal, prior_of_columns(p, sizes), group, priors)
-
-
-def prior_of_columns(p: int, sizes: Sizes) -> FloatArray:
-    """Precision of the columns of the model, (r, p + q): next to none for the ``p`` of law and mechanisms."""
-    return np.concatenate([np.full((len(sizes.effects), p), 1e-12), sizes.precision], axis=1)
+    return Replicates(precision, residual, found, normal_of(found), sizes, s.group, priors)

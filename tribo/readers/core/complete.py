@@ -5,6 +5,7 @@ The one place where a recorded force is changed; everything after it sees the co
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,6 +32,9 @@ def complete(
         arrays = {**arrays, "friction force": arrays["torque"] / (correction.lever_arm_m or 1.0)}
         reason = f"torque over the lever arm of {(correction.lever_arm_m or 0.0) * 1e3:g} mm, as given"
         columns.append(Column("friction force", -1, column.label, 1.0, 0.0, reason))
+    if "rotation speed" in arrays and "speed" not in arrays and correction.lever_arm_m is not None:
+        arrays = {**arrays, "speed": 2.0 * np.pi * correction.lever_arm_m * arrays["rotation speed"]}
+        columns.append(_speed_of_turns(columns, correction.lever_arm_m))
     factor = correction.sign * correction.gain
     if factor != 1.0:
         arrays = {**arrays, "friction force": arrays["friction force"] * factor}
@@ -42,6 +46,12 @@ def complete(
         if correction.sampling_rate_Hz is None and correction.speed_m_s is None:
             findings.append(Finding(NO_TIME, _no_time(file)))
     return arrays, replace(assignment, columns=tuple(columns)), tuple(findings)
+
+
+def _speed_of_turns(columns: Sequence[Column], lever_arm_m: float) -> Column:
+    turns = next(c for c in columns if c.quantity == "rotation speed")
+    reason = f"rotation speed times 2 pi times the lever arm of {lever_arm_m * 1e3:g} mm, as given"
+    return Column("speed", -1, turns.label, 1.0, 0.0, reason)
 
 
 def _scaled(column: Column, correction: Correction) -> Column:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tribo.display import displayed
 from tribo.errors import Problem, ReadError
 from tribo.input_files import MAPPED_BYTES
 from tribo.readers.core.assign import NEEDED, Column, assign
@@ -56,6 +57,7 @@ class TableSeen:
     normal_load_N: float | None
 
 
+@displayed()
 @dataclass(frozen=True)
 class Inspection:
     """Description of an export.

@@ -30,6 +30,7 @@ def hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
         Hint("time", "#2 [s]", reason),
         Hint("normal force", "#3 [N]", reason),
         Hint("torque", "#4 [N m]", reason),
+        Hint("rotation speed", "#6 [rev/s]", reason),
     )
 
 

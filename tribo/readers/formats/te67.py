@@ -1,7 +1,8 @@
 """Phoenix TE67: tabs, decimal commas, an empty first column, no units; what they are follows from the columns.
 
 Load = mass times g only if the load is in newton and the mass in gram, and friction coefficient = friction force /
-load only if both forces share a unit. Clock and test time run alike only if the test time is in seconds.
+load only if both forces share a unit. Clock and test time run alike only if the test time is in seconds. The sliding
+velocity is 2 pi times radius times turns a minute only if it is in m/s and the radius in millimetre.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from tribo.readers.core.source import Source
 _CLOCK = re.compile(r"(\d+):(\d\d):(\d\d)")
 _G = 9.81  # what the rig itself reckons with
 _ROWS_BYTES = 20_000
+_STEADY = 0.9  # of the rows; while the drive speeds up, velocity and turns are not of the same instant
 
 
 def recognises(source: Source) -> bool:
@@ -34,6 +36,9 @@ def hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
     found = []
     if _runs_with_the_clock(columns):
         found.append(Hint("time", "Test Time [s]", "no unit in the file; it agrees with the clock column"))
+    if _velocity_is_radius_times_turns(columns):
+        reason = "no unit in the file; it equals 2 pi times the radius (mm) times the speed (turns a minute)"
+        found.append(Hint("speed", "Sliding Velocity [m/s]", reason))
     if _load_is_mass_times_g(columns):
         reason = "no unit in the file; the load column equals mass (g) times 9.81 m/s2"
         found.append(Hint("normal force", "Load [N]", reason))
@@ -62,6 +67,16 @@ def _runs_with_the_clock(columns: dict[str, list[str]]) -> bool:
 def _load_is_mass_times_g(columns: dict[str, list[str]]) -> bool:
     mass, load = _numbers(columns, "Mass"), _numbers(columns, "Load")
     return bool(mass.size and mass.size == load.size and np.allclose(load, mass * 1e-3 * _G, rtol=1e-4))
+
+
+def _velocity_is_radius_times_turns(columns: dict[str, list[str]]) -> bool:
+    velocity, radius, turns = (_numbers(columns, name) for name in ("Sliding Velocity", "Radius", "Speed"))
+    if not velocity.any() or not velocity.size == radius.size == turns.size:
+        return False
+    # the velocity is written to 1 mm/s, the turns to one a minute
+    rounded = 1e-3 + 2.0 * np.pi * radius * 1e-3 / 60.0
+    alike = np.abs(2.0 * np.pi * radius * 1e-3 * turns / 60.0 - velocity) <= rounded
+    return bool(alike.mean() > _STEADY)
 
 
 def _coefficient_is_force_over_load(columns: dict[str, list[str]]) -> bool:

@@ -17,10 +17,13 @@ from tribo.records import Study
 from tribo.report.content import content, figure_places
 from tribo.report.drawings import Drawn, draw_all, inline_svg
 from tribo.report.html.embedded import figure_data, trace_data
-from tribo.report.html.pull_cards import PullCard
+from tribo.report.html.pull_cards import PullCard, on_pages
 from tribo.report.provenance import Provenance
+from tribo.report.words.card_text import hours_text
 from tribo.report.words.numerals import ratio_text, significant, unbroken
 from tribo.report.words.wording import flags_in_words
+
+PAGE = "report.html"
 
 
 def html(
@@ -39,25 +42,42 @@ def html(
 
 def page_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> str:
     """The page with the given content (:func:`tribo.report.content.content`) and figures."""
+    return pages_of(said, figures)[PAGE]
+
+
+def pages_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str, str]:
+    """The page by its file name, and further pages of pulls where there are more than one page holds."""
     places = {k: [_shown(figures[n]) for n in names] for k, names in figure_places(list(figures)).items()}
-    style, script = (_static(name) for name in ("style.css", "page.js"))
-    return (
-        _environment()
-        .get_template("report.html")
-        .render(
-            **said,
-            lead=places["lead"],
-            figures=places["figures"],
-            diagnosis_figures=places,
-            filters=_filters(said["cards"]),
-            figure_data=figure_data({name: figure.series for name, figure in figures.items()}),
-            trace_data=trace_data(said["study"], [card.test_id for card in said["cards"]]),
-            style=Markup(style),
-            style_hash=_csp_hash(style),
-            script=Markup(script),
-            script_hash=_csp_hash(script),
+    each = on_pages(said["cards"])
+    names = [PAGE, *(f"pulls-{k}.html" for k in range(2, len(each) + 1))]
+    pages = {}
+    for number, (name, cards) in enumerate(zip(names, each, strict=True), start=1):
+        shown = figures if number == 1 else {}
+        parts = {"lead": places["lead"], "figures": places["figures"], "diagnosis_figures": places}
+        pages[name] = (
+            _environment()
+            .get_template("report.html" if number == 1 else "further_pulls.html")
+            .render(
+                **{**said, "cards": cards},
+                **parts,
+                filters=_filters(cards),
+                pages=names,
+                number=number,
+                pulls=len(said["cards"]),
+                figure_data=figure_data({n: figure.series for n, figure in shown.items()}),
+                trace_data=trace_data(said["study"], [card.test_id for card in cards]),
+                **_style_and_script(),
+            )
         )
-    )
+    return pages
+
+
+def _style_and_script() -> dict[str, str]:
+    style, script = (_static(name) for name in ("style.css", "page.js"))
+    return {
+        "style": Markup(style), "style_hash": _csp_hash(style), "script": Markup(script),
+        "script_hash": _csp_hash(script),
+    }  # fmt: skip
 
 
 def _static(name: str) -> str:
@@ -97,6 +117,7 @@ def _environment() -> Environment:
     environment.filters["sig"] = significant
     environment.filters["ratio"] = ratio_text
     environment.filters["unbroken"] = unbroken
+    environment.filters["duration"] = hours_text
     return environment
 
 

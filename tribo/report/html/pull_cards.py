@@ -17,6 +17,7 @@ from tribo.report.words.wording import by_hand_sentence, flags_in_words, odd_sen
 
 WIDTH, HEIGHT = 180, 56
 PICTURE_BYTES = 1_200_000  # all pictures together, so that the page stays easy to send
+PULLS_A_PAGE = 2000  # more of them on one page are slow to open
 BY_HAND = ("peak_by_hand", "window_by_hand")
 
 
@@ -51,10 +52,19 @@ def pull_cards(study: Study) -> list[PullCard]:
     standing = standings(study)
     levels = load_labels(study)
     read = [t for t in ingested.campaign.tests if t.test_id in ingested.pulls or t.test_id in ingested.by_hand]
-    points = int(np.clip(PICTURE_BYTES / (9 * max(len(read), 1)), 24, 160))
+    points = int(np.clip(PICTURE_BYTES / (9 * min(max(len(read), 1), PULLS_A_PAGE)), 24, 160))
     read = [t for t in read if t.test_id in study.ingested.traces or t.test_id in study.ingested.by_hand]
     cards = [_card(study, t, levels[t.test_id], standing.get(t.test_id), points) for t in read]
     return sorted(cards, key=lambda card: (-card.oddness, card.test_id))
+
+
+def on_pages(cards: list[PullCard]) -> list[list[PullCard]]:
+    """The cards of each page. Where there are several pages, pulls with a decision by hand come first, so that the
+    first page holds all decisions."""
+    if len(cards) <= PULLS_A_PAGE:
+        return [cards]
+    ordered = sorted(cards, key=lambda card: card.state == "used")
+    return [ordered[k : k + PULLS_A_PAGE] for k in range(0, len(ordered), PULLS_A_PAGE)]
 
 
 def doubted_s(trace: Trace, pull: Pull) -> dict[float, tuple[str, ...]]:

@@ -77,6 +77,7 @@ def _record(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str, 
         "by_hand": said["by_hand"],
         "flags": [[flag, str(count), ", ".join(tests)] for flag, count, tests in said["flags"]],
         "tribosystem": [[c.name, c.in_words] for c in said["tribosystem"]],
+        "uncertainty_kind": said["uncertainty_kind"],
         "load": significant(said["table2"]["load_N"]),
         "correlation": summary["correlation"],
         "table2": _table2(said["table2"], "τ₀ (kPa)" if said["has_area"] else "T₀ (N)"),
@@ -123,13 +124,14 @@ def _table2(table: Mapping[str, Any], intercept: str) -> list[dict[str, Any]]:
 
 def _diagnosis_tables(verdict: Mapping[str, Any] | None) -> dict[str, list[Any]]:
     if verdict is None:
-        return {"misfits": [], "causes": [], "excluded": [], "not_testable": [], "corrections": []}
+        return {"misfits": [], "causes": [], "excluded": [], "not_testable": [], "corrections": [], "laws": []}
     return {
         "misfits": [[m["observable"], m["p"], m["sample"], m["covariate"], m["text"]] for m in verdict["misfits"]],
         "causes": [[c["mechanism"], c["weight"], "; ".join(c["sizes"]), c["text"]] for c in verdict["causes"]],
         "excluded": verdict["excluded"],
         "not_testable": verdict["not_testable"],
         "corrections": verdict["corrections"],
+        "laws": [[law["formula"], law["text"], law["ties"]] for law in verdict["laws"]],
     }
 
 

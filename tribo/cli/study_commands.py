@@ -1,0 +1,319 @@
+"""Commands that run the stages of a study on one campaign and write their results: ingest to report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tribo.cli.console import Console, command_options, set_aside_record, status_of
+from tribo.cli.given_paths import GivenPath
+from tribo.cli.output import Output, output_options
+from tribo.cli.reading_options import reading_options, with_reading_options
+from tribo.cli.run_record import command_line, now, provenance_of_run
+from tribo.cli.study_options import (
+    CAMPAIGN,
+    DRY_RUN,
+    FLAT,
+    LAWS,
+    OUT,
+    OVERRIDES,
+    RULE,
+    ZEROS,
+    fit_options,
+    model_options,
+)
+
+if TYPE_CHECKING:
+    from tribo.diagnose import Diagnosis
+    from tribo.diagnose.verdict import Verdict
+    from tribo.records import Study
+    from tribo.report.card import Card
+    from tribo.stages import Progress, StudyOptions, Until
+
+
+@click.command()
+@CAMPAIGN
+@OUT
+@DRY_RUN
+@fit_options
+@command_options
+def ingest(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
+    """Read the exports of CAMPAIGN.
+
+    Determines the static peak and the mean sliding force of each pull. Writes tests.csv and campaign.nc.
+    """
+    return _walk(console, campaign, out, "ingest", dry_run, **options)
+
+
+@click.command()
+@CAMPAIGN
+@OUT
+@DRY_RUN
+@fit_options
+@command_options
+def fit(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
+    """Fit mu and tau0 of every sample.
+
+    Writes fits.csv, with the uncertainties of both parameters, in addition to the files of tribo ingest.
+    """
+    return _walk(console, campaign, out, "fit", dry_run, **options)
+
+
+@click.command()
+@CAMPAIGN
+@OUT
+@click.option(
+    "--only",
+    default="",
+    help="Run only this part: calibration, the name of a sample, or SAMPLE@PRESSUREPa (named as in OUT/kept). "
+    "Default: all parts.",
+)
+@fit_options
+@model_options
+@command_options
+def predict(console: Console, campaign: Path, out: Output, only: str, columns: str, **options: Any) -> int:
+    """Run the simulations of CAMPAIGN only.
+
+    Calibrates the model on the flat sample, runs it for every sample and stores the results in OUT/kept, where
+    tribo compare and tribo report find them.
+    """
+    from tribo import stages
+    from tribo.campaign import open_campaign
+
+    stated = options.pop("stated")
+    chosen = stages.StudyOptions(kept=out.kept, **options)
+    with (
+        out.taken(campaign, shared=True),
+        open_campaign(campaign) as described,
+        console.progress() as progress,
+    ):
+        stated_so = with_reading_options(described, columns, stated)
+        ingested = stages.study(stated_so, chosen, until="ingest", progress=progress).ingested
+        cells = stages.simulate_cells(ingested, stages.fit(ingested, weights=chosen.weights), chosen, only, progress)
+    names = [cell.name for cell in cells]
+    console.result(
+        {"out": str(out.path), "cells": names}, f"model calibrated; simulations run: {', '.join(names) or 'none'}"
+    )
+    return status_of(ingested.set_aside)
+
+
+@click.command()
+@CAMPAIGN
+@OUT
+@DRY_RUN
+@fit_options
+@model_options
+@command_options
+def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
+    """Compare the measurements with the model.
+
+    The model is calibrated on the flat sample alone. Writes comparison.csv and the figures in addition to the files
+    of tribo fit.
+    """
+    return _walk(console, campaign, out, "compare", dry_run, **options)
+
+
+@click.command()
+@click.argument("campaign", required=False, type=GivenPath())
+@OUT
+@click.option("--published", type=click.Choice(["berardo2019"]), help="Diagnose a published table instead of CAMPAIGN.")
+@RULE
+@FLAT
+@LAWS
+@reading_options
+@ZEROS[0]
+@ZEROS[1]
+@OVERRIDES
+@command_options
+def diagnose(
+    console: Console,
+    campaign: Path | None,
+    out: Output,
+    published: str | None,
+    columns: str,
+    stated: dict[str, float],
+    **options: Any,
+) -> int:
+    """Find where the model fails, and the likely cause.
+
+    Writes verdict.json and the figures of the diagnosis. Where the data do not allow a conclusion, the verdict says
+    so.
+    """
+    if (campaign is None) == (published is None):
+        raise click.UsageError("give either a CAMPAIGN or --published with the name of a table")
+    if campaign is None:
+        return _diagnose_published(console, out, options["seed"])
+    from tribo import stages
+    from tribo.campaign import open_campaign
+    from tribo.report import write_until
+    from tribo.report.card import card_of
+    from tribo.report.drawings import Drawing
+    from tribo.report.words.card_text import card_text
+    from tribo.report.words.verdict_text import verdict_text
+    from tribo.store.kept_results import Shelf
+
+    with out.taken(campaign), open_campaign(campaign) as opened, console.progress() as progress:
+        chosen = stages.StudyOptions(kept=out.kept, **options)
+        study = stages.study(with_reading_options(opened, columns, stated), chosen, until="ingest", progress=progress)
+        found = _diagnosis(study, chosen, progress)
+        drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
+        verdict = found.verdict
+        card = card_of(stages.with_fits(study), verdict.as_dict())
+        write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found, card)
+    console.result(verdict.as_dict() | {"card": card.as_dict()}, f"{card_text(card)}\n\n{verdict_text(verdict)}")
+    console.list_tests("set aside", study.ingested.set_aside, level=-1)
+    return status_of(study.ingested.set_aside)
+
+
+def _diagnose_published(console: Console, out: Output, seed: int) -> int:
+    """The verdict on Table 2 of Berardo et al. (2019), for every interpretation of what it leaves open."""
+    from tribo.diagnose.discovery.across_words import record_of, sentence
+    from tribo.diagnose.from_table.published_diagnosis import across_published, diagnose_published
+    from tribo.published import BERARDO2019, data_dir, load_table2, load_table2_simulated_anew
+    from tribo.report.provenance import provenance_of_table
+    from tribo.report.table_report import write_published
+    from tribo.report.words.verdict_text import verdict_text
+
+    folder, tables = data_dir() / BERARDO2019, ("table2.csv", "table2_tribo.csv")
+    with out.taken(folder), console.progress() as progress:
+        found = diagnose_published(load_table2(), load_table2_simulated_anew(), seed=seed, progress=progress)
+        across = across_published(found, seed=seed)
+        write_published(found, across, out.path, provenance_of_table(folder, tables, command_line(), seed, now()))
+    record = {**found.verdict.as_dict(), "across_patterns": record_of(across)}
+    console.result(record, f"{verdict_text(found.verdict)}\n{sentence(across)}")
+    return 0
+
+
+@click.command()
+@CAMPAIGN
+@OUT
+@DRY_RUN
+@fit_options
+@model_options
+@LAWS
+@command_options
+def report(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
+    """Run every stage and write the report.
+
+    Runs ingest, fit, compare and diagnose on CAMPAIGN. Writes their files, report.html, report.pdf and
+    ro-crate-metadata.json.
+    """
+    return _walk(console, campaign, out, "report", dry_run, **options)
+
+
+@click.command()
+@output_options("out/demo")
+@fit_options
+@model_options
+@command_options
+def demo(console: Console, out: Output, **options: Any) -> int:
+    """Write the report on the bundled example."""
+    from tribo.published import data_dir
+
+    status = _walk(console, data_dir() / "example", out, "report", False, **options)
+    console.say(f"open {out.path / 'report.html'}")
+    return status
+
+
+def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool, columns: str, **options: Any) -> int:
+    """Run the stages up to ``until`` on one campaign and write their results."""
+    from tribo import stages
+    from tribo.campaign import open_campaign
+    from tribo.report import write_until
+    from tribo.report.drawings import Drawing
+    from tribo.store.kept_results import Shelf
+
+    stated = options.pop("stated")
+    chosen = stages.StudyOptions(kept=out.kept, **options)
+    if dry_run:
+        out.check(path)
+        with open_campaign(path) as described:
+            planned = stages.plan(with_reading_options(described, columns, stated), chosen, until)
+            console.result(planned, _plan_text(planned, out.path))
+            return status_of(described.set_aside)
+    with out.taken(path), open_campaign(path) as described, console.progress() as progress:
+        study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
+        compared = until == "report" and study.comparison is not None
+        study, found = _diagnosed(study, chosen, progress) if compared else (study, None)
+        drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
+        card = _card(study, found) if until == "report" else None
+        write_until(study, out.path, until, drawing, provenance_of_run(study, path, chosen), found, card)
+    return _conclude(console, study, out.path, found.verdict if found else None, card)
+
+
+def _card(study: Study, found: Diagnosis | None) -> Card:
+    from tribo.report.card import card_of
+
+    return card_of(study, found.verdict.as_dict() if found is not None else None)
+
+
+def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[Study, Diagnosis | None]:
+    """The diagnosis of a study; a note instead where there is too little to diagnose."""
+    from dataclasses import replace
+
+    from tribo.errors import FitError, TriboError, unexpected
+
+    try:
+        return study, _diagnosis(study, chosen, progress)
+    except FitError as why:
+        return replace(study, notes=(*study.notes, f"no diagnosis: {why}")), None
+    except (TriboError, OSError):
+        raise
+    except Exception as why:  # the other results stand without it
+        problem = unexpected(why, "the diagnosis stopped")
+        return replace(study, notes=(*study.notes, f"no diagnosis: {problem}")), None
+
+
+def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis:
+    from tribo.stages import diagnosis
+
+    return diagnosis(
+        study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, laws=chosen.laws, progress=progress
+    )
+
+
+def _conclude(
+    console: Console, study: Study, out: Path, verdict: Verdict | None = None, card: Card | None = None
+) -> int:
+    """Print the results and the tests set aside; return the exit status."""
+    from dataclasses import asdict
+
+    from tribo.report import summary_text, table2_text
+    from tribo.report.result_tables import fits_table
+    from tribo.report.words.card_text import card_text
+    from tribo.report.words.verdict_text import verdict_text
+
+    set_aside = study.ingested.set_aside
+    doubts = study.ingested.doubts()
+    fits = fits_table(study.fits, study.combined).astype(object)
+    record = {
+        "out": str(out),
+        "tests": len(study.ingested.pulls),
+        "set_aside": set_aside_record(set_aside),
+        "used_with_doubts": set_aside_record(doubts),
+        "problems": [asdict(p) for p in study.ingested.campaign.problems],
+        "notes": list(study.notes),
+        "fits": fits.where(fits.notna(), None).to_dict("records"),
+        "power": list(study.power),
+        "outlying": list(study.outlying),
+        "differences": [] if study.differences is None else study.differences.to_dict("records"),
+        "verdict": verdict.verdict if verdict else None,
+        "card": card.as_dict() if card else None,
+    }
+    words = [card_text(card)] if card else []
+    words += [table2_text(study)] if study.fits else []
+    looks = ["\n".join(lines) for lines in (study.power, study.outlying) if lines]
+    said = [verdict_text(verdict)] if verdict else []
+    console.result(record, "\n\n".join([*words, summary_text(study), *said, *looks]))
+    for note in study.notes:
+        console.say(f"note: {note}", level=-1)
+    console.list_tests("set aside", set_aside, level=-1)
+    console.list_tests("used with doubts", doubts)
+    return status_of(set_aside)
+
+
+def _plan_text(planned: dict[str, Any], out: Path) -> str:
+    lines = [f"would {step}" for step in planned["steps"]]
+    return "\n".join([*lines, f"would write into {out}", *(f"set aside: {s}" for s in planned["set_aside"])])

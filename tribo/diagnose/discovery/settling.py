@@ -1,0 +1,313 @@
+"""The form of a law that is beyond chance: all forms at the noise that remains with it, places and widths on a fine
+grid, ties, intervals and band."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tribo.diagnose.discovery.grammar import Group, fine_products, fine_shapes, refined_shapes
+from tribo.diagnose.discovery.scoring import Courses, Projection, acts_of, courses_of, terms_of
+from tribo.diagnose.discovery.written_law import LOAD_TERM, UNITS, Shape, WrittenLaw
+from tribo.diagnose.statistics.fit import fit
+from tribo.diagnose.statistics.gain import gain
+from tribo.diagnose.statistics.interval import NORMAL_90, estimates, informed_share
+from tribo.diagnose.statistics.linearisation import ModelFit
+from tribo.diagnose.statistics.model import Acting, effect_of
+from tribo.diagnose.verdict import Estimate, Gain
+from tribo.mechanisms.record import Conditions
+from tribo.records import FloatArray
+
+CLOSE = 3.0  # log likelihood within which laws cannot be told apart: odds of 20 to 1
+IN_REACH = 8.0  # below the best on the coarse grid, within which a form is looked at on the fine one
+LOOKED_AT = 40  # forms at most on the fine grid
+WEIGHTLESS = 1e-3  # of the likeliest, below which a law does not count in the band
+PLACED = ("step", "soft step", "ramp", "optimum", "hump", "window")  # kinds with a place
+WIDE = ("hump", "saturating", "soft step")  # kinds with a width
+ROUNDS = 3  # of finding the best form at the noise that the one before leaves
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What a search hands on: all courses and groups, and the p value of the best law."""
+
+    courses: Courses
+    groups: tuple[Group, ...]
+    p: float = 1.0
+
+
+@dataclass(frozen=True)
+class Band:
+    """Change of ln T of every test by a law beyond what flat law and patterns can absorb (:func:`centred`), (n, 2):
+    value and 90 % band.
+
+    It is averaged over all laws that the design cannot tell apart from it.
+    """
+
+    value: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+@dataclass(frozen=True)
+class FoundLaw:
+    """A law beyond chance, fitted, with those the design cannot distinguish from it.
+
+    ``p`` is the chance that the best of all laws gains as much with nothing hidden. ``ties`` are the other forms within
+    CLOSE of it, the likeliest first. ``model`` is the fit with all laws so far.
+    """
+
+    law: WrittenLaw
+    parameters: dict[str, Estimate]
+    effect_percent: tuple[float, float, float]
+    p: float
+    gain: Gain | None
+    ties: tuple[WrittenLaw, ...]
+    model: ModelFit
+    band: Band
+
+    @property
+    def n_ties(self) -> int:
+        return len(self.ties)
+
+
+@dataclass(frozen=True)
+class Form:
+    """One form with its shapes on a fine grid: the log likelihood ``gains`` (k,) of each, and ``evidence``, their mean
+    over the grid less what the choice of the form costs."""
+
+    group: Group
+    courses: Courses
+    gains: FloatArray
+    evidence: float
+
+    @property
+    def best(self) -> WrittenLaw:
+        return self.group.law(self.courses.shapes[int(self.gains.argmax())])
+
+    @property
+    def weight(self) -> FloatArray:
+        """Of each shape within the form, adding to one."""
+        weight = np.exp(self.gains - self.gains.max())
+        return np.asarray(weight / weight.sum())
+
+
+def settled(model: ModelFit, found: Searched, first: WrittenLaw, rng: np.random.Generator) -> FoundLaw:
+    """The best form at the noise that it leaves, with its parameters, ties and band; ``first`` is the best law at the
+    noise without any."""
+    after, state, forms = _rounds(model, found, first)
+    index = len(after.acting) - 1
+    parameters = estimates(after, index) | _places(forms[0])
+    wider = _wider(state, forms[0], parameters["a"])
+    return FoundLaw(
+        forms[0].best, parameters, _percent(state, forms[0], parameters, wider), found.p, gain(model, after, rng),
+        tuple(f.best for f in forms[1:] if f.evidence > forms[0].evidence - CLOSE), after,
+        _band(state, forms, wider),
+    )  # fmt: skip
+
+
+def best_form(model: ModelFit, found: Searched) -> tuple[Form, State]:
+    """The best form of these laws at the noise that it leaves, and the campaign at that noise."""
+    c, terms = model.setup.observations.conditions, terms_of(model)
+    projected = Projection(model.linear, model.linear.residual[None])
+    gains = [projected.gains(found.courses, acts_of(g, c, terms))[0] - g.cost for g in found.groups]
+    group, shape = np.unravel_index(int(np.argmax(gains)), (len(gains), len(found.courses.shapes)))
+    first = found.groups[int(group)].law(found.courses.shapes[int(shape)])
+    _, state, forms = _rounds(model, found, first)
+    return forms[0], state
+
+
+def _rounds(model: ModelFit, found: Searched, law: WrittenLaw) -> tuple[ModelFit, State, list[Form]]:
+    """The model with the best law, the campaign at its noise, and all forms in reach there, the best first."""
+    after, state = _with_law(model, law)
+    forms = _forms(state, found)
+    for _ in range(ROUNDS):
+        if forms[0].best == law:
+            break
+        law = forms[0].best
+        after, state = _with_law(model, law)
+        forms = _forms(state, found)
+    if forms[0].best != law:
+        after, state = _with_law(model, forms[0].best)
+    return after, state, forms
+
+
+@dataclass(frozen=True)
+class State:
+    """A campaign at the noise that a law leaves, ready to score other laws in its place."""
+
+    conditions: Conditions
+    terms: dict[str, FloatArray]
+    projected: Projection
+    informed: float
+
+    def acts(self, group: Group) -> FloatArray:
+        return acts_of(group, self.conditions, self.terms)
+
+
+def _with_law(model: ModelFit, law: WrittenLaw) -> tuple[ModelFit, State]:
+    """The model with a law fitted, and the same campaign without it at the noise of that fit."""
+    acting = Acting(law.mechanism())
+    after = fit(model.setup, (*model.acting, acting), start=model)
+    residual = after.residual + effect_of(after.setup, after.law, acting, after.values[-1])
+    jacobian = after.linear.jacobian[:, :, : -len(acting.mechanism.parameters)]
+    projected = Projection(replace(after.linear, jacobian=jacobian), residual[None])
+    conditions = after.setup.observations.conditions
+    return after, State(conditions, terms_of(after), projected, informed_share(after.noise))
+
+
+def _forms(state: State, found: Searched) -> list[Form]:
+    """The forms in reach of the best on the fine grid, the best first."""
+    coarse: dict[tuple[int, object], list[float]] = {}
+    leading: dict[tuple[int, object], tuple[float, tuple[Shape, ...]]] = {}
+    for g, group in enumerate(found.groups):
+        gains = state.projected.gains(found.courses, state.acts(group))[0] - group.cost
+        for shapes, value in zip(found.courses.shapes, gains.tolist(), strict=True):
+            key = (g, tuple((s.kind, s.column, s.level) for s in shapes))
+            coarse.setdefault(key, []).append(value)
+            if key not in leading or value > leading[key][0]:
+                leading[key] = value, shapes
+    worth = {key: leading[key][0] - np.log(len(each)) for key, each in coarse.items()}
+    ranked = sorted(worth, key=lambda key: -worth[key])[:LOOKED_AT]
+    near = [key for key in ranked if worth[key] > worth[ranked[0]] - IN_REACH]
+    forms = [_on_fine_grid(state, found.groups[key[0]], *_priced(found, leading[key][1])) for key in near]
+    return sorted(forms, key=lambda f: -f.evidence)
+
+
+def _priced(found: Searched, shapes: tuple[Shape, ...]) -> tuple[tuple[Shape, ...], float]:
+    """The shapes of a form, with what a product of two columns costs."""
+    return shapes, float(found.courses.cost[found.courses.shapes.index(shapes)]) if len(shapes) > 1 else 0.0
+
+
+def _on_fine_grid(state: State, group: Group, shapes: tuple[Shape, ...], cost: float) -> Form:
+    c, acts = state.conditions, state.acts(group)
+    grid = fine_products(shapes) if len(shapes) > 1 else [(s,) for s in fine_shapes(shapes[0], c)]
+    courses = courses_of([(s, 0.0) for s in grid], c)
+    gains = state.projected.gains(courses, acts)[0]
+    evidence = _log_mean(gains) - group.cost - cost
+    finer = refined_shapes(courses.shapes[int(gains.argmax())][0], c) if len(shapes) == 1 else []
+    if finer:
+        courses = courses_of([((s,), 0.0) for s in finer], c)
+        gains = state.projected.gains(courses, acts)[0]
+    return Form(group, courses, gains, evidence)
+
+
+def _log_mean(gains: FloatArray) -> float:
+    return float(gains.max() + np.log(np.mean(np.exp(gains - gains.max()))))
+
+
+def _places(form: Form) -> dict[str, Estimate]:
+    """Place and width of the shape that stands alone, with 90 % intervals over the grid."""
+    if len(form.courses.shapes[0]) > 1:
+        return {}
+    shapes = [s[0] for s in form.courses.shapes]
+    best, found = form.best.shapes[0], {}
+    for name, kinds in (("place", PLACED), ("width", WIDE)):
+        if best.kind in kinds:
+            values = np.array([getattr(s, name) for s in shapes])
+            low, high = _quantiles(values, form.weight)
+            value = float(getattr(best, name))
+            found[name] = Estimate(value, min(low, value), max(high, value), UNITS.get(best.column, ""))
+    return found
+
+
+def _quantiles(values: FloatArray, weight: FloatArray) -> tuple[float, float]:
+    order = np.argsort(values)
+    share = np.cumsum(weight[order]) - 0.5 * weight[order]
+    low, high = np.interp((0.05, 0.95), share, values[order])
+    return float(low), float(high)
+
+
+def _wider(state: State, form: Form, a: Estimate) -> float:
+    """The interval of the amplitude over that of the linear model: what the latter does not know."""
+    if form.best.shapes[0].kind == "wave":
+        return 1.0
+    one = courses_of([(form.best.shapes, 0.0)], state.conditions)
+    own = state.projected.products(one.first, state.acts(form.group))[0]
+    return max((a.high - a.low) / (2.0 * NORMAL_90) * float(np.sqrt(own[0] * state.informed)), 1.0)
+
+
+@dataclass(frozen=True)
+class _Amplitudes:
+    """The amplitudes of every shape of a form with their variances, (k,) each; of a wave those of its first column and,
+    (k,) each, of its second."""
+
+    value: FloatArray
+    variance: FloatArray
+    second: FloatArray
+    second_variance: FloatArray
+
+
+def _amplitudes(state: State, form: Form) -> _Amplitudes:
+    own, pull, _ = state.projected.products(form.courses.first, state.acts(form.group))
+    nothing = np.zeros(len(own))
+    found = _Amplitudes(pull[0] / own, 1.0 / (own * state.informed), nothing, nothing)
+    if not len(form.courses.two):
+        return found
+    own2, pull2, _ = state.projected.products(form.courses.second, state.acts(form.group))
+    return replace(found, second=pull2[0] / own2, second_variance=1.0 / (own2 * state.informed))
+
+
+def _percent(
+    state: State, form: Form, parameters: dict[str, Estimate], wider: float
+) -> tuple[float, float, float]:
+    """Change of T (or of the term) from the least to the most of the shape where the law acts fully; 90 % interval.
+
+    The interval is averaged over places and widths.
+    """
+    law = form.best
+    here = law.weight(state.conditions) != 0
+    full = float(np.abs(law.weight(state.conditions)).max())
+    each = _amplitudes(state, form)
+    if len(form.courses.two):
+        size = 2.0 * np.hypot(each.value, each.second)
+        sd = 2.0 * np.sqrt(0.5 * (each.variance + each.second_variance))
+        value = 2.0 * float(np.hypot(parameters["a"].value, parameters["b"].value))
+    else:
+        reach = full * np.ptp(form.courses.first[here], axis=0)
+        size, sd = each.value * reach, np.sqrt(each.variance) * reach
+        value = parameters["a"].value * full * float(np.ptp(law.course(state.conditions)[here]))
+    centre = float(form.weight @ size)
+    half = NORMAL_90 * float(np.sqrt(form.weight @ ((wider * sd) ** 2 + (size - centre) ** 2)))
+    low, value, high = (100.0 * float(np.expm1(x)) for x in (value - half, value, value + half))
+    return value, low, high
+
+
+def _band(state: State, forms: list[Form], wider: float) -> Band:
+    """The mean change by all laws in proportion to their likelihood, each about its own mean, with its spread."""
+    n = len(state.conditions.sample)
+    mean, square, total = np.zeros((n, 2)), np.zeros((n, 2)), 0.0
+    for form in forms:
+        if form.evidence < forms[0].evidence + np.log(WEIGHTLESS):
+            continue
+        share = float(np.exp(form.evidence - forms[0].evidence))
+        acts, each = state.acts(form.group), _amplitudes(state, form)
+        two = {int(k): j for j, k in enumerate(form.courses.two)}
+        for k in np.flatnonzero(form.weight > WEIGHTLESS * form.weight.max()):
+            parts = [(form.courses.first[:, k], each.value[k], each.variance[k])]
+            if k in two:
+                j = two[int(k)]
+                parts.append((form.courses.second[:, j], each.second[j], each.second_variance[j]))
+            load_share = state.terms[LOAD_TERM]
+            changes = [(centred(course[:, None] * acts, state.conditions, load_share), a, v) for course, a, v in parts]
+            whole = np.sum([a * g for g, a, _ in changes], axis=0)
+            weight = share * form.weight[k]
+            mean += weight * whole
+            square += weight * (whole**2 + wider**2 * np.sum([v * g**2 for g, _, v in changes], axis=0))
+            total += weight
+    mean, square = mean / total, square / total
+    half = NORMAL_90 * np.sqrt(np.maximum(square - mean**2, 0.0))
+    return Band(mean, mean - half, mean + half)
+
+
+def centred(change: FloatArray, c: Conditions, load_share: FloatArray) -> FloatArray:
+    """A change (n, 2) less what the flat law and the pattern of each sample can absorb of it: a level, a slope in ln p,
+    and a multiple of the ``load_share`` (n, 2) of T."""
+    found, log_p = change.copy(), np.log(c.pressure_Pa)
+    for name in np.unique(c.sample):
+        here = c.sample == name
+        for k in (0, 1):
+            own = np.column_stack([np.ones(here.sum()), log_p[here] - log_p[here].mean(), load_share[here, k]])
+            found[here, k] -= own @ np.linalg.lstsq(own, change[here, k], rcond=None)[0]
+    return found

@@ -1,0 +1,91 @@
+"""Which columns of a table of evaluated forces are the sample, the load, the speed and the friction, by their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from tribo.campaign.table import Table
+from tribo.quantities import match_quantity
+
+_SAMPLE = ("sample", "material", "probe", "werkstoff", "matiere", "materiau", "echantillon", "muestra")
+_COEFFICIENT = re.compile(
+    r"(?:cof|mu|friction coefficient|coefficient of friction|coefficient)(?: (?:mean|avg|average))?"
+)
+_FORCE = re.compile(r"(?:friction(?:al)?|sliding|tangential) force(?: (?:mean|avg|average))?")
+_LOAD = re.compile(r"(?:nominal |applied |mean )?(?:normal )?load|normal force|nominalload|normalload")
+_SPEED = re.compile(r"(?:max |mean |nominal )?(?:lin |linear |sliding )?(?:speed|velocity)|maxlinspeed")
+_UNIT_AT_END = re.compile(r"[\[(]\s*(m?k?N|gf?|kgf|um/s|mm/s|m/s|mm/min)\s*[\])]\s*$")
+_FIELDS = {
+    "N": "normal_load_N", "mN": "normal_load_mN", "kN": "normal_load_kN", "gf": "normal_load_gf", "g": "mass_g",
+    "kgf": "normal_load_kgf", "mm/s": "speed_mm_s", "um/s": "speed_um_s", "m/s": "speed_m_s", "mm/min": "speed_mm_min",
+}  # fmt: skip
+_LOOKED_AT = 200  # rows in which a label has to repeat the number with its unit
+
+
+def proposed_mapping(table: Table) -> dict[str, str]:
+    """Column of the table for each column of tests.csv, as far as names and units tell; {} without load and friction.
+
+    The unit of a number stands in brackets behind the name, or in a column of labels that repeats it: 10 beside
+    "10 mN". Without a unit a column is not taken. A table with a time or a displacement is a trace.
+    """
+    if any((match_quantity(name) or ("", 0))[0] in ("time", "displacement") for name in table.names):
+        return {}
+    found: dict[str, str] = {}
+    for name in table.names:
+        plain = _plain(name)
+        if plain in _SAMPLE:
+            found.setdefault("sample", name)
+        elif _COEFFICIENT.fullmatch(plain):
+            found.setdefault("coefficient", name)
+        elif _FORCE.fullmatch(plain) and _unit(table, name) == "N":
+            found.setdefault("sliding_N", name)
+        elif _LOAD.fullmatch(plain) or _SPEED.fullmatch(plain):
+            field = _FIELDS.get(_unit(table, name), "")
+            if field.startswith("speed") == bool(_SPEED.fullmatch(plain)) and field:
+                found.setdefault(field, name)
+    loads = [field for field in found if field.startswith(("normal_load", "mass"))]
+    return found if loads and ("coefficient" in found or "sliding_N" in found) else {}
+
+
+def _plain(name: str) -> str:
+    """A column name in lower case without its unit, marks as blanks: "CoF.mean" -> "cof mean"."""
+    return re.sub(r"[\W_]+", " ", _UNIT_AT_END.sub("", name)).strip().lower()
+
+
+def _unit(table: Table, name: str) -> str:
+    stated = _UNIT_AT_END.search(name)
+    return stated[1] if stated else next(_units_in_labels(table, name), "")
+
+
+def _units_in_labels(table: Table, name: str) -> Iterator[str]:
+    """The unit behind the number in another column, where that column repeats this one row by row."""
+    rows = table.rows[:_LOOKED_AT]
+    for other in table.names:
+        units = {_unit_behind(row.cells.get(name, ""), row.cells.get(other, "")) for row in rows} - {None}
+        alike = all(_unit_behind(row.cells.get(name, ""), row.cells.get(other, "")) is not None for row in rows)
+        if other != name and alike and len(units) == 1:
+            yield str(units.pop())
+
+
+def _unit_behind(number: str, label: str) -> str | None:
+    unit = label.strip().removeprefix(number.strip())
+    return unit.strip() if number.strip() and unit != label.strip() and unit.strip() in _FIELDS else None
+
+
+def repeated_or_derived(table: Table, taken: dict[str, str]) -> set[str]:
+    """Columns that say nothing of their own: copies of a mapped number in other units or words, and further figures of
+    the evaluation, whose names begin like that of the friction ("CoF.sd" beside "CoF.mean")."""
+    friction = [name for field, name in taken.items() if field in ("coefficient", "sliding_N", "static_N")]
+    stems = {_plain(name).split(" ")[0] for name in friction}
+    found = {name for name in table.names if _plain(name).split(" ")[0] in stems and name not in friction}
+    mapped = [name for name in taken.values() if name not in friction]
+    for name in table.names:
+        if any(name != other and _one_to_one(table, name, other) for other in mapped):
+            found.add(name)
+    return found
+
+
+def _one_to_one(table: Table, one: str, other: str) -> bool:
+    pairs = {(row.cells.get(one, ""), row.cells.get(other, "")) for row in table.rows}
+    return len(pairs) == len({a for a, _ in pairs}) == len({b for _, b in pairs})
