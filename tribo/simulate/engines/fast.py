@@ -132,7 +132,8 @@ def run_fast(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Tra
     _refuse_thresholds(thresholds, lattice)
     drive = drive_of(config, lattice)
     failure = first_failure_s(lattice, thresholds, drive, config.stiffness_N_m)
-    numerics = _numerics(config, lattice, thresholds, drive, failure - 2 * config.dt_s)
+    # half a step off, so that no rounding decides in which step the first block fails
+    numerics = _numerics(config, lattice, thresholds, drive, failure - 1.5 * config.dt_s)
     state = _initial_state(config, lattice, thresholds, drive, numerics)
     active = None if config.engine == "dense" else active_set(state, numerics, lattice, drive, config)
     chunks: list[k.Samples] = []

@@ -109,7 +109,7 @@ def vectorised(function: Function) -> Function:
 
 
 def inner_vectorised(function: Function) -> Function:
-    """As :func:`vectorised`, for a loop that only compiled functions call; plain Python elsewhere."""
+    """As :func:`vectorised`, for a loop that only compiled functions can call."""
     registered: Function = register_jitable(**INNER_OPTIONS, **VECTOR_OPTIONS)(function)
     return registered
 

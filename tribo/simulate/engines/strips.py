@@ -24,7 +24,8 @@ from tribo.simulate.engines.state import Numerics, State
 from tribo.simulate.friction import sliding_threshold, static_threshold
 
 LANES = LINE  # blocks in a strip
-IntArray, BoolArray = NDArray[np.int64], NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 NOTHING, CONTACT, CAVITY = 0.0, 1.0, 2.0  # Planes.kind
 
 
