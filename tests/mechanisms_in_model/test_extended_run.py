@@ -15,9 +15,7 @@ from tribo.mechanisms_in_model.on_blocks import conditions_of_run
 from tribo.records import Run
 from tribo.simulate import SimConfig, simulate
 
-# With other seeds the highest force may come with another avalanche: over eight of them, single runs scatter about the
-# law by 0.3 % (static) and 0.2 % (sliding), with any engine. With this one it comes with the same.
-SMALL = SimConfig(sample="B", pressure_Pa=8e3, angle_deg=20.0, blocks=(25, 25), seed=9, dt_s=1e-7)
+SMALL = SimConfig(sample="B", pressure_Pa=8e3, angle_deg=20.0, blocks=(25, 25), seed=3, dt_s=1e-7)
 LONG = SMALL.with_(sample="Sx", angle_deg=4.0, blocks=(45, 25))
 KNOWN = {"humidity_pct": 58.0, "hold_s": 100.0, "temperature_C": 25.0, "speed_m_s": 8e-4, "specimen_run": 2.0}
 KEYS = [f"{name}(C)" if MECHANISMS[name].placement.other_sample else name for name in SIMULATED]
@@ -26,6 +24,9 @@ EVERY = pytest.mark.parametrize("key", KEYS)
 # the equations of the model are linear in load and adhesion, and only the samples that the mean over stick-slip takes
 # in may shift. More where the law averages over what the blocks do one by one, for the reason given.
 ALIKE = 1e-3
+# Sliding friction of single runs scatters about the law by 0.23 % where the load changes (suction and pattern_geometry,
+# seeds 3 to 10, the same with the engine that moved blocks one by one); three of these standard deviations.
+SCATTER = 7e-3
 BLOCK_BY_BLOCK = {
     "velocity_dependence": 0.02,  # blocks slide faster and slower than they are pulled
     "contact_ageing": 0.02,  # a block that has slipped is young again, also while others still stick
@@ -106,7 +107,7 @@ def test_the_simulated_friction_is_that_of_the_law_and_the_stated_error_does_not
     static, sliding = quick(key, config, base, before)
     within = BLOCK_BY_BLOCK.get(key, ALIKE)
     assert run.static_friction == pytest.approx(static, rel=within)
-    assert run.sliding_friction == pytest.approx(sliding, rel=within)
+    assert run.sliding_friction == pytest.approx(sliding, rel=max(within, SCATTER))
     assert m.quick_error >= within
 
 
