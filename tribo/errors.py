@@ -11,7 +11,14 @@ from dataclasses import dataclass, replace
 from tribo.display import displayed
 
 _LOG = logging.getLogger("tribo")
+_QUESTION = "did you mean"
+LONGEST_FOUND = 2000  # characters of what was found that a problem holds
 _OF_THE_SYSTEM = "system"  # kind of a problem that another try may not have: disk full, no permission
+
+
+def _without_middle(text: str) -> str:
+    half = LONGEST_FOUND // 2
+    return text if len(text) <= LONGEST_FOUND else f"{text[:half]} ... {text[-half:]}"
 
 
 @displayed(str)
@@ -29,6 +36,8 @@ class Problem:
         Its place, the value found there and the values allowed. ``row`` counts lines of the file from 1.
     test_id : str, optional
         The test it belongs to.
+
+    Where ``found`` is long, its middle is left out.
     """
 
     kind: str
@@ -40,6 +49,10 @@ class Problem:
     allowed: str | None = None
     test_id: str | None = None
 
+    def __post_init__(self) -> None:
+        if self.found is not None:
+            object.__setattr__(self, "found", _without_middle(self.found))  # the record is frozen
+
     def __str__(self) -> str:
         place = [str(self.file)] if self.file else []
         if self.row is not None:
@@ -48,9 +61,9 @@ class Problem:
             place.append(f"column {self.column}")
         parts = [f"{', '.join(place)}: " if place else "", self.what]
         if self.found is not None:
-            parts.append(f"; found {self.found!r}")
+            parts.append(f"; found {_without_middle(repr(self.found))}")
         if self.allowed is not None:
-            parts.append(f"; allowed: {self.allowed}")
+            parts.append(f"; {self.allowed if self.allowed.startswith(_QUESTION) else f'allowed: {self.allowed}'}")
         return "".join(parts)
 
     def at(self, *, file: str | None = None, test_id: str | None = None) -> Problem:
@@ -95,6 +108,15 @@ def naming(path: object, also_for: object = None) -> Iterator[None]:
         if why.filename is None or why.filename == str(also_for):
             why.filename, why.filename2 = str(path), None
         raise
+
+
+def failed_by_system(why: BaseException) -> bool:
+    """Whether a file is there and the system could not read it; not where it is absent, or its contents are damaged.
+
+    HDF5 gives errors without a number for damaged contents.
+    """
+    absent = isinstance(why, (FileNotFoundError, NotADirectoryError))
+    return isinstance(why, OSError) and why.errno is not None and not absent
 
 
 def system_problem(why: OSError, file: str | None = None) -> Problem:
