@@ -113,22 +113,22 @@ class Plan:
 def cases(half: Mapping[str, float], plan: Plan, seed: int) -> Iterator[Case]:
     """Every campaign of a run. A campaign's seed follows from its cell, so that a run can be widened."""
     for k in range(plan.clean):
-        number = _seed(seed, "clean", k)
+        number = seed_of(seed, "clean", k)
         yield Case("clean", number, (), clean_design(number))
     for times in (2.0, 3.0):
         for k in range(plan.large_error):
             cell = f"clean, pattern error {times:g}"
-            number = _seed(seed, cell, k)
+            number = seed_of(seed, cell, k)
             yield Case(cell, number, (), replace(clean_design(number), pattern_error=times))
     parts = ((plan.singles, singles(half)), (plan.before, as_before(half)), (plan.curves, curves(half)))
     for campaigns, cells in parts:
         for cell, effects, changes in cells:
             for k in range(campaigns if effects else 3 * campaigns):
                 design = design_for(*(name for name, _ in effects), **changes)
-                yield Case(cell, _seed(seed, cell, k), effects, design)
+                yield Case(cell, seed_of(seed, cell, k), effects, design)
 
 
-def _seed(seed: int, cell: str, k: int) -> int:
+def seed_of(seed: int, cell: str, k: int) -> int:
     """From what the campaign is and not from its place in the list."""
     return int(np.random.SeedSequence([seed, *cell.encode(), k]).generate_state(1)[0])
 

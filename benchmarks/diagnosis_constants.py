@@ -26,7 +26,7 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from blind_cases import Case, _seed, answer, clean_design, design_for
+from blind_cases import Case, answer, clean_design, design_for, seed_of
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 SEED = 7_700
@@ -95,14 +95,14 @@ CONSTANTS = {
 def campaigns() -> Iterator[Case]:
     """The fixed set: clean ones, clean ones with three times the pattern error, and one of each effect."""
     for k in range(CLEAN):
-        number = _seed(SEED, "clean", k)
+        number = seed_of(SEED, "clean", k)
         yield Case("clean", number, (), clean_design(number))
     for k in range(LARGE_ERROR):
-        number = _seed(SEED, "large error", k)
+        number = seed_of(SEED, "large error", k)
         yield Case("pattern error 3", number, (), replace(clean_design(number), pattern_error=3.0))
     for name, size in EFFECTS.items():
         design = design_for(name, pattern_error=1.5, specimen_slope=0.04)
-        yield Case(name, _seed(SEED, name, 0), ((name, size),), design)
+        yield Case(name, seed_of(SEED, name, 0), ((name, size),), design)
 
 
 def outcome(row: dict[str, Any]) -> str:

@@ -1,12 +1,13 @@
 """A fault at every file operation of every command, as SQLite is tested.
 
-    python benchmarks/torture_faults.py [--out out/torture] [--only COMMAND] [--every N] [--seed N]
+    python benchmarks/torture_faults.py [--out out/torture] [--only COMMAND] [--every N] [--distinct] [--seed N]
 
 Each command runs once undisturbed, on a campaign of 12 pulls, to count its file operations: to open, read, write,
-rename, list, delete. Then it is run again for each of them, twice: once that operation fails, with an error number that
-the operation can give (the numbers take turns), and once the process is killed at it. It is also run with a limit on
-the size of files and, where the process may mount a file system, with OUT on one that is too small; both reach what C
-libraries write. Required, every time:
+rename, list, delete. Each of them then has two trials: once it fails, with an error number that it can give (the
+numbers take turns), and once the process is killed at it. Where the process may have file systems of its own (Linux,
+root), the command runs once for all of these trials and is forked before every operation; elsewhere once for each. The
+command is also run with a limit on the size of files and, for root, with OUT on a file system that is too small; both
+reach what C libraries write. Required, every time:
 
 - a sentence that names the path and the cause, no traceback, exit status 1; or the complete result, and where it was
   made without a file that could not be read, a sentence that says so;
@@ -22,76 +23,134 @@ import argparse
 import csv
 import itertools
 import os
+import re
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
+from faults.branches import branch_trials, can_branch
 from faults.commands import prepared
-from faults.file_operations import KILL, Fault, Operation, errors_of
+from faults.file_operations import KILL, KINDS, Fault, Operation, errors_of
 from faults.small_site import write_inputs
-from faults.trial import Bench, Outcome
+from faults.trial import Bench, Outcome, masked
 
-COLUMNS = ("what", "tried", "held", "failed", "seconds", "seed")
-
-
-def faults_of(operations: list[Operation], every: int, seed: int) -> Iterator[Fault]:
-    """An error and a kill at each operation, or at each ``every``-th; the errors that one can give take turns."""
-    turns = {kind: itertools.count(seed) for kind in {o.kind for o in operations}}
-    for at, operation in enumerate(operations):
-        names = errors_of(operation.kind)
-        name = names[next(turns[operation.kind]) % len(names)]
-        if at % every == seed % every:
-            yield Fault(at, name)
-            yield Fault(at, KILL)
+IN_MEMORY = Path("/dev/shm")
+COLUMNS = ("what", "tried", "held", "failed", "seed")
 
 
-Trial = tuple[str, Callable[[], tuple[Outcome, list[str]]]]
+Trial = tuple[str, Outcome, list[str]]
 
 
-def trials_of(bench: Bench, every: int, seed: int) -> dict[str, list[Trial]]:
-    """The trials of a command by kind, each with its name."""
-    name = bench.command.name
-    faults = list(faults_of(bench.operations, every, seed))
-    found = {
-        f"faults at file operations: {name}": [
-            (f"{f.at} {f.name}", partial(bench.trial, f)) for f in faults if f.name != KILL
-        ],
-        f"killed at file operations: {name}": [
-            (f"{f.at} {f.name}", partial(bench.trial, f)) for f in faults if f.name == KILL
-        ],
-    }
-    if name not in ("verify", "report again"):
-        largest = [0, *(int(bench.written_bytes / 2**k) for k in range(1, 14))]
-        found[f"files not larger than a limit: {name}"] = [
-            (f"limit {size}", partial(bench.with_largest_file, size)) for size in largest
-        ]
-        ready = bench.ready_bytes
-        sizes = [ready + (bench.written_bytes - ready) * share // 12 + 40960 for share in range(12)]
-        if os.geteuid() == 0:
-            found[f"disk full: {name}"] = [(f"{size} bytes", partial(bench.on_full_disk, size)) for size in sizes]
-    return found
+def wanted(every: int, seed: int, distinct: bool) -> Callable[[int, Operation], list[str]]:
+    """An error and a kill at each operation, or at each ``every``-th; the errors that one can give take turns.
+
+    With ``distinct`` operations of one kind, from the same lines of tribo, on files of one kind in folders of one kind
+    are tried once.
+    """
+    turns = {kind: itertools.count(seed) for kind in KINDS}
+    tried: set[tuple[object, ...]] = set()
+
+    def names(at: int, operation: Operation) -> list[str]:
+        if at % every != seed % every:
+            return []
+        if distinct:
+            like = (operation.kind, *kind_of_file(operation.path), *lines_of_tribo())
+            if like in tried:
+                return []
+            tried.add(like)
+        possible = errors_of(operation.kind)
+        return [possible[next(turns[operation.kind]) % len(possible)], KILL]
+
+    return names
 
 
-def torture(what: str, trials: Sequence[Trial], seed: int, failures: list[str]) -> dict[str, object]:
-    """All trials of a kind as a row of the table; what did not hold is added to ``failures``."""
-    failed = 0
-    started = time.monotonic()
-    for name, trial in trials:
-        outcome, wrong = trial()
+def kind_of_file(path: str) -> tuple[str, str, bool]:
+    """The folder of a file without its numbers and random names, the ending, and whether it is hidden."""
+    place = Path(masked(path))
+    return re.sub(r"\d+", "", str(place.parent)), place.suffix, place.name.startswith(".")
+
+
+def lines_of_tribo() -> Iterator[tuple[str, int]]:
+    """The lines of tribo that are being executed, from the innermost outwards."""
+    frame = sys._getframe()
+    while (frame := frame.f_back) is not None:  # type: ignore[assignment]
+        if frame.f_globals.get("__name__", "").startswith("tribo"):
+            yield frame.f_code.co_filename, frame.f_lineno
+
+
+def faults(bench: Bench, names: Callable[[int, Operation], list[str]], aside: Path) -> Iterator[Trial]:
+    """All faults at the file operations of a command."""
+    if can_branch():
+        trials: Iterable[tuple[Fault, Outcome, list[str]]] = branch_trials(bench, names, aside)
+    else:
+        found = [Fault(at, name) for at, o in enumerate(bench.operations) for name in names(at, o)]
+        trials = ((fault, *bench.trial(fault)) for fault in found)
+    for fault, outcome, wrong in trials:
+        what = "killed at file operations" if fault.name == KILL else "faults at file operations"
+        yield what, outcome, [f"{fault.at} {fault.name}: {why}" for why in wrong]
+
+
+def sizes(bench: Bench) -> Iterator[Trial]:
+    """Limits of the size of a file, and file systems that are too small; a few of them for commands that take long."""
+    few = 12 if len(bench.operations) < 600 else 4
+    for k in range(few):
+        limit = int(bench.written_bytes / 2 ** (k + 1)) if k else 0
+        outcome, wrong = bench.with_largest_file(limit)
+        yield "files not larger than a limit", outcome, [f"limit {limit}: {why}" for why in wrong]
+    ready = bench.ready_bytes
+    for share in range(few) if os.geteuid() == 0 else ():
+        size = ready + (bench.written_bytes - ready) * share // few + 40960
+        outcome, wrong = bench.on_full_disk(size)
+        yield "disk full", outcome, [f"{size} bytes: {why}" for why in wrong]
+
+
+@dataclass
+class Table:
+    """Trials by kind and command, and a line for everything that did not hold."""
+
+    seed: int
+    rows: dict[str, dict[str, int]] = field(default_factory=dict)
+    failures: list[str] = field(default_factory=list)
+
+    def add(self, trial: Trial, command: str) -> None:
+        kind, outcome, wrong = trial
+        what = f"{kind}: {command}"
+        row = self.rows.setdefault(what, dict.fromkeys(COLUMNS[1:], 0) | {"seed": self.seed})
+        row["tried"] += 1
+        row["failed" if wrong else "held"] += 1
         if wrong:
-            failed += 1
             where = f"{outcome.struck.kind} {outcome.struck.path}" if outcome.struck else ""
-            said = " ".join(outcome.said.split())[-400:]
-            failures.append(f"{what}\t{name}\t{where}\t{'; '.join(wrong)}\t{said}")
-    return {
-        "what": what, "tried": len(trials), "held": len(trials) - failed, "failed": failed,
-        "seconds": round(time.monotonic() - started), "seed": seed,
-    }  # fmt: skip
+            self.failures.append("\t".join((what, where, "; ".join(wrong), " ".join(outcome.said.split())[-400:])))
+
+    def write(self, out: Path) -> None:
+        with (out / "faults.csv").open("w", newline="", encoding="utf-8") as stream:
+            table = csv.DictWriter(stream, COLUMNS)
+            table.writeheader()
+            table.writerows({"what": what, **row} for what, row in self.rows.items())
+        text = "\n".join(self.failures) + "\n" * bool(self.failures)
+        (out / "faults-failures.txt").write_text(text, encoding="utf-8")
+
+
+def torture(bench: Bench, table: Table, given: argparse.Namespace, aside: Path) -> None:
+    """All trials of one command."""
+    name = bench.command.name
+    started = time.monotonic(), sum(os.times()[:4])
+    for trial in faults(bench, wanted(given.every, given.seed, given.distinct), aside):
+        table.add(trial, name)
+    if name not in ("verify", "report again"):
+        for trial in sizes(bench):
+            table.add(trial, name)
+    table.write(given.out)
+    took, worked = time.monotonic() - started[0], sum(os.times()[:4]) - started[1]
+    of_command = {what: row for what, row in table.rows.items() if what.endswith(f": {name}")}
+    print(f"{name}: {len(bench.operations)} file operations, {took:.0f} s, {worked:.0f} s of processor time")
+    for what, row in of_command.items():
+        print(f"  {row['tried']:6} tried {row['held']:6} held  {what.partition(':')[0]}", flush=True)
 
 
 def main() -> int:
@@ -99,26 +158,20 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out/torture"))
     parser.add_argument("--only", action="append", help="name of a command; several may be given")
     parser.add_argument("--every", type=int, default=1, help="only each so manieth operation")
+    parser.add_argument("--distinct", action="store_true", help="operations that are alike only once; see wanted()")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
-    rows, failures = [], []
-    with tempfile.TemporaryDirectory(prefix="torture-") as folder:
+    table = Table(given.seed)
+    with tempfile.TemporaryDirectory(prefix="torture-", dir=IN_MEMORY if IN_MEMORY.is_dir() else None) as folder:
         root = Path(folder).resolve()
         place = write_inputs(root / "watched")
         builds = not given.only or any("build" in name for name in given.only)
         for name, command in prepared(place, root, builds).items():
             if given.only and name not in given.only:
                 continue
-            for what, trials in trials_of(Bench(place, command), given.every, given.seed).items():
-                rows.append(torture(what, trials, given.seed, failures))
-                print(" ".join(f"{rows[-1][column]!s:>8}" for column in COLUMNS[1:]), what, flush=True)
-    with (given.out / "faults.csv").open("w", newline="", encoding="utf-8") as stream:
-        table = csv.DictWriter(stream, COLUMNS)
-        table.writeheader()
-        table.writerows(rows)
-    (given.out / "faults-failures.txt").write_text("\n".join(failures) + "\n" * bool(failures), encoding="utf-8")
-    return 1 if failures else 0
+            torture(Bench(place, command), table, given, root / "aside")
+    return 1 if table.failures else 0
 
 
 if __name__ == "__main__":

@@ -4,18 +4,15 @@
 
 A round kills one command several times (SIGKILL to it and all its workers, at a moment drawn evenly over the time that
 the command takes), lets the last start end, and compares every file of the results byte by byte, and looks for files
-that a kill has left. Rounds of ``report`` begin with a random part of the kept results, so that kills fall into every
-stage. Exit status 1 where anything differs.
+that a kill has left. Rounds of ``report`` and ``build`` begin with a random part of the kept results, so that kills
+fall into every stage. Exit status 1 where anything differs.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
 import random
 import shutil
-import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -25,24 +22,27 @@ from pathlib import Path
 from torture_processes import (
     ENSEMBLE,
     REPORT,
+    Command,
     differing,
     ensemble,
     finished,
     leftovers,
+    quick_reports,
     results,
     run,
     small_campaign,
     start,
+    start_build,
     thinned,
 )
 
-BUILD = ("build", "../drop", "-o", "site", "--settle", "0", "--runs", "2", "--jobs", "2", "-q")
 Round = Callable[[Path, int, random.Random], list[str]]
 
 
 def kill_report(base: Path) -> Round:
     """Rounds of `tribo report` on one small campaign."""
     small_campaign(base / "campaign")
+    quick_reports(base, REPORT)
     run(base / "first", *REPORT)
     shutil.copytree(base / "first" / "out" / "kept", base / "untouched" / "out" / "kept")
     began = time.monotonic()
@@ -52,8 +52,7 @@ def kill_report(base: Path) -> Round:
 
     def one(folder: Path, kills: int, rng: random.Random) -> list[str]:
         thinned(base / "first" / "out" / "kept", folder / "out" / "kept", rng)
-        for _ in range(kills):
-            _kill_after(start(folder, *REPORT), rng.random() * took)
+        _kill(lambda: start(folder, *REPORT), kills, lambda: rng.random() * took)
         status = run(folder, *REPORT)
         found = differing(results(folder / "out"), expected) + leftovers(folder)
         return [f"status {status}"] * (status != 0) + found
@@ -70,8 +69,7 @@ def kill_ensemble(base: Path) -> Round:
     expected = ensemble(base / "untouched" / "e.nc")
 
     def one(folder: Path, kills: int, rng: random.Random) -> list[str]:
-        for _ in range(kills):
-            _kill_after(start(folder, *asked), rng.random() * took / kills)
+        _kill(lambda: start(folder, *asked), kills, lambda: rng.random() * took / kills)
         status = run(folder, *asked)
         same = ensemble(folder / "e.nc") == expected
         return [f"status {status}"] * (status != 0) + ["e.nc"] * (not same) + leftovers(folder)
@@ -79,43 +77,39 @@ def kill_ensemble(base: Path) -> Round:
     return one
 
 
-def _kill_after(command: object, seconds: float) -> None:
-    if command.wait(seconds) is None:  # type: ignore[attr-defined]
-        command.kill()  # type: ignore[attr-defined]
+def _kill(starting: Callable[[], Command], kills: int, moments: Callable[[], float]) -> None:
+    """Start a command and kill it at a moment (s), until so many of its processes were killed before they ended."""
+    hit = 0
+    while hit < kills:
+        command = starting()
+        if command.wait(moments()) is None:
+            command.kill()
+            hit += 1
 
 
 def kill_build(base: Path) -> Round:
     """Rounds of `tribo build` on a drop folder of one campaign."""
     small_campaign(base / "drop" / "a")
+    assert start_build(base / "first").wait() == 0
+    kept = base / "first" / "site" / "current" / "a" / "kept"
+    shutil.copytree(kept, base / "untouched" / "site" / "current" / "a" / "kept")
+    (base / "untouched" / "site" / ".tribo").mkdir()  # known as a site of tribo
     began = time.monotonic()
-    assert _build(base / "untouched").wait() == 0
+    assert start_build(base / "untouched").wait() == 0
     took = time.monotonic() - began
     expected = results(base / "untouched" / "site" / "current")
 
     def one(folder: Path, kills: int, rng: random.Random) -> list[str]:
-        for _ in range(kills):
-            process = _build(folder)
-            try:
-                process.wait(rng.random() * took / 2)
-            except subprocess.TimeoutExpired:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
-        status = _build(folder).wait()
         site = folder / "site"
-        found = differing(results(site / "current"), expected) + leftovers(site / "current")
+        thinned(kept, site / "current" / "a" / "kept", rng)
+        (site / ".tribo").mkdir()
+        _kill(lambda: start_build(folder), kills, lambda: rng.random() * took / 2)
+        status = start_build(folder).wait()
+        found = differing(results(site / "current"), expected) + leftovers(site)
         copied = differing(results(site / "latest"), {**expected, ".number": ""}) != [".number"]
         return [f"status {status}"] * (status != 0) + found + ["latest"] * copied
 
     return one
-
-
-def _build(folder: Path) -> subprocess.Popen[bytes]:
-    folder.mkdir(exist_ok=True)
-    with (folder.parent / f"{folder.name}.log").open("ab") as log:
-        return subprocess.Popen(
-            [sys.executable, "-m", "tribo", *BUILD], cwd=folder, start_new_session=True, stdout=log, stderr=log,
-            env={**os.environ, "SOURCE_DATE_EPOCH": "1700000000"},
-        )  # fmt: skip
 
 
 KINDS = {"report": kill_report, "ensemble": kill_ensemble, "build": kill_build}

@@ -11,10 +11,8 @@ run may be missing, and `tribo verify` must find no difference. Exit status 1 wh
 from __future__ import annotations
 
 import argparse
-import os
 import random
 import shutil
-import subprocess
 import sys
 import tempfile
 import time
@@ -22,8 +20,19 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from torture_kills import BUILD
-from torture_processes import ENSEMBLE, REPORT, ensemble, finished, leftovers, results, run, small_campaign, start
+from torture_processes import (
+    ENSEMBLE,
+    REPORT,
+    ensemble,
+    finished,
+    leftovers,
+    quick_reports,
+    results,
+    run,
+    small_campaign,
+    start,
+    start_build,
+)
 
 BUSY = 75
 Pair = Callable[[Path, int, random.Random], tuple[tuple[int | None, ...], list[str]]]
@@ -33,6 +42,7 @@ def pair_reports(base: Path) -> Pair:
     """Pairs of `tribo report` with other weights."""
     small_campaign(base / "campaign")
     ways = [REPORT, (*REPORT, "--weights", "force")]
+    quick_reports(base, *ways)
     expected, took = [], 1.0
     for k, way in enumerate(ways):
         run(base / f"first-{k}", *way)
@@ -92,29 +102,21 @@ def pair_ensembles(base: Path) -> Pair:
 def pair_builds(base: Path) -> Pair:
     """Pairs of `tribo build` of one site."""
     small_campaign(base / "drop" / "a")
-    began = time.monotonic()
-    assert _build(base / "first").wait() == 0
-    took = time.monotonic() - began
-    expected = results(base / "first" / "site" / "current")
+    assert start_build(base / "first").wait() == 0
+    kept = base / "first" / "site" / "current" / "a" / "kept"
+    expected, took = results(base / "first" / "site" / "current"), 20.0
 
     def one(folder: Path, number: int, rng: random.Random) -> tuple[tuple[int | None, ...], list[str]]:
-        first = _build(folder)
+        shutil.copytree(kept, folder / "site" / "current" / "a" / "kept")
+        (folder / "site" / ".tribo").mkdir()  # known as a site of tribo
+        first = start_build(folder)
         time.sleep(rng.random() * took * (number % 5) / 4)
-        second = _build(folder, *(("--wait", "600") if number % 3 == 0 else ()))
+        second = start_build(folder, *(("--wait", "600") if number % 3 == 0 else ()))
         ended = first.wait(), second.wait()
         same = results(folder / "site" / "current") == expected
-        return ended, ["mixed or incomplete results"] * (not same) + leftovers(folder / "site" / "current")
+        return ended, ["mixed or incomplete results"] * (not same) + leftovers(folder / "site")
 
     return one
-
-
-def _build(folder: Path, *more: str) -> subprocess.Popen[bytes]:
-    folder.mkdir(exist_ok=True)
-    with (folder.parent / f"{folder.name}.log").open("ab") as log:
-        return subprocess.Popen(
-            [sys.executable, "-m", "tribo", *BUILD, *more], cwd=folder, stdout=log, stderr=log,
-            env={**os.environ, "SOURCE_DATE_EPOCH": "1700000000"},
-        )  # fmt: skip
 
 
 KINDS = {"report": pair_reports, "ensemble": pair_ensembles, "build": pair_builds}

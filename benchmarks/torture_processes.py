@@ -1,7 +1,9 @@
 """Shared by the runs that kill, pair and damage: a small campaign, commands in forked processes, and their results.
 
-Commands run in children forked from a process that has imported tribo, so that a start costs no import. The clock of
-the outputs is fixed (SOURCE_DATE_EPOCH) and all paths are relative, so that equal results are equal bytes.
+Commands run in children forked from a process that has imported tribo, so that a start costs no import; their
+lattices are small, and pages that typst has set once are remembered. Builds are the exception: they and the steps that
+Snakemake starts for them are processes of their own. The clock of the outputs is fixed (SOURCE_DATE_EPOCH) and all
+paths are relative, so that equal results are equal bytes.
 """
 
 from __future__ import annotations
@@ -12,11 +14,18 @@ import os
 import random
 import shutil
 import signal
+import subprocess
 import sys
+import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from faults.commands import RememberedPages, small_lattice
 
 from tribo.virtual_tribometer.sled import SledDesign, SledLaw, write_campaign
 
@@ -25,17 +34,19 @@ TOML = (
     '[patterns.F]\ncavity = "none"\n'
     '[patterns.B]\ncavity = "circle"\ndiameter_um = 10.0\npitch_um = [15.0, 15.0]\n'
 )
-REPORT = ("report", "../campaign", "-o", "out", "--runs", "2", "--jobs", "2", "-q")
+REPORT = ("report", "../campaign.zip", "-o", "out", "--runs", "2", "--jobs", "2", "-q")
 ENSEMBLE = (
     "simulate", "--sample", "F", "--sample", "B", "--pressure", "5", "--pressure", "12", "--blocks", "40", "--dt",
     "1e-7", "--set", "rest_tolerance=0.01", "--jobs", "2", "-q", "-o", "e.nc", "--repeats",
 )  # fmt: skip
+BUILD = ("build", "../drop", "-o", "site", "--settle", "0", "--runs", "2", "--jobs", "2", "-q")
 
 
 def small_campaign(folder: Path, specimens: int = 2, seed: int = 3) -> Path:
-    """Two samples at two loads, in a folder that other folders stand beside."""
+    """Two samples at two loads, as a folder that other folders stand beside, and as a zip of it."""
     laws = {"F": SledLaw(4.8, 23e3, 2.9, 12e3), "B": SledLaw(3.6, 10e3, 2.9, 6e3)}
     write_campaign(folder, SledDesign(laws, masses_g=(25.0, 138.5), specimens=specimens, repeats=2), TOML, seed=seed)
+    shutil.make_archive(str(folder), "zip", folder)
     return folder
 
 
@@ -70,6 +81,7 @@ def start(folder: Path, *arguments: str) -> Command:
     """Start a command in ``folder``, in a process group of its own."""
     folder.mkdir(parents=True, exist_ok=True)
     said = folder.parent / f"{folder.name}-{time.monotonic_ns()}.log"
+    surroundings(folder)
     pid = os.fork()
     if pid:
         return Command(pid, said)
@@ -79,7 +91,8 @@ def start(folder: Path, *arguments: str) -> Command:
         stream = os.open(said, os.O_WRONLY | os.O_CREAT, 0o644)
         for number in (1, 2):
             os.dup2(stream, number)
-        os.environ["SOURCE_DATE_EPOCH"] = "1700000000"
+        os.environ |= surroundings(folder)
+        tempfile.tempdir = None
         sys.argv = ["tribo", *arguments]
         from tribo.cli import main
 
@@ -96,11 +109,58 @@ def start(folder: Path, *arguments: str) -> Command:
     os._exit(0)
 
 
+def surroundings(folder: Path) -> dict[str, str]:
+    """The environment of commands in ``folder``: a fixed clock, and a folder for temporary files, made beside it."""
+    temporary = temporary_of(folder)
+    temporary.mkdir(exist_ok=True)
+    return {"SOURCE_DATE_EPOCH": "1700000000", "TMPDIR": str(temporary)}
+
+
+def temporary_of(folder: Path) -> Path:
+    return folder.resolve().with_name(f"{folder.name}-tmp")
+
+
 def run(folder: Path, *arguments: str) -> int:
     """A command to its end."""
     status = start(folder, *arguments).wait()
     assert status is not None
     return status
+
+
+def start_build(folder: Path, *more: str) -> Command:
+    """Start `tribo build` in ``folder``, in a process group of its own, with Snakemake and all its steps."""
+    folder.mkdir(exist_ok=True)
+    said = folder.parent / f"{folder.name}.log"
+    with said.open("ab") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "tribo", *BUILD, *more], cwd=folder, start_new_session=True,
+            stdout=log, stderr=log, env={**os.environ, **surroundings(folder)},
+        )  # fmt: skip
+    return Command(process.pid, said)
+
+
+def quick_reports(base: Path, *ways: Sequence[str]) -> None:
+    """Let the reports of this process and its children be quick: small lattices, and the pages of these ways known."""
+    small_lattice()
+    pages = base / "pages.pickle"
+    for number, way in enumerate(ways):
+        child = os.fork()  # typst starts threads, which a process that forks must not have
+        if not child:
+            remembered = RememberedPages(pages)
+            status = _here(base / f"pages-{number}", *way)
+            remembered.save()
+            os._exit(status)
+        assert os.waitpid(child, 0)[1] == 0, way
+    RememberedPages(pages)
+
+
+def _here(folder: Path, *arguments: str) -> int:
+    from faults.trial import run_command
+
+    folder.mkdir()
+    os.environ |= surroundings(folder)
+    os.chdir(folder)
+    return run_command(arguments)
 
 
 def results(out: Path) -> dict[str, str]:
@@ -110,9 +170,9 @@ def results(out: Path) -> dict[str, str]:
 
 
 def leftovers(folder: Path) -> list[str]:
-    """Files that only a killed process leaves."""
-    hidden = (p for p in folder.rglob(".*") if p.name.endswith((".part", ".lock", ".unfinished")))
-    return [str(p.relative_to(folder)) for p in hidden]
+    """Files that only a killed process leaves: in the folder, and among its temporary files."""
+    hidden = [p for p in folder.rglob(".*") if p.name.endswith((".part", ".lock", ".unfinished"))]
+    return [p.name for p in (*hidden, *temporary_of(folder).iterdir())]
 
 
 def differing(found: dict[str, str], expected: dict[str, str]) -> list[str]:

@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
 GROUND = {
     "display", "errors", "limits", "escaping", "input_files", "quantities", "zeroing", "records", "published", "zips",
-    "links", "forked",
+    "links", "temporary", "forked",
 }  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
     ("escaping", set()),
@@ -28,6 +28,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("published", set()),
     ("zips", {"errors", "limits"}),
     ("links", set()),
+    ("temporary", set()),
     ("forked", set()),
     ("store", GROUND),
     ("campaign", GROUND),

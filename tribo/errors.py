@@ -11,7 +11,13 @@ from dataclasses import dataclass, replace
 from tribo.display import displayed
 
 _LOG = logging.getLogger("tribo")
+LONGEST_FOUND = 2000  # characters of what was found that a problem holds
 _OF_THE_SYSTEM = "system"  # kind of a problem that another try may not have: disk full, no permission
+
+
+def _without_middle(text: str) -> str:
+    half = LONGEST_FOUND // 2
+    return text if len(text) <= LONGEST_FOUND else f"{text[:half]} ... {text[-half:]}"
 
 
 @displayed(str)
@@ -29,6 +35,8 @@ class Problem:
         Its place, the value found there and the values allowed. ``row`` counts lines of the file from 1.
     test_id : str, optional
         The test it belongs to.
+
+    Where ``found`` is long, its middle is left out.
     """
 
     kind: str
@@ -40,6 +48,10 @@ class Problem:
     allowed: str | None = None
     test_id: str | None = None
 
+    def __post_init__(self) -> None:
+        if self.found is not None:
+            object.__setattr__(self, "found", _without_middle(self.found))  # the record is frozen
+
     def __str__(self) -> str:
         place = [str(self.file)] if self.file else []
         if self.row is not None:
@@ -48,7 +60,7 @@ class Problem:
             place.append(f"column {self.column}")
         parts = [f"{', '.join(place)}: " if place else "", self.what]
         if self.found is not None:
-            parts.append(f"; found {self.found!r}")
+            parts.append(f"; found {_without_middle(repr(self.found))}")
         if self.allowed is not None:
             parts.append(f"; allowed: {self.allowed}")
         return "".join(parts)

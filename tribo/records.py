@@ -391,6 +391,34 @@ class LawFit:
         return np.asarray(np.sqrt(c[0, 0] * n**2 + 2 * c[0, 1] * n * a + c[1, 1] * a**2))
 
 
+@displayed(lambda fit: f"{fit.sample}, {fit.regime}: {fit.in_numbers()}")
+@dataclass(frozen=True)
+class CombinedFit(LawFit):
+    """A fitted law with its combined uncertainty (GUM): ``covariance`` is ``type_a`` plus what all pulls share.
+
+    ``type_a`` is the covariance of the mean over specimens and ``dof`` its degrees of freedom; what all pulls share
+    (type B: gain, zero, load, area, angle) counts as known. ``largest`` holds, for mu, tau0_Pa and T, the component
+    with the largest share of the variance and that share in percent.
+    """
+
+    type_a: FloatArray = field(default_factory=lambda: np.zeros((2, 2)))
+    largest: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+
+    def effective_dof(self, by: FloatArray) -> float:
+        """Degrees of freedom of a combination ``by`` (2,) of both parameters, by Welch and Satterthwaite (GUM, G.4)."""
+        type_a = float(by @ self.type_a @ by)
+        return self.dof * (float(by @ self.covariance @ by) / type_a) ** 2 if type_a > 0 else float("inf")
+
+    def interval(self, parameter: str, level: float = 0.95) -> tuple[float, float]:
+        """Two-sided t interval at ``level`` of the combined uncertainty."""
+        from scipy.stats import t
+
+        k = self.parameters.index(parameter)
+        factor = float(t.ppf(0.5 + level / 2, self.effective_dof(np.eye(2)[k])))
+        half = factor * self.standard_uncertainty(parameter)
+        return self.value(parameter) - half, self.value(parameter) + half
+
+
 @displayed(lambda r: f"{r.sample} at {r.pressure_Pa / 1e3:.4g} kPa, seed {r.seed}")
 @dataclass(frozen=True)
 class Run:
@@ -536,14 +564,15 @@ class Ingested:
 class Study:
     """One campaign with the results of all stages.
 
-    ``fits`` holds the measured law of every sample and regime (T = mu N + tau0 A, the default weights),
-    ``other_fits`` the same under other weights or laws. ``simulated`` is the ensemble, one row per run: sample,
-    pressure_Pa, normal_load_N (p times the nominal area of the campaign), angle_deg, seed, static_N,
-    sliding_N. ``example_runs`` holds one full force trace of the model per sample. ``budget`` is the uncertainty
-    budget of every fitted number, one row per component. ``power`` states the differences this campaign could detect,
-    ``outlying`` the outlying pulls and specimens. ``differences`` holds the differences between samples measured on the
-    same specimens, one row per pair of samples, regime and number. ``laws`` compares the candidate laws of every sample
-    by held-out loads, ``dependence`` states how T/N changes with each recorded variable.
+    ``fits`` holds the measured law of every sample and regime (T = mu N + tau0 A, the default weights), ``combined``
+    the same with the combined uncertainty, which is what the report states, ``other_fits`` the same under other weights
+    or laws. ``simulated`` is the ensemble, one row per run: sample, pressure_Pa, normal_load_N (p times the nominal
+    area of the campaign), angle_deg, seed, static_N, sliding_N. ``example_runs`` holds one full force trace of the
+    model per sample. ``budget`` is the uncertainty budget of every fitted number, one row per component. ``power``
+    states the differences this campaign could detect, ``outlying`` the outlying pulls and specimens. ``differences``
+    holds the differences between samples measured on the same specimens, one row per pair of samples, regime and
+    number. ``laws`` compares the candidate laws of every sample by held-out loads, ``dependence`` states how T/N
+    changes with each recorded variable.
     """
 
     ingested: Ingested
@@ -559,3 +588,4 @@ class Study:
     laws: pd.DataFrame | None = None
     dependence: pd.DataFrame | None = None
     notes: tuple[str, ...] = ()
+    combined: tuple[CombinedFit, ...] = ()

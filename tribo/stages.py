@@ -53,6 +53,7 @@ class StudyOptions:
     runs: int = 4
     seed: int = 0
     jobs: int = 2
+    laws: Path | None = None  # folder with laws of earlier campaigns
     overrides: Path | None = None  # table of decisions made by hand about single pulls
     kept: Path | None = None  # folder of finished simulations and diagnosis, used again by the next start
     scheduler: str | None = None  # address of a dask scheduler that runs the simulations
@@ -66,8 +67,9 @@ class StudyOptions:
 
     def as_words(self) -> dict[str, str]:
         """The options as text, for the provenance."""
+        laws = {"laws": str(self.laws)} if self.laws is not None else {}
         zeros = {name: text for name, text in (("zero", self.zero), ("load_zero", self.load_zero)) if text}
-        return {"rule": self.rule, "weights": self.weights, "flat": self.flat, "runs": str(self.runs), **zeros}
+        return {"rule": self.rule, "weights": self.weights, "flat": self.flat, "runs": str(self.runs), **zeros, **laws}
 
 
 DEFAULTS = StudyOptions()
@@ -209,10 +211,30 @@ def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
     return replace(walked, **looks)
 
 
+def with_fits(read: Study, weights: Weights = "relative") -> Study:
+    """The study with its fits and their combined uncertainties; as it is where no law can be fitted."""
+    from tribo.fitting.assessment import budgets_of
+
+    try:
+        fits = fit(read.ingested, weights=weights)
+    except FitError:
+        return read
+    budgets = budgets_of(read.ingested, fits, weights)
+    return replace(read, fits=fits, combined=tuple(b.combined() for b in budgets))
+
+
 def diagnosis(
-    ingested: Ingested, *, seed: int = 0, jobs: int = 2, kept: Path | None = None, progress: Progress = _silent
+    ingested: Ingested,
+    *,
+    seed: int = 0,
+    jobs: int = 2,
+    kept: Path | None = None,
+    laws: Path | None = None,
+    progress: Progress = _silent,
 ) -> Diagnosis:
     """Where the calibrated model fails and why, with the evidence; taken from ``kept`` if it is there.
+
+    Laws of earlier campaigns in the folder ``laws`` are tested. What no mechanism explains is searched for its law.
 
     The model's prediction for each pattern comes from the simulations of the campaign if ``kept`` holds them, else from
     tabulated ones. A mechanism that is named is then simulated as part of the spring-block model.
@@ -225,16 +247,19 @@ def diagnosis(
     from tribo.diagnose import examine, with_simulation
     from tribo.diagnose.discovery.across_verdict import with_law_across
     from tribo.diagnose.discovery.in_verdict import with_laws
+    from tribo.diagnose.discovery.known_laws import read_laws
     from tribo.diagnose.statistics import pattern_table
 
     predictor = own_predictor(ingested.campaign, kept)
+    known = read_laws(laws) if laws is not None else ()
 
     def found() -> Diagnosis:
         examined = examine(ingested, seed=seed, predictor=predictor, progress=progress)
-        examined = with_law_across(with_laws(examined, seed=seed, progress=progress), seed=seed)
+        examined = with_law_across(with_laws(examined, known, seed=seed, progress=progress), seed=seed)
         return with_simulation(examined, seed=seed, jobs=jobs, progress=progress).without_columns()
 
-    return Shelf(kept).take("diagnosis", (ingested, seed, predictor, pattern_table.record()), found, DIAGNOSED_BY)
+    made_from = (ingested, seed, predictor, pattern_table.record(), known)
+    return Shelf(kept).take("diagnosis", made_from, found, DIAGNOSED_BY)
 
 
 def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:

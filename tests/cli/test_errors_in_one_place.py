@@ -25,6 +25,13 @@ def _level_of_the_log_returns() -> Iterator[None]:
 FULL = OSError(errno.ENOSPC, "No space left on device")
 
 
+def test_a_value_of_any_length_is_shown_by_its_start_and_end() -> None:
+    said = str(Problem("wrong_value", "not a number", found="first" + "\0" * 100_000 + "last"))
+    assert len(said) < 2100
+    assert "'first" in said
+    assert "last'" in said
+
+
 def test_a_full_disk_is_named_with_the_file_that_was_being_written(
     small_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

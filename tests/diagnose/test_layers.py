@@ -91,6 +91,8 @@ def test_without_noise_the_corrections_are_the_errors_that_were_drawn() -> None:
         for c in found
     ]
     assert np.abs(drawn).max() > 10
+    assert min(c.p for c in found) < 0.01
+    assert max(c.p for c in found) == 1.0
     assert np.corrcoef([c.mean.value for c in found], drawn)[0, 1] > 0.95
     assert [c.mean.value for c in found] == pytest.approx(drawn, abs=4)  # specimens are expected to differ by 5 %
 

@@ -434,9 +434,8 @@ def test_the_covariance_of_predictions_is_that_of_the_whole_matrix_and_random_ef
     effects = s.random_effects
     values = rng.normal(size=(2, effects.count))
     assert effects.on_tests(values) == pytest.approx(np.einsum("nak,rk->rna", s.random, values))
-    weight, precision = np.array([1.0, -1.0]), 1.0 / of_effects(s, noise_of(s))
-    expected = np.einsum("nrq,r->nq", s.random, weight) ** 2 @ (1.0 / precision)
-    assert effects.variance(weight, precision) == pytest.approx(expected)
+    weight = np.array([1.0, -0.5])
+    assert effects.summed(weight) == pytest.approx(np.einsum("nrq,r->q", s.random, weight))
     target = Target(s, ())
     state = at_the_mode(s, noise_of(s))
     system = solved(s, state, target.jacobian(s.first_law, target.predict(s.first_law)), target.bounds)

@@ -26,6 +26,7 @@ from tribo.diagnose.statistics.model import (
     setup,
     start_changes,
     with_form_error,
+    with_free_columns,
 )
 from tribo.diagnose.statistics.observations import observe
 from tribo.diagnose.statistics.predictor import tabled_predictor
@@ -253,3 +254,12 @@ def test_a_candidate_is_called_by_its_mechanism_and_its_choice() -> None:
     assert a.name == "covariate:operator"
     assert a.start.tolist() == [p.start for p in a.mechanism.parameters]
     assert SMALL.samples == ("F", "A", "B", "C")
+
+
+def test_free_columns_may_be_twice_their_coefficients_and_at_least_half_the_largest() -> None:
+    s = campaign()
+    columns = np.ones((s.observations.n, 2, 3))
+    wider = with_free_columns(s, columns, np.array([3.0, -1.0, 0.0]))
+    assert wider.unit[-3:].tolist() == [6.0, 2.0, 1.5]
+    assert wider.group[-3:].tolist() == [FIXED] * 3
+    assert wider.random_effects.count == s.random_effects.count + 3

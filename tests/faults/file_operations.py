@@ -55,13 +55,17 @@ def errors_of(kind: str) -> tuple[str, ...]:
 
 @dataclass
 class Watch:
-    """What happens below ``root``: every operation in order, and the fault that was let happen, if any."""
+    """What happens below ``root``: every operation in order, and the fault that was let happen, if any.
+
+    ``branching`` is told every operation before it is done; where it returns a fault, this process has that fault.
+    """
 
     root: str
     fault: Fault | None = None
     seen: list[Operation] = field(default_factory=list)
     struck: Operation | None = None
     on_strike: Callable[[Operation], object] = lambda operation: None
+    branching: Callable[[int, Operation], Fault | None] | None = None
 
     def inside(self, path: Any) -> str | None:
         """The path relative to the watched folder; None where it lies elsewhere."""
@@ -84,6 +88,8 @@ class Watch:
             return
         operation = Operation(kind, inside)
         self.seen.append(operation)
+        if self.branching is not None and (fault := self.branching(len(self.seen) - 1, operation)) is not None:
+            self.fault, self.branching = fault, None
         if self.fault is None:
             return
         name = self.fault.name
@@ -103,7 +109,7 @@ class Watch:
 
 
 real_open, real_listdir = _io.open, os.listdir
-_real_os_open, _real_readlink = os.open, os.readlink
+real_os_open, _real_readlink = os.open, os.readlink
 
 
 def watch(root: Path, fault: Fault | None = None) -> Watch:
@@ -174,12 +180,12 @@ def _opener(watched: Watch) -> Callable[..., Any]:
 
 
 def _os_opener(watched: Watch) -> Callable[..., int]:
-    @wraps(_real_os_open)
+    @wraps(real_os_open)
     def opened(path: Any, flags: int, mode: int = 0o777, *, dir_fd: int | None = None) -> int:
         writes = flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT)
         kind = "open to write" if writes else "list" if flags & os.O_DIRECTORY else "open to read"
         watched.at(kind, _joined(watched, path, dir_fd))
-        return _real_os_open(path, flags, mode, dir_fd=dir_fd)
+        return real_os_open(path, flags, mode, dir_fd=dir_fd)
 
     return opened
 

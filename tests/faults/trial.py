@@ -13,10 +13,11 @@ import subprocess
 import sys
 import tempfile
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 
 from faults.file_operations import KILL, KILLED, LASTING, Fault, Operation, watch
 from faults.small_site import Place, hashes
@@ -24,6 +25,8 @@ from faults.small_site import Place, hashes
 SLOW_S = 1200
 TEMPORARY_NAME = re.compile(r"\.(?P<name>.+?)(\.[^.]+)?\.part$")
 TIMES = re.compile(r'\d{4}-\d\d-\d\d[T ]\d\d:?\d\d(:?\d\d)?Z?|"seconds": [\d.]+|process \d+')
+
+RANDOM = re.compile(r"(?<=\.)\d+(?=\.part$)|(?<=-)\w{8}(?=/|$)")  # process numbers, names of temporary folders
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,7 @@ def in_child(
     printed, listed = os.pipe(), os.pipe()
     child = os.fork()
     if child == 0:
-        _be_child(work, _Orders(place, fault, largest_file), printed[1], listed[1])
+        be_child(work, Orders(place, fault, largest_file), printed[1], listed[1])
     os.close(printed[1])
     os.close(listed[1])
     said, lines = _read_both(printed[0], listed[0])
@@ -104,15 +107,17 @@ def _read_both(*pipes: int) -> list[str]:
 
 
 @dataclass(frozen=True)
-class _Orders:
+class Orders:
     """What a child is to do beside its work."""
 
     place: Place
-    fault: Fault | None
-    largest_file: int | None
+    fault: Fault | None = None
+    largest_file: int | None = None
+    branching: Callable[[int, Operation], Fault | None] | None = None
 
 
-def _be_child(work: Callable[[], int], orders: _Orders, printed: int, listed: int) -> None:
+def be_child(work: Callable[[], int], orders: Orders, printed: int, listed: int) -> NoReturn:
+    """Do the work in this process, which ends with it: what it prints to one descriptor, its operations to another."""
     status, report = 70, os.write
     try:
         os.dup2(printed, 1)
@@ -123,6 +128,7 @@ def _be_child(work: Callable[[], int], orders: _Orders, printed: int, listed: in
         tempfile.tempdir = None
         watched = watch(orders.place.root, orders.fault)
         watched.on_strike = lambda o: report(listed, f"!{o.kind}\t{o.path}\n".encode("utf-8", "replace"))
+        watched.branching = orders.branching
         if orders.largest_file is not None:
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (orders.largest_file, resource.RLIM_INFINITY))
@@ -147,7 +153,24 @@ def state_of(out: Path) -> dict[str, str]:
             continue
         if file.suffix in (".json", ".html", ".log") and TIMES.search(text := file.read_text("utf-8", "replace")):
             digest = TIMES.sub("", text)
-        found[TIMES.sub("TIME", name)] = digest
+        found[masked(name)] = digest
+    return found
+
+
+def masked(name: str) -> str:
+    """A path without times, process numbers and the random names of temporary folders."""
+    return RANDOM.sub("", TIMES.sub("TIME", name))
+
+
+def files_read(seen: Iterable[Operation]) -> set[str]:
+    """The files, by masked path, that were read as they were at the start: not after they had been removed."""
+    found, gone = set(), set()
+    for operation in seen:
+        name = masked(operation.path)
+        if operation.kind in ("delete", "rename"):
+            gone.add(name)
+        elif operation.kind in ("open to read", "read") and name not in gone:
+            found.add(name)
     return found
 
 
@@ -155,6 +178,24 @@ def leftovers(place: Place) -> list[str]:
     """Temporary files that are still there: beside results, and in the folder for temporary files of the system."""
     parts = [p for p in place.out.rglob("*") if p.name.endswith(".part")] if place.out.is_dir() else []
     return [str(p.relative_to(place.root)) for p in (*parts, *place.temporary.iterdir())]
+
+
+@dataclass(frozen=True)
+class Mended:
+    """An undisturbed start from a state that a fault has left: what of its result does not hold.
+
+    The start did not read the ``unread`` files, and replaced or removed them: from a state that differs in their
+    contents only, it would have come to the same.
+    """
+
+    state: dict[str, str]
+    unread: frozenset[str]
+    wrong: list[str]
+
+    def tells(self, state: dict[str, str]) -> bool:
+        """Whether a start from this state comes to the same."""
+        same = self.state.keys() == state.keys()
+        return same and all(digest == state[name] for name, digest in self.state.items() if name not in self.unread)
 
 
 @dataclass
@@ -167,7 +208,7 @@ class Bench:
     result: dict[str, str] = field(init=False)
     inputs: dict[str, str] = field(init=False)
     written_bytes: int = field(init=False)
-    _mended: dict[str, list[str]] = field(default_factory=dict)
+    mended: list[Mended] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.inputs = self._inputs()
@@ -185,10 +226,14 @@ class Bench:
         """Run the command with this fault from its first state; what was required and does not hold."""
         self.reset()
         outcome = self._run(fault)
+        return outcome, self.judged(fault, outcome)
+
+    def judged(self, fault: Fault, outcome: Outcome) -> list[str]:
+        """What was required of a fault that came out so, and does not hold in the files as they now are."""
         if outcome.struck is None:
-            return outcome, ["the operation was not reached"]
+            return ["the operation was not reached"]
         wrong = self._killed(outcome) if fault.name == KILL else self._failed(outcome, fault)
-        return outcome, [*wrong, *self._inputs_changed(), *self._mends()]
+        return [*wrong, *self._inputs_changed(), *self._mends()]
 
     def with_largest_file(self, size: int) -> tuple[Outcome, list[str]]:
         """The same where no file can grow beyond ``size`` bytes, whoever writes it."""
@@ -239,9 +284,12 @@ class Bench:
         if self.command.ready is not None:
             shutil.copytree(self.command.ready, self.place.out, symlinks=True)
 
+    def work(self) -> int:
+        """The command, in this process; its exit status."""
+        return (self.command.run or run_command)(self.command.arguments)
+
     def _run(self, fault: Fault | None, largest_file: int | None = None) -> Outcome:
-        run = self.command.run or run_command
-        return in_child(lambda: run(self.command.arguments), self.place, fault, largest_file)
+        return in_child(self.work, self.place, fault, largest_file)
 
     def _inputs(self) -> dict[str, str]:
         return {name: digest for folder in self.place.inputs for name, digest in hashes(folder).items()}
@@ -276,23 +324,30 @@ class Bench:
 
     def _mends(self) -> list[str]:
         """What does not hold after an undisturbed start from the present state."""
-        left = sorted(leftovers(self.place))
-        random = [re.sub(r"\w{8}(?=/|$)|\d+", "", name) for name in left]  # process numbers, names of folders
-        key = repr((sorted(state_of(self.place.out).items()), random))
-        if key not in self._mended:
-            for path in self.place.temporary.iterdir():  # of the system, which empties it: no start looks there
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
+        state = self._state()
+        known = next((mended for mended in self.mended if mended.tells(state)), None)
+        if known is None:
             again = self._run(None)
-            wrong = []
-            if again.status != self.expected.status:
-                wrong.append(f"the next start ends with {again.status}: {again.said.strip()[-300:]}")
-            elif (found := state_of(self.place.out)) != self.result:
-                names = [n for n in {*found, *self.result} if found.get(n) != self.result.get(n)]
-                wrong.append(f"the next start makes something else of {', '.join(sorted(names)[:4])}")
-            elif left := leftovers(self.place):
-                wrong.append(f"left over after the next start: {', '.join(left[:3])}")
-            self._mended[key] = wrong
-        return self._mended[key]
+            after = self._state()
+            replaced = {name for name, digest in state.items() if after.get(name) != digest}
+            unread = frozenset(replaced - files_read(again.seen))
+            known = Mended(state, unread, self._not_mended(again))
+            self.mended.append(known)
+        return known.wrong
+
+    def _not_mended(self, again: Outcome) -> list[str]:
+        if again.status != self.expected.status:
+            return [f"the next start ends with {again.status}: {again.said.strip()[-300:]}"]
+        if (found := state_of(self.place.out)) != self.result:
+            names = [n for n in {*found, *self.result} if found.get(n) != self.result.get(n)]
+            return [f"the next start makes something else of {', '.join(sorted(names)[:4])}"]
+        left = leftovers(self.place)
+        return [f"left over after the next start: {', '.join(left[:3])}"] if left else []
+
+    def _state(self) -> dict[str, str]:
+        """Everything that a start finds: results with their hashes, temporary files by name."""
+        names = (str(path.relative_to(self.place.root)) for path in self.place.temporary.rglob("*"))
+        return state_of(self.place.out) | {masked(name): "" for name in names}
 
 
 @contextmanager

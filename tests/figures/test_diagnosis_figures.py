@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,8 @@ from matplotlib.text import Text
 
 from tribo.diagnose import examine
 from tribo.diagnose.diagnosis import Diagnosis
-from tribo.diagnose.statistics.fit import fit
+from tribo.diagnose.statistics.fit import fit, residual_on_flat
+from tribo.diagnose.statistics.model import PATTERN
 from tribo.figures import detectable, extended, misfit, residuals
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
 from tribo.figures.style import house_style
@@ -75,10 +77,50 @@ def test_the_strongest_look_comes_first_with_the_curve_of_the_named_mechanism(te
     assert first["axis"].iloc[0].startswith("Temperature")
     curve = first[first["mark"] == "curve"].sort_values("x")
     assert (curve["y"].diff(2).dropna() < 0).all()  # neighbouring bins hold tests at different loads
-    tests, band = first[first["mark"] == "test"], first[first["mark"] == "band"]
-    assert len(tests) == temperature.baseline.setup.observations.n
-    inside = np.mean(np.abs(tests["y"]) < band["y_high"].max())
-    assert 0.75 < inside < 1.0
+    assert (first["mark"] == "test").sum() == temperature.baseline.setup.observations.n
+
+
+def test_the_grey_band_is_that_of_the_means_beside_it(nothing: Diagnosis) -> None:
+    rows = residuals.numbers(nothing).reset_index()
+    means = rows[rows["mark"] == "mean"].merge(rows[rows["mark"] == "band"], on=["panel", "x"], suffixes=("", "_band"))
+    inside = ((means["y"] > means["y_low_band"]) & (means["y"] < means["y_high_band"])).mean()
+    assert inside > 0.9
+    weight, every = np.array([1.0, 0.0]), np.arange(nothing.baseline.setup.observations.n)
+    single = np.mean([residuals.variance_of_mean(nothing, weight, every[k : k + 1]) for k in every])
+    assert residuals.variance_of_mean(nothing, weight, every) < single / 3
+
+
+def test_what_is_expected_of_a_right_model_does_not_grow_with_how_wrong_the_campaign_shows_it_to_be(
+    nothing: Diagnosis,
+) -> None:
+    f = nothing.baseline
+    patterned = f.setup.group == PATTERN
+    sample = np.flatnonzero(f.setup.observations.conditions.area_fraction < 1.0)
+    found = []
+    for factor in (1.0, 10.0):
+        linear = replace(f.linear, precision=np.where(patterned, factor**-2.0, f.linear.precision))
+        wrong = replace(f, noise=replace(f.noise, pattern=factor), linear=linear)
+        found.append(residuals.variance_of_mean(replace(nothing, baseline=wrong), np.array([1.0, 0.0]), sample))
+    assert found[1] == pytest.approx(found[0])
+
+
+def test_a_point_of_a_residual_is_measured_over_model_less_one(temperature: Diagnosis) -> None:
+    rows = residuals.numbers(temperature)
+    static = rows[(rows["mark"] == "test") & rows["y_axis"].str.startswith("Static friction")]
+    both = rows[(rows["mark"] == "test") & rows["y_axis"].str.startswith("Static and sliding")]
+    shown = static if len(static) else both
+    ratio = np.exp(residual_on_flat(temperature.baseline))
+    expected = 100 * ((ratio[:, 0] if len(static) else np.sqrt(ratio.prod(axis=1))) - 1)
+    by_test = dict(zip(temperature.baseline.setup.observations.test_ids, expected, strict=True))
+    first = shown[shown["panel"] == shown["panel"].iloc[0]]
+    assert first["y"].to_numpy() == pytest.approx([by_test[t] for t in first["test_id"]])
+
+
+def test_the_caption_names_columns_that_the_heat_map_has(nothing: Diagnosis) -> None:
+    caption = DIAGNOSIS_FIGURES["misfit"].caption
+    named = re.findall(r"[Cc]olumn “([^”]*)”", caption)
+    assert len(named) == 2
+    assert set(named) <= set(misfit.numbers(nothing)["label"])
 
 
 def test_the_extended_model_has_the_smaller_residuals(temperature: Diagnosis, nothing: Diagnosis) -> None:

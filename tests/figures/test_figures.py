@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,7 +15,7 @@ from report.synthetic import AREA_M2, make_study
 
 from tribo.comparison import study_lookup
 from tribo.figures.catalogue import FIGURES
-from tribo.figures.style import SAMPLE_COLOURS, SAMPLE_MARKERS, house_style, sample_mark
+from tribo.figures.style import SAMPLE_COLOURS, SAMPLE_MARKERS, house_style, sample_mark, settle
 from tribo.records import Study
 
 NAMES = list(FIGURES)
@@ -39,7 +40,8 @@ def test_the_numbers_of_a_figure_are_what_it_draws(name: str, study: Study) -> N
         "fig7": ("normal_load_N", "T_N"),
         "fig8": ("area_fraction", "value"),
     }[name]
-    expected = {(float(f"{a:.6g}"), float(f"{b:.6g}")) for a, b in numbers[[x, y]].to_numpy(float)}
+    points = numbers[[x, y]].dropna().to_numpy(float)
+    expected = {(float(f"{a:.6g}"), float(f"{b:.6g}")) for a, b in points}
     assert expected <= drawn_points(FIGURES[name].draw(numbers))
 
 
@@ -64,24 +66,94 @@ def test_a_study_without_a_model_still_shows_the_measurement(name: str, study: S
     assert FIGURES[name].draw(numbers).axes
 
 
+def labels(figure: Figure) -> list[tuple[str, Any]]:
+    """Every text of a figure with its place on paper, as it is laid out."""
+    with house_style():  # the number of ticks depends on their size, which the style sets
+        settle(figure)
+        figure.draw_without_rendering()
+        texts = [
+            text
+            for ax in figure.axes
+            for text in (
+                *(t for t in ax.get_xticklabels() if ax.get_xlim()[0] <= t.get_position()[0] <= ax.get_xlim()[1]),
+                *(t for t in ax.get_yticklabels() if min(ax.get_ylim()) <= t.get_position()[1] <= max(ax.get_ylim())),
+                ax.xaxis.label, ax.yaxis.label, *(c for c in ax.get_children() if isinstance(c, Text)),
+            )
+        ]  # fmt: skip
+        texts += [text for legend in figure.legends for text in legend.get_texts()]
+        return [(t.get_text(), t.get_window_extent()) for t in texts if t.get_text() and t.get_visible()]
+
+
+def collisions(figure: Figure) -> list[tuple[str, str]]:
+    """Pairs of labels that lie on each other, and labels that lie outside the page."""
+    found, page = labels(figure), figure.bbox
+    out = [(text, "the page") for text, b in found if not page.frozen().padded(0.5).contains(b.x0, b.y0)
+           or not page.frozen().padded(0.5).contains(b.x1, b.y1)]  # fmt: skip
+    pairs = [(a, b) for k, (a, here) in enumerate(found) for b, there in found[k + 1 :] if here.overlaps(there)]
+    return out + pairs
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_no_label_lies_outside_the_figure_or_on_another(name: str, study: Study) -> None:
-    figure = FIGURES[name].draw(FIGURES[name].numbers(study))
-    with house_style():
-        figure.draw_without_rendering()
-    page = figure.bbox
-    boxes = [
-        text.get_window_extent()
-        for ax in figure.axes
-        for text in (
-            *(t for t in ax.get_xticklabels() if ax.get_xlim()[0] <= t.get_position()[0] <= ax.get_xlim()[1]),
-            ax.xaxis.label, ax.yaxis.label, *(c for c in ax.get_children() if isinstance(c, Text)),
-        )
-        if text.get_text() and text.get_visible()
-    ]  # fmt: skip
-    boxes += [text.get_window_extent() for legend in figure.legends for text in legend.get_texts()]
-    assert all(page.x0 <= b.x0 and b.x1 <= page.x1 and page.y0 <= b.y0 and b.y1 <= page.y1 for b in boxes)
-    assert not [1 for k, a in enumerate(boxes) for b in boxes[k + 1 :] if a.overlaps(b)]
+    assert collisions(FIGURES[name].draw(FIGURES[name].numbers(study))) == []
+
+
+@pytest.fixture(scope="module", params=[2, 12], ids="{} samples".format)
+def other_study(request: pytest.FixtureRequest) -> Study:
+    names = ("F", "A", "Sx", "S 20/40 dry", "K5", "Kx", "Ky", "holes 7", "B", "C", "D", "E")
+    return make_study(samples=names[: request.param], n_samples=60)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_label_lies_on_another_with_two_or_twelve_samples(name: str, other_study: Study) -> None:
+    assert collisions(FIGURES[name].draw(FIGURES[name].numbers(other_study))) == []
+
+
+def test_labels_on_each_other_are_seen() -> None:
+    figure = Figure()
+    figure.subplots().set_title("title")
+    figure.axes[0].text(0.4, 1.01, "on the title", transform=figure.axes[0].transAxes)
+    figure.axes[0].text(3.0, 0.5, "outside")
+    assert collisions(figure) == [("outside", "the page"), ("on the title", "title")]
+
+
+@pytest.mark.parametrize("name", ["fig6", "fig7"])
+def test_no_band_is_clipped_and_every_specimen_has_a_mark_of_its_own(name: str, study: Study) -> None:
+    numbers = FIGURES[name].numbers(study)
+    figure = FIGURES[name].draw(numbers)
+    low, high = figure.axes[0].get_ylim()
+    assert low <= numbers["T_low_N"].min()
+    assert numbers["T_high_N"].max() <= high
+    of_a = next(ax for ax in figure.axes if ax.get_title(loc="left") == "A")
+    marks = {str(line.get_label()): line.get_marker() for line in of_a.lines if "specimen" in str(line.get_label())}
+    assert sorted(marks) == ["specimen A1", "specimen A2", "specimen A3"]
+    assert len(set(marks.values())) == 3
+
+
+def test_a_band_too_wide_to_draw_says_how_far_it_reaches(study: Study) -> None:
+    wide = tuple(replace(f, covariance=f.covariance * 1e6) if f.sample == "B" else f for f in study.fits)
+    numbers = FIGURES["fig6"].numbers(replace(study, fits=wide))
+    figure = FIGURES["fig6"].draw(numbers)
+    said = [t.get_text() for ax in figure.axes for t in ax.texts if "95 % band" in t.get_text()]
+    part = numbers[numbers["sample"] == "B"]
+    assert said == [f"95 % band from −{-part['T_low_N'].min():.3g} to {part['T_high_N'].max():.3g} N"]
+    assert figure.axes[0].get_ylim()[1] < 10 * numbers[numbers["mark"] == "measured"]["T_N"].max()
+
+
+def test_fig5_draws_the_model_and_every_pattern_at_scale(study: Study) -> None:
+    figure = FIGURES["fig5"].draw(FIGURES["fig5"].numbers(study))
+    titles = [ax.get_title(loc="left") for ax in figure.axes]
+    assert titles[:2] == ["Mesh, from above", "Side view, not to scale"]
+    assert titles[2:8] == list(study.comparison.area_fractions) if study.comparison else []
+    panels = dict(zip(titles, figure.axes, strict=True))
+    mark = panels["B"].lines[0]  # circles of 10 µm at a pitch of 15 µm
+    on_paper = panels["B"].get_window_extent().width / figure.dpi * 72 / 425
+    assert mark.get_markersize() == pytest.approx(10 * on_paper)
+    x, y = mark.get_xydata().T
+    assert sorted(set(np.diff(sorted(set(x.round(6)))))) == pytest.approx([15.0])
+    assert {len(set(x.round(6))), len(set(y.round(6)))} <= {29, 30, 31}
+    slots = panels["Sx"].collections[0].get_paths()[0].vertices
+    assert np.ptp(slots, axis=0) == pytest.approx([200, 40])
 
 
 def test_fig4_means_have_the_standard_deviation_of_the_mean(study: Study) -> None:
@@ -172,10 +244,11 @@ def test_numbers_name_their_units(study: Study) -> None:
     unitless = {
         "sample_number", "sample", "regime", "group", "mark", "test_id", "n_pulls", "seed", "parameter", "value",
         "value_u", "area_fraction", "ratio", "ratio_low", "ratio_high", "T_over_N", "T_over_N_u", "T_over_peak",
+        "specimen", "specimen_number", "cavity", "staggered",
     }  # fmt: skip
     for figure in FIGURES.values():
         for column in set(figure.numbers(study).columns) - unitless:
-            assert column.rsplit("_", 1)[-1] in {"N", "s", "ms", "kPa", "deg"}, (figure.name, column)
+            assert column.rsplit("_", 1)[-1] in {"N", "s", "ms", "kPa", "deg", "um"}, (figure.name, column)
 
 
 def test_an_empty_campaign_has_empty_numbers(study: Study) -> None:

@@ -99,6 +99,12 @@ def test_every_fault_is_listed_at_once_with_its_place(ingested: Ingested, tmp_pa
     assert "to" in str(outside.allowed)
 
 
+@pytest.mark.parametrize("times", ["5,,2", ",5,2"])
+def test_a_peak_with_half_a_window_is_one_fault(ingested: Ingested, tmp_path: Path, times: str) -> None:
+    path = written(tmp_path, f"{ingested.pulls[0].test_id},move,x,{times}")
+    assert [problem.kind for problem in faults(ingested, path)] == ["half_a_window"]
+
+
 def test_a_column_that_is_none_is_refused_with_the_known_ones(ingested: Ingested, tmp_path: Path) -> None:
     found = faults(ingested, written(tmp_path, header="test_id,act,reason"))
     assert {(p.kind, p.column) for p in found} == {("missing_column", "action"), ("unknown_column", "act")}

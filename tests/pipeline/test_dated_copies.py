@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tribo.errors import TriboError
-from tribo.pipeline.dated_copies import date_build, dated
+from tribo.pipeline.dated_copies import clear_unfinished, date_build, dated
 from tribo.store.whole_files import write_text
 
 DAY = 86400.0
@@ -103,10 +104,32 @@ def test_work_in_progress_and_leftovers_of_a_killed_build_are_not_copied(tmp_pat
     write(tmp_path, "runs", "a/kept/F@1Pa.nc")
     write(tmp_path, "half", "a/.report.html.12.part")
     (tmp_path / "builds" / ".1970-01-01T000000Z.part").mkdir(parents=True)
+    (tmp_path / ".latest.part").symlink_to("builds")
+    clear_unfinished(tmp_path)
     new = date_build(tmp_path, keep=1, now=0.0)
     assert new is not None
     assert {p.relative_to(new).as_posix() for p in new.rglob("*") if p.is_file()} == {"a/report.html", ".number"}
     assert [p.name for p in (tmp_path / "builds").iterdir()] == [new.name]
+    assert not os.path.lexists(tmp_path / ".latest.part")
+
+
+@pytest.mark.parametrize("failing", ["shutil.copytree", "pathlib.Path.rename", "os.symlink", "os.replace"])
+def test_a_copy_that_cannot_be_finished_leaves_nothing_half_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str
+) -> None:
+    real = shutil.copytree
+
+    def full(*given: object, **named: object) -> None:
+        if failing == "shutil.copytree":
+            real(*given, **named)  # type: ignore[arg-type]
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    write(tmp_path, "page")
+    with monkeypatch.context() as patched:
+        patched.setattr(failing, full)
+        with pytest.raises(OSError, match="No space left"):
+            date_build(tmp_path, keep=1, now=0.0)
+    assert [p.name for p in (*tmp_path.glob(".*"), *(tmp_path / "builds").glob(".*"))] == []
 
 
 def test_two_builds_within_a_second_have_two_names_in_order(tmp_path: Path) -> None:

@@ -13,7 +13,16 @@ import numpy as np
 import pytest
 
 from tribo.pipeline.history import CampaignRow, Law, history
-from tribo.pipeline.index_page import change_sentence, page, series, series_name, trend_csv, write_index
+from tribo.pipeline.index_page import (
+    _range,
+    change_sentence,
+    page,
+    series,
+    series_name,
+    ticks,
+    trend_csv,
+    write_index,
+)
 from tribo.pipeline.trend import change_points
 
 
@@ -162,3 +171,36 @@ def test_the_page_is_written_only_where_it_differs(tmp_path: Path) -> None:
     before = (site / "current" / "index.html").stat().st_mtime_ns
     assert write_index(site) == first
     assert (site / "current" / "index.html").stat().st_mtime_ns == before
+
+
+def test_intervals_of_campaigns_that_agree_are_shown_whole() -> None:
+    laws = [Law("F", "static", "mu", value, value - 0.4, value + 0.4) for value in (2.2361, 2.2362, 2.2363)]
+    assert _range(laws) == pytest.approx((1.8361, 2.6363))
+
+
+def test_one_absurd_interval_does_not_squeeze_the_others() -> None:
+    laws = [Law("F", "static", "mu", 2.0 + k / 10, 1.9, 2.4) for k in range(5)]
+    assert _range([*laws, Law("F", "static", "mu", 2.1, -500.0, 500.0)]) == pytest.approx((1.9, 2.4))
+
+
+@pytest.mark.parametrize(("low", "high"), [(2.2351, 2.2363), (0.0, 140.0), (-0.02, 0.03), (4.7, 9.1)])
+def test_the_labels_of_an_axis_differ_and_are_near_their_values(low: float, high: float) -> None:
+    found = ticks(low, high)
+    assert len({text for _, text in found}) == 3
+    for value, text in found:
+        assert float(text.replace("−", "-")) == pytest.approx(value, abs=(high - low) / 10)
+
+
+def test_a_campaign_shows_the_sentence_of_its_card_and_its_combined_interval(tmp_path: Path) -> None:
+    site = site_with(tmp_path, {}, [])
+    out = site / "current" / "a"
+    out.mkdir()
+    card = {"sentence": "Friction falls.", "counts": "9 tests used", "next_test": {"what": "Weigh the sled."}}
+    (out / "card.json").write_text(json.dumps(card))
+    head = "sample,regime,mu,mu_low,mu_high,mu_combined_low,mu_combined_high"
+    (out / "fits.csv").write_text(f"{head}\nF,static,2.0,1.9,2.1,1.5,2.5\nA,static,2.0,1.9,2.1,,\n")
+    (row,) = history(site)
+    assert (row.laws[0].low, row.laws[0].high) == (1.5, 2.5)
+    assert (row.laws[1].low, row.laws[1].high) == (1.9, 2.1)
+    shown = page([row], [])
+    assert all(words in shown for words in ("Friction falls.", "9 tests used", "Next test: Weigh the sled."))

@@ -142,8 +142,17 @@ def make_run(sample: str, area_fraction: float) -> Run:
     return Run(
         sample, 9185.82, 45.0 if area_fraction == 1 else -7.8, 1, t,
         force * scale, moving, load_N, 7.0, 4.0, 6e-3, (8e-3, 20e-3), "fast",
-        {"dt_s": 5e-8, "area_fraction": area_fraction},
+        {"dt_s": 5e-8, "area_fraction": area_fraction, **drawn_pattern(sample)},
     )  # fmt: skip
+
+
+def drawn_pattern(sample: str) -> dict[str, object]:
+    """What a run says about its lattice and its pattern."""
+    pattern = PATTERNS.get(sample, Pattern(sample, "square", (6e-6, 6e-6), (12e-6, 12e-6)))
+    return {
+        "blocks": (85, 85), "spacing_m": 5e-6, "cavity": pattern.cavity, "cavity_size_m": pattern.size_m or 0.0,
+        "cavity_pitch_m": pattern.pitch_m or 0.0, "cavity_staggered": pattern.staggered,
+    }
 
 
 def compare(

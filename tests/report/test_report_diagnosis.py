@@ -49,7 +49,8 @@ def test_the_page_tells_the_verdict_first_and_in_full(study: Study) -> None:
     page = html(study, drawn={}, verdict=NAMED)
     assert page.index("Patterned samples have &lt;more&gt; friction.") < page.index("Fitted friction law")
     for words in (
-        "cannot distinguish between suction and normal load error", "3000 (2000 to 4000)", "acts the other way",
+        "between suction under the cavities and an error of the normal load", "3000 (2000 to 4000)",
+        "acts the other way",
         "Weigh the sled.", "below 0.001", "predicts better by a log score of 0.500",
     ):  # fmt: skip
         assert words in page.replace("\u00a0", " ")

@@ -26,7 +26,7 @@ def test_out_holds_the_agreed_files(written: Written) -> None:
     figures = {f"figures/{name}.{kind}" for name in FIGURES for kind in ("svg", "pdf", "png", "csv")}
     tables = {"tests.csv", "fits.csv", "other_fits.csv", "comparison.csv"}
     assert found == figures | tables | {
-        "campaign.nc", "report.html", "report.pdf", "provenance.json", "ro-crate-metadata.json",
+        "campaign.nc", "card.json", "report.html", "report.pdf", "provenance.json", "ro-crate-metadata.json",
     }  # fmt: skip
 
 

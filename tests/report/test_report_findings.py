@@ -34,11 +34,11 @@ def test_an_interval_has_one_verdict(load: LoadRatio, verdict: str) -> None:
     assert load.verdict == verdict
 
 
-def test_a_model_twice_the_measurement_is_a_hundred_percent_too_high() -> None:
-    assert ratio(0.5, 0.4, 0.6).deviation == pytest.approx(1.0)
+def test_a_measurement_of_half_the_model_deviates_by_minus_fifty_percent() -> None:
+    assert ratio(0.5, 0.4, 0.6).deviation == pytest.approx(-0.5)
     agreement = Agreement("C", "static", (ratio(0.5, 0.4, 0.6, 1), ratio(0.4, 0.3, 0.5, 2)), False)
     assert agreement.verdict == "model too high"
-    assert agreement.mean_deviation == pytest.approx(1 / np.sqrt(0.5 * 0.4) - 1)
+    assert agreement.mean_deviation == pytest.approx((0.5 + 0.4) / 2 - 1)
     assert agreement.worst.normal_load_N == 2
 
 
@@ -67,7 +67,7 @@ def test_the_sentence_counts_loads_and_names_the_worst() -> None:
     sentence = wording.agreement_sentence(Agreement("B", "sliding", loads, False))
     assert "agrees within the 95 % interval at 1 of 3 loads" in sentence
     assert "too high at 2 of 3 loads" in sentence
-    assert "the largest deviation is 100 %, at 3.00 N" in sentence
+    assert "by −23 %; the largest difference is −50 %, at 3.00 N" in sentence
 
 
 def test_the_calibrated_sample_is_no_evidence(study: Study) -> None:
@@ -84,7 +84,7 @@ def test_the_synthetic_model_is_found_where_it_was_put(study: Study) -> None:
     from report.synthetic import MODEL_FACTOR
 
     agreements = findings.agreements(study)
-    found = {(a.sample, a.regime): 1 + a.mean_deviation for a in agreements}
+    found = {(a.sample, a.regime): 1 / (1 + a.mean_deviation) for a in agreements}
     put = {(sample, regime): factor for sample, factor in MODEL_FACTOR.items() for regime in ("static", "sliding")}
     assert found == pytest.approx(put, rel=0.06)
     verdicts = {(a.sample, a.regime): a.verdict for a in agreements}

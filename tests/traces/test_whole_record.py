@@ -13,6 +13,7 @@ from tribo.records import Pull, Test, Trace
 from tribo.traces import read_pull, read_record
 from tribo.traces.oscillation import oscillation_of
 from tribo.traces.rules import RULES
+from tribo.traces.sliding import settled
 from tribo.traces.whole_record import Reading
 from tribo.zeroing import zero_choice
 
@@ -266,3 +267,21 @@ def test_a_few_peaks_have_one_cycle_less(peaks: int) -> None:
     time = np.arange(500 * peaks + 50) / 500
     force = 1.0 + 0.2 * (time % 1.0)
     assert oscillation_of(time, force + noise(time.size, 0, 1e-4)).cycles == peaks - 1
+
+
+def test_where_sliding_before_a_stop_drifts_the_steadiest_slide_after_it_counts() -> None:
+    start = np.concatenate([np.zeros(100), np.linspace(0, 3.0, 50), np.linspace(2.6, 1.6, 800)])
+    force = start
+    for level, drift in ((1.6, 0.8), (1.5, 0.0), (1.4, 0.6)):
+        stop = np.concatenate([np.linspace(force[-1], 0, 10), np.zeros(120)])
+        slide = np.linspace(level + drift, level, 800)
+        force = np.concatenate([force, stop, np.linspace(0, 1.25 * slide[0], 50), slide])
+    pull = read_record(Trace("stops", np.arange(force.size) / RATE, force + noise(force.size)), test=a_test())
+    assert len(pull.restarts) == 3
+    assert pull.sliding_N == pytest.approx(1.5, abs=0.02)
+
+
+@pytest.mark.parametrize("size", [12, 15, 17, 19, 20, 23, 41])
+def test_a_force_has_settled_within_the_first_half_of_its_samples(size: int) -> None:
+    force = 1.0 + np.exp(-np.arange(size) / (size / 6))
+    assert 0 < settled(force) <= size // 2 + 1

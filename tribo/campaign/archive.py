@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 from tribo.campaign.load import TOML, load_campaign
 from tribo.errors import CampaignError, Problem
 from tribo.records import Campaign
+from tribo.temporary import temporary_folder
 from tribo.zips import unpack
 
 
@@ -29,9 +29,9 @@ def open_campaign(path: Path | str, *, measured: bool = True) -> Iterator[Campai
     if path.is_dir():
         yield load_campaign(_campaign_folder(path, path.name), measured=measured)
     elif path.is_file():
-        with tempfile.TemporaryDirectory(prefix="tribo-", ignore_cleanup_errors=True) as folder:
-            unpack(path, Path(folder))
-            yield load_campaign(_campaign_folder(Path(folder), path.name), measured=measured)
+        with temporary_folder() as folder:
+            unpack(path, folder)
+            yield load_campaign(_campaign_folder(folder, path.name), measured=measured)
     else:
         raise CampaignError(Problem("missing", "this folder or .zip does not exist", file=str(path)))
 

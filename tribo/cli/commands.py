@@ -58,8 +58,12 @@ def verify(console: Console, out: Path, campaign: Path | None, **_: Any) -> int:
 
 @main.command()
 @CAMPAIGN
+@click.option(
+    "--with", "law_file", type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="LAW.TOML",
+    help="State whether the design would show this law of an earlier campaign.",
+)
 @command_options
-def plan(console: Console, campaign: Path, **_: Any) -> None:
+def plan(console: Console, campaign: Path, law_file: Path | None, **_: Any) -> None:
     """Assess a test plan before measuring.
 
     States which effects the tests listed in CAMPAIGN could detect and which they could not distinguish. The exports
@@ -69,12 +73,18 @@ def plan(console: Console, campaign: Path, **_: Any) -> None:
 
     from tribo.campaign import open_campaign
     from tribo.diagnose import plan_design
+    from tribo.diagnose.discovery.law_file import read_law
+    from tribo.diagnose.discovery.planned_law import plan_law
     from tribo.report.words.verdict_text import plan_text
 
+    law = read_law(law_file) if law_file is not None else None
     with open_campaign(campaign, measured=False) as opened:
         planned = plan_design(opened)
+        shown = plan_law(opened, *law) if law is not None else None
     record = {"tests": planned.n_tests, "findings": [asdict(f) for f in planned.findings], "tied": planned.tied}
-    console.result(record, plan_text(planned))
+    if shown is not None:
+        record["law"] = asdict(shown)
+    console.result(record, "\n".join([*([shown.text] if shown is not None else []), plan_text(planned)]))
 
 
 @main.command()

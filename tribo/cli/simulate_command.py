@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from tribo.cli.output import FORCE, WAIT
 if TYPE_CHECKING:
     import pandas as pd
 
+    from tribo.diagnose.discovery.written_law import WrittenLaw
     from tribo.records import Run
     from tribo.simulate import SimConfig
     from tribo.simulate.resume import Work
@@ -70,7 +72,10 @@ def _described(command: Any) -> Any:
     is_flag=True,
     help="Recompute the simulated column of Table 2 of the paper: 6 samples, 8 pressures, 20 runs each.",
 )
-@click.option("--with", "mechanisms", default="", help="Mechanism to add to the model: MECHANISM:PARAM=VALUE,...")
+@click.option(
+    "--with", "mechanisms", default="", metavar="TEXT",
+    help="Mechanism to add to the model: MECHANISM:PARAM=VALUE,...; or a law that was found: LAW.TOML.",
+)
 @click.option("--given", default="", help="Test conditions for --with, such as hold_s=100,temperature_C=25.")
 @click.option("--scheduler", metavar="ADDRESS", help="Address of a dask scheduler; its workers run the ensemble.")
 @click.option(
@@ -89,7 +94,7 @@ def simulate(
     ensemble; FILE.nc then holds one entry per run. If the same command is started again, it computes only the missing
     runs.
     """
-    from tribo.mechanisms_in_model import parse_given, parse_with
+    from tribo.mechanisms_in_model import columns_from, parse_given, parse_with
     from tribo.simulate.design_file import asked_runs, described_by_options, read_design, together
     from tribo.simulate.results_file import ENSEMBLE, ONE_RUN, kind_of
     from tribo.simulate.resume import continues, run_stored
@@ -104,17 +109,20 @@ def simulate(
     if not (design or table2 or (options["samples"] and options["pressures_kPa"])):
         raise click.UsageError("give --sample and --pressure, or --design, or --table2")
     one, table = (False, {}) if design else described_by_options(options, seed, table2)
+    laws, mechanisms = _laws_in(mechanisms)
+    given, columns = columns_from(given, [name for law, _ in laws for name in law.columns])
     runs, acting, conditions = together(
         lambda: read_design(design, seed) if design else asked_runs(table, seed if one else None),
         lambda: parse_with(mechanisms),
         lambda: parse_given(given),
     )
+    added = Added(acting, conditions, laws, columns)
     check_file(out, ONE_RUN if one else ENSEMBLE, kind_of, force)
     if one:
         with only_writer_of(out, wait_s):
-            _one_run(console, pulled(runs[0], acting, conditions), out)
+            _one_run(console, pulled(runs[0], added), out)
     else:
-        work = _work(acting, conditions)
+        work = _work(added)
         if force and out.exists() and not continues(runs, out, work):
             out.unlink()
         with console.progress() as progress:
@@ -124,11 +132,38 @@ def simulate(
         _say_ensemble(console, ran, out, table2)
 
 
-def pulled(config: SimConfig, acting: Mapping[str, Any], conditions: Mapping[str, float]) -> Run:
-    """One run with mechanisms in the model; at module level so that workers can import it."""
-    from tribo.mechanisms_in_model import simulate_with
+@dataclass(frozen=True)
+class Added:
+    """What is added to the model: mechanisms, the conditions of the test, laws with their values, and their columns."""
 
-    return simulate_with(config, acting, **conditions)
+    acting: Mapping[str, Any]
+    conditions: Mapping[str, float]
+    laws: tuple[tuple[WrittenLaw, tuple[float, ...]], ...] = ()
+    columns: Mapping[str, str] = field(default_factory=dict)
+
+
+def pulled(config: SimConfig, added: Added) -> Run:
+    """One run with laws and mechanisms in the model; at module level so that workers can import it."""
+    import numpy as np
+
+    from tribo.mechanisms_in_model import simulate_with, with_law
+
+    for law, values in added.laws:
+        config = with_law(config, (law.mechanism(), np.array(values)), added.conditions, added.columns)
+    return simulate_with(config, added.acting, **added.conditions)
+
+
+def _laws_in(text: str) -> tuple[tuple[tuple[WrittenLaw, tuple[float, ...]], ...], str]:
+    """The laws whose files a text names, with their amplitudes, and the rest of the text."""
+    from tribo.diagnose.discovery.law_file import read_law
+
+    items = text.split(",")
+    files = [Path(item.strip()) for item in items if item.strip().endswith(".toml")]
+    laws = []
+    for file in files:
+        law, parameters = read_law(file)
+        laws.append((law, tuple(parameters[p.name].value for p in law.mechanism().parameters)))
+    return tuple(laws), ",".join(item for item in items if not item.strip().endswith(".toml"))
 
 
 def _one_run(console: Console, run: Run, out: Path) -> None:
@@ -149,16 +184,18 @@ def _one_run(console: Console, run: Run, out: Path) -> None:
     )
 
 
-def _work(acting: Mapping[str, Any], conditions: Mapping[str, float]) -> Work:
-    """What is done for each run of an ensemble: the run itself, with the mechanisms at work."""
+def _work(added: Added) -> Work:
+    """What is done for each run of an ensemble: the run itself, with what is added to the model."""
     from functools import partial
 
     from tribo.display import exact_text
     from tribo.simulate.resume import FRICTION, Work
 
-    if not acting:
+    if not added.acting and not added.laws:
         return FRICTION
-    return Work(partial(pulled, acting=acting, conditions=conditions), label=exact_text((acting, conditions)))
+    label = exact_text((added.acting, added.conditions))
+    label += exact_text((added.laws, added.columns)) if added.laws else ""
+    return Work(partial(pulled, added=added), label=label)
 
 
 def _say_ensemble(console: Console, table: pd.DataFrame, out: Path, table2: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import click
@@ -19,6 +20,10 @@ DRY_RUN = click.option("--dry-run", is_flag=True, help="List the steps without r
 RULE = click.option(
     "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
 )
+LAWS = click.option(
+    "--laws", type=click.Path(exists=True, file_okay=False, path_type=Path), metavar="DIR",
+    help="Folder with laws of earlier campaigns (law*.toml). Each is tested; one that holds is a layer of the verdict.",
+)  # fmt: skip
 FLAT = click.option(
     "--flat", default="", metavar="SAMPLE",
     help="Flat sample on which the model is calibrated. [default: F, or the only flat sample]",

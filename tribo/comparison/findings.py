@@ -42,8 +42,8 @@ class LoadRatio:
 
     @property
     def deviation(self) -> float:
-        """(simulated - measured) / measured: above zero where the model predicts too much friction."""
-        return 1 / self.ratio - 1
+        """measured / simulated - 1: below zero where the model predicts too much friction."""
+        return self.ratio - 1
 
 
 @dataclass(frozen=True)
@@ -60,13 +60,13 @@ class Agreement:
 
     @property
     def worst(self) -> LoadRatio:
-        """The load at which the ratio is farthest from 1."""
-        return max(self.loads, key=lambda load: abs(math.log(load.ratio)))
+        """The load with the largest deviation."""
+        return max(self.loads, key=lambda load: abs(load.deviation))
 
     @property
     def mean_deviation(self) -> float:
-        """Geometric mean over the loads of simulated over measured, less 1."""
-        return math.exp(-float(np.mean([math.log(load.ratio) for load in self.loads]))) - 1
+        """Mean over the loads of measured / simulated - 1."""
+        return float(np.mean([load.deviation for load in self.loads]))
 
     @property
     def verdict(self) -> Verdict | Literal["mixed"]:

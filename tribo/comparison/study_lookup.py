@@ -39,6 +39,11 @@ def fit_of(fits: Iterable[LawFit], sample: str, regime: str) -> LawFit | None:
     return next((f for f in fits if f.sample == sample and f.regime == regime), None)
 
 
+def stated_fit(study: Study, sample: str, regime: str) -> LawFit | None:
+    """The measured law with its combined uncertainty, as reports state it; that of the fit where there is no budget."""
+    return fit_of(study.combined, sample, regime) or fit_of(study.fits, sample, regime)
+
+
 def load_levels(normal_load_N: FloatArray, tolerance: float = LOAD_TOLERANCE) -> FloatArray:
     """The mean load of the level each load belongs to: loads within ``tolerance`` are one level."""
     return levels_of(np.asarray(normal_load_N, float), tolerance)

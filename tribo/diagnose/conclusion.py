@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tribo.diagnose.effects import Residual, residual_of
 from tribo.diagnose.layers import cause_layers, pattern_layers, remainder_layers
 from tribo.diagnose.next_test import next_test_of
 from tribo.diagnose.search.naming import Named
@@ -27,6 +28,7 @@ from tribo.diagnose.sentences import (
     summary,
 )
 from tribo.diagnose.statistics.direct_evidence import TraceFindings, stated_evidence
+from tribo.diagnose.statistics.fit import residual_on_flat
 from tribo.diagnose.statistics.gain import gain, gain_of_zero
 from tribo.diagnose.statistics.interval import estimates
 from tribo.diagnose.statistics.linearisation import ModelFit
@@ -65,12 +67,16 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
     flat = baseline.setup.observations.flat
     direct = causes_from_evidence(found.evidence.certain)
     weighed = causes_weighed(shown, baseline)
-    misfits = [m for _, m in direct] + misfits_of(found.screened, level, flat)
+    calibrated = Residual(residual_on_flat(baseline), baseline.setup.observations.conditions)
+    misfits = [m for _, m in direct] + misfits_of(found.screened, level, calibrated, flat)
     causes = [c for c, _ in direct] + sorted(weighed, key=lambda c: -c.weight)
     if named is not None:
-        left = [*misfits_remaining(named.remainders), *misfits_of(named.left, level, flat)]
+        beyond = residual_of(named.model)
+        left = [*misfits_remaining(named.remainders, beyond), *misfits_of(named.left, level, beyond, flat)]
         misfits = [*left, *misfits] if named.causes and not patterns_apart(misfits) else [*misfits, *left]
-    misfits = [*(misfits_of_patterns(excess) if excess is not None else ()), *misfits]
+    layers = _layers(found, shown, rng)
+    corrections = [layer for layer in layers if layer.kind == "pattern_correction"]
+    misfits = [*(misfits_of_patterns(corrections, level) if excess is not None else ()), *misfits]
     excluded = exclusions_beside(causes, found.barred, named.weighed if named is not None else ())
     shown_misfits = each_once(misfits)
     text = summary(outcome, causes, equivalent, misfits, smallest)
@@ -83,7 +89,7 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
         equivalent=equivalent,
         excluded=tuple(e for e in excluded if not e.reason.startswith(NOT_TESTABLE)),
         not_testable=tuple(e for e in excluded if e.reason.startswith(NOT_TESTABLE)),
-        layers=_layers(found, shown, rng),
+        layers=layers,
         gain=gained,
         set_aside=baseline.setup.observations.set_aside,
         next_test=next_test_of(named, outcome, misfits, baseline.setup.observations.conditions),

@@ -8,6 +8,8 @@ import numpy as np
 
 from tribo.diagnose.diagnosis_record import Diagnosis
 from tribo.diagnose.search.rivals import weights_of
+from tribo.diagnose.statistics.fit import residual_on_flat
+from tribo.diagnose.statistics.percent import percent
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
@@ -18,8 +20,9 @@ def residual_table(d: Diagnosis) -> pd.DataFrame:
     """One row a test and regime: the measurement, the models, and their differences.
 
     Columns: test_id, sample, specimen, regime, normal_load_N, run_order, specimen_run, temperature_C,
-    humidity_pct, speed_m_s, hold_s, measured_N, baseline_N, extended_N, residual_percent and
-    residual_extended_percent (100 ln of measured over modelled). Without a named mechanism the extended
+    humidity_pct, speed_m_s, hold_s, measured_N, baseline_N, calibrated_N, extended_N, residual_percent,
+    residual_calibrated_percent and residual_extended_percent: 100 (measured / modelled - 1). The baseline is fitted to
+    all samples, calibrated_N is the model calibrated on the flat sample alone. Without a named mechanism the extended
     columns repeat the baseline. Where the extended model was run in the simulator itself, simulated_N is what it says.
     """
     import pandas as pd
@@ -27,6 +30,7 @@ def residual_table(d: Diagnosis) -> pd.DataFrame:
     o = d.baseline.setup.observations
     c = o.conditions
     extended = d.named.model if d.named is not None and d.named.causes else d.baseline
+    on_flat = residual_on_flat(d.baseline)
     parts = []
     for k, regime in enumerate(REGIMES):
         measured, before, after = o.log_force[:, k], d.baseline.predicted[:, k], extended.predicted[:, k]
@@ -38,8 +42,10 @@ def residual_table(d: Diagnosis) -> pd.DataFrame:
                     "normal_load_N": c.normal_load_N, "run_order": c.run_order, "specimen_run": c.specimen_run,
                     "temperature_C": c.temperature_C, "humidity_pct": c.humidity_pct, "speed_m_s": c.speed_m_s,
                     "hold_s": c.hold_s, "measured_N": np.exp(measured), "baseline_N": np.exp(before),
-                    "extended_N": np.exp(after), "residual_percent": 100 * (measured - before),
-                    "residual_extended_percent": 100 * (measured - after),
+                    "calibrated_N": np.exp(measured - on_flat[:, k]), "extended_N": np.exp(after),
+                    "residual_percent": percent(measured - before),
+                    "residual_calibrated_percent": percent(on_flat[:, k]),
+                    "residual_extended_percent": percent(measured - after),
                 }
                 | simulated
             )
@@ -67,7 +73,7 @@ def misfit_map(d: Diagnosis) -> pd.DataFrame:
 
 
 def look_table(d: Diagnosis) -> pd.DataFrame:
-    """Every look at the baseline: its strength in standard deviations, adjusted p and size, strongest first."""
+    """Every look at the baseline: its strength in standard deviations, adjusted p and peak-to-peak size."""
     import pandas as pd
 
     s = d.screened
@@ -75,7 +81,7 @@ def look_table(d: Diagnosis) -> pd.DataFrame:
         {
             "kind": look.kind, "observable": look.observable, "covariate": look.covariate, "sample": look.sample,
             "choice": look.acting.choice if look.acting else "", "strength": strength,
-            "p_adjusted": s.p_adjusted(float(strength)), "effect_percent": 100 * float(np.expm1(min(size, 5.0))),
+            "p_adjusted": s.p_adjusted(float(strength)), "peak_to_peak_percent": float(percent(min(size, 5.0))),
         }
         for look, strength, size in zip(s.looks, s.strength, s.size, strict=True)
     ]  # fmt: skip

@@ -72,7 +72,7 @@ def plan_design(
     law : array (4,)
         Expected flat law: mu and tau0 in kPa, static then sliding.
     """
-    f = _expected(campaign, noise, law, predictor)
+    f = expected_fit(campaign, noise, law, predictor)
     effects = start_effects(f)
     first = _one_each(effects)
     acting = [effects.acting[k] for k in first]
@@ -86,7 +86,7 @@ def plan_design(
     return Plan(f.setup.observations.n, (*found, *_not_applying(f.setup)))
 
 
-def _expected(campaign: Campaign, noise: Noise, law: FloatArray, predictor: Predictor | None) -> ModelFit:
+def expected_fit(campaign: Campaign, noise: Noise, law: FloatArray, predictor: Predictor | None) -> ModelFit:
     """The model as it would be fitted if the campaign came out exactly as expected."""
     tests = list(campaign.tests)
     n, patterns = len(tests), dict(campaign.samples)

@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
+from tribo.diagnose.effects import Effect, Residual, effect_of_look
 from tribo.diagnose.search.looks import Look
 from tribo.diagnose.search.naming import Remainder
 from tribo.diagnose.search.screen import Screen
@@ -14,8 +15,9 @@ from tribo.diagnose.statistics.direct_evidence import Evidence, stated_evidence
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting
 from tribo.diagnose.statistics.pattern_excess import WITHIN, PatternExcess
+from tribo.diagnose.statistics.percent import percent
 from tribo.diagnose.terms import ABSORBED, in_words, not_varied
-from tribo.diagnose.verdict import Cause, Estimate, Excluded, Misfit, Outcome
+from tribo.diagnose.verdict import Cause, Estimate, Excluded, Layer, Misfit, Outcome
 from tribo.mechanisms.direct_estimates import TraceEvidence
 from tribo.mechanisms.record import Conditions, Mechanism
 from tribo.mechanisms.table import MECHANISMS, mechanism
@@ -29,8 +31,10 @@ WHAT = {
 NOT_TESTABLE = "cannot be tested with this design"
 
 
-def misfits_of(screened: Screen, level: float, flat: str = "") -> list[Misfit]:
+def misfits_of(screened: Screen, level: float, residual: Residual, flat: str = "") -> list[Misfit]:
     """The looks that chance does not explain, the strongest first. Mechanisms are reported as causes instead.
+
+    ``residual`` is that of the model that was looked at; the size of each misfit is read off it.
 
     A difference between the sample ``flat`` and the other samples is reported as a misfit of the other samples, because
     the model is calibrated on the flat one.
@@ -46,17 +50,27 @@ def misfits_of(screened: Screen, level: float, flat: str = "") -> list[Misfit]:
             break
         if look.kind != "mechanism" and not look.is_taken_up(flat) and key not in seen:
             seen.add(key)
-            found.append(misfit_of(look, float(screened.size[k]), screened.coefficients[k], p))
+            found.append(_misfit_at(screened, int(k), residual))
     if not found and len(order) and screened.p[order[0]] < level:
-        k = order[0]
-        p = float(screened.p[k])
-        found.append(misfit_of(screened.looks[k], float(screened.size[k]), screened.coefficients[k], p))
+        found.append(_misfit_at(screened, int(order[0]), residual))
     return found
 
 
-def misfits_remaining(remainders: Sequence[Remainder]) -> list[Misfit]:
+def _misfit_at(screened: Screen, k: int, residual: Residual) -> Misfit:
+    look, coefficients = screened.looks[k], screened.coefficients[k]
+    effect = effect_of_look(look, residual, coefficients, float(screened.size[k]), float(screened.strength[k]))
+    return misfit_of(look, effect, coefficients, float(screened.p[k]))
+
+
+def misfits_remaining(remainders: Sequence[Remainder], residual: Residual) -> list[Misfit]:
     """What follows a recorded column and no mechanism, in the order in which it was found."""
-    return [misfit_of(r.look, r.size, r.coefficients, r.p) for r in remainders]
+    return [misfit_remaining(r, residual) for r in remainders]
+
+
+def misfit_remaining(r: Remainder, residual: Residual) -> Misfit:
+    """What follows a recorded column and no mechanism."""
+    effect = effect_of_look(r.look, residual, r.coefficients, r.size, r.strength)
+    return misfit_of(r.look, effect, r.coefficients, r.p)
 
 
 def each_once(misfits: Sequence[Misfit]) -> tuple[Misfit, ...]:
@@ -72,19 +86,25 @@ def _covariate(look: Look) -> str:
     return look.acting.mechanism.column(look.acting.choice)
 
 
-def misfit_of(look: Look, size: float, coefficients: np.ndarray, p: float) -> Misfit:
-    percent = 100.0 * float(np.expm1(min(size, 5.0)))
+def misfit_of(look: Look, effect: Effect, coefficients: np.ndarray, p: float) -> Misfit:
+    """A look as a misfit; ``coefficients`` tell the course of one with several columns."""
     of = f" of {look.sample}" if look.sample and look.kind != "specimen" else ""
-    text = f"{sentence_case(WHAT[look.observable])}{of} {_predicate(look, coefficients)}"
-    text += f": {percent:.0f} %, peak to peak (adjusted p {p_text(p)})."
-    return Misfit(look.observable, look.sample, _covariate(look), percent, p, text)
+    text = f"{sentence_case(WHAT[look.observable])}{of} {_predicate(look, effect.percent > 0, coefficients)}"
+    text += f": {effect_in_words(effect)}, {effect.between} (adjusted p {p_text(p)})."
+    return Misfit(
+        look.observable, look.sample, _covariate(look), effect.percent, p, text, effect.low, effect.high
+    )  # fmt: skip
 
 
-def _predicate(look: Look, coefficients: np.ndarray) -> str:
+def effect_in_words(effect: Effect) -> str:
+    """ "-27 % (90 % interval -31 to -23 %)"."""
+    return f"{effect.percent:+.0f} % (90 % interval {effect.low:+.0f} to {effect.high:+.0f} %)"
+
+
+def _predicate(look: Look, up: bool, coefficients: np.ndarray) -> str:
     """What the observable does relative to the model, in words."""
     column, _, detail = look.covariate.partition(", ")
     words = in_words(column)
-    up = coefficients[0] > 0
     if look.acting is not None:
         return f"varies as expected from {acting_in_words(look.acting)}"
     if look.kind == "sample":
@@ -128,6 +148,12 @@ def name_in_words(name: str) -> str:
     return mechanism(name).in_words + (f" ({label})" if label else "")
 
 
+def meaning_in_words(name: str) -> str:
+    """What a mechanism that a verdict names means, as a clause."""
+    _, _, label = name.partition(":")
+    return f"friction follows the recorded column {in_words(label)}" if label else mechanism(name).meaning
+
+
 def sentence_case(text: str) -> str:
     """With a capital first letter."""
     return text[:1].upper() + text[1:]
@@ -161,11 +187,11 @@ def causes_weighed(shown: Sequence[Weighed], baseline: ModelFit) -> list[Cause]:
     found = []
     for candidate, weight, parameters in shown:
         moved = candidate.fit.predicted - baseline.predicted
-        size = 100.0 * float(np.expm1(np.clip(np.ptp(moved), 0.0, 5.0)))
+        low, high = percent(np.array([moved.min(), moved.max()]))
         name, first = next(iter(parameters.items()))
         text = (
-            f"{sentence_case(acting_in_words(candidate.acting))}: {_estimate(name, first)}. It changes T by "
-            f"{size:.0f} %, peak to peak. {signs_of(candidate.acting.mechanism)}"
+            f"{sentence_case(acting_in_words(candidate.acting))}: {_estimate(name, first)}. With it, the "
+            f"calibrated model changes by {low:+.0f} to {high:+.0f} %. {signs_of(candidate.acting.mechanism)}"
         )
         found.append(Cause(candidate.name, weight, parameters, text))
     return found
@@ -299,15 +325,13 @@ def _joined(equivalent: Sequence[Sequence[str]]) -> str:
     return " This design cannot distinguish the mechanisms joined by \"or\"." if equivalent else ""
 
 
-def misfits_of_patterns(excess: PatternExcess) -> list[Misfit]:
-    """Each patterned sample with the mean by which its friction differs from the model, the largest first."""
-    found = []
-    for sample, both in excess.percent.items():
-        for observable, percent in zip(("static", "sliding"), both, strict=True):
-            side = "above" if percent > 0 else "below"
-            what = f"{sentence_case(WHAT[observable])} of {sample}"
-            text = f"{what} is on average {abs(percent):.0f} % {side} the model (adjusted p {p_text(excess.p)})."
-            found.append(Misfit(observable, sample, "sample", percent, excess.p, text))
+def misfits_of_patterns(corrections: Sequence[Layer], level: float) -> list[Misfit]:
+    """Each patterned sample whose mean friction differs from the model beyond chance, the largest first."""
+    found = [
+        Misfit(c.regimes[0], c.name, "sample", c.effect_percent, c.p_adjusted, c.text, c.low, c.high)
+        for c in corrections
+        if c.p_adjusted < level
+    ]
     return sorted(found, key=lambda m: -abs(m.effect_percent))
 
 

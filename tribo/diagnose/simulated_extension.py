@@ -20,6 +20,7 @@ from tribo.diagnose.sentences import name_in_words
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import effect_of
 from tribo.diagnose.statistics.pattern_table import flat_law
+from tribo.diagnose.statistics.percent import rms_percent
 from tribo.diagnose.verdict import CERTAIN_CAUSES
 from tribo.errors import SimulationError
 from tribo.mechanisms.record import Conditions, Values
@@ -236,7 +237,7 @@ def with_simulation(
     The text and the ``model`` record of its verdict say where the predictions come from and what the simulation gave,
     or why there is none.
     """
-    model: dict[str, object] = {"shares_from": d.baseline.setup.predictor.source}
+    model: dict[str, object] = {**d.verdict.model, "shares_from": d.baseline.setup.predictor.source}
     words = [d.verdict.text, f"The predictions for the patterned samples are based on {model['shares_from']}."]
     found = None
     if d.named is not None and d.named.causes and d.verdict.verdict in CERTAIN_CAUSES:
@@ -262,16 +263,17 @@ def _reported(d: Diagnosis, found: SimulatedExtension | NotSimulated) -> tuple[s
     }  # fmt: skip
     sentence = (
         f"With {names} in the simulator itself ({len(found.table)} pairs of runs), the effect is {found.ratio:.3f} +- "
-        f"{found.ratio_u:.3f} times that of its law. The RMS of the residuals is {before:.1f} % for the calibrated "
-        f"model, {after:.1f} % with the simulated effect and {quick:.1f} % with the law."
+        f"{found.ratio_u:.3f} times that of its law. The root mean square of measured over modelled T, less one, is "
+        f"{before:.1f} % for the calibrated model, {after:.1f} % with the simulated effect and {quick:.1f} % with the "
+        "law."
     )
     return "simulated", record, sentence
 
 
 def residual_percent(d: Diagnosis, found: SimulatedExtension) -> tuple[float, float, float]:
-    """Root mean square of 100 ln of measured over modelled T: calibrated, extended by law, and by the simulator."""
+    """Root mean square of 100 (measured / modelled T - 1): calibrated, extended by law, and by the simulator."""
     assert d.named is not None
     measured = d.baseline.setup.observations.log_force
     left = (d.baseline.residual, d.named.model.residual, measured - found.log_force)
-    before, quick, after = (float(100 * np.sqrt(np.mean(part**2))) for part in left)
+    before, quick, after = (rms_percent(part) for part in left)
     return before, quick, after

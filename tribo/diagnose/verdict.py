@@ -20,7 +20,11 @@ CERTAIN_CAUSES: tuple[Outcome, ...] = ("named", "undetermined", "partly")  # ver
 @displayed()
 @dataclass(frozen=True)
 class Misfit:
-    """Where the model fails: which observable follows which covariate, the size, and the adjusted p value."""
+    """Where the model fails: which observable follows which covariate, the size, and the adjusted p value.
+
+    ``effect_percent`` is 100 (measured / model - 1), or the change of measured / model from one end of the covariate to
+    the other, as ``text`` says, with its 90 % interval.
+    """
 
     observable: str
     sample: str
@@ -28,6 +32,8 @@ class Misfit:
     effect_percent: float
     p_adjusted: float
     text: str
+    low: float = math.nan
+    high: float = math.nan
 
 
 @displayed()
@@ -64,7 +70,8 @@ class Excluded:
 @displayed()
 @dataclass(frozen=True)
 class Gain:
-    """What the extended model gains on tests it has not seen: log scores per test, and RMSE of ln T."""
+    """What the extended model gains on tests it has not seen: log scores per test, and the root mean square of
+    100 (measured / predicted - 1)."""
 
     held_out: str
     log_score_baseline: float
@@ -82,7 +89,8 @@ class Layer:
 
     ``effect_percent`` is 100 (measured / model - 1) of a pattern correction, and the largest signed change of T by a
     cause, with a 90 % interval from ``low`` to ``high``; of a remainder it is the peak-to-peak effect. ``tied_with``
-    are mechanisms that the design cannot distinguish from it, ``gain`` what the layer gains on tests left out.
+    are mechanisms that the design cannot distinguish from it, ``gain`` what the layer gains on tests left out, ``at``
+    the sample, regime and load at which a cause acts most.
     """
 
     kind: LayerKind
@@ -98,6 +106,7 @@ class Layer:
     tied_with: tuple[str, ...] = ()
     gain: Gain | None = None
     text: str = ""
+    at: str = ""
 
 
 @displayed()

@@ -30,7 +30,7 @@ def numbers(study: Study) -> pd.DataFrame:
     frames = []
     for regime in REGIMES:
         for parameter in PARAMETERS:
-            measured = _points(study, study.fits, regime, parameter, "measured", order)
+            measured = _points(study, study.combined or study.fits, regime, parameter, "measured", order)
             model = _points(study, simulated, regime, parameter, "simulated", order)
             flat = study_lookup.fit_of(study.fits, study_lookup.flat_sample(study), regime)
             frames += [measured, model, _line(measured), _prediction(flat, measured, parameter)]

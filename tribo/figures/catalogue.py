@@ -10,6 +10,7 @@ from tribo.figures import (
     detectable,
     evidence,
     extended,
+    finding,
     force,
     friction_panels,
     measured_over_simulated,
@@ -58,9 +59,11 @@ FIGURES: dict[str, StudyFigure] = {
         ),
         StudyFigure(
             "fig5",
-            "Simulated friction against time",
-            "Friction force divided by normal load in one run of the spring-block model for each sample. Filled "
-            "marker: static peak. Dotted line: mean over the sliding window.",
+            "Model, patterns and simulated friction",
+            "Top: the spring-block model. Blocks on a square lattice are joined by springs to their eight neighbours "
+            "and by shear springs to a slider that moves at a constant speed. Middle: the simulated part of each "
+            "sample at scale, cavities grey, with the direction of the pull. Bottom: friction force divided by load in "
+            "one run for each sample. Filled marker: static peak. Dotted line: mean over the sliding window.",
             simulated_runs.numbers,
             simulated_runs.draw,
         ),
@@ -83,8 +86,8 @@ FIGURES: dict[str, StudyFigure] = {
         StudyFigure(
             "fig8",
             "μ and τ₀ against contact area fraction",
-            "Fitted μ and τ₀ with their standard uncertainties, and a straight line in AF through the measured "
-            "values (equal weights). Points that would overlap are shifted slightly. Simulated points are "
+            "Fitted μ and τ₀ with their combined standard uncertainties, and a straight line in AF through the "
+            "measured values (equal weights). Points that would overlap are shifted slightly. Simulated points are "
             "plotted at the area fraction of the model lattice. μ and τ₀ of a fit are correlated: judge the "
             "model by the force at a load, not by μ or τ₀ alone.",
             area.numbers,
@@ -136,31 +139,43 @@ DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
     figure.name: figure
     for figure in (
         FigureOf(
+            "finding",
+            "What was found",
+            "100 (measured / model − 1) against what it follows, for the model calibrated on the flat sample. Black: "
+            "means with twice their standard error. Grey: range of 95 % of such means if the model were right. Red: "
+            "what the named cause adds. Small points: tests.",
+            finding.numbers,
+            finding.draw,
+        ),
+        FigureOf(
             "misfit",
             "Where the calibrated model fails",
-            "Ratio of measured to modelled friction for each sample: change, in percent, between the low and the "
-            "high end of each recorded variable. Column “mean”: mean of the sample. “Bend with load”: height of "
-            "the ends of the load range above its middle. Strong colours and asterisks (** p < 0.01, * p < 0.05) mark "
-            "statistically significant deviations. The p values are adjusted for all comparisons: each is compared "
-            "with the strongest deviation in simulated campaigns of the calibrated model. Pale cells are not "
-            "significant. Last rows: rank correlations within samples and loads, adjusted for their number.",
+            "Change of measured over modelled friction, in percent, from the low to the high end of each recorded "
+            "variable (5 to 95 % of its range), for each sample. Column “mean”: mean over the sample of 100 (measured "
+            "/ model − 1). Column “bend with load”: height of the ends of the load range above its middle. Strong "
+            "colours and asterisks (** p < 0.01, * p < 0.05) mark statistically significant deviations. The p values "
+            "are adjusted for all comparisons: each is compared with the strongest deviation in simulated campaigns "
+            "of the calibrated model. Pale cells are not significant. Last rows: change of the zero of the force (in "
+            "percent of the median sliding force), of the slope of the rise and of the stick-slip amplitude; their p "
+            "values are those of rank correlations.",
             misfit.numbers,
             misfit.draw,
         ),
         FigureOf(
             "residuals",
             "The strongest deviations",
-            "Ratio of measured to modelled friction (100 ln of the ratio) against the recorded variable with which "
-            "it varies most strongly; if no deviation is significant, against the three variables that come closest. "
-            "Grey band: range of 95 % of single tests, given the scatter of repeats and specimens and the error of the "
-            "model. Red line: contribution of the identified mechanism.",
+            "100 (measured / model − 1) against the recorded variable with which it varies most strongly; if no "
+            "deviation is significant, against the three variables that come closest. Small points: tests; black: "
+            "means with twice their standard error. Grey band: range of 95 % of such means if the model were right, "
+            "given the scatter of repeats and specimens and the error of the model. Red line: contribution of the "
+            "identified mechanism.",
             residuals.numbers,
             residuals.draw,
         ),
         FigureOf(
             "extended",
             "Model before and after its extension",
-            "Mean ratio of measured to modelled friction (100 ln of the ratio) at each load, for the model "
+            "Mean of 100 (measured / model − 1) at each load, for the model "
             "calibrated on the flat sample and for the model extended by the identified mechanism, both fitted in the "
             "same way; where available, also for a spring-block simulation that includes the mechanism. Above each "
             "panel: root mean square over all its tests. The verdict states the improvement on tests not used in the "

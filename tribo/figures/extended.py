@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from tribo.comparison import study_lookup
+from tribo.diagnose.statistics.percent import percent, rms_percent
 from tribo.figures import style
 from tribo.records import REGIMES
 
@@ -31,7 +32,7 @@ SHIFT_POINTS = {"before": -2.0, "after": 0.0, "simulated": 2.0}
 
 
 def numbers(d: Diagnosis) -> pd.DataFrame:
-    """Mean residual (percent, 100 ln of measured over modelled) of each sample, regime and load, before and after.
+    """Mean residual, 100 (measured / model - 1), of each sample, regime and load, before and after.
 
     ``low`` to ``high`` are two standard errors of the mean over tests; ``rms_percent`` is the root mean square over
     all tests of the panel. "simulated" is the spring-block model itself with the mechanism in it, where it was run.
@@ -62,14 +63,13 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
 
 def _spread(at_load: np.ndarray, panel: np.ndarray) -> dict[str, Any]:
     """Mean of the residuals at a load with twice its standard error, and the root mean square of those of a panel."""
-    values = 100.0 * at_load
+    values = percent(at_load)
     values = values[np.isfinite(values)]
     mean = float(values.mean()) if len(values) else float("nan")
     error = float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else float("nan")
-    whole = 100.0 * panel
     return {
         "residual_percent": mean, "low_percent": mean - 2 * error, "high_percent": mean + 2 * error,
-        "rms_percent": float(np.sqrt(np.nanmean(whole**2))), "n_tests": len(values),
+        "rms_percent": rms_percent(panel), "n_tests": len(values),
     }  # fmt: skip
 
 
@@ -87,7 +87,7 @@ def draw(numbers: pd.DataFrame) -> Figure:
                 ax.set_title(str(part["sample"].iloc[0]), loc="left")
             ax.set_title(_rms(cell), loc="right", fontweight="normal", fontsize=6.5)
             if style.is_leftmost(ax):
-                ax.set_ylabel(f"{regime} friction:\n100 ln(measured/model)")
+                ax.set_ylabel(f"{regime} friction:\nmeasured / model − 1 (%)")
     for ax in axes[len(samples) :]:
         style.plain_log_axis(ax.xaxis, numbers["normal_load_N"])
         ax.tick_params(axis="x", labelsize=6, rotation=90)

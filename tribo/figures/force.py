@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,8 +25,15 @@ COLUMNS = [
     "T_N",
     "T_low_N",
     "T_high_N",
+    "specimen",
+    "specimen_number",
 ]
 LINE_POINTS = 25
+SPECIMEN_COLOURS = (style.BLUE, style.PURPLE, style.SKY, style.BLACK)
+SPECIMEN_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+ASIDE_POINTS = 1.9  # between the marks of two specimens at one load
+MOST_NAMED = 7  # specimens of one sample in the legend
+WIDEST_BAND = 3.0  # times the highest value drawn otherwise; a wider band is cut, and its end is written there
 
 
 def numbers(regime: Regime) -> Callable[[Study], pd.DataFrame]:
@@ -57,7 +65,10 @@ def _area_fraction(study: Study, sample: str) -> float:
 def _one_sample(study: Study, sample: str, regime: Regime, pulls: pd.DataFrame) -> pd.DataFrame:
     pulls = pulls[np.isfinite(pulls[f"{regime}_N"])]
     loads = pulls["normal_load_N"].to_numpy(float)
-    points = pd.DataFrame({"mark": "measured", "normal_load_N": loads, "T_N": pulls[f"{regime}_N"].to_numpy(float)})
+    points = pd.DataFrame({
+        "mark": "measured", "normal_load_N": loads, "T_N": pulls[f"{regime}_N"].to_numpy(float),
+        "specimen": pulls["specimen"].to_numpy(), "specimen_number": pd.factorize(pulls["specimen"], sort=True)[0],
+    })  # fmt: skip
     if not len(loads):
         return points
     line = np.linspace(0.0, 1.05 * loads.max(), LINE_POINTS)
@@ -93,8 +104,10 @@ def draw(numbers: pd.DataFrame) -> Figure:
         _panel(ax, sample)
         first = sample.iloc[0]
         style.panel_title(ax, first["sample"], f"AF = {first['area_fraction']:.2f}")
-    highest = numbers.groupby("mark")["T_N"].max()
-    axes[0].set_ylim(0, 1.03 * min(highest.max(), 2.5 * highest.get("measured", highest.max())))
+    low, high = _limits(numbers)
+    axes[0].set_ylim(low, high)
+    for ax, (_, sample) in zip(axes, groups, strict=True):
+        _say_cut_band(ax, sample, low, high)
     axes[0].set_xlim(left=0)
     regime = str(numbers["regime"].iloc[0]).capitalize()
     for ax in axes:
@@ -102,7 +115,7 @@ def draw(numbers: pd.DataFrame) -> Figure:
             ax.set_ylabel(f"{regime} friction force T (N)")
         ax.set_xlabel("Normal load N (N)")
         ax.tick_params(labelbottom=True)
-    style.legend_below(figure, _handles(numbers))
+    style.legend_below(figure, _handles(numbers), columns=4)
     return figure
 
 
@@ -118,15 +131,58 @@ def _panel(ax: Axes, sample: pd.DataFrame) -> None:
         area = by_mark["AF prediction"]
         ax.plot(area["normal_load_N"], area["T_N"], color=style.ORANGE, ls=":", lw=1.4)
     if "measured" in by_mark:
-        points = by_mark["measured"]
-        ax.plot(points["normal_load_N"], points["T_N"], "o", color=style.BLUE, mfc="none", ms=3, mew=0.6)
+        _points(ax, by_mark["measured"])
+
+
+def _points(ax: Axes, pulls: pd.DataFrame) -> None:
+    """Every pull with the mark of its specimen, specimens side by side on paper."""
+    last = int(pulls["specimen_number"].max())
+    for number, part in pulls.groupby("specimen_number"):
+        place = int(str(number).split(".")[0])
+        style.cover(ax, part["normal_load_N"], part["T_N"], part["T_N"])
+        ax.plot(
+            part["normal_load_N"], part["T_N"], ls="", ms=2.8, mew=0.6, mfc="none",
+            transform=style.moved_aside(ax, (place - last / 2) * ASIDE_POINTS),
+            label=f"specimen {part['specimen'].iloc[0]}", **_specimen_look(place),
+        )  # fmt: skip
+
+
+def _specimen_look(number: int) -> dict[str, Any]:
+    return {
+        "marker": SPECIMEN_MARKERS[number % len(SPECIMEN_MARKERS)],
+        "color": SPECIMEN_COLOURS[number % len(SPECIMEN_COLOURS)],
+    }
+
+
+def _limits(numbers: pd.DataFrame) -> tuple[float, float]:
+    """Ends of the force axis: everything drawn, and bands as far as they leave the points readable."""
+    values = numbers["T_N"]
+    measured = values[numbers["mark"] == "measured"]
+    top = float(min(values.max(), 2.5 * (measured.max() if len(measured) else values.max())))
+    low, high = float(min(numbers["T_low_N"].min(), 0.0)), float(max(numbers["T_high_N"].max(), top))
+    return max(np.nan_to_num(low), -0.5 * top), 1.03 * min(np.nan_to_num(high, nan=top), WIDEST_BAND * top)
+
+
+def _say_cut_band(ax: Axes, sample: pd.DataFrame, low: float, high: float) -> None:
+    """Where a band leaves the panel, how far it reaches."""
+    lowest, highest = float(sample["T_low_N"].min()), float(sample["T_high_N"].max())
+    if highest > high or lowest < low:
+        text = f"95 % band from {lowest:.3g} to {highest:.3g} N".replace("-", "−")
+        ax.text(0.03, 0.97, text, transform=ax.transAxes, va="top", fontsize=6.5, color=style.VERMILLION)
 
 
 def _handles(numbers: pd.DataFrame) -> list[Line2D]:
-    handles = {
-        "measured": Line2D([], [], color=style.BLUE, marker="o", mfc="none", ls="", ms=3.5, label="measured pulls"),
+    specimens = numbers["specimen_number"].dropna().astype(int)
+    several = specimens.nunique() > 1
+    shown = sorted(specimens.unique())[:MOST_NAMED]
+    points = [
+        Line2D([], [], mfc="none", ls="", ms=3.5, label=f"pulls of specimen {number + 1}" if several else "pulls",
+               **_specimen_look(number))
+        for number in shown
+    ]  # fmt: skip
+    lines = {
         "fit": Line2D([], [], color=style.VERMILLION, label="fit T = μN + τ₀A, 95 % band"),
         "simulated": Line2D([], [], color=style.GREEN, ls="--", label="spring-block model"),
         "AF prediction": Line2D([], [], color=style.ORANGE, ls=":", lw=1.4, label="T = T(flat) · AF"),
     }
-    return [handle for mark, handle in handles.items() if (numbers["mark"] == mark).any()]
+    return [*points, *(line for mark, line in lines.items() if (numbers["mark"] == mark).any())]

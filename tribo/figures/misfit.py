@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm
 from matplotlib.figure import Figure
 
+from tribo.diagnose.statistics.percent import bend_percent, change_percent, mean_percent, percent
 from tribo.figures import style
 from tribo.figures.covariates import BEND, Covariate, covariates
 from tribo.records import FloatArray
@@ -34,14 +35,14 @@ FAINT = 0.35  # how strongly a cell is coloured that chance explains
 
 
 def numbers(d: Diagnosis) -> pd.DataFrame:
-    """Change of the residual from end to end of each covariate (percent), for each sample and observable.
+    """Change of measured / modelled T from the low to the high end of each covariate, for each sample and observable.
 
-    The change is that of the measurement over the model calibrated on the flat sample alone. The column "mean" is its
-    mean over a sample; the flat sample has neither a mean nor a change with load, since the calibration absorbs both.
-    ``strength`` is the signed score in standard deviations once the flat law, the model's own error of a sample and the
-    specimens are taken out; ``p_adjusted`` sets it against the strongest of all looks at simulated campaigns. The
-    observable "trace" has the rank correlation of the zero, the slope of the rise and the stick-slip amplitude with the
-    covariate, adjusted for the number of cells.
+    The model is the one calibrated on the flat sample alone. The column "mean" is the mean over a sample of
+    100 (measured / model - 1); the flat sample has neither a mean nor a change with load, since the calibration absorbs
+    both. ``strength`` is the signed score in standard deviations once the flat law, the model's own error of a sample
+    and the specimens are taken out; ``p_adjusted`` sets it against the strongest of all looks at simulated campaigns.
+    The observable "trace" has the change of the zero (of the median sliding force), of the slope of the rise and of the
+    stick-slip amplitude, with the p value of a rank correlation, adjusted for the number of cells.
     """
     from tribo.diagnose.statistics.fit import residual_on_flat
 
@@ -91,14 +92,11 @@ def _shape(column: Covariate, here: np.ndarray) -> FloatArray:
 def _end_to_end(column: Covariate, residual: FloatArray, here: np.ndarray) -> float:
     """The mean of a sample; or by how much a straight line rises from the 5 % to the 95 % quantile; in percent."""
     if column.name == "mean":
-        return 100.0 * float(np.expm1(residual.mean()))
+        return mean_percent(residual)
     x = column.score[here]
     if column.name == BEND:  # beside a straight line in ln N: how far the ends lie above the middle
-        line = np.log(column.values[here])
-        slope = np.linalg.lstsq(np.column_stack([x, line, np.ones_like(x)]), residual, rcond=None)[0][0]
-        return 100.0 * float(np.expm1(slope * np.ptp(x)))
-    slope = np.polyfit(x, residual, 1)[0]
-    return 100.0 * float(np.expm1(slope * (np.quantile(x, 0.95) - np.quantile(x, 0.05))))
+        return bend_percent(x, np.log(column.values[here]), residual)
+    return change_percent(x, residual)
 
 
 def _strengths(f: ModelFit, shapes: FloatArray, observable: str) -> FloatArray:
@@ -118,7 +116,7 @@ def _cell(observable: str, row: str, column: Covariate, effect: float, strength:
 
 
 def _trace_cells(d: Diagnosis, columns: list[Covariate]) -> list[dict[str, Any]]:
-    """Rank correlations of what the traces show besides the forces; nothing is modelled there."""
+    """Changes of what the traces show besides the forces, each with the p value of its rank correlation."""
     from scipy.stats import spearmanr
 
     found = []
@@ -130,7 +128,8 @@ def _trace_cells(d: Diagnosis, columns: list[Covariate]) -> list[dict[str, Any]]
                 continue
             rho, p = spearmanr(x, values[good])
             slope = np.polyfit(x, values[good], 1)[0]
-            effect = 100.0 * float(slope * (np.quantile(x, 0.95) - np.quantile(x, 0.05)))
+            change = float(slope * (np.quantile(x, 0.95) - np.quantile(x, 0.05)))
+            effect = 100.0 * change if name == "zero" else float(percent(change))  # the others are logarithms
             found.append((name, column, effect, float(rho) * np.sqrt(good.sum() - 1), float(p)))
     return [_cell("trace", name, c, effect, z, min(1.0, p * len(found))) for name, c, effect, z, p in found]
 
@@ -165,7 +164,7 @@ def draw(numbers: pd.DataFrame) -> Figure:
         ax.tick_params(labelbottom=False)
     axes[-1].set_xticks(np.arange(len(labels)) + 0.5, list(labels), rotation=25, ha="right", rotation_mode="anchor")
     bar = figure.colorbar(mesh, ax=list(axes), shrink=0.6, pad=0.015, aspect=35, extend="both")
-    bar.set_label("change of measured / modelled T (%)")
+    bar.set_label("100 (measured / model − 1), or its change (%)")
     bar.outline.set_visible(False)
     return figure
 

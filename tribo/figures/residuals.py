@@ -12,6 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from tribo.diagnose.statistics.model import PATTERN
+from tribo.diagnose.statistics.percent import percent
 from tribo.figures import style
 from tribo.figures.covariates import LOGARITHMIC, Covariate, covariate
 from tribo.records import FloatArray
@@ -28,12 +30,15 @@ MOST_PANELS = 6
 MOST_POINTS_OF_CURVE = 12
 BAND = 2.0  # standard deviations
 WEIGHTS = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (0.5, 0.5), "drop": (1.0, -1.0)}
-NAMES = {"static": "static friction", "sliding": "sliding friction", "both": "static and sliding", "drop": "drop"}
+NAMES = {
+    "static": "Static friction", "sliding": "Sliding friction", "both": "Static and sliding friction",
+    "drop": "Static / sliding friction",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One look as a panel: the tests it is about, their covariate and their residual in percent of T."""
+    """One look as a panel: the tests it is about, and their covariate."""
 
     look: Look
     covariate: Covariate
@@ -42,12 +47,12 @@ class Panel:
 
 
 def numbers(d: Diagnosis) -> pd.DataFrame:
-    """Residuals (percent: 100 ln of measured over modelled) of the strongest looks, one panel each.
+    """Residuals, 100 (measured / model - 1), of the strongest looks, one panel each.
 
     The model is the one calibrated on the flat sample alone.
 
-    ``mark`` is test; mean and band, the mean of a bin and two standard deviations of single tests by the fitted
-    noise (repeats, specimens, the model's own error of a sample); curve, what the named model adds there.
+    ``mark`` is test; mean and band, the mean of a bin and two standard deviations of such a mean by the fitted noise
+    (repeats, specimens, the model's own error of a sample); curve, what the named model adds there.
     """
     from tribo.diagnose.statistics.fit import residual_on_flat
 
@@ -108,11 +113,11 @@ def _rows(d: Diagnosis, k: int, panel: Panel, residual: FloatArray) -> list[dict
     weight = np.array(WEIGHTS[observable])
     samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
     places = {s: i for i, s in enumerate(samples)}
-    x, y = panel.covariate.values, 100.0 * residual @ weight
-    added = _added(d, residual, weight)
+    x, y = panel.covariate.values, percent(residual @ weight)
+    added = added_by_causes(d, residual, weight)
     common = {
         "panel": k, "title": _title(look), "detail": f"p {_p(panel.p)}", "axis": panel.covariate.axis,
-        "y_axis": f"{NAMES[observable]} (%)",
+        "y_axis": f"{NAMES[observable]}:\nmeasured / model − 1 (%)",
     }  # fmt: skip
     tests = [
         {
@@ -121,42 +126,48 @@ def _rows(d: Diagnosis, k: int, panel: Panel, residual: FloatArray) -> list[dict
         }
         for i in np.flatnonzero(here)
     ]  # fmt: skip
-    return [common | row for row in (*tests, *_summaries(d, panel, x, y, weight, added))]
+    return [common | row for row in (*tests, *summaries(d, panel.covariate, here, y, weight, added))]
 
 
-def _added(d: Diagnosis, residual: FloatArray, weight: FloatArray) -> FloatArray | None:
+def added_by_causes(d: Diagnosis, residual: FloatArray, weight: FloatArray) -> FloatArray | None:
     """What the named model predicts beyond the calibrated one, in percent (n,); None where none is named."""
     if d.named is None or not d.named.causes or d.verdict.verdict == "unknown":
         return None
     calibrated = d.baseline.setup.observations.log_force - residual
-    return np.asarray(100.0 * (d.named.model.predicted - calibrated) @ weight)
+    return percent((d.named.model.predicted - calibrated) @ weight)
 
 
-def _summaries(
-    d: Diagnosis, panel: Panel, x: FloatArray, y: FloatArray, weight: FloatArray, added: FloatArray | None
+def summaries(
+    d: Diagnosis, column: Covariate, here: np.ndarray, y: FloatArray, weight: FloatArray, added: FloatArray | None
 ) -> list[dict[str, Any]]:
-    """Mean with its standard error, noise band and curve of the named mechanism, bin by bin."""
-    noise = 100.0 * np.sqrt(_variance(d, weight))
+    """Mean of ``y`` (n,) with its error, noise band and what the named mechanism adds, bin by bin of a column."""
+    x = column.values
     found: list[dict[str, Any]] = []
-    for rows in _bins(x, panel.here, panel.covariate):
-        centre = float(np.exp(np.log(x[rows]).mean())) if _logarithmic(panel.covariate) else float(x[rows].mean())
-        at = {"x": centre, "x_name": _name(panel.covariate, centre)}
+    for rows in _bins(x, here, column):
+        centre = float(np.exp(np.log(x[rows]).mean())) if _logarithmic(column) else float(x[rows].mean())
+        at = {"x": centre, "x_name": _name(column, centre)}
         error = float(y[rows].std(ddof=1) / np.sqrt(len(rows))) if len(rows) > 1 else float("nan")
-        mean, band = float(y[rows].mean()), BAND * float(np.sqrt(np.mean(noise[rows] ** 2)))
+        mean = float(y[rows].mean())
+        low, high = percent(np.array([-BAND, BAND]) * np.sqrt(variance_of_mean(d, weight, rows)))
         found.append(at | {"mark": "mean", "y": mean, "y_low": mean - BAND * error, "y_high": mean + BAND * error})
-        found.append(at | {"mark": "band", "y": 0.0, "y_low": -band, "y_high": band})
+        found.append(at | {"mark": "band", "y": 0.0, "y_low": float(low), "y_high": float(high)})
         if added is not None:
             found.append(at | {"mark": "curve", "y": float(added[rows].mean())})
     return found
 
 
-def _variance(d: Diagnosis, weight: FloatArray) -> FloatArray:
-    """Variance of one test's residual by the fitted noise: repeats, reading, specimens, error of the sample."""
+def variance_of_mean(d: Diagnosis, weight: FloatArray, rows: np.ndarray) -> float:
+    """Variance of the mean residual of ``rows`` by the fitted noise: repeats, reading, specimens, error of the sample.
+
+    The tests of a specimen, or of a sample, share its deviation, so that more of them do not reduce it. The error of
+    the model counts with the size that is stated for it, however far the campaign lies from the model.
+    """
     f = d.baseline
-    repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup), weight)
-    repeats += f.setup.observations.reading**2 @ weight**2
-    effects = f.setup.random_effects.variance(weight, f.linear.precision)
-    return np.asarray(repeats + effects)
+    stated = np.where(f.setup.group == PATTERN, max(f.noise.pattern, 1.0), 1.0)
+    repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup)[rows], weight)
+    repeats += f.setup.observations.reading[rows] ** 2 @ weight**2
+    shared = f.setup.random_effects.take(rows).summed(weight) / len(rows)
+    return float(repeats.sum() / len(rows) ** 2 + shared**2 @ (1.0 / (stated**2 * f.linear.precision)))
 
 
 def _bins(x: FloatArray, here: np.ndarray, column: Covariate) -> list[np.ndarray]:
@@ -198,7 +209,7 @@ def _p(p: float) -> str:
 
 @style.in_house_style
 def draw(numbers: pd.DataFrame) -> Figure:
-    """Grey band: 95 % of single tests if nothing were hidden. Bars: mean of a bin with twice its standard error."""
+    """Grey band: 95 % of the means if nothing were hidden. Bars: mean of a bin with twice its standard error."""
     groups = [part for _, part in numbers.groupby("panel")]
     figure, axes = style.panel_grid(len(groups), 56, columns=min(len(groups), 3))
     for ax, part in zip(axes, groups, strict=True):
@@ -259,7 +270,7 @@ def _legend(numbers: pd.DataFrame) -> list[Any]:
         Line2D([], [], color=m.colour, marker=m.marker, lw=0, ms=3.5, label=name) for name, m in marks
     ]
     handles.append(Line2D([], [], color="black", marker="o", lw=0.9, ms=3.4, label="mean ± 2 SE"))
-    handles.append(Patch(color="0.75", alpha=0.5, lw=0, label="± 2 SD, expected scatter"))
+    handles.append(Patch(color="0.75", alpha=0.5, lw=0, label="± 2 SD of a mean, expected"))
     if (numbers["mark"] == "curve").any():
         handles.append(Line2D([], [], color=style.VERMILLION, lw=1.6, label="contribution of the named mechanism"))
     return handles

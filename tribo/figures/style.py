@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
@@ -22,6 +22,8 @@ from matplotlib.transforms import ScaledTranslation, Transform
 
 COLUMN_WIDTH_MM = 190.0
 MM_PER_INCH = 25.4
+DETAIL_POINTS = 7.5
+LABELS_MM = 6.0  # beside a panel
 
 # Okabe and Ito (2008), without the yellow, which is lost on white paper.
 BLACK, VERMILLION, BLUE, GREEN = "#000000", "#D55E00", "#0072B2", "#009E73"
@@ -53,10 +55,24 @@ class PageFigure(Figure):
     """A figure that also shows itself in a notebook; no pyplot is needed."""
 
     def _repr_svg_(self) -> str:
-        buffer = io.StringIO()
-        with house_style():
-            FigureCanvasSVG(self).print_svg(buffer, metadata={"Date": None})
-        return buffer.getvalue()
+        return as_svg(self)
+
+
+def as_svg(figure: Figure, about: Mapping[str, str] | None = None) -> str:
+    """A figure as SVG without a date and without random names; ``about`` is written to its metadata."""
+    buffer = io.StringIO()
+    with house_style():  # the canvas is called directly: Figure.savefig draws every figure once more than it needs to
+        settle(figure)
+        FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, **(about or {})})
+    return buffer.getvalue()
+
+
+def settle(figure: Figure) -> None:
+    """Lay a figure out for good: drawing it again changes nothing."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine("none")
 
 
 @contextmanager
@@ -77,9 +93,12 @@ def in_house_style(draw: Callable[P, R]) -> Callable[P, R]:
     return drawn
 
 
-def page_figure(height_mm: float) -> PageFigure:
-    """An empty figure as wide as the page."""
-    return PageFigure(figsize=(COLUMN_WIDTH_MM / MM_PER_INCH, height_mm / MM_PER_INCH), layout="constrained")
+def page_figure(height_mm: float, fixed: bool = False) -> PageFigure:
+    """An empty figure as wide as the page; ``fixed`` leaves axes where they are put."""
+    figure = PageFigure(figsize=(COLUMN_WIDTH_MM / MM_PER_INCH, height_mm / MM_PER_INCH), layout="constrained")
+    if fixed:
+        figure.set_layout_engine("none")
+    return figure
 
 
 def panel_grid(
@@ -103,9 +122,28 @@ def _columns_for(n_panels: int) -> int:
 
 
 def panel_title(ax: Axes, name: str, detail: str = "") -> None:
-    """The name in bold at the left of a panel's head, what belongs to it in plain type at the right."""
-    ax.set_title(name, loc="left")
-    ax.set_title(detail, loc="right", fontweight="normal", fontsize=7.5)
+    """The name in bold at the left of a panel's head; what belongs to it in plain type at the right, or below it."""
+    if _text_mm(name, 8.0) + _text_mm(detail, DETAIL_POINTS) < _width_mm(ax):
+        ax.set_title(name, loc="left")
+        ax.set_title(detail, loc="right", fontweight="normal", fontsize=DETAIL_POINTS)
+        return
+    ax.set_title(name, loc="left", pad=DETAIL_POINTS + 6)
+    ax.annotate(detail, (1, 1), (0, 4), xycoords="axes fraction", textcoords="offset points", ha="right",
+                fontsize=DETAIL_POINTS)  # fmt: skip
+
+
+def _text_mm(text: str, points: float) -> float:
+    """At most about how wide a text is set: letters of DejaVu Sans bold are 0.7 of their size wide in the mean."""
+    return 0.7 * points * MM_PER_INCH / 72 * len(text)
+
+
+def _width_mm(ax: Axes) -> float:
+    """About how wide a panel is: its share of the page without the labels at its left; or its own width if fixed."""
+    figure, spec = ax.get_figure(root=True), ax.get_subplotspec()
+    page = figure.get_size_inches()[0] * MM_PER_INCH if figure is not None else COLUMN_WIDTH_MM
+    if spec is None or (figure is not None and figure.get_layout_engine() is None):
+        return float(page * ax.get_position().width)
+    return float(page / spec.get_gridspec().ncols) - LABELS_MM
 
 
 def by_sample(numbers: pd.DataFrame) -> list[tuple[int, pd.DataFrame]]:

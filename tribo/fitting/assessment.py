@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from tribo.errors import FitError
-from tribo.fitting.budget import campaign_budgets
+from tribo.fitting.budget import Budget, campaign_budgets
 from tribo.fitting.dependence import dependence
 from tribo.fitting.law_choice import compared_laws
 from tribo.fitting.mixed import mixed_model
@@ -19,15 +19,15 @@ from tribo.fitting.power import power_of_campaign
 from tribo.fitting.samples import fit_samples
 from tribo.fitting.three_term import fit_three_term
 from tribo.fitting.weighting import WEIGHTS
-from tribo.records import REGIMES, Ingested, LawFit
+from tribo.records import NO_AREA_M2, REGIMES, Ingested, LawFit
 
 
 def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> dict[str, Any]:
     """The results that complete the fits of a study, by the name of their field in ``Study``."""
     table, area = ingested.table(), ingested.campaign.nominal_area_m2
     has_area = ingested.campaign.has_area  # budget and power are stated at a pressure
-    budgets = campaign_budgets(ingested, fits, weights=weights) if fits and has_area else ()
-    parts = [b.table().assign(sample=b.fit.sample, regime=b.fit.regime) for b in budgets]
+    budgets = budgets_of(ingested, fits, weights)
+    parts = [b.table().assign(sample=b.fit.sample, regime=b.fit.regime) for b in budgets if has_area]
     power: list[str] = []
     outlying: list[str] = []
     for regime in REGIMES:
@@ -39,6 +39,7 @@ def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> di
             with suppress(FitError):
                 outlying += [found.text() for found in look(table, regime, area)]
     return {
+        "combined": tuple(b.combined() for b in budgets),
         "other_fits": _other_fits(ingested, fits, weights),
         "budget": pd.concat(parts, ignore_index=True) if parts else None,
         "power": tuple(power),
@@ -47,6 +48,16 @@ def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> di
         "dependence": dependence(ingested),
         "differences": differences_table(paired) if (paired := paired_differences(fits)) else None,
     }
+
+
+def budgets_of(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> tuple[Budget, ...]:
+    """The budget of every fit; without a nominal area, T is judged at the middle load."""
+    if not fits:
+        return ()
+    if ingested.campaign.has_area:
+        return campaign_budgets(ingested, fits, weights=weights)
+    middle = float(np.median([test.normal_load_N for test in ingested.campaign.tests]))
+    return campaign_budgets(ingested, fits, weights=weights, pressure_Pa=middle / NO_AREA_M2)
 
 
 def _other_fits(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> tuple[LawFit, ...]:

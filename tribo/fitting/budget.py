@@ -1,24 +1,27 @@
 """Uncertainty budget of a fitted law (GUM, JCGM 100:2008): components, their combination and the largest.
 
 The interval of :func:`tribo.fitting.fit_samples` contains the differences between specimens and between pulls
-(type A). Errors common to all pulls, such as those of the load cell or the height of the wire, do not show in repeats.
+(type A); in a campaign the scatter of specimens is partly pooled over the samples, against the luck of few specimens
+(:mod:`tribo.fitting.partial_pooling`).
+Errors common to all pulls, such as those of the load cell or the height of the wire, do not show in repeats.
 They are taken from ``[instrument]`` of campaign.toml or from the stated defaults (type B) and are added here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tribo.errors import FitError, Problem
 from tribo.fitting.linear import least_squares
+from tribo.fitting.partial_pooling import at_least, partly_pooled
 from tribo.fitting.rows import Rows, sample_rows
 from tribo.fitting.weighting import weights_of
 from tribo.laws.table import LAWS
-from tribo.records import STANDARD_GRAVITY, FloatArray, Ingested, LawFit
+from tribo.records import STANDARD_GRAVITY, CombinedFit, FloatArray, Ingested, LawFit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -103,6 +106,15 @@ class Budget:
         """The component with the largest share in a number."""
         return max(self.components, key=lambda component: component.u[number])
 
+    def combined(self) -> CombinedFit:
+        """The fit with the combined covariance, and the component that dominates each number."""
+        largest = {}
+        for number, key in {"mu": "mu", "tau0_kPa": "tau0_Pa", "T_N": "T"}.items():
+            top = self.dominant(number)
+            largest[key] = (top.name, self.share_pct(top, number))
+        own = {f.name: getattr(self.fit, f.name) for f in fields(self.fit)}
+        return CombinedFit(**own | {"covariance": self.covariance}, type_a=self.fit.covariance, largest=largest)
+
     def table(self) -> pd.DataFrame:
         """One row per component and a last one "combined": type, dof, origin, u_NUMBER, share_pct_NUMBER."""
         import pandas as pd
@@ -182,8 +194,12 @@ def campaign_budgets(
     weights: str = "relative",
     pressure_Pa: float = PRESSURE_PA,
 ) -> tuple[Budget, ...]:
-    """Budgets of all ``fits`` that hold values, rise and sampling rate taken from pulls and traces."""
+    """Budgets of all ``fits`` that hold values, rise and sampling rate taken from pulls and traces.
+
+    The covariance of specimens is partly pooled over the samples first.
+    """
     table = ingested.table()
+    fits = _partly_pooled(table, tuple(fit for fit in fits if np.isfinite(fit.covariance).all()), weights)
     rate = [1 / float(np.median(np.diff(t.time_s))) for t in ingested.traces.values() if len(t.time_s) > 1]
     instrument = ingested.campaign.instrument
     stated = instrument.get("sampling_rate_Hz", float(np.median(rate)) if rate else float("nan"))
@@ -198,8 +214,19 @@ def campaign_budgets(
             rise_N_per_s=rise.get(fit.sample, float("nan")),
         )
         for fit in fits
-        if np.isfinite(fit.covariance).all()
     )  # fmt: skip
+
+
+def _partly_pooled(table: pd.DataFrame, fits: tuple[LawFit, ...], weights: str) -> tuple[LawFit, ...]:
+    """Of a single sample, the scatter of specimens is at least what its repeats explain."""
+    found: list[LawFit] = []
+    for regime in dict.fromkeys(fit.regime for fit in fits):
+        rows = {r.sample: r for r in sample_rows(table, regime)}
+        own = tuple(fit for fit in fits if fit.regime == regime)
+        for before, fit in zip(own, partly_pooled(own, rows), strict=True):
+            alone = fit is before and len(fit.specimens) > 1
+            found.append(at_least(fit, _within(rows[fit.sample], fit, weights)[0]) if alone else fit)
+    return tuple(found)
 
 
 def sensitivities(fit: LawFit, pressure_Pa: float) -> dict[str, FloatArray]:
@@ -267,6 +294,7 @@ def _type_b(
     settings = {name: float(instrument.get(name, default.value)) for name, default in DEFAULTS.items()}
     gain, as_adhesion = np.array([mu, tau0_Pa]), np.array([0.0, 1 / area])
     mass_N = settings["mass_u_g"] * 1e-3 * STANDARD_GRAVITY
+    settings["area_u_percent"] *= fit.has_area
     effects = [
         ("load cell, gain", gain * settings["load_cell_u_percent"] / 100, "load_cell_u_percent"),
         ("load cell, offset", as_adhesion * settings["load_cell_u_N"], "load_cell_u_N"),

@@ -53,7 +53,7 @@ def _pool(fits: tuple[LawFit, ...], pressures_Pa: tuple[float, float]) -> dict[s
     freedom = np.array([len(shares[s]) - 1.0 for s in several])
     covariances = np.array([np.cov(shares[s], rowvar=False) for s in several])
     common = np.einsum("s,sij->ij", freedom, covariances) / freedom.sum()
-    dof = _degrees_of_freedom([fit for fit in used if len(fit.specimens) > 1])
+    dof = degrees_of_freedom([fit for fit in used if len(fit.specimens) > 1])
     notes = _unlike([shares[s] for s in several])
     found = {fit.sample: fit for fit in fits}
     for fit in used:
@@ -87,7 +87,7 @@ def _back(common: FloatArray, fit: LawFit, pressures_Pa: tuple[float, float]) ->
     return np.asarray(inverse @ common @ inverse.T)
 
 
-def _degrees_of_freedom(fits: list[LawFit]) -> float:
+def degrees_of_freedom(fits: list[LawFit]) -> float:
     """Specimens less samples, samples that share specimens (one pattern pulled two ways) taken as one."""
     groups: list[set[str]] = []
     for fit in fits:

@@ -210,7 +210,7 @@ def _outside(row: TestRow, file: str, times: Mapping[str, float], trace: Trace) 
         if not first <= value <= last:
             what = "this time is outside the recorded trace"
             yield Problem("outside_trace", what, file, row.row, column, row.cells[column], f"{first:g} to {last:g}")
-    if len(times) > 1 and "window_start_s" in times:
+    if {"window_start_s", "window_end_s"} <= times.keys():
         inside = (trace.time_s >= times["window_start_s"]) & (trace.time_s <= times["window_end_s"])
         if np.count_nonzero(inside) < FEWEST_IN_WINDOW:
             yield Problem("window_short", "too few data points in this window", file, row.row, "window_end_s",

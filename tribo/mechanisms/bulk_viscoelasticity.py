@@ -50,6 +50,7 @@ MECHANISM = Mechanism(
     silenced_by=("stop and hold in mid-rise",),
     needs=("speed_m_s",),
     plain="bulk viscoelasticity",
+    meaning="the material behind the contact is stiffer when it is pulled faster",
     placement=Placement(springs=stiffening),
     evidence=TraceEvidence(
         quantity="rise",

@@ -77,6 +77,8 @@ MECHANISM = Mechanism(
     silenced_by=("the same pattern with deeper cavities",),
     needs=("area_fraction", "normal_load_N"),
     plain="collapse of the cavities",
+    meaning="above a certain load the floors of the cavities touch the counterface, so that the "
+    "pattern rubs like a flat sample",
     placement=Placement(floors=floors),
     measurement=DirectMeasurement("Image a weak pattern through the counterface at the highest load.", 0.1, 2.0),
     in_table=InTable(guess="deformed patterns", finding=finding),

@@ -48,6 +48,7 @@ MECHANISM = Mechanism(
     silenced_by=("pull the long cavities at 45 degrees and in reverse",),
     needs=("elongation",),
     plain="deformation of the cavities under shear",
+    meaning="long cavities open or close under shear, so that friction depends on the direction of the pull",
     in_table=InTable(
         guess="deformed patterns",
         finding=finding,

@@ -40,6 +40,7 @@ MECHANISM = Mechanism(
     silenced_by=("hold for 0.1 to 1000 s in random order",),
     needs=("hold_s",),
     plain="contact ageing",
+    meaning="static friction grows with the time for which the contact has rested",
     variation=Variation("the hold time over 1, 10 and 300 s", "hold_s", (1.0, 10.0, 300.0)),
     in_table=InTable(missing="the hold time is not printed"),
 )

@@ -62,6 +62,7 @@ MECHANISM = Mechanism(
     silenced_by=("image the contact area under load and shear",),
     needs=("normal_load_N",),
     plain="loss of contact area under shear",
+    meaning="the contact shrinks as the shear stress on it grows, so that friction rises less than the load",
     placement=Placement(thresholds=area_left, own_friction=True),
     in_table=InTable(guess="changed contact area", finding=finding),
 )

@@ -94,6 +94,7 @@ MECHANISM = Mechanism(
     silenced_by=("vary that column alone, in random order",),
     choices=choices,
     plain="a recorded column",
+    meaning="friction follows a recorded column that no other mechanism uses",
     choosing=Choosing(label=column_of, on_test=on_test, in_one_run=in_one_run),
     in_table=InTable(missing="no further column is printed"),
 )

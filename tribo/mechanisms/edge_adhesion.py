@@ -36,5 +36,6 @@ MECHANISM = Mechanism(
     silenced_by=("use a pattern of the same area fraction at twice the pitch",),
     needs=("rim_per_m",),
     plain="adhesion along the cavity edges",
+    meaning="the rims of the cavities stick, which adds friction in proportion to their length",
     placement=Placement(rims=rims),
 )

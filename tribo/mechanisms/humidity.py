@@ -34,5 +34,6 @@ MECHANISM = Mechanism(
     silenced_by=("change the humidity in a controlled step at constant temperature",),
     needs=("humidity_pct",),
     plain="humidity",
+    meaning="adhesion changes with the humidity of the room",
     in_table=InTable(missing="no humidity is printed"),
 )

@@ -45,6 +45,7 @@ MECHANISM = Mechanism(
     silenced_by=("read the zero before and after each pull",),
     needs=("elapsed_s",),
     plain="a drift of the load cell",
+    meaning="the zero of the load cell moves with time",
     placement=Placement(chain=in_chain),
     evidence=TraceEvidence(
         quantity="zero drift",

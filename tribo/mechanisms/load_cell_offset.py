@@ -42,6 +42,7 @@ MECHANISM = Mechanism(
     separates="read the zero before and after each pull",
     silenced_by=("read the zero before and after each pull",),
     plain="an offset of the load cell",
+    meaning="the load cell shows a force when there is none",
     placement=Placement(chain=in_chain),
     evidence=TraceEvidence(
         quantity="zero",

@@ -38,6 +38,7 @@ MECHANISM = Mechanism(
     separates="pull a rigid dummy sample",
     silenced_by=("pull a rigid dummy sample",),
     plain="compliance of the machine",
+    meaning="the machine yields like a spring, so that the force rises more slowly",
     placement=Placement(chain=in_chain),
     untested="no rigid dummy sample was pulled for comparison",
     in_table=InTable(missing="no trace is printed in numbers"),

@@ -124,6 +124,7 @@ MECHANISM = Mechanism(
     silenced_by=("look at the specimen under a microscope",),
     choices=choices,
     plain="a mislabelled specimen",
+    meaning="a specimen rubs like another sample than the one on its label",
     choosing=Choosing(column="specimen", on_test=on_test, held_out="loads", parts=parts, all_or_nothing_sd=0.15),
     placement=Placement(other_sample=True),
     measurement=DirectMeasurement("Look at the specimens under a microscope.", 0.1, 0.5),

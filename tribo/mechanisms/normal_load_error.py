@@ -27,5 +27,6 @@ MECHANISM = Mechanism(
     silenced_by=("weigh the sled with everything on it",),
     needs=("area_fraction",),
     plain="an error of the normal load",
+    meaning="the true normal load differs from the stated one by a constant",
     measurement=DirectMeasurement("Weigh the sled with everything that rests on it, the wire attached.", 0.005, 0.25),
 )

@@ -65,6 +65,7 @@ MECHANISM = Mechanism(
     needs=("area_fraction",),
     choices=patterns,
     plain="a wrong area fraction",
+    meaning="the area fraction of one pattern differs from the stated one",
     choosing=Choosing(on_test=on_test, in_one_run=in_one_run, held_out="loads"),
     measurement=DirectMeasurement("Measure the area fraction of the pattern under a microscope.", 0.02, 1.0),
     in_table=InTable(

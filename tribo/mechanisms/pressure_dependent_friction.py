@@ -26,4 +26,5 @@ MECHANISM = Mechanism(
     silenced_by=("widen the load range to lower loads",),
     needs=("normal_load_N",),
     plain="pressure-dependent friction",
+    meaning="the friction coefficient falls as the contact pressure rises",
 )

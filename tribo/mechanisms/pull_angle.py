@@ -41,5 +41,6 @@ MECHANISM = Mechanism(
     separates="change the height of the wire",
     silenced_by=("change the height of the wire",),
     plain="an inclined wire",
+    meaning="the wire is inclined, which changes the load on the contact",
     placement=Placement(load=lifted, chain=in_chain, own_friction=True),
 )

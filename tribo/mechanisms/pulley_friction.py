@@ -35,6 +35,7 @@ MECHANISM = Mechanism(
     separates="hang a dead weight over the roller",
     silenced_by=("hang a dead weight over the roller",),
     plain="friction of the roller",
+    meaning="the roller under the wire adds friction of its own",
     placement=Placement(chain=in_chain),
     in_table=InTable(barred="not testable with this table: the calibration on the flat sample absorbs its effect"),
 )

@@ -53,8 +53,9 @@ class Mechanism:
 
     Parameters
     ----------
-    name, plain, kind
-        The name in a verdict; what it is called in a sentence (without one, the name with spaces); what it belongs to.
+    name, plain, meaning, kind
+        The name in a verdict; what it is called in a sentence (without one, the name with spaces); what that means, as
+        a clause; what it belongs to.
     formula, law, parameters
         ``parameters[0]`` is the amplitude: at its ``zero`` the law returns the baseline to the bit.
     sign
@@ -100,6 +101,7 @@ class Mechanism:
     rise: Rise | None = None
     choices: Callable[[Base, Conditions], tuple[str, ...]] = no_choice
     plain: str = ""
+    meaning: str = ""
     choosing: Choosing = NO_CHOICE
     placement: Placement = BY_LAW
     evidence: TraceEvidence | None = None
@@ -137,7 +139,7 @@ class Mechanism:
 
     def zero(self) -> Values:
         """Parameter values at which the mechanism is absent."""
-        return np.array([self.amplitude.zero, *(p.start for p in self.parameters[1:])])
+        return np.array([self.amplitude.zero, *(p.zero if p.amplitude else p.start for p in self.parameters[1:])])
 
     def start(self) -> Values:
         """Parameter values from which a fit starts: a clear effect."""

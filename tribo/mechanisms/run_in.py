@@ -32,5 +32,6 @@ MECHANISM = Mechanism(
     silenced_by=("use a fresh specimen in the middle of the series",),
     needs=("specimen_run",),
     plain="run-in",
+    meaning="the first pulls of a specimen differ from the later ones",
     in_table=InTable(missing="the order of the pulls is not printed"),
 )

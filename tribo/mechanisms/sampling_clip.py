@@ -46,6 +46,7 @@ MECHANISM = Mechanism(
     silenced_by=("raise the sampling rate tenfold",),
     needs=("clip_N",),
     plain="a peak missed between two samples",
+    meaning="the recorder misses the top of the peak between two samples",
     placement=Placement(chain=in_chain),
     measurement=DirectMeasurement("Repeat twelve pulls at ten times the sampling rate.", 0.2, 1.5),
     in_table=InTable(missing="no sampling rate is printed"),

@@ -36,5 +36,6 @@ MECHANISM = Mechanism(
     silenced_by=("repeat with vented cavities",),
     needs=("area_fraction",),
     plain="suction under the cavities",
+    meaning="the air in the cavities is below room pressure, which presses the sample down",
     in_table=InTable(guess="suction cups", finding=finding),
 )

@@ -31,5 +31,6 @@ MECHANISM = Mechanism(
     silenced_by=("change the temperature in a controlled step at constant humidity",),
     needs=("temperature_C",),
     plain="temperature",
+    meaning="friction changes with the temperature of the room",
     in_table=InTable(missing="no temperature is printed"),
 )

@@ -75,6 +75,7 @@ MECHANISM = Mechanism(
     silenced_by=("lower the wire to the height of the interface",),
     needs=("normal_load_N",),
     plain="a tilt of the sled",
+    meaning="the pull tips the sled, which relieves its trailing edge",
     placement=Placement(along=along, own_friction=True),
     measurement=DirectMeasurement("Measure the height of the wire over the interface.", 0.002, 0.25),
 )

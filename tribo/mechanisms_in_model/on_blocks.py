@@ -108,8 +108,14 @@ def lighter(friction: LocalFriction, static: float, sliding: float) -> LocalFric
 def by_law(
     config: SimConfig, friction: LocalFriction, mechanism: Mechanism, values: Values, recorded: Mapping[str, float]
 ) -> LocalFriction:
+    """Local friction changed by the mechanism's own law, under the recorded conditions of a run."""
+    return by_law_under(friction, mechanism, values, conditions_of_run(config, recorded))
+
+
+def by_law_under(
+    friction: LocalFriction, mechanism: Mechanism, values: Values, conditions: Conditions
+) -> LocalFriction:
     """Local friction changed by the mechanism's own law. The load of the contact blocks is p / AF, their area AF A."""
-    conditions = conditions_of_run(config, recorded)
     choice = mechanism.choosing.in_one_run(conditions)
     load = conditions.contact_pressure_Pa[0]
     area = conditions.nominal_area_m2

@@ -22,15 +22,14 @@ from typing import Any
 
 from tribo.errors import CampaignError, Problem, TriboError, unexpected
 from tribo.escaping import well_formed
-from tribo.pipeline.dated_copies import date_build
+from tribo.pipeline.dated_copies import CURRENT, clear_unfinished, date_build
 from tribo.pipeline.scan import Dropped, difference, scan
 from tribo.pipeline.step_record import OF_A_REPORT, read_record
 from tribo.store.kept_results import package_sources
 from tribo.store.lock import WAIT, only_writer
-from tribo.store.own_folder import STATE, check_site
+from tribo.store.own_folder import STATE, check_site, is_leftover
 from tribo.store.whole_files import write_text
 
-CURRENT = "current"
 GONE = "report.html has been deleted"
 END_S = 60.0  # how long the steps of an interrupted build may take to end
 PROFILES = ("local", "slurm")
@@ -118,7 +117,17 @@ def build_site(drop: Path, site: Path, options: BuildOptions, *, dry_run: bool =
         return _built(drop, state, options, dry_run=True, descriptor=None)
     busy = Problem("busy", f"another build of this site is running; {WAIT}", file=str(site))
     with only_writer(state / "lock", options.wait_s, lasting=True, busy=busy) as descriptor:
+        _clear_leftovers(state)
         return _built(drop, state, options, dry_run=False, descriptor=descriptor)
+
+
+def _clear_leftovers(state: Path) -> None:
+    """Remove what a killed build has left; the folders of reports are cleared by the steps that write into them."""
+    site = state.parent
+    for path in (*state.rglob(".*"), *site.glob(".*"), *(site / CURRENT).glob(".*")):
+        if is_leftover(path.name) and path.is_file():
+            path.unlink()
+    clear_unfinished(site)
 
 
 def _built(drop: Path, state: Path, options: BuildOptions, *, dry_run: bool, descriptor: int | None) -> Built:

@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from tribo.errors import Problem, TriboError
@@ -34,8 +35,6 @@ def date_build(site: Path, keep: int, now: float | None = None) -> Path | None:
         raise TriboError(Problem("keep_nothing", what, found=str(keep), allowed="1 or more"))
     current, builds = site / CURRENT, site / BUILDS
     builds.mkdir(parents=True, exist_ok=True)
-    for part in builds.glob(".*.part"):  # of a build that was killed
-        shutil.rmtree(part)
     before = dated(builds)
     new = None
     if current.is_dir() and contents(current) != (contents(before[-1]) if before else None):
@@ -46,6 +45,13 @@ def date_build(site: Path, keep: int, now: float | None = None) -> Path | None:
     for old in copies[:-keep]:
         shutil.rmtree(old)
     return new
+
+
+def clear_unfinished(site: Path) -> None:
+    """Remove the copies and links that a killed build has left half made; for the holder of the lock of the site."""
+    for part in (site / BUILDS).glob(".*.part"):
+        shutil.rmtree(part)
+    (site / f".{LATEST}.part").unlink(missing_ok=True)
 
 
 def dated(builds: Path) -> list[Path]:
@@ -85,10 +91,14 @@ def _copy(current: Path, builds: Path, now: float | None) -> Path:
     def skipped(folder: str, names: list[str]) -> set[str]:
         return {n for n in names if n.startswith(".") or n in NOT_COPIED}
 
-    shutil.copytree(current, part, ignore=skipped)
-    number = max((_order(copy)[0] for copy in dated(builds)), default=0) + 1
-    (part / NUMBER).write_text(f"{number}\n", encoding="utf-8")
-    part.rename(builds / name)
+    try:
+        shutil.copytree(current, part, ignore=skipped)
+        number = max((_order(copy)[0] for copy in dated(builds)), default=0) + 1
+        (part / NUMBER).write_text(f"{number}\n", encoding="utf-8")
+        part.rename(builds / name)
+    except BaseException:
+        shutil.rmtree(part, ignore_errors=True)
+        raise
     return builds / name
 
 
@@ -100,6 +110,10 @@ def _points_to(site: Path, newest: Path) -> bool:
 def _point(site: Path, new: Path) -> None:
     """Let ``latest`` point to the newest copy, in one step."""
     part = site / f".{LATEST}.part"
-    part.unlink(missing_ok=True)
-    part.symlink_to(new.relative_to(site), target_is_directory=True)
-    os.replace(part, site / LATEST)
+    try:
+        part.symlink_to(new.relative_to(site), target_is_directory=True)
+        os.replace(part, site / LATEST)
+    except BaseException:
+        with suppress(OSError):  # the first error is the one to report
+            part.unlink(missing_ok=True)
+        raise

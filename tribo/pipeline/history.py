@@ -14,7 +14,10 @@ from typing import Any
 from tribo.escaping import from_spreadsheet
 from tribo.pipeline.step_record import OF_A_REPORT, read_record
 
-PARAMETERS = {"mu": ("mu", "mu_low", "mu_high"), "tau0": ("tau0_kPa", "tau0_low_kPa", "tau0_high_kPa")}
+PARAMETERS = {
+    "mu": ("mu", "mu_combined_low", "mu_combined_high", "mu_low", "mu_high"),
+    "tau0": ("tau0_kPa", "tau0_combined_low_kPa", "tau0_combined_high_kPa", "tau0_low_kPa", "tau0_high_kPa"),
+}  # value, interval of the combined uncertainty, and that of the fit alone where a report has no other
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,7 @@ class Law:
 
 @dataclass(frozen=True)
 class CampaignRow:
-    """One campaign as the index page shows it.
+    """One campaign as the index page shows it: its verdict, its counts and its next test are those of its card.
 
     ``state`` is done, some set aside, unusable, failed, waiting or gone (no longer in the folder of campaigns); ``why``
     the reason. ``measured`` is when the first pull started, ``built`` when the report was made.
@@ -47,6 +50,8 @@ class CampaignRow:
     set_aside: int = 0
     verdict: str = ""
     verdict_text: str = ""
+    counts: str = ""
+    next_test: str = ""
     has_report: bool = False
     laws: tuple[Law, ...] = ()
     measured_s: float = math.inf  # the same moment in seconds since 1970
@@ -66,7 +71,7 @@ def _row(name: str, site: Path, config: Mapping[str, Any]) -> CampaignRow:
     out = site / "current" / name
     record = read_record(site / ".tribo" / "steps" / name / "report.json", *OF_A_REPORT)
     state, why = _state(name, record, config)
-    verdict = read_record(out / "verdict.json") or {}
+    verdict, card = (read_record(out / f"{name}.json") or {} for name in ("verdict", "card"))
     tests = _table(out / "tests.csv")
     started = sorted(moment for t in tests if (moment := _moment(t.get("started_at", ""))))
     return CampaignRow(
@@ -79,7 +84,9 @@ def _row(name: str, site: Path, config: Mapping[str, Any]) -> CampaignRow:
         tests=sum(not t.get("set_aside") for t in tests),
         set_aside=sum(bool(t.get("set_aside")) for t in tests),
         verdict=str(verdict.get("verdict", "")),
-        verdict_text=str(verdict.get("text") or ""),
+        verdict_text=str(card.get("sentence") or verdict.get("text") or ""),
+        counts=str(card.get("counts") or ""),
+        next_test=_next_test(card),
         has_report=(out / "report.html").is_file(),
         laws=tuple(_laws(_table(out / "fits.csv"))),
         measured_s=started[0].timestamp() if started else math.inf,
@@ -101,6 +108,11 @@ def _state(name: str, record: Mapping[str, Any] | None, config: Mapping[str, Any
     if record["status"] == "unusable":
         return "unusable", tuple(_problem(p) for p in record["problems"])
     return record["status"].replace("_", " "), ()
+
+
+def _next_test(card: Mapping[str, Any]) -> str:
+    step = card.get("next_test")
+    return str(step.get("what") or "") if isinstance(step, dict) else ""
 
 
 def _problem(problem: Any) -> str:
@@ -145,7 +157,8 @@ def _laws(fits: Sequence[Mapping[str, str]]) -> list[Law]:
     found = []
     for fit in fits:
         for parameter, columns in PARAMETERS.items():
-            value, low, high = (_number(fit.get(column, "")) for column in columns)
+            value, low, high, fit_low, fit_high = (_number(fit.get(column, "")) for column in columns)
+            low, high = (low, high) if math.isfinite(low) else (fit_low, fit_high)
             if {"sample", "regime"} <= set(fit) and math.isfinite(value):
                 found.append(Law(fit["sample"], fit["regime"], parameter, value, low, high))
     return found

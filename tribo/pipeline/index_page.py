@@ -14,6 +14,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 from urllib.parse import quote
 
 from tribo import __version__
@@ -30,6 +31,7 @@ VERDICTS = {
     "partly": "cause identified, misfit left", "unknown": "misfit of unknown cause", "": "–",
 }  # fmt: skip
 SYMBOLS = {"mu": ("μ", ""), "tau0": ("τ₀", "kPa")}
+WIDE = 6.0  # times the median arm of the intervals: a wider one is cut off, so that the others stay readable
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 300.0, 136.0, 44.0, 8.0, 16.0, 18.0
 
 Key = tuple[str, str, str]  # sample, regime, parameter
@@ -159,7 +161,7 @@ def panel(key: Key, rows: Sequence[CampaignRow], changes: Sequence[Change]) -> P
         title=f"{regime} {symbol}{f' in {unit}' if unit else ''}",
         label=f"{regime} {symbol} of {sample} in {len(points)} campaigns: " + "; ".join(p.text for p in points),
         points=points,
-        ticks=tuple((y(v), _short(v)) for v in (low, (low + high) / 2, high)),
+        ticks=tuple((y(v), text) for v, text in ticks(low, high)),
         dates=(rows[fitted[0]].measured, rows[fitted[-1]].measured) if len(fitted) > 1 else ("", ""),
         changes=tuple((x(c.at, -0.5), f"{_short(c.before)} to {_short(c.after)}") for c in changes),
     )
@@ -170,12 +172,19 @@ def _key(law: Law) -> Key:
 
 
 def _range(laws: Sequence[Law]) -> tuple[float, float]:
-    """Lowest and highest number shown: all values, and intervals as far as they are not absurdly wide."""
+    """Lowest and highest number shown: all values, and every interval but those far wider than most."""
     values = [law.value for law in laws]
-    centre, span = sum(values) / len(values), max(values) - min(values) or abs(values[0]) * 0.1 or 1.0
-    ends = [e for law in laws for e in (law.low, law.high) if math.isfinite(e) and abs(e - centre) < 4 * span]
+    arms = [abs(e - law.value) for law in laws for e in (law.low, law.high) if math.isfinite(e)]
+    widest = WIDE * median(arms) if arms else 0.0
+    ends = [e for law in laws for e in (law.low, law.high) if math.isfinite(e) and abs(e - law.value) <= widest]
     low, high = min(values + ends), max(values + ends)
     return (low, high) if high > low else (low - 1.0, high + 1.0)
+
+
+def ticks(low: float, high: float) -> tuple[tuple[float, str], ...]:
+    """Values and labels at the foot, the middle and the head of an axis, with as many decimals as part them."""
+    decimals = max(0, 1 - math.floor(math.log10((high - low) / 2)))
+    return tuple((v, f"{v:.{decimals}f}".replace("-", "−")) for v in (low, (low + high) / 2, high))
 
 
 def _hover(row: CampaignRow, law: Law) -> str:

@@ -83,7 +83,7 @@ def write_store(
     groups = {"/": table.set_coords(OF_A_TEST).assign_attrs(about), "/tests": table}
     groups["/traces"] = _ragged(study)
     if study.fits:
-        groups["/fits"] = _table(result_tables.fits_table(study.fits), "fit")
+        groups["/fits"] = _table(result_tables.fits_table(study.fits, study.combined), "fit")
         groups["/other_fits"] = _table(result_tables.other_fits_table(study), "parameter_row")
     if study.budget is not None:
         groups["/budget"] = _table(study.budget, "budget_row")

@@ -11,6 +11,7 @@ from tribo import __version__
 from tribo.comparison import findings, study_lookup
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
 from tribo.records import REGIMES, Campaign, Regime, Study
+from tribo.report.card import Card, card_of
 from tribo.report.html.pull_cards import pull_cards
 from tribo.report.provenance import Provenance
 from tribo.report.result_tables import all_set_aside
@@ -21,7 +22,7 @@ from tribo.report.words import wording
 from tribo.report.words.friction_words import friction_sentences
 from tribo.report.words.terminal_text import fit_cells
 
-LEAD_FIGURE = "agreement"
+LEAD_FIGURES = ("finding", "agreement", "fig4", "dependence")  # the first that there is shows what the card says
 MISFIT_FIGURES = ("misfit", "residuals")
 CAUSE_FIGURES = ("extended", "evidence")
 CALIBRATED = {
@@ -38,17 +39,21 @@ CALIBRATED = {
 VERDICT_MARKS = {"agrees": "=", "model too high": "▲", "model too low": "▼", "inconclusive": "?"}
 
 
-def content(study: Study, provenance: Provenance | None, verdict: Mapping[str, Any] | None) -> dict[str, Any]:
+def content(
+    study: Study, provenance: Provenance | None, verdict: Mapping[str, Any] | None, card: Card | None = None
+) -> dict[str, Any]:
     """Everything but the figures, by the names the templates use."""
     return {
         "study": study,
         "campaign": study.ingested.campaign,
+        "card": card if card is not None else card_of(study, verdict),
         "verdict": verdict_in_words(verdict) if verdict is not None else None,
         "summary": _summary(study),
         "friction": friction_sentences(study),
         "has_area": study.ingested.campaign.has_area,
         "about": about(study.ingested.campaign),
         "table2": _table2(study),
+        "uncertainty_kind": wording.uncertainty_kind(study),
         "paired": paired_sentences(study),
         "budget": budget_tables(study),
         "budget_origins": budget_origins(study),
@@ -77,8 +82,9 @@ def about(campaign: Campaign) -> str:
 def figure_places(names: list[str]) -> dict[str, list[str]]:
     """Place of each figure: beside the verdict, among Figs. 3 to 8, at the misfits, at the cause, at the end."""
     places: dict[str, list[str]] = {"lead": [], "figures": [], "misfit": [], "cause": [], "rest": []}
+    lead = next((name for name in LEAD_FIGURES if name in names), "")
     for name in names:
-        if name == LEAD_FIGURE:
+        if name == lead:
             places["lead"].append(name)
         elif name in MISFIT_FIGURES:
             places["misfit"].append(name)
@@ -119,7 +125,7 @@ def _table2(study: Study) -> dict[str, Any]:
     for regime in REGIMES:
         rows = []
         for sample in study_lookup.sample_numbers(study):
-            fit = study_lookup.fit_of(study.fits, sample, regime)
+            fit = study_lookup.stated_fit(study, sample, regime)
             if fit is not None:
                 model = fit_cells(study_lookup.fit_of(simulated, sample, regime), load)
                 area_fraction = study.ingested.campaign.area_fraction(sample)

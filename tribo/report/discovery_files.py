@@ -33,9 +33,7 @@ def write_discovery(d: Discovery, title: str, out: Path, provenance: Provenance)
     import pandas as pd
 
     text = discovery_text(d)
-    laws = {
-        f"law-{k}.toml": law_text(found.law, found.parameters, title) for k, found in enumerate(d.laws, start=1)
-    }
+    laws = law_texts(d, title)
     rows = [
         {
             "formula": s.law.formula(), "regime": s.law.regime, "where": s.law.where, "log_likelihood_gain": s.gain,
@@ -49,6 +47,11 @@ def write_discovery(d: Discovery, title: str, out: Path, provenance: Provenance)
     }  # fmt: skip
     _write({**laws, "laws.csv": to_csv(pd.DataFrame(rows)), RECORD: _json(record)}, out, provenance)
     return Written(record, text)
+
+
+def law_texts(d: Discovery, title: str) -> dict[str, str]:
+    """law-1.toml and so on by name, found in the campaign of this title."""
+    return {f"law-{k}.toml": law_text(found.law, found.parameters, title) for k, found in enumerate(d.laws, start=1)}
 
 
 def write_held(held: Held, out: Path, provenance: Provenance) -> Written:

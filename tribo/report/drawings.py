@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import io
+import base64
 import logging
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import pandas as pd
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from tribo.errors import Problem, unexpected
 from tribo.escaping import printable
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES, FIGURES, FRICTION_FIGURES
 from tribo.figures.record import FigureOf
-from tribo.figures.style import house_style
+from tribo.figures.style import as_svg, house_style
 from tribo.forked import each
 from tribo.records import Study
 from tribo.report.html.hover import Series, series_of
@@ -36,6 +36,7 @@ Progress = Callable[[str, int, int], None]
 Keep = Callable[[str, object, Callable[[], Any], Iterable[str]], Any]
 STAGE = "drawing figures"
 DRAWN_BY = ("figures", "report/drawings", "report/html/hover")
+SET_BY = ("report/drawings", "report/paper/typeset")
 THEME = {
     "#ffffff": "var(--paper)",
     "#000000": "currentColor",
@@ -108,11 +109,23 @@ def draw_all(
     found = {}
     for done, figure in enumerate(each(partial(_drawn_or_said, origin, drawing.keep), todo, drawing.jobs), start=1):
         # not in the other processes: typst keeps threads of its own, which do not survive a fork
-        rest = figure_files(figure.files["svg"], figure.title, origin)
+        rest = _other_files(figure, origin, drawing.keep)
         found[figure.name] = replace(figure, files={**figure.files, **rest})
         if drawing.progress is not None:
             drawing.progress(STAGE, done, len(todo))
     return found
+
+
+def _other_files(figure: Drawn, origin: str, keep: Keep) -> dict[str, bytes]:
+    """The PDF and the PNG of a figure; what is kept of them is text."""
+
+    def made() -> dict[str, str]:
+        files = figure_files(figure.files["svg"], figure.title, origin)
+        return {ending: base64.b64encode(content).decode("ascii") for ending, content in files.items()}
+
+    made_from = (figure.svg, figure.title, origin, metadata.version("typst"))
+    kept = keep(f"figure-{figure.name}-files", made_from, made, SET_BY)
+    return {ending: base64.b64decode(text) for ending, text in kept.items()}
 
 
 Numbers = pd.DataFrame | Problem
@@ -176,11 +189,8 @@ def _svg_and_series(record: FigureOf[Any], numbers: pd.DataFrame, origin: str) -
 
 def svg_text(figure: Figure, title: str = "", origin: str = "") -> str:
     """A figure as SVG without a date and without random names; its layout is settled on the way."""
-    buffer = io.StringIO()
-    about = {"Date": None, "Creator": "tribo", "Title": title or None, "Description": origin or None}
-    with house_style():  # the canvas is called directly: Figure.savefig draws every figure once more than it needs to
-        FigureCanvasSVG(figure).print_svg(buffer, metadata={k: v for k, v in about.items() if v or k == "Date"})
-    return buffer.getvalue()
+    about = {"Creator": "tribo", "Title": title, "Description": origin}
+    return as_svg(figure, {name: text for name, text in about.items() if text})
 
 
 def inline_svg(svg: str, name: str, label: str) -> str:

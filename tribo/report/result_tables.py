@@ -11,12 +11,15 @@ import pandas as pd
 
 from tribo.comparison.agreement import ratios
 from tribo.escaping import for_spreadsheet
-from tribo.records import LawFit, Pull, SetAside, Study, Test
+from tribo.records import CombinedFit, LawFit, Pull, SetAside, Study, Test
 from tribo.store.whole_files import write_text
 
 FLOAT_FORMAT = "%.8g"
 PA_PER_KPA = 1e3
-_PER_AREA = ("tau0_kPa", "tau0_u_kPa", "cov", "tau0_low_kPa", "tau0_high_kPa")
+_PER_AREA = (
+    "tau0_kPa", "tau0_u_kPa", "cov", "tau0_low_kPa", "tau0_high_kPa", "tau0_u_combined_kPa", "cov_combined",
+    "tau0_combined_low_kPa", "tau0_combined_high_kPa",
+)  # fmt: skip
 TESTS_COLUMNS = [
     "test_id", "static_N", "static_u_N", "sliding_N", "sliding_u_N", "rule", "window", "zero_N", "flags",
     "set_aside", "sample", "specimen", "normal_load_N", "peak_s", "onset_s", "window_start_s", "window_end_s",
@@ -35,6 +38,8 @@ RESTARTS_COLUMNS = [
 FITS_COLUMNS = [
     "sample", "regime", "mu", "mu_u", "tau0_kPa", "tau0_u_kPa", "cov", "n_specimens", "n_tests", "method",
     "chi2_red", "law", "dof", "mu_low", "mu_high", "tau0_low_kPa", "tau0_high_kPa", "notes", "T0_N", "T0_u_N",
+    "mu_u_combined", "tau0_u_combined_kPa", "cov_combined", "mu_combined_low", "mu_combined_high",
+    "tau0_combined_low_kPa", "tau0_combined_high_kPa", "T0_u_combined_N", "largest_mu", "largest_tau0",
 ]  # fmt: skip
 COMPARISON_COLUMNS = [
     "sample", "regime", "normal_load_N", "measured_N", "measured_u_N", "simulated_N", "simulated_u_N",
@@ -133,9 +138,34 @@ def restarts_table(study: Study) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=RESTARTS_COLUMNS)
 
 
-def fits_table(fits: Iterable[LawFit]) -> pd.DataFrame:
-    """mu and tau0 (kPa) of every fit; ``cov`` is cov(mu, tau0) in kPa, ``*_low`` to ``*_high`` 95 %."""
-    return pd.DataFrame([_fit_row(fit) for fit in fits if "tau0_Pa" in fit.parameters], columns=FITS_COLUMNS)
+def fits_table(fits: Iterable[LawFit], combined: Iterable[CombinedFit] = ()) -> pd.DataFrame:
+    """mu and tau0 (kPa) of every fit; ``cov`` is cov(mu, tau0) in kPa, ``*_low`` to ``*_high`` 95 %.
+
+    ``*_u``, ``*_low`` and ``*_high`` are of specimens and repeats alone; those of ``combined`` include the instrument.
+    """
+    by = {(fit.sample, fit.regime): fit for fit in combined}
+    laws = [fit for fit in fits if "tau0_Pa" in fit.parameters]
+    rows = [_fit_row(fit) | _without_area(_combined_cells(by.get((fit.sample, fit.regime))), fit) for fit in laws]
+    return pd.DataFrame(rows, columns=FITS_COLUMNS)
+
+
+def _combined_cells(fit: CombinedFit | None) -> dict[str, object]:
+    if fit is None:
+        return {}
+    low, high = (v / PA_PER_KPA for v in fit.interval("tau0_Pa"))
+    mu_low, mu_high = fit.interval("mu")
+    tau0_u = fit.standard_uncertainty("tau0_Pa")
+    return {
+        "mu_u_combined": fit.standard_uncertainty("mu"), "tau0_u_combined_kPa": tau0_u / PA_PER_KPA,
+        "cov_combined": float(fit.covariance[0, 1]) / PA_PER_KPA, "mu_combined_low": mu_low,
+        "mu_combined_high": mu_high, "tau0_combined_low_kPa": low, "tau0_combined_high_kPa": high,
+        "T0_u_combined_N": tau0_u * fit.nominal_area_m2, "largest_mu": fit.largest["mu"][0],
+        "largest_tau0": fit.largest["tau0_Pa"][0],
+    }  # fmt: skip
+
+
+def _without_area(cells: dict[str, object], fit: LawFit) -> dict[str, object]:
+    return cells if fit.has_area else cells | dict.fromkeys(_PER_AREA, float("nan"))
 
 
 def _fit_row(fit: LawFit) -> dict[str, object]:
@@ -165,7 +195,7 @@ def _fit_row(fit: LawFit) -> dict[str, object]:
         "T0_N": fit.value("tau0_Pa") * area,
         "T0_u_N": fit.standard_uncertainty("tau0_Pa") * area,
     }
-    return row if fit.has_area else row | dict.fromkeys(_PER_AREA, float("nan"))
+    return _without_area(row, fit)
 
 
 def other_fits_table(study: Study) -> pd.DataFrame:
@@ -223,7 +253,7 @@ def write_tables(study: Study, out: Path) -> list[Path]:
     if not (restarts := restarts_table(study)).empty:
         tables["restarts.csv"] = restarts
     if study.fits:
-        tables["fits.csv"] = fits_table(study.fits)
+        tables["fits.csv"] = fits_table(study.fits, study.combined)
         tables["other_fits.csv"] = other_fits_table(study)
     if study.laws is not None and not study.laws.empty:
         tables["laws.csv"] = study.laws

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from tribo.diagnose.sentences import name_in_words, sentence_case
 from tribo.figures.covariates import LABELS
 from tribo.report.words.numerals import joined, significant
 from tribo.store.whole_files import write_text
@@ -23,6 +24,11 @@ OUTCOMES = {
     "partly": "A cause was identified, and a misfit remains that it does not explain.",
     "unknown": "The model does not fit the data, and no known mechanism explains the misfit.",
 }
+TIED = {
+    "named": "The model does not fit the data; the cause is one of several that this campaign cannot distinguish.",
+    "partly": "The model does not fit the data; the cause is one of several that this campaign cannot distinguish, and "
+    "a misfit remains that none of them explains.",
+}
 
 
 def write_verdict(verdict: Mapping[str, Any], out: Path) -> Path:
@@ -33,15 +39,15 @@ def write_verdict(verdict: Mapping[str, Any], out: Path) -> Path:
 def verdict_in_words(verdict: Mapping[str, Any]) -> dict[str, Any]:
     """The parts of a verdict as text for the report; empty where the verdict has none."""
     return {
-        "outcome": _outcome(str(verdict["verdict"]), _layers(verdict, "law")),
+        "outcome": _outcome(verdict),
         "text": str(verdict.get("text") or ""),
         "equivalent": [_tie(names) for names in verdict.get("equivalent") or () if len(names) > 1],
         "causes": [_cause(cause) for cause in verdict.get("causes") or ()],
         "gain": _gain(verdict.get("gain")),
         "next_test": str((verdict.get("next_test") or {}).get("text") or ""),
         "misfits": [_misfit(misfit) for misfit in verdict.get("misfits") or ()],
-        "excluded": [(_plain(e["mechanism"]), e["reason"]) for e in verdict.get("excluded") or ()],
-        "not_testable": [(_plain(e["mechanism"]), _why(e["reason"])) for e in verdict.get("not_testable") or ()],
+        "excluded": [(_named(e["mechanism"]), e["reason"]) for e in verdict.get("excluded") or ()],
+        "not_testable": [(_named(e["mechanism"]), _why(e["reason"])) for e in verdict.get("not_testable") or ()],
         "corrections": [_correction(x) for x in _layers(verdict, "pattern_correction")],
         "laws": [_law(x) for x in _layers(verdict, "law")],
     }
@@ -51,9 +57,11 @@ def _layers(verdict: Mapping[str, Any], kind: str) -> list[Mapping[str, Any]]:
     return [layer for layer in verdict.get("layers") or () if layer["kind"] == kind]
 
 
-def _outcome(outcome: str, laws: list[Mapping[str, Any]]) -> str:
-    """The verdict in one sentence, and that it has laws."""
-    found = OUTCOMES.get(outcome, outcome)
+def _outcome(verdict: Mapping[str, Any]) -> str:
+    """The verdict in one sentence, and that it has laws; causes that cannot be told apart are not called identified."""
+    outcome, laws = str(verdict["verdict"]), _layers(verdict, "law")
+    tied = any(len(names) > 1 for names in verdict.get("equivalent") or ())
+    found = TIED[outcome] if tied and outcome in TIED else OUTCOMES.get(outcome, outcome)
     if not laws:
         return found
     return f"{found} {'A law was' if len(laws) == 1 else f'{len(laws)} laws were'} found that it follows."
@@ -87,13 +95,22 @@ def _plain(mechanism: str) -> str:
     return mechanism.replace("_", " ")
 
 
+def _named(mechanism: str) -> str:
+    """The plain name of a mechanism; of one that the library does not know, the name with spaces."""
+    try:
+        return name_in_words(mechanism)
+    except KeyError:
+        return _plain(mechanism)
+
+
 def _tie(names: list[str]) -> str:
-    return f"This campaign cannot distinguish between {joined([_plain(n) for n in names])}."
+    return f"This campaign cannot distinguish between {joined([_named(n) for n in names])}."
 
 
 def _cause(cause: Mapping[str, Any]) -> dict[str, Any]:
     weight, text = f"{_number(cause['weight']):.2f}", cause.get("text", "")
-    return {"mechanism": _plain(cause["mechanism"]), "weight": weight, "sizes": _sizes(cause), "text": text}
+    name = sentence_case(_named(cause["mechanism"]))
+    return {"mechanism": name, "weight": weight, "sizes": _sizes(cause), "text": text}
 
 
 def _sizes(named: Mapping[str, Any]) -> list[str]:

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from tribo.records import Study
 from tribo.report.campaign_nc import write_store
+from tribo.report.card import Card, card_of, write_card
+from tribo.report.diagnosis_csv import write_diagnosis_tables
+from tribo.report.discovery_files import law_texts
 from tribo.report.drawings import DRAWING, Drawing, Progress, write_figures
 from tribo.report.provenance import (
     Provenance,
@@ -34,13 +37,15 @@ def write_until(
     drawing: Drawing = DRAWING,
     provenance: Provenance | None = None,
     diagnosis: Diagnosis | None = None,
+    card: Card | None = None,
 ) -> None:
     """Write the results of all stages up to ``until`` (ingest, fit, compare or report).
 
     Tables and campaign.nc always, as far as the study went; verdict.json and its figures where there is a
-    ``diagnosis``; the figures of the study from ``compare`` on; then page, PDF and crate. Every file is whole or
-    absent: it is written under a temporary name and renamed. Last comes provenance.json with the hash of each; files of
-    an earlier run that are no longer valid are removed.
+    ``diagnosis``; card.json where a ``card`` is given, and of a report always; the figures of the study from
+    ``compare`` on; then page, PDF and crate. Every file is whole or absent: it is written under a temporary name and
+    renamed. Last comes provenance.json with the hash of each; files of an earlier run that are no longer valid are
+    removed.
     """
     before = read_record(out)
     made_by = provenance if provenance is not None else gather_provenance(study)
@@ -51,17 +56,26 @@ def write_until(
     written = [*write_tables(study, out), write_store(study, out, made_by, diagnosis, keep_earlier)]
     if verdict is not None:
         written.append(write_verdict(verdict, out))
+    if diagnosis is not None and diagnosis.laws is not None:
+        laws = law_texts(diagnosis.laws, study.ingested.campaign.title)
+        written += [write_text(out / name, text) for name, text in laws.items()]
+    if diagnosis is not None:
+        written += write_diagnosis_tables(diagnosis, out)
     if until in ("compare", "report") or diagnosis is not None:
         shown = study if until in ("compare", "report") else None
         drawn = write_figures(shown, out, diagnosis, made_by.origin, drawing)
         written += [out / "figures" / f"{f.name}.{ending}" for f in drawn.values() for ending in f.files]
+    if card is None and until == "report":
+        card = card_of(study, verdict)
+    if card is not None:
+        written.append(write_card(card, out))
     if until == "report":
         from tribo.report.content import content
         from tribo.report.crate import write_crate
         from tribo.report.html.page import pages_of
         from tribo.report.paper.pdf import pdf_of
 
-        said = content(study, made_by, verdict)
+        said = content(study, made_by, verdict, card)
         written += [write_text(out / name, page) for name, page in pages_of(said, drawn).items()]
         written.append(write_bytes(out / "report.pdf", pdf_of(said, drawn, made_by.origin)))
         written.append(write_crate(study, out, made_by, written))

@@ -18,12 +18,12 @@ from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from tribo.display import exact_text
-from tribo.errors import Problem, SimulationError
+from tribo.errors import Problem, SimulationError, naming
 from tribo.records import Run
 from tribo.simulate.config import SimConfig
 from tribo.simulate.ensemble import Progress, check_all, run_row
@@ -104,19 +104,20 @@ def run_stored(
     check_all(design)
     with only_writer_of(path, wait_s):
         _open_store(design, path, work)
-        missing = [k for k, done in enumerate(read_stored(path)[DONE]) if not done]
+        table = read_stored(path)
+        missing = [k for k, done in enumerate(table[DONE]) if not done]
         finished = len(design) - len(missing)
         if progress is not None:
             progress(finished, len(design))
+        if not missing:
+            return table
         given = _given(design)
         made_from = " ".join(identity(design, work).values())
-        with _columns(path, work) as columns:
+        with _places(path, work) as places:
             for k, row in _rows(design, missing, jobs, scheduler, partial(cell, work=work)):
-                for name in work.units:
-                    columns[name][k] = row[name]
-                results = [(name, columns[name][k]) for name in work.units]
-                columns[CHECKSUM][k] = row_checksum(made_from, k, [*_row(given, k), *results])
-                columns[DONE][k] = 1
+                results = [(name, places.write(name, k, row[name])) for name in work.units]
+                places.write(CHECKSUM, k, row_checksum(made_from, k, [*_row(given, k), *results]))
+                places.write(DONE, k, 1)
                 finished += 1
                 if progress is not None:
                     progress(finished, len(design))
@@ -232,22 +233,32 @@ def _shared_parameters(design: Sequence[SimConfig]) -> dict[str, Any]:
     return {name: value for name, value in first.items() if all(p.get(name) == value for p in all_parameters)}
 
 
+@dataclass(frozen=True)
+class _Places:
+    """Where the numbers of a store are in its file: for each column its offset in bytes, and the type of a number."""
+
+    file: IO[bytes]
+    columns: Mapping[str, tuple[int, np.dtype[Any]]]
+
+    def write(self, name: str, k: int, value: Any) -> Any:
+        """Overwrite one number; the number as it is stored. Written at once: errors of the disk are raised here."""
+        offset, kind = self.columns[name]
+        stored = np.asarray(value).astype(kind)
+        self.file.seek(offset + k * kind.itemsize)
+        self.file.write(stored.tobytes())
+        return stored[()]
+
+
 @contextmanager
-def _columns(path: Path, work: Work) -> Iterator[dict[str, Any]]:
-    """The result columns of a store as arrays mapped into memory, writable in place."""
+def _places(path: Path, work: Work) -> Iterator[_Places]:
+    """The result columns of a store, writable in place."""
     import h5py
 
-    names = (*work.units, DONE, CHECKSUM)
     with h5py.File(path) as file:
-        places = {name: (file[name].id.get_offset(), file[name].shape, file[name].dtype) for name in names}
-    columns = {
-        name: np.memmap(path, dtype, "r+", offset, shape) for name, (offset, shape, dtype) in places.items()
-    }
-    try:
-        yield columns
-    finally:
-        for column in columns.values():
-            column.flush()
+        found = {name: file[name].id for name in (*work.units, DONE, CHECKSUM)}
+        columns = {name: (column.get_offset(), column.dtype) for name, column in found.items()}
+    with naming(path), path.open("r+b", buffering=0) as raw:
+        yield _Places(raw, columns)
 
 
 def cell(config: SimConfig, work: Work) -> Mapping[str, Any]:

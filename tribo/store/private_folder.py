@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import atexit
 import os
-import shutil
 import stat
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+
+from tribo.temporary import held_folder
 
 _OWNER_ONLY = 0o700
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
@@ -78,11 +79,11 @@ def _writable(folder: Path) -> bool:
 
 
 def _fresh(prefix: str) -> Path:
-    folder = Path(tempfile.mkdtemp(prefix=prefix))
-    atexit.register(_remove, folder, os.getpid())
+    folder, release = held_folder(prefix)
+    atexit.register(_release, release, os.getpid())
     return folder
 
 
-def _remove(folder: Path, maker: int) -> None:
+def _release(release: Callable[[], None], maker: int) -> None:
     if os.getpid() == maker:  # a forked process leaves the folder to the one that made it
-        shutil.rmtree(folder, ignore_errors=True)
+        release()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -32,6 +32,9 @@ WIDE = 3.0  # ratio of the largest to the smallest value above which a logarithm
 LEVELS = 12  # names of a column that may each have an effect of its own
 CYCLES = 12  # of a wave over the series
 TENTHS = 10  # of the series: ends of its stretches
+WIDTHS = (30.0, 22.0, 16.0, 12.0, 9.0, 7.0, 5.5, 4.0)  # of humps, by how much less than the range
+SOFT = (120.0, 60.0, 40.0, 28.0, 20.0, 14.0, 10.0)  # the same of soft steps
+ZEROS = (-1.0, -0.4, 0.0, 0.15, 0.3, 0.5)  # of a factor, from the lowest value in shares of the range
 FINE = 41  # places of a shape that is looked at closely
 # Columns that say the same in another unit or count, so that their product is no law of two columns.
 ALIKE = (
@@ -98,10 +101,12 @@ def _of_column(name: str, x: FloatArray) -> Iterator[Shape]:
         yield from _saturating(name, low, high, (20.0, 8.0, 3.0))
     if len(distinct) > 7:
         yield from _ramps(name, x, (0.25, 0.5, 0.75))
+        for p in np.quantile(x, (0.2, 0.35, 0.5, 0.65, 0.8)):
+            yield from (Shape("soft step", name, low, high, place=float(p), width=(high - low) / k) for k in (40, 15))
         for p in np.quantile(x, np.arange(1, 8) / 8):
             yield from (Shape("hump", name, low, high, place=float(p), width=(high - low) / k) for k in (16, 8, 4))
     if name == "run_order" and len(distinct) > 18:
-        yield from (Shape("wave", name, low, high, width=(high - low + 1) / k) for k in range(1, CYCLES + 1))
+        yield from (Shape("wave", name, low, high, width=(high - low + 1) / k) for k in np.arange(1.0, CYCLES, 0.5))
         yield from _windows(name, low, high, TENTHS)
     if name == "elapsed_s" and high - low > DAY_S:
         yield from (Shape("wave", name, low, high, width=DAY_S / k) for k in (1, 2, 3))
@@ -151,15 +156,27 @@ def fine_shapes(s: Shape, c: Conditions) -> list[Shape]:
     if s.kind == "window":
         return list(_windows(s.column, low, high, 2 * TENTHS))
     if s.kind == "wave":
-        return [replace(s, width=s.width / (1.0 + k)) for k in np.linspace(-0.06, 0.06, 13)]
+        return [replace(s, width=s.width / (1.0 + k)) for k in np.linspace(-0.25, 0.25, FINE) * s.width / reach]
     places = np.linspace(low, high, FINE)[1:-1]
-    widths = [reach / k for k in (30.0, 22.0, 16.0, 12.0, 9.0, 7.0, 5.5, 4.0)]
-    return [Shape("hump", s.column, low, high, place=float(p), width=w) for p in places for w in widths]
+    widths = [reach / k for k in (WIDTHS if s.kind == "hump" else SOFT)]
+    return [Shape(s.kind, s.column, low, high, place=float(p), width=w) for p in places for w in widths]
+
+
+def fine_products(shapes: tuple[Shape, ...]) -> list[tuple[Shape, ...]]:
+    """Products of the same two shapes with the zero of each at several places."""
+    return list(product(*([_from_zero(s, share) for share in ZEROS] for s in shapes)))
+
+
+def _from_zero(s: Shape, share: float) -> Shape:
+    """A line or logarithm whose zero lies at a share of the way from ``low`` to ``high``."""
+    if s.kind == "log":
+        return replace(s, low=s.low * (s.high / s.low) ** share)
+    return replace(s, low=s.low + share * (s.high - s.low))
 
 
 def refined_shapes(s: Shape, c: Conditions) -> list[Shape]:
     """Shapes about one of the fine grid, with places between its neighbours; none where the grid says all there is."""
-    if s.kind not in ("step", "ramp", "optimum", "hump"):
+    if s.kind not in ("step", "ramp", "optimum", "hump", "soft step"):
         return []
     values = column_values(c, s.column)
     x = np.unique(values[np.isfinite(values)])
@@ -170,7 +187,7 @@ def refined_shapes(s: Shape, c: Conditions) -> list[Shape]:
         chosen = between[np.abs(between - s.place) <= near]
         return [replace(s, place=float(p)) for p in chosen] if len(x) > FINE else []
     places = np.clip(np.linspace(s.place - near, s.place + near, 21), x[0], x[-1])
-    widths = [s.width * k for k in (0.7, 0.85, 1.0, 1.2, 1.45)] if s.kind == "hump" else [s.width]
+    widths = [s.width * k for k in (0.7, 0.85, 1.0, 1.2, 1.45)] if s.kind in ("hump", "soft step") else [s.width]
     return [replace(s, place=float(p), width=w) for p in np.unique(places) for w in widths if p != s.high]
 
 

@@ -2,40 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from tribo.diagnose.diagnosis_record import Diagnosis
+from tribo.diagnose.discovery.contested import without_wrong_forms
+from tribo.diagnose.discovery.known_laws import KnownLaw, Tested, try_laws
 from tribo.diagnose.discovery.law_words import law_layers, laws_text
 from tribo.diagnose.discovery.parting import parting_test
 from tribo.diagnose.discovery.search import Discovery, Progress, discover_laws
 from tribo.diagnose.layers import pattern_layers
 from tribo.diagnose.search.screen import Screen, screen_left
+from tribo.diagnose.sentences import summary
 from tribo.diagnose.statistics.linearisation import ModelFit
-from tribo.diagnose.verdict import CERTAIN_CAUSES, Layer, Verdict
+from tribo.diagnose.verdict import CERTAIN_CAUSES, Excluded, Layer, Outcome, Verdict
 
 REPLICATES_LEFT = 60
 
 
-def with_laws(d: Diagnosis, *, seed: int = 0, level: float = 0.01, progress: Progress | None = None) -> Diagnosis:
-    """The same diagnosis with the laws of what its causes leave as further layers; unchanged where nothing is left."""
-    if not _is_left(d, level):
-        return d
+def with_laws(
+    d: Diagnosis,
+    known: Sequence[KnownLaw] = (),
+    *,
+    seed: int = 0,
+    level: float = 0.01,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """The same diagnosis with laws as further layers: those ``known`` that hold, and those of what is left.
+
+    A cause that loses against a law of its own column is no longer a cause. Where nothing is left, nothing is searched.
+    """
     rng = np.random.default_rng(seed)
-    found = discover_laws(explained(d), level=level, rng=rng, progress=progress)
-    if not found.laws:
+    model, lost = uncontested(d)
+    tested = try_laws(model, known, rng)
+    d = replace(d, verdict=with_tested(d.verdict, tested))
+    searched = _is_left(d, level)
+    if not (lost or searched or tested.layers):
+        return d
+    found = Discovery((), (), 0)
+    if lost or searched:
+        found = discover_laws(tested.model, level=level, rng=rng, progress=progress, without=tested.columns)
+    if not found.laws and not tested.layers:
         return replace(d, laws=found)
-    model = found.laws[-1].model
+    model = found.laws[-1].model if found.laws else tested.model
     left = screen_left(model, replicates=REPLICATES_LEFT, rng=rng, progress=progress)
-    return replace(d, laws=found, verdict=_extended(d.verdict, found, model, (left, level)))
+    verdict = without_causes(d.verdict, lost if found.laws else {})
+    return replace(d, laws=found, verdict=_extended(verdict, (tested, found), model, (left, level)))
+
+
+def with_tested(v: Verdict, tested: Tested) -> Verdict:
+    """The verdict with the answers about known laws in its ``model`` record."""
+    if not tested.answers:
+        return v
+    answers = [
+        {"law": known.name, "found_in": known.found_in, "formula": known.law.formula(), "answer": held.answer,
+         "text": held.text}
+        for known, held in tested.answers
+    ]  # fmt: skip
+    return replace(v, model={**v.model, "known_laws": answers}, text=f"{v.text} {tested.text}")
 
 
 def explained(d: Diagnosis) -> ModelFit:
-    """The model with the causes that are certain."""
+    """The model with the causes that are certain, and with the laws of what they leave where these were searched."""
+    if d.laws is not None and d.laws.laws:
+        return d.laws.laws[-1].model
     certain = d.named is not None and d.named.causes and d.verdict.verdict in CERTAIN_CAUSES
     return d.named.model if d.named is not None and certain else d.baseline
+
+
+def uncontested(d: Diagnosis) -> tuple[ModelFit, dict[str, float]]:
+    """The model with the causes that no law of their own columns replaces, and those that are replaced, each with the
+    log likelihood by which a law is better."""
+    model = explained(d)
+    return without_wrong_forms(model) if model.acting else (model, {})
 
 
 def _is_left(d: Diagnosis, level: float) -> bool:
@@ -45,25 +86,42 @@ def _is_left(d: Diagnosis, level: float) -> bool:
     return not d.named.causes or bool(d.named.remainders) or d.named.p_left < level
 
 
-def _extended(v: Verdict, found: Discovery, model: ModelFit, left: tuple[Screen, float]) -> Verdict:
+def without_causes(v: Verdict, lost: Mapping[str, float]) -> Verdict:
+    """The verdict without the causes that a law replaces; they are excluded with the reason."""
+    if not lost:
+        return v
+    gone = set(lost) | {n for names in v.equivalent if set(names) & set(lost) for n in names}
+    causes = tuple(c for c in v.causes if c.mechanism not in gone)
+    outcome: Outcome = "partly" if causes else "unknown"
+    equivalent = tuple(names for names in v.equivalent if not set(names) & gone)
+    excluded = [
+        Excluded(name, f"a law of the same column explains the campaign better: log likelihood higher by {by:.1f}")
+        for name, by in lost.items()
+    ]
+    layers = tuple(layer for layer in v.layers if not (layer.kind == "cause" and layer.name in gone))
+    return replace(
+        v, verdict=outcome, causes=causes, equivalent=equivalent, excluded=(*v.excluded, *excluded), layers=layers,
+        gain=v.gain if causes else None, text=summary(outcome, causes, equivalent, v.misfits, dict(v.smallest_effects)),
+    )  # fmt: skip
+
+
+def _extended(
+    v: Verdict, laws: tuple[Tested, Discovery], model: ModelFit, left: tuple[Screen, float]
+) -> Verdict:
     """The verdict with corrections of the patterns beside the laws, the laws, and what is left after them."""
-    screened, level = left
-    columns = {name for law in found.laws for name in law.law.columns}
+    (screened, level), (tested, found) = left, laws
+    columns = {name for law in found.laws for name in law.law.columns} | tested.columns
     kept = [layer for layer in v.layers if layer.kind == "cause"]
     remainders = _still_left([layer for layer in v.layers if layer.kind == "remainder"], columns, screened, level)
-    rest = (
-        "With this included, the remaining differences are within chance."
-        if screened.p.min() >= level
-        else "A misfit remains beyond chance."
-    )
+    within = screened.p.min() >= level
+    rest = "With this included, the remaining differences are within chance." if within else "A misfit remains."
+    ties = [(law.law, law.ties[0]) for law in found.laws if law.ties]
     next_test = v.next_test
-    first = found.laws[0]
-    if first.ties and not v.equivalent:
-        next_test = parting_test(first.law, first.ties[0], model.setup.observations.conditions)
-    return replace(
-        v, layers=(*pattern_layers(model), *kept, *law_layers(found), *remainders), next_test=next_test,
-        text=f"{v.text} {laws_text(found)} {rest}",
-    )  # fmt: skip
+    if ties and not v.equivalent:
+        next_test = parting_test(*ties[0], model.setup.observations.conditions)
+    layers = (*pattern_layers(model), *kept, *tested.layers, *law_layers(found), *remainders)
+    said = [v.text, laws_text(found), rest] if found.laws or v.verdict != "no_misfit" else [v.text]
+    return replace(v, layers=layers, next_test=next_test, text=" ".join(filter(None, said)))
 
 
 def _still_left(layers: Sequence[Layer], columns: set[str], screened: Screen, level: float) -> list[Layer]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from tribo.diagnose.discovery.written_law import ADHESION_TERM, BOTH, LOAD_TERM, Shape, T, WrittenLaw
 from tribo.diagnose.verdict import Estimate
@@ -24,7 +24,9 @@ class _Strict(BaseModel):
 class ShapeTable(_Strict):
     """[[shape]]: a function of one column."""
 
-    kind: Literal["linear", "log", "step", "optimum", "hump", "saturating", "ramp", "window", "wave", "level"]
+    kind: Literal[
+        "linear", "log", "step", "soft step", "ramp", "optimum", "hump", "saturating", "window", "wave", "level"
+    ]
     column: str
     low: Finite = 0.0
     high: Finite = 1.0
@@ -60,6 +62,13 @@ class LawTable(_Strict):
     found_in: str = ""
     shape: list[ShapeTable] = Field(min_length=1, max_length=2)
     parameters: dict[str, ParameterTable]
+
+    @model_validator(mode="after")
+    def _has_amplitudes(self) -> LawTable:
+        wanted = ("a", "b") if self.shape[0].kind == "wave" else ("a",)
+        if missing := [name for name in wanted if name not in self.parameters]:
+            raise ValueError(f"[parameters.{missing[0]}] is missing")
+        return self
 
 
 assert {T, LOAD_TERM, ADHESION_TERM, BOTH} == {"T", "load term", "adhesion term", "both"}
@@ -98,16 +107,25 @@ def read_law(path: Path) -> tuple[WrittenLaw, dict[str, Estimate]]:
     CampaignError
         The file is no law, with every fault of it.
     """
+    table = _table(path)
+    law = WrittenLaw(
+        tuple(s.shape() for s in table.shape), table.acts_on, table.regime, table.where, table.where_scale
+    )
+    parameters = {name: Estimate(p.value, p.low, p.high, p.unit) for name, p in table.parameters.items()}
+    return law, parameters
+
+
+def read_title(path: Path) -> str:
+    """The title of the campaign that a law was found in; raises as :func:`read_law`."""
+    return _table(path).found_in
+
+
+def _table(path: Path) -> LawTable:
     try:
-        table = LawTable.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        return LawTable.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as why:
         raise CampaignError(Problem("bad_toml", f"not a TOML file: {why}", file=path.name)) from None
     except ValidationError as why:
         raise CampaignError(
             Problem("bad_law", e["msg"], file=path.name, column=".".join(map(str, e["loc"]))) for e in why.errors()
         ) from None
-    law = WrittenLaw(
-        tuple(s.shape() for s in table.shape), table.acts_on, table.regime, table.where, table.where_scale
-    )
-    parameters = {name: Estimate(p.value, p.low, p.high, p.unit) for name, p in table.parameters.items()}
-    return law, parameters

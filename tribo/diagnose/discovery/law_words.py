@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from tribo.diagnose.discovery.search import Discovery, FoundLaw
 from tribo.diagnose.discovery.written_law import (
@@ -19,6 +20,7 @@ from tribo.diagnose.discovery.written_law import (
     WrittenLaw,
 )
 from tribo.diagnose.sentences import p_text
+from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.terms import in_words
 from tribo.diagnose.verdict import Estimate, Layer
 from tribo.records import REGIMES
@@ -33,14 +35,19 @@ WHERE = {
 
 def law_sentence(found: FoundLaw) -> str:
     """What follows what, where, in which regime and by how much."""
-    law = found.law
-    value, low, high = found.effect_percent
+    said = size_sentence(found.law, found.parameters, found.effect_percent)
+    return f"{said} (adjusted p {p_text(found.p)})."
+
+
+def size_sentence(
+    law: WrittenLaw, parameters: Mapping[str, Estimate], effect_percent: tuple[float, float, float]
+) -> str:
+    """The same of any law with these parameters, without evidence and full stop."""
+    value, low, high = effect_percent
     size = f"by {abs(value):.0f} % (90 % interval {_span(low, high)})"
     if law.shapes[0].kind == "wave":
-        return f"{subject(law)} {_wave(law.shapes[0])}, {size} from lowest to highest (adjusted p {p_text(found.p)})."
-    rises = (found.parameters["a"].value > 0) == (value > 0) and value > 0
-    verb = "is higher" if rises else "is lower"
-    return f"{subject(law)} {verb} {size} {_where(law, found.parameters)} (adjusted p {p_text(found.p)})."
+        return f"{subject(law)} {_wave(law.shapes[0])}, {size} from lowest to highest"
+    return f"{subject(law)} {'is higher' if value > 0 else 'is lower'} {size} {_where(law, parameters)}"
 
 
 def _span(low: float, high: float) -> str:
@@ -56,7 +63,7 @@ def subject(law: WrittenLaw) -> str:
     return f"{what}{of}"
 
 
-def _where(law: WrittenLaw, parameters: dict[str, Estimate]) -> str:
+def _where(law: WrittenLaw, parameters: Mapping[str, Estimate]) -> str:
     if len(law.shapes) > 1:
         names = " and ".join(_name(s) for s in law.shapes)
         return f"where {names} are both at their highest than where one of them is at its lowest"
@@ -68,7 +75,7 @@ def _where(law: WrittenLaw, parameters: dict[str, Estimate]) -> str:
         return f"at {_name(s)} = {_value(s, s.high)}, growing {side} {_value(s, s.place)}"
     if s.kind == "level":
         return f"where {_name(s)} is {s.level}"
-    if s.kind == "step":
+    if s.kind in ("step", "soft step"):
         return f"where {_name(s)} is above {_value(s, s.place)}"
     if s.kind in ("optimum", "hump"):
         place = parameters["place"]
@@ -113,17 +120,27 @@ def _tied(ties: Sequence[WrittenLaw]) -> str:
 def law_layers(d: Discovery) -> list[Layer]:
     """The laws as layers of a verdict."""
     return [
-        Layer(
-            kind="law", name=" and ".join(f.law.columns), samples=_samples(f),
-            regimes=tuple(REGIMES) if f.law.regime == BOTH else (f.law.regime,), p_adjusted=f.p,
-            effect_percent=f.effect_percent[0], low=f.effect_percent[1], high=f.effect_percent[2],
-            parameters=f.parameters, formula=f.law.formula(), tied_with=tuple(t.formula() for t in f.ties),
-            gain=f.gain, text=law_sentence(f),
+        replace(
+            law_layer(f.law, f.model, f.parameters, f.effect_percent, law_sentence(f)), p_adjusted=f.p,
+            tied_with=tuple(t.formula() for t in f.ties), gain=f.gain,
         )
         for f in d.laws
     ]  # fmt: skip
 
 
-def _samples(f: FoundLaw) -> tuple[str, ...]:
-    c = f.model.setup.observations.conditions
-    return tuple(sorted({str(name) for name, w in zip(c.sample, f.law.weight(c), strict=True) if w != 0}))
+def law_layer(
+    law: WrittenLaw,
+    model: ModelFit,
+    parameters: Mapping[str, Estimate],
+    effect_percent: tuple[float, float, float],
+    text: str,
+) -> Layer:
+    """A law that ``model`` holds as a layer, without its evidence."""
+    c = model.setup.observations.conditions
+    samples = tuple(sorted({str(name) for name, w in zip(c.sample, law.weight(c), strict=True) if w != 0}))
+    return Layer(
+        kind="law", name=" and ".join(law.columns), samples=samples,
+        regimes=tuple(REGIMES) if law.regime == BOTH else (law.regime,), p_adjusted=float("nan"),
+        effect_percent=effect_percent[0], low=effect_percent[1], high=effect_percent[2], parameters=parameters,
+        formula=law.formula(), text=text,
+    )  # fmt: skip

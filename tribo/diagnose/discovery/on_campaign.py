@@ -7,8 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from tribo.diagnose.diagnosis import examine
+from tribo.diagnose.diagnosis_record import Diagnosis
 from tribo.diagnose.discovery.held import Held, holds
-from tribo.diagnose.discovery.in_verdict import explained
+from tribo.diagnose.discovery.in_verdict import uncontested
 from tribo.diagnose.discovery.search import Discovery, Progress, discover_laws
 from tribo.diagnose.discovery.written_law import WrittenLaw
 from tribo.diagnose.verdict import Estimate
@@ -20,17 +21,22 @@ WITHOUT_MISFIT = 0.1  # of the level: the diagnosis did not ask for a law
 def discover_in(
     ingested: Ingested, *, seed: int = 0, level: float = 0.01, progress: Progress | None = None
 ) -> Discovery:
-    """Search for the laws of what the causes of a campaign leave unexplained.
-
-    Where the diagnosis finds no misfit, a law has to be beyond chance at a tenth of the level.
-    """
+    """Search for the laws of what the causes of a campaign leave unexplained."""
     d = examine(ingested, seed=seed, level=level, progress=progress)
+    return searched_laws(d, seed=seed, level=level, progress=progress)
+
+
+def searched_laws(d: Diagnosis, *, seed: int = 0, level: float = 0.01, progress: Progress | None = None) -> Discovery:
+    """The laws of what the causes of a diagnosis leave unexplained.
+
+    Where it found no misfit, a law has to be beyond chance at a tenth of the level.
+    """
     strict = level if d.named is not None else WITHOUT_MISFIT * level
-    return discover_laws(explained(d), level=strict, rng=np.random.default_rng(seed), progress=progress)
+    return discover_laws(uncontested(d)[0], level=strict, rng=np.random.default_rng(seed), progress=progress)
 
 
 def hold_law_against(
     ingested: Ingested, law: WrittenLaw, parameters: Mapping[str, Estimate], *, seed: int = 0, level: float = 0.01
 ) -> Held:
     """Whether a law of another campaign holds in this one, its own causes taken into account."""
-    return holds(explained(examine(ingested, seed=seed, level=level)), law, parameters)
+    return holds(uncontested(examine(ingested, seed=seed, level=level))[0], law, parameters)

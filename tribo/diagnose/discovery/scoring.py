@@ -133,6 +133,13 @@ class Projection:
         pull = self._onto(self.left, static, sliding) @ course
         return np.where(own > TAKEN_UP * whole + 1e-12, own, np.inf), pull, absorbed
 
+    def joint_gain(self, columns: FloatArray) -> float:
+        """Log likelihood gained by columns (n, 2, k) together at their best amplitudes."""
+        white = whitened(self.factor, columns)
+        absorbed, pull = np.concatenate([self.own @ white, self.border @ white]), (self.left @ white)[0]
+        own = white.T @ white - absorbed.T @ absorbed
+        return float(0.5 * pull @ np.linalg.lstsq(own, pull, rcond=1e-9)[0])
+
     def _onto(self, rows: FloatArray, static: FloatArray, sliding: FloatArray) -> FloatArray:
         return np.asarray(rows[:, : self.n] * static + rows[:, self.n :] * sliding)
 

@@ -41,6 +41,7 @@ def discover_laws(
     replicates: int = 60,
     rng: np.random.Generator | None = None,
     progress: Progress | None = None,
+    without: Collection[str] = (),
 ) -> Discovery:
     """Add the best law of the grammar while it is beyond what chance gives the best of all laws.
 
@@ -56,13 +57,15 @@ def discover_laws(
         Simulated campaigns at most, each searched in the same way.
     rng : numpy Generator, optional
         Of the simulated campaigns and the resamples behind the error of the gain.
+    without : collection of str
+        Columns that have a law already.
     """
     rng = rng or np.random.default_rng(0)
     found: list[FoundLaw] = []
     table: tuple[Scored, ...] = ()
     searched = 0
     while len(found) < MOST_LAWS:
-        used = {name for law in found for name in law.law.columns}
+        used = {*without, *(name for law in found for name in law.law.columns)}
         grammar = Grammar.of(model, used)
         if not grammar.courses.shapes:
             break
@@ -71,7 +74,7 @@ def discover_laws(
         p = share_beyond(_chance(model, grammar, scored[0].net, (replicates, rng), progress), scored[0].net)
         if p >= level:
             break
-        law = settled(model, Searched(grammar.courses, grammar.groups, scored[0].law, p), rng)
+        law = settled(model, Searched(grammar.courses, grammar.groups, p), scored[0].law, rng)
         found.append(law)
         model = law.model
     return Discovery(tuple(found), table, searched)

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tribo.diagnose.discovery.grammar import Group, fine_shapes, refined_shapes
+from tribo.diagnose.discovery.grammar import Group, fine_products, fine_shapes, refined_shapes
 from tribo.diagnose.discovery.scoring import Courses, Projection, acts_of, courses_of, terms_of
-from tribo.diagnose.discovery.written_law import UNITS, Shape, WrittenLaw
+from tribo.diagnose.discovery.written_law import LOAD_TERM, UNITS, Shape, WrittenLaw
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.gain import gain
 from tribo.diagnose.statistics.interval import NORMAL_90, estimates, informed_share
@@ -23,22 +23,24 @@ CLOSE = 3.0  # log likelihood within which laws cannot be told apart: odds of 20
 IN_REACH = 8.0  # below the best on the coarse grid, within which a form is looked at on the fine one
 LOOKED_AT = 40  # forms at most on the fine grid
 WEIGHTLESS = 1e-3  # of the likeliest, below which a law does not count in the band
+PLACED = ("step", "soft step", "ramp", "optimum", "hump", "window")  # kinds with a place
+WIDE = ("hump", "saturating", "soft step")  # kinds with a width
 ROUNDS = 3  # of finding the best form at the noise that the one before leaves
 
 
 @dataclass(frozen=True)
 class Searched:
-    """What a search hands on: all courses and groups, the best law at the noise without any, and its p value."""
+    """What a search hands on: all courses and groups, and the p value of the best law."""
 
     courses: Courses
     groups: tuple[Group, ...]
-    best: WrittenLaw
-    p: float
+    p: float = 1.0
 
 
 @dataclass(frozen=True)
 class Band:
-    """Change of ln T of every test by a law about its mean over the tests it acts on, (n, 2): value and 90 % band.
+    """Change of ln T of every test by a law beyond what flat law and patterns can absorb (:func:`centred`), (n, 2):
+    value and 90 % band.
 
     It is averaged over all laws that the design cannot tell apart from it.
     """
@@ -91,28 +93,48 @@ class Form:
         return np.asarray(weight / weight.sum())
 
 
-def settled(model: ModelFit, found: Searched, rng: np.random.Generator) -> FoundLaw:
-    """The best form at the noise that it leaves, with its parameters, ties and band."""
-    law, forms = found.best, []
-    after, state = _with_law(model, law)
-    for _ in range(ROUNDS):
-        forms = _forms(state, found)
-        if forms[0].best == law:
-            break
-        law = forms[0].best
-        after, state = _with_law(model, law)
+def settled(model: ModelFit, found: Searched, first: WrittenLaw, rng: np.random.Generator) -> FoundLaw:
+    """The best form at the noise that it leaves, with its parameters, ties and band; ``first`` is the best law at the
+    noise without any."""
+    after, state, forms = _rounds(model, found, first)
     index = len(after.acting) - 1
     parameters = estimates(after, index) | _places(forms[0])
     wider = _wider(state, forms[0], parameters["a"])
     return FoundLaw(
-        law, parameters, _percent(state, forms[0], parameters, wider), found.p, gain(model, after, rng),
+        forms[0].best, parameters, _percent(state, forms[0], parameters, wider), found.p, gain(model, after, rng),
         tuple(f.best for f in forms[1:] if f.evidence > forms[0].evidence - CLOSE), after,
         _band(state, forms, wider),
     )  # fmt: skip
 
 
+def best_form(model: ModelFit, found: Searched) -> tuple[Form, State]:
+    """The best form of these laws at the noise that it leaves, and the campaign at that noise."""
+    c, terms = model.setup.observations.conditions, terms_of(model)
+    projected = Projection(model.linear, model.linear.residual[None])
+    gains = [projected.gains(found.courses, acts_of(g, c, terms))[0] - g.cost for g in found.groups]
+    group, shape = np.unravel_index(int(np.argmax(gains)), (len(gains), len(found.courses.shapes)))
+    first = found.groups[int(group)].law(found.courses.shapes[int(shape)])
+    _, state, forms = _rounds(model, found, first)
+    return forms[0], state
+
+
+def _rounds(model: ModelFit, found: Searched, law: WrittenLaw) -> tuple[ModelFit, State, list[Form]]:
+    """The model with the best law, the campaign at its noise, and all forms in reach there, the best first."""
+    after, state = _with_law(model, law)
+    forms = _forms(state, found)
+    for _ in range(ROUNDS):
+        if forms[0].best == law:
+            break
+        law = forms[0].best
+        after, state = _with_law(model, law)
+        forms = _forms(state, found)
+    if forms[0].best != law:
+        after, state = _with_law(model, forms[0].best)
+    return after, state, forms
+
+
 @dataclass(frozen=True)
-class _State:
+class State:
     """A campaign at the noise that a law leaves, ready to score other laws in its place."""
 
     conditions: Conditions
@@ -124,7 +146,7 @@ class _State:
         return acts_of(group, self.conditions, self.terms)
 
 
-def _with_law(model: ModelFit, law: WrittenLaw) -> tuple[ModelFit, _State]:
+def _with_law(model: ModelFit, law: WrittenLaw) -> tuple[ModelFit, State]:
     """The model with a law fitted, and the same campaign without it at the noise of that fit."""
     acting = Acting(law.mechanism())
     after = fit(model.setup, (*model.acting, acting), start=model)
@@ -132,34 +154,35 @@ def _with_law(model: ModelFit, law: WrittenLaw) -> tuple[ModelFit, _State]:
     jacobian = after.linear.jacobian[:, :, : -len(acting.mechanism.parameters)]
     projected = Projection(replace(after.linear, jacobian=jacobian), residual[None])
     conditions = after.setup.observations.conditions
-    return after, _State(conditions, terms_of(after), projected, informed_share(after.noise))
+    return after, State(conditions, terms_of(after), projected, informed_share(after.noise))
 
 
-def _forms(state: _State, found: Searched) -> list[Form]:
+def _forms(state: State, found: Searched) -> list[Form]:
     """The forms in reach of the best on the fine grid, the best first."""
     coarse: dict[tuple[int, object], list[float]] = {}
-    first: dict[tuple[int, object], tuple[Shape, ...]] = {}
+    leading: dict[tuple[int, object], tuple[float, tuple[Shape, ...]]] = {}
     for g, group in enumerate(found.groups):
         gains = state.projected.gains(found.courses, state.acts(group))[0] - group.cost
-        for shapes, value in zip(found.courses.shapes, gains, strict=True):
+        for shapes, value in zip(found.courses.shapes, gains.tolist(), strict=True):
             key = (g, tuple((s.kind, s.column, s.level) for s in shapes))
-            coarse.setdefault(key, []).append(float(value))
-            first.setdefault(key, shapes)
-    ranked = sorted(coarse, key=lambda key: -max(coarse[key]) + np.log(len(coarse[key])))
-    least = max(coarse[ranked[0]]) - np.log(len(coarse[ranked[0]])) - IN_REACH
-    near = [key for key in ranked[:LOOKED_AT] if max(coarse[key]) - np.log(len(coarse[key])) > least]
-    forms = [_on_fine_grid(state, found.groups[key[0]], first[key], _pairs(found, first[key])) for key in near]
+            coarse.setdefault(key, []).append(value)
+            if key not in leading or value > leading[key][0]:
+                leading[key] = value, shapes
+    worth = {key: leading[key][0] - np.log(len(each)) for key, each in coarse.items()}
+    ranked = sorted(worth, key=lambda key: -worth[key])[:LOOKED_AT]
+    near = [key for key in ranked if worth[key] > worth[ranked[0]] - IN_REACH]
+    forms = [_on_fine_grid(state, found.groups[key[0]], *_priced(found, leading[key][1])) for key in near]
     return sorted(forms, key=lambda f: -f.evidence)
 
 
-def _pairs(found: Searched, shapes: tuple[Shape, ...]) -> float:
-    """What a product of two columns costs."""
-    return float(found.courses.cost[found.courses.shapes.index(shapes)]) if len(shapes) > 1 else 0.0
+def _priced(found: Searched, shapes: tuple[Shape, ...]) -> tuple[tuple[Shape, ...], float]:
+    """The shapes of a form, with what a product of two columns costs."""
+    return shapes, float(found.courses.cost[found.courses.shapes.index(shapes)]) if len(shapes) > 1 else 0.0
 
 
-def _on_fine_grid(state: _State, group: Group, shapes: tuple[Shape, ...], cost: float) -> Form:
+def _on_fine_grid(state: State, group: Group, shapes: tuple[Shape, ...], cost: float) -> Form:
     c, acts = state.conditions, state.acts(group)
-    grid = [shapes] if len(shapes) > 1 else [(s,) for s in fine_shapes(shapes[0], c)]
+    grid = fine_products(shapes) if len(shapes) > 1 else [(s,) for s in fine_shapes(shapes[0], c)]
     courses = courses_of([(s, 0.0) for s in grid], c)
     gains = state.projected.gains(courses, acts)[0]
     evidence = _log_mean(gains) - group.cost - cost
@@ -180,7 +203,7 @@ def _places(form: Form) -> dict[str, Estimate]:
         return {}
     shapes = [s[0] for s in form.courses.shapes]
     best, found = form.best.shapes[0], {}
-    for name, kinds in (("place", ("step", "ramp", "optimum", "hump", "window")), ("width", ("hump", "saturating"))):
+    for name, kinds in (("place", PLACED), ("width", WIDE)):
         if best.kind in kinds:
             values = np.array([getattr(s, name) for s in shapes])
             low, high = _quantiles(values, form.weight)
@@ -196,7 +219,7 @@ def _quantiles(values: FloatArray, weight: FloatArray) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _wider(state: _State, form: Form, a: Estimate) -> float:
+def _wider(state: State, form: Form, a: Estimate) -> float:
     """The interval of the amplitude over that of the linear model: what the latter does not know."""
     if form.best.shapes[0].kind == "wave":
         return 1.0
@@ -216,7 +239,7 @@ class _Amplitudes:
     second_variance: FloatArray
 
 
-def _amplitudes(state: _State, form: Form) -> _Amplitudes:
+def _amplitudes(state: State, form: Form) -> _Amplitudes:
     own, pull, _ = state.projected.products(form.courses.first, state.acts(form.group))
     nothing = np.zeros(len(own))
     found = _Amplitudes(pull[0] / own, 1.0 / (own * state.informed), nothing, nothing)
@@ -227,7 +250,7 @@ def _amplitudes(state: _State, form: Form) -> _Amplitudes:
 
 
 def _percent(
-    state: _State, form: Form, parameters: dict[str, Estimate], wider: float
+    state: State, form: Form, parameters: dict[str, Estimate], wider: float
 ) -> tuple[float, float, float]:
     """Change of T (or of the term) from the least to the most of the shape where the law acts fully; 90 % interval.
 
@@ -251,7 +274,7 @@ def _percent(
     return value, low, high
 
 
-def _band(state: _State, forms: list[Form], wider: float) -> Band:
+def _band(state: State, forms: list[Form], wider: float) -> Band:
     """The mean change by all laws in proportion to their likelihood, each about its own mean, with its spread."""
     n = len(state.conditions.sample)
     mean, square, total = np.zeros((n, 2)), np.zeros((n, 2)), 0.0
@@ -266,7 +289,8 @@ def _band(state: _State, forms: list[Form], wider: float) -> Band:
             if k in two:
                 j = two[int(k)]
                 parts.append((form.courses.second[:, j], each.second[j], each.second_variance[j]))
-            changes = [(_centred(course[:, None] * acts, acts), a, v) for course, a, v in parts]
+            load_share = state.terms[LOAD_TERM]
+            changes = [(centred(course[:, None] * acts, state.conditions, load_share), a, v) for course, a, v in parts]
             whole = np.sum([a * g for g, a, _ in changes], axis=0)
             weight = share * form.weight[k]
             mean += weight * whole
@@ -277,8 +301,13 @@ def _band(state: _State, forms: list[Form], wider: float) -> Band:
     return Band(mean, mean - half, mean + half)
 
 
-def _centred(change: FloatArray, acts: FloatArray) -> FloatArray:
-    """Less its mean over the tests on which the law acts, regime by regime."""
-    here = acts != 0
-    mean = np.sum(change * here, axis=0) / np.maximum(here.sum(axis=0), 1)
-    return np.asarray(np.where(here, change - mean, 0.0))
+def centred(change: FloatArray, c: Conditions, load_share: FloatArray) -> FloatArray:
+    """A change (n, 2) less what the flat law and the pattern of each sample can absorb of it: a level, a slope in ln p,
+    and a multiple of the ``load_share`` (n, 2) of T."""
+    found, log_p = change.copy(), np.log(c.pressure_Pa)
+    for name in np.unique(c.sample):
+        here = c.sample == name
+        for k in (0, 1):
+            own = np.column_stack([np.ones(here.sum()), log_p[here] - log_p[here].mean(), load_share[here, k]])
+            found[here, k] -= own @ np.linalg.lstsq(own, change[here, k], rcond=None)[0]
+    return found

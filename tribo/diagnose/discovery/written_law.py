@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribo.display import displayed
-from tribo.mechanisms.record import Base, Choosing, Conditions, Forces, Mechanism, Parameter, Values, amplitude
+from tribo.mechanisms.record import Base, Choosing, Conditions, Forces, Mechanism, Values, amplitude
 from tribo.records import REGIMES, FloatArray
 
 T, LOAD_TERM, ADHESION_TERM = "T", "load term", "adhesion term"
@@ -25,12 +25,12 @@ LARGEST = 3.0  # of an amplitude in ln T
 class Shape:
     """A function of one column x, about one in size.
 
-    ``linear`` and ``log`` run from 0 at ``low`` to 1 at ``high``; ``step`` is 1 above ``place``; ``optimum`` is a
-    parabola with 1 at ``place`` and 0 at the farther end; ``hump`` is a Gaussian of standard deviation ``width`` at
-    ``place``; ``saturating`` is 1 - exp(-(x - low) / width), from ``low`` upwards or, with a negative ``width``,
-    downwards; ``ramp`` is 0 up to ``place`` and runs to 1 at ``high``, which may lie on either side; ``window`` is 1
-    from ``place`` to ``place`` + ``width``; ``wave`` is sin and cos of the period ``width``; ``level`` is 1 where a
-    column of names has the value ``level``.
+    ``linear`` and ``log`` run from 0 at ``low`` to 1 at ``high``; ``step`` is 1 above ``place``; ``soft step`` is a
+    logistic function of the scale ``width`` about it; ``ramp`` is 0 up to ``place`` and runs to 1 at ``high``, which
+    may lie on either side; ``optimum`` is a parabola with 1 at ``place`` and 0 at the farther end; ``hump`` is a
+    Gaussian of standard deviation ``width`` at ``place``; ``saturating`` is 1 - exp(-(x - low) / width), from ``low``
+    upwards or, with a negative ``width``, downwards; ``window`` is 1 from ``place`` to ``place`` + ``width``; ``wave``
+    is sin and cos of the period ``width``; ``level`` is 1 where a column of names has the value ``level``.
     """
 
     kind: str
@@ -65,6 +65,8 @@ class Shape:
             return (1.0 - np.exp(-np.maximum((x - self.low) / self.width, 0.0)))[:, None]
         if self.kind == "ramp":
             return np.maximum((x - self.place) / (self.high - self.place), 0.0)[:, None]
+        if self.kind == "soft step":
+            return 1.0 / (1.0 + np.exp(-(x - self.place) / self.width))[:, None]
         if self.kind == "window":
             inside = (x >= self.place) & (x <= self.place + self.width)
             return np.where(np.isnan(x), np.nan, inside * 1.0)[:, None]
@@ -121,7 +123,7 @@ class WrittenLaw:
         """The law as a mechanism: its amplitude is free (two of a wave), its places and widths are as written."""
         first = amplitude("a", "", -LARGEST, LARGEST, 0.1, "change of ln T at 1 of the shape")
         d = 2 if self.shapes[0].kind == "wave" else 1
-        parameters = [first, *(Parameter("b", "", -LARGEST, LARGEST, 0.0, "of the cosine") for _ in range(d - 1))]
+        parameters = [first, *(amplitude("b", "", -LARGEST, LARGEST, 0.1, "of the cosine") for _ in range(d - 1))]
 
         def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
             change = self.course(conditions) @ values[:d] * self.weight(conditions)
@@ -179,6 +181,8 @@ def _formula(s: Shape) -> str:
     if s.kind == "ramp":
         beyond = f"{x} - {s.place:.4g}" if s.high > s.place else f"{s.place:.4g} - {x}"
         return f"max(0, {beyond}) / {abs(s.high - s.place):.4g}"
+    if s.kind == "soft step":
+        return f"1 / (1 + exp(-({x} - {s.place:.4g}) / {s.width:.4g}))"
     if s.kind == "window":
         return f"[{s.place:.4g} <= {x} <= {s.place + s.width:.4g}]"
     return f"[{x} = {s.level}]"

@@ -12,6 +12,7 @@ from tribo.diagnose.statistics.fit import fit_without
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting, Setup, Target
 from tribo.diagnose.statistics.observations import Observations
+from tribo.diagnose.statistics.percent import rms_percent
 from tribo.diagnose.verdict import Gain
 from tribo.records import FloatArray
 
@@ -20,7 +21,7 @@ MOST_FOLDS = 30  # of whole specimens: where there are more of them, several are
 
 
 def gain(before: ModelFit, after: ModelFit, rng: np.random.Generator) -> Gain | None:
-    """Log score and RMSE of ``after`` against ``before`` on whole samples, specimens or loads left out.
+    """What ``after`` gains over ``before`` on whole samples, specimens or loads left out.
 
     Both are fitted anew without the held-out tests, noise included. A mechanism whose choice cannot be learned
     from other specimens (a wrong label, a wrong pattern) has whole loads left out; otherwise whole samples are
@@ -37,15 +38,15 @@ def gain(before: ModelFit, after: ModelFit, rng: np.random.Generator) -> Gain | 
         for k, model in enumerate((before, after)):
             scores[out, k], errors[out, k] = _held_out(model, out)
     difference = scores[:, 1] - scores[:, 0]
-    rmse = 100 * np.sqrt(np.mean(errors**2, axis=(0, 2)))
+    rmse_before, rmse_after = (rms_percent(errors[:, k]) for k in range(2))
     return Gain(
         held_out=kind,
         log_score_baseline=float(scores[:, 0].mean()),
         log_score_extended=float(scores[:, 1].mean()),
         difference=float(difference.mean()),
         se=_specimen_bootstrap(difference, s.observations.conditions.specimen, rng),
-        rmse_percent_before=float(rmse[0]),
-        rmse_percent_after=float(rmse[1]),
+        rmse_percent_before=rmse_before,
+        rmse_percent_after=rmse_after,
     )
 
 

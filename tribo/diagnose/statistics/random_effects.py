@@ -65,11 +65,11 @@ class RandomEffects:
             + np.tensordot(shared, self.shared, axes=(-1, 2))
         )
 
-    def variance(self, weight: FloatArray, precision: FloatArray) -> FloatArray:
-        """Variance (n,) of the regimes of every test added with ``weight`` (2,), for effects of ``precision`` (q,)."""
-        own, shared = self.parts(1.0 / precision)
-        on_specimens = np.einsum("nrk,r->nk", self.own, weight) ** 2 * own[self.specimen]
-        return np.asarray(on_specimens.sum(axis=1) + np.einsum("nrk,r->nk", self.shared, weight) ** 2 @ shared)
+    def summed(self, weight: FloatArray) -> FloatArray:
+        """The columns of all effects (q,), regimes added with ``weight`` (2,) and tests added up."""
+        own = np.zeros((self.specimens, OF_A_SPECIMEN))
+        np.add.at(own, self.specimen, np.einsum("nrk,r->nk", self.own, weight))
+        return np.concatenate([own.ravel(), np.einsum("nrk,r->k", self.shared, weight)])
 
     def take(self, keep: np.ndarray) -> RandomEffects:
         """The same for the tests picked by a mask or by indices."""

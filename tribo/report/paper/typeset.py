@@ -6,9 +6,9 @@ import struct
 import zlib
 from collections.abc import Mapping
 from datetime import datetime
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
+
+from tribo.temporary import temporary_folder
 
 PNG_DPI = 300.0
 FIGURE_PAGE = """#set page(width: auto, height: auto, margin: 0pt, fill: white)
@@ -21,8 +21,7 @@ def figure_files(svg: bytes, title: str, origin: str) -> dict[str, bytes]:
     """A figure given as SVG, as PDF (vectors, lettering as outlines) and as PNG of 300 dots per inch."""
     import typst
 
-    with TemporaryDirectory(prefix="tribo-") as place:
-        folder = Path(place)
+    with temporary_folder() as folder:
         (folder / "figure.svg").write_bytes(svg)
         (folder / "page.typ").write_text(FIGURE_PAGE, encoding="utf-8")
         compiler: Any = typst.Compiler(root=folder, ignore_system_fonts=True)
@@ -36,8 +35,7 @@ def document(source: str, files: Mapping[str, bytes], made_at: datetime | None) 
     """A PDF of a typst source and the files it reads; ``made_at`` stands in it as its date of creation."""
     import typst
 
-    with TemporaryDirectory(prefix="tribo-") as place:
-        folder = Path(place)
+    with temporary_folder() as folder:
         for name, content in files.items():
             (folder / name).write_bytes(content)
         (folder / "document.typ").write_text(source, encoding="utf-8")

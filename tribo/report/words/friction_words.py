@@ -47,6 +47,22 @@ def _samples(study: Study) -> Iterator[str]:
             yield f"{regime.capitalize()} friction of {sample}: {said} ({counted(ratio.size, 'test')}, {at})."
 
 
+def ratio_of_samples(study: Study) -> str:
+    """The samples of the highest and of the lowest mean T/N, in one sentence."""
+    table = study.ingested.table()
+    said = []
+    for regime in REGIMES[::-1]:
+        usable = table[np.isfinite(table[f"{regime}_N"]) & (table["normal_load_N"] > 0)] if len(table) else table
+        if usable.empty:
+            continue
+        ratio = (usable[f"{regime}_N"] / usable["normal_load_N"]).groupby(usable["sample"]).mean().sort_values()
+        low, high = (f"{significant(float(ratio.iloc[k]))} for {ratio.index[k]}" for k in (0, -1))
+        said.append(f"mean {regime} T/N is {high}" + (f" and {low}" if len(ratio) > 1 else ""))
+    if not said:
+        return "No friction force was read."
+    return f"Friction was measured and not compared with a model: {'; '.join(said)}."
+
+
 def _laws(study: Study) -> Iterator[str]:
     table = study.laws
     if table is None or table.empty:
@@ -61,9 +77,9 @@ def _laws(study: Study) -> Iterator[str]:
         others = joined([f"{law['formula']} {_deviation(law)}" for law in laws if not law["chosen"]])
         yield (
             f"{str(regime).capitalize()} friction of {sample} is described best by {chosen['formula']} with "
-            f"{_values(chosen)}: loads left out of the fit are predicted to within {_deviation(chosen)}. The other "
-            f"laws: {others}. Chosen is the law with the fewest parameters that is worse than the best by no more than "
-            "one standard error, and that the parameters of the best do not exclude."
+            f"{_values(chosen)}: loads left out of the fit are predicted to within {_deviation(chosen)} (root mean "
+            f"square of ln T). The other laws: {others}. Chosen is the law with the fewest parameters that is worse "
+            "than the best by no more than one standard error, and that the parameters of the best do not exclude."
         )
 
 

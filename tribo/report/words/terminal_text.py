@@ -18,7 +18,7 @@ def table2_text(study: Study) -> str:
     load = findings.common_loads(study)[1]
     blocks = [_regime_block(study, regime, load) for regime in REGIMES]
     foot = (
-        f"T at N = {load:.3g} N. Values after ± are standard uncertainties (k = 1).\n"
+        f"T at N = {load:.3g} N. After ±: {wording.uncertainty_kind(study)}.\n"
         "mu and tau0 of a fit are correlated: compare T rather than mu or tau0 alone."
     )
     return "\n\n".join([*(b for b in blocks if b), foot])
@@ -29,7 +29,7 @@ def _regime_block(study: Study, regime: Regime, load: float) -> str:
     rows = []
     for sample in study_lookup.sample_numbers(study):
         measured, model = (
-            study_lookup.fit_of(study.fits, sample, regime),
+            study_lookup.stated_fit(study, sample, regime),
             study_lookup.fit_of(simulated, sample, regime),
         )
         if measured is not None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from tribo.comparison import findings, study_lookup
 from tribo.comparison.findings import Agreement, DirectionRatio, Ranking, Verdict
-from tribo.records import REGIMES, ByHand, LawFit, Pull, Regime, Study
+from tribo.records import REGIMES, ByHand, Campaign, LawFit, Pull, Regime, Study, Test
 from tribo.report.oddness import OddPull
 from tribo.report.result_tables import PA_PER_KPA, all_set_aside
 from tribo.report.words.numerals import counted, joined, percent, significant, span, with_uncertainty
@@ -23,7 +23,10 @@ FLAGS = {
 }  # fmt: skip
 SIDE: dict[Verdict, str] = {"model too high": "too high", "model too low": "too low"}
 HOW_TO_READ = (
-    "The ratio is the measured friction force divided by the simulated one, with its 95 % interval. The model "
+    "The ratio is the measured friction force divided by the simulated one, with its 95 % interval. Percentages are "
+    "this ratio less one: −20 % means that the measured force is 20 % below the simulated one. The interval contains "
+    "the scatter of specimens and repeats and the error of the calibration; an error of the load cell's gain changes "
+    "the measurement and the calibrated model alike, so it is not in the interval. The model "
     "agrees at a load if the interval contains 1 and its limits are within a factor of 1.2 of the ratio. If the "
     "interval contains 1 but is wider, the result at this load is inconclusive. The overall result for a sample "
     "is the result found at half or more of its loads. The loads of a sample share the same specimens, so their "
@@ -37,7 +40,7 @@ def what_was_measured(study: Study) -> str:
     aside = len(all_set_aside(study))
     tests = [t for t in campaign.tests if t.test_id in used]
     samples = [s for s in study_lookup.sample_numbers(study) if any(t.sample == s for t in tests)]
-    specimens = {(t.sample, t.specimen) for t in tests}
+    specimens = specimens_of(campaign, tests)
     loads = np.array([t.normal_load_N for t in tests])
     levels = np.unique(study_lookup.load_levels(loads))
     lowest, highest = (significant(p / campaign.nominal_area_m2 / PA_PER_KPA) for p in (levels[0], levels[-1]))
@@ -50,6 +53,11 @@ def what_was_measured(study: Study) -> str:
     )
 
 
+def specimens_of(campaign: Campaign, tests: Iterable[Test]) -> set[tuple[str, str]]:
+    """Pattern and name of every specimen: one that was pulled in two directions counts once."""
+    return {(campaign.samples[t.sample].name if t.sample in campaign.samples else t.sample, t.specimen) for t in tests}
+
+
 def _set_aside_clause(aside: int) -> str:
     if not aside:
         return "No test was set aside."
@@ -59,14 +67,21 @@ def _set_aside_clause(aside: int) -> str:
 def flat_law(study: Study) -> list[str]:
     """The measured law of the flat sample, one sentence per regime."""
     flat = study_lookup.flat_sample(study)
-    fits = [(regime, study_lookup.fit_of(study.fits, flat, regime)) for regime in REGIMES]
+    fits = [(regime, study_lookup.stated_fit(study, flat, regime)) for regime in REGIMES]
     return [
         f"The {regime} friction of the flat sample {flat} follows T = μN + {'τ₀A' if fit.has_area else 'T₀'} with "
         f"{_law_values(fit)} "
-        "(± standard uncertainty)."
+        f"(± {uncertainty_kind(study)})."
         for regime, fit in fits
         if fit is not None
     ]
+
+
+def uncertainty_kind(study: Study) -> str:
+    """What stands after ±."""
+    if study.combined:
+        return "combined standard uncertainty, k = 1: scatter of specimens and repeats, and the instrument"
+    return "standard uncertainty, k = 1, of specimens and repeats alone"
 
 
 def _law_values(fit: LawFit) -> str:
@@ -105,6 +120,11 @@ def _verdicts(agreements: list[Agreement]) -> str:
     return "; it ".join(clauses)
 
 
+def deviation(fraction: float) -> str:
+    """measured / model - 1 in percent, with its sign."""
+    return f"{'+' if fraction > 0 else ''}{percent(fraction)}"
+
+
 def _inside(agreement: Agreement) -> str:
     if not agreement.n_outside:
         return agreement.sample
@@ -113,8 +133,8 @@ def _inside(agreement: Agreement) -> str:
 
 def _off_by(agreement: Agreement) -> str:
     count, n = agreement.n_outside, len(agreement.loads)
-    off = percent(abs(agreement.mean_deviation))
-    return f"{agreement.sample} (by {off}{'' if count == n else ' on average'}, at {_at(count, n)})"
+    off = deviation(agreement.mean_deviation)
+    return f"{agreement.sample} ({off}{'' if n == 1 else ' on average'}, at {_at(count, n)})"
 
 
 def agreement_sentence(agreement: Agreement) -> str:
@@ -131,9 +151,8 @@ def agreement_sentence(agreement: Agreement) -> str:
     if agreement.verdict in ("model too high", "model too low", "mixed"):
         worst = agreement.worst
         parts.append(
-            f"Averaged over the loads, the model is {percent(abs(agreement.mean_deviation))} too "
-            f"{'high' if agreement.mean_deviation > 0 else 'low'}; the largest "
-            f"deviation is {percent(worst.deviation)}, at {significant(worst.normal_load_N)} N."
+            f"Averaged over the loads, measured T differs from simulated T by {deviation(agreement.mean_deviation)}; "
+            f"the largest difference is {deviation(worst.deviation)}, at {significant(worst.normal_load_N)} N."
         )
     if agreement.calibrated:
         parts.append("The model was calibrated on this sample, so agreement here does not test the model.")

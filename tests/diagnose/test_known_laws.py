@@ -1,0 +1,128 @@
+"""Laws of earlier campaigns: tested on a new one, in a plan, and in the spring-block model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from blind.tribometer import hide
+
+from tribo.diagnose.diagnosis import examine
+from tribo.diagnose.discovery.contested import without_wrong_forms
+from tribo.diagnose.discovery.in_verdict import with_laws
+from tribo.diagnose.discovery.known_laws import read_laws, try_laws
+from tribo.diagnose.discovery.law_file import law_text
+from tribo.diagnose.discovery.planned_law import plan_law
+from tribo.diagnose.discovery.written_law import Shape, WrittenLaw
+from tribo.diagnose.search.weighing import refitted
+from tribo.diagnose.statistics.model import Acting, Setup
+from tribo.diagnose.verdict import Estimate
+from tribo.errors import CampaignError, SimulationError
+from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms_in_model import columns_from, with_law
+from tribo.simulate.config import SimConfig
+
+from .known import baseline, made
+from .synthetic import SMALL, ingested
+
+WARM = WrittenLaw((Shape("linear", "temperature_C", 20.0, 26.0),))
+SIZE = {"a": Estimate(0.6, 0.5, 0.7, "")}
+
+
+def warming(s: Setup) -> np.ndarray:
+    t = s.observations.conditions.temperature_C
+    return np.repeat(0.1 * (t - 23.0)[:, None], 2, axis=1)
+
+
+def curved(s: Setup) -> np.ndarray:
+    t = s.observations.conditions.temperature_C
+    return np.repeat(-0.05 * (t - 23.0)[:, None] ** 2, 2, axis=1)
+
+
+def nothing(s: Setup) -> np.ndarray:
+    return np.zeros((s.observations.n, 2))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A law that is at work in ``warming``, and one of a column that is nowhere recorded."""
+    (tmp_path / "law-1.toml").write_text(law_text(WARM, SIZE, "first"))
+    other = WrittenLaw((Shape("linear", "lot_age_d", 0.0, 9.0),))
+    (tmp_path / "law-2.toml").write_text(law_text(other, SIZE, "second"))
+    return tmp_path
+
+
+def test_a_known_law_that_holds_is_added_and_one_that_cannot_be_tested_says_why(folder: Path) -> None:
+    tested = try_laws(baseline(made(warming, seed=31)), read_laws(folder), np.random.default_rng(0))
+    assert [held.answer for _, held in tested.answers] == ["held", "cannot be told"]
+    assert [layer.name for layer in tested.layers] == ["temperature_C"]
+    assert "The law of first held" in tested.text
+    assert tested.layers[0].low < tested.layers[0].effect_percent < tested.layers[0].high
+
+
+def test_a_verdict_lists_the_answers_about_known_laws(folder: Path) -> None:
+    quiet = with_laws(examine(made(nothing, seed=102), replicates=(40, 40)), read_laws(folder))
+    assert [law["answer"] for law in quiet.verdict.model["known_laws"]] == ["not held", "cannot be told"]
+    assert "0 of 2 known laws held." in quiet.verdict.text
+    assert all(layer.kind == "pattern_correction" for layer in quiet.verdict.layers)
+
+
+def test_every_faulty_law_of_a_folder_is_named(folder: Path) -> None:
+    (folder / "law-3.toml").write_text("x = 1")
+    (folder / "law-4.toml").write_text("y = [")
+    with pytest.raises(CampaignError) as faults:
+        read_laws(folder)
+    assert {p.file for p in faults.value.problems} == {"law-3.toml", "law-4.toml"}
+
+
+def test_a_folder_without_laws_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(CampaignError):
+        read_laws(tmp_path)
+
+
+def test_a_mechanism_whose_form_is_wrong_loses_against_a_law_of_its_column() -> None:
+    temperature = Acting(MECHANISMS["temperature"])
+    wrong = refitted(baseline(made(curved, seed=33)), [temperature])
+    right = refitted(baseline(made(warming, seed=33)), [temperature])
+    assert set(without_wrong_forms(wrong)[1]) == {"temperature"}
+    assert without_wrong_forms(right)[1] == {}
+
+
+def test_a_plan_says_whether_a_design_would_show_a_law() -> None:
+    campaign = ingested(hide(3, [], SMALL)).campaign
+    large = plan_law(campaign, WARM, SIZE)
+    small = plan_law(campaign, WARM, {"a": Estimate(0.03, 0.01, 0.05, "")})
+    assert large.strength == pytest.approx(20.0 * small.strength, rel=1e-2)
+    assert "would show" in large.text
+    assert small.tests_needed > len(campaign.tests)
+    elsewhere = replace(WARM, shapes=(replace(WARM.shapes[0], column="lot"),))
+    assert "lot is not recorded" in plan_law(campaign, elsewhere, SIZE).text
+
+
+def test_a_law_in_the_model_changes_the_thresholds_of_every_block() -> None:
+    config = SimConfig(sample="F", pressure_Pa=5e3)
+    law = (WARM.mechanism(), np.array([np.log(2.0)]))
+    warm = with_law(config, law, {"temperature_C": 26.0}, {}).friction
+    assert warm.mu_s == pytest.approx(2.0 * config.friction.mu_s)
+    assert warm.sliding_adhesion_Pa == pytest.approx(2.0 * config.friction.sliding_adhesion_Pa)
+    assert with_law(config, law, {"temperature_C": 20.0}, {}) == config
+
+
+def test_a_law_of_one_sample_and_one_regime_leaves_the_rest_of_the_model_alone() -> None:
+    of_a = (replace(WARM, where="sample A", regime="static").mechanism(), np.array([0.5]))
+    flat, cavities = SimConfig(sample="F", pressure_Pa=5e3), SimConfig(sample="A", pressure_Pa=5e3)
+    assert with_law(flat, of_a, {"temperature_C": 26.0}, {}) == flat
+    changed = with_law(cavities, of_a, {"temperature_C": 26.0}, {}).friction
+    assert changed.mu_s > 1.5 * cavities.friction.mu_s
+    assert changed.mu_d == pytest.approx(cavities.friction.mu_d)
+
+
+def test_a_column_that_the_model_does_not_have_has_to_be_given() -> None:
+    assert columns_from("film_um=3.5, hold_s=100", ["film_um", "hold_s", "pressure_Pa"]) == (
+        "hold_s=100",
+        {"film_um": "3.5"},
+    )
+    with pytest.raises(SimulationError, match="film_um"):
+        columns_from("hold_s=100", ["film_um"])

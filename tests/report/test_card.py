@@ -1,0 +1,189 @@
+"""The card says what was found, how much, where and how sure, in the same words on every output."""
+
+from __future__ import annotations
+
+import html as html_text
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from report.conftest import Written
+from tribo.errors import Problem
+from tribo.mechanisms.table import MECHANISMS
+from tribo.records import CombinedFit, LawFit, SetAside, Study
+from tribo.report.card import Card, card_law, card_of
+from tribo.report.html.page import html
+from tribo.report.verdict_file import verdict_in_words
+from tribo.report.words.card_text import card_text
+
+LAYER: dict[str, Any] = {
+    "kind": "cause", "name": "suction", "samples": ["B", "C"], "regimes": ["static"], "p_adjusted": 1e-9,
+    "effect_percent": 41.7, "low": 30.2, "high": 54.9, "parameters": {}, "formula": "", "tied_with": [], "gain": None,
+    "text": "", "at": "static friction of C at 0.0637 N",
+}  # fmt: skip
+CAUSE = {"mechanism": "suction", "weight": 1.0, "parameters": {}, "text": "acts on cavities"}
+FOUND: dict[str, Any] = {
+    "schema": "tribo.verdict/2", "verdict": "named", "text": "The model fails beyond chance.", "misfits": [],
+    "causes": [CAUSE], "equivalent": [], "excluded": [], "gain": None, "set_aside": [], "layers": [LAYER],
+    "not_testable": [{"mechanism": "contact_ageing", "reason": "cannot be tested with this design: no hold times"}],
+    "next_test": {
+        "text": "Vent the cavities: 18 pulls of C.", "separates": ["suction", "edge_adhesion"],
+        "design": {"hours": 3.1}, "expected_bits": 0.9,
+    },
+}  # fmt: skip
+
+
+def misfit(**other: Any) -> dict[str, Any]:
+    found = {
+        "observable": "both", "sample": "", "covariate": "time of day", "effect_percent": -21.4, "p_adjusted": 1e-6,
+        "text": "", "low": -25.0, "high": -17.0,
+    }  # fmt: skip
+    return found | other
+
+
+@pytest.fixture
+def card(study: Study) -> Card:
+    return card_of(study, FOUND)
+
+
+def test_the_sentence_says_what_happens_how_much_where_and_its_name(card: Card) -> None:
+    assert card.sentence == (
+        "The air in the cavities is below room pressure, which presses the sample down (suction under the cavities): "
+        "this changes static friction of B and C by up to +42 % (90 % interval +30 to +55 %), most in static friction "
+        "of C at 0.0637 N."
+    )
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_every_mechanism_has_a_meaning_that_reads_as_a_sentence(name: str) -> None:
+    meaning = MECHANISMS[name].meaning
+    assert 20 < len(meaning) < 130
+    assert meaning[0].islower()
+    assert not meaning.endswith(".")
+    assert "_" not in meaning
+
+
+def test_no_card_of_any_mechanism_shows_an_identifier(study: Study) -> None:
+    for name in MECHANISMS:
+        found = FOUND | {"causes": [{**CAUSE, "mechanism": name}], "layers": [{**LAYER, "name": name}]}
+        card = card_of(study, found)
+        assert "_" not in card_text(card)
+        assert MECHANISMS[name].in_words in card.sentence
+
+
+def test_causes_that_cannot_be_told_apart_are_not_called_identified(study: Study) -> None:
+    tied = FOUND | {
+        "layers": [{**LAYER, "tied_with": ["normal_load_error"]}],
+        "equivalent": [["suction", "normal_load_error"]],
+        "causes": [CAUSE, {**CAUSE, "mechanism": "normal_load_error"}],
+    }
+    card = card_of(study, tied)
+    assert card.sentence.startswith(
+        "Suction under the cavities or an error of the normal load (this campaign cannot tell which) changes"
+    )
+    assert any("each of these equally well" in sentence for sentence in card.to_know)
+    assert "identified" not in verdict_in_words(tied)["outcome"]
+    assert "identified" in verdict_in_words(FOUND)["outcome"]
+
+
+def test_the_next_test_says_why_and_how_long(card: Card) -> None:
+    assert card.next_test is not None
+    assert card.next_test.hours == 3.1
+    assert card.next_test.why == (
+        "it distinguishes suction under the cavities from adhesion along the cavity edges"
+    )
+    assert "(about 3.1 h)" in card_text(card)
+
+
+def test_what_the_design_cannot_test_is_said(card: Card) -> None:
+    assert "This design cannot test contact ageing." in card.to_know
+
+
+@pytest.mark.parametrize(
+    ("verdict", "words"),
+    [
+        ({"verdict": "unknown", "misfits": [misfit()], "causes": [], "layers": []},
+         "Static and sliding friction of all samples changes with the time of day by −21 % (90 % interval −25 to "),
+        ({"verdict": "unknown", "misfits": [misfit(sample="C", covariate="sample", observable="sliding")], "causes": [],
+          "layers": []},
+         "The model predicts the wrong friction for C: measured sliding friction of C differs most, by −21 %"),
+        ({"verdict": "no_misfit", "misfits": [], "causes": [],
+          "layers": [LAYER | {"kind": "pattern_correction", "name": "B", "effect_percent": 3.4, "low": -2, "high": 9}]},
+         "the largest mean difference, static friction of B, is +3 % (90 % interval −2 to +9 %)"),
+        ({"verdict": "partly"}, "part of the difference from the model remains unexplained"),
+    ],
+)  # fmt: skip
+def test_every_outcome_has_a_sentence_with_its_size(verdict: dict[str, Any], words: str, study: Study) -> None:
+    assert words in card_of(study, FOUND | verdict).sentence
+
+
+def test_tests_set_aside_are_counted_with_their_reasons_also_where_nothing_was_found(study: Study) -> None:
+    nothing = FOUND | {"verdict": "no_misfit", "causes": [], "layers": []}
+    faults = tuple(SetAside(f"X{k}", "cut", (Problem("truncated", "the file is cut"),)) for k in range(14))
+    spoiled = replace(study, ingested=replace(study.ingested, set_aside=(*study.ingested.set_aside, *faults)))
+    card = card_of(spoiled, nothing)
+    assert card.set_aside == 16
+    assert "16 tests set aside" in card.counts
+    assert any("14 × the file is cut" in sentence for sentence in card.to_know)
+
+
+def test_a_specimen_pulled_in_two_directions_counts_once(study: Study) -> None:
+    tests = tuple(
+        replace(t, specimen=f"S{t.specimen[-1]}") if t.sample in ("Sx", "Sy") else t
+        for t in study.ingested.campaign.tests
+    )
+    campaign = replace(study.ingested.campaign, tests=tests)
+    shared = replace(study, ingested=replace(study.ingested, campaign=campaign))
+    assert card_of(study, None).specimens == 18
+    assert card_of(shared, None).specimens == 15
+    assert "15 specimens" in html(shared, drawn={}).replace("\u00a0", " ")
+
+
+def test_a_law_that_is_no_straight_line_is_said(study: Study) -> None:
+    note = "the load means deviate from a straight line: chi2_red 19.31, p = 1e-05"
+    fits = tuple(replace(f, notes=(note,), chi2_red=19.31) if f.sample == "C" else f for f in study.fits)
+    said = card_of(replace(study, fits=fits), FOUND).to_know
+    assert any("not a straight line for C static (χ²/ν = 19) and C sliding (χ²/ν = 19)" in s for s in said)
+
+
+def test_another_flat_sample_than_f_is_said(study: Study) -> None:
+    chosen = replace(study.ingested.campaign, chosen_flat="Q")
+    other = replace(study, ingested=replace(study.ingested, campaign=chosen))
+    assert "The model is calibrated on sample Q (as chosen)." in card_of(other, FOUND).to_know
+
+
+def combined(fit: LawFit, largest: dict[str, tuple[str, float]]) -> CombinedFit:
+    own = {name: getattr(fit, name) for name in fit.__dataclass_fields__}
+    return CombinedFit(**own | {"covariance": fit.covariance * 100}, type_a=fit.covariance, largest=largest)
+
+
+def test_the_uncertainty_of_the_card_is_the_combined_one_with_what_dominates_it(study: Study) -> None:
+    largest = {"mu": ("wire angle", 60.4), "tau0_Pa": ("specimens", 48.0), "T": ("wire angle", 50.0)}
+    fits = tuple(combined(fit, largest) for fit in study.fits)
+    card = card_of(replace(study, combined=fits), FOUND)
+    alone = card_of(study, FOUND)
+    assert card.laws[0].mu.split(" ± ")[1] != alone.laws[0].mu.split(" ± ")[1]
+    assert card.laws[0].largest == "μ: wire angle (60 %); τ₀: specimens (48 %)"
+    assert card_law(combined(study.fits[0], dict.fromkeys(largest, ("repeats", 50.0)))).largest == "repeats (50 %)"
+    assert card.uncertainty.startswith("combined standard uncertainty")
+
+
+def test_page_terminal_and_file_hold_the_same_card(written: Written, study: Study, card: Card) -> None:
+    page = html_text.unescape(html(study, drawn={}, verdict=FOUND)).replace("\u00a0", " ")
+    for words in (card.sentence, card.counts, *card.to_know):
+        assert words in page
+        assert words in card_text(card)
+    assert card.next_test is not None
+    assert card.next_test.why in page
+    kept = json.loads((written.out / "card.json").read_text(encoding="utf-8"))
+    assert kept == json.loads(json.dumps(card_of(study, None).as_dict()))
+
+
+def test_intervals_of_a_combined_fit_take_the_degrees_of_freedom_of_both_parts(study: Study) -> None:
+    fit = combined(study.fits[0], {})
+    low, high = fit.interval("mu")
+    assert fit.effective_dof(np.array([1.0, 0.0])) == pytest.approx(study.fits[0].dof * 100**2)
+    assert (high - low) / 2 == pytest.approx(1.96 * fit.standard_uncertainty("mu"), rel=1e-3)

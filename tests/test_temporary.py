@@ -1,0 +1,71 @@
+"""Folders for temporary files are gone at their end, and after a kill at the next start; those in use stay."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tribo.temporary import PREFIX, temporary_folder
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="files are not locked on this system")
+HOLDER = """
+import sys, time
+from tribo.temporary import temporary_folder
+with temporary_folder() as folder:
+    (folder / "export.csv").write_text("unpacked")
+    print(folder, flush=True)
+    time.sleep(60)
+"""
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    return tmp_path
+
+
+def test_the_folder_of_a_killed_process_goes_at_the_next_start_and_not_before(place: Path) -> None:
+    environment = {**os.environ, "TMPDIR": str(place)}
+    with subprocess.Popen([sys.executable, "-c", HOLDER], stdout=subprocess.PIPE, text=True, env=environment) as other:
+        assert other.stdout is not None
+        theirs = Path(other.stdout.readline().strip())
+        with temporary_folder() as own:
+            assert own != theirs
+            assert (theirs / "export.csv").read_text() == "unpacked"
+        other.kill()
+        other.wait()
+    assert theirs.is_dir()
+    with temporary_folder() as own:
+        assert list(place.iterdir()) == [own.parent]
+    assert list(place.iterdir()) == []
+
+
+def test_an_empty_folder_of_a_process_killed_before_it_held_anything_goes_too(place: Path) -> None:
+    (place / f"{PREFIX}abc").mkdir(mode=0o700)
+    with temporary_folder() as own:
+        assert list(place.iterdir()) == [own.parent]
+
+
+def test_folders_that_others_can_write_to_and_links_are_not_touched(place: Path) -> None:
+    (place / "precious").mkdir()
+    (place / f"{PREFIX}link").symlink_to("precious")
+    (place / f"{PREFIX}open").mkdir()
+    (place / f"{PREFIX}open").chmod(0o777)
+    with temporary_folder():
+        pass
+    assert sorted(p.name for p in place.iterdir()) == ["precious", f"{PREFIX}link", f"{PREFIX}open"]
+
+
+def test_an_error_inside_leaves_nothing_behind(place: Path) -> None:
+    def fill() -> None:
+        with temporary_folder() as own:
+            (own / "half").write_text("half")
+            raise OSError("no space")
+
+    with pytest.raises(OSError, match="no space"):
+        fill()
+    assert list(place.iterdir()) == []

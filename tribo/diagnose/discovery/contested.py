@@ -1,0 +1,62 @@
+"""Causes whose form is wrong: a law of the same column explains the campaign better than the mechanism does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from tribo.diagnose.discovery.grammar import groups_of, shapes_of
+from tribo.diagnose.discovery.scoring import courses_of
+from tribo.diagnose.discovery.settling import CLOSE, Searched, best_form
+from tribo.diagnose.discovery.written_law import Shape
+from tribo.diagnose.search.weighing import refitted
+from tribo.diagnose.statistics.linearisation import ModelFit
+from tribo.diagnose.statistics.model import Acting, effect_of
+from tribo.mechanisms.record import Conditions
+
+# Log likelihood by which a law has to be better than mechanisms of the library: odds of 400 to 1. With 3, one of seven
+# effects of the library (benchmarks/blind_cases.py, seed 7000, three times the half-found size) lost; none with 6.
+MARGIN = 2.0 * CLOSE
+SAME = {"speed_mm_s": "speed_m_s", "started_at": "elapsed_s"}  # columns of mechanisms by their names in the grammar
+
+
+def without_wrong_forms(model: ModelFit) -> tuple[ModelFit, dict[str, float]]:
+    """The model without the mechanisms that lose against a law of their own column, or two of them against a product
+    of their columns, and by how much each loses."""
+    lost: dict[str, float] = {}
+    for together in (*((a,) for a in model.acting), *combinations(model.acting, 2)):
+        if not all(a in model.acting for a in together):
+            continue
+        by = _lost_by(model, together)
+        if by > MARGIN:
+            lost |= {a.name: by for a in together}
+            model = refitted(model, [a for a in model.acting if a not in together])
+    return model, lost
+
+
+def _lost_by(model: ModelFit, together: Sequence[Acting]) -> float:
+    """Log likelihood by which the best law of the columns of one or two mechanisms is better; negative where none is.
+
+    Both are judged at the noise that the law leaves. The law pays for its choices among those of these columns, the
+    mechanisms do not.
+    """
+    named = [a.mechanism.column(a.choice) for a in together]
+    columns = {SAME.get(name, name) for name in named}
+    c = model.setup.observations.conditions
+    shapes = _of_columns(c, columns) if len(columns) == len(together) else []
+    if not shapes:
+        return -np.inf
+    changes = [effect_of(model.setup, model.law, a, model.values[model.acting.index(a)]) for a in together]
+    without = refitted(model, [a for a in model.acting if a not in together])
+    form, state = best_form(without, Searched(courses_of(shapes, c), tuple(groups_of(c))))
+    return form.evidence - state.projected.joint_gain(np.stack(changes, axis=2))
+
+
+def _of_columns(c: Conditions, columns: set[str]) -> list[tuple[tuple[Shape, ...], float]]:
+    """The shapes of one column and its products, or the products of two; a product costs what choosing among these is
+    worth."""
+    every = [(shape, cost) for shape, cost in shapes_of(c) if columns <= {s.column for s in shape}]
+    products = sum(len(shape) > 1 for shape, _ in every)
+    return [(shape, float(np.log(products)) if len(shape) > 1 else cost) for shape, cost in every]

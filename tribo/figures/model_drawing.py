@@ -1,0 +1,158 @@
+"""Drawings of the spring-block model, as in Fig. 5 of Berardo et al. (2019): mesh, side view and patterns at scale."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+
+from tribo.figures import style
+from tribo.records import FloatArray, Run
+
+PATTERN_COLUMNS = [
+    "cavity", "size_x_um", "size_y_um", "pitch_x_um", "pitch_y_um", "staggered", "domain_x_um", "domain_y_um",
+    "area_fraction",
+]  # fmt: skip
+CAVITY_COLOUR = "0.60"
+BLOCK, GAP = 0.46, 1.0  # side of a block and distance of two blocks in the schematics
+TEETH = 5  # of a drawn spring
+
+
+def pattern_row(run: Run) -> dict[str, Any]:
+    """The pattern of a run and the part of the sample that is simulated, lengths in micrometres."""
+    given = run.parameters
+    cavity = str(given.get("cavity", "none"))
+    size, pitch = given.get("cavity_size_m"), given.get("cavity_pitch_m")
+    size, pitch = (_micrometres(pair) if cavity != "none" and pair else (np.nan, np.nan) for pair in (size, pitch))
+    domain = _micrometres([n * given.get("spacing_m", np.nan) for n in given.get("blocks", (np.nan, np.nan))])
+    staggered, fraction = bool(given.get("cavity_staggered", False)), float(given.get("area_fraction", np.nan))
+    return dict(zip(PATTERN_COLUMNS, (cavity, *size, *pitch, staggered, *domain, fraction), strict=True))
+
+
+def _micrometres(lengths_m: Any) -> tuple[float, float]:
+    x, y = (float(f"{1e6 * float(v):.6g}") for v in lengths_m)
+    return x, y
+
+
+def draw_pattern(ax: Axes, pattern: pd.Series, name: str, angle_deg: float) -> None:
+    """The simulated part of a sample at scale: cavities grey, an arrow along the pull."""
+    width, height = float(pattern["domain_x_um"]), float(pattern["domain_y_um"])
+    width, height = (w if np.isfinite(w) else 1.0 for w in (width, height))
+    ax.set_xlim(0, width)
+    ax.set_ylim(0, height)
+    if pattern["cavity"] not in ("none", ""):
+        _add_cavities(ax, pattern, width, height)
+    middle, reach = np.array([width, height]) / 2, 0.33 * min(width, height)
+    step = reach * np.array([np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))])
+    _arrow(ax, middle - step, middle + step)
+    _as_drawing(ax)
+    ax.spines[:].set_visible(True)
+    ax.spines[:].set_linewidth(0.6)
+    fraction = float(pattern["area_fraction"])
+    style.panel_title(ax, name, f"AF = {fraction:.2f}" if np.isfinite(fraction) else "")
+
+
+def _add_cavities(ax: Axes, pattern: pd.Series, width: float, height: float) -> None:
+    size = np.array([pattern["size_x_um"], pattern["size_y_um"]], float)
+    centres = _centres(pattern, width, height)
+    if pattern["cavity"] == "circle":  # as marks, which an SVG holds once; the panel keeps its size on paper
+        figure = ax.get_figure(root=True)
+        assert figure is not None
+        points = 72 * figure.get_size_inches()[0] * ax.get_position().width / width
+        ax.plot(*centres.T, "o", ms=float(points * size.mean()), color=CAVITY_COLOUR, mew=0)
+        return
+    corners = 0.5 * size * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    rectangles = PolyCollection(centres[:, None, :] + corners, facecolors=CAVITY_COLOUR, edgecolors="none")
+    ax.add_collection(rectangles, autolim=False)
+
+
+def _centres(pattern: pd.Series, width: float, height: float) -> FloatArray:
+    """Centres of all cavities (n, 2) that reach into the drawn part; every other row is shifted if staggered."""
+    px, py = float(pattern["pitch_x_um"]), float(pattern["pitch_y_um"])
+    rows = np.arange(-1, int(height / py) + 2)
+    columns = np.arange(-1, int(width / px) + 2)
+    x, y = np.meshgrid((columns + 0.5) * px, (rows + 0.5) * py)
+    if pattern["staggered"]:
+        x = x + 0.5 * px * (rows[:, None] % 2)
+    return np.column_stack([x.ravel(), y.ravel()])
+
+
+def draw_mesh(ax: Axes) -> None:
+    """Blocks on a square lattice, each joined by springs to its eight neighbours."""
+    nx, ny = 4, 3
+    springs: list[FloatArray] = []
+    links: list[FloatArray] = []
+    for x in range(nx):
+        for y in range(ny):
+            here = np.array([x, y]) * GAP
+            for step, found in (((1, 0), springs), ((0, 1), springs), ((1, 1), links), ((1, -1), links)):
+                if 0 <= x + step[0] < nx and 0 <= y + step[1] < ny:
+                    there = here + GAP * np.array(step)
+                    found.append(_spring(here, there) if found is springs else np.array([here, there]))
+    ax.add_collection(LineCollection(links, colors="0.45", linewidths=0.5), autolim=False)
+    ax.add_collection(LineCollection(springs, colors="black", linewidths=0.7), autolim=False)
+    _add_blocks(ax, [(x * GAP, y * GAP) for x in range(nx) for y in range(ny)], "0.70")
+    right = (nx - 1) * GAP + 0.5
+    ax.text(right, 1.5 * GAP, "springs of stiffness $K_{int}$,\nalong the diagonals half of it", va="center",
+            fontsize=7, parse_math=True)  # fmt: skip
+    ax.text(right, 0.35 * GAP, "block: its friction\ndrawn at random", va="center", fontsize=7)
+    ax.set_xlim(-0.4, right + 4.4)
+    ax.set_ylim(-0.4, (ny - 1) * GAP + 0.4)
+    _as_drawing(ax)
+    ax.set_title("Mesh, from above", loc="left")
+
+
+def draw_side_view(ax: Axes) -> None:
+    """The slider at constant velocity pulls every block by a spring; a block over a cavity touches nothing."""
+    n, lid = 6, 1.75
+    over_cavity = (2, 3)
+    places = [(x * GAP, 0.32 if x in over_cavity else 0.0) for x in range(n)]
+    slanted = [_spring(np.array([x, y + BLOCK / 2]), np.array([x + 0.55, lid])) for x, y in places]
+    between = [_spring(np.array(a), np.array(b)) for a, b in pairwise(places)]
+    ax.add_collection(LineCollection([*slanted, *between], colors="black", linewidths=0.7), autolim=False)
+    _add_blocks(ax, [p for k, p in enumerate(places) if k not in over_cavity], "0.70")
+    _add_blocks(ax, [places[k] for k in over_cavity], "white")
+    ax.fill_between([-0.6, n * GAP + 0.2], lid, lid + 0.34, color="0.70", lw=0)
+    ax.plot([-0.6, n * GAP - 0.3], [-BLOCK / 2, -BLOCK / 2], color="black", lw=1.2)
+    _arrow(ax, np.array([n * GAP + 0.3, lid + 0.17]), np.array([n * GAP + 1.4, lid + 0.17]))
+    ax.text(n * GAP + 1.5, lid + 0.17, "slider, speed v", va="center", fontsize=7)
+    ax.text(n * GAP - 0.1, 0.95, "shear springs, stiffness $K_s$", va="center", fontsize=7, parse_math=True)
+    ax.text(n * GAP - 0.1, 0.05, "blocks in contact carry\nthe normal force", va="center", fontsize=7)
+    ax.text(2.5 * GAP, -0.34, "cavity", ha="center", va="top", fontsize=7)
+    ax.set_xlim(-0.7, n * GAP + 5.0)
+    ax.set_ylim(-0.85, lid + 0.45)
+    _as_drawing(ax)
+    ax.set_title("Side view, not to scale", loc="left")
+
+
+def _arrow(ax: Axes, start: FloatArray, end: FloatArray) -> None:
+    ax.annotate("", tuple(end), tuple(start), arrowprops={"arrowstyle": "-|>", "color": style.VERMILLION, "lw": 1.4})
+
+
+def _add_blocks(ax: Axes, centres: list[tuple[float, float]], colour: str) -> None:
+    corners = 0.5 * BLOCK * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    squares = np.array(centres)[:, None, :] + corners
+    blocks = PolyCollection(list(squares), facecolors=colour, edgecolors="black", linewidths=0.7, zorder=3)
+    ax.add_collection(blocks, autolim=False)
+
+
+def _spring(start: FloatArray, end: FloatArray) -> FloatArray:
+    """A zigzag between two points, straight at its ends (k, 2)."""
+    along = np.r_[0.0, 0.28, np.linspace(0.32, 0.68, 2 * TEETH - 1), 0.72, 1.0]
+    across = np.r_[0.0, 0.0, np.where(np.arange(2 * TEETH - 1) % 2, 1.0, -1.0), 0.0, 0.0] * 0.07
+    step = end - start
+    normal = np.array([-step[1], step[0]]) / np.hypot(*step)
+    return np.asarray(start + along[:, None] * step + across[:, None] * normal)
+
+
+def _as_drawing(ax: Axes) -> None:
+    """No axes, ticks or grid; one length is the same along both."""
+    ax.set_aspect("equal", anchor="W")
+    ax.set_xticks([])
+    ax.set_yticks([])
+    ax.grid(visible=False)
+    ax.spines[:].set_visible(False)
