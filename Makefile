@@ -89,7 +89,7 @@ hashes: $(VENV)/.release
 	for file in constraints-hashed.txt constraints-hashed-pipelines.txt; do mv $$file.part $$file; done
 
 audit: $(VENV)/.release
-	$(BIN)/pip-audit --strict --disable-pip --require-hashes -r constraints-hashed-pipelines.txt
+	$(BIN)/pip-audit --strict --disable-pip --require-hashes $(AUDIT) -r constraints-hashed-pipelines.txt
 
 torture: $(VENV)/.dev
 	$(BIN)/python benchmarks/torture.py --out out/torture
