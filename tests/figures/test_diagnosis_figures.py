@@ -12,6 +12,7 @@ from diagnose.synthetic import hidden
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from figures.test_figures import collisions
 from tribo.diagnose import examine
 from tribo.diagnose.diagnosis import Diagnosis
 from tribo.diagnose.statistics.fit import fit, residual_on_flat
@@ -178,6 +179,17 @@ def test_no_label_lies_outside_the_figure_or_on_another(name: str, temperature: 
     assert not outside
     upright = [(t.get_text(), t.get_window_extent()) for t in texts if t.get_rotation() in (0, 90)]
     assert not [(s, u) for k, (s, a) in enumerate(upright) for u, b in upright[k + 1 :] if a.overlaps(b)]
+
+
+@pytest.mark.parametrize("n", [2, 5, 8, 12])
+def test_before_and_after_of_any_number_of_samples_have_no_label_on_another(temperature: Diagnosis, n: int) -> None:
+    rows = extended.numbers(temperature)
+    one = rows[rows["sample"] == rows["sample"].iloc[0]]
+    names = ("F", "A", "Sx", "S 20/40 dry", "K5", "Kx", "Ky", "holes 7", "B", "C", "D", "E")[:n]
+    many = pd.concat([one.assign(sample=name, sample_number=k) for k, name in enumerate(names)], ignore_index=True)
+    figure = extended.draw(many)
+    assert collisions(figure) == []
+    assert len(figure.axes) == 2 * n
 
 
 def test_long_words_beside_a_long_bar_stay_on_the_page(temperature: Diagnosis) -> None:

@@ -66,13 +66,17 @@ def test_every_tag_is_closed_in_order(outline: Outline) -> None:
     assert outline.open == []
 
 
-def test_no_id_stands_twice_and_no_link_leads_nowhere(outline: Outline) -> None:
+def test_no_id_stands_twice_and_no_link_leads_nowhere(outline: Outline, written: Written) -> None:
     assert not [i for i, n in Counter(outline.ids).items() if n > 1]
-    assert {t[1:] for t in outline.targets} <= set(outline.ids)
+    inside = {t[1:] for t in outline.targets if t.startswith("#")}
+    assert inside <= set(outline.ids)
+    files = {t for t in outline.targets if not t.startswith("#")}
+    assert {f.rsplit(".", 1)[1] for f in files} == {"svg", "pdf", "png", "csv"}
+    assert all((written.out / f).is_file() for f in files)
 
 
 def test_the_page_fetches_nothing_and_runs_only_the_script_its_policy_names(page: str, outline: Outline) -> None:
-    assert all(target.startswith("#") for target in outline.targets)
+    assert all(target.startswith(("#", "figures/")) for target in outline.targets)
     assert outline.sources == []
     (script,) = re.findall(r"<script>(.*?)</script>", page, flags=re.DOTALL)
     policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)

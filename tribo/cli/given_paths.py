@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+import stat
 from pathlib import Path
 from typing import Any
 
 import click
+
+from tribo.nearest import nearest
 
 
 class GivenPath(click.Path):
@@ -17,9 +20,23 @@ class GivenPath(click.Path):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
-            os.stat(value)
+            is_folder = stat.S_ISDIR(os.stat(value).st_mode)
         except (FileNotFoundError, NotADirectoryError):
-            pass  # click says so
+            if near := _beside(Path(value)):
+                self.fail(f"{value!r} does not exist; did you mean {near}?", param, ctx)
+            return super().convert(value, param, ctx)  # click says so
         except OSError as why:
             raise click.ClickException(f"{value}: {(why.strerror or str(why)).lower()}") from why
+        if self.dir_okay if is_folder else self.file_okay:
+            return Path(value)
         return super().convert(value, param, ctx)
+
+
+def _beside(path: Path) -> Path | None:
+    """The file or folder beside ``path`` whose name is nearest to its name."""
+    try:
+        names = [p.name for p in path.parent.iterdir() if not p.name.startswith(".")]
+    except OSError:
+        return None
+    near = nearest(path.name, names)
+    return path.parent / near if near else None

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tribo.cli.console import Console, command_options, set_aside_record, status_of
+from tribo.cli.console import UNUSABLE, Console, command_options, set_aside_record, status_of
 from tribo.cli.given_paths import GivenPath
 from tribo.cli.output import Output, output_options
 from tribo.cli.reading_options import reading_options, with_reading_options
@@ -17,6 +18,7 @@ from tribo.cli.study_options import (
     DRY_RUN,
     FLAT,
     LAWS,
+    NO_MODEL,
     OUT,
     OVERRIDES,
     RULE,
@@ -27,8 +29,10 @@ from tribo.cli.study_options import (
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
+    from tribo.diagnose.diagnosis_record import Alone
     from tribo.diagnose.verdict import Verdict
-    from tribo.records import Study
+    from tribo.dry_run import Until as DryUntil
+    from tribo.records import Campaign, Study
     from tribo.report.card import Card
     from tribo.stages import Progress, StudyOptions, Until
 
@@ -122,16 +126,19 @@ def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **opti
 @RULE
 @FLAT
 @LAWS
+@NO_MODEL
 @reading_options
 @ZEROS[0]
 @ZEROS[1]
 @OVERRIDES
+@DRY_RUN
 @command_options
 def diagnose(
     console: Console,
     campaign: Path | None,
     out: Output,
     published: str | None,
+    dry_run: bool,
     columns: str,
     stated: dict[str, float],
     **options: Any,
@@ -154,15 +161,20 @@ def diagnose(
     from tribo.report.words.verdict_text import verdict_text
     from tribo.store.kept_results import Shelf
 
+    chosen = stages.StudyOptions(kept=out.kept, **options)
+    if dry_run:
+        return _checked(console, campaign, out, "diagnose", chosen, lambda c: with_reading_options(c, columns, stated))
     with out.taken(campaign), open_campaign(campaign) as opened, console.progress() as progress:
-        chosen = stages.StudyOptions(kept=out.kept, **options)
-        study = stages.study(with_reading_options(opened, columns, stated), chosen, until="ingest", progress=progress)
+        stated_so = with_reading_options(opened, columns, stated)
+        until: Until = "compare" if stages.without_model(stated_so, chosen) else "ingest"
+        study = stages.study(stated_so, chosen, until=until, progress=progress)
         found = _diagnosis(study, chosen, progress)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
         verdict = found.verdict
         card = card_of(stages.with_fits(study), verdict.as_dict())
         write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found, card)
     console.result(verdict.as_dict() | {"card": card.as_dict()}, f"{card_text(card)}\n\n{verdict_text(verdict)}")
+    console.list_doubts(study.doubts)
     console.list_tests("set aside", study.ingested.set_aside, level=-1)
     return status_of(study.ingested.set_aside)
 
@@ -228,28 +240,23 @@ def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool
     stated = options.pop("stated")
     chosen = stages.StudyOptions(kept=out.kept, **options)
     if dry_run:
-        out.check(path)
-        with open_campaign(path) as described:
-            planned = stages.plan(with_reading_options(described, columns, stated), chosen, until)
-            console.result(planned, _plan_text(planned, out.path))
-            return status_of(described.set_aside)
+        return _checked(console, path, out, until, chosen, lambda c: with_reading_options(c, columns, stated))
     with out.taken(path), open_campaign(path) as described, console.progress() as progress:
         study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
-        compared = until == "report" and study.comparison is not None
-        study, found = _diagnosed(study, chosen, progress) if compared else (study, None)
+        study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
         card = _card(study, found) if until == "report" else None
         write_until(study, out.path, until, drawing, provenance_of_run(study, path, chosen), found, card)
     return _conclude(console, study, out.path, found.verdict if found else None, card)
 
 
-def _card(study: Study, found: Diagnosis | None) -> Card:
+def _card(study: Study, found: Diagnosis | Alone | None) -> Card:
     from tribo.report.card import card_of
 
     return card_of(study, found.verdict.as_dict() if found is not None else None)
 
 
-def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[Study, Diagnosis | None]:
+def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[Study, Diagnosis | Alone | None]:
     """The diagnosis of a study; a note instead where there is too little to diagnose."""
     from dataclasses import replace
 
@@ -266,9 +273,12 @@ def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[
         return replace(study, notes=(*study.notes, f"no diagnosis: {problem}")), None
 
 
-def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis:
-    from tribo.stages import diagnosis
+def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis | Alone:
+    """With the spring-block model, or, where a study was made without it, without."""
+    from tribo.stages import diagnosis, diagnosis_without_model, without_model
 
+    if without_model(study.ingested.campaign, chosen):
+        return diagnosis_without_model(study, seed=chosen.seed, kept=chosen.kept)
     return diagnosis(
         study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, laws=chosen.laws, progress=progress
     )
@@ -295,6 +305,7 @@ def _conclude(
         "used_with_doubts": set_aside_record(doubts),
         "problems": [asdict(p) for p in study.ingested.campaign.problems],
         "notes": list(study.notes),
+        "doubts": [asdict(doubt) for doubt in study.doubts],
         "fits": fits.where(fits.notna(), None).to_dict("records"),
         "power": list(study.power),
         "outlying": list(study.outlying),
@@ -307,6 +318,7 @@ def _conclude(
     looks = ["\n".join(lines) for lines in (study.power, study.outlying) if lines]
     said = [verdict_text(verdict)] if verdict else []
     console.result(record, "\n\n".join([*words, summary_text(study), *said, *looks]))
+    console.list_doubts(study.doubts)
     for note in study.notes:
         console.say(f"note: {note}", level=-1)
     console.list_tests("set aside", set_aside, level=-1)
@@ -314,6 +326,23 @@ def _conclude(
     return status_of(set_aside)
 
 
-def _plan_text(planned: dict[str, Any], out: Path) -> str:
-    lines = [f"would {step}" for step in planned["steps"]]
-    return "\n".join([*lines, f"would write into {out}", *(f"set aside: {s}" for s in planned["set_aside"])])
+def _checked(
+    console: Console, path: Path, out: Output, until: DryUntil, chosen: StudyOptions,
+    prepared: Callable[[Campaign], Campaign],
+) -> int:  # fmt: skip
+    """Print everything that a study of a campaign would meet, and the status it would end with."""
+    from dataclasses import replace
+
+    from tribo.cli.dry_run_text import dry_run_text
+    from tribo.dry_run import check
+    from tribo.errors import TriboError
+
+    with console.progress() as progress:
+        found = check(path, chosen, until, prepared, progress)
+    try:
+        out.check(path)
+    except TriboError as why:
+        found = replace(found, faults=(*why.problems, *found.faults))
+    console.result(found.as_record(), dry_run_text(found, out.path, all_of_them=console.verbosity > 0))
+    console.list_problems(found.faults)
+    return UNUSABLE if found.faults else status_of(found.set_aside)

@@ -55,6 +55,14 @@ class NotSimulated:
     reason: str
 
 
+@displayed()
+@dataclass(frozen=True)
+class Alone:
+    """A verdict without the spring-block model: what friction varies with beside the law of each sample."""
+
+    verdict: Verdict
+
+
 @displayed(lambda d: d.verdict.verdict)
 @dataclass(frozen=True)
 class Diagnosis:

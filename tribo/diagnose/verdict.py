@@ -13,7 +13,7 @@ from tribo.records import SetAside
 
 SCHEMA = "tribo.verdict/2"
 Outcome = Literal["no_misfit", "named", "undetermined", "partly", "unknown"]
-LayerKind = Literal["pattern_correction", "cause", "law", "remainder"]
+LayerKind = Literal["pattern_correction", "cause", "law", "remainder", "baseline"]
 CERTAIN_CAUSES: tuple[Outcome, ...] = ("named", "undetermined", "partly")  # verdicts that hold causes
 
 

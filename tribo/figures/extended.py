@@ -75,23 +75,28 @@ def _spread(at_load: np.ndarray, panel: np.ndarray) -> dict[str, Any]:
 
 @style.in_house_style
 def draw(numbers: pd.DataFrame) -> Figure:
-    """One column per sample, static above sliding; on the line at zero the model is right."""
+    """Static above sliding for every sample, a few samples to a row; on the line at zero the model is right."""
     samples = style.by_sample(numbers)
-    figure, axes = style.panel_grid(2 * len(samples), 44, columns=len(samples), sharex=True, sharey=True)
-    for k, (_, part) in enumerate(samples):
-        for row, regime in enumerate(REGIMES):
-            ax = axes[row * len(samples) + k]
+    across = len(samples) if len(samples) <= 4 else 3 if len(samples) <= 6 else 4
+    deep = -(-len(samples) // across)
+    figure, axes = style.panel_grid(2 * deep * across, 40, columns=across, sharex=True, sharey=True)
+    for k in range(deep * across):
+        row, column = divmod(k, across)
+        pair = [axes[(2 * row + below) * across + column] for below in range(len(REGIMES))]
+        for ax, regime in zip(pair, REGIMES, strict=True):
+            if k >= len(samples):
+                ax.remove()
+                continue
+            part = samples[k][1]
             cell = part[part["regime"] == regime]
             _draw_panel(ax, cell)
-            if row == 0:
-                ax.set_title(str(part["sample"].iloc[0]), loc="left")
-            ax.set_title(_rms(cell), loc="right", fontweight="normal", fontsize=6.5)
+            style.panel_title(ax, str(part["sample"].iloc[0]) if ax is pair[0] else "", _rms(cell))
+            style.plain_log_axis(ax.xaxis, numbers["normal_load_N"])
+            ax.tick_params(axis="x", labelsize=6, rotation=90, labelbottom=ax is pair[-1])
+            ax.set_xlabel("Load N (N)" if ax is pair[-1] else "")
             if style.is_leftmost(ax):
-                ax.set_ylabel(f"{regime} friction:\nmeasured / model − 1 (%)")
-    for ax in axes[len(samples) :]:
-        style.plain_log_axis(ax.xaxis, numbers["normal_load_N"])
-        ax.tick_params(axis="x", labelsize=6, rotation=90)
-        ax.set_xlabel("Load N (N)")
+                ax.set_ylabel(f"{regime} friction")
+    figure.supylabel("measured / model − 1 (%)", fontsize=8)
     shown = [m for m in MODELS if (numbers["model"] == m).any()]
     handles: list[Any] = [Line2D([], [], ms=3.2, lw=0.9, label=f"{MODELS[m]}, ± 2 SE", **LOOKS[m]) for m in shown]
     style.legend_below(figure, handles)

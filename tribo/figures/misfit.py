@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm, to_rgb
 from matplotlib.figure import Figure
 
 from tribo.diagnose.statistics.percent import bend_percent, change_percent, mean_percent, percent
@@ -29,7 +31,12 @@ TITLES = {
 }  # fmt: skip
 MARKS = ((0.01, "**"), (0.05, "*"))  # adjusted p below which a cell is marked
 LEAST_PERCENT, MOST_PERCENT = 10.0, 60.0  # ends of the colour scale
-DIVERGING = LinearSegmentedColormap.from_list("misfit", [style.BLUE, "#FFFFFF", style.VERMILLION])
+STRONGEST = 0.55  # opacity at the ends of the scale: numbers in black and in white are read on it
+DIVERGING = LinearSegmentedColormap.from_list(
+    "misfit",
+    [(0.0, (*to_rgb(style.BLUE), STRONGEST)), (0.5, (*to_rgb(style.BLUE), 0.0)),
+     (0.5, (*to_rgb(style.VERMILLION), 0.0)), (1.0, (*to_rgb(style.VERMILLION), STRONGEST))], N=40,
+)  # fmt: skip
 CELL_MM, HEAD_MM, FOOT_MM = 4.3, 7.0, 20.0
 FAINT = 0.35  # how strongly a cell is coloured that chance explains
 
@@ -158,35 +165,33 @@ def draw(numbers: pd.DataFrame) -> Figure:
     reach = float(np.clip(numbers["effect_percent"].abs().quantile(0.98), LEAST_PERCENT, MOST_PERCENT))
     norm = TwoSlopeNorm(0.0, -reach, reach)
     for ax, (name, part) in zip(axes, panels, strict=True):
-        mesh = _draw_panel(ax, part, list(labels.index), norm)
+        _draw_panel(ax, part, list(labels.index), norm)
         style.panel_title(ax, TITLES[name])
     for ax in axes[:-1]:
         ax.tick_params(labelbottom=False)
     axes[-1].set_xticks(np.arange(len(labels)) + 0.5, list(labels), rotation=25, ha="right", rotation_mode="anchor")
-    bar = figure.colorbar(mesh, ax=list(axes), shrink=0.6, pad=0.015, aspect=35, extend="both")
+    scale = ScalarMappable(norm, DIVERGING)
+    bar = figure.colorbar(scale, ax=list(axes), shrink=0.6, pad=0.015, aspect=35, extend="both")
     bar.set_label("100 (measured / model − 1), or its change (%)")
     bar.outline.set_visible(False)
     return figure
 
 
-def _draw_panel(ax: Axes, part: pd.DataFrame, covariates: list[str], norm: TwoSlopeNorm) -> Any:
-    """Cells that chance explains are faint, so that the eye goes to the others."""
+def _draw_panel(ax: Axes, part: pd.DataFrame, covariates: list[str], norm: TwoSlopeNorm) -> None:
+    """Cells that chance explains are faint, so that the eye goes to the others; paper shows through all of them."""
     rows = list(dict.fromkeys(part["row"]))
-    values = np.full((len(rows), len(covariates)), np.nan)
-    strong = np.zeros(values.shape, bool)
+    cells, colours = [], []
     for cell in part.to_dict("records"):
         i, j, percent = rows.index(cell["row"]), covariates.index(cell["covariate"]), float(cell["effect_percent"])
-        values[i, j], strong[i, j] = percent, bool(cell["mark"])
-        dark = strong[i, j] and abs(norm(percent) - 0.5) > 0.32
+        strong = bool(cell["mark"])
         ax.text(
             j + 0.5, i + 0.5, f"{_signed(percent)}{cell['mark']}", ha="center", va="center", fontsize=6.5,
-            fontweight="bold" if strong[i, j] else "normal",
-            color="white" if dark else ("black" if strong[i, j] else "0.35"),
+            fontweight="bold" if strong else "normal", color="black" if strong else "0.35",
         )  # fmt: skip
-    drawing: dict[str, Any] = {"cmap": DIVERGING, "norm": norm, "edgecolors": "white", "linewidth": 0.8}
-    ax.pcolormesh(np.ma.masked_where(np.isnan(values) | strong, values), alpha=FAINT, **drawing)
-    mesh = ax.pcolormesh(np.ma.masked_where(np.isnan(values) | ~strong, values), **drawing)
-    ax.set_facecolor("0.93")
+        cells.append([(j, i), (j + 1, i), (j + 1, i + 1), (j, i + 1)])
+        *colour, opacity = DIVERGING(norm(percent)) if np.isfinite(percent) else (0.5, 0.5, 0.5, 0.0)
+        colours.append((*colour, opacity if strong else FAINT * opacity))
+    ax.add_collection(PolyCollection(cells, facecolors=colours, edgecolors="0.85", linewidths=0.4))
     ax.set_yticks(np.arange(len(rows)) + 0.5, rows)
     ax.set_xticks([])
     ax.set_xlim(0, len(covariates))
@@ -194,7 +199,6 @@ def _draw_panel(ax: Axes, part: pd.DataFrame, covariates: list[str], norm: TwoSl
     ax.grid(visible=False)
     ax.tick_params(length=0)
     ax.spines[:].set_visible(False)
-    return mesh
 
 
 def _signed(percent: float) -> str:

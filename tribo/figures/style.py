@@ -15,6 +15,7 @@ import pandas as pd
 from matplotlib import style
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
@@ -52,7 +53,12 @@ def sample_mark(sample_number: int) -> SampleMark:
 
 
 class PageFigure(Figure):
-    """A figure that also shows itself in a notebook; no pyplot is needed."""
+    """A figure that keeps the house style wherever it is drawn, and shows itself in a notebook; no pyplot is needed."""
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw in the house style: ticks are made when they are first drawn."""
+        with house_style():
+            super().draw(renderer)
 
     def _repr_svg_(self) -> str:
         return as_svg(self)
@@ -71,7 +77,8 @@ def settle(figure: Figure) -> None:
     """Lay a figure out for good: drawing it again changes nothing."""
     engine = figure.get_layout_engine()
     if engine is not None:
-        engine.execute(figure)
+        if figure.axes:
+            engine.execute(figure)
         figure.set_layout_engine("none")
 
 

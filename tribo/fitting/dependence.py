@@ -18,6 +18,7 @@ LABELS = {
 }  # fmt: skip
 COLUMNS = ["sample", "regime", "variable", "label", "n", "low", "high", "change_percent", "change_u_percent", "rank",
            "p", "p_adjusted", "inseparable_from"]  # fmt: skip
+NOMINAL_LOAD = "nominal_load_N"  # the load by another name, beside the one that was recorded
 SAME_COLUMN = 0.95  # rank correlation of two variables from which on their effects cannot be separated
 _FEWEST = 5
 _FEWEST_VALUES = 2
@@ -27,6 +28,8 @@ def test_values(test: Test) -> dict[str, float]:
     """Every number recorded for a test, by name."""
     found = {name: getattr(test, name) for name in LABELS}
     for name, cell in test.covariates.items():
+        if name == NOMINAL_LOAD:
+            continue
         try:
             found[name] = float(str(cell).replace(",", "."))
         except ValueError:
@@ -77,7 +80,7 @@ def dependence(ingested: Ingested) -> pd.DataFrame:
             row = _one(part, name)
             if row:
                 others = [o for o in names if o != name and _same(part, name, o)]
-                joined = ", ".join(LABELS.get(o, o) for o in others)
+                joined = ", ".join(LABELS.get(o, o.replace("_", " ")) for o in others)
                 found.append({"sample": sample, "regime": regime, **row, "inseparable_from": joined})
     table = pd.DataFrame(found, columns=COLUMNS)
     return table.assign(p_adjusted=_holm(table["p"].to_numpy(float)))

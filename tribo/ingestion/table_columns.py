@@ -9,6 +9,7 @@ from tribo.campaign.table import Table
 from tribo.quantities import match_quantity
 
 _SAMPLE = ("sample", "material", "probe", "werkstoff", "matiere", "materiau", "echantillon", "muestra")
+_SETS = ("dataname", "data name", "data set", "dataset", "series")  # of one rig each: not to be pooled
 _COEFFICIENT = re.compile(
     r"(?:cof|mu|friction coefficient|coefficient of friction|coefficient)(?: (?:mean|avg|average))?"
 )
@@ -44,8 +45,19 @@ def proposed_mapping(table: Table) -> dict[str, str]:
             field = _FIELDS.get(_unit(table, name), "")
             if field.startswith("speed") == bool(_SPEED.fullmatch(plain)) and field:
                 found.setdefault(field, name)
+    if (finer := _finer(table, found.get("sample", ""))) is not None:
+        found["sample"] = finer
     loads = [field for field in found if field.startswith(("normal_load", "mass"))]
     return found if loads and ("coefficient" in found or "sliding_N" in found) else {}
+
+
+def _finer(table: Table, sample: str) -> str | None:
+    """A column of data sets, each of one sample; None where there is none."""
+    for name in table.names:
+        pairs = {(row.cells.get(name, ""), row.cells.get(sample, "")) for row in table.rows}
+        if _plain(name) in _SETS and sample and len(pairs) == len({one for one, _ in pairs}) < len(table.rows) / 2:
+            return name
+    return None
 
 
 def _plain(name: str) -> str:

@@ -11,6 +11,7 @@ from tribo import __version__
 from tribo.comparison import findings, study_lookup
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
 from tribo.records import REGIMES, Campaign, Regime, Study
+from tribo.report.campaign_nc import unit_of
 from tribo.report.card import Card, card_of
 from tribo.report.html.pull_cards import pull_cards
 from tribo.report.provenance import Provenance
@@ -22,19 +23,20 @@ from tribo.report.words import wording
 from tribo.report.words.friction_words import friction_sentences
 from tribo.report.words.terminal_text import fit_cells
 
-LEAD_FIGURES = ("finding", "agreement", "fig4", "dependence")  # the first that there is shows what the card says
+# the first that there is shows what the card says
+LEAD_FIGURES = ("finding", "agreement", "forces", "fig4", "dependence")
 MISFIT_FIGURES = ("misfit", "residuals")
-CAUSE_FIGURES = ("extended", "evidence")
-CALIBRATED = {
-    "mu_s": "Static friction coefficient of a block, mean",
-    "mu_s_sd": "Static friction coefficient of a block, standard deviation",
-    "mu_d": "Sliding friction coefficient of a block, mean",
-    "mu_d_sd": "Sliding friction coefficient of a block, standard deviation",
-    "static_adhesion_Pa": "Static adhesion of a block per area (Pa)",
-    "sliding_adhesion_Pa": "Sliding adhesion of a block per area (Pa)",
-    "blocks_x": "Blocks along x",
-    "blocks_y": "Blocks along y",
-    "dt_s": "Time step (s)",
+CAUSE_FIGURES = ("law", "extended", "evidence")
+CALIBRATED = {  # of a block of the model: name and unit
+    "mu_s": ("Static friction coefficient, mean over the blocks", "1"),
+    "mu_s_sd": ("Static friction coefficient, standard deviation over the blocks", "1"),
+    "mu_d": ("Sliding friction coefficient, mean over the blocks", "1"),
+    "mu_d_sd": ("Sliding friction coefficient, standard deviation over the blocks", "1"),
+    "static_adhesion_Pa": ("Adhesion per area at rest", "Pa"),
+    "sliding_adhesion_Pa": ("Adhesion per area while sliding", "Pa"),
+    "blocks_x": ("Number of blocks along x", "1"),
+    "blocks_y": ("Number of blocks along y", "1"),
+    "dt_s": ("Time step", "s"),
 }
 VERDICT_MARKS = {"agrees": "=", "model too high": "▲", "model too low": "▼", "inconclusive": "?"}
 
@@ -95,6 +97,12 @@ def figure_places(names: list[str]) -> dict[str, list[str]]:
     return places
 
 
+def figure_numbers(names: list[str]) -> dict[str, int]:
+    """The number of each figure, counted through the report in the order of its places."""
+    in_order = [name for place in figure_places(names).values() for name in place]
+    return {name: number for number, name in enumerate(in_order, start=1)}
+
+
 def by_hand(study: Study) -> list[tuple[str, str]]:
     """Every pull with a peak or window moved by hand, with the change; excluded ones are among those set aside."""
     ingested = study.ingested
@@ -109,7 +117,7 @@ def _summary(study: Study) -> dict[str, Any]:
     agreements = findings.agreements(study)
     return {
         "measured": wording.what_was_measured(study),
-        "flat": wording.flat_law(study),
+        "flat": wording.flat_law(study) if study.comparison is not None else [],
         "model": wording.in_short(agreements, study_lookup.flat_sample(study)),
         "order": [wording.ranking_sentence(r) for r in findings.rankings(study)],
         "directions": wording.direction_sentences(findings.direction_ratios(study)),
@@ -159,11 +167,23 @@ def _agreement_table(agreements: list[findings.Agreement], regime: Regime) -> di
     return {"regime": regime, "loads": columns, "rows": rows, "sentences": sentences, "marks": VERDICT_MARKS}
 
 
-def _calibration(study: Study) -> list[tuple[str, str]]:
+def _calibration(study: Study) -> list[tuple[str, str, str]]:
+    """Name, value and unit of every calibrated parameter."""
     if study.comparison is None:
         return []
     found = study.comparison.calibration
-    return [(CALIBRATED.get(name, name), f"{float(value):.5g}".replace("-", "−")) for name, value in found.items()]
+    return [
+        (words, f"{float(value):.5g}".replace("-", "−"), unit)
+        for name, value in found.items()
+        for words, unit in [_named(name)]
+    ]
+
+
+def _named(parameter: str) -> tuple[str, str]:
+    """A calibrated parameter in words and its unit; one without words says its unit at the end of its name."""
+    if parameter in CALIBRATED:
+        return CALIBRATED[parameter]
+    return parameter.replace("_", " "), unit_of(parameter) or "1"
 
 
 def _flag_counts(study: Study) -> list[tuple[str, int, list[str]]]:

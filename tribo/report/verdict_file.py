@@ -11,6 +11,7 @@ from typing import Any
 from tribo.diagnose.sentences import name_in_words, sentence_case
 from tribo.figures.covariates import LABELS
 from tribo.report.words.numerals import joined, significant
+from tribo.report.words.verdict_headings import OUTCOMES_WITHOUT_MODEL, headings, without_model
 from tribo.store.whole_files import write_text
 
 OBSERVABLES = {
@@ -39,6 +40,8 @@ def write_verdict(verdict: Mapping[str, Any], out: Path) -> Path:
 def verdict_in_words(verdict: Mapping[str, Any]) -> dict[str, Any]:
     """The parts of a verdict as text for the report; empty where the verdict has none."""
     return {
+        "headings": headings(verdict),
+        "own_laws": [str(layer["text"]) for layer in _layers(verdict, "baseline")],
         "outcome": _outcome(verdict),
         "text": str(verdict.get("text") or ""),
         "equivalent": [_tie(names) for names in verdict.get("equivalent") or () if len(names) > 1],
@@ -59,6 +62,8 @@ def _layers(verdict: Mapping[str, Any], kind: str) -> list[Mapping[str, Any]]:
 
 def _outcome(verdict: Mapping[str, Any]) -> str:
     """The verdict in one sentence, and that it has laws; causes that cannot be told apart are not called identified."""
+    if without_model(verdict):
+        return OUTCOMES_WITHOUT_MODEL.get(str(verdict["verdict"]), str(verdict["verdict"]))
     outcome, laws = str(verdict["verdict"]), _layers(verdict, "law")
     tied = any(len(names) > 1 for names in verdict.get("equivalent") or ())
     found = TIED[outcome] if tied and outcome in TIED else OUTCOMES.get(outcome, outcome)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from tribo.diagnose.diagnosis_record import Alone, Diagnosis
 from tribo.records import Study
 from tribo.report.campaign_nc import write_store
 from tribo.report.card import Card, card_of, write_card
@@ -26,9 +27,6 @@ from tribo.report.verdict_file import write_verdict
 from tribo.store.own_folder import own_folder
 from tribo.store.whole_files import write_bytes, write_text
 
-if TYPE_CHECKING:
-    from tribo.diagnose import Diagnosis
-
 
 def write_until(
     study: Study,
@@ -36,7 +34,7 @@ def write_until(
     until: str = "report",
     drawing: Drawing = DRAWING,
     provenance: Provenance | None = None,
-    diagnosis: Diagnosis | None = None,
+    diagnosis: Diagnosis | Alone | None = None,
     card: Card | None = None,
 ) -> None:
     """Write the results of all stages up to ``until`` (ingest, fit, compare or report).
@@ -53,17 +51,18 @@ def write_until(
     keep_earlier = before is not None and until != "report" and same_origin(before, made_by) and _is_as_recorded(
         out / "campaign.nc", before
     )
-    written = [*write_tables(study, out), write_store(study, out, made_by, diagnosis, keep_earlier)]
+    modelled = diagnosis if isinstance(diagnosis, Diagnosis) else None
+    written = [*write_tables(study, out), write_store(study, out, made_by, modelled, keep_earlier)]
     if verdict is not None:
         written.append(write_verdict(verdict, out))
-    if diagnosis is not None and diagnosis.laws is not None:
-        laws = law_texts(diagnosis.laws, study.ingested.campaign.title)
+    if modelled is not None and modelled.laws is not None:
+        laws = law_texts(modelled.laws, study.ingested.campaign.title)
         written += [write_text(out / name, text) for name, text in laws.items()]
-    if diagnosis is not None:
-        written += write_diagnosis_tables(diagnosis, out)
+    if modelled is not None:
+        written += write_diagnosis_tables(modelled, out)
     if until in ("compare", "report") or diagnosis is not None:
         shown = study if until in ("compare", "report") else None
-        drawn = write_figures(shown, out, diagnosis, made_by.origin, drawing)
+        drawn = write_figures(shown, out, modelled, made_by.origin, drawing)
         written += [out / "figures" / f"{f.name}.{ending}" for f in drawn.values() for ending in f.files]
     if card is None and until == "report":
         card = card_of(study, verdict)
@@ -92,7 +91,7 @@ def write_report(
     out: Path | str,
     progress: Progress | None = None,
     provenance: Provenance | None = None,
-    diagnosis: Diagnosis | None = None,
+    diagnosis: Diagnosis | Alone | None = None,
     jobs: int = 1,
 ) -> None:
     """All of OUT: tables, campaign.nc, figures, verdict.json where there is a diagnosis, page, PDF and crate.

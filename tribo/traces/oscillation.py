@@ -26,6 +26,8 @@ _IRREGULAR = 1.2  # spread of the cycle times over their mean above which they a
 _OF_LOADING = 0.5  # share of the loading slope above which the slider counts as stuck
 _MEDIAN_U = 1.2533  # standard uncertainty of a median over that of a mean, normal distribution
 _MAD = 1.4826
+_REPEATS = 0.4  # largest spread of the cycle times over their mean of an oscillation that repeats
+_OF_TIME = 0.5  # share of the time that a slider which sticks is stuck
 _FREE = 1.3  # a period up to this many free periods is that of an inertial oscillation
 _AS_DRIVEN = 0.85  # share of k v that the loading slope reaches where the slider sticks
 
@@ -58,6 +60,8 @@ def oscillation_of(
     troughs = np.array([a + int(np.argmin(force[a:b])) for a, b in pairwise(peaks)])
     found = _measured(time, force, peaks, troughs, (drive_N_per_s, free_period_s))
     stuck = _stuck(*fine, np.searchsorted(fine[0], time[peaks]), found.loading_N_per_s)
+    if not (drive_N_per_s > 0 or free_period_s > 0):
+        found = replace(found, regime=_without_rig(found.regime, np.diff(time[peaks]), float(stuck.mean())))
     return replace(found, stuck_share=float(stuck.mean()), stuck_share_u=float(stuck.std(ddof=1) / stuck.size**0.5))
 
 
@@ -122,6 +126,14 @@ def _regime(
     if math.isfinite(free_s) and period_s < _FREE * free_s:
         return "inertial oscillation"
     return "stick-slip" if rising > _STICKS else "inertial oscillation"
+
+
+def _without_rig(regime: str, periods: FloatArray, stuck: float) -> str:
+    """The regime where neither drive nor free period is known: waves that do not repeat are no oscillation, and a
+    slider that sticks does so for most of the time."""
+    scatter = float(periods.std() / periods.mean())
+    wave = regime == "inertial oscillation" and scatter > _REPEATS
+    return "irregular" if wave or (regime == "stick-slip" and stuck < _OF_TIME) else regime
 
 
 def _slope(time: FloatArray, force: FloatArray, trough: int, peak: int) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from tribo.display import displayed
 from tribo.errors import Problem, TraceError
 from tribo.traces.apex import Apex, rounded_apex
-from tribo.traces.sliding import Motion, Window, settled
+from tribo.traces.sliding import Motion, Window, settled, slides_on_closed_track
 
 Parameters = Mapping[str, float]
 
@@ -67,8 +67,10 @@ def highest_early(motion: Motion, parameters: Parameters) -> Apex:
 
 
 def once_stabilised(motion: Motion, parameters: Parameters) -> Window:
-    """From when the force has stabilised (MSER-5) to the end of sliding."""
+    """From when the force has stabilised (MSER-5) to the end of sliding; on a closed track, its second half."""
     first, end = motion.sliding
+    if slides_on_closed_track(motion.travel_m, (first, end)):
+        return first + (end - first) // 2, end
     return first + settled(motion.force_N[first:end]), end
 
 
@@ -115,7 +117,8 @@ RULES: dict[str, Rule] = {
         Rule(
             "seed",
             "first maximum of the force",
-            "mean from the time the force has stabilised (MSER-5) to the end of sliding",
+            "mean from the time the force has stabilised (MSER-5) to the end of sliding; of a slide over more than "
+            "10 m, the second half, so that running-in is left out",
             "Berardo et al. 2019, Materials & Design 107930; stabilised: White 1997, Simulation 69, 323",
             first_peak,
             once_stabilised,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribo.errors import Problem
-from tribo.records import FloatArray
+from tribo.records import CLOSED_TRACK_M, FloatArray
 from tribo.traces.apex import Apex
 from tribo.traces.loading import Climb, Rise, Zero
 from tribo.traces.noise import Steady, condense, line, steady, wander
@@ -116,6 +116,12 @@ def fallen_range(motion: Motion) -> Window:
         return end, end
     smooth = motion.smooth_N[first:end]
     return first + int(np.argmax(smooth <= np.median(smooth))), end
+
+
+def slides_on_closed_track(travel_m: FloatArray | None, sliding: Window) -> bool:
+    """Whether a slide is so long that it runs over its own track, as on a disc or a ring."""
+    first, end = sliding
+    return travel_m is not None and end - first > 1 and abs(float(travel_m[end - 1] - travel_m[first])) > CLOSED_TRACK_M
 
 
 def settled(force: FloatArray) -> int:

@@ -17,7 +17,7 @@ from tribo.traces.pull import Asked, named_rule, pull_of
 from tribo.traces.rules import Rule
 from tribo.traces.segments import piece_of
 from tribo.traces.signal import Signal, signal_of
-from tribo.traces.sliding import settled
+from tribo.traces.sliding import settled, slides_on_closed_track
 from tribo.traces.zero import Level, chosen_zero, disagreement_N, load_level
 
 _LEFT_OUT = 0.1  # share at the start of a record that slides from its first sample, left out as not yet settled
@@ -115,6 +115,8 @@ def _sliding_from(signal: Signal, span: Range, zero: Level | None, reading: Read
         raise TraceError(Problem("too_short", what, allowed=f"{_FEWEST} data points or more"))
     force = signal.force_N[first:last]
     start = first + max(settled(force), int(_LEFT_OUT * force.size))
+    if reading.test.speed_m_s and slides_on_closed_track(reading.test.speed_m_s * signal.time_s, span):
+        start = first + force.size // 2
     level = zero or Level(0.0, math.nan, "none")
     mean = steady(signal.time_s[start:last], signal.force_N[start:last])
     if mean.mean_N - level.force_N < 0:

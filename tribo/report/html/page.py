@@ -14,16 +14,16 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from tribo.records import Study
-from tribo.report.content import content, figure_places
+from tribo.report.content import content, figure_numbers, figure_places
 from tribo.report.drawings import Drawn, draw_all, inline_svg
 from tribo.report.html.embedded import figure_data, trace_data
 from tribo.report.html.pull_cards import PullCard, on_pages
 from tribo.report.provenance import Provenance
-from tribo.report.words.card_text import hours_text
 from tribo.report.words.numerals import ratio_text, significant, unbroken
 from tribo.report.words.wording import flags_in_words
 
 PAGE = "report.html"
+SCRIPTS = ("helpers.js", "reading.js", "pulls.js")  # joined in this order, in one function
 
 
 def html(
@@ -47,7 +47,8 @@ def page_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> str:
 
 def pages_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str, str]:
     """The page by its file name, and further pages of pulls where there are more than one page holds."""
-    places = {k: [_shown(figures[n]) for n in names] for k, names in figure_places(list(figures)).items()}
+    numbers = figure_numbers(list(figures))
+    places = {k: [_shown(figures[n], numbers[n]) for n in names] for k, names in figure_places(list(figures)).items()}
     each = on_pages(said["cards"])
     names = [PAGE, *(f"pulls-{k}.html" for k in range(2, len(each) + 1))]
     pages = {}
@@ -64,6 +65,7 @@ def pages_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str,
                 pages=names,
                 number=number,
                 pulls=len(said["cards"]),
+                report_key=_key(said),
                 figure_data=figure_data({n: figure.series for n, figure in shown.items()}),
                 trace_data=trace_data(said["study"], [card.test_id for card in cards]),
                 **_style_and_script(),
@@ -72,8 +74,16 @@ def pages_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str,
     return pages
 
 
+def _key(said: Mapping[str, Any]) -> str:
+    """What tells this campaign from others, for what a browser remembers of its report."""
+    campaign = said["campaign"]
+    told = [campaign.title, *sorted(campaign.inputs.values()), *sorted(card.test_id for card in said["cards"])]
+    return sha256("\0".join(told).encode("utf-8", errors="backslashreplace")).hexdigest()[:16]
+
+
 def _style_and_script() -> dict[str, str]:
-    style, script = (_static(name) for name in ("style.css", "page.js"))
+    style = _static("style.css")
+    script = '"use strict";\n(() => {\n' + "".join(_static(name) for name in SCRIPTS) + "})();\n"
     return {
         "style": Markup(style), "style_hash": _csp_hash(style), "script": Markup(script),
         "script_hash": _csp_hash(script),
@@ -117,7 +127,6 @@ def _environment() -> Environment:
     environment.filters["sig"] = significant
     environment.filters["ratio"] = ratio_text
     environment.filters["unbroken"] = unbroken
-    environment.filters["duration"] = hours_text
     return environment
 
 
@@ -125,12 +134,13 @@ def _environment() -> Environment:
 class ShownFigure:
     """A figure as the page shows it."""
 
+    number: int
     name: str
     title: str
     caption: str
     svg: Markup
 
 
-def _shown(figure: Drawn) -> ShownFigure:
+def _shown(figure: Drawn, number: int) -> ShownFigure:
     picture = Markup(inline_svg(figure.svg, figure.name, str(escape(f"{figure.title}. {figure.caption}"))))
-    return ShownFigure(figure.name, figure.title, figure.caption, picture)
+    return ShownFigure(number, figure.name, figure.title, figure.caption, picture)

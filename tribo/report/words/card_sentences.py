@@ -10,6 +10,7 @@ from tribo.diagnose.sentences import meaning_in_words, name_in_words as plain_na
 from tribo.diagnose.terms import in_words
 from tribo.records import Study
 from tribo.report.words.numerals import counted, joined, significant
+from tribo.report.words.verdict_headings import without_model
 
 BENT = "the load means deviate from a straight line"
 OBSERVABLES = {
@@ -32,6 +33,8 @@ def sentence(study: Study, verdict: Mapping[str, Any] | None) -> str:
     """What happens to friction, how much, with its interval, where, and what it is called."""
     if verdict is None:
         return _without_diagnosis(study)
+    if without_model(verdict):
+        return _alone(verdict)
     outcome = str(verdict["verdict"])
     if outcome == "no_misfit":
         return _no_misfit(study, verdict)
@@ -43,6 +46,14 @@ def sentence(study: Study, verdict: Mapping[str, Any] | None) -> str:
     if verdict["causes"] and outcome != "unknown":
         return _direct(verdict)
     return _unknown(verdict)
+
+
+def _alone(verdict: Mapping[str, Any]) -> str:
+    """Without the model: what friction varies with beside the load; without anything, the first law."""
+    causes = [str(cause["text"]) for cause in verdict["causes"]]
+    laws = [str(layer["text"]) for layer in _layers(verdict, "baseline")]
+    found = causes or [*laws[:1], "Nothing beyond the law of each sample was found."]
+    return " ".join(found)
 
 
 def meanings(verdict: Mapping[str, Any] | None) -> tuple[tuple[str, str], ...]:
@@ -58,7 +69,9 @@ def why_next(verdict: Mapping[str, Any]) -> str:
         return "it is the most informative test"
     if verdict["verdict"] == "unknown" and not _layers(verdict, "law"):
         return f"to see whether friction follows {joined([in_words(s) for s in separates])} when nothing else changes"
-    names = [name_in_words(s) for s in separates]
+    names = [in_words(s) if without_model(verdict) else name_in_words(s) for s in separates]
+    if without_model(verdict) and len(names) > 1:
+        return f"it tells the effect of {names[0]} from that of {joined(names[1:])}"
     if verdict["verdict"] == "no_misfit":
         return f"this campaign could not test {joined(names)}"
     if len(names) > 1:

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 
 LEVEL = 0.05
 _MOST_SAID = 12
+_REGIMES = {
+    "steady": "Steady sliding", "stick-slip": "Stick-slip", "irregular": "An irregularly varying sliding force",
+    "inertial oscillation": "An oscillating sliding force without sticking (inertial oscillation)",
+}  # fmt: skip
 
 
 def friction_sentences(study: Study) -> dict[str, list[str]]:
@@ -106,9 +110,13 @@ def _dependence(study: Study) -> Iterator[str]:
         change = f"{percent(row['change_percent'] / 100)} from {significant(row['low'])} to {significant(row['high'])}"
         yield (
             f"{row['regime'].capitalize()} T/N of {row['sample']} varies with {row['label']}: {change} (rank "
-            f"correlation {row['rank']:.2f}, adjusted p = {row['p_adjusted']:.1g}, {counted(row['n'], 'test')})."
+            f"correlation {row['rank']:.2f}, adjusted p {_p(row['p_adjusted'])}, {counted(row['n'], 'test')})."
         )
     yield from _inseparable(table)
+
+
+def _p(value: float) -> str:
+    return "below 0.001" if value < 0.001 else f"= {value:.1g}"
 
 
 def _inseparable(table: pd.DataFrame) -> Iterator[str]:
@@ -137,7 +145,7 @@ def _oscillation(study: Study) -> Iterator[str]:
             regimes.setdefault(pull.oscillation.regime, []).append(test_id)
     for regime, tests in sorted(regimes.items()):
         named = joined(tests[:_MOST_SAID]) + (f" and {len(tests) - _MOST_SAID} more" if len(tests) > _MOST_SAID else "")
-        yield f"Sliding is {regime} in {counted(len(tests), 'test')}: {named}."
+        yield f"{_REGIMES[regime]} in {counted(len(tests), 'test')}: {named}."
 
 
 def _directions(study: Study) -> Iterator[str]:

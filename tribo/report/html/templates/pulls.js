@@ -1,48 +1,3 @@
-"use strict";
-(() => {
-  const byId = (id) => document.getElementById(id);
-  const make = (name, attributes = {}, ...children) => {
-    const svg = ["svg", "g", "path", "line", "circle", "rect", "text", "title"].includes(name);
-    const node = svg ? document.createElementNS("http://www.w3.org/2000/svg", name) : document.createElement(name);
-    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-    node.append(...children);
-    return node;
-  };
-  const number = (value, digits = 4) =>
-    value === null || !Number.isFinite(value) ? "–" : String(Number(value.toPrecision(digits))).replace("-", "−");
-  const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
-
-  document.querySelectorAll("[data-with-script]").forEach((node) => node.removeAttribute("hidden"));
-
-  // Numbers under the pointer in the figures.
-  const tip = make("div", { class: "tip", hidden: "", "aria-hidden": "true" });
-  document.body.append(tip);
-  const figures = JSON.parse(byId("figure-data").textContent);
-  for (const [name, series] of Object.entries(figures)) {
-    const svg = document.querySelector(`#figure-${name} svg`);
-    if (!svg || !series.length) continue;
-    const reach = 9;
-    svg.addEventListener("pointermove", (event) => {
-      const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
-      let best = null, least = reach * reach;
-      for (const s of series) {
-        for (let k = 0; k < s.place.length; k += 2) {
-          const away = (s.place[k] - at.x) ** 2 + (s.place[k + 1] - at.y) ** 2;
-          if (away < least) [best, least] = [[s, k], away];
-        }
-      }
-      tip.hidden = !best;
-      if (!best) return;
-      const [s, k] = best;
-      const lines = [`${s.x}: ${number(s.value[k])}`, `${s.y}: ${number(s.value[k + 1])}`];
-      tip.replaceChildren(...[s.name, ...lines].filter(Boolean).map((line) => make("div", {}, line)));
-      const width = tip.offsetWidth, left = event.clientX + 14;
-      tip.style.left = `${left + width > innerWidth ? Math.max(event.clientX - width - 14, 4) : left}px`;
-      tip.style.top = `${event.clientY + 14}px`;
-    });
-    svg.addEventListener("pointerleave", () => { tip.hidden = true; });
-  }
-
   // The pulls: filters, order, decisions.
   const traces = JSON.parse(byId("trace-data").textContent);
   const list = byId("pull-list"), dialog = byId("pull");
@@ -50,6 +5,8 @@
   const decisions = new Map();
   let saved = true;
   for (const [id, record] of Object.entries(traces)) if (record.decided) decisions.set(id, { ...record.decided });
+  const kept = `decisions of page ${document.body.dataset.page}`;
+  const ofReport = JSON.stringify([...decisions]);
 
   const filters = [...document.querySelectorAll("[id^=filter-]")].map((node) => [node.id.slice(7), node]);
   const passes = (card) => filters.every(([name, node]) =>
@@ -105,6 +62,83 @@
     byId("decision-count").textContent = decisions.size ? `Excluded: ${out}. Moved: ${moved}.` : "No decisions yet.";
   }
   count();
+
+  // Decisions made before: kept by this browser, or loaded from a file. Everything in them is checked and shown as text.
+  const isTime = (value) => value === null || Number.isFinite(value);
+  function takeOver(found) {
+    decisions.clear();
+    for (const [id, d] of found) decisions.set(id, d);
+    for (const id of Object.keys(traces)) mark(id);
+    count();
+  }
+  function checked(entries) {
+    const found = [];
+    for (const [id, d] of entries) {
+      if (!Object.hasOwn(traces, id) || !["exclude", "move"].includes(d?.action) || !isTime(d.peak ?? null)) continue;
+      const window = d.window ?? null;
+      if (window !== null && !(Array.isArray(window) && window.length === 2 && window.every(Number.isFinite))) continue;
+      if (d.action === "move" && window === null && (d.peak ?? null) === null) continue;
+      found.push([id, { action: d.action, reason: String(d.reason ?? "").slice(0, 1000), peak: d.peak ?? null, window }]);
+    }
+    return found;
+  }
+  function keep() {
+    const all = [...decisions];
+    const asReported = JSON.stringify(all) === ofReport;
+    if (memory.write(kept, asReported ? null : { when: new Date().toISOString(), all })) saved = true;
+    byId("forget-decisions").hidden = asReported;
+  }
+  const before = memory.read(kept);
+  if (Array.isArray(before?.all)) {
+    takeOver(checked(before.all.filter(Array.isArray)));
+    byId("decision-note").textContent =
+      `Decisions made on ${String(before.when).slice(0, 16).replace("T", " ")} (UTC) were kept by this browser.`;
+    byId("forget-decisions").hidden = false;
+  }
+  byId("forget-decisions").addEventListener("click", () => {
+    takeOver(JSON.parse(ofReport));
+    memory.write(kept, null);
+    byId("forget-decisions").hidden = true;
+    byId("decision-note").textContent = "The decisions are those of this report again.";
+  });
+  function parsed(text) {
+    const rows = [[""]];
+    let quoted = false;
+    for (let k = 0; k < text.length; k++) {
+      const row = rows[rows.length - 1], letter = text[k];
+      if (quoted && letter === '"' && text[k + 1] === '"') { row[row.length - 1] += '"'; k += 1; }
+      else if (letter === '"') quoted = !quoted;
+      else if (!quoted && letter === ",") row.push("");
+      else if (!quoted && (letter === "\n" || letter === "\r")) { if (letter === "\n") rows.push([""]); }
+      else row[row.length - 1] += letter;
+    }
+    return rows.filter((row) => row.length > 1 || row[0].trim());
+  }
+  byId("load-overrides").addEventListener("change", async (event) => {
+    const file = event.target.files[0];
+    if (!file) return;
+    const [head, ...rows] = parsed((await file.text()).replace(/^\ufeff/, ""));
+    event.target.value = "";
+    const place = (name) => (head || []).map((cell) => cell.trim()).indexOf(name);
+    const note = byId("decision-note");
+    if (place("test_id") < 0 || place("action") < 0) {
+      note.textContent = `${file.name} was not loaded: its first line has no columns test_id and action.`;
+      return;
+    }
+    const cellOf = (row, name) => (row[place(name)] ?? "").trim();
+    const time = (row, name) => (cellOf(row, name) === "" ? null : Number(cellOf(row, name)));
+    const entries = rows.map((row) => {
+      const window = [time(row, "window_start_s"), time(row, "window_end_s")];
+      return [cellOf(row, "test_id"), { action: cellOf(row, "action"), reason: cellOf(row, "reason"), peak: time(row, "peak_s"),
+        window: window.every((t) => t === null) ? null : window }];
+    });
+    const found = checked(entries);
+    takeOver(found);
+    keep();
+    const lost = entries.length - found.length;
+    note.textContent = `${found.length} decisions loaded from ${file.name}.` +
+      (lost ? ` ${lost} rows were left out: their test is not on this page, or their action or a time is not valid.` : "");
+  });
 
   // One pull at full size.
   let current = null, view = null, from = null;
@@ -187,6 +221,7 @@
     else decisions.set(current.id, next);
     saved = false;
     mark(current.id);
+    keep();
     says();
   }
   function moveTo(which, time) {
@@ -221,6 +256,7 @@
     decisions.delete(current.id);
     saved = false;
     mark(current.id);
+    keep();
     fill();
     draw();
   });
@@ -379,4 +415,3 @@
     saved = true;
   });
   addEventListener("beforeunload", (event) => { if (!saved) event.preventDefault(); });
-})();

@@ -1,0 +1,184 @@
+"""The diagnosis without the spring-block model: what friction varies with beside the law of each sample."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from tribo import stages
+from tribo.campaign import load_campaign
+from tribo.cli import main
+from tribo.diagnose.verdict import Verdict
+from tribo.diagnose.without_model.along_records import running_in
+from tribo.diagnose.without_model.tested_columns import load_levels, points_of
+from tribo.fitting.dependence import dependence
+from tribo.fitting.law_choice import compared_laws
+from tribo.records import Campaign, Ingested, Pattern, Pull, Study, Test, Trace
+
+Change = Callable[[dict[str, Any]], float]
+Further = Callable[[dict[str, Any]], dict[str, Any]]
+
+
+def of_speed(row: dict[str, Any]) -> float:
+    return float(0.02 * np.log(row["speed_mm_s"]))
+
+
+def no_further(row: dict[str, Any]) -> dict[str, Any]:
+    return {}
+
+
+def made(folder: Path, change: Change, seed: int = 1, columns: Further = no_further) -> Path:
+    """Sixty tests of two samples: five loads, six repeats in random order, power law and line, 3 % scatter."""
+    rng = np.random.default_rng(seed)
+    plan = [(s, n) for s in "AB" for n in (1.0, 2.0, 4.0, 8.0, 16.0) for _ in range(6)]
+    rows = []
+    for place, at in enumerate(rng.permutation(len(plan))):
+        sample, load = plan[at]
+        row = {"test_id": f"T{place:02d}", "sample": sample, "normal_load_N": load, "run_order": place + 1,
+               "speed_mm_s": float(rng.choice([0.1, 1.0, 10.0])), "bath": str(rng.choice(["old", "new"]))}  # fmt: skip
+        force = (0.5 * load**0.8 if sample == "A" else 0.3 * load + 1.0) * np.exp(change(row) + rng.normal(0.0, 0.03))
+        rows.append({**row, "sliding_N": f"{force:.6g}", **columns(row)})
+    folder.mkdir()
+    lines = [",".join(rows[0]), *(",".join(map(str, row.values())) for row in rows)]
+    (folder / "tests.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    text = '[campaign]\ntitle = "made"\n[patterns.A]\ncavity = "none"\n[patterns.B]\ncavity = "none"\n'
+    (folder / "campaign.toml").write_text(text, encoding="utf-8")
+    return folder
+
+
+def verdict_of(folder: Path) -> Verdict:
+    return diagnosed(stages.ingest(load_campaign(folder)))
+
+
+def diagnosed(ingested: Ingested) -> Verdict:
+    study = Study(ingested, (), laws=compared_laws(ingested.table()), dependence=dependence(ingested))
+    return stages.diagnosis_without_model(study).verdict
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_nothing_is_named_where_friction_follows_its_laws_alone(tmp_path: Path, seed: int) -> None:
+    found = verdict_of(made(tmp_path / "c", lambda row: 0.0, seed))
+    assert (found.verdict, found.causes) == ("no_misfit", ())
+    assert "nothing exceeds chance" in found.text
+
+
+def test_the_law_of_every_sample_is_a_layer_with_its_parameters(tmp_path: Path) -> None:
+    laws = {layer.samples[0]: layer for layer in verdict_of(made(tmp_path / "c", lambda row: 0.0)).layers}
+    assert laws["A"].formula == "T = a N^b"
+    b = laws["A"].parameters["b"]
+    assert b.low < b.value < b.high
+    assert b.value == pytest.approx(0.8, abs=3 * 0.007)  # six repeats of 3 % at five loads: 0.7 % of standard error
+    assert laws["B"].parameters["T0"].low < 1.0 < laws["B"].parameters["T0"].high
+    assert "does not depend on the load" in laws["B"].text
+
+
+def test_a_dependence_on_speed_is_named_with_its_size(tmp_path: Path) -> None:
+    found = verdict_of(made(tmp_path / "c", of_speed))
+    assert [cause.mechanism for cause in found.causes] == ["velocity_dependence"]
+    size = found.causes[0].parameters["change of sliding T"]
+    assert size.low < 100 * (100**0.02 - 1) < size.high
+    assert size.high - size.low < 5.0
+    (layer,) = (x for x in found.layers if x.kind == "cause")
+    assert layer.p_adjusted < 0.01
+
+
+def test_two_causes_are_named_beside_each_other(tmp_path: Path) -> None:
+    found = verdict_of(made(tmp_path / "c", lambda row: of_speed(row) + 0.08 * (row["bath"] == "old")))
+    assert {cause.mechanism for cause in found.causes} == {"velocity_dependence", "covariate:bath"}
+    assert "bath" in found.text
+
+
+def test_columns_that_run_alike_are_named_as_tied_with_the_test_that_parts_them(tmp_path: Path) -> None:
+    further: Further = lambda row: {"wear_m": 3 * row["run_order"]}  # noqa: E731
+    found = verdict_of(made(tmp_path / "c", lambda row: 0.004 * row["run_order"], columns=further))
+    assert {frozenset(names) for names in found.equivalent} == {frozenset({"covariate:run_order", "covariate:wear_m"})}
+    assert found.next_test is not None
+    assert set(found.next_test.separates) == {"run_order", "wear_m"}
+
+
+def test_a_column_that_varies_only_with_the_load_cannot_be_told_from_it(tmp_path: Path) -> None:
+    found = verdict_of(made(tmp_path / "c", lambda row: 0.0, columns=lambda row: {"step": 7 * row["normal_load_N"]}))
+    assert "covariate:step" in [e.mechanism for e in found.not_testable]
+    assert found.next_test is not None
+    assert found.next_test.separates == ("step", "normal_load_N")
+    assert "random order" in found.next_test.text
+
+
+def test_fewer_than_twelve_tests_are_not_searched_and_the_verdict_says_so(tmp_path: Path) -> None:
+    folder = made(tmp_path / "c", lambda row: 0.5 * (row["bath"] == "old"))
+    lines = (folder / "tests.csv").read_text().splitlines()
+    (folder / "tests.csv").write_text("\n".join(lines[:10]) + "\n", encoding="utf-8")
+    found = verdict_of(folder)
+    assert found.causes == ()
+    assert "there are 9 tests, and at least" in found.text
+
+
+def test_the_verdict_does_not_depend_on_the_unit_of_the_force(tmp_path: Path) -> None:
+    first = stages.ingest(load_campaign(made(tmp_path / "c", of_speed)))
+    small = {i: _scaled(pull, 1e-6) for i, pull in first.pulls.items()}
+    tests = tuple(_lighter(test, 1e-6) for test in first.campaign.tests)
+    second = replace(first, pulls=small, campaign=replace(first.campaign, tests=tests))
+    both = [diagnosed(one) for one in (first, second)]
+    sizes = [v.causes[0].parameters["change of sliding T"].value for v in both]
+    assert sizes[0] == pytest.approx(sizes[1], rel=1e-6)
+
+
+def _scaled(pull: Pull, factor: float) -> Pull:
+    return replace(pull, sliding_N=pull.sliding_N * factor)
+
+
+def _lighter(test: Test, factor: float) -> Test:
+    return replace(test, normal_load_N=test.normal_load_N * factor)
+
+
+def test_loads_that_scatter_about_one_value_are_one_level() -> None:
+    assert load_levels(np.array([2.0, 1.0, 2.01, 1.005, 4.0])).tolist() == [1, 0, 1, 0, 2]
+
+
+def long_slides(excess: float, records: int = 4) -> Ingested:
+    """Rotary records of 150 m at 0.15 m/s, 10 N, with an excess of friction that fades over 5 m."""
+    rng = np.random.default_rng(5)
+    time = np.arange(0.0, 1000.0, 1.0)
+    tests, traces, pulls = [], {}, {}
+    for k in range(records):
+        force = 10.0 * (1.0 + excess * np.exp(-0.15 * time / 5.0)) + rng.normal(0.0, 0.2, time.size)
+        name = f"T{k}"
+        tests.append(Test(name, "", "pin", 50.0, "pin", speed_m_s=0.15))
+        traces[name] = Trace(name, time, force)
+        nan = float("nan")
+        pulls[name] = Pull(
+            test_id=name, rule="seed", static_N=nan, static_u_N=nan, sliding_N=10.0, sliding_u_N=0.1, zero_N=0.0,
+            zero_u_N=nan, onset_s=nan, peak_s=nan, window_s=(500.0, 999.0),
+        )  # fmt: skip
+    return Ingested(Campaign("pins", Path(), 1.0, tuple(tests), {"pin": Pattern("pin")}), traces, pulls, ())
+
+
+def test_running_in_along_a_long_slide_is_found_and_a_steady_one_is_left() -> None:
+    found = running_in(long_slides(0.3))
+    assert [r.p < 0.001 for r in found] == [True] * 4
+    # over the first 7.5 m, 0.3 exp(-s / 5 m) has the mean 0.3 (1 - exp(-1.5)) / 1.5
+    assert [r.first_percent for r in found] == pytest.approx([100 * 0.3 * (1 - np.exp(-1.5)) / 1.5] * 4, abs=1.5)
+    assert all(r.p > 0.01 for r in running_in(long_slides(0.0)))
+
+
+def test_diagnose_writes_a_verdict_without_the_model(tmp_path: Path) -> None:
+    folder = made(tmp_path / "c", of_speed)
+    done = CliRunner().invoke(main, ["diagnose", str(folder), "-o", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    verdict = json.loads((tmp_path / "out" / "verdict.json").read_text())
+    assert verdict["model"] == {"baseline": "the law of each sample alone"}
+    assert [cause["mechanism"] for cause in verdict["causes"]] == ["velocity_dependence"]
+    assert "Friction varies with more than the load." in done.output
+
+
+def test_a_column_named_by_another_name_of_the_load_is_no_column(tmp_path: Path) -> None:
+    folder = made(tmp_path / "c", lambda row: 0.0, columns=lambda row: {"nominal_load_N": row["normal_load_N"]})
+    points = points_of(stages.ingest(load_campaign(folder)), "sliding")
+    assert "nominal_load_N" not in [*points.untold, *(c.name for c in points.columns)]
