@@ -23,8 +23,10 @@ from tribo.diagnose.statistics.model import Setup
 from tribo.diagnose.verdict import Estimate
 from tribo.display import exact_text
 from tribo.errors import CampaignError
+from tribo.figures import law as law_figure
 from tribo.mechanisms.record import Base, Conditions
 from tribo.report.verdict_file import verdict_in_words
+from tribo.store.kept_results import decoded, encoded
 
 from .known import baseline, made
 
@@ -83,6 +85,28 @@ def test_a_campaign_without_misfit_is_not_searched_for_laws() -> None:
     assert quiet.verdict.verdict == "no_misfit"
     assert quiet.laws is None
     assert all(layer.kind == "pattern_correction" for layer in quiet.verdict.layers)
+
+
+def test_the_figure_shows_the_law_over_its_column(diagnosed: Diagnosis) -> None:
+    shown = law_figure.numbers(diagnosed)
+    assert set(shown["regime"]) == {"sliding"}
+    assert len(shown) == diagnosed.baseline.setup.observations.n
+    peak = shown.loc[shown["law_percent"].idxmax(), "x"]
+    assert abs(peak - 23.0) < 0.4
+    assert (shown["low_percent"] <= shown["high_percent"]).all()
+    assert np.corrcoef(shown["partial_percent"], shown["law_percent"])[0, 1] > 0.5
+    assert len(law_figure.draw(shown).axes) == 1
+
+
+def test_a_campaign_without_laws_has_no_figure_of_them() -> None:
+    assert law_figure.numbers_of(Discovery((), (), 0)).empty
+
+
+def test_a_diagnosis_with_a_law_can_be_kept(diagnosed: Diagnosis) -> None:
+    kept = decoded(encoded(diagnosed.without_columns()))
+    assert kept.verdict == diagnosed.verdict or repr(kept.verdict) == repr(diagnosed.verdict)
+    law = kept.laws.laws[0].model.acting[-1].mechanism.law
+    assert law == diagnosed.laws.laws[0].model.acting[-1].mechanism.law
 
 
 def test_the_report_shows_a_law_with_its_size(diagnosed: Diagnosis) -> None:

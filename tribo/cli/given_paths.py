@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from tribo.nearest import nearest
+
 
 class GivenPath(click.Path):
     """A path that exists. Errors of the system other than its absence are named as such, with exit status 1."""
@@ -19,7 +21,18 @@ class GivenPath(click.Path):
         try:
             os.stat(value)
         except (FileNotFoundError, NotADirectoryError):
-            pass  # click says so
+            if near := _beside(Path(value)):
+                self.fail(f"{value!r} does not exist; did you mean {near}?", param, ctx)
         except OSError as why:
             raise click.ClickException(f"{value}: {(why.strerror or str(why)).lower()}") from why
         return super().convert(value, param, ctx)
+
+
+def _beside(path: Path) -> Path | None:
+    """The file or folder beside ``path`` whose name is nearest to its name."""
+    try:
+        names = [p.name for p in path.parent.iterdir() if not p.name.startswith(".")]
+    except OSError:
+        return None
+    near = nearest(path.name, names)
+    return path.parent / near if near else None

@@ -13,6 +13,7 @@ from tribo.figures import (
     finding,
     force,
     friction_panels,
+    law,
     measured_over_simulated,
     misfit,
     normalised_pulls,
@@ -182,6 +183,16 @@ DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
             "fit.",
             extended.numbers,
             extended.draw,
+        ),
+        FigureOf(
+            "law",
+            "Laws that the remaining misfit follows",
+            "Change of T over the column of each law that was found. Grey points: what the model without the law "
+            "leaves of each test; black: means over stretches of the column with twice their standard error. Red: the "
+            "law with its 90 % band, which is averaged over all forms in proportion to their evidence. Both are about "
+            "the mean of the law. Of a product of two columns, the horizontal axis is the product of its two shapes.",
+            law.numbers,
+            law.draw,
         ),
         FigureOf(
             "evidence",

@@ -25,7 +25,7 @@ from tribo.report.words.terminal_text import fit_cells
 
 LEAD_FIGURES = ("finding", "agreement", "fig4", "dependence")  # the first that there is shows what the card says
 MISFIT_FIGURES = ("misfit", "residuals")
-CAUSE_FIGURES = ("extended", "evidence")
+CAUSE_FIGURES = ("law", "extended", "evidence")
 CALIBRATED = {  # of a block of the model: name and unit
     "mu_s": ("Static friction coefficient, mean over the blocks", "1"),
     "mu_s_sd": ("Static friction coefficient, standard deviation over the blocks", "1"),

@@ -29,8 +29,12 @@ class Written:
 
 
 def write_discovery(d: Discovery, title: str, out: Path, provenance: Provenance) -> Written:
-    """law-1.toml and further laws, laws.csv (the best of all that were tried), discovery.json and provenance.json."""
+    """law-1.toml and further laws, law.svg and law.csv (the figure), laws.csv (the best of all that were tried),
+    discovery.json and provenance.json."""
     import pandas as pd
+
+    from tribo.figures import law as law_figure
+    from tribo.figures.style import as_svg
 
     text = discovery_text(d)
     laws = law_texts(d, title)
@@ -45,7 +49,9 @@ def write_discovery(d: Discovery, title: str, out: Path, provenance: Provenance)
         "schema": SCHEMA, "text": text, "laws_tried": d.searched,
         "layers": [asdict(layer) for layer in law_layers(d)], "ties": [f.n_ties for f in d.laws],
     }  # fmt: skip
-    _write({**laws, "laws.csv": to_csv(pd.DataFrame(rows)), RECORD: _json(record)}, out, provenance)
+    numbers = law_figure.numbers_of(d)
+    figure = {} if numbers.empty else {"law.svg": as_svg(law_figure.draw(numbers)), "law.csv": to_csv(numbers)}
+    _write({**laws, **figure, "laws.csv": to_csv(pd.DataFrame(rows)), RECORD: _json(record)}, out, provenance)
     return Written(record, text)
 
 

@@ -196,7 +196,7 @@ class _Encoder:
             return {"tuple": [self.encoded(part) for part in value]}
         if isinstance(value, Mapping):
             return {"mapping": [[self.encoded(key), self.encoded(part)] for key, part in value.items()]}
-        if hasattr(value, "columns") and hasattr(value, "to_numpy"):
+        if hasattr(value, "to_numpy") and hasattr(value, "columns"):
             return {"table": [[str(name), self.encoded(value[name].to_numpy())] for name in value.columns]}
         if is_dataclass(value) and type(value).__module__.startswith("tribo."):
             parts = [[field.name, self.encoded(getattr(value, field.name))] for field in fields(value) if field.init]

@@ -125,14 +125,10 @@ class WrittenLaw:
         d = 2 if self.shapes[0].kind == "wave" else 1
         parameters = [first, *(amplitude("b", "", -LARGEST, LARGEST, 0.1, "of the cosine") for _ in range(d - 1))]
 
-        def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
-            change = self.course(conditions) @ values[:d] * self.weight(conditions)
-            return self.changed(base, conditions.normal_load_N, change)
-
         needs = tuple(name for name in self.columns if name in UNITS and not name.endswith("pressure_Pa"))
         return Mechanism(
             name=f"law {self.formula()} ({self.regime}, {self.where})", kind="any", formula=self.formula(),
-            parameters=tuple(parameters), law=law, sign=0,
+            parameters=tuple(parameters), law=ActingLaw(self), sign=0,
             regimes=REGIMES if self.regime == BOTH else (self.regime,),
             enters="the friction forces", shows="", confused_with="", separates="", needs=needs,
             choosing=Choosing(held_out="loads" if self.where.startswith("sample ") else "samples"),
@@ -161,6 +157,18 @@ class WrittenLaw:
             return f"{self.acts_on} * exp(a sin({turns}) + b cos({turns}))"
         inner = " * ".join(_formula(s) for s in self.shapes)
         return f"{self.acts_on} * exp({a} {inner}{weight})"
+
+
+@dataclass(frozen=True)
+class ActingLaw:
+    """The forces under a law, as a mechanism calls for them; a record, so that it can be kept and sent to workers."""
+
+    law: WrittenLaw
+
+    def __call__(self, values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
+        course = self.law.course(conditions)
+        change = course @ values[: course.shape[1]] * self.law.weight(conditions)
+        return self.law.changed(base, conditions.normal_load_N, change)
 
 
 def _formula(s: Shape) -> str:
