@@ -38,11 +38,12 @@ class CardLaw:
 
 @dataclass(frozen=True)
 class NextStep:
-    """The next test: what, why, and how long it takes; ``hours`` is None where nobody can say."""
+    """The next test: what, why, and how long (``hours``, None where nobody can say); ``line`` says all of it."""
 
     what: str
     why: str
     hours: float | None
+    line: str
 
 
 @displayed(lambda card: card.counts)
@@ -149,4 +150,12 @@ def _next(verdict: Mapping[str, Any] | None) -> NextStep | None:
     if not found:
         return None
     hours = (found.get("design") or {}).get("hours")
-    return NextStep(str(found["text"]), card_sentences.why_next(verdict or {}), None if hours is None else float(hours))
+    what, why = str(found["text"]), card_sentences.why_next(verdict or {})
+    return NextStep(what, why, hours, f"{what.rstrip('.')}{_duration(hours)}: {why}.")
+
+
+def _duration(hours: float | None) -> str:
+    """ " (about 2.1 h)"; empty where nobody can say."""
+    if hours is None:
+        return ""
+    return f" (about {hours:.1f} h)" if hours >= 1 else f" (about {60 * hours:.0f} min)"

@@ -19,7 +19,6 @@ from tribo.report.drawings import Drawn, draw_all, inline_svg
 from tribo.report.html.embedded import figure_data, trace_data
 from tribo.report.html.pull_cards import PullCard, on_pages
 from tribo.report.provenance import Provenance
-from tribo.report.words.card_text import hours_text
 from tribo.report.words.numerals import ratio_text, significant, unbroken
 from tribo.report.words.wording import flags_in_words
 
@@ -128,7 +127,6 @@ def _environment() -> Environment:
     environment.filters["sig"] = significant
     environment.filters["ratio"] = ratio_text
     environment.filters["unbroken"] = unbroken
-    environment.filters["duration"] = hours_text
     return environment
 
 
