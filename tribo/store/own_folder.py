@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from tribo.errors import CampaignError, Problem
+from tribo.errors import CampaignError, Problem, naming
 from tribo.store.lock import only_writer
 
 LOCK = ".tribo.lock"
@@ -191,10 +191,17 @@ def _holds_kept_results(path: Path) -> bool:
 
 
 def recorded_outputs(out: Path) -> set[str] | None:
-    """The files that the record in a folder of results lists; None where there is no record."""
+    """The files that the record in a folder of results lists; None where there is no record.
+
+    Raises
+    ------
+    OSError
+        There is a record, and it cannot be read.
+    """
     try:
-        record = json.loads((out / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        with naming(out / RECORD):
+            record = json.loads((out / RECORD).read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError, IsADirectoryError, ValueError, RecursionError):
         return None
     outputs = record.get("outputs") if isinstance(record, dict) else None
     return set(outputs) if isinstance(outputs, dict) else None
