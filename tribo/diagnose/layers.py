@@ -75,6 +75,7 @@ def _cause_layer(
         kind="cause", name=best.name, samples=samples, regimes=regimes, p_adjusted=first.p_library(beside.strength),
         effect_percent=value, low=low, high=high, parameters=parameters, formula=m.formula,
         tied_with=tuple(c.name for c in tied), gain=gained, text=text, at=_place(best.fit, where),
+        choice=best.acting.choice,
     )  # fmt: skip
 
 

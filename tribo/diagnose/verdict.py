@@ -90,7 +90,7 @@ class Layer:
     ``effect_percent`` is 100 (measured / model - 1) of a pattern correction, and the largest signed change of T by a
     cause, with a 90 % interval from ``low`` to ``high``; of a remainder it is the peak-to-peak effect. ``tied_with``
     are mechanisms that the design cannot distinguish from it, ``gain`` what the layer gains on tests left out, ``at``
-    the sample, regime and load at which a cause acts most.
+    the sample, regime and load at which a cause acts most, ``choice`` the specimen, pattern or value it concerns.
     """
 
     kind: LayerKind
@@ -107,6 +107,7 @@ class Layer:
     gain: Gain | None = None
     text: str = ""
     at: str = ""
+    choice: str = ""
 
 
 @displayed()

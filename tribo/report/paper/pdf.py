@@ -97,7 +97,7 @@ def record_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str
         "budget_origins": said["budget_origins"],
         "power": study.power,
         "outlying": study.outlying,
-        "notes": [*(f"Doubtful: {doubt}" for doubt in said["card"].doubts), *study.notes],
+        "notes": study.notes,
         "provenance": [[n, v] for n, v in said["provenance"] or () if n not in NOT_OF_THE_INPUTS],
         "pulls": [_pull_row(card) for card in sorted(said["cards"], key=lambda card: card.test_id)],
         **_diagnosis_tables(verdict),

@@ -187,7 +187,8 @@ def _names(verdict: Mapping[str, Any], layer: Mapping[str, Any]) -> str:
 def _named(verdict: Mapping[str, Any], layer: Mapping[str, Any]) -> str:
     names = _alternatives(verdict, layer)
     if len(names) == 1:
-        return f"{sentence_case(meaning_in_words(names[0]))} ({name_in_words(names[0])}): this changes"
+        choice = f": {layer['choice']}" if layer.get("choice") else ""
+        return f"{sentence_case(meaning_in_words(names[0]))} ({name_in_words(names[0])}{choice}): this changes"
     return f"{sentence_case(_names(verdict, layer))} (this campaign cannot tell which) changes"
 
 
