@@ -16,7 +16,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 RUNS = {
-    "faults": ("faults", "--out", "{out}"),
+    "faults": ("faults", "--distinct", "--out", "{out}"),
     "flips": ("flips", "--flips", "1000"),
     "inputs": ("inputs", "--cases", "2000"),
     "kills-of-report": ("kills", "report", "--kills", "100"),

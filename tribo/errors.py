@@ -110,6 +110,15 @@ def naming(path: object, also_for: object = None) -> Iterator[None]:
         raise
 
 
+def failed_by_system(why: BaseException) -> bool:
+    """Whether a file is there and the system could not read it; not where it is absent, or its contents are damaged.
+
+    HDF5 gives errors without a number for damaged contents.
+    """
+    absent = isinstance(why, (FileNotFoundError, NotADirectoryError))
+    return isinstance(why, OSError) and why.errno is not None and not absent
+
+
 def system_problem(why: OSError, file: str | None = None) -> Problem:
     """An error of the operating system with its path and cause."""
     place = next((str(part) for part in (why.filename2, why.filename) if part), None) or file

@@ -63,6 +63,16 @@ def test_no_command_writes_into_or_around_its_campaign(
     assert digest(lab) == before
 
 
+@pytest.mark.parametrize("out", [".", "raw", "..", "../campaign"])
+def test_a_command_that_starts_in_its_campaign_writes_nothing_there(
+    lab: Path, monkeypatch: pytest.MonkeyPatch, out: str
+) -> None:
+    before = digest(lab)
+    monkeypatch.chdir(lab / "campaign")
+    assert run("report", ".", "-o", out).exit_code == 1
+    assert digest(lab) == before
+
+
 def test_a_link_to_a_campaign_is_the_campaign(lab: Path) -> None:
     before = digest(lab)
     assert run("fit", linked_campaign(lab), "-o", lab / "campaign" / "out").exit_code == 1

@@ -26,6 +26,7 @@ def conditions() -> Conditions:
         cavity_width_m=np.repeat([0.0, 1e-5, 4e-5], 16),
         elongation=np.repeat([0.0, 0.0, np.log(5.0)], 16),
         sample=samples,
+        pattern=np.repeat(["F", "B", "S"], 16),
         specimen=np.array([f"{s[0]}{k}" for s, k in zip(samples, number, strict=True)]),
         speed_m_s=np.tile([5e-5, 2e-4, 8e-4], n // 3),
         hold_s=np.tile([1.0, 10.0, 300.0], n // 3),

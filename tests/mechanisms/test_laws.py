@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,19 @@ def forces(name: str, values: list[float], choice: str = "") -> Forces:
 def before() -> Forces:
     c = conditions()
     return base(c).forces(c.normal_load_N)
+
+
+def test_a_pattern_that_is_called_sx_is_not_pattern_s_along_x() -> None:
+    m = MECHANISMS["pattern_geometry"]
+    directed = conditions()
+    own = replace(conditions(), pattern=np.repeat(["F", "B", "Sx"], 16))
+    assert m.choices(base(own), directed) == ("B", "S")
+    assert m.choices(base(own), own) == ("B", "Sx")
+    values = np.array([0.1])
+    assert (m.law(values, base(own), own, "S").static_N == m.law(np.zeros(1), base(own), own, "Sx").static_N).all()
+    assert m.law(values, base(own), directed, "S").static_N == pytest.approx(
+        m.law(values, base(own), own, "Sx").static_N, rel=1e-12
+    )
 
 
 def test_suction_adds_mu_dp_times_the_open_area() -> None:

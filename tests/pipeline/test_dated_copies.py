@@ -132,6 +132,21 @@ def test_a_copy_that_cannot_be_finished_leaves_nothing_half_made(
     assert [p.name for p in (*tmp_path.glob(".*"), *(tmp_path / "builds").glob(".*"))] == []
 
 
+def test_a_copy_whose_number_cannot_be_read_is_not_taken_for_the_oldest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(self: Path, **_: object) -> str:
+        raise OSError(errno.EIO, "Input/output error")
+
+    write(tmp_path, "first")
+    new = date_build(tmp_path, keep=1, now=0.0)
+    assert new is not None
+    monkeypatch.setattr(Path, "read_text", failing)
+    with pytest.raises(OSError, match="Input/output") as why:
+        date_build(tmp_path, keep=1, now=DAY)
+    assert why.value.filename == str(new / ".number")
+
+
 def test_two_builds_within_a_second_have_two_names_in_order(tmp_path: Path) -> None:
     names = []
     for k in range(12):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -93,6 +95,24 @@ def test_damaged_results_of_one_campaign_leave_the_index(tmp_path: Path, name: s
         place.write_bytes(content)
         write_index(tmp_path / "site")
         assert "campaign" in (tmp_path / "site" / "current" / "index.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["tests.csv", "fits.csv"])
+def test_results_that_the_system_cannot_read_are_not_taken_for_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    real = Path.open
+
+    def failing(self: Path, *given: Any, **named: Any) -> Any:
+        if self.name == name:
+            raise OSError(errno.EIO, "Input/output error", str(self))
+        return real(self, *given, **named)
+
+    state = tmp_path / "site" / ".tribo"
+    _configuration(scan(drop_of(tmp_path / "drop", "a"), settle_s=0.0), state / "inputs", state, BuildOptions())
+    monkeypatch.setattr(Path, "open", failing)
+    with pytest.raises(OSError, match="Input/output"):
+        history(tmp_path / "site")
 
 
 @pytest.mark.parametrize("content", [*DAMAGED, b'{"outputs": {}, "inputs": [], "inputs_sha256": "", "campaign": 7}'])

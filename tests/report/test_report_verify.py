@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from hostile_zips import packed
 
 from tribo.cli import main
 from tribo.errors import CampaignError
@@ -107,6 +108,15 @@ def test_a_campaign_that_was_moved_or_zipped_is_found_where_it_is_said_to_be(
     assert {status for _, status, _ in differences(out)} == {"missing"}
     assert differences(out, tmp_path / "elsewhere") == set()
     assert differences(out, archive) == set()
+
+
+def test_a_bomb_in_place_of_the_campaign_is_refused_before_it_is_unpacked(
+    placed: tuple[Study, Path, Path], tmp_path: Path
+) -> None:
+    (tmp_path / "bomb.zip").write_bytes(packed(("raw/x.csv", bytes(30 << 20))))
+    with pytest.raises(CampaignError) as refused:
+        verify(placed[2], tmp_path / "bomb.zip")
+    assert [problem.kind for problem in refused.value.problems] == ["zip_bomb"]
 
 
 def test_study_and_campaign_moved_together_still_verify(placed: tuple[Study, Path, Path], tmp_path: Path) -> None:

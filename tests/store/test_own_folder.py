@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -13,7 +14,7 @@ import pytest
 
 from tribo.errors import CampaignError
 from tribo.store.lock import BusyError
-from tribo.store.own_folder import Access, own_folder
+from tribo.store.own_folder import RECORD, Access, own_folder, recorded_outputs
 
 HOLDER = """
 import sys, time
@@ -41,6 +42,17 @@ def holder(out: Path, shared: bool = False) -> subprocess.Popen[str]:
 def killed(process: subprocess.Popen[str]) -> None:
     process.kill()
     process.communicate()
+
+
+def test_a_record_that_cannot_be_read_is_not_taken_for_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(self: Path, **_: object) -> str:
+        raise OSError(errno.EIO, "Input/output error")
+
+    (tmp_path / RECORD).write_text("{}")
+    monkeypatch.setattr(Path, "read_text", failing)
+    with pytest.raises(OSError, match="Input/output") as why:
+        recorded_outputs(tmp_path)
+    assert why.value.filename == str(tmp_path / RECORD)
 
 
 def test_a_second_writer_is_told_the_first_one(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +20,15 @@ class GivenPath(click.Path):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
-            os.stat(value)
+            is_folder = stat.S_ISDIR(os.stat(value).st_mode)
         except (FileNotFoundError, NotADirectoryError):
             if near := _beside(Path(value)):
                 self.fail(f"{value!r} does not exist; did you mean {near}?", param, ctx)
+            return super().convert(value, param, ctx)  # click says so
         except OSError as why:
             raise click.ClickException(f"{value}: {(why.strerror or str(why)).lower()}") from why
+        if self.dir_okay if is_folder else self.file_okay:
+            return Path(value)
         return super().convert(value, param, ctx)
 
 

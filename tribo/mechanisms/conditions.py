@@ -72,7 +72,8 @@ class Conditions:
     sample), ``elongation`` ln(long/short) of the cavity, positive when pulled along its long side and
     negative across it, ``specimen_run`` counts the pulls of a specimen from 1, ``elapsed_s`` the time since
     the first pull, ``clip_N`` = k v / (2 f_s), the mean loss of a peak between two samples of the recorder.
-    ``columns`` holds every further recorded column as text.
+    ``columns`` holds every further recorded column as text. ``pattern`` names the pattern of each
+    test: ``Sx`` and ``Sy`` may be S along x and y, or patterns of these names.
     """
 
     normal_load_N: FloatArray
@@ -82,6 +83,7 @@ class Conditions:
     cavity_width_m: FloatArray
     elongation: FloatArray
     sample: StringArray
+    pattern: StringArray
     specimen: StringArray
     speed_m_s: FloatArray
     hold_s: FloatArray

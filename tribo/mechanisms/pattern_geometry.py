@@ -20,7 +20,7 @@ from tribo.mechanisms.record import (
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str) -> Forces:
     """tau0 A of one pattern scales with its area fraction; ``values`` = [dAF], ``choice`` names the pattern."""
-    here = pattern_of(conditions.sample) == choice
+    here = conditions.pattern == choice
     scale = 1.0 + np.where(here, np.maximum(values[0] / conditions.area_fraction, -0.95), 0.0)
     load = conditions.normal_load_N
     return Forces(
@@ -29,24 +29,19 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str) -> Forc
     )
 
 
-def pattern_of(samples: np.ndarray) -> np.ndarray:
-    """The pattern of each sample name: ``Sx`` and ``Sy`` are both S."""
-    return np.array([s[:-1] if len(s) > 1 and s[-1] in "xy" else s for s in samples])
-
-
 def patterns(base: Base, conditions: Conditions) -> tuple[str, ...]:
     """Every pattern with cavities."""
-    return tuple(sorted(set(pattern_of(conditions.sample[conditions.area_fraction < 1.0]))))
+    return tuple(sorted(set(conditions.pattern[conditions.area_fraction < 1.0].tolist())))
 
 
 def on_test(values: Values, choice: str, conditions: Conditions, test: int) -> OnTest | None:
     """None on other patterns."""
-    return OnTest(values) if str(pattern_of(conditions.sample[[test]])[0]) == choice else None
+    return OnTest(values) if str(conditions.pattern[test]) == choice else None
 
 
 def in_one_run(conditions: Conditions) -> str:
     """The pattern of the sample."""
-    return str(pattern_of(conditions.sample)[0])
+    return str(conditions.pattern[0])
 
 
 MECHANISM = Mechanism(

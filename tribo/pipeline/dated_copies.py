@@ -10,7 +10,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from tribo.errors import Problem, TriboError
+from tribo.errors import Problem, TriboError, naming
 
 BUILDS, LATEST, CURRENT = "builds", "latest", "current"
 NOT_COPIED = ("kept",)  # work in progress, not results
@@ -64,8 +64,9 @@ def _order(copy: Path) -> tuple[int, str, int]:
     found = _DATED.fullmatch(copy.name)
     assert found is not None
     try:
-        number = int((copy / NUMBER).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        with naming(copy / NUMBER):
+            number = int((copy / NUMBER).read_text(encoding="utf-8"))
+    except (FileNotFoundError, ValueError):
         number = 0
     return number, found[1], int(found[2] or 1)
 

@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from tribo.errors import failed_by_system, naming
 from tribo.escaping import from_spreadsheet
 from tribo.pipeline.step_record import OF_A_REPORT, read_record
 
@@ -140,16 +141,20 @@ def _title(out: Path) -> str:
     try:
         with h5py.File(out / "campaign.nc") as file:
             return str(file.attrs.get("title", ""))
-    except (OSError, RuntimeError, KeyError, ValueError):  # h5py on damaged files
+    except (OSError, RuntimeError, KeyError, ValueError) as why:  # h5py on damaged files
+        if failed_by_system(why):
+            raise
         return ""
 
 
 def _table(path: Path) -> list[dict[str, str]]:
     try:
-        with path.open(encoding="utf-8", newline="") as stream:
+        with naming(path), path.open(encoding="utf-8", newline="") as stream:
             rows = csv.DictReader(stream)
             return [{k: from_spreadsheet(v or "") for k, v in row.items() if k is not None} for row in rows]
-    except (OSError, ValueError, csv.Error):
+    except (OSError, ValueError, csv.Error) as why:
+        if failed_by_system(why):
+            raise
         return []
 
 

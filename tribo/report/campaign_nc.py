@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from tribo.errors import failed_by_system
 from tribo.records import Study, Trace
 from tribo.report import result_tables
 from tribo.report.provenance import Provenance
@@ -104,11 +105,13 @@ def write_store(
 
 
 def _earlier(path: Path) -> dict[str, xr.Dataset]:
-    """The groups of a file that is there, but the root; none where it cannot be read."""
+    """The groups of a file that is there, but the root; none where it is damaged."""
     try:
         with xr.open_datatree(path, engine="h5netcdf") as tree:
             return {f"/{node.name}": node.to_dataset(inherit=False).load() for node in tree.children.values()}
-    except (OSError, ValueError):
+    except (OSError, ValueError) as why:
+        if failed_by_system(why):
+            raise
         return {}
 
 

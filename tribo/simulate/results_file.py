@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tribo.errors import failed_by_system
 from tribo.records import Run
 from tribo.store.hdf5_files import whole_hdf5
 
@@ -122,6 +123,8 @@ def kind_of(path: Path) -> str:
     try:
         with h5py.File(path) as file:
             title = str(file.attrs.get("title", ""))
-    except (OSError, ValueError, KeyError):
+    except (OSError, ValueError, KeyError) as why:
+        if failed_by_system(why):
+            raise
         return ""
     return next((kind for kind in (ONE_RUN, ENSEMBLE) if title.startswith(kind)), "")

@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from tribo.errors import CampaignError, Problem
+from tribo.errors import CampaignError, Problem, naming
 from tribo.store.lock import only_writer
 
 LOCK = ".tribo.lock"
@@ -26,7 +26,7 @@ CAMPAIGN_FILE = "campaign.toml"
 PRODUCTS = frozenset({
     "tests.csv", "fits.csv", "other_fits.csv", "budget.csv", "differences.csv", "comparison.csv", "campaign.nc",
     "verdict.json", "laws.csv", "dependence.csv", "restarts.csv", "discovery.json", "report.html", "report.pdf",
-    "ro-crate-metadata.json",
+    "ro-crate-metadata.json", "compare.html", "compare.csv",
 })  # fmt: skip
 PULL_PAGES = "pulls-*.html"  # of reports of many pulls
 OF_SYSTEMS = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
@@ -191,10 +191,17 @@ def _holds_kept_results(path: Path) -> bool:
 
 
 def recorded_outputs(out: Path) -> set[str] | None:
-    """The files that the record in a folder of results lists; None where there is no record."""
+    """The files that the record in a folder of results lists; None where there is no record.
+
+    Raises
+    ------
+    OSError
+        There is a record, and it cannot be read.
+    """
     try:
-        record = json.loads((out / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        with naming(out / RECORD):
+            record = json.loads((out / RECORD).read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError, IsADirectoryError, ValueError, RecursionError):
         return None
     outputs = record.get("outputs") if isinstance(record, dict) else None
     return set(outputs) if isinstance(outputs, dict) else None

@@ -146,6 +146,7 @@ def _conditions(samples: Sequence[str], loads_Pa: FloatArray) -> Conditions:
         sample=np.repeat(np.array(samples, str), m), specimen=np.repeat(np.array(samples, str), m),
         speed_m_s=np.full(n * m, 2e-4), hold_s=unknown, specimen_run=unknown, run_order=unknown, elapsed_s=unknown,
         temperature_C=unknown, humidity_pct=unknown, clip_N=np.zeros(n * m),
+        pattern=np.repeat(np.array([p.name for p in patterns], str), m),
     )  # fmt: skip
 
 

@@ -143,13 +143,14 @@ def conditions_of(
         humidity_pct=_numbers([t.humidity_pct for t in tests]),
         clip_N=clip,
         columns=_further_columns(tests),
+        pattern=np.array([p.name for p in patterns], str),
     )
 
 
 def _elongation(test: Test, pattern: Pattern) -> float:
     if pattern.size_m is None or pattern.size_m[0] == pattern.size_m[1]:
         return 0.0
-    direction = test.direction or test.sample[-1:]
+    direction = test.direction or test.sample.removeprefix(pattern.name)
     along_x = {"x": 1.0, "y": -1.0}.get(direction.lower(), 0.0)
     return float(along_x * np.log(pattern.size_m[0] / pattern.size_m[1]))
 
