@@ -20,6 +20,7 @@ from tribo.diagnose.without_model.along_records import running_in
 from tribo.diagnose.without_model.tested_columns import load_levels, points_of
 from tribo.fitting.dependence import dependence
 from tribo.fitting.law_choice import compared_laws
+from tribo.plausibility.doubts import doubts_of
 from tribo.records import Campaign, Ingested, Pattern, Pull, Study, Test, Trace
 
 Change = Callable[[dict[str, Any]], float]
@@ -182,3 +183,11 @@ def test_a_column_named_by_another_name_of_the_load_is_no_column(tmp_path: Path)
     folder = made(tmp_path / "c", lambda row: 0.0, columns=lambda row: {"nominal_load_N": row["normal_load_N"]})
     points = points_of(stages.ingest(load_campaign(folder)), "sliding")
     assert "nominal_load_N" not in [*points.untold, *(c.name for c in points.columns)]
+
+
+@pytest.mark.parametrize(("spread", "doubted"), [(1.003, False), (1.08, True)])
+def test_loads_that_were_meant_to_be_one_are_no_doubtful_number(tmp_path: Path, spread: float, doubted: bool) -> None:
+    campaign = load_campaign(made(tmp_path / "c", lambda row: 0.0))
+    tests = tuple(replace(t, normal_load_N=2.0 * (spread if k % 2 else 1.0)) for k, t in enumerate(campaign.tests))
+    found = doubts_of(replace(campaign, tests=tests))
+    assert any("range of the loads" in str(doubt) for doubt in found) is doubted

@@ -66,6 +66,7 @@ HUMIDITY_PCT: Mapping[str, Bound] = {"": Bound(0.0, 100.0, "definition of relati
 SMALLEST_CAVITY_UM = 0.5  # about what contact lithography resolves
 FEWEST_CAVITIES_ACROSS = 2.0  # a sample with fewer is no pattern
 MOST_OFF_AREA_FRACTION = 0.2  # by which a measured contact area fraction may differ from that of the geometry
+ONE_LOAD = 1.05  # largest over smallest load up to which loads were meant to be one, as in the fits
 SMALLEST_LOAD_SPAN = 1.1  # largest over smallest load; at 1 % scatter of T a slope over 10 % is uncertain by about 20 %
 
 TABLES: Mapping[str, Mapping[str, Bound]] = {

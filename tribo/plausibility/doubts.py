@@ -171,7 +171,7 @@ def _load_span(campaign: Campaign) -> Iterator[Doubt]:
     close = {
         s: 100 * (max(loads) / min(loads) - 1)
         for s, loads in sorted(by_sample.items())
-        if 1 < max(loads) / min(loads) < bounds.SMALLEST_LOAD_SPAN
+        if bounds.ONE_LOAD < max(loads) / min(loads) < bounds.SMALLEST_LOAD_SPAN
     }
     if not close:
         return
