@@ -18,9 +18,23 @@ from tribo.cli.reading_options import corrected, reading_options
 from tribo.cli.simulate_command import simulate
 from tribo.cli.study_commands import compare, demo, diagnose, fit, ingest, predict, report
 from tribo.cli.study_options import CAMPAIGN
+from tribo.nearest import did_you_mean
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+class Commands(click.Group):
+    """A group that asks what was meant where a command is not known."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        given = args[0]
+        hint = did_you_mean(given, self.list_commands(ctx))
+        if hint and self.get_command(ctx, given) is None and not given.startswith("-"):
+            ctx.fail(f"No such command {given!r}; {hint}")
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="tribo")
 def main() -> None:
     """Analyse sled friction tests: fit mu and tau0, compare with a spring-block model.
