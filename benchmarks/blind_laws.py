@@ -208,17 +208,18 @@ def main() -> None:
     parser.add_argument("--campaigns", type=int, default=15, help="per form")
     parser.add_argument("--clean", type=int, default=300)
     parser.add_argument("--pairs", type=int, default=50)
-    parser.add_argument("--seed", type=int, default=2026)
+    parser.add_argument("--seed", type=int, default=2029)
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
+    todo, rows = list(pieces(options)), read_rows(options.path)
     if options.what == "run":
-        todo = list(pieces(options))
         np.random.default_rng(options.seed).shuffle(todo)  # type: ignore[arg-type]
         run(todo, options.path, options.jobs)
-    text = tables(read_rows(options.path))
+        rows = read_rows(options.path)
+    text = tables(rows)
     if options.what == "page":
         above = PAGE.read_text().split(MARK)[0]
-        PAGE.write_text(f"{above}{MARK}\n\nSeed {options.seed}.\n\n{text}")
+        PAGE.write_text(f"{above}{MARK}\n\nSeed {options.seed}: {len(rows)} of {len(todo)} campaigns.\n\n{text}")
     print(text)
 
 
