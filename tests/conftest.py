@@ -67,6 +67,19 @@ def small_campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def small_report(small_campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """`tribo report` on the small campaign."""
+    from click.testing import CliRunner
+
+    from tribo.cli import main
+
+    folder = tmp_path_factory.mktemp("small_report") / "out"
+    result = CliRunner().invoke(main, ["report", str(small_campaign), "-o", str(folder), "--runs", "2", "-q"])
+    assert result.exit_code == 0, result.output
+    return folder
+
+
 LONG_FILES = ("pipeline", "test_spoiled_campaigns", "faults", "blind", "cli", "simulate", "diagnose")
 
 

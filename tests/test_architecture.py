@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
 GROUND = {
     "display", "errors", "limits", "escaping", "input_files", "quantities", "zeroing", "records", "published", "zips",
-    "links", "temporary", "forked",
+    "links", "temporary", "forked", "nearest", "sheets",
 }  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
     ("escaping", set()),
@@ -30,6 +30,8 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("links", set()),
     ("temporary", set()),
     ("forked", set()),
+    ("nearest", set()),
+    ("sheets", {"errors", "limits", "zips"}),
     ("store", GROUND),
     ("campaign", GROUND),
     ("readers", GROUND),
@@ -38,6 +40,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("virtual_tribometer", GROUND),
     ("ingestion", GROUND | {"campaign", "readers", "traces"}),
     ("fitting", GROUND | {"laws"}),
+    ("plausibility", GROUND),
     ("simulate", GROUND | {"campaign", "laws", "store"}),
     ("mechanisms", GROUND | {"laws"}),
     ("mechanisms_in_model", GROUND | {"mechanisms", "simulate", "virtual_tribometer"}),
@@ -50,8 +53,9 @@ STREET: tuple[tuple[str, set[str]], ...] = (
 MAY_IMPORT = dict(STREET)
 BELOW = set(MAY_IMPORT)
 MAY_IMPORT["stages"] = BELOW - {"figures", "report"}
-MAY_IMPORT["pipeline"] = BELOW | {"stages"}
-MAY_IMPORT["cli"] = BELOW | {"stages", "pipeline"}
+MAY_IMPORT["dry_run"] = MAY_IMPORT["stages"] | {"stages"}
+MAY_IMPORT["pipeline"] = BELOW | {"stages", "dry_run"}
+MAY_IMPORT["cli"] = BELOW | {"stages", "dry_run", "pipeline"}
 MAY_IMPORT["__main__"] = {"cli"}
 MAY_IMPORT["__init__"] = set()
 ROOMS = sorted(p for p in PACKAGE.rglob("*.py"))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from tribo.display import displayed
 
 _LOG = logging.getLogger("tribo")
+_QUESTION = "did you mean"
 LONGEST_FOUND = 2000  # characters of what was found that a problem holds
 _OF_THE_SYSTEM = "system"  # kind of a problem that another try may not have: disk full, no permission
 
@@ -62,7 +63,7 @@ class Problem:
         if self.found is not None:
             parts.append(f"; found {_without_middle(repr(self.found))}")
         if self.allowed is not None:
-            parts.append(f"; allowed: {self.allowed}")
+            parts.append(f"; {self.allowed if self.allowed.startswith(_QUESTION) else f'allowed: {self.allowed}'}")
         return "".join(parts)
 
     def at(self, *, file: str | None = None, test_id: str | None = None) -> Problem:

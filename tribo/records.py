@@ -130,6 +130,8 @@ class Test:
     zero: ZeroChoice = DEFAULT
     load_zero: ZeroChoice = DEFAULT
     stiffness_N_per_m: float | None = None  # of the spring, wire or beam through which the slider is pulled
+    load_from: str = ""  # column of tests.csv that gave the load; empty where the export did
+    mass_kg: float | None = None  # put on the slider, as tests.csv states it
 
 
 @displayed(lambda s: f"{s.test_id}: {s.reason}")
@@ -140,6 +142,34 @@ class SetAside:
     test_id: str
     reason: str
     problems: tuple[Problem, ...] = ()
+
+
+@displayed(lambda d: f"{d.name}: {d.found}")
+@dataclass(frozen=True)
+class Doubt:
+    """A number outside its broad physical bounds, or a design that cannot give the number it is for.
+
+    ``quantity`` is its name for programs, ``name`` that for people; ``found`` and ``plausible`` are texts with units,
+    ``place`` is where to look, ``slip`` the question that may explain it, ``source`` where the bounds are from, and
+    ``material_class`` the class they hold for.
+    """
+
+    quantity: str
+    name: str
+    found: str
+    plausible: str
+    place: str
+    slip: str = ""
+    source: str = ""
+    material_class: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.without_slip()}. Likely slip: {self.slip}" if self.slip else self.without_slip()
+
+    def without_slip(self) -> str:
+        """The number, its bounds and its place as a sentence."""
+        kind = f" ({self.material_class})" if self.material_class else ""
+        return f"{self.name} is {self.found}; plausible{kind}: {self.plausible}; see {self.place}"
 
 
 @displayed(lambda c: f"{c.title}, {len(c.tests)} tests of {len(c.samples)} samples")
@@ -172,6 +202,8 @@ class Campaign:
     zero: ZeroChoice = DEFAULT
     load_zero: ZeroChoice = DEFAULT
     contact: str = "sled"
+    material_class: str = ""  # as stated: elastomer, polymer, metal, ceramic, lubricated or granular
+    plausible: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # bounds stated in place of the usual
     inputs: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @property
@@ -573,7 +605,7 @@ class Study:
     states the differences this campaign could detect, ``outlying`` the outlying pulls and specimens. ``differences``
     holds the differences between samples measured on the same specimens, one row per pair of samples, regime and
     number. ``laws`` compares the candidate laws of every sample by held-out loads, ``dependence`` states how T/N
-    changes with each recorded variable.
+    changes with each recorded variable. ``doubts`` are the numbers outside their broad physical bounds.
     """
 
     ingested: Ingested
@@ -590,3 +622,4 @@ class Study:
     dependence: pd.DataFrame | None = None
     notes: tuple[str, ...] = ()
     combined: tuple[CombinedFit, ...] = ()
+    doubts: tuple[Doubt, ...] = ()

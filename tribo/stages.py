@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
+from typing import TYPE_CHECKING, Literal
 
 from tribo.campaign.flat_sample import required_flat_sample, with_flat_sample
 from tribo.campaign.zeros import with_zeros
@@ -174,7 +173,7 @@ def study(
     chosen = with_zeros(with_flat_sample(campaign, options.flat), options.zero, options.load_zero)
     ingested = ingest(chosen, rule=options.rule, jobs=options.jobs, overrides=options.overrides, progress=progress)
     if until == "ingest":
-        return Study(ingested)
+        return with_doubts(Study(ingested))
     without = without_model(chosen, options) if until != "fit" else ""
     fits: tuple[LawFit, ...] = ()
     no_law = ""
@@ -185,8 +184,18 @@ def study(
             raise
         no_law = f"No friction law over load was fitted: {why}."
     if until == "fit" or without:
-        return assess(Study(ingested, fits, notes=tuple(filter(None, (without, no_law)))), options)
-    return assess(compare(ingested, fits, options, progress=progress), options)
+        return assess(with_doubts(Study(ingested, fits, notes=tuple(filter(None, (without, no_law))))), options)
+    return assess(with_doubts(compare(ingested, fits, options, progress=progress)), options)
+
+
+def with_doubts(walked: Study) -> Study:
+    """The study with the numbers that lie outside their broad physical bounds."""
+    from tribo.plausibility.doubts import doubts_of
+
+    fits = walked.fits
+    with suppress(FitError):
+        fits = fits or fit(walked.ingested)
+    return replace(walked, doubts=doubts_of(walked.ingested.campaign, walked.ingested, fits))
 
 
 def without_model(campaign: Campaign, options: StudyOptions) -> str:
@@ -292,28 +301,3 @@ def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:
     if flat not in set(forces["sample"]):
         return None
     return simulated_predictor(campaign.samples, forces, flat, campaign.nominal_area_m2)
-
-
-def plan(campaign: Campaign, options: StudyOptions, until: Until) -> dict[str, Any]:
-    """The steps of a study without running them: ``steps`` as text, ``set_aside``, and all problems."""
-    from tribo.comparison.prediction import loads_to_simulate
-
-    steps = [f"read {len(campaign.tests)} exports of {campaign.root} with rule {options.rule}"]
-    campaign = with_flat_sample(campaign, options.flat)
-    samples = sorted({t.sample for t in campaign.tests})
-    if unknown := sum(np.isnan(t.normal_load_N) for t in campaign.tests):
-        steps.append(f"take the normal load of {unknown} tests from their exports")
-    if until != "ingest":
-        steps.append(f"fit mu and tau0 of {len(samples)} samples ({', '.join(samples)}) with weights {options.weights}")
-    if until in ("compare", "report") and (why := without_model(campaign, options)):
-        steps.append(f"report without the spring-block model. {why}")
-    elif until in ("compare", "report"):
-        loads = loads_to_simulate(campaign)
-        flat = required_flat_sample(campaign)
-        runs = len(samples) * len(loads) * options.runs
-        steps.append(f"calibrate the model on sample {flat} and run it {runs} times at {len(loads)} loads")
-    return {
-        "steps": steps,
-        "set_aside": [f"{s.test_id}: {s.reason}" for s in campaign.set_aside],
-        "problems": [asdict(p) for p in campaign.problems],
-    }

@@ -37,6 +37,21 @@ def test_no_page_is_wider_than_its_window(browser: Browser, out: Path, width: in
     opened.context.close()
 
 
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize(("width", "height"), [(1280, 800), (390, 844)])
+def test_the_first_screen_holds_sentence_counts_and_picture(
+    browser: Browser, out: Path, width: int, height: int, theme: str
+) -> None:
+    opened = open_report(browser, out, theme, width)
+    opened.page.set_viewport_size({"width": width, "height": height})
+    for part in (".verdict", ".counts", "#short figure svg"):
+        box = opened.page.locator(part).first.bounding_box()
+        assert box is not None
+        assert box["y"] + box["height"] <= height, part
+        assert box["x"] + box["width"] <= width, part
+    opened.context.close()
+
+
 def test_filters_show_what_they_say(report: Opened) -> None:
     page = report.page
     assert len(visible(page)) == 24

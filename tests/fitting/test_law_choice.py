@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from tribo.fitting.dependence import dependence
-from tribo.fitting.law_choice import compared_laws
+from tribo.fitting.law_choice import CANDIDATES, compared_laws, fit_candidate, force_N
 from tribo.fitting.load_levels import levels_of, meant_to_be_one
 from tribo.records import Campaign, Ingested, Pattern, Pull, Test
 
@@ -95,3 +95,12 @@ def test_the_error_on_loads_left_out_is_known_to_about_a_third_with_six_levels()
         found = compared_laws(table(0.6 * LOADS * scatter)).set_index("law").loc["proportional"]
         shares.append(found["se_percent"] / found["held_out_percent"])
     assert 0.15 < float(np.median(shares)) < 0.45
+
+
+def test_the_force_of_a_law_by_its_name_is_that_of_its_fit() -> None:
+    load = np.array([1.0, 2.0, 4.0, 8.0])
+    force = np.array([1.1, 1.9, 3.2, 5.9])
+    for law in CANDIDATES:
+        fitted = fit_candidate(law, load, force)
+        a, b = (*fitted.values, np.nan)[:2]
+        np.testing.assert_allclose(force_N(law.name, a, b, load), fitted.force_N(load))

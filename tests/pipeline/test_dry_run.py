@@ -29,6 +29,21 @@ def test_an_unusable_campaign_gives_status_3(tmp_path: Path) -> None:
     assert "unusable: bad" in result.output
 
 
+def test_a_dry_run_opens_the_exports_of_what_is_due(tmp_path: Path) -> None:
+    age(small(tmp_path / "drop" / "good", 1))
+    (tmp_path / "drop" / "good" / "raw" / "T002.csv").write_bytes(b"")
+    result = dry(tmp_path / "drop", tmp_path / "site", "--settle", "0")
+    assert "checked good: 7 tests can be used" in result.output
+    assert "1 test would be set aside:\n  T002: raw/T002.csv: the file is empty" in result.output
+
+
+def test_an_unknown_rule_is_refused_once_and_at_once(tmp_path: Path) -> None:
+    age(small(tmp_path / "drop" / "good", 1))
+    result = dry(tmp_path / "drop", tmp_path / "site", "--settle", "0", "--rule", "iso8295")
+    assert result.exit_code == 1
+    assert result.output.count("did you mean iso_8295?") == 1
+
+
 def test_a_workflow_that_cannot_run_gives_status_1(tmp_path: Path) -> None:
     age(small(tmp_path / "drop" / "good", 1))
     (tmp_path / "profile").mkdir()

@@ -195,7 +195,7 @@ def test_a_campaign_shows_the_sentence_of_its_card_and_its_combined_interval(tmp
     site = site_with(tmp_path, {}, [])
     out = site / "current" / "a"
     out.mkdir()
-    card = {"sentence": "Friction falls.", "counts": "9 tests used", "next_test": {"what": "Weigh the sled."}}
+    card = {"sentence": "Friction falls.", "counts": "9 tests used", "next_test": {"line": "Weigh the sled."}}
     (out / "card.json").write_text(json.dumps(card))
     head = "sample,regime,mu,mu_low,mu_high,mu_combined_low,mu_combined_high"
     (out / "fits.csv").write_text(f"{head}\nF,static,2.0,1.9,2.1,1.5,2.5\nA,static,2.0,1.9,2.1,,\n")

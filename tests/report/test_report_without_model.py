@@ -47,7 +47,7 @@ def test_a_campaign_of_flat_samples_is_reported_without_the_model(tmp_path: Path
     assert laws.loc[("sliding", "proportional"), "chosen"]
     assert "is described best by" in page
     assert "No sample has a pattern" in page.replace("\u00a0", " ")
-    assert {p.stem for p in (tmp_path / "out" / "figures").glob("*.svg")} >= {"dependence", "records", "fig7"}
+    assert {p.stem for p in (tmp_path / "out" / "figures").glob("*.svg")} >= {"dependence", "records", "forces"}
     assert not (tmp_path / "out" / "comparison.csv").exists()
 
 
@@ -64,6 +64,8 @@ def test_one_load_has_no_law_over_load_but_what_it_varies_with(tmp_path: Path) -
     page = report(write(tmp_path / "c", (2.0, 2.004, 1.997)), tmp_path / "out").replace("\u00a0", " ")
     assert not (tmp_path / "out" / "laws.csv").exists()
     assert "No friction law over load was fitted" in page
+    drawn = {p.stem for p in (tmp_path / "out" / "figures").glob("*.svg")}
+    assert not drawn & {"forces", "fig6", "fig7"}
     assert "What friction varies with" in page
     assert "Where the model fails" not in page
     found = pd.read_csv(tmp_path / "out" / "dependence.csv").set_index(["regime", "variable"])

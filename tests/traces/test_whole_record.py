@@ -285,3 +285,29 @@ def test_where_sliding_before_a_stop_drifts_the_steadiest_slide_after_it_counts(
 def test_a_force_has_settled_within_the_first_half_of_its_samples(size: int) -> None:
     force = 1.0 + np.exp(-np.arange(size) / (size / 6))
     assert 0 < settled(force) <= size // 2 + 1
+
+
+def rotary_slide(length_m: float) -> Pull:
+    """A slide that begins at 0.1 m/s under 12 N and falls to 10 N over the first fifth of its length."""
+    time = np.arange(0.0, length_m / 0.1, max(length_m / 0.1 / 2000, 0.01))
+    force = 10.0 + 2.0 * np.exp(-5.0 * time / time[-1]) + np.random.default_rng(2).normal(0.0, 0.05, time.size)
+    force[:20] = np.linspace(0.0, 12.0, 20)
+    return read_record(Trace("disc", time, force), test=Test("T", "f", "S", 50.0, "S", speed_m_s=0.1))
+
+
+def test_a_slide_over_its_own_track_is_averaged_over_its_second_half() -> None:
+    long, short = rotary_slide(100.0), rotary_slide(1.0)
+    assert long.window_s == pytest.approx((500.0, 1000.0), rel=0.01)
+    assert long.sliding_N == pytest.approx(10.0 + 2.0 * (np.exp(-2.5) - np.exp(-5.0)) / 2.5, abs=0.01)
+    assert short.window_s[0] != pytest.approx(5.0, rel=0.01)
+
+
+def test_slow_waves_that_do_not_repeat_are_no_oscillation() -> None:
+    rng = np.random.default_rng(4)
+    time = np.arange(0.0, 1800.0, 1.0)
+    ends = np.cumsum(rng.lognormal(4.0, 0.7, 40))
+    wave = np.sin(np.pi * np.interp(time, ends, np.arange(40)))
+    regular = np.sin(2 * np.pi * time / 60.0)
+    noise = rng.normal(0.0, 0.01, time.size)
+    assert oscillation_of(time, 10.0 + wave + noise).regime == "irregular"
+    assert oscillation_of(time, 10.0 + regular + noise).regime == "inertial oscillation"

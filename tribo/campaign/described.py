@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 import tomllib
 from collections.abc import Sequence
@@ -10,12 +9,13 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from tribo.errors import Problem, system_problem
 from tribo.escaping import is_control
 from tribo.input_files import nests_too_deeply, read_input
 from tribo.limits import DEEPEST_NESTING, LARGEST_DESCRIPTION_BYTES, LARGEST_NUMBER, LONGEST_NAME, SMALLEST_NUMBER
+from tribo.nearest import did_you_mean
 from tribo.quantities import QUANTITIES, quantity_named
 from tribo.zeroing import zero_choice
 
@@ -44,6 +44,9 @@ Line = Annotated[str, AfterValidator(_on_one_line)]
 Name = Annotated[Line, AfterValidator(_fit_for_a_file_name)]
 
 
+_QUOTED_NUMBER = re.compile(r"([-+]?\d+(?:[.,]\d+)?)\s*[^\d]{0,10}")
+
+
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
@@ -64,6 +67,7 @@ class CampaignTable(_Strict):
     counterface: Line = ""
     nominal_area_mm2: Positive | None = None
     contact: Literal["sled", "pin_on_disc", "ball_on_disc", "ring_shear", "reciprocating", "rotary"] = "sled"
+    material_class: Literal["", "elastomer", "polymer", "metal", "ceramic", "lubricated", "granular"] = ""
     slider_mass_g: NotNegative = 0.0
     pull_speed_mm_s: Positive | None = None
     sign: Literal[1, -1] | None = None
@@ -74,6 +78,12 @@ class CampaignTable(_Strict):
     load_zero: Zero = ""
 
 
+def _a_fraction(given: Any) -> Any:
+    if isinstance(given, int | float) and not isinstance(given, bool) and 1 < given <= 100:
+        raise ValueError(f"must not be more than 1; {given:g} looks like percent: divide by 100?")
+    return given
+
+
 class PatternTable(_Strict):
     """[patterns.NAME]: geometry of one pattern, lengths in micrometre; one number is x and y alike."""
 
@@ -82,7 +92,7 @@ class PatternTable(_Strict):
     size_um: Positive | list[Positive] | None = None
     pitch_um: Positive | list[Positive] | None = None
     staggered: bool = False
-    area_fraction: Annotated[float, Field(gt=0, le=1)] | None = None
+    area_fraction: Annotated[float, BeforeValidator(_a_fraction), Field(gt=0, le=1)] | None = None
 
     @property
     def size(self) -> tuple[float, float] | None:
@@ -134,6 +144,29 @@ class InstrumentTable(_Strict):
     sampling_rate_Hz: Positive | None = None
 
 
+def _low_and_high(given: list[float]) -> list[float]:
+    if len(given) != 2 or not given[0] < given[1]:
+        raise ValueError("must be [lowest, highest]")
+    return given
+
+
+Range = Annotated[list[float], AfterValidator(_low_and_high)]
+
+
+class PlausibleTable(_Strict):
+    """[plausible]: bounds outside which a number is doubtful, in place of those of the material class."""
+
+    mu: Range | None = None
+    friction_ratio: Range | None = None
+    tau0_kPa: Range | None = None
+    pressure_kPa: Range | None = None
+    speed_mm_s: Range | None = None
+    area_mm2: Range | None = None
+    mass_g: Range | None = None
+    temperature_C: Range | None = None
+    humidity_pct: Range | None = None
+
+
 Stated = dict[str, str | list[str] | dict[str, str | list[str]]]
 
 
@@ -144,8 +177,7 @@ def _only_quantities(columns: Stated) -> Stated:
         if isinstance(value, dict):
             _only_quantities(dict(value))
         elif key not in ("ignore", "decimal") and quantity_named(key) is None:
-            near = difflib.get_close_matches(key, names, 1)
-            hint = f"did you mean {near[0]}?" if near else f"known quantities: {', '.join(names)}"
+            hint = did_you_mean(key, names) or f"known quantities: {', '.join(names)}"
             raise ValueError(f"{key} is not a known quantity; {hint}")
         elif key != "ignore" and not isinstance(value, str):
             raise ValueError(f"{key} must be one column, not a list; only ignore takes a list")
@@ -161,6 +193,7 @@ class CampaignFile(_Strict):
     patterns: Annotated[dict[Name, PatternTable], Field(min_length=1)]
     columns: Annotated[Stated, AfterValidator(_only_quantities)] = {}
     instrument: InstrumentTable = InstrumentTable()
+    plausible: PlausibleTable = PlausibleTable()
 
 
 def _pair(value: float | list[float] | None) -> tuple[float, float] | None:
@@ -190,12 +223,27 @@ def read_description(path: Path, file: str, problems: list[Problem]) -> Campaign
     except tomllib.TOMLDecodeError as why:
         row_said = re.search(r"line (\d+)", str(why))
         row = int(row_said.group(1)) if row_said else text.count("\n") + 1
-        problems.append(Problem("not_toml", f"not valid TOML: {why}", file=file, row=row))
+        problems.append(_not_toml(str(why), text, file, row))
     except ValidationError as why:
         problems.extend(_problem(error, text, file) for error in why.errors(include_url=False))
     except ValueError as why:  # a whole number of more digits than Python converts
         problems.append(Problem("not_toml", f"not valid TOML: {why}", file=file))
     return None
+
+
+def _not_toml(why: str, text: str, file: str, row: int) -> Problem:
+    """A line that is not TOML, with what it may mean: a decimal comma, a text or a unit without quotation marks."""
+    line = [*text.split("\n"), ""][row - 1].strip()
+    key, _, value = (part.strip() for part in line.partition("="))
+    number = re.match(r"([-+]?\d+)(?:,(\d+))?\s*(\S.*)?$", value)
+    meant = None
+    if number and number[2]:
+        meant = f"a decimal point: did you mean {key} = {number[1]}.{number[2]}?"
+    elif number and number[3]:
+        meant = f"a number without its unit: did you mean {key} = {number[1]}?"
+    elif key and re.match(r"[^\W\d]", value) and not value.startswith(("true", "false", "inf", "nan")):
+        meant = f'a text in quotation marks: did you mean {key} = "{value}"?'
+    return Problem("not_toml", f"not valid TOML: {why}", file, row, None, line[:80] or None, meant)
 
 
 def _problem(error: Any, text: str, file: str) -> Problem:
@@ -205,13 +253,23 @@ def _problem(error: Any, text: str, file: str) -> Problem:
     found = None if error["type"] == "missing" else _shown(error["input"])
     if error["type"] == "extra_forbidden":
         allowed = _allowed_keys(path)
-        near = difflib.get_close_matches(path[-1], allowed, 1, 0.5)
-        hint = f"did you mean {near[0]}?" if near else ", ".join(allowed)
+        hint = did_you_mean(path[-1], allowed, 0.5) or ", ".join(allowed)
         return Problem("unknown_key", "unknown key", file, row, column, path[-1], hint)
     if error["type"] == "missing":
         return Problem("missing_key", "this required key is missing", file, row, column)
     what = error["msg"].removeprefix("Value error, ")
-    return Problem("wrong_value", what[:1].lower() + what[1:], file, row, column, found)
+    return Problem("wrong_value", what[:1].lower() + what[1:], file, row, column, found, _meant_value(error))
+
+
+def _meant_value(error: Any) -> str | None:
+    """The allowed values where pydantic knows them, or the number that a quoted text may mean."""
+    given, expected = error["input"], error.get("ctx", {}).get("expected")
+    if error["type"] == "literal_error" and isinstance(given, str):
+        return did_you_mean(given, re.findall(r"'([^']+)'", expected)) or expected
+    found = _QUOTED_NUMBER.fullmatch(given.strip()) if isinstance(given, str) else None
+    if found and error["type"] in ("float_type", "float_parsing", "int_type"):
+        return f"a number without quotation marks and unit: did you mean {found[1].replace(',', '.')}?"
+    return None
 
 
 def _is_branch(part: object) -> bool:
@@ -229,6 +287,7 @@ def _allowed_keys(path: Sequence[str]) -> list[str]:
         "campaign": CampaignTable,
         "patterns": PatternTable,
         "instrument": InstrumentTable,
+        "plausible": PlausibleTable,
     }
     table = CampaignFile if len(path) == 1 else tables[path[0]]
     return list(table.model_fields)

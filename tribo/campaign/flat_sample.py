@@ -19,7 +19,9 @@ def with_flat_sample(campaign: Campaign, wanted: str = "") -> Campaign:
     if not wanted or wanted == campaign.chosen_flat:
         return campaign
     if wanted not in campaign.flat_samples:
-        raise CampaignError(_problem(campaign, "not a measured flat sample", wanted))
+        measured = {test.sample for test in campaign.tests}
+        what = "this sample has cavities" if wanted in measured else "no test of this campaign has this sample"
+        raise CampaignError(replace(_problem(campaign, what, wanted), file="--flat", column=None))
     return replace(campaign, chosen_flat=wanted)
 
 

@@ -2,37 +2,39 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
-from tribo.campaign.choice import overlap, split_choice
-from tribo.campaign.dates import ALLOWED as ALLOWED_DATES, order_of, parsed
+from tribo.campaign.choice import overlap
+from tribo.campaign.dates import order_of, parsed
 from tribo.campaign.described import CampaignFile, PatternTable, read_description
-from tribo.campaign.numbers import load_faults, number, number_faults
-from tribo.campaign.stated import (
-    columns_by_file,
-    correction_of,
-    evaluated_forces,
-    force_faults,
-    has_forces,
-    stated_faults,
-)  # fmt: skip
-from tribo.campaign.table import COUNTS, KNOWN, LOADS, NUMBERS, ZEROS, TestRow, read_tests_table
-from tribo.errors import CampaignError, Problem, unexpected
+from tribo.campaign.numbers import number
+from tribo.campaign.row_faults import date_faults, export_of, pattern_of, relative_path, row_faults
+from tribo.campaign.stated import columns_by_file, correction_of, evaluated_forces
+from tribo.campaign.table import (
+    COUNTS,
+    KNOWN,
+    LOADS,
+    NUMBERS,
+    RAW,
+    TABLES,
+    TestRow,
+    read_tests_table,
+    tests_file,
+)
+from tribo.errors import CampaignError, Problem, system_problem
 from tribo.escaping import well_formed
 from tribo.input_files import hashes_of_reads
 from tribo.links import LEADS_OUT, leads_out, paths_below
 from tribo.records import NO_AREA_M2, STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
-from tribo.zeroing import ALLOWED, zero_choice
+from tribo.zeroing import zero_choice
 
 _NOT_WORTH_A_NOTE = (".", "~$", "Thumbs.db")
 TOML = "campaign.toml"
-TESTS = "tests.csv"
-RAW = "raw"
+TESTS = TABLES[0]
 _MM2, _GRAM, _MM, _UM = 1e-6, 1e-3, 1e-3, 1e-6
 _LOADS_AGREE = 0.05  # share by which normal_load_N may differ from the weight put on
 _NUMBER_ROW = re.compile(rb'^\s*"?[-+]?[.,]?\d+[.,\d]*"?\s*[,;\t|]', re.M)
@@ -56,19 +58,21 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
         files. Or one of the two files, or raw/, is a link that leads out of the folder.
     """
     root = Path(folder)
-    problems = [Problem("link", LEADS_OUT, file=name) for name in (TOML, TESTS, RAW) if leads_out(root, root / name)]
+    links = (TOML, *TABLES, RAW)
+    problems = [Problem("link", LEADS_OUT, file=name) for name in links if leads_out(root, root / name)]
     if problems:
         raise CampaignError(problems)
     with hashes_of_reads() as hashes:
         described = read_description(root / TOML, TOML, problems)
-        rows = read_tests_table(root / TESTS, TESTS, problems)
+        rows = _rows(root, problems)
     if described is None or rows is None:
         raise CampaignError(problems)
     patterns = {name: pattern_of_table(name, table) for name, table in described.patterns.items()}
     usable, set_aside = _sort_rows(root, rows, patterns, measured)
     problems += [p for s in set_aside for p in s.problems]
     if not usable:
-        nothing = Problem("no_usable_test", "no test of this campaign is usable", file=TESTS)
+        file = rows[0].file if rows else TESTS
+        nothing = Problem("no_usable_test", "no test of this campaign is usable", file=file)
         raise CampaignError([*problems, nothing])
     _require_area(described, usable)
     area_m2 = _area_m2(described)
@@ -78,6 +82,19 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     tests = tuple(_test(row, described, order, area_m2) for row in usable)
     campaign = _campaign(root, described, patterns, tests, set_aside, problems)
     return replace(campaign, inputs={Path(path).name: digest for path, digest in hashes.items()})
+
+
+def _rows(root: Path, problems: list[Problem]) -> list[TestRow] | None:
+    """The rows of the table of tests; None where it cannot be used, with every fault added to ``problems``."""
+    try:
+        file = tests_file(root)
+    except CampaignError as why:
+        problems += why.problems
+        return None
+    except OSError as why:
+        problems.append(system_problem(why, str(root)))
+        return None
+    return read_tests_table(root / file, file, problems)
 
 
 def _require_area(described: CampaignFile, rows: Sequence[TestRow]) -> None:
@@ -109,14 +126,16 @@ def _campaign(
     general = described.campaign
     columns, by_file = columns_by_file(described.columns)
     order = list(patterns)
-    names = sorted({t.sample for t in tests}, key=lambda n: (order.index(_pattern_of(n, patterns)), n))
+    names = sorted({t.sample for t in tests}, key=lambda n: (order.index(pattern_of(n, patterns)), n))
     return Campaign(
         title=general.title,
         root=root,
         nominal_area_m2=_area_m2(described),
         contact=general.contact,
+        material_class=general.material_class,
+        plausible={k: (v[0], v[1]) for k, v in described.plausible.model_dump(exclude_none=True).items()},
         tests=tests,
-        samples={name: patterns[_pattern_of(name, patterns)] for name in names},
+        samples={name: patterns[pattern_of(name, patterns)] for name in names},
         material=general.material,
         counterface=general.counterface,
         slider_mass_kg=general.slider_mass_g * _GRAM,
@@ -145,13 +164,6 @@ def pattern_of_table(name: str, table: PatternTable) -> Pattern:
     )
 
 
-def _pattern_of(sample: str, patterns: Mapping[str, Pattern]) -> str:
-    """Name of the pattern of a sample ("S" for "Sx"); "" where there is none."""
-    if sample in patterns:
-        return sample
-    return sample[:-1] if sample[-1:] in ("x", "y") and sample[:-1] in patterns else ""
-
-
 def _sort_rows(
     root: Path, rows: Sequence[TestRow], patterns: Mapping[str, Pattern], measured: bool
 ) -> tuple[list[TestRow], tuple[SetAside, ...]]:
@@ -160,7 +172,7 @@ def _sort_rows(
     users: dict[str, list[tuple[str, str]]] = {}
     for row in rows:
         places.setdefault(row.test_id, []).append(row.row)
-        path, choice = _export_of(row)
+        path, choice = export_of(row)
         users.setdefault(path, []).append((row.test_id, choice))
     recorded = not any(row.cells.get(column) for row in rows for column in LOADS)  # by all exports
     usable, set_aside = [], []
@@ -169,14 +181,14 @@ def _sort_rows(
         test_id = row.test_id
         if row.row != places[test_id][0]:
             continue
-        problems = _row_faults(root, row, patterns, measured, recorded) + _date_faults(row, order)
+        problems = row_faults(root, row, patterns, measured, recorded) + date_faults(row, order)
         if len(places[test_id]) > 1:
-            problems.append(_duplicate(test_id, places[test_id]))
-        path, choice = _export_of(row)
+            problems.append(_duplicate(row, places[test_id]))
+        path, choice = export_of(row)
         others = [other for other, theirs in users[path] if other != test_id and overlap(choice, theirs)]
         if others and path:
             what = f"this export is also given for {', '.join(others)}; none of these tests is used"
-            place = (TESTS, row.row, "file", row.cells["file"])
+            place = (row.file, row.row, "file", row.cells["file"])
             problems.append(Problem("duplicate_file", what, *place, "one export per test"))
         if problems:
             problems = [p.at(test_id=test_id) for p in problems]
@@ -188,100 +200,9 @@ def _sort_rows(
     return usable, tuple(set_aside)
 
 
-def _duplicate(test_id: str, rows: Sequence[int]) -> Problem:
+def _duplicate(row: TestRow, rows: Sequence[int]) -> Problem:
     what = f"this test_id occurs in rows {', '.join(map(str, rows))}; none of them is used"
-    return Problem("duplicate_row", what, TESTS, rows[1], "test_id", test_id, "one row per test")
-
-
-def _export_of(row: TestRow) -> tuple[str, str]:
-    """(path, choice within it) of the export a row names; the path as it stands where it leaves the campaign."""
-    path, choice = split_choice(row.cells.get("file", ""))
-    return str(_relative(path) or path) if path else "", choice
-
-
-def _row_faults(
-    root: Path, row: TestRow, patterns: Mapping[str, Pattern], measured: bool, recorded: bool
-) -> list[Problem]:
-    if row.fault is not None:
-        return [row.fault]
-    problems = []
-    if not row.cells["test_id"]:
-        problems.append(Problem("no_test_id", "test_id is missing", TESTS, row.row, "test_id"))
-    problems += _sample_faults(row, patterns)
-    problems += number_faults(row, TESTS) + _zero_faults(row)
-    problems += stated_faults(row, TESTS)
-    problems += load_faults(row, TESTS, load_in_export=measured and (recorded or bool(_export_of(row)[1])))
-    if has_forces(row):
-        return [*problems, *force_faults(row, TESTS)]
-    problems += [p for p in _file_faults(root, row) if measured or p.kind != "missing"]
-    return problems
-
-
-def _sample_faults(row: TestRow, patterns: Mapping[str, Pattern]) -> list[Problem]:
-    sample = row.cells["sample"]
-    if _pattern_of(sample, patterns):
-        return []
-    near = difflib.get_close_matches(sample, patterns, 1)
-    hint = f"; did you mean {near[0]}?" if near else ""
-    allowed = f"{', '.join(patterns)}, or one of these names followed by x or y{hint}"
-    return [Problem("unknown_sample", "no pattern has this name", TESTS, row.row, "sample", sample, allowed)]
-
-
-def _zero_faults(row: TestRow) -> list[Problem]:
-    problems = []
-    for column in ZEROS:
-        cell = row.cells.get(column, "")
-        try:
-            zero_choice(cell)
-        except ValueError:
-            problems.append(Problem("unknown_zero", "not a zero", TESTS, row.row, column, cell, ALLOWED))
-    return problems
-
-
-def _date_faults(row: TestRow, order: str) -> list[Problem]:
-    cell = row.cells.get("started_at", "")
-    if not cell or row.fault is not None:
-        return []
-    try:
-        parsed(cell, order)
-    except ValueError as why:
-        return [Problem("not_a_date", str(why), TESTS, row.row, "started_at", cell, ALLOWED_DATES)]
-    return []
-
-
-def _file_faults(root: Path, row: TestRow) -> list[Problem]:
-    name = row.cells.get("file", "")
-    place = (TESTS, row.row, "file", name)
-    path = _relative(name)
-    try:
-        if path is None or leads_out(root, root / path):
-            what = "the path leads outside the campaign"
-            return [Problem("path_outside_campaign", what, *place, "a path inside the campaign folder")]
-        if (root / path).is_file() or _is_in_a_zip(root, path):
-            return []
-        if (root / path).exists() and name:
-            return [Problem("not_a_file", "not a regular file", *place, "a file of the campaign")]
-        folder = (root / path).parent
-        beside = [p.name for p in folder.iterdir()] if folder.is_dir() else []
-    except (OSError, ValueError, RuntimeError) as why:  # too long, no permission, links in a circle
-        return [replace(unexpected(why, "this path cannot be followed"), file=TESTS, row=row.row, column="file")]
-    near = [n for n in beside if n.lower() == path.name.lower()]
-    near = near or difflib.get_close_matches(path.name, beside, 1, 0.9)
-    hint = f"a file of the campaign{f'; did you mean {near[0]}?' if near else ''}"
-    return [Problem("missing", "this file does not exist" if name else "no file is given", *place, hint)]
-
-
-def _is_in_a_zip(root: Path, path: PurePosixPath) -> bool:
-    """Whether a part of a path is a .zip of the campaign: the rest is an entry of it, which its reader looks for."""
-    return any(parent.suffix.lower() == ".zip" and (root / parent).is_file() for parent in path.parents)
-
-
-def _relative(name: str) -> PurePosixPath | None:
-    """A path inside the campaign, "/" between its parts, a choice such as "#2" dropped; None if it leaves it."""
-    path = PurePosixPath(split_choice(name)[0].replace("\\", "/"))
-    if path.is_absolute() or ".." in path.parts or "\0" in name or re.match(r"[A-Za-z]:", name):
-        return None
-    return path
+    return Problem("duplicate_row", what, row.file, rows[1], "test_id", row.test_id, "one row per test")
 
 
 def _test(row: TestRow, described: CampaignFile, order: str, area_m2: float) -> Test:
@@ -297,11 +218,12 @@ def _test(row: TestRow, described: CampaignFile, order: str, area_m2: float) -> 
         load = math.nan
     if load is None:
         load = ((numbers["mass_g"] or 0.0) + described.campaign.slider_mass_g) * _GRAM * STANDARD_GRAVITY
+    mass = numbers["mass_g"]
     sample = cells["sample"]
     directed = sample[-1:] if sample not in described.patterns else ""
     return Test(
         test_id=cells["test_id"],
-        file="#".join(part for part in _export_of(row) if part),
+        file="#".join(part for part in export_of(row) if part),
         sample=sample,
         normal_load_N=load,
         specimen=cells.get("specimen") or sample,
@@ -322,7 +244,15 @@ def _test(row: TestRow, described: CampaignFile, order: str, area_m2: float) -> 
         zero=zero_choice(cells.get("zero") or described.campaign.zero),
         load_zero=zero_choice(cells.get("load_zero") or described.campaign.load_zero),
         stiffness_N_per_m=numbers["stiffness_N_per_m"] or described.instrument.stiffness_N_per_m,
+        load_from=_load_from(numbers),
+        mass_kg=None if mass is None else mass * _GRAM,
     )
+
+
+def _load_from(numbers: Mapping[str, float | None]) -> str:
+    """The column that gives the load, the first of those that may: force, stress, mass."""
+    order = ("normal_load_N", "normal_stress_Pa", "mass_g")
+    return next((column for column in order if numbers[column] is not None), "")
 
 
 def _loads_disagree(row: TestRow, described: CampaignFile) -> Problem | None:
@@ -334,13 +264,13 @@ def _loads_disagree(row: TestRow, described: CampaignFile) -> Problem | None:
     if abs(weight / load - 1.0) < _LOADS_AGREE:
         return None
     what, found = "this load is used, although it differs from the weight of mass_g and slider", f"{load:g} N"
-    place = (TESTS, row.row, "normal_load_N", found, f"about {weight:.4g} N")
+    place = (row.file, row.row, "normal_load_N", found, f"about {weight:.4g} N")
     return Problem("loads_disagree", what, *place, test_id=row.test_id)
 
 
 def _unlisted(root: Path, rows: Sequence[TestRow]) -> list[Problem]:
     """Notes on files of raw/ that no row names."""
-    named = {str(_relative(row.cells.get("file", ""))) for row in rows}
+    named = {str(relative_path(row.cells.get("file", ""))) for row in rows}
     notes = []
     for path, outward in paths_below(root, RAW):
         name = path.relative_to(root).as_posix()

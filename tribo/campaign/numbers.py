@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 
 from tribo.campaign.table import COUNTS, LOADS, NUMBERS, TestRow
@@ -17,6 +18,8 @@ from tribo.limits import (
 )
 
 _NOT_NEGATIVE = ("speed_mm_s", "hold_s", "stiffness_N_per_m")
+_UNITS = {"g": "g", "N": "N", "Pa": "Pa", "s": "s", "C": "C", "pct": "%", "mm": "mm", "Hz": "Hz"}
+_WITH_UNIT = re.compile(r"([-+]?\d+(?:[.,]\d+)?)\s*([^\d\s.,+-][^\d]{0,9})?")
 _SMALL_OR_ZERO = ("mass_g", *_NOT_NEGATIVE)
 
 
@@ -42,7 +45,7 @@ def number_faults(row: TestRow, file: str) -> list[Problem]:
             value = number(row, column)
         except ValueError:
             kind = "load_not_a_number" if column in LOADS else "not_a_number"
-            problems.append(Problem(kind, "not a number", *at, column, cell, "a number"))
+            problems.append(Problem(kind, "not a number", *at, column, cell, _meant_number(row, column)))
             continue
         if value is None:
             continue
@@ -53,6 +56,22 @@ def number_faults(row: TestRow, file: str) -> list[Problem]:
         elif outside := _outside(column, value):
             problems.append(Problem("impossible_number", "not a possible value", *at, column, cell, outside))
     return problems
+
+
+def _meant_number(row: TestRow, column: str) -> str:
+    """What a cell that holds no number may mean: a number with its unit, or one with a decimal comma."""
+    cell, unit = row.cells[column], _UNITS.get(column.rpartition("_")[2], "")
+    found = _WITH_UNIT.fullmatch(cell)
+    if not found:
+        return "a number"
+    digits, given = found[1].replace(",", "."), found[2]
+    if not given:
+        return f"a number with a decimal point: did you mean {digits}?"
+    if not unit:
+        return f"a number without a unit: did you mean {digits}?"
+    if given.casefold() == unit.casefold():
+        return f"a number without its unit, which is in the name of the column: did you mean {digits}?"
+    return f"a number in {unit}, without the unit: convert {cell} to {unit}"
 
 
 def _outside(column: str, value: float) -> str:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from tribo.errors import CampaignError, Problem, system_problem
+from tribo.errors import CampaignError, Problem, ReadError, system_problem
 from tribo.escaping import is_control
 from tribo.input_files import read_input
 from tribo.limits import LARGEST_TABLE_BYTES, LONGEST_CELL, MOST_COLUMNS, MOST_TABLE_ROWS
+from tribo.nearest import nearest
+from tribo.sheets import OLD_EXCEL, ZIP, sheets_as_text
 
 REQUIRED = ("test_id", "file", "sample")
 LOADS = ("mass_g", "normal_load_N", "normal_stress_Pa")
@@ -27,6 +28,9 @@ COUNTS = ("repeat", "run_order", "specimen_run")
 TEXTS = ("specimen", "direction", "started_at", "operator", "exclude")
 ZEROS = ("zero", "load_zero")
 NAMES = ("test_id", "file", "sample", "specimen", "direction", "operator")  # on one line, without control characters
+RAW = "raw"
+TABLES = ("tests.csv", "tests.xlsx", "tests.ods", "tests.xls")
+_NAMES_OF_TESTS = ("tests", "test")
 KNOWN = (*REQUIRED, *NUMBERS, *COUNTS, *TEXTS, *ZEROS)
 
 
@@ -40,6 +44,7 @@ class TestRow:
     cells: Mapping[str, str]
     decimal_comma: bool
     fault: Problem | None = None
+    file: str = TABLES[0]
 
     @property
     def test_id(self) -> str:
@@ -55,13 +60,33 @@ class Table:
     rows: tuple[TestRow, ...]
 
 
+def tests_file(root: Path) -> str:
+    """Name of the table of tests in a campaign folder: tests.csv, or tests.xlsx or tests.ods where there is no .csv.
+
+    Raises
+    ------
+    CampaignError
+        There are two of them, so that it is not clear which one holds; or none.
+    """
+    there = [name for name in TABLES if (root / name).exists() or (root / name).is_symlink()]
+    if len(there) > 1:
+        what = "the tests are listed in more than one file; it is not clear which one is meant"
+        raise CampaignError(Problem("several_tables", what, file=there[0], found=", ".join(there), allowed="one file"))
+    if there:
+        return there[0]
+    beside = sorted(path.name for path in root.iterdir() if path.is_file() and path.name != "campaign.toml")
+    near = next((n for n in beside if n.partition(".")[0].casefold() in _NAMES_OF_TESTS), "") or nearest(
+        TABLES[0], beside, 0.75
+    )
+    hint = f"; rename {near}?" if near else ""
+    allowed = f"{TABLES[0]}, {' or '.join(TABLES[1:3])}{hint}"
+    raise CampaignError(Problem("missing_file", f"a campaign must contain {TABLES[0]}", TABLES[0], allowed=allowed))
+
+
 def read_tests_table(path: Path, file: str, problems: list[Problem]) -> list[TestRow] | None:
     """The rows of tests.csv; None where the table cannot be used, with every fault added to ``problems``."""
     try:
         table = read_table(path, file)
-    except FileNotFoundError:
-        problems.append(Problem("missing_file", f"a campaign must contain {file}", file=file))
-        return None
     except OSError as why:
         problems.append(system_problem(why, file))
         return None
@@ -77,7 +102,7 @@ def read_tests_table(path: Path, file: str, problems: list[Problem]) -> list[Tes
 
 
 def read_table(path: Path, file: str) -> Table | None:
-    """A delimited table of any encoding and delimiter; None where there is not even a header.
+    """A delimited table of any encoding and delimiter, or a sheet of a workbook; None where there is no header.
 
     Raises
     ------
@@ -86,13 +111,19 @@ def read_table(path: Path, file: str) -> Table | None:
     CampaignError
         The table has too many rows or columns, or a cell is too long to be one.
     """
-    text = _decoded(read_input(path, LARGEST_TABLE_BYTES))
+    raw = read_input(path, LARGEST_TABLE_BYTES)
+    is_workbook = raw[:4] in (ZIP, OLD_EXCEL)
+    text = _sheet_of_tests(raw, file) if is_workbook else _decoded(raw)
     lines = text.splitlines()
     first = next((k for k, line in enumerate(lines) if line.strip()), None)
     if first is None:
         return None
-    delimiter = max(",;\t|", key=lines[first].count)
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
+    delimiter = "\t" if is_workbook else max(",;\t|", key=lines[first].count)
+    lines_of_text = io.StringIO(text, newline="")
+    if is_workbook:
+        reader = csv.reader(lines_of_text, delimiter=delimiter, quoting=csv.QUOTE_NONE)
+    else:
+        reader = csv.reader(lines_of_text, delimiter=delimiter)
     names: list[str] = []
     header_row, rows = 0, []
     try:
@@ -109,6 +140,19 @@ def read_table(path: Path, file: str) -> Table | None:
     except csv.Error as why:
         raise CampaignError(_unreadable_cell(why, file, reader.line_num)) from why
     return Table(tuple(names), header_row, tuple(rows))
+
+
+def _sheet_of_tests(raw: bytes, file: str) -> str:
+    """The text of the only filled sheet of a workbook, or of the one called tests."""
+    try:
+        sheets = sheets_as_text(raw, file)
+    except ReadError as why:
+        raise CampaignError(why.problems) from None
+    named = [name for name in sheets if name.strip().casefold() in _NAMES_OF_TESTS]
+    if len(sheets) > 1 and len(named) != 1:
+        what, allowed = "several sheets of this workbook are filled", "one filled sheet, or one called tests"
+        raise CampaignError(Problem("several_sheets", what, file, found=", ".join(sheets), allowed=allowed))
+    return sheets[named[0]] if named else next(iter(sheets.values()))
 
 
 def _check_size(kind: str, found: int, most: int, what: str, file: str) -> None:
@@ -144,7 +188,7 @@ def _row(cells: list[str], names: list[str], row: int, delimiter: str, file: str
     given = dict(zip(names, cells, strict=False))
     fault = fault or next((f for name, cell in given.items() if (f := _cell_fault(name, cell, file, row))), None)
     fault = fault or _swallowed(given, delimiter, file, row)
-    return TestRow(row, given, delimiter != ",", fault)
+    return TestRow(row, given, delimiter != ",", fault, file)
 
 
 def _cell_fault(name: str, cell: str, file: str, row: int) -> Problem | None:
@@ -178,19 +222,23 @@ def _header_faults(names: list[str], file: str, row: int) -> list[Problem]:
     wanted = [n for n in REQUIRED if n not in names and not (forces and n == "file")]
     if not any(n in names for n in LOADS):
         wanted.append(" or ".join(LOADS[:2]))
-    for name in wanted:
-        near = difflib.get_close_matches(name.split(" or ")[0], unknown, 1)
-        found = f"{near[0]} (did you mean {name}?)" if near else ", ".join(names)
-        problems.append(Problem("missing_column", "this required column is missing", file, row, name, found))
+    problems += [_missing(name, unknown, names, file, row) for name in wanted]
     if not problems:
-        problems += [_resembling(n, names, file, row) for n in unknown if _near(n, names)]
+        problems += [_resembling(n, near, file, row) for n in unknown if (near := _near(n, names))]
     return problems
 
 
-def _near(name: str, names: list[str]) -> list[str]:
-    return difflib.get_close_matches(name, [n for n in KNOWN if n not in names], 1, 0.8)
+def _missing(name: str, unknown: list[str], names: list[str], file: str, row: int) -> Problem:
+    """A required column that is missing, with the column that may be meant: the same but for capitals, or similar."""
+    near = next(filter(None, (nearest(one, unknown) for one in name.split(" or "))), "")
+    meant = next((one for one in name.split(" or ") if near and nearest(near, [one])), name)
+    found = f"{near} (did you mean {meant}?)" if near else ", ".join(names)
+    return Problem("missing_column", "this required column is missing", file, row, name, found)
 
 
-def _resembling(name: str, names: list[str], file: str, row: int) -> Problem:
-    what = f"this column is kept as a covariate; did you mean {_near(name, names)[0]}?"
-    return Problem("resembles_a_column", what, file, row, name)
+def _near(name: str, names: list[str]) -> str:
+    return nearest(name, [n for n in KNOWN if n not in names], 0.8)
+
+
+def _resembling(name: str, near: str, file: str, row: int) -> Problem:
+    return Problem("resembles_a_column", f"this column is kept as a covariate; did you mean {near}?", file, row, name)

@@ -10,6 +10,7 @@ import click
 from tribo.cli.console import DONE, SOME_SET_ASIDE, Console, command_options
 from tribo.cli.given_paths import GivenPath
 from tribo.cli.output import FOLDER, FORCE
+from tribo.cli.study_options import RULE, WEIGHTS
 
 if TYPE_CHECKING:
     from tribo.pipeline.build import Built
@@ -24,7 +25,7 @@ KEEP = click.option(
 @click.command()
 @DROP
 @SITE
-@click.option("--dry-run", is_flag=True, help="List the steps and their reasons without running them.")
+@click.option("--dry-run", is_flag=True, help="Check the campaigns that are due and list the steps, without results.")
 @click.option(
     "--profile",
     default="local",
@@ -43,10 +44,8 @@ KEEP = click.option(
 )
 @FORCE
 @KEEP
-@click.option(
-    "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
-)
-@click.option("--weights", default="relative", show_default=True, help="Weights of the fit, as in tribo fit.")
+@RULE
+@WEIGHTS
 @click.option("--flat", default="", metavar="SAMPLE", help="Flat sample for the calibration, as in tribo report.")
 @click.option("--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulations per load.")
 @click.option("--scheduler", help="Address of a dask scheduler; its workers run the simulations.")
@@ -58,22 +57,34 @@ def build(console: Console, drop: Path, site: Path, dry_run: bool, **options: An
     index page lists all of them. If DROP holds NAME.overrides.csv, it is applied to campaign NAME. Exit status 75:
     another build of the site is running.
     """
-    from tribo.pipeline.build import BuildOptions, build_site
+    from tribo.cli.build_progress import build_progress
+    from tribo.pipeline.build import BuildOptions, Watch, build_site
 
-    built = build_site(drop, site, BuildOptions(**options), dry_run=dry_run)
-    console.result(built.as_dict(), _words(built, dry_run))
+    chosen = BuildOptions(**options)
+    if dry_run:
+        with console.progress() as checks:
+            built = build_site(drop, site, chosen, dry_run=True, watch=Watch(checks=checks))
+    else:
+        with build_progress(console) as steps:
+            built = build_site(drop, site, chosen, watch=Watch(steps=steps))
+    console.result(built.as_dict(), _words(built, dry_run, all_of_them=console.verbosity > 0))
     unusable = any(status == "unusable" for status in built.status.values())
     return SOME_SET_ASIDE if unusable or built.waiting else DONE
 
 
-def _words(built: Built, dry_run: bool) -> str:
+def _words(built: Built, dry_run: bool, *, all_of_them: bool) -> str:
     """What was built, or would be built, and why."""
+    from tribo.cli.dry_run_text import findings_text
+
     verb = "would build" if dry_run else "built"
     lines = [f"{verb} {name}: {why}" for name, why in built.due.items()]
     lines += [f"postponed to the next build: {name}: {'; '.join(why)}" for name, why in built.waiting.items()]
     lines += [f"unusable: {name}" for name, status in built.status.items() if status == "unusable"]
     if dry_run:
         lines += [f"  {step}" for step in built.steps]
+        for name, found in built.checked.items():
+            lines.append(f"checked {name}: {found.tests} tests can be used")
+            lines += [text for text in (findings_text(found, all_of_them=all_of_them),) if text]
     if not built.due:
         lines.append("no campaign changed" if built.steps else "nothing changed, nothing to build")
     if not dry_run:

@@ -9,6 +9,7 @@ import click
 
 from tribo import __version__
 from tribo.cli.build_commands import build, schedule
+from tribo.cli.compare_reports_command import compare_reports
 from tribo.cli.console import Console, command_options
 from tribo.cli.discover_command import discover
 from tribo.cli.given_paths import GivenPath
@@ -32,7 +33,7 @@ def main() -> None:
 
 
 for command in (
-    build, init, schedule, simulate, discover, ingest, fit, predict, compare, diagnose, report, demo,
+    build, init, schedule, simulate, discover, compare_reports, ingest, fit, predict, compare, diagnose, report, demo,
 ):  # fmt: skip
     main.add_command(command)
 

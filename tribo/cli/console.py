@@ -18,10 +18,11 @@ from typing import Any
 
 import click
 
+from tribo.cli.grouped_faults import doubts_text, faults_text, set_aside_text
 from tribo.cli.interruption import damage_said, ended_by_terminate
 from tribo.errors import Problem, TriboError, system_problem, unexpected
 from tribo.escaping import printable
-from tribo.records import SetAside
+from tribo.records import Doubt, SetAside
 from tribo.store.lock import BusyError
 
 DONE, UNUSABLE, SOME_SET_ASIDE = 0, 1, 3
@@ -42,10 +43,22 @@ class Console:
             click.echo(printable(text), err=True)
 
     def list_tests(self, what: str, tests: Sequence[SetAside], *, level: int = 0) -> None:
-        """The tests of one kind with their reasons, one line each; nothing where there are none."""
+        """The tests of one kind with their reasons, equal ones grouped; nothing where there are none."""
         if tests:
-            lines = "\n".join(f"  {test.test_id}: {test.reason}" for test in tests)
-            self.say(f"{len(tests)} tests {what}:\n{lines}", level=level)
+            lines = set_aside_text(tests, all_of_them=self.verbosity > 0)
+            self.say(f"{len(tests)} test{'s' if len(tests) != 1 else ''} {what}:\n{lines}", level=level)
+
+    def list_problems(self, problems: Sequence[Problem]) -> None:
+        """What stands in the way, equal ones grouped; shown even with -q, nothing where there is none."""
+        if problems:
+            lines = faults_text(problems, all_of_them=self.verbosity > 0)
+            self.say(f"{len(problems)} problem{'s' if len(problems) != 1 else ''}:\n{lines}", level=-1)
+
+    def list_doubts(self, doubts: Sequence[Doubt]) -> None:
+        """Numbers outside their broad physical bounds; shown even with -q, nothing where there are none."""
+        if doubts:
+            number = f"{len(doubts)} doubtful number{'s' if len(doubts) != 1 else ''}"
+            self.say(f"{number}:\n{doubts_text(doubts)}", level=-1)
 
     def result(self, record: dict[str, Any], text: str) -> None:
         """The result itself: JSON where asked for, else ``text``."""
@@ -139,11 +152,6 @@ def without_nan(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def faults_text(problems: Sequence[Problem]) -> str:
-    """All problems, one line each."""
-    return "\n".join(f"  {p.test_id + ': ' if p.test_id else ''}{p}" for p in problems)
-
-
 def set_aside_record(set_aside: Sequence[SetAside]) -> list[dict[str, Any]]:
     """The same for JSON, with every problem in full."""
     return [{"test_id": s.test_id, "reason": s.reason, "problems": [asdict(p) for p in s.problems]} for s in set_aside]
@@ -191,7 +199,7 @@ def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
 
 def _report_faults(console: Console, why: Exception) -> None:
     problems = problems_of(why)
-    console.say(f"{len(problems)} problem{'s' if len(problems) != 1 else ''}:\n{faults_text(problems)}", level=-1)
+    console.list_problems(problems)
     if console.as_json:
         click.echo(json.dumps({"problems": [asdict(p) for p in problems]}, indent=1, default=str))
 

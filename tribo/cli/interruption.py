@@ -30,10 +30,15 @@ def damage_said(say: Callable[[str], None]) -> Iterator[None]:
 
 @contextmanager
 def ended_by_terminate() -> Iterator[None]:
-    """Let SIGTERM end the command as Ctrl-C does, so that nothing is left half written."""
+    """Let SIGTERM end the command as Ctrl-C does, so that nothing is left half written.
+
+    Further ones are ignored: a build and Snakemake both ask a step to end, and the second request must not interrupt
+    the removal of unfinished files.
+    """
     process = os.getpid()
 
     def interrupt(number: int, _: Any) -> None:
+        signal.signal(number, signal.SIG_IGN)
         if os.getpid() != process:  # a forked worker tidies up and ends; the command speaks for all
             raise SystemExit(128 + number)
         raise KeyboardInterrupt

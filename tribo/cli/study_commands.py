@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tribo.cli.console import Console, command_options, set_aside_record, status_of
+from tribo.cli.console import UNUSABLE, Console, command_options, set_aside_record, status_of
 from tribo.cli.given_paths import GivenPath
 from tribo.cli.output import Output, output_options
 from tribo.cli.reading_options import reading_options, with_reading_options
@@ -30,7 +31,8 @@ if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
     from tribo.diagnose.diagnosis_record import Alone
     from tribo.diagnose.verdict import Verdict
-    from tribo.records import Study
+    from tribo.dry_run import Until as DryUntil
+    from tribo.records import Campaign, Study
     from tribo.report.card import Card
     from tribo.stages import Progress, StudyOptions, Until
 
@@ -129,12 +131,14 @@ def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **opti
 @ZEROS[0]
 @ZEROS[1]
 @OVERRIDES
+@DRY_RUN
 @command_options
 def diagnose(
     console: Console,
     campaign: Path | None,
     out: Output,
     published: str | None,
+    dry_run: bool,
     columns: str,
     stated: dict[str, float],
     **options: Any,
@@ -157,8 +161,10 @@ def diagnose(
     from tribo.report.words.verdict_text import verdict_text
     from tribo.store.kept_results import Shelf
 
+    chosen = stages.StudyOptions(kept=out.kept, **options)
+    if dry_run:
+        return _checked(console, campaign, out, "diagnose", chosen, lambda c: with_reading_options(c, columns, stated))
     with out.taken(campaign), open_campaign(campaign) as opened, console.progress() as progress:
-        chosen = stages.StudyOptions(kept=out.kept, **options)
         stated_so = with_reading_options(opened, columns, stated)
         until: Until = "compare" if stages.without_model(stated_so, chosen) else "ingest"
         study = stages.study(stated_so, chosen, until=until, progress=progress)
@@ -168,6 +174,7 @@ def diagnose(
         card = card_of(stages.with_fits(study), verdict.as_dict())
         write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found, card)
     console.result(verdict.as_dict() | {"card": card.as_dict()}, f"{card_text(card)}\n\n{verdict_text(verdict)}")
+    console.list_doubts(study.doubts)
     console.list_tests("set aside", study.ingested.set_aside, level=-1)
     return status_of(study.ingested.set_aside)
 
@@ -233,11 +240,7 @@ def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool
     stated = options.pop("stated")
     chosen = stages.StudyOptions(kept=out.kept, **options)
     if dry_run:
-        out.check(path)
-        with open_campaign(path) as described:
-            planned = stages.plan(with_reading_options(described, columns, stated), chosen, until)
-            console.result(planned, _plan_text(planned, out.path))
-            return status_of(described.set_aside)
+        return _checked(console, path, out, until, chosen, lambda c: with_reading_options(c, columns, stated))
     with out.taken(path), open_campaign(path) as described, console.progress() as progress:
         study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
         study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
@@ -302,6 +305,7 @@ def _conclude(
         "used_with_doubts": set_aside_record(doubts),
         "problems": [asdict(p) for p in study.ingested.campaign.problems],
         "notes": list(study.notes),
+        "doubts": [asdict(doubt) for doubt in study.doubts],
         "fits": fits.where(fits.notna(), None).to_dict("records"),
         "power": list(study.power),
         "outlying": list(study.outlying),
@@ -314,6 +318,7 @@ def _conclude(
     looks = ["\n".join(lines) for lines in (study.power, study.outlying) if lines]
     said = [verdict_text(verdict)] if verdict else []
     console.result(record, "\n\n".join([*words, summary_text(study), *said, *looks]))
+    console.list_doubts(study.doubts)
     for note in study.notes:
         console.say(f"note: {note}", level=-1)
     console.list_tests("set aside", set_aside, level=-1)
@@ -321,6 +326,23 @@ def _conclude(
     return status_of(set_aside)
 
 
-def _plan_text(planned: dict[str, Any], out: Path) -> str:
-    lines = [f"would {step}" for step in planned["steps"]]
-    return "\n".join([*lines, f"would write into {out}", *(f"set aside: {s}" for s in planned["set_aside"])])
+def _checked(
+    console: Console, path: Path, out: Output, until: DryUntil, chosen: StudyOptions,
+    prepared: Callable[[Campaign], Campaign],
+) -> int:  # fmt: skip
+    """Print everything that a study of a campaign would meet, and the status it would end with."""
+    from dataclasses import replace
+
+    from tribo.cli.dry_run_text import dry_run_text
+    from tribo.dry_run import check
+    from tribo.errors import TriboError
+
+    with console.progress() as progress:
+        found = check(path, chosen, until, prepared, progress)
+    try:
+        out.check(path)
+    except TriboError as why:
+        found = replace(found, faults=(*why.problems, *found.faults))
+    console.result(found.as_record(), dry_run_text(found, out.path, all_of_them=console.verbosity > 0))
+    console.list_problems(found.faults)
+    return UNUSABLE if found.faults else status_of(found.set_aside)

@@ -15,10 +15,18 @@ from tribo.cli.reading_options import reading_options
 CAMPAIGN = click.argument("campaign", type=GivenPath())
 OUT = output_options()
 SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler; its workers run the simulations.")
-DRY_RUN = click.option("--dry-run", is_flag=True, help="List the steps without running them.")
+DRY_RUN = click.option("--dry-run", is_flag=True, help="Check everything and list the steps, without results.")
 
 RULE = click.option(
     "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
+)
+WEIGHTS = click.option(
+    "--weights",
+    type=click.Choice(["relative", "ratio", "force", "repeats"]),
+    default="relative",
+    show_default=True,
+    help="Scatter assumed equal at all loads: of T in percent (relative), of T/N (ratio) or of T (force); or "
+    "estimated from repeated tests (repeats).",
 )
 LAWS = click.option(
     "--laws", type=click.Path(exists=True, file_okay=False, path_type=Path), metavar="DIR",
@@ -75,14 +83,7 @@ def fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
         *ZEROS,
         OVERRIDES,
         RULE,
-        click.option(
-            "--weights",
-            type=click.Choice(["relative", "ratio", "force", "repeats"]),
-            default="relative",
-            show_default=True,
-            help="Scatter assumed equal at all loads: of T in percent (relative), of T/N (ratio) or of T (force); or "
-            "estimated from repeated tests (repeats).",
-        ),
+        WEIGHTS,
     ):
         function = option(function)
     return function

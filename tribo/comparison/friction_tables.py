@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pandas as pd
 
 from tribo.comparison.study_lookup import sample_numbers
 from tribo.fitting.dependence import LABELS, measured_points, variables_of
-from tribo.records import Study
+from tribo.fitting.law_choice import force_N
+from tribo.fitting.load_levels import meant_to_be_one
+from tribo.records import REGIMES, Study
 
 POINTS_COLUMNS = [
     "sample_number", "sample", "regime", "test_id", "variable", "label", "value", "T_over_N", "T_over_N_u",
@@ -17,6 +21,8 @@ OSCILLATION_COLUMNS = [
     "sample_number", "sample", "test_id", "regime", "variable", "label", "value", "quantity", "y", "y_u",
 ]  # fmt: skip
 RESTART_COLUMNS = ["sample_number", "sample", "test_id", "hold_s", "T_over_N", "T_over_N_u"]
+FORCE_COLUMNS = ["sample_number", "sample", "regime", "mark", "normal_load_N", "T_N"]
+_LAW_POINTS = 80
 _MOST_VARIABLES = 8
 _RECORD_POINTS = 80
 _MOST_RECORDS = 60
@@ -40,6 +46,27 @@ def dependence_points(study: Study) -> pd.DataFrame:
     table = pd.concat(frames, ignore_index=True)
     table = table[np.isfinite(table["value"])]
     return table.assign(sample_number=table["sample"].map(order))[POINTS_COLUMNS]
+
+
+def law_points(study: Study) -> pd.DataFrame:
+    """T of every test against its load, and the law chosen for each sample and regime; nothing at a single load."""
+    order, laws = sample_numbers(study), study.laws
+    frames: list[pd.DataFrame] = []
+    table = study.ingested.table()
+    several = shown(study) and not meant_to_be_one(table["normal_load_N"].to_numpy(float))
+    for (sample, number), regime in product(order.items(), REGIMES) if several else ():
+        part = table[(table["sample"] == sample) & np.isfinite(table[f"{regime}_N"]) & (table["normal_load_N"] > 0)]
+        said = {"sample_number": number, "sample": sample, "regime": regime}
+        load = part["normal_load_N"].to_numpy(float)
+        frames.append(pd.DataFrame({**said, "mark": "measured", "normal_load_N": load, "T_N": part[f"{regime}_N"]}))
+        own = None if laws is None else laws[(laws["sample"] == sample) & (laws["regime"] == regime) & laws["chosen"]]
+        if own is not None and len(own) and len(load):
+            law = own.iloc[0]
+            grid = np.geomspace(load.min(), load.max(), _LAW_POINTS)
+            force = force_N(str(law["law"]), float(law["a"]), float(law["b"]), grid)
+            frames.append(pd.DataFrame({**said, "mark": str(law["formula"]), "normal_load_N": grid, "T_N": force}))
+    there = [frame for frame in frames if len(frame)]
+    return pd.concat(there, ignore_index=True) if there else pd.DataFrame(columns=FORCE_COLUMNS)
 
 
 def within_records(study: Study) -> pd.DataFrame:

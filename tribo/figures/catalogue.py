@@ -102,6 +102,14 @@ FRICTION_FIGURES: dict[str, StudyFigure] = {
     figure.name: figure
     for figure in (
         StudyFigure(
+            "forces",
+            "Friction force against load",
+            "Friction force of every test and the law chosen for each sample by loads left out of the fit. Both axes "
+            "are logarithmic where the forces span more than a decade: a power law is then a straight line.",
+            friction_tables.law_points,
+            friction_panels.draw_forces,
+        ),
+        StudyFigure(
             "dependence",
             "T/N against recorded variables",
             "T/N of every test against each recorded variable that varies, with the standard uncertainty of the "

@@ -34,6 +34,36 @@ def draw_dependence(numbers: pd.DataFrame) -> Figure:
 
 
 @style.in_house_style
+def draw_forces(numbers: pd.DataFrame) -> Figure:
+    """One panel per regime: measured forces as marks, the law of each sample as a line."""
+    regimes = list(dict.fromkeys(numbers["regime"]))
+    figure, axes = style.panel_grid(len(regimes), 70, columns=len(regimes))
+    for ax, regime in zip(axes, regimes, strict=True):
+        part = numbers[numbers["regime"] == regime]
+        for number, points in style.by_sample(part):
+            mark = style.sample_mark(number)
+            measured = points[points["mark"] == "measured"]
+            load, force = measured["normal_load_N"], measured["T_N"]
+            ax.plot(load, force, mark.marker, ms=3, color=mark.colour, mfc="none", mew=0.6)
+            for formula, line in points[points["mark"] != "measured"].groupby("mark"):
+                ax.plot(line["normal_load_N"], line["T_N"], color=mark.colour, lw=1.1)
+                end = line.iloc[-1]
+                ax.annotate(str(formula), (end["normal_load_N"], end["T_N"]), textcoords="offset points",
+                            xytext=(-4, 6), ha="right", color=mark.colour, fontsize=7)  # fmt: skip
+        style.panel_title(ax, _sentence(f"{regime} friction"))
+        ax.set_xlabel("Normal load N (N)")
+        ax.set_ylabel("Friction force T (N)")
+        if _over_a_decade(part["T_N"]):
+            _spread(ax, part["normal_load_N"])
+            ax.set_yscale("log")
+            style.plain_log_axis(ax.yaxis, part["T_N"])
+        else:  # from zero, so that what does not depend on the load is seen
+            ax.set(xlim=(0.0, None), ylim=(0.0, None))
+    style.legend_below(figure, _samples(numbers), columns=8)
+    return figure
+
+
+@style.in_house_style
 def draw_records(numbers: pd.DataFrame) -> Figure:
     """One panel per sample, one line per record."""
     groups = style.by_sample(numbers)
@@ -88,9 +118,13 @@ def draw_restarts(numbers: pd.DataFrame) -> Figure:
     return figure
 
 
+def _over_a_decade(values: pd.Series) -> bool:
+    return float(values.min()) > 0 and float(values.max()) > 10 * float(values.min())
+
+
 def _spread(ax: Axes, values: pd.Series) -> None:
     """A logarithmic axis for positive values over more than a decade."""
-    if float(values.min()) > 0 and float(values.max()) > 10 * float(values.min()):
+    if _over_a_decade(values):
         ax.set_xscale("log")
         style.plain_log_axis(ax.xaxis, values)
 

@@ -54,6 +54,15 @@ CANDIDATES = (
 )
 
 
+def force_N(law: str, a: float, b: float, load_N: FloatArray) -> FloatArray:
+    """T of a candidate by its name and parameters, N; loads (n,) in N."""
+    if law == "power":
+        return np.asarray(a * load_N**b)
+    candidate = next(c for c in CANDIDATES if c.name == law)
+    values = (a, b)[: len(candidate.powers)]
+    return np.asarray(sum(value * load_N**power for value, power in zip(values, candidate.powers, strict=True)))
+
+
 @dataclass(frozen=True)
 class Fitted:
     """A candidate fitted: values and standard uncertainties of its parameters, and its force at loads."""

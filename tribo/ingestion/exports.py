@@ -152,7 +152,17 @@ def _off_speed(trace: Trace, pull: Pull, test: Test) -> Problem | None:
     if time_s <= 0 or abs(travel_m / time_s / test.speed_m_s - 1.0) < _OFF_SPEED:
         return None
     what, found = "the displacement does not match the speed of the test", f"{travel_m / time_s * 1e3:.4g} mm/s"
-    return Problem("off_speed", what, trace.file, None, "displacement", found, f"{test.speed_m_s * 1e3:.4g} mm/s")
+    stated = f"{test.speed_m_s * 1e3:.4g} mm/s"
+    slip = _unit_of_speed(test.speed_m_s * time_s / travel_m) if travel_m > 0 else ""
+    allowed = f"{stated}; {slip}" if slip else stated
+    return Problem("off_speed", what, trace.file, None, "displacement", found, allowed)
+
+
+def _unit_of_speed(factor: float) -> str:
+    """The unit that the stated speed may be in, as a question; ``factor`` is stated over recorded."""
+    units = {60.0: "mm/min: divide by 60", 1e3: "um/s: divide by 1000", 1e-3: "m/s: multiply by 1000"}
+    found = [words for times, words in units.items() if abs(factor / times - 1.0) < _OFF_SPEED]
+    return f"does speed_mm_s hold {found[0]}?" if found else ""
 
 
 def _carry_load(pieces: Sequence[Trace]) -> list[bool]:

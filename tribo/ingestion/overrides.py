@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -14,6 +13,7 @@ from tribo.campaign.table import Table, TestRow, read_table
 from tribo.errors import CampaignError, Problem, TraceError, system_problem, unexpected
 from tribo.input_files import hashes_of_reads
 from tribo.links import LEADS_OUT, leads_out
+from tribo.nearest import did_you_mean
 from tribo.records import ByHand, Ingested, Override, Pull, SetAside, Trace
 
 TIMES = ("window_start_s", "window_end_s", "peak_s")
@@ -131,7 +131,8 @@ def _header_faults(table: Table, file: str) -> Iterator[Problem]:
                           ", ".join(table.names))  # fmt: skip
     for name in dict.fromkeys(table.names):
         if name not in COLUMNS:
-            yield Problem("unknown_column", "unknown column", file, table.header_row, name, name, ", ".join(COLUMNS))
+            yield Problem("unknown_column", "unknown column", file, table.header_row, name, name,
+                          did_you_mean(name, COLUMNS) or ", ".join(COLUMNS))  # fmt: skip
         elif table.names.count(name) > 1:
             yield Problem("duplicate_column", "this column occurs twice", file, table.header_row, name)
 
@@ -148,11 +149,11 @@ def _repeated(table: Table, file: str) -> Iterator[Problem]:
 def _row_faults(row: TestRow, file: str, known: Mapping[str, Trace | None]) -> Iterator[Problem]:
     test_id, action = row.cells.get("test_id", ""), row.cells.get("action", "")
     if test_id not in known:
-        near = difflib.get_close_matches(test_id, known, 1, 0.5)
-        hint = f"a test of this campaign{f'; did you mean {near[0]}?' if near else ''}"
+        hint = "; ".join(filter(None, ("a test of this campaign", did_you_mean(test_id, known, 0.5))))
         yield Problem("unknown_test", "no test has this test_id", file, row.row, "test_id", test_id, hint)
     if action not in ACTIONS:
-        yield Problem("unknown_action", "unknown action", file, row.row, "action", action, " or ".join(ACTIONS))
+        hint = did_you_mean(action, ACTIONS) or " or ".join(ACTIONS)
+        yield Problem("unknown_action", "unknown action", file, row.row, "action", action, hint)
     times, faults = _times(row, file)
     yield from faults
     if action == "exclude":

@@ -8,30 +8,32 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from tribo.dry_run import Checked, check
 from tribo.errors import CampaignError, Problem, TriboError, unexpected
 from tribo.escaping import well_formed
 from tribo.pipeline.dated_copies import CURRENT, clear_unfinished, date_build
+from tribo.pipeline.live import Progress
 from tribo.pipeline.scan import Dropped, difference, scan
 from tribo.pipeline.step_record import OF_A_REPORT, read_record
+from tribo.pipeline.workflow_run import run_workflow
+from tribo.stages import StudyOptions, Weights
 from tribo.store.kept_results import package_sources
 from tribo.store.lock import WAIT, only_writer
 from tribo.store.own_folder import STATE, check_site, is_leftover
 from tribo.store.whole_files import write_text
+from tribo.traces.pull import named_rule
 
 GONE = "report.html has been deleted"
-END_S = 60.0  # how long the steps of an interrupted build may take to end
 PROFILES = ("local", "slurm")
 _BLOCKS = re.compile(r"(?m)^(?=\[|\s*$)")  # Snakemake says one thing after a blank line or a date in brackets
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -46,7 +48,7 @@ class BuildOptions:
     """What a build may choose: ``settle_s`` is how long a file must rest, ``keep`` how many dated copies stay."""
 
     rule: str = "seed"
-    weights: str = "relative"
+    weights: Weights = "relative"
     flat: str = ""  # as --flat of the commands
     runs: int = 4
     seed: int = 0
@@ -68,6 +70,24 @@ class BuildOptions:
         parts = {"fit": fit, "model": [*model, *where], "diagnose": diagnosis, "words": model}
         return {name: shlex.join(words) for name, words in parts.items()}
 
+    def of_study(self, overrides: Path | None) -> StudyOptions:
+        """The same as options of a study of one campaign."""
+        return StudyOptions(
+            rule=self.rule, weights=self.weights, flat=self.flat, runs=self.runs, seed=self.seed, jobs=self.jobs,
+            overrides=overrides,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Watch:
+    """What is told of a build while it works: ``steps`` how far it is, ``checks`` the exports read by a dry run."""
+
+    steps: Callable[[Progress], None] = lambda progress: None
+    checks: Callable[[str, int, int], None] = lambda stage, done, total: None
+
+
+UNWATCHED = Watch()
+
 
 @dataclass(frozen=True)
 class Built:
@@ -79,12 +99,14 @@ class Built:
     status: Mapping[str, str] = field(default_factory=dict)
     steps: tuple[str, ...] = ()
     dated: Path | None = None
+    checked: Mapping[str, Checked] = field(default_factory=dict)  # of a dry run: what each campaign would meet
 
     def as_dict(self) -> dict[str, Any]:
         """The same as plain types."""
         return {
             "site": str(self.site), "due": dict(self.due), "waiting": {k: list(v) for k, v in self.waiting.items()},
             "status": dict(self.status), "steps": list(self.steps), "dated": str(self.dated) if self.dated else None,
+            "checked": {name: found.as_record() for name, found in self.checked.items()},
         }  # fmt: skip
 
 
@@ -96,8 +118,12 @@ def workflow_dir() -> Path:
     raise BuildError(Problem("missing_workflow", "this installation lacks pipelines/Snakefile; install tribo again"))
 
 
-def build_site(drop: Path, site: Path, options: BuildOptions, *, dry_run: bool = False) -> Built:
-    """Bring the site up to date with a folder of campaigns; with ``dry_run`` only list the steps and reasons.
+def build_site(
+    drop: Path, site: Path, options: BuildOptions, *, dry_run: bool = False, watch: Watch = UNWATCHED
+) -> Built:
+    """Bring the site up to date with a folder of campaigns; with ``dry_run`` only check what would be built.
+
+    A dry run lists the steps with their reasons, and opens every export of the campaigns that are due.
 
     Raises
     ------
@@ -105,20 +131,23 @@ def build_site(drop: Path, site: Path, options: BuildOptions, *, dry_run: bool =
         Another build of this site is running.
     CampaignError
         The drop folder cannot be used; the site is, holds or lies in it, or holds files that tribo has not written.
+    TraceError
+        The rule is not known.
     BuildError
         Snakemake is missing, or a step failed other than by unusable input; everything else is built.
     """
     if find_spec("snakemake") is None:
         what, allowed = "tribo build requires snakemake", "pip install 'tribo[pipelines]'"
         raise BuildError(Problem("missing_package", what, allowed=allowed))
+    named_rule(options.rule, None)
     check_site(site, drop, options.force)
     state = site.resolve() / STATE
     if dry_run:
-        return _built(drop, state, options, dry_run=True, descriptor=None)
+        return _planned(drop, state, options, watch)
     busy = Problem("busy", f"another build of this site is running; {WAIT}", file=str(site))
     with only_writer(state / "lock", options.wait_s, lasting=True, busy=busy) as descriptor:
         _clear_leftovers(state)
-        return _built(drop, state, options, dry_run=False, descriptor=descriptor)
+        return _built(drop, state, options, watch, descriptor)
 
 
 def _clear_leftovers(state: Path) -> None:
@@ -130,26 +159,48 @@ def _clear_leftovers(state: Path) -> None:
     clear_unfinished(site)
 
 
-def _built(drop: Path, state: Path, options: BuildOptions, *, dry_run: bool, descriptor: int | None) -> Built:
+def _planned(drop: Path, state: Path, options: BuildOptions, watch: Watch) -> Built:
+    """What a build would do, and what it would meet in the campaigns that are due."""
+    found, due = _due(drop, state, options)
+    config = _configuration(found, state / "dry-run", state, options)
+    said = _snakemake(state, config, options, ("--dry-run", *_forced(due, state)), None, UNWATCHED)
+    if said.returncode:
+        raise BuildError(_failures(state, said.stdout))
+    checked = {c.name: _checked(c, options, watch) for c in found if c.name in due}
+    status = {c.name: "unusable" if c.refused else _status(c.name, state) for c in found if c.name not in due}
+    status |= {name: "unusable" if look.faults else "to be built" for name, look in checked.items()}
+    return Built(
+        state.parent, due, _waiting(found), status, tuple(planned_steps(said.stdout)), checked=checked
+    )  # fmt: skip
+
+
+def _checked(campaign: Dropped, options: BuildOptions, watch: Watch) -> Checked:
+    def progress(stage: str, done: int, total: int) -> None:
+        watch.checks(f"{campaign.name}: {stage}", done, total)
+
+    return check(campaign.path, options.of_study(campaign.overrides), "report", progress=progress)
+
+
+def _due(drop: Path, state: Path, options: BuildOptions) -> tuple[tuple[Dropped, ...], dict[str, str]]:
+    """The campaigns of a drop folder, and which of them are to be built and why."""
     found = scan(drop.resolve(), options.settle_s)
-    due = {c.name: why for c in found if c.is_ready and (why := _why_due(c, state, options))}
-    waiting = {c.name: c.waiting for c in found if c.waiting}
-    target = state / ("dry-run" if dry_run else "inputs")
-    config = _configuration(found, target, state, options)
-    forced = _forced(due, state)
-    if dry_run:
-        said = _snakemake(state, config, options, ("--dry-run", *forced), None)
-        if said.returncode:
-            raise BuildError(_failures(state, said.stdout))
-        expected = {c.name: _expected_status(c, due, state) for c in found}
-        return Built(state.parent, due, waiting, expected, tuple(planned_steps(said.stdout)))
-    said = _snakemake(state, config, options, forced, descriptor)
+    return found, {c.name: why for c in found if c.is_ready and (why := _why_due(c, state, options))}
+
+
+def _waiting(found: Sequence[Dropped]) -> dict[str, tuple[str, ...]]:
+    return {c.name: c.waiting for c in found if c.waiting}
+
+
+def _built(drop: Path, state: Path, options: BuildOptions, watch: Watch, descriptor: int | None) -> Built:
+    found, due = _due(drop, state, options)
+    config = _configuration(found, state / "inputs", state, options)
+    said = _snakemake(state, config, options, _forced(due, state), descriptor, watch)
     write_text(state / "log" / "snakemake.log", said.stdout)
     dated = date_build(state.parent, options.keep)
     if said.returncode:
         raise BuildError(_failures(state, said.stdout))
     status = {c.name: "unusable" if c.refused else _status(c.name, state) for c in found}
-    return Built(state.parent, due, waiting, status, tuple(planned_steps(said.stdout)), dated)
+    return Built(state.parent, due, _waiting(found), status, tuple(planned_steps(said.stdout)), dated)
 
 
 def _why_due(campaign: Dropped, state: Path, options: BuildOptions) -> str:
@@ -245,7 +296,7 @@ def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
 
 
 def _snakemake(
-    state: Path, config: Path, options: BuildOptions, more: Sequence[str], descriptor: int | None
+    state: Path, config: Path, options: BuildOptions, more: Sequence[str], descriptor: int | None, watch: Watch
 ) -> subprocess.CompletedProcess[str]:
     """Run the workflow; the lock of the site is what keeps two apart, so that Snakemake needs none of its own.
 
@@ -258,36 +309,7 @@ def _snakemake(
         "--configfile", str(config), "--profile", str(profile.resolve()), "--workflow-profile", "none",
         "--cores", str(options.jobs), "--nolock", "--nocolor", *more,
     ]  # fmt: skip
-    (state / "log").mkdir(parents=True, exist_ok=True)
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
-        env={**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONSAFEPATH": "1"},
-        pass_fds=() if descriptor is None else (descriptor,),
-    )  # fmt: skip
-    try:
-        said, _ = process.communicate()
-    except BaseException:
-        _end(process)
-        raise
-    return subprocess.CompletedProcess(command, process.returncode, said)
-
-
-def _end(process: subprocess.Popen[str]) -> None:
-    """Ask the workflow and its steps to end, and wait for them, so that none writes on after the build."""
-    import psutil
-
-    try:
-        workflow = psutil.Process(process.pid)
-        everyone = [workflow, *workflow.children(recursive=True)]
-    except psutil.NoSuchProcess:
-        everyone = []
-    for each in everyone:
-        with suppress(psutil.NoSuchProcess):
-            each.terminate()
-    for each in psutil.wait_procs(everyone, timeout=END_S)[1]:
-        with suppress(psutil.NoSuchProcess):
-            each.kill()
-    process.communicate()
+    return run_workflow(command, state, descriptor, watch.steps)
 
 
 def planned_steps(said: str) -> list[str]:
@@ -316,19 +338,6 @@ def _plain_reason(reason: str) -> str:
     if reason.startswith("Input files updated by another job"):
         return "an earlier step runs again"
     return reason
-
-
-def _expected_status(campaign: Dropped, due: Mapping[str, str], state: Path) -> str:
-    """How a campaign stands after a build, as far as this is known before it: unusable where it cannot be opened."""
-    from tribo.campaign import open_campaign
-
-    if campaign.name not in due:
-        return _status(campaign.name, state)
-    try:
-        with open_campaign(campaign.path):
-            return "to be built"
-    except CampaignError:
-        return "unusable"
 
 
 def _status(name: str, state: Path) -> str:

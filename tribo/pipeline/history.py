@@ -113,7 +113,7 @@ def _state(name: str, record: Mapping[str, Any] | None, config: Mapping[str, Any
 
 def _next_test(card: Mapping[str, Any]) -> str:
     step = card.get("next_test")
-    return str(step.get("what") or "") if isinstance(step, dict) else ""
+    return str(step.get("line") or "") if isinstance(step, dict) else ""
 
 
 def _problem(problem: Any) -> str:

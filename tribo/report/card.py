@@ -38,11 +38,12 @@ class CardLaw:
 
 @dataclass(frozen=True)
 class NextStep:
-    """The next test: what, why, and how long it takes; ``hours`` is None where nobody can say."""
+    """The next test: what, why, and how long (``hours``, None where nobody can say); ``line`` says all of it."""
 
     what: str
     why: str
     hours: float | None
+    line: str
 
 
 @displayed(lambda card: card.counts)
@@ -52,7 +53,8 @@ class Card:
 
     ``sentence`` says what happens to friction, how much, where and what it is called; ``meanings`` are the names used
     in it, each with one sentence. ``used`` and ``set_aside``
-    count tests; ``specimens`` counts each one once, also if it was pulled in two directions.
+    count tests; ``specimens`` counts each one once, also if it was pulled in two directions. ``doubts`` are the numbers
+    outside their physical bounds, one sentence each.
     """
 
     sentence: str
@@ -66,6 +68,7 @@ class Card:
     uncertainty: str
     to_know: tuple[str, ...]
     next_test: NextStep | None
+    doubts: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """The card as plain types."""
@@ -90,6 +93,7 @@ def card_of(study: Study, verdict: Mapping[str, Any] | None) -> Card:
         uncertainty=uncertainty_kind(study),
         to_know=tuple(card_sentences.to_know(study, verdict)),
         next_test=_next(verdict),
+        doubts=tuple(map(str, study.doubts)),
     )
 
 
@@ -137,7 +141,8 @@ def _counts(study: Study, used: int, aside: int, specimens: int) -> str:
         f"{counted(len(levels), 'load')} from {significant(levels[0])} to {significant(levels[-1])} N" if used else ""
     )
     left_out = f"{counted(aside, 'test')} set aside" if aside else "no test set aside"
-    return f"{counted(used, 'test')} used, {left_out}; {where}{f'; {loads}' if loads else ''}."
+    doubts = f", {counted(len(study.doubts), 'doubtful number')}" if study.doubts else ""
+    return f"{counted(used, 'test')} used, {left_out}{doubts}; {where}{f'; {loads}' if loads else ''}."
 
 
 def _next(verdict: Mapping[str, Any] | None) -> NextStep | None:
@@ -145,4 +150,12 @@ def _next(verdict: Mapping[str, Any] | None) -> NextStep | None:
     if not found:
         return None
     hours = (found.get("design") or {}).get("hours")
-    return NextStep(str(found["text"]), card_sentences.why_next(verdict or {}), None if hours is None else float(hours))
+    what, why = str(found["text"]), card_sentences.why_next(verdict or {})
+    return NextStep(what, why, hours, f"{what.rstrip('.')}{_duration(hours)}: {why}.")
+
+
+def _duration(hours: float | None) -> str:
+    """ " (about 2.1 h)"; empty where nobody can say."""
+    if hours is None:
+        return ""
+    return f" (about {hours:.1f} h)" if hours >= 1 else f" (about {60 * hours:.0f} min)"

@@ -23,7 +23,8 @@ from tribo.report.words import wording
 from tribo.report.words.friction_words import friction_sentences
 from tribo.report.words.terminal_text import fit_cells
 
-LEAD_FIGURES = ("finding", "agreement", "fig4", "dependence")  # the first that there is shows what the card says
+# the first that there is shows what the card says
+LEAD_FIGURES = ("finding", "agreement", "forces", "fig4", "dependence")
 MISFIT_FIGURES = ("misfit", "residuals")
 CAUSE_FIGURES = ("law", "extended", "evidence")
 CALIBRATED = {  # of a block of the model: name and unit

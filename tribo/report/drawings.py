@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[str, int, int], None]
 Keep = Callable[[str, object, Callable[[], Any], Iterable[str]], Any]
+OF_STRAIGHT_LINES = ("fig4", "fig6", "fig7", "fig8")  # without the model, "forces" shows the law chosen by the data
 STAGE = "drawing figures"
 DRAWN_BY = ("figures", "report/drawings", "report/html/hover")
 SET_BY = ("report/drawings", "report/paper/typeset")
@@ -136,8 +137,11 @@ def _with_numbers(study: Study | None, diagnosis: Diagnosis | None) -> Iterator[
     made_of: list[tuple[Mapping[str, FigureOf[Any]], Any]] = [
         (FIGURES, study), (FRICTION_FIGURES, study), (DIAGNOSIS_FIGURES, diagnosis),
     ]  # fmt: skip
+    left_out = OF_STRAIGHT_LINES if study is not None and study.comparison is None and study.laws is not None else ()
     for figures, results in made_of:
         for name, figure in figures.items() if results is not None else ():
+            if name in left_out:
+                continue
             try:
                 numbers = figure.numbers(results)
             except Exception as why:  # one figure must not cost the others

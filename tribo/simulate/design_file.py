@@ -21,7 +21,6 @@ A design is a table, in TOML or JSON::
 
 from __future__ import annotations
 
-import difflib
 import json
 import math
 import tomllib
@@ -38,6 +37,7 @@ from tribo.campaign.load import pattern_of_table
 from tribo.errors import Problem, SimulationError, system_problem
 from tribo.input_files import nests_too_deeply, read_input
 from tribo.limits import DEEPEST_NESTING, LARGEST_DESCRIPTION_BYTES, MOST_RUNS
+from tribo.nearest import did_you_mean
 from tribo.records import Pattern
 from tribo.simulate.config import FrictionTerms, LocalFriction, SimConfig
 from tribo.simulate.ensemble import AngleRule, angle_range_deg, check_all, middle_deg, stratified_design
@@ -235,8 +235,7 @@ def _problem(error: Any) -> Problem:
 
 
 def _nearest(name: str, allowed: Sequence[str]) -> str:
-    near = difflib.get_close_matches(name, allowed, 1, 0.6)
-    return f"did you mean {near[0]}?" if near else ", ".join(allowed)
+    return did_you_mean(name, allowed) or ", ".join(allowed)
 
 
 def _types() -> dict[str, Any]:

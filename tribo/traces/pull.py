@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tribo.errors import Problem, TraceError
+from tribo.nearest import did_you_mean
 from tribo.records import Pull, Test, Trace
 from tribo.traces.apex import Apex, find_apex, near
 from tribo.traces.loading import climb_of
@@ -94,7 +95,8 @@ def pull_of(signal: Signal, asked: Asked) -> Pull:
 
 def named_rule(name: str, parameters: Mapping[str, float] | None) -> Rule:
     if name not in RULES:
-        raise TraceError(Problem("unknown_rule", "unknown rule", found=name, allowed=", ".join(RULES)))
+        hint = "; ".join(filter(None, (", ".join(RULES), did_you_mean(name, RULES))))
+        raise TraceError(Problem("unknown_rule", "unknown rule", found=name, allowed=hint))
     rule = RULES[name]
     if not parameters:
         return rule

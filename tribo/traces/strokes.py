@@ -13,7 +13,6 @@ from tribo.records import Pull, Test, Trace
 from tribo.traces.loading import starting_level
 from tribo.traces.noise import median_of_three, steady
 from tribo.traces.pull import read_pull
-from tribo.traces.rest_at_end import without_rest_at_end
 from tribo.traces.segments import Strokes, orient_strokes, split_pulls
 from tribo.traces.signal import signal_of, unreadable
 from tribo.traces.sliding import settled
@@ -63,8 +62,7 @@ def read_pieces(
     zero = None if math.isnan(strokes.zero_N) else (0.0, strokes.zero_u_N)
     for piece, direction in zip(strokes.traces, strokes.directions, strict=True):
         try:
-            stroke = without_rest_at_end(piece) if zero else piece
-            pull = _read_piece(stroke, rule, test, parameters, zero)
+            pull = _read_piece(piece, rule, test, parameters, zero)
         except TraceError as fault:
             yield fault
             continue

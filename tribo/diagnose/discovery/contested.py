@@ -19,7 +19,9 @@ from tribo.mechanisms.record import Conditions
 # Log likelihood by which a law has to be better than mechanisms of the library: odds of 400 to 1. With 3, one of seven
 # effects of the library (benchmarks/blind_cases.py, seed 7000, three times the half-found size) lost; none with 6.
 MARGIN = 2.0 * CLOSE
+MARGIN_OF_COVARIATE = CLOSE  # a covariate is a law of the grammar itself, on all samples and in both regimes
 SAME = {"speed_mm_s": "speed_m_s", "started_at": "elapsed_s"}  # columns of mechanisms by their names in the grammar
+SERIES = {"run_order", "specimen_run", "elapsed_s", "date"}  # columns that follow each other through a series
 
 
 def without_wrong_forms(model: ModelFit) -> tuple[ModelFit, dict[str, float]]:
@@ -30,7 +32,7 @@ def without_wrong_forms(model: ModelFit) -> tuple[ModelFit, dict[str, float]]:
         if not all(a in model.acting for a in together):
             continue
         by = _lost_by(model, together)
-        if by > MARGIN:
+        if by > (MARGIN_OF_COVARIATE if all(a.mechanism.name == "covariate" for a in together) else MARGIN):
             lost |= {a.name: by for a in together}
             model = refitted(model, [a for a in model.acting if a not in together])
     return model, lost
@@ -57,6 +59,13 @@ def _lost_by(model: ModelFit, together: Sequence[Acting]) -> float:
 def _of_columns(c: Conditions, columns: set[str]) -> list[tuple[tuple[Shape, ...], float]]:
     """The shapes of one column and its products, or the products of two; a product costs what choosing among these is
     worth."""
-    every = [(shape, cost) for shape, cost in shapes_of(c) if columns <= {s.column for s in shape}]
+    alike = SERIES if len(columns) == 1 and columns <= SERIES else columns
+    every = [(shape, cost) for shape, cost in shapes_of(c) if _follows(shape, columns, alike)]
     products = sum(len(shape) > 1 for shape, _ in every)
     return [(shape, float(np.log(products)) if len(shape) > 1 else cost) for shape, cost in every]
+
+
+def _follows(shape: tuple[Shape, ...], columns: set[str], alike: set[str]) -> bool:
+    """Whether a shape follows all these columns, or alone one that is alike."""
+    own = {s.column for s in shape}
+    return columns <= own or (len(own) == 1 and own <= alike)

@@ -4,16 +4,19 @@ grid, ties, intervals and band."""
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from tribo.diagnose.discovery.grammar import Group, fine_products, fine_shapes, refined_shapes
 from tribo.diagnose.discovery.scoring import Courses, Projection, acts_of, courses_of, terms_of
 from tribo.diagnose.discovery.written_law import LOAD_TERM, UNITS, Shape, WrittenLaw
+from tribo.diagnose.search.screen import FORM
+from tribo.diagnose.search.weighing import PER_PARAMETER
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.gain import gain
 from tribo.diagnose.statistics.interval import NORMAL_90, estimates, informed_share
-from tribo.diagnose.statistics.linearisation import ModelFit
+from tribo.diagnose.statistics.linearisation import Linear, ModelFit
 from tribo.diagnose.statistics.model import Acting, effect_of
 from tribo.diagnose.verdict import Estimate, Gain
 from tribo.mechanisms.record import Conditions
@@ -24,7 +27,8 @@ IN_REACH = 8.0  # below the best on the coarse grid, within which a form is look
 LOOKED_AT = 40  # forms at most on the fine grid
 WEIGHTLESS = 1e-3  # of the likeliest, below which a law does not count in the band
 PLACED = ("step", "soft step", "ramp", "optimum", "hump", "window")  # kinds with a place
-WIDE = ("hump", "saturating", "soft step")  # kinds with a width
+WIDE = ("hump", "saturating", "soft step", "window")  # kinds with a width
+FITTED = 3  # of the best forms, with the weights of the tests and without
 ROUNDS = 3  # of finding the best form at the noise that the one before leaves
 
 
@@ -96,14 +100,14 @@ class Form:
 def settled(model: ModelFit, found: Searched, first: WrittenLaw, rng: np.random.Generator) -> FoundLaw:
     """The best form at the noise that it leaves, with its parameters, ties and band; ``first`` is the best law at the
     noise without any."""
-    after, state, forms = _rounds(model, found, first)
-    index = len(after.acting) - 1
-    parameters = estimates(after, index) | _places(forms[0])
-    wider = _wider(state, forms[0], parameters["a"])
+    best = _decided(model, found, first)
+    after, state, form = best.after, best.state, best.forms[0]
+    parameters = estimates(after, len(after.acting) - 1) | _places(form)
+    wider = _wider(state, form, parameters["a"])
     return FoundLaw(
-        forms[0].best, parameters, _percent(state, forms[0], parameters, wider), found.p, gain(model, after, rng),
-        tuple(f.best for f in forms[1:] if f.evidence > forms[0].evidence - CLOSE), after,
-        _band(state, forms, wider),
+        form.best, parameters, _percent(state, form, parameters, wider), found.p, gain(model, after, rng),
+        tuple(f.best for f in best.forms[1:] if f.evidence > form.evidence - CLOSE), after,
+        _band(state, best.forms, wider),
     )  # fmt: skip
 
 
@@ -114,33 +118,68 @@ def best_form(model: ModelFit, found: Searched) -> tuple[Form, State]:
     gains = [projected.gains(found.courses, acts_of(g, c, terms))[0] - g.cost for g in found.groups]
     group, shape = np.unravel_index(int(np.argmax(gains)), (len(gains), len(found.courses.shapes)))
     first = found.groups[int(group)].law(found.courses.shapes[int(shape)])
-    _, state, forms = _rounds(model, found, first)
-    return forms[0], state
+    best = _decided(model, found, first)
+    return best.forms[0], best.state
 
 
-def _rounds(model: ModelFit, found: Searched, law: WrittenLaw) -> tuple[ModelFit, State, list[Form]]:
-    """The model with the best law, the campaign at its noise, and all forms in reach there, the best first."""
+@dataclass(frozen=True)
+class _Decided:
+    """The model with a law, the campaign at its noise, and the forms in reach there, that of the law first."""
+
+    after: ModelFit
+    state: State
+    forms: list[Form]
+
+
+def _decided(model: ModelFit, found: Searched, law: WrittenLaw) -> _Decided:
+    """The form with the best likelihood when fitted in full, less what its choice costs.
+
+    The weights of the tests follow the law with which they were estimated: where it is wrong they are small. So the
+    forms to be fitted are the best with these weights and the best with none.
+    """
     after, state = _with_law(model, law)
-    forms = _forms(state, found)
+    fitted: dict[object, tuple[float, ModelFit, State]] = {}
     for _ in range(ROUNDS):
-        if forms[0].best == law:
+        for form in (*_forms(state, found)[:FITTED], *_forms(state.unweighted, found)[:FITTED]):
+            if form.best.form not in fitted:
+                again, there = _with_law(model, form.best)
+                fitted[form.best.form] = again.score - (form.gains.max() - form.evidence), again, there
+        best = max(fitted, key=lambda key: fitted[key][0])
+        if fitted[best][2] is state:
             break
-        law = forms[0].best
-        after, state = _with_law(model, law)
-        forms = _forms(state, found)
-    if forms[0].best != law:
-        after, state = _with_law(model, forms[0].best)
-    return after, state, forms
+        _, after, state = fitted[best]
+    forms = _forms(state, found)
+    shift = {f.best.form: fitted[f.best.form][0] - fitted[best][0] for f in forms if f.best.form in fitted}
+    own = next((f for f in forms if f.best.form == best), None)
+    if own is None:
+        return _Decided(after, state, forms)
+    judged = [replace(f, evidence=own.evidence + shift[f.best.form]) if f.best.form in shift else f for f in forms]
+    ranked = sorted(judged, key=lambda f: (f.best.form != best, -f.evidence))
+    if own.best != state.law:
+        after, state = _with_law(model, own.best)
+    return _Decided(after, state, ranked)
 
 
 @dataclass(frozen=True)
 class State:
-    """A campaign at the noise that a law leaves, ready to score other laws in its place."""
+    """A campaign at the noise that a ``law`` leaves, ready to score other laws in its place; ``linear`` is the model
+    without it, ``residual`` (n, 2) what that leaves."""
 
+    law: WrittenLaw
     conditions: Conditions
     terms: dict[str, FloatArray]
-    projected: Projection
+    linear: Linear
+    residual: FloatArray
     informed: float
+
+    @cached_property
+    def projected(self) -> Projection:
+        return Projection(self.linear, self.residual[None])
+
+    @property
+    def unweighted(self) -> State:
+        """The same with every test counting alike."""
+        return replace(self, linear=replace(self.linear, weight=np.ones(len(self.residual))))
 
     def acts(self, group: Group) -> FloatArray:
         return acts_of(group, self.conditions, self.terms)
@@ -152,9 +191,8 @@ def _with_law(model: ModelFit, law: WrittenLaw) -> tuple[ModelFit, State]:
     after = fit(model.setup, (*model.acting, acting), start=model)
     residual = after.residual + effect_of(after.setup, after.law, acting, after.values[-1])
     jacobian = after.linear.jacobian[:, :, : -len(acting.mechanism.parameters)]
-    projected = Projection(replace(after.linear, jacobian=jacobian), residual[None])
-    conditions = after.setup.observations.conditions
-    return after, State(conditions, terms_of(after), projected, informed_share(after.noise))
+    linear, conditions = replace(after.linear, jacobian=jacobian), after.setup.observations.conditions
+    return after, State(law, conditions, terms_of(after), linear, residual, informed_share(after.noise))
 
 
 def _forms(state: State, found: Searched) -> list[Form]:
@@ -185,12 +223,17 @@ def _on_fine_grid(state: State, group: Group, shapes: tuple[Shape, ...], cost: f
     grid = fine_products(shapes) if len(shapes) > 1 else [(s,) for s in fine_shapes(shapes[0], c)]
     courses = courses_of([(s, 0.0) for s in grid], c)
     gains = state.projected.gains(courses, acts)[0]
-    evidence = _log_mean(gains) - group.cost - cost
+    evidence = _log_mean(gains) - group.cost - cost - PER_PARAMETER * sum(map(_further, courses.shapes[0]))
     finer = refined_shapes(courses.shapes[int(gains.argmax())][0], c) if len(shapes) == 1 else []
     if finer:
         courses = courses_of([((s,), 0.0) for s in finer], c)
         gains = state.projected.gains(courses, acts)[0]
     return Form(group, courses, gains, evidence)
+
+
+def _further(s: Shape) -> int:
+    """Numbers of a shape besides its amplitude."""
+    return (s.kind in PLACED) + (s.kind in WIDE) + (s.kind == "wave")
 
 
 def _log_mean(gains: FloatArray) -> float:
@@ -275,7 +318,10 @@ def _percent(
 
 
 def _band(state: State, forms: list[Form], wider: float) -> Band:
-    """The mean change by all laws in proportion to their likelihood, each about its own mean, with its spread."""
+    """The mean change by all laws in proportion to their likelihood, with its spread.
+
+    A law may be wrong in form by the same share of its own effect as a mechanism.
+    """
     n = len(state.conditions.sample)
     mean, square, total = np.zeros((n, 2)), np.zeros((n, 2)), 0.0
     for form in forms:
@@ -297,7 +343,8 @@ def _band(state: State, forms: list[Form], wider: float) -> Band:
             square += weight * (whole**2 + wider**2 * np.sum([v * g**2 for g, _, v in changes], axis=0))
             total += weight
     mean, square = mean / total, square / total
-    half = NORMAL_90 * np.sqrt(np.maximum(square - mean**2, 0.0))
+    wrong = FORM * np.sqrt(np.mean(mean[mean != 0] ** 2)) * (mean != 0)  # the form is none of the grammar exactly
+    half = NORMAL_90 * np.sqrt(np.maximum(square - mean**2, 0.0) + wrong**2)
     return Band(mean, mean - half, mean + half)
 
 

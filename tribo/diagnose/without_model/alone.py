@@ -11,6 +11,7 @@ from tribo.diagnose.without_model.column_search import Follows, Searched, search
 from tribo.diagnose.without_model.own_laws import law_layers
 from tribo.diagnose.without_model.strokes_apart import Apart, strokes_apart
 from tribo.diagnose.without_model.tested_columns import FEWEST_TESTS, Tested, points_of
+from tribo.fitting.dependence import LABELS
 from tribo.records import REGIMES, Study
 
 BASELINE = "the law of each sample alone"
@@ -37,8 +38,8 @@ def diagnose_alone(study: Study, *, seed: int = 0, level: float = 0.01) -> Verdi
     layers = [*law_layers(study), *_column_layers(found), *_record_layers(records), *_offset_layers(apart)]
     causes = [*_column_causes(found), *_record_causes(records), *_offset_causes(apart)]
     inseparable = _inseparable(study, found)
-    equivalent = tuple(dict.fromkeys((words.name_of_column(f.name), *map(words.name_of_column, f.alike))
-                                     for s in found for f in s.follows if f.alike))  # fmt: skip
+    tied = ((f.name, *f.alike) for s in found for f in s.follows if f.alike)
+    equivalent = tuple(dict.fromkeys(tuple(map(words.name_of_column, names)) for names in tied))
     outcome: Outcome = "named" if causes else "no_misfit"
     return Verdict(
         verdict=outcome,
@@ -60,10 +61,10 @@ def _too_few(points: list[Tested], found: list[Searched]) -> str:
         return ""
     if not any(t.columns or t.untold for t in points):
         return "No recorded column varies beside the load."
-    n, numbers = max(t.n for t in points), points[-1].law.shape[1]
+    needed = max(FEWEST_TESTS, 2 * points[-1].law.shape[1])
     return (
-        f"Dependence on recorded columns was not tested: there are {n} tests, and the laws have {numbers} parameters. "
-        f"At least {FEWEST_TESTS} tests are needed, and two for each parameter."
+        f"Dependence on recorded columns was not tested: there are {max(t.n for t in points)} tests, and at least "
+        f"{needed} are needed beside the laws of these samples."
     )
 
 
@@ -151,6 +152,8 @@ def _inseparable(study: Study, found: list[Searched]) -> list[Excluded]:
     for row in [] if table is None else table.to_dict("records"):
         for other in filter(None, str(row["inseparable_from"]).split(", ")):
             one, two = sorted((str(row["label"]), other))
+            if LABELS["normal_load_N"] in (one, two):
+                continue  # said of the columns that vary only with the load
             samples = pairs.setdefault((one, two), [])
             if row["sample"] not in samples:
                 samples.append(str(row["sample"]))

@@ -28,7 +28,7 @@ def of_column(f: Follows) -> str:
     """How friction follows a column, with the size of the change."""
     unit = UNITS.get(f.name, "")
     first, last = f.where
-    between = f"from {first} to {last}{unit}" if f.kind == "trend" else f"from {first} to {last}"
+    between = f"from {first} to {last}{unit}" if f.kind == "trend" else f"between {first} and {last}{unit}"
     way = "rises" if f.change_percent > 0 else "falls"
     low, high = sorted((abs(f.low_percent), abs(f.high_percent)))
     said = (

@@ -111,7 +111,7 @@ def searched(t: Tested, regimes: int, level: float, rng: np.random.Generator) ->
         rivals = [c for c in t.columns if c.name not in {k.name for k in taken}]
         p = min(_chances(beside, [column, *rivals], rng).get(0, 1.0) * regimes, 1.0)
         if p < level:
-            found.append(_described(beside, column, p))
+            found.append(_described(beside, _first_alike(beside, column), p))
     names = tuple(dict.fromkeys(c.name for c in t.columns))
     scatter = 100.0 * float(np.expm1(np.sqrt(_fit(t, taken).variance)))
     return Searched(t.regime, tuple(found), names, t.untold, p_first, scatter, t.n)
@@ -238,6 +238,14 @@ def _described(f: _Fitted, column: Column, p: float) -> Follows:
     return Follows(column.name, column.kind, f.tested.regime, p, middle, low, high, where, alike)
 
 
+def _first_alike(f: _Fitted, column: Column) -> Column:
+    """Of the columns that this design cannot tell apart, the first: the same one in both regimes."""
+    alike = {column.name, *_described(f, column, 1.0).alike}
+    first = next(c.name for c in f.tested.columns if c.name in alike)
+    same = [c for c in f.tested.columns if c.name == first and c.kind == column.kind]
+    return same[0] if same else column
+
+
 def _ends(column: Column, size: FloatArray) -> tuple[FloatArray, FloatArray, tuple[str, str]]:
     """Between which levels the change is stated: the ends of a trend, else the lowest and the highest level."""
     if column.kind == "trend":
@@ -245,8 +253,7 @@ def _ends(column: Column, size: FloatArray) -> tuple[FloatArray, FloatArray, tup
     levels = np.vstack([np.zeros(len(size)), np.eye(len(size))])
     heights = levels @ size
     first, last = int(np.argmin(heights)), int(np.argmax(heights))
-    names = column.levels or tuple(f"part {k + 1} of {len(levels)} of its range" for k in range(len(levels)))
-    return levels[first], levels[last], (names[first], names[last])
+    return levels[first], levels[last], (column.levels[first], column.levels[last])
 
 
 def _alike(f: _Fitted, column: Column, effect: FloatArray) -> tuple[str, ...]:

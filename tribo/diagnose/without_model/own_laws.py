@@ -75,6 +75,8 @@ def _constant_part(line: Mapping[str, Any], loads: np.ndarray) -> str:
     constant = _estimate(line["b"], line["b_u"], "N", line["loads"] - 2)
     if constant.low <= 0.0 <= constant.high:
         return "A straight line leaves no certain part of T that does not depend on the load."
+    if constant.value < 0.0:
+        return f"A straight line falls to {_sized(constant)} at zero load: friction is weak at small loads."
     middle = float(np.median(loads))
     share = 100.0 * line["b"] / max(line["a"] * middle + line["b"], 1e-300)
     return (

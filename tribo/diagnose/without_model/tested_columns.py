@@ -26,7 +26,8 @@ LEFT_OVER = 0.02  # share of a column's variance beyond the laws of the samples 
 class Column:
     """One way to follow a recorded column: ``columns`` (n, d) beside the law, and where its values run from and to.
 
-    ``kind`` is trend, course (levels of a number) or names. ``levels`` are the names, the first being the reference.
+    ``kind`` is trend, course (groups of a number) or names. ``levels`` are the names of groups, the first being the
+    reference.
     """
 
     name: str
@@ -65,7 +66,7 @@ class Tested:
 
 
 def points_of(ingested: Ingested, regime: Regime) -> Tested:
-    """The tests of one regime; ``untold`` are columns that vary but only together with sample and load."""
+    """The tests of one regime; ``untold`` are columns that vary within samples, but only together with the load."""
     pairs = [
         (test, pull)
         for test in ingested.campaign.tests
@@ -78,7 +79,8 @@ def points_of(ingested: Ingested, regime: Regime) -> Tested:
     law = _laws(sample, load)
     found = [c for c in _columns(tests, pulls) if np.ptp(c.columns) > 0] if tests else []
     told = [c for c in found if _beyond(law, c.columns) > LEFT_OVER]
-    names = {c.name for c in told}
+    samples = (sample[:, None] == np.unique(sample)[None]).astype(float)
+    names = {c.name for c in told} | {c.name for c in found if _beyond(samples, c.columns) <= LEFT_OVER}
     return Tested(
         regime, sample, np.array([t.specimen for t in tests], str), load,
         np.log([getattr(p, f"{regime}_N") for p in pulls]), law, tuple(told),
@@ -161,9 +163,15 @@ def _of_numbers(name: str, values: FloatArray) -> Iterator[Column]:
     distinct = np.unique(values[there])
     edges = distinct[1:] if len(distinct) <= BINS else np.unique(np.quantile(values[there], np.arange(1, BINS) / BINS))
     code = np.searchsorted(edges, filled, side="right")
-    groups = [k for k in range(1, len(edges) + 1) if (code == k).any()]
+    groups = [k for k in range(1, len(edges) + 1) if (there & (code == k)).any()]
     if len(groups) > 1:
-        yield Column(name, "course", np.column_stack([code == k for k in groups]).astype(float), low, high)
+        parts = [values[there & (code == k)] for k in (0, *groups)]
+        levels = tuple(_span(part) for part in parts)
+        yield Column(name, "course", np.column_stack([code == k for k in groups]).astype(float), low, high, levels)
+
+
+def _span(values: FloatArray) -> str:
+    return f"{values.min():.3g} to {values.max():.3g}" if np.ptp(values) else f"{values.min():.3g}"
 
 
 def _of_names(name: str, cells: list[str]) -> Iterator[Column]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from tribo.errors import Problem, ReadError
+from tribo.nearest import did_you_mean
 from tribo.quantities import QUANTITIES, unit_factor
 from tribo.readers.core.given import ASKED, NOTHING_GIVEN, Given, Hint
 from tribo.readers.core.names import bare_unit, match_column, split_unit
@@ -158,8 +159,8 @@ def _wanted_column(hint: Hint, names: Sequence[str]) -> tuple[int, str | None, s
     for have in (list(names), bare):
         if name in have:
             return have.index(name), unit, f"{hint.reason} by name" if hint.reason == ASKED else hint.reason
-    near = difflib.get_close_matches(name, [n for n in names if n], 1)
-    allowed = f"{_listed(names)}{f' (did you mean {near[0]}?)' if near else ''}"
+    meant = did_you_mean(name, [n for n in names if n])
+    allowed = f"{_listed(names)}{f' ({meant})' if meant else ''}"
     what = f"no column has the name or position given for the {hint.quantity}"
     raise ReadError(Problem("missing_column", what, found=wanted, allowed=allowed))
 

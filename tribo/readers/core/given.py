@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from tribo.errors import Problem, ReadError
+from tribo.nearest import did_you_mean
 from tribo.quantities import QUANTITIES, quantity_named
 from tribo.readers.core.names import split_unit
 from tribo.records import UNCORRECTED, Correction
@@ -88,8 +88,8 @@ def column_faults(key: str, value: object) -> Iterator[Problem]:
             yield Problem("unknown_decimal", "not a decimal mark", found=str(value), allowed='"." or ","')
     elif quantity_named(key) is None:
         names = [name.replace(" ", "_") for name in QUANTITIES]
-        near = difflib.get_close_matches(key, [*names, IGNORE, DECIMAL], 1)
-        allowed = f"{', '.join(names)}; {IGNORE}, {DECIMAL}{f' (did you mean {near[0]}?)' if near else ''}"
+        meant = did_you_mean(key, [*names, IGNORE, DECIMAL])
+        allowed = f"{', '.join(names)}; {IGNORE}, {DECIMAL}{f' ({meant})' if meant else ''}"
         yield Problem("unknown_quantity", "not a known quantity", found=key, allowed=allowed)
 
 

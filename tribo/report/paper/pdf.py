@@ -8,13 +8,16 @@ from datetime import UTC, datetime
 from importlib.resources import files
 from typing import Any
 
+from tribo.comparison.findings import LoadRatio
 from tribo.records import Study
+from tribo.report.card import Card
 from tribo.report.content import content, figure_numbers, figure_places
 from tribo.report.drawings import Drawn, draw_all
 from tribo.report.html.pull_cards import PullCard
 from tribo.report.paper.typeset import document
 from tribo.report.provenance import Provenance
-from tribo.report.words.numerals import significant, unbroken
+from tribo.report.uncertainty import BudgetTable
+from tribo.report.words.numerals import ratio_text, significant, unbroken
 
 TEMPLATE = "report.typ"
 FRICTION = {
@@ -41,7 +44,7 @@ def pdf(
 
 def pdf_of(said: Mapping[str, Any], figures: Mapping[str, Drawn], origin: str) -> bytes:
     """The document with the given content (:func:`tribo.report.content.content`) and figures."""
-    record = _record(said, figures)
+    record = record_of(said, figures)
     record["origin"] = origin
     pictures = {f"{name}.svg": figure.files["svg"] for name, figure in figures.items()}
     template = (files("tribo.report.paper") / "templates" / TEMPLATE).read_text(encoding="utf-8")
@@ -61,7 +64,7 @@ def _last_day(study: Study) -> datetime:
     return max(days, default=datetime.fromtimestamp(0, UTC))
 
 
-def _record(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str, Any]:
+def record_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str, Any]:
     """The content as plain strings and tables of strings."""
     verdict, summary, campaign, study = said["verdict"], said["summary"], said["campaign"], said["study"]
     record = {
@@ -70,6 +73,7 @@ def _record(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str, 
         "friction": [[title, said["friction"][key]] for key, title in FRICTION.items() if said["friction"][key]],
         "law": "T = μN + τ₀A" if said["has_area"] else "T = μN + T₀",
         "verdict": verdict,
+        "card": _card(said["card"]),
         "model": summary["model"],
         "flat": summary["flat"],
         "measured": summary["measured"],
@@ -82,13 +86,18 @@ def _record(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str, 
         "correlation": summary["correlation"],
         "table2": _table2(said["table2"], "τ₀ (kPa)" if said["has_area"] else "T₀ (N)"),
         "paired": said["paired"],
-        "agreement": [{"title": _title(p["regime"]), "rows": p["sentences"]} for p in said["agreement"]],
+        "table2_notes": [[f"{f.sample}, {f.regime}", "; ".join(f.notes)] for f in study.fits if f.notes],
+        "agreement": [_agreement(part) for part in said["agreement"]],
+        "calibration": said["calibration"],
+        "flat_sample": study.comparison.flat if study.comparison is not None else "",
         "how_to_read": summary["how_to_read"],
         "order": summary["order"],
         "directions": summary["directions"],
-        "budget": [table.sentence for table in said["budget"]],
+        "budget": [_budget(table) for table in said["budget"]],
+        "budget_origins": said["budget_origins"],
         "power": study.power,
-        "notes": study.notes,
+        "outlying": study.outlying,
+        "notes": [*(f"Doubtful: {doubt}" for doubt in said["card"].doubts), *study.notes],
         "provenance": [[n, v] for n, v in said["provenance"] or () if n not in NOT_OF_THE_INPUTS],
         "pulls": [_pull_row(card) for card in sorted(said["cards"], key=lambda card: card.test_id)],
         **_diagnosis_tables(verdict),
@@ -108,7 +117,7 @@ def _title(regime: str) -> str:
 
 
 def _table2(table: Mapping[str, Any], intercept: str) -> list[dict[str, Any]]:
-    head = ["Sample", "AF", "μ", intercept, "T (N)", "Specimens, tests"]
+    head = ["Sample", "AF", "μ", intercept, "T (N)", "Specimens, tests", "χ²/ν"]
     if table["simulated"]:
         head[5:5] = ["μ simulated", "τ₀ simulated", "T simulated"]
     return [
@@ -117,12 +126,41 @@ def _table2(table: Mapping[str, Any], intercept: str) -> list[dict[str, Any]]:
             "head": head,
             "rows": [
                 [sample, f"{af:.3f}", *measured, *(model if table["simulated"] else ()),
-                 f"{fit.n_specimens}, {fit.n_tests}"]
+                 f"{fit.n_specimens}, {fit.n_tests}", significant(fit.chi2_red, 2)]
                 for sample, af, measured, model, fit in rows
             ],
         }
         for regime, rows in table["regimes"]
     ]  # fmt: skip
+
+
+def _card(card: Card) -> dict[str, Any]:
+    """The card with its next test in one line."""
+    said = card.as_dict() | {"next": card.next_test.line if card.next_test is not None else ""}
+    return said | {"laws": [[law.sample, law.regime, law.mu, law.intercept, law.largest] for law in card.laws]}
+
+
+def _agreement(part: Mapping[str, Any]) -> dict[str, Any]:
+    """The ratios of one regime, one column per load, and the sentence of each sample."""
+    head = ["Sample", *(f"{significant(load)} N" for load in part["loads"])]
+    rows = [
+        [f"{a.sample} (calibrated)" if a.calibrated else a.sample, *(_ratio(cell, part["marks"]) for cell in cells)]
+        for a, cells in part["rows"]
+    ]
+    return {"title": _title(part["regime"]), "head": head, "ratios": rows, "rows": part["sentences"]}
+
+
+def _ratio(cell: LoadRatio | None, marks: Mapping[str, str]) -> str:
+    if cell is None:
+        return "–"
+    return f"{marks[cell.verdict]} {cell.ratio:.2f} ({ratio_text(cell.low)}–{ratio_text(cell.high)})"
+
+
+def _budget(table: BudgetTable) -> dict[str, Any]:
+    """Shares of one regime, and the sentence about the largest."""
+    rows = [[sample, *shares, combined] for sample, shares, combined in table.rows]
+    head = ["Sample", *table.components, "u(T), combined (N)"]
+    return {"title": _title(table.regime), "sentence": table.sentence, "head": head, "rows": rows}
 
 
 def _diagnosis_tables(verdict: Mapping[str, Any] | None) -> dict[str, list[Any]]:
@@ -134,7 +172,7 @@ def _diagnosis_tables(verdict: Mapping[str, Any] | None) -> dict[str, list[Any]]
         "excluded": verdict["excluded"],
         "not_testable": verdict["not_testable"],
         "corrections": verdict["corrections"],
-        "laws": [[law["formula"], law["text"], law["ties"]] for law in verdict["laws"]],
+        "laws": [[law["formula"], law["text"], law["ties"], law["gain"]] for law in verdict["laws"]],
     }
 
 

@@ -1,0 +1,167 @@
+"""The forty mistakes: each with the place and the remedy that its message must name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mistakes.slips import (
+    Mistake,
+    each_row,
+    export,
+    header,
+    option,
+    renamed,
+    rows,
+    toml,
+    write_rows,
+)  # fmt: skip
+
+
+def _times(column: str, factor: float):
+    return each_row(lambda row: {column: f"{float(row[column]) * factor:.6g}"})
+
+
+def _as_load(factor: float):
+    """mass_g replaced by normal_load_N: the number of newtons times ``factor``."""
+
+    def make(folder: Path) -> None:
+        table = rows(folder)
+        for row in table:
+            newton = (float(row.pop("mass_g")) + 1.5) * 9.80665e-3
+            row["normal_load_N"] = f"{newton * factor:.6g}"
+        write_rows(folder, table)
+
+    return make
+
+
+def _grams_as_newtons(folder: Path) -> None:
+    header("mass_g", "normal_load_N")(folder)
+
+
+def _decimal_commas(folder: Path) -> None:
+    each_row(lambda row: {"speed_mm_s": "0,2", "mass_g": row["mass_g"].replace(".", ",")})(folder)
+
+
+def _one_load(folder: Path) -> None:
+    each_row(lambda row: {"mass_g": "50"})(folder)
+
+
+def _close_loads(folder: Path) -> None:
+    each_row(lambda row: {"mass_g": "50" if row["mass_g"] == "25" else "50.05"})(folder)
+
+
+def _toml_for_the_folder(folder: Path) -> tuple[Path]:
+    return (folder / "campaign.toml",)
+
+
+def _an_export_for_the_folder(folder: Path) -> tuple[Path]:
+    return (folder / "raw" / "T001.csv",)
+
+
+def _exports_only(folder: Path) -> tuple[Path]:
+    return (folder / "raw",)
+
+
+def _typed_wrong(folder: Path) -> tuple[Path]:
+    return (folder.parent / "campain",)
+
+
+def _inside_the_campaign(folder: Path) -> tuple[object, ...]:
+    return folder, "-o", folder / "out"
+
+
+def _columns_of_another_machine(folder: Path) -> None:
+    with (folder / "campaign.toml").open("a", encoding="utf-8") as stream:
+        stream.write('[columns]\nforce = "Laod [N]"\n')
+
+
+def _unknown_decision(folder: Path) -> tuple[object, ...]:
+    (folder / "decisions.csv").write_text("test_id,action,reason\nt001,exclude,slipped\n", encoding="utf-8")
+    return folder, "--overrides", folder / "decisions.csv"
+
+
+REFUSED, LEFT_OUT, DOUBTED = (1,), (1, 3), (0,)
+MISTAKES = (
+    # what is given on the command line
+    Mistake("campaign.toml given for the folder", _toml_for_the_folder, "campaign.toml", "give the folder", REFUSED),
+    Mistake("an export given for the folder", _an_export_for_the_folder, "T001.csv", "give the folder", REFUSED),
+    Mistake("the folder of exports given", _exports_only, "raw", "tribo init NEW --from raw", REFUSED),
+    Mistake("a folder typed wrong", _typed_wrong, "campain", "did you mean .*campaign", (2,)),
+    Mistake("results written into the campaign", _inside_the_campaign, "out", "outside of every campaign", REFUSED),
+    Mistake("an unknown rule", option("--rule", "ASTM-D1894"), "--rule", r"did you mean astm_d1894\?", REFUSED),
+    Mistake("unknown weights", option("--weights", "relativ"), "--weights", "'relative'", (2,)),
+    Mistake("an unknown flat sample", option("--flat", "Q"), "--flat", "allowed: --flat F", REFUSED),
+    Mistake("a patterned sample as the flat one", option("--flat", "B"), "has cavities", "--flat F", REFUSED),
+    Mistake("overrides of a test that is not there",
+            _unknown_decision, "decisions.csv, row 2", "did you mean T001", REFUSED),
+    # campaign.toml
+    Mistake("campaign.toml under another name", renamed("campaign.toml", "Campaign.toml.txt"), "campaign.toml",
+            r"rename Campaign.toml.txt\?", REFUSED),
+    Mistake("a decimal comma in campaign.toml",
+            toml("= 55.0", "= 55,0"), "campaign.toml, row", "nominal_area_mm2 = 55.0", REFUSED),
+    Mistake("a unit behind a number",
+            toml("= 55.0", "= 55 mm2"), "campaign.toml, row", "nominal_area_mm2 = 55", REFUSED),
+    Mistake("a number in quotation marks", toml("= 1.5", '= "1.5 g"'),
+            "slider_mass_g", r"did you mean 1.5\?", REFUSED),
+    Mistake("a text without quotation marks",
+            toml('"PDMS"', "PDMS"), "campaign.toml, row", 'material = "PDMS"', REFUSED),
+    Mistake("a key typed wrong",
+            toml("slider_mass_g", "sled_mass_g"), "sled_mass_g", r"did you mean slider_mass_g\?", REFUSED),
+    Mistake("a cavity spelled otherwise",
+            toml('"circle"', '"circles"'), "patterns.B", r"did you mean circle\?", REFUSED),
+    Mistake("an area fraction in percent",
+            toml("pitch_um = [15.0", "area_fraction = 65\npitch_um = [15.0"), "area_fraction",
+            "divide by 100", REFUSED),
+    Mistake("a pitch smaller than the cavity",
+            toml("[15.0, 15.0]", "[5.0, 5.0]"), "patterns.B", "pitch must be larger", REFUSED),
+    Mistake("a pattern in millimetres", toml("diameter_um = 10.0\npitch_um = [15.0, 15.0]",
+            "diameter_um = 0.010\npitch_um = [0.015, 0.015]"), "patterns.B", r"multiply by 1000\?", DOUBTED),
+    Mistake("the area in cm2", toml("= 55.0", "= 0.55"), "nominal_area_mm2", r"cm2: multiply by 100\?", DOUBTED),
+    Mistake("the area in m2", toml("= 55.0", "= 55e-6"), "nominal_area_mm2", "m2: multiply by 1000000", DOUBTED),
+    Mistake("no flat sample",
+            toml('[patterns.F]\ncavity = "none"\n', ""),
+            r"tests.csv, row \d+, column sample", r"a table \[patterns.F\]", LEFT_OUT),
+    # tests.csv
+    Mistake("column names in capitals",
+            header("^.*$", "TEST_ID,FILE,SAMPLE,SPECIMEN,DIRECTION,MASS_G,SPEED_MM_S,HOLD_S,"
+            "REPEAT,RUN_ORDER,STARTED_AT,TEMPERATURE_C,HUMIDITY_PCT"),
+            "column test_id", r"did you mean test_id\?", REFUSED),
+    Mistake("a column named with a unit in brackets",
+            header("mass_g", "Mass [g]"), "mass_g", r"did you mean mass_g\?", REFUSED),
+    Mistake("a unit in a cell",
+            each_row(lambda row: {"mass_g": f"{row['mass_g']} g"}),
+            "row 2, column mass_g", r"did you mean 25\?|did you mean 138.5\?", REFUSED),
+    Mistake("quoted decimal commas", _decimal_commas, "row 2, column speed_mm_s", r"did you mean 0.2\?", REFUSED),
+    Mistake("a forgotten raw/",
+            each_row(lambda row: {"file": Path(row["file"]).name}),
+            "row 2, column file", r"did you mean raw/T001.csv\?", REFUSED),
+    Mistake("file names without their ending",
+            each_row(lambda row: {"file": row["file"][:-4]}),
+            "row 2, column file", r"did you mean raw/T001.csv\?", REFUSED),
+    Mistake("an export given twice",
+            each_row(lambda row: {"file": "raw/T001.csv"}, 0, 3),
+            "row 2, column file", "one export per test", LEFT_OUT),
+    Mistake("a test_id given twice",
+            each_row(lambda row: {"test_id": "T001"}, 0, 2), "column test_id", "one row per test", LEFT_OUT),
+    Mistake("a sample in small letters",
+            each_row(lambda row: {"sample": row["sample"].replace("F", "f")}),
+            "column sample", r"did you mean F\?", LEFT_OUT),
+    Mistake("a direction against the sample",
+            each_row(lambda row: {"direction": "y"} if row["sample"] == "Sx" else None),
+            "column direction", "or Sy in the column sample", LEFT_OUT),
+    Mistake("one load only", _one_load, "sample B", "two or more loads for each sample", REFUSED),
+    Mistake("loads 0.1 % apart", _close_loads, "tests.csv", "differ by a factor of two", (0, 1)),
+    Mistake("the mass in kilograms", _times("mass_g", 1e-3), "mass_g", r"kilograms: multiply by 1000\?", DOUBTED),
+    Mistake("grams typed as newtons", _grams_as_newtons, "loads", "grams: move it to a column mass_g", DOUBTED),
+    Mistake("kilonewtons for newtons", _as_load(1e-3), "loads", "kilonewtons: multiply by 1000", DOUBTED),
+    Mistake("the speed in mm/min", _times("speed_mm_s", 60), "displacement", r"mm/min: divide by 60\?", DOUBTED),
+    Mistake("the temperature in kelvin",
+            each_row(lambda row: {"temperature_C": f"{float(row['temperature_C']) + 273.15:.2f}"}),
+            "temperature_C", r"subtract 273.15\?", DOUBTED),
+    Mistake("the humidity as a fraction", _times("humidity_pct", 1e-2),
+            "humidity_pct", r"multiply by 100\?", DOUBTED),
+    # raw/
+    Mistake("an export without units", export('"(s)","(mm)","(N)"\n', ""), "raw/T001.csv", "columns", REFUSED),
+    Mistake("a column of another machine",
+            _columns_of_another_machine, "raw/T001.csv", r"did you mean Load\?|did you mean Load \[N\]", REFUSED),
+)  # fmt: skip
