@@ -160,6 +160,8 @@ def _here(folder: Path, *arguments: str) -> int:
     folder.mkdir()
     os.environ |= surroundings(folder)
     os.chdir(folder)
+    for number in (1, 2):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), number)
     return run_command(arguments)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import warnings
 from dataclasses import replace
@@ -90,6 +91,16 @@ def test_a_damaged_file_is_made_anew_and_said(tmp_path: Path, content: bytes) ->
     with pytest.warns(DamagedResultWarning, match=r"result\.json: this kept result is damaged"):
         assert counted(Shelf(tmp_path), 1)[1] == 1
     assert counted(Shelf(tmp_path), 1)[1] == 0
+
+
+def test_a_file_that_cannot_be_read_is_made_anew_and_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(self: Path) -> bytes:
+        raise OSError(errno.EIO, "Input/output error", str(self))
+
+    counted(Shelf(tmp_path), 1)
+    monkeypatch.setattr(Path, "read_bytes", failing)
+    with pytest.warns(DamagedResultWarning, match=r"result\.json: .* cannot be read \(Input/output error\)"):
+        assert counted(Shelf(tmp_path), 1)[1] == 1
 
 
 def test_every_flipped_bit_of_a_kept_file_is_noticed(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ T = TypeVar("T")
 
 
 class DamagedResultWarning(RuntimeWarning):
-    """A kept result differs from its checksum and is made again."""
+    """A kept result differs from its checksum, or cannot be read, and is made again."""
 
 
 LIBRARIES = ("numpy", "scipy", "pandas", "statsmodels", "numba", "odrpack")
@@ -80,10 +80,14 @@ def _head(key: str, body: bytes) -> bytes:
 
 
 def _read(path: Path, key: str) -> dict[str, Any] | None:
-    """The contents of a kept file made from ``key``; None where there is none, and with a warning where damaged."""
+    """The contents of a kept file made from ``key``; else None, and a warning where it is damaged or unreadable."""
     try:
         content = path.read_bytes()
-    except OSError:
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as why:
+        what = f"{path}: this kept result cannot be read ({why.strerror or why}); it is made again"
+        warnings.warn(what, DamagedResultWarning, stacklevel=3)
         return None
     head, newline, body = content.partition(b"\n")
     made_from = re.match(rb'\{"made_from": "([0-9a-f]{64})"', head)
