@@ -82,6 +82,11 @@ def dependence(study: Study) -> Figure:
     return _drawn("dependence", study)
 
 
+def forces(study: Study) -> Figure:
+    """Friction force of every test against the load, with the law that the data choose."""
+    return _drawn("forces", study)
+
+
 def records(study: Study) -> Figure:
     """T/N along each record."""
     return _drawn("records", study)
@@ -100,6 +105,16 @@ def restarts(study: Study) -> Figure:
 def misfit(diagnosis: Diagnosis) -> Figure:
     """Where the calibrated model fails, by sample and recorded variable."""
     return _drawn("misfit", diagnosis)
+
+
+def finding(diagnosis: Diagnosis) -> Figure:
+    """Measured over modelled friction against what the finding follows: the picture of the card."""
+    return _drawn("finding", diagnosis)
+
+
+def law(diagnosis: Diagnosis) -> Figure:
+    """What a law that was found explains, test by test, with its band."""
+    return _drawn("law", diagnosis)
 
 
 def residuals(diagnosis: Diagnosis) -> Figure:
