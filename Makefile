@@ -6,7 +6,7 @@
 #   make blind-laws   campaigns with hidden laws, about half an hour on two cores; continues a run that was stopped
 #   make mutants 300 changes of the code at random, each tried against the quick tests; about two hours; continues too
 #   make release the wheel and the source archive in dist/, tried outside of the checkout; see SECURITY.md
-#   make hashes  constraints-hashed.txt anew, after a change of constraints.txt; needs a connection
+#   make hashes  the pins with hashes anew, after a change of constraints.txt; needs a connection
 #   make audit   the pinned versions against published advisories; needs a connection
 #   make torture faults, kills, damage and hostile input, tried until something is lost; hours; docs/results/torture.md
 PYTHON ?= python3
@@ -74,18 +74,22 @@ release: $(VENV)/.release
 	rm -rf dist $(VENV)/tried
 	$(BIN)/python -m build --outdir dist
 	$(PYTHON) -m venv $(VENV)/tried
-	$(VENV)/tried/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r constraints-hashed.txt
+	$(VENV)/tried/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes --only-binary :all: \
+	  -r constraints-hashed.txt
 	$(VENV)/tried/bin/python -m pip install --quiet --disable-pip-version-check --no-deps dist/*.whl
 	cd $(VENV)/tried && bin/tribo demo -o demo --quiet && bin/tribo verify demo
 
+HASHED = --universal --python-version 3.11 --generate-hashes --no-header --no-annotate -c constraints.txt
+
 hashes: $(VENV)/.release
-	sed -n '/^#/p' constraints-hashed.txt > constraints-hashed.part
-	$(BIN)/uv pip compile --quiet pyproject.toml --extra cluster --extra pipelines -c constraints.txt \
-	  --universal --python-version 3.11 --generate-hashes --no-header --no-annotate >> constraints-hashed.part
-	mv constraints-hashed.part constraints-hashed.txt
+	for file in constraints-hashed.txt constraints-hashed-pipelines.txt; do sed -n '/^#/p' $$file > $$file.part; done
+	$(BIN)/uv pip compile --quiet pyproject.toml --extra cluster $(HASHED) >> constraints-hashed.txt.part
+	$(BIN)/uv pip compile --quiet pyproject.toml --extra cluster --extra pipelines $(HASHED) \
+	  >> constraints-hashed-pipelines.txt.part
+	for file in constraints-hashed.txt constraints-hashed-pipelines.txt; do mv $$file.part $$file; done
 
 audit: $(VENV)/.release
-	$(BIN)/pip-audit --strict --disable-pip --require-hashes -r constraints-hashed.txt
+	$(BIN)/pip-audit --strict --disable-pip --require-hashes $(AUDIT) -r constraints-hashed-pipelines.txt
 
 torture: $(VENV)/.dev
 	$(BIN)/python benchmarks/torture.py --out out/torture

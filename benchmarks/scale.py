@@ -37,7 +37,7 @@ COMMANDS, GROWS = ("diagnose", "report"), ("repeats", "specimens")
 A_SPECIMEN, A_SAMPLE = 18, 54  # tests: six loads, three repeats; of three specimens
 EFFECT = ("humidity", 1.0)
 SEED = 7
-EVERY_S = 0.2  # between two looks at the memory
+EVERY_S = 1.0  # between two looks at the memory
 
 
 def design_of(tests: int, grows: str) -> Design:

@@ -23,8 +23,8 @@ from tribo.records import FloatArray
 from tribo.simulate import SimConfig
 from tribo.simulate.engines.fast import drive_of, first_failure_s, lattice_of, run_fast, thresholds_of
 from tribo.simulate.engines.jit import compiled
-from tribo.simulate.engines.kernels import last_stretch
 from tribo.simulate.engines.lattice import Lattice
+from tribo.simulate.engines.strips import last_stretch
 from tribo.simulate.run import run_of
 
 CASES = (("A", 20.0), ("C", 20.0))

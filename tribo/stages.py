@@ -244,7 +244,7 @@ def diagnosis(
 ) -> Diagnosis:
     """Where the calibrated model fails and why, with the evidence; taken from ``kept`` if it is there.
 
-    Laws of earlier campaigns in the folder ``laws`` are tested. What no mechanism explains is searched for its law.
+    Laws of other campaigns in the folder ``laws`` are tested. What no mechanism explains is searched for its law.
 
     The model's prediction for each pattern comes from the simulations of the campaign if ``kept`` holds them, else from
     tabulated ones. A mechanism that is named is then simulated as part of the spring-block model.
@@ -261,7 +261,8 @@ def diagnosis(
     from tribo.diagnose.statistics import pattern_table
 
     predictor = own_predictor(ingested.campaign, kept)
-    known = read_laws(laws) if laws is not None else ()
+    title = ingested.campaign.title
+    known = tuple(law for law in (read_laws(laws) if laws is not None else ()) if law.found_in != title)
 
     def found() -> Diagnosis:
         examined = examine(ingested, seed=seed, predictor=predictor, progress=progress)

@@ -38,6 +38,7 @@ def ingested(bench: Bench, seed: int = 0) -> Ingested:
             row.test_id, f"raw/{row.test_id}.csv", row.sample, row.N, row.specimen, row.direction,
             row.speed_mm_s * 1e-3, row.hold_s, row.repeat, row.run_order, row.specimen_run, row.started_at,
             row.temperature_C, row.humidity_pct, row.operator, correction=Correction(speed_m_s=row.speed_mm_s * 1e-3),
+            load_from="mass_g", mass_kg=row.mass_g * 1e-3,
         )  # fmt: skip
         tests.append(test)
         stiffness = float(bench.stiffness_N_per_mm[k]) * 1e3 * np.exp(0.05 * rng.normal())

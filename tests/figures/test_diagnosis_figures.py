@@ -155,7 +155,7 @@ def test_what_is_drawn_is_what_the_table_says(name: str, temperature: Diagnosis)
     assert {(float(f"{a:.6g}"), float(f"{b:.6g}")) for a, b in part[[x, y]].to_numpy(float)} <= drawn
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [n for n in NAMES if n != "law"])  # a known cause leaves no law; see test_discovery
 def test_no_label_lies_outside_the_figure_or_on_another(name: str, temperature: Diagnosis) -> None:
     rows = DIAGNOSIS_FIGURES[name].numbers(temperature)
     assert isinstance(rows, pd.DataFrame)

@@ -142,5 +142,21 @@ def test_a_dry_run_lists_faults_of_options_table_and_output_at_once(campaign: Pa
         assert said in result.output or said.replace("25", "138.5") in result.output
 
 
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["reprot", "x"], "did you mean report?"),
+        (["inspect", "x", "--set", "lever_arm=3"], "did you mean lever_arm_mm?"),
+    ],
+)
+def test_words_of_the_command_line_that_are_not_known_are_asked_about(
+    tmp_path: Path, words: list[str], meant: str
+) -> None:
+    (tmp_path / "x").write_text("")
+    result = run(*(tmp_path / w if w == "x" else w for w in words))
+    assert result.exit_code == 2
+    assert meant in result.stderr
+
+
 def test_forty_mistakes_are_tried() -> None:
     assert len({mistake.name for mistake in MISTAKES}) >= 40

@@ -1,4 +1,4 @@
-"""The step of all blocks: against a plain one, on vector units, and stopped by numbers that are not finite."""
+"""The compiled steps: against a plain one, on vector units, and stopped by numbers that are not finite."""
 
 from __future__ import annotations
 
@@ -7,20 +7,23 @@ import re
 
 import numpy as np
 import pytest
-from numba import njit, types
+from numba import njit, typeof, types
 
 from tribo.errors import SimulationError
 from tribo.records import FloatArray
 from tribo.simulate import FrictionTerms, SimConfig
-from tribo.simulate.engines import dense, kernels as k
+from tribo.simulate.engines import dense, state as k, strips
+from tribo.simulate.engines.active import advance
 from tribo.simulate.engines.fast import (
+    Drive,
     Thresholds,
     _initial_state,
     _numerics,
     _refuse_not_finite,
-    advance,
+    active_set,
     drive_of,
     lattice_of,
+    put_back,
     run_fast,
     thresholds_of,
 )
@@ -44,17 +47,17 @@ def friction_of_block(cell: FloatArray, drive: FloatArray, t: float, c: k.Numeri
         return (0.5 * (1.0 - sliding / size) * drive if begins else 0.0 * drive), False
     if size > sliding:
         return (1.0 - sliding / size) * drive, False
-    return drive * k.last_stretch(before, size, sliding), True
+    return drive * strips.last_stretch(before, size, sliding), True
 
 
-def plain_steps(cells: FloatArray, steps: int, lattice: Lattice, c: k.Numerics) -> float:
+def plain_steps(cells: FloatArray, steps: int, lattice: Lattice, drive_: Drive, c: k.Numerics) -> float:
     """The model block by block, counted from the quasi-static motion; returns the friction work."""
     work = 0.0
-    drag = cells[:, k.GX : k.GY + 1] - c.stiffness * lattice.spring_forces(cells[:, k.QX : k.QY + 1])
+    drag = -c.mass * c.damping * drive_.follow
     for step in range(steps):
         t = c.start + step * c.dt
         springs = c.stiffness * lattice.spring_forces(cells[:, k.QX : k.QY + 1])
-        force = springs + drag + cells[:, k.RX : k.RY + 1] * t
+        force = springs + drag + drive_.rate * t
         stopped = []
         for i, cell in enumerate(cells):
             drive = (1.0 - c.damping * c.dt) * cell[k.VX : k.VY + 1] + c.dt / c.mass * force[i]
@@ -73,10 +76,11 @@ def plain_steps(cells: FloatArray, steps: int, lattice: Lattice, c: k.Numerics) 
 
 @pytest.mark.parametrize("terms", [FrictionTerms(), FrictionTerms(ageing_b=0.05, ageing_t0_s=1e-6, speed_a=0.02)])
 @pytest.mark.parametrize(("sample", "edges"), [("F", "free"), ("C", "free"), ("B", "periodic")])
-def test_all_blocks_at_once_are_the_plain_step(sample: str, edges: str, terms: FrictionTerms):
+@pytest.mark.parametrize("engine", ["fast", "dense"])
+def test_a_compiled_step_is_the_plain_step(engine: str, sample: str, edges: str, terms: FrictionTerms):
     """Blocks that start, slide and stop, with and without friction terms: the same to rounding."""
     config = SimConfig(
-        sample=sample, edges=edges, blocks=(15, 12), angle_deg=25.0, seed=1, engine="dense", terms=terms,
+        sample=sample, edges=edges, blocks=(15, 12), angle_deg=25.0, seed=1, engine=engine, terms=terms,
         rest_tolerance=1e-12,
     )  # fmt: skip
     lattice = lattice_of(config)
@@ -84,23 +88,26 @@ def test_all_blocks_at_once_are_the_plain_step(sample: str, edges: str, terms: F
     numerics = _numerics(config, lattice, thresholds, drive, 3e-3)
     state = _initial_state(config, lattice, thresholds, drive, numerics)
     rng = np.random.default_rng(3)
-    cells = state.cells[:-1]
+    cells = state.cells
     moves = rng.random(len(cells)) < 0.5
     cells[:, k.VX : k.VY + 1] = rng.normal(0.0, 5.0, (len(cells), 2)) * moves[:, None]
     cells[:, k.QX : k.QY + 1] += rng.normal(0.0, 3e-7, (len(cells), 2))
-    drag = -config.mass_kg * config.damping_per_s * drive.follow
-    cells[:, k.GX : k.GY + 1] = config.stiffness_N_m * lattice.spring_forces(cells[:, k.QX : k.QY + 1]) + drag
     twin = cells.copy()
     moved = cells[:, k.QX : k.QY + 1] @ drive.velocity / config.speed_m_s
     before = float(moved.sum())
     state.totals[k.ALONG] = before
-    dense.advance_dense(state, samples(80), numerics, STEPS, lattice, drive.follow)
-    work = plain_steps(twin, STEPS, lattice, numerics)
+    if engine == "dense":
+        dense.advance_dense(state, samples(80), numerics, STEPS, lattice, drive.follow)
+    else:
+        active = active_set(state, numerics, lattice, drive, config)
+        advance(active, state, samples(80), numerics, STEPS)
+        put_back(active, state, numerics)
+    work = plain_steps(twin, STEPS, lattice, drive, numerics)
     rests = (twin[lattice.contact, k.VX] == 0.0).mean()
     assert 0.05 < rests < 0.95
     for columns in (slice(k.QX, k.QY + 1), slice(k.VX, k.VY + 1), slice(k.SINCE, k.SINCE + 1)):
-        if columns.start == k.SINCE and not terms.active:
-            continue  # only ageing asks when a block stopped
+        if columns.start == k.SINCE and (engine == "fast" or not terms.active):
+            continue  # only ageing asks when a block stopped, and only the step of all blocks hands it back
         assert np.allclose(cells[:, columns], twin[:, columns], rtol=1e-9, atol=1e-9 * np.abs(twin[:, columns]).max())
     along = float((twin[:, k.QX : k.QY + 1] @ drive.velocity).sum()) / config.speed_m_s
     assert state.totals[k.ALONG] == pytest.approx(along, rel=1e-9)
@@ -114,11 +121,32 @@ def test_loops_over_all_blocks_use_vector_instructions(loop):
     array, number = types.float64[::1], types.float64
     arrays = 8 if loop is dense.pushed else 10
     rest = (number,) * 5 if loop is dense.pushed else (number, number, number, types.none, types.none)
-    fresh = njit(error_model="numpy", **VECTOR_OPTIONS)(loop.py_func)
+    fresh = njit(error_model="numpy", **VECTOR_OPTIONS)(loop)
     fresh.compile((array,) * arrays + rest)
     assembly = next(iter(fresh.inspect_asm().values()))
     wanted = r"sqrtpd" if loop is dense.rubbed else r"v?(fn?madd\w*|mul)pd\s.*%[yz]mm|mulpd\s"
     assert re.search(wanted, assembly)
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="reads x86 instructions")
+def test_loops_over_strips_use_vector_instructions():
+    """Forces and gliding without a square root, sliding with it; each compiled by itself."""
+    config = SimConfig(blocks=(12, 12))
+    lattice = lattice_of(config)
+    drive = drive_of(config, lattice)
+    numerics = _numerics(config, lattice, thresholds_of(config, lattice), drive, 3e-3)
+    state = _initial_state(config, lattice, thresholds_of(config, lattice), drive, numerics)
+    a = active_set(state, numerics, lattice, drive, config)
+    given = {
+        strips.forces: (a.planes, a.lists.strips, 0, 0, a.starts, numerics, 0.0),
+        strips.glides: (a.planes, a.lists.strips, 0, a.calm, numerics, a.sums),
+        strips.slides: (a.planes, a.lists.strips, 0, a.moving, numerics, 0, a.sums),
+    }
+    for loop, arguments in given.items():
+        fresh = njit(error_model="numpy", **VECTOR_OPTIONS)(loop)
+        fresh.compile(tuple(typeof(value) for value in arguments))
+        assembly = next(iter(fresh.inspect_asm().values()))
+        assert re.search(r"sqrtpd" if loop is strips.slides else r"v?fn?madd\w*pd\s.*%[yz]mm|mulpd\s", assembly), loop
 
 
 @pytest.mark.parametrize("engine", ["fast", "dense"])
@@ -140,8 +168,12 @@ def test_a_block_without_velocity_is_named_in_the_step_it_appears():
         numerics = _numerics(config, lattice, thresholds, drive, 3e-3)
         state = _initial_state(config, lattice, thresholds, drive, numerics)
         state.cells[7 * 20 + 4, k.VX] = np.nan
-        k.start_lists(state, numerics)
-        advance(state, samples(80), numerics, 60, lattice, drive)
+        if engine == "dense":
+            dense.advance_dense(state, samples(80), numerics, 60, lattice, drive.follow)
+        else:
+            active = active_set(state, numerics, lattice, drive, config)
+            advance(active, state, samples(80), numerics, 60)
+            put_back(active, state, numerics)
         with pytest.raises(SimulationError, match=r"t = 0\.00300005 s; found '1 blocks, the first at x = 4, y = 7'"):
             _refuse_not_finite(state, numerics)
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from tribo.errors import SimulationError
-from tribo.simulate import SimConfig, stratified_design
+from tribo.simulate import SimConfig, simulate, stratified_design
 from tribo.simulate.design_file import runs_of_design
+from tribo.simulate.engines.fast import lattice_of, thresholds_of
 from tribo.simulate.readings import ANGLES, OPEN_CHOICES, READINGS
 
 DESIGN = {"samples": ["A", "Sy"], "pressures_kPa": [5.0], "repeats": 2}
@@ -55,3 +56,25 @@ def test_nominal_angles_are_the_direction_in_the_name_of_a_sample():
     design = stratified_design(["C", "Sx", "Sy"], [5e3], 2, angles="nominal")
     assert [config.angle_deg for config in design] == [0.0, 0.0, 0.0, 0.0, 90.0, 90.0]
     assert len({config.seed for config in design}) == 6
+
+
+EVERY = pytest.mark.parametrize("name", list(READINGS))
+SHORT = SimConfig(blocks=(24, 24), angle_deg=27.0, seed=3, duration_peaks=1.1)
+
+
+@EVERY
+def test_the_weakest_block_is_static_friction_of_the_flat_sample_in_every_reading(name: str):
+    """T/N = min(mu_s) + F_as / (p l2), to 0.1 %, at the steps of 1e-8 to 5e-8 s."""
+    config = SHORT.of_reading(name)
+    weakest = thresholds_of(config, lattice_of(config)).static_N.min() / (config.pressure_Pa * config.spacing_m**2)
+    for dt_s in (1e-8, 5e-8):
+        assert simulate(config.with_(dt_s=dt_s)).static_friction == pytest.approx(weakest, rel=1e-3)
+
+
+@EVERY
+@pytest.mark.parametrize("sample", ["F", "C"])
+def test_finite_rotation_moves_peaks_by_less_than_half_a_percent_in_every_reading(sample: str, name: str):
+    """Springs of the full r_ij against linearised ones."""
+    config = SHORT.of_reading(name).with_(sample=sample, engine="dense")
+    turned = simulate(config.with_(rotation="finite"))
+    assert turned.static_friction == pytest.approx(simulate(config).static_friction, rel=5e-3)

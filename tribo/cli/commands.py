@@ -9,6 +9,7 @@ import click
 
 from tribo import __version__
 from tribo.cli.build_commands import build, schedule
+from tribo.cli.compare_reports_command import compare_reports
 from tribo.cli.console import Console, command_options
 from tribo.cli.discover_command import discover
 from tribo.cli.given_paths import GivenPath
@@ -17,9 +18,23 @@ from tribo.cli.reading_options import corrected, reading_options
 from tribo.cli.simulate_command import simulate
 from tribo.cli.study_commands import compare, demo, diagnose, fit, ingest, predict, report
 from tribo.cli.study_options import CAMPAIGN
+from tribo.nearest import did_you_mean
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+class Commands(click.Group):
+    """A group that asks what was meant where a command is not known."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        given = args[0]
+        hint = did_you_mean(given, self.list_commands(ctx))
+        if hint and self.get_command(ctx, given) is None and not given.startswith("-"):
+            ctx.fail(f"No such command {given!r}; {hint}")
+        return super().resolve_command(ctx, args)
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="tribo")
 def main() -> None:
     """Analyse sled friction tests: fit mu and tau0, compare with a spring-block model.
@@ -32,7 +47,7 @@ def main() -> None:
 
 
 for command in (
-    build, init, schedule, simulate, discover, ingest, fit, predict, compare, diagnose, report, demo,
+    build, init, schedule, simulate, discover, compare_reports, ingest, fit, predict, compare, diagnose, report, demo,
 ):  # fmt: skip
     main.add_command(command)
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tribo.nearest import did_you_mean
+
 if TYPE_CHECKING:
     from tribo.records import Campaign, Correction
 
@@ -31,7 +33,8 @@ def _corrections(context: click.Context, parameter: click.Parameter, given: tupl
         except ValueError:
             raise click.BadParameter(f"{text!r} is not KEY=NUMBER") from None
         if key.strip() not in _KEYS:
-            raise click.BadParameter(f"{key.strip()!r} is unknown; allowed: {', '.join(_KEYS)}")
+            hint = did_you_mean(key, _KEYS) or f"allowed: {', '.join(_KEYS)}"
+            raise click.BadParameter(f"{key.strip()!r} is unknown; {hint}")
         if key.strip() == "sign" and found["sign"] not in (1.0, -1.0):
             raise click.BadParameter("sign is 1 or -1")
         if key.strip() != "sign" and not 0 < found[key.strip()] < float("inf"):

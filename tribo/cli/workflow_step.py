@@ -1,9 +1,9 @@
 """One step of the workflow: a tribo command, and a record of what it was made from and how it ended.
 
-``python -m tribo.cli.workflow_step RECORD --digest D [--after RECORD...] [--files FILES.json] -- COMMAND...`` runs
-``tribo COMMAND... --json``. Unusable input is a result and not a failure: it is recorded, the steps after it are not
-run, and the build goes on with the other campaigns. Anything else that goes wrong ends the step with a failure, so
-that the next build tries it again.
+``python -m tribo.cli.workflow_step RECORD --digest D [--laws DIR] [--after RECORD...] [--files FILES.json] --
+COMMAND...`` runs ``tribo COMMAND... --json``, with the laws of earlier campaigns if the folder DIR holds any. Unusable
+input is a result and not a failure: it is recorded, the steps after it are not run, and the build goes on with the
+other campaigns. Anything else that goes wrong ends the step with a failure, so that the next build tries it again.
 """
 
 from __future__ import annotations
@@ -82,8 +82,15 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--digest", required=True)
     parser.add_argument("--after", type=Path, nargs="*", default=[])
     parser.add_argument("--files", type=Path)
+    parser.add_argument("--laws", type=Path)
     given = parser.parse_args(own)
+    command += with_laws(given.laws)
     return run_step(given.record, command, given.digest, given.after, given.files)
+
+
+def with_laws(folder: Path | None) -> list[str]:
+    """The option that names a folder of laws, where there are any in it."""
+    return ["--laws", str(folder)] if folder is not None and any(folder.rglob("law*.toml")) else []
 
 
 def _split(arguments: list[str]) -> tuple[list[str], str, list[str]]:

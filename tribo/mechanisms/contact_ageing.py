@@ -43,4 +43,5 @@ MECHANISM = Mechanism(
     meaning="static friction grows with the time for which the contact has rested",
     variation=Variation("the hold time over 1, 10 and 300 s", "hold_s", (1.0, 10.0, 300.0)),
     in_table=InTable(missing="the hold time is not printed"),
+    without_model=("hold_s",),
 )

@@ -97,4 +97,5 @@ MECHANISM = Mechanism(
     meaning="friction follows a recorded column that no other mechanism uses",
     choosing=Choosing(label=column_of, on_test=on_test, in_one_run=in_one_run),
     in_table=InTable(missing="no further column is printed"),
+    any_column=True,
 )

@@ -36,4 +36,5 @@ MECHANISM = Mechanism(
     plain="humidity",
     meaning="adhesion changes with the humidity of the room",
     in_table=InTable(missing="no humidity is printed"),
+    without_model=("humidity_pct",),
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from tribo.mechanisms.record import (
+    STROKES_APART,
     Base,
     Conditions,
     DirectMeasurement,
@@ -51,4 +52,5 @@ MECHANISM = Mechanism(
         corrected=True,
     ),
     measurement=DirectMeasurement("Record two seconds of force before contact and after lift-off.", 0.003, 0.5),
+    without_model=(STROKES_APART,),
 )

@@ -30,6 +30,10 @@ Law = Callable[[Values, Base, Conditions, str], Forces]
 Rise = Callable[[Values, FloatArray, Conditions], FloatArray]
 
 
+ALONG_RECORDS = "course along a record"
+STROKES_APART = "offset between directions"
+
+
 @displayed()
 @dataclass(frozen=True)
 class Parameter:
@@ -82,6 +86,11 @@ class Mechanism:
         Why a campaign says nothing about it, where neither the forces nor the traces do.
     in_table
         What it means for a published table of mu and tau0.
+    without_model
+        What shows it in a diagnosis without the spring-block model: recorded columns that friction follows,
+        :data:`ALONG_RECORDS` or :data:`STROKES_APART`.
+    any_column
+        Whether it follows whatever recorded column is chosen, by no law of its own.
     """
 
     name: str
@@ -109,6 +118,8 @@ class Mechanism:
     variation: Variation | None = None
     untested: str = ""
     in_table: InTable = WEIGHED
+    without_model: tuple[str, ...] = ()
+    any_column: bool = False
 
     @property
     def amplitude(self) -> Parameter:
@@ -166,8 +177,29 @@ def _varies(values: FloatArray) -> bool:
 
 
 __all__ = [
-    "REFERENCE_HOLD_S", "REFERENCE_PRESSURE_PA", "REFERENCE_SPEED_M_S",
-    "Base", "BenchTest", "Choosing", "Conditions", "Contact", "DirectMeasurement", "Forces", "InTable", "Kind",
-    "Mechanism", "OnTest", "Parameter", "Placement", "Readings", "StringArray", "TraceEvidence", "Values",
-    "Variation", "amplitude", "no_choice",
+    "ALONG_RECORDS",
+    "REFERENCE_HOLD_S",
+    "REFERENCE_PRESSURE_PA",
+    "REFERENCE_SPEED_M_S",
+    "STROKES_APART",
+    "Base",
+    "BenchTest",
+    "Choosing",
+    "Conditions",
+    "Contact",
+    "DirectMeasurement",
+    "Forces",
+    "InTable",
+    "Kind",
+    "Mechanism",
+    "OnTest",
+    "Parameter",
+    "Placement",
+    "Readings",
+    "StringArray",
+    "TraceEvidence",
+    "Values",
+    "Variation",
+    "amplitude",
+    "no_choice",
 ]  # fmt: skip

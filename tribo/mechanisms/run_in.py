@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Forces, InTable, Mechanism, Parameter, Values, amplitude
+from tribo.mechanisms.record import (
+    ALONG_RECORDS,
+    Base,
+    Conditions,
+    Forces,
+    InTable,
+    Mechanism,
+    Parameter,
+    Values,
+    amplitude,
+)
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -34,4 +44,5 @@ MECHANISM = Mechanism(
     plain="run-in",
     meaning="the first pulls of a specimen differ from the later ones",
     in_table=InTable(missing="the order of the pulls is not printed"),
+    without_model=("specimen_run", ALONG_RECORDS),
 )

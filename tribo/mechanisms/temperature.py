@@ -33,4 +33,5 @@ MECHANISM = Mechanism(
     plain="temperature",
     meaning="friction changes with the temperature of the room",
     in_table=InTable(missing="no temperature is printed"),
+    without_model=("temperature_C",),
 )

@@ -43,4 +43,5 @@ MECHANISM = Mechanism(
     meaning="sliding friction changes with the pull speed",
     variation=Variation("the pull speed over 0.05, 0.2 and 0.8 mm/s", "speed_mm_s", (0.05, 0.2, 0.8)),
     in_table=InTable(missing="all pulls are at one speed"),
+    without_model=("speed_mm_s",),
 )

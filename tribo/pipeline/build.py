@@ -22,6 +22,7 @@ from tribo.dry_run import Checked, check
 from tribo.errors import CampaignError, Problem, TriboError, unexpected
 from tribo.escaping import well_formed
 from tribo.pipeline.dated_copies import CURRENT, clear_unfinished, date_build
+from tribo.pipeline.laws_of_site import collect_laws
 from tribo.pipeline.live import Progress
 from tribo.pipeline.scan import Dropped, difference, scan
 from tribo.pipeline.step_record import OF_A_REPORT, read_record
@@ -196,6 +197,7 @@ def _built(drop: Path, state: Path, options: BuildOptions, watch: Watch, descrip
     config = _configuration(found, state / "inputs", state, options)
     said = _snakemake(state, config, options, _forced(due, state), descriptor, watch)
     write_text(state / "log" / "snakemake.log", said.stdout)
+    collect_laws(state.parent / CURRENT, state)
     dated = date_build(state.parent, options.keep)
     if said.returncode:
         raise BuildError(_failures(state, said.stdout))

@@ -20,6 +20,7 @@ from urllib.parse import quote
 from tribo import __version__
 from tribo.escaping import for_spreadsheet
 from tribo.pipeline.history import CampaignRow, Law, history
+from tribo.pipeline.laws_of_site import answers_of, laws_csv, laws_in_words
 from tribo.pipeline.trend import FEWEST, LEVEL, SHORTEST, Change, change_points
 
 STATES = {
@@ -62,13 +63,17 @@ class Panel:
 
 
 def write_index(site: Path) -> str:
-    """Write SITE/current/index.html and trend.csv where they differ from what is there; returns their SHA-256."""
+    """Write SITE/current/index.html, trend.csv and laws.csv where they differ from what is there; their SHA-256."""
     from tribo.store.whole_files import write_text
 
     rows = history(site)
     changes = change_points({series_name(key): values for key, values in series(rows).items()})
     digest = hashlib.sha256()
-    for name, text in {"index.html": page(rows, changes), "trend.csv": trend_csv(rows)}.items():
+    answers = answers_of(site / "current")
+    texts = {"index.html": page(rows, changes, laws_in_words(answers)), "trend.csv": trend_csv(rows)}
+    if answers:
+        texts["laws.csv"] = laws_csv(answers)
+    for name, text in texts.items():
         path = site / "current" / name
         if not path.is_file() or path.read_bytes() != text.encode("utf-8"):
             write_text(path, text)
@@ -107,7 +112,7 @@ def key_of(name: str) -> Key:
     return sample, regime, parameter
 
 
-def page(rows: Sequence[CampaignRow], changes: Sequence[Change]) -> str:
+def page(rows: Sequence[CampaignRow], changes: Sequence[Change], laws: Sequence[str] = ()) -> str:
     """The page as text: the same bytes for the same campaigns."""
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
@@ -123,7 +128,7 @@ def page(rows: Sequence[CampaignRow], changes: Sequence[Change]) -> str:
         rows=list(reversed(rows)), states=STATES, verdicts=VERDICTS, link=report_link, panels=by_sample,
         sentences=[change_sentence(c, rows) for c in changes], looked=longest >= FEWEST, fewest=FEWEST,
         shortest=SHORTEST, level=LEVEL, width=WIDTH, height=HEIGHT, left=LEFT, right=RIGHT, top=TOP, bottom=BOTTOM,
-        version=__version__,
+        version=__version__, laws=laws,
     )  # fmt: skip
 
 

@@ -71,7 +71,7 @@ class Follower:
             self._running.pop(job, None)
         elif self._rule != "all":
             self._running[job] = self._rule, _in_words(self._rule, "")
-        return True
+        return self._failed  # a step that begins is told with the line that names its campaign
 
     def _count(self, line: str) -> None:
         """Lines of the table of planned jobs, which begins with "Job stats" and ends with the total."""

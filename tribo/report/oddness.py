@@ -74,6 +74,11 @@ def _judged_in(table: pd.DataFrame, regime: Regime) -> list[OddPull]:
 def _from_the_others(values: pd.Series) -> np.ndarray:
     """Each value less the median of all the others; NaN for a value alone."""
     x = values.to_numpy(float)
-    if len(x) < 2:
+    others = len(x) - 1
+    if others < 1:
         return np.full(len(x), np.nan)
-    return x - np.array([np.median(np.delete(x, k)) for k in range(len(x))])
+    rank = np.empty(len(x), int)
+    rank[np.argsort(x)] = np.arange(len(x))
+    ordered = np.sort(x)
+    low, high = ((others - 1) // 2, others // 2)  # the middle of the others, counted without the value itself
+    return np.asarray(x - (ordered[low + (rank <= low)] + ordered[high + (rank <= high)]) / 2)

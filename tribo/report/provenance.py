@@ -120,6 +120,15 @@ def provenance_of_table(
     return Provenance(command, started_at, seed, {}, _versions(), inputs, str(folder))
 
 
+def provenance_of_comparison(folders: tuple[Path, Path], command: str = "", started_at: str = "") -> Provenance:
+    """The same for two folders of results; their files are named FOLDER/FILE, from the folder that holds both."""
+    root = Path(os.path.commonpath([folder.resolve() for folder in folders]))
+    names = ("fits.csv", "tests.csv", "card.json", "verdict.json")
+    files = [folder.resolve() / name for folder in folders for name in names if (folder / name).is_file()]
+    inputs = {well_formed(path.relative_to(root).as_posix()): file_hash(path) for path in files}
+    return Provenance(command, started_at, None, {}, _versions(), inputs, str(root))
+
+
 def input_names(root: Path) -> Iterator[str]:
     """What a campaign folder holds: its two tables and every file of raw/, in order; no links that lead out of it."""
     yield from (name for name in DESCRIBED_IN if (root / name).is_file() and not leads_out(root, root / name))

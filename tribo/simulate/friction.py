@@ -15,7 +15,7 @@ import numpy as np
 
 from tribo.records import FloatArray
 from tribo.simulate.config import FrictionTerms
-from tribo.simulate.engines.jit import compiled
+from tribo.simulate.engines.jit import inner
 
 # places in the parameter array
 AGEING_B, AGEING_T0, SPEED_A, SPEED_V0, N_PARAMETERS = range(5)
@@ -31,7 +31,7 @@ def packed(terms: FrictionTerms) -> FloatArray | None:
     return law
 
 
-@compiled
+@inner
 def aged(threshold_N: float, held_s: float, law: FloatArray | None) -> float:
     """F (1 + b ln(1 + t / t0)): contacts strengthen with the time at rest t in s (never negative)."""
     if law is None:
@@ -41,7 +41,7 @@ def aged(threshold_N: float, held_s: float, law: FloatArray | None) -> float:
     return threshold_N * (1.0 + law[AGEING_B] * math.log1p(max(held_s, 0.0) / law[AGEING_T0]))
 
 
-@compiled
+@inner
 def at_speed(threshold_N: float, speed_m_s: float, law: FloatArray | None) -> float:
     """F (1 + a ln(1 + v / v0)): sliding friction depends on the slip speed v in m/s; never below zero."""
     if law is None:
@@ -51,13 +51,13 @@ def at_speed(threshold_N: float, speed_m_s: float, law: FloatArray | None) -> fl
     return max(threshold_N * (1.0 + law[SPEED_A] * math.log1p(speed_m_s / law[SPEED_V0])), 0.0)
 
 
-@compiled
+@inner
 def static_threshold(base_N: float, held_s: float, law: FloatArray | None) -> float:
     """Largest friction force (N) of a block at rest; ``base_N`` is mu_s F_n + F_as (Amontons-Coulomb, adhesion)."""
     return aged(base_N, held_s, law)
 
 
-@compiled
+@inner
 def sliding_threshold(base_N: float, speed_m_s: float, law: FloatArray | None) -> float:
     """Friction force (N) of a sliding block; ``base_N`` is mu_d F_n + F_ad."""
     return at_speed(base_N, speed_m_s, law)

@@ -26,7 +26,7 @@ CAMPAIGN_FILE = "campaign.toml"
 PRODUCTS = frozenset({
     "tests.csv", "fits.csv", "other_fits.csv", "budget.csv", "differences.csv", "comparison.csv", "campaign.nc",
     "verdict.json", "laws.csv", "dependence.csv", "restarts.csv", "discovery.json", "report.html", "report.pdf",
-    "ro-crate-metadata.json",
+    "ro-crate-metadata.json", "compare.html", "compare.csv",
 })  # fmt: skip
 PULL_PAGES = "pulls-*.html"  # of reports of many pulls
 OF_SYSTEMS = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})

@@ -22,7 +22,8 @@ def under_the_wrong_test(traces: Mapping[str, Trace], test_ids: Collection[str])
     ``other_test``: its header names another test, where the headers of a campaign name their own. ``same_numbers``: its
     data are those of another test, and no header states to which test they belong; then none of them is used.
     """
-    named = {test_id: _words(trace) & set(test_ids) for test_id, trace in traces.items()}
+    ids = frozenset(test_ids)
+    named = {test_id: ids.intersection(_words(trace)) for test_id, trace in traces.items()}
     own = [test_id for test_id, words in named.items() if test_id in words]
     labelled = len(own) >= max(_FEWEST, _LABELLED * len(traces))
     found = {

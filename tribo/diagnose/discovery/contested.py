@@ -32,7 +32,7 @@ def without_wrong_forms(model: ModelFit) -> tuple[ModelFit, dict[str, float]]:
         if not all(a in model.acting for a in together):
             continue
         by = _lost_by(model, together)
-        if by > (MARGIN_OF_COVARIATE if all(a.mechanism.name == "covariate" for a in together) else MARGIN):
+        if by > (MARGIN_OF_COVARIATE if all(a.mechanism.any_column for a in together) else MARGIN):
             lost |= {a.name: by for a in together}
             model = refitted(model, [a for a in model.acting if a not in together])
     return model, lost

@@ -12,9 +12,12 @@ from tribo.diagnose.without_model.own_laws import law_layers
 from tribo.diagnose.without_model.strokes_apart import Apart, strokes_apart
 from tribo.diagnose.without_model.tested_columns import FEWEST_TESTS, Tested, points_of
 from tribo.fitting.dependence import LABELS
+from tribo.mechanisms.record import ALONG_RECORDS, STROKES_APART
 from tribo.records import REGIMES, Study
 
 BASELINE = "the law of each sample alone"
+
+RUNNING_IN, OFFSET = words.SHOWN_BY[ALONG_RECORDS], words.SHOWN_BY[STROKES_APART]
 
 
 def diagnose_alone(study: Study, *, seed: int = 0, level: float = 0.01) -> Verdict:
@@ -116,7 +119,7 @@ def _record_layers(records: list[RunningIn]) -> list[Layer]:
         changes = [r.first_percent for r in part]
         p = min(r.p for r in part)
         found.append(
-            Layer(kind="cause", name="run_in", samples=(sample,), regimes=("sliding",), p_adjusted=p,
+            Layer(kind="cause", name=RUNNING_IN, samples=(sample,), regimes=("sliding",), p_adjusted=p,
                   effect_percent=float(np.median(changes)), low=min(changes), high=max(changes),
                   text=words.of_records(part))
         )  # fmt: skip
@@ -128,13 +131,13 @@ def _record_causes(records: list[RunningIn]) -> list[Cause]:
         return []
     changes = [r.first_percent for r in records]
     size = Estimate(float(np.median(changes)), min(changes), max(changes), "%")
-    return [Cause("run_in", 1.0, {"first twentieth over second half": size}, words.of_records(records))]
+    return [Cause(RUNNING_IN, 1.0, {"first twentieth over second half": size}, words.of_records(records))]
 
 
 def _offset_layers(apart: Apart | None) -> list[Layer]:
     if apart is None or not apart.certain:
         return []
-    return [Layer(kind="cause", name="load_cell_offset", samples=(), regimes=(), p_adjusted=apart.p,
+    return [Layer(kind="cause", name=OFFSET, samples=(), regimes=(), p_adjusted=apart.p,
                   effect_percent=apart.percent, low=apart.low_percent, high=apart.high_percent,
                   parameters={"F0": apart.offset}, text=words.of_strokes(apart))]  # fmt: skip
 
@@ -142,7 +145,7 @@ def _offset_layers(apart: Apart | None) -> list[Layer]:
 def _offset_causes(apart: Apart | None) -> list[Cause]:
     if apart is None or not apart.certain:
         return []
-    return [Cause("load_cell_offset", 1.0, {"F0": apart.offset}, words.of_strokes(apart))]
+    return [Cause(OFFSET, 1.0, {"F0": apart.offset}, words.of_strokes(apart))]
 
 
 def _inseparable(study: Study, found: list[Searched]) -> list[Excluded]:

@@ -10,18 +10,19 @@ from tribo.diagnose.verdict import Cause, Excluded, Layer, NextTest
 from tribo.diagnose.without_model.along_records import RunningIn
 from tribo.diagnose.without_model.column_search import Follows, Searched
 from tribo.diagnose.without_model.strokes_apart import Apart
+from tribo.mechanisms.record import ALONG_RECORDS, STROKES_APART
+from tribo.mechanisms.table import MECHANISMS
 
-MECHANISMS_OF_COLUMNS = {
-    "speed_mm_s": "velocity_dependence", "hold_s": "contact_ageing", "temperature_C": "temperature",
-    "humidity_pct": "humidity", "specimen_run": "run_in",
-}  # fmt: skip
+SHOWN_BY = {shown: m.name for m in MECHANISMS.values() for shown in m.without_model}
+ANY_COLUMN = next(m.name for m in MECHANISMS.values() if m.any_column)
+MECHANISMS_OF_COLUMNS = {k: name for k, name in SHOWN_BY.items() if k not in (ALONG_RECORDS, STROKES_APART)}
 UNITS = {"speed_mm_s": " mm/s", "hold_s": " s", "temperature_C": " °C", "humidity_pct": " %"}
 _MOST_SAID = 4
 
 
 def name_of_column(column: str) -> str:
     """The name in a verdict of what follows a column: a mechanism of the library, or the column itself."""
-    return MECHANISMS_OF_COLUMNS.get(column, f"covariate:{column}")
+    return MECHANISMS_OF_COLUMNS.get(column, f"{ANY_COLUMN}:{column}")
 
 
 def of_column(f: Follows) -> str:

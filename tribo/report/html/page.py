@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
@@ -13,6 +13,9 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from tribo import __version__
+from tribo.figures.catalogue import DIAGNOSIS_FIGURES, FIGURES, FRICTION_FIGURES
+from tribo.figures.record import FigureOf
 from tribo.records import Study
 from tribo.report.content import content, figure_numbers, figure_places
 from tribo.report.drawings import Drawn, draw_all, inline_svg
@@ -74,6 +77,18 @@ def pages_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str,
     return pages
 
 
+def compared_page(columns: Sequence[Any], rows: Sequence[Any], said: Sequence[str], shown: Sequence[str]) -> str:
+    """compare.html: two reports side by side, as :mod:`tribo.report.reports_compared` found them."""
+    tables: tuple[Mapping[str, FigureOf[Any]], ...] = (FIGURES, FRICTION_FIGURES, DIAGNOSIS_FIGURES)
+    titles = {name: figure.title for table in tables for name, figure in table.items()}
+    return (
+        _environment()
+        .get_template("compared.html")
+        .render(columns=columns, rows=rows, said=said, shown=shown, titles=titles, version=__version__,
+                **_style_and_script(SCRIPTS[:2]))
+    )  # fmt: skip
+
+
 def _key(said: Mapping[str, Any]) -> str:
     """What tells this campaign from others, for what a browser remembers of its report."""
     campaign = said["campaign"]
@@ -81,9 +96,9 @@ def _key(said: Mapping[str, Any]) -> str:
     return sha256("\0".join(told).encode("utf-8", errors="backslashreplace")).hexdigest()[:16]
 
 
-def _style_and_script() -> dict[str, str]:
+def _style_and_script(scripts: Sequence[str] = SCRIPTS) -> dict[str, str]:
     style = _static("style.css")
-    script = '"use strict";\n(() => {\n' + "".join(_static(name) for name in SCRIPTS) + "})();\n"
+    script = '"use strict";\n(() => {\n' + "".join(_static(name) for name in scripts) + "})();\n"
     return {
         "style": Markup(style), "style_hash": _csp_hash(style), "script": Markup(script),
         "script_hash": _csp_hash(script),

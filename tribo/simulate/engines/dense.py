@@ -15,27 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.records import FloatArray
-from tribo.simulate.engines import kernels as k
-from tribo.simulate.engines.jit import compiled, copied_into_callers, vectorised, widest_vectors
-from tribo.simulate.engines.kernels import CODE, DENSE_STEPS, RUNNING, STEP, Numerics, Samples, State, observe
-from tribo.simulate.engines.lattice import INNER, OFFSETS, Lattice
+from tribo.simulate.engines import state as k
+from tribo.simulate.engines.jit import compiled, copied_into_callers, inner, inner_vectorised, widest_vectors
+from tribo.simulate.engines.lattice import OFFSETS, Lattice
+from tribo.simulate.engines.planes import Layout, aligned, layout_of, places_of, spare_stiffness, wrap
+from tribo.simulate.engines.state import CODE, DENSE_STEPS, RUNNING, STEP, Numerics, Samples, State, observe
 from tribo.simulate.friction import sliding_threshold, static_threshold
 
 # rows of Field.planes: m v / dt and its amount (zero at rest), thresholds (static now, sliding), time of the last
 # stop, static threshold after a slip
 PX, PY, PACE, FS, FD, SINCE, FA, PLANES = range(8)
-
-
-LINE, PAGE = 8, 512  # numbers in a cache line, and in the bytes after which cache sets repeat
-
-
-class Layout(NamedTuple):
-    """Where the blocks lie: block (x, y) at ``first + y width + x``."""
-
-    width: int
-    first: int
-    last: int  # end of the stretch that is worked on, a whole number of vectors
-    places: int
 
 
 class Field(NamedTuple):
@@ -50,24 +39,16 @@ class Field(NamedTuple):
     follow: float  # m a step: what the quasi-static motion adds to the sum of displacements along the pull
     pull_x: float  # N/s: rate of the slider's pull on every block
     pull_y: float
-
-
-def layout_of(nx: int, ny: int) -> Layout:
-    """Rows and first blocks begin at cache lines; equal places of two planes never share a cache set."""
-    width = -(-(nx + 2) // LINE) * LINE
-    first = LINE + width
-    last = first + -(-ny * width // (4 * LINE)) * 4 * LINE
-    least = last + width + LINE
-    return Layout(width, first, last, least + (PAGE // 7 // LINE * LINE - least) % PAGE)
+    weakens: int | None  # None if a block that has slipped holds as much as before
 
 
 def field_of(state: State, numerics: Numerics, lattice: Lattice, follow: FloatArray) -> Field:
     """The blocks of a state; ``follow`` (n, 2) is the quasi-static velocity of the cavities in m/s."""
     layout = layout_of(lattice.nx, lattice.ny)
-    inside = _places(layout, lattice)
+    inside = places_of(layout, lattice.nx, lattice.ny)
     now = numerics.start + int(state.counts[STEP]) * numerics.dt
-    cells = state.cells[:-1]
-    positions, planes = _aligned(4, layout.places), _aligned(PLANES, layout.places)
+    cells = state.cells
+    positions, planes = aligned(4, layout.places), aligned(PLANES, layout.places)
     positions[:2, inside] = (cells[:, k.QX : k.QY + 1] + follow * now).T
     planes[PX : PY + 1, inside] = (cells[:, k.VX : k.VY + 1] + follow).T * (numerics.mass / numerics.dt)
     planes[PACE] = np.hypot(planes[PX], planes[PY])
@@ -75,80 +56,49 @@ def field_of(state: State, numerics: Numerics, lattice: Lattice, follow: FloatAr
     planes[FA] = np.inf
     for row, column in ((FS, k.FS), (FD, k.FD), (SINCE, k.SINCE), (FA, k.FA)):
         planes[row, inside] = cells[:, column]
-    inner = numerics.stiffness * np.add(INNER, (lattice.shear, lattice.shear, 0.0))
-    spare = inner - cells[:, k.KXX : k.KXY + 1]
-    edge = np.flatnonzero(np.abs(spare).max(axis=1) > 1e-9 * numerics.stiffness)
+    spare = numerics.stiffness * spare_stiffness(lattice)
+    edge = np.flatnonzero(spare.any(axis=1))
     spare = np.ascontiguousarray(spare[edge].T)
-    there = _aligned(1, layout.places)[0]
+    there = aligned(1, layout.places)[0]
     there[inside] = 1.0
     if lattice.periodic:
         wrap(there, layout, lattice.nx, lattice.ny)
     direction = np.array([numerics.direction_x, numerics.direction_y])
     pull = numerics.shear_stiffness * numerics.speed * direction
     along = numerics.dt * float((follow @ direction).sum())
-    return Field(layout, positions, planes, inside[edge], spare, there, along, *map(float, pull))
-
-
-def _aligned(rows: int, places: int) -> FloatArray:
-    """Zeros that begin at a cache line."""
-    room = np.zeros(rows * places + LINE)
-    skip = -room.ctypes.data % (8 * LINE) // 8
-    return room[skip : skip + rows * places].reshape(rows, places)
-
-
-def _places(layout: Layout, lattice: Lattice) -> NDArray[np.int64]:
-    y, x = np.divmod(np.arange(lattice.nx * lattice.ny), lattice.nx)
-    return np.asarray(layout.first + y * layout.width + x)
+    weakens = None if np.array_equal(cells[:, k.FA], cells[:, k.FS]) else 1
+    pull_x, pull_y = map(float, pull)
+    return Field(layout, positions, planes, inside[edge], spare, there, along, pull_x, pull_y, weakens)
 
 
 def advance_dense(
     state: State, out: Samples, numerics: Numerics, until_step: int, lattice: Lattice, follow: FloatArray
 ) -> None:
-    """Integrate all blocks until few enough move, then return them to the active set."""
+    """Integrate all blocks of a state to a step, or to the end of the run."""
     field = field_of(state, numerics, lattice, follow)
-    state.counts[CODE] = RUNNING
     swapped = integrate(field, state, out, numerics, until_step)
-    put_back(field, swapped, state, numerics, lattice, follow)
-    k.start_lists(state, numerics)
-
-
-def put_back(
-    field: Field, swapped: bool, state: State, numerics: Numerics, lattice: Lattice, follow: FloatArray
-) -> None:
-    """Write displacements, velocities and forces into the state; calm cavity blocks come to rest."""
-    inside = _places(field.layout, lattice)
-    cells, contact = state.cells[:-1], lattice.contact
+    inside = places_of(field.layout, lattice.nx, lattice.ny)
+    cells = state.cells
     now = numerics.start + int(state.counts[STEP]) * numerics.dt
     with np.errstate(over="ignore", invalid="ignore"):  # the caller refuses a run that met such a number
         newest = field.positions[2:] if swapped else field.positions[:2]
         cells[:, k.QX : k.QY + 1] = newest[:, inside].T - follow * now
         cells[:, k.VX : k.VY + 1] = field.planes[PX : PY + 1, inside].T * (numerics.dt / numerics.mass) - follow
-        cells[:, k.SINCE] = field.planes[SINCE, inside]
-        cells[:, k.FS] = field.planes[FS, inside]
-        drag = -numerics.mass * numerics.damping * follow
-        force = numerics.stiffness * lattice.spring_forces(cells[:, k.QX : k.QY + 1]) + drag
-        cells[:, k.GX : k.GY + 1] = force
-        speed = np.hypot(*cells[:, k.VX : k.VY + 1].T)
-        rest_speed = numerics.rest_force / math.sqrt(numerics.stiffness * numerics.mass)
-        calm = ~contact & (speed < rest_speed) & (np.hypot(*force.T) < numerics.rest_force)
-    cells[calm, k.VX : k.VY + 1] = 0.0
+    cells[:, k.SINCE] = field.planes[SINCE, inside]
+    cells[:, k.FS] = field.planes[FS, inside]
 
 
 @compiled
 def integrate(f: Field, s: State, out: Samples, c: Numerics, until_step: int) -> bool:
-    """Steps of all blocks up to ``until_step``, or fewer once the active set would be faster.
-
-    True if the newest positions are the second two rows.
-    """
+    """Steps of all blocks up to ``until_step``; true if the newest positions are the second two rows."""
     widest_vectors()
     swapped = False
     first, last, width = f.layout.first, f.layout.last, f.layout.width
     p_x, p_y, pace = f.planes[PX, first:last], f.planes[PY, first:last], f.planes[PACE, first:last]
     fs, fd, since = f.planes[FS, first:last], f.planes[FD, first:last], f.planes[SINCE, first:last]
-    again = None if c.weakens is None else f.planes[FA, first:last]
+    again = None if f.weakens is None else f.planes[FA, first:last]
     own = 12.0 + 4.0 * c.shear_stiffness / c.stiffness
     way = c.dt * c.dt / c.mass
-    rest = c.rest_force * math.sqrt(c.mass / c.stiffness) / c.dt
     while s.counts[STEP] < until_step and s.counts[CODE] == RUNNING:
         before, after = (2, 0) if swapped else (0, 2)
         x, y = f.positions[before], f.positions[before + 1]
@@ -174,17 +124,14 @@ def integrate(f: Field, s: State, out: Samples, c: Numerics, until_step: int) ->
         s.totals[k.FRICTION_WORK] += way * work
         s.totals[k.VISCOUS_WORK] += way * squares * c.damping * c.dt
         s.counts[DENSE_STEPS] += 1
-        moving, active = 0, c.nx * c.ny
-        check = (s.counts[STEP] + 1) % 16 == 0
-        if check or (s.counts[STEP] + 1) % c.stride == 0:
-            moving, active = count_moving(pace, fs, rest)
+        moving = 0
+        if (s.counts[STEP] + 1) % c.stride == 0:
+            moving = count_moving(pace, fs)
         observe(1, moving, s, out, c)
-        if check and active < c.dense_above // 2:
-            break
     return swapped
 
 
-@compiled
+@inner
 def pushed_apart(f: Field, x: FloatArray, y: FloatArray, c: Numerics, t: float) -> None:
     """As :func:`pushed` and :func:`free_edges`, with springs that turn with their ends (the full r_ij of the paper)."""
     keep = 1.0 - c.damping * c.dt
@@ -205,7 +152,7 @@ def pushed_apart(f: Field, x: FloatArray, y: FloatArray, c: Numerics, t: float) 
         f.planes[PY, i] = keep * f.planes[PY, i] + f.there[i] * force_y
 
 
-@compiled
+@inner
 def free_edges(f: Field, x: FloatArray, y: FloatArray) -> None:
     """Take back what :func:`pushed` has of springs that are not there."""
     p_x, p_y = f.planes[PX], f.planes[PY]
@@ -216,20 +163,7 @@ def free_edges(f: Field, x: FloatArray, y: FloatArray) -> None:
         p_y[i] += across[m] * x[i] + own_y[m] * y[i]
 
 
-@compiled
-def wrap(a: FloatArray, layout: Layout, nx: int, ny: int) -> None:
-    """Put a copy of each side beyond the opposite one."""
-    top = layout.first + (ny - 1) * layout.width
-    below, above = layout.first - layout.width, top + layout.width
-    for x in range(nx):
-        a[below + x] = a[top + x]
-        a[above + x] = a[layout.first + x]
-    for row in range(below, above + 1, layout.width):
-        a[row - 1] = a[row + nx - 1]
-        a[row + nx] = a[row]
-
-
-@vectorised
+@inner_vectorised
 def pushed(
     x_up: FloatArray,
     x_row: FloatArray,
@@ -261,7 +195,7 @@ def pushed(
         p_y[i] = keep * p_y[i] + quarter * bent_y + pull_y
 
 
-@vectorised
+@inner_vectorised
 def rubbed(
     x: FloatArray,
     y: FloatArray,
@@ -279,7 +213,7 @@ def rubbed(
     law: FloatArray | None,
     again: FloatArray | None,
 ) -> tuple[float, float, float, float]:
-    """Friction and displacement of all blocks: :func:`tribo.simulate.engines.kernels.kick` in N, without a branch.
+    """Friction and displacement of all blocks: :func:`tribo.simulate.engines.strips.slides` on planes of their own.
 
     ``pace`` is |p| after the last step, zero at rest; ``way`` turns p into the displacement of a step, ``speed_of``
     into a speed. Returns the sums of p_x, p_y, p2 and |p| times friction.
@@ -304,7 +238,7 @@ def rubbed(
         begins = 0.5 if drive > holding else 0.0  # the first kick of a slip is half a step long
         part = (begins if rests else 1.0) * max(excess, 0.0)
         middle = was + excess
-        part = 0.125 * middle * middle if stops else part  # kernels.last_stretch
+        part = 0.125 * middle * middle if stops else part  # strips.last_stretch
         whole = drive * (was - excess if stops else 1.0)
         share = part / (whole if whole > 0.0 else 1.0)
         length = share * drive
@@ -326,15 +260,12 @@ def rubbed(
     return sum_x, sum_y, squares, work
 
 
-@vectorised
-def count_moving(pace: FloatArray, fs: FloatArray, rest: float) -> tuple[int, int]:
-    """Contact blocks that move, and with them the cavity blocks faster than ``rest``."""
+@inner_vectorised
+def count_moving(pace: FloatArray, fs: FloatArray) -> int:
+    """Contact blocks that move."""
     widest_vectors()
     copied_into_callers()
     contacts = 0
-    active = 0
     for i in range(len(pace)):
-        rubs = fs[i] > 0.0
-        contacts += 1 if rubs & (pace[i] > 0.0) else 0
-        active += 1 if pace[i] > (0.0 if rubs else rest) else 0
-    return contacts, active
+        contacts += 1 if (fs[i] > 0.0) & (pace[i] > 0.0) else 0
+    return contacts

@@ -1,4 +1,4 @@
-"""The fast engine: exact jump to the first failure, then the compiled loop in chunks."""
+"""The fast engine: exact jump to the first failure, then the compiled loop over what moves, in chunks."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 from tribo.errors import Problem, SimulationError
 from tribo.records import FloatArray
 from tribo.simulate.config import SimConfig, mask_of
-from tribo.simulate.engines import kernels as k
+from tribo.simulate.engines import state as k
+from tribo.simulate.engines.active import Active, active_of, advance
 from tribo.simulate.engines.dense import advance_dense
 from tribo.simulate.engines.lattice import Lattice, make_lattice
+from tribo.simulate.engines.planes import places_of
+from tribo.simulate.engines.strips import planes_of
 from tribo.simulate.friction import packed
 
-_RING = 1 << 15  # steps the failure queue looks ahead
 _CHUNK = 4096  # samples between two returns from the compiled loop
-_DENSE_SHARE = 0.15  # share of active blocks from which integrating all of them is faster
 
 
 @dataclass(frozen=True)
@@ -131,8 +132,10 @@ def run_fast(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Tra
     _refuse_thresholds(thresholds, lattice)
     drive = drive_of(config, lattice)
     failure = first_failure_s(lattice, thresholds, drive, config.stiffness_N_m)
-    numerics = _numerics(config, lattice, thresholds, drive, failure - 2 * config.dt_s)
+    # half a step off, so that no rounding decides in which step the first block fails
+    numerics = _numerics(config, lattice, thresholds, drive, failure - 1.5 * config.dt_s)
     state = _initial_state(config, lattice, thresholds, drive, numerics)
+    active = None if config.engine == "dense" else active_set(state, numerics, lattice, drive, config)
     chunks: list[k.Samples] = []
     last_step = _last_step(config, thresholds, numerics)
     while state.counts[k.CODE] == k.RUNNING and state.counts[k.STEP] < last_step:
@@ -141,20 +144,32 @@ def run_fast(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Tra
         )
         state.counts[k.N_SAMPLES] = 0
         until = min(int(state.counts[k.STEP]) + _CHUNK * numerics.stride, last_step)
-        while state.counts[k.CODE] == k.RUNNING and state.counts[k.STEP] < until:
-            advance(state, samples, numerics, until, lattice, drive)
+        if active is None:
+            advance_dense(state, samples, numerics, until, lattice, drive.follow)
+        else:
+            advance(active, state, samples, numerics, until)
         chunks.append(_first(samples, int(state.counts[k.N_SAMPLES])))
+    if active is not None:
+        put_back(active, state, numerics)
     _refuse_not_finite(state, numerics)
     return _trajectory(chunks, state, numerics, drive, failure)
 
 
-def advance(
-    state: k.State, samples: k.Samples, numerics: k.Numerics, until_step: int, lattice: Lattice, drive: Drive
-) -> None:
-    """Steps of the moving blocks, or of all while most move, up to ``until_step`` or the end of the run."""
-    k.advance(state, samples, numerics, until_step)
-    if state.counts[k.CODE] == k.CROWDED:
-        advance_dense(state, samples, numerics, until_step, lattice, drive.follow)
+def active_set(state: k.State, numerics: k.Numerics, lattice: Lattice, drive: Drive, config: SimConfig) -> Active:
+    """What the compiled loop of the fast engine works on."""
+    drag = -config.mass_kg * config.damping_per_s * drive.follow
+    pull = np.where(lattice.contact[:, None], drive.rate, drag)
+    return active_of(*planes_of(state, numerics, lattice, pull), numerics)
+
+
+def put_back(active: Active, state: k.State, numerics: k.Numerics) -> None:
+    """Write the displacements and velocities of the active set into the state."""
+    inside = places_of(active.layout, numerics.nx, numerics.ny)
+    p = active.planes
+    state.cells[:, k.QX], state.cells[:, k.QY] = p.q_x[inside], p.q_y[inside]
+    with np.errstate(over="ignore", invalid="ignore"):  # the caller refuses a run that met such a number
+        state.cells[:, k.VX] = p.p_x[inside] * (numerics.dt / numerics.mass)
+        state.cells[:, k.VY] = p.p_y[inside] * (numerics.dt / numerics.mass)
 
 
 def once(blocks: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -169,7 +184,6 @@ def _first(samples: k.Samples, n: int) -> k.Samples:
 def _numerics(
     config: SimConfig, lattice: Lattice, thresholds: Thresholds, drive: Drive, start: float
 ) -> k.Numerics:
-    n = lattice.contact.size
     direction = drive.velocity / config.speed_m_s
     return k.Numerics(
         nx=lattice.nx,
@@ -190,9 +204,7 @@ def _numerics(
         stride=max(1, round(config.sample_interval_s / config.dt_s)),
         stop_at_peaks=np.inf if config.duration_s is not None else config.duration_peaks,
         peak_drop=config.peak_drop,
-        dense_above=-1 if config.engine == "dense" else int(_DENSE_SHARE * n),
         law=packed(config.terms),
-        weakens=None if thresholds.again_N is None else 1,
     )
 
 
@@ -201,24 +213,13 @@ def _initial_state(
 ) -> k.State:
     """Everything at rest shortly before the first failure."""
     n = lattice.contact.size
-    cells = np.zeros((n + 1, k.WIDTH))
-    drag = -config.mass_kg * config.damping_per_s * drive.follow
-    cells[:n, k.GX : k.GY + 1] = config.stiffness_N_m * lattice.spring_forces(drive.lag) + drag
-    cells[:n, k.RX : k.RY + 1] = drive.rate
-    cells[:n, k.QX : k.QY + 1] = drive.lag
-    cells[:n, k.FS], cells[:n, k.FD] = thresholds.static_N, thresholds.sliding_N
-    cells[:n, k.FA] = thresholds.static_N if thresholds.again_N is None else thresholds.again_N
-    cells[:, k.KXX : k.KXY + 1] = config.stiffness_N_m * lattice.own
+    cells = np.zeros((n, k.WIDTH))
+    cells[:, k.QX : k.QY + 1] = drive.lag
+    cells[:, k.FS], cells[:, k.FD] = thresholds.static_N, thresholds.sliding_N
+    cells[:, k.FA] = thresholds.static_N if thresholds.again_N is None else thresholds.again_N
     cells[:, k.SINCE] = -config.terms.hold_s
-    links = np.zeros((n + 1, k.LINKS), np.int64)
-    links[:n, k.CONTACT] = lattice.contact
-    links[n, k.STATUS] = k.NOBODY
     state = k.State(
         cells=cells,
-        links=links,
-        neighbours=lattice.neighbours,
-        lists=np.zeros((2, n + 1), np.int64),
-        head=np.full(_RING, -1, np.int64),
         failed=np.full((2, min(n, 64)), -1, np.int64),
         counts=np.zeros(k.N_COUNTS, np.int64),
         totals=np.zeros(k.N_TOTALS),
@@ -229,7 +230,6 @@ def _initial_state(
     state.totals[k.PEAK] = state.totals[k.FORCE]
     state.totals[k.PEAK_TIME] = numerics.start
     state.totals[k.INTEGRAL] = 0.5 * state.totals[k.FORCE] * numerics.start
-    k.start_lists(state, numerics)
     return state
 
 
@@ -257,7 +257,7 @@ def _refuse_thresholds(thresholds: Thresholds, lattice: Lattice) -> None:
 def _refuse_not_finite(state: k.State, numerics: k.Numerics) -> None:
     if state.counts[k.CODE] != k.NOT_FINITE:
         return
-    bad = np.flatnonzero(~np.isfinite(state.cells[:-1, k.QX : k.VY + 1]).all(axis=1))
+    bad = np.flatnonzero(~np.isfinite(state.cells[:, k.QX : k.VY + 1]).all(axis=1))
     y, x = divmod(int(bad[0]), numerics.nx) if bad.size else (-1, -1)
     t = numerics.start + state.counts[k.STEP] * numerics.dt
     raise SimulationError(
@@ -291,8 +291,8 @@ def _trajectory(
         failed=once(blocks[np.lexsort((blocks, steps))]),
         end_s=now,
         end_impulse_Ns=float(totals[k.INTEGRAL]),
-        displacement_m=state.cells[:-1, k.QX : k.QY + 1] + drive.follow * now,
-        velocity_m_s=state.cells[:-1, k.VX : k.VY + 1] + drive.follow,
+        displacement_m=state.cells[:, k.QX : k.QY + 1] + drive.follow * now,
+        velocity_m_s=state.cells[:, k.VX : k.VY + 1] + drive.follow,
         friction_work_J=float(totals[k.FRICTION_WORK]),
         viscous_work_J=float(totals[k.VISCOUS_WORK]),
         dense_steps=int(state.counts[k.DENSE_STEPS]),

@@ -1,7 +1,7 @@
   // Numbers under the pointer in the figures.
   const tip = make("div", { class: "tip", hidden: "", "aria-hidden": "true" });
   document.body.append(tip);
-  const figures = JSON.parse(byId("figure-data").textContent);
+  const figures = JSON.parse(byId("figure-data")?.textContent ?? "{}");
   for (const [name, series] of Object.entries(figures)) {
     const svg = document.querySelector(`#figure-${name} svg`);
     if (!svg || !series.length) continue;
