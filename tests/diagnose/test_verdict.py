@@ -78,6 +78,15 @@ def test_every_mechanism_is_either_a_cause_or_excluded_with_a_reason(tied: Diagn
     assert "the calibration on the flat sample absorbs" in reasons["pulley_friction"]
 
 
+def test_only_what_the_design_can_test_is_ruled_out(tied: Diagnosis) -> None:
+    from tribo.mechanisms.table import mechanism
+
+    v, conditions = tied.verdict, tied.baseline.setup.observations.conditions
+    assert all(mechanism(e.mechanism).applies(conditions) for e in v.excluded)
+    assert not [e for e in v.excluded if "cannot be tested" in e.reason]
+    assert {"velocity_dependence", "pulley_friction"} <= {e.mechanism for e in v.not_testable}
+
+
 def test_the_same_seed_gives_the_same_verdict_to_the_bit() -> None:
     ingested = hidden(seed=8)
     first, second = (examine(ingested, seed=4, replicates=(20, 10)).verdict.to_json() for _ in range(2))
