@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from tribo.records import Ingested, Run, Study
 
 __all__ = [
-    "agreement", "dependence", "evidence", "extended", "laws_against_area", "misfit", "oscillations", "power",
-    "published", "published_readings", "pull", "pulls", "ratio_against_pressure", "records", "residuals",
-    "restarts", "run", "simulated_pulls", "sliding_force", "static_force",
-]
+    "agreement", "dependence", "evidence", "extended", "finding", "forces", "law", "laws_against_area", "misfit",
+    "oscillations", "power", "published", "published_readings", "pull", "pulls", "ratio_against_pressure", "records",
+    "residuals", "restarts", "run", "simulated_pulls", "sliding_force", "static_force",
+]  # fmt: skip
 
 
 def __dir__() -> list[str]:

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from tribo import stages
 from tribo.campaign import load_campaign
 from tribo.escaping import for_spreadsheet, from_spreadsheet
-from tribo.figures.catalogue import FIGURES
+from tribo.figures.catalogue import FIGURES, FRICTION_FIGURES
 from tribo.figures.style import house_style
 from tribo.records import Study
 from tribo.report import result_tables
@@ -104,7 +104,7 @@ def test_a_figure_that_fails_is_replaced_by_its_reason_and_the_others_are_drawn(
 ) -> None:
     from dataclasses import replace
 
-    first, second = [n for n, f in FIGURES.items() if not f.numbers(study).empty][:2]
+    first, second = (next(n for n in draw_all(study) if n in table) for table in (FIGURES, FRICTION_FIGURES))
 
     def broken(numbers: pd.DataFrame) -> Figure:
         raise KeyError("$sample")
@@ -112,12 +112,13 @@ def test_a_figure_that_fails_is_replaced_by_its_reason_and_the_others_are_drawn(
     def empty(results: Study) -> pd.DataFrame:
         raise FloatingPointError("overflow")
 
-    for name in set(FIGURES) - {first, second}:
-        monkeypatch.setitem(FIGURES, name, replace(FIGURES[name], numbers=lambda _: pd.DataFrame()))
+    for table in (FIGURES, FRICTION_FIGURES):
+        for name in set(table) - {first, second}:
+            monkeypatch.setitem(table, name, replace(table[name], numbers=lambda _: pd.DataFrame()))
     monkeypatch.setitem(FIGURES, first, replace(FIGURES[first], draw=broken))
     drawn = draw_all(study)
     assert "this figure cannot be drawn because of an error in tribo (KeyError" in drawn[first].caption
     assert len(drawn[first].files["csv"]) > 100
     assert "an error in tribo" not in drawn[second].caption
-    monkeypatch.setitem(FIGURES, second, replace(FIGURES[second], numbers=empty))
+    monkeypatch.setitem(FRICTION_FIGURES, second, replace(FRICTION_FIGURES[second], numbers=empty))
     assert "the numbers of this figure cannot be computed" in draw_all(study)[second].caption

@@ -224,8 +224,10 @@ def informations(fitted: Replicates, looks: Columns) -> tuple[FloatArray, FloatA
     wide, local = _wide_products(fitted, looks.wide), _local_products(fitted, looks)
     crossed, pull = _wide_cleared(wide, at)
     left, score, whole = (np.zeros((len(pull), len(looks.whole))) for _ in range(3))
-    whole[:, looks.wide_at] = wide.whole
-    left[:, looks.wide_at], score[:, looks.wide_at] = wide.whole - np.sum(crossed**2, axis=1), pull
+    shown = np.array([pair.stop > pair.start for pair in looks.wide.pairs], bool)  # a column of zeros has no products
+    whole[:, looks.wide_at[shown]] = wide.whole
+    left[:, looks.wide_at] = whole[:, looks.wide_at] - np.sum(crossed**2, axis=1)
+    score[:, looks.wide_at] = pull
     for positions, single in _singles(looks, local, at):
         left[:, positions], score[:, positions], whole[:, positions] = single.left, single.pull, single.whole
     seen = left > TAKEN_UP * whole
