@@ -68,6 +68,7 @@ def expected(name: str, step: str, *more: str, after: str, first: str = "") -> l
     record = f"steps/{name}/{first or step}.json"
     digest = f"d {name} s {shlex.join(['--flat', ODD])}"
     own = ["-P", "-m", "tribo.cli.workflow_step", record, "--digest", digest]
+    own += ["--laws", "laws"] if step in ("diagnose", "report") else []
     own += ["--after", f"steps/{name}/{after}.json"] if after else []
     own += ["--files", f"inputs/{name}.json"] if step == "report" else []
     given = ["--flat", ODD, "--overrides", f"/drop/{name}{ODD}"]

@@ -34,7 +34,7 @@ def test_a_kept_figure_is_not_drawn_again_unless_its_numbers_change(
     ingested = measured.ingested
     pulls = {**ingested.pulls, "T0001": replace(ingested.pulls["T0001"], static_N=9.0)}
     draw_all(replace(measured, ingested=replace(ingested, pulls=pulls)), drawing=Drawing(keep=keep))
-    assert set(drawn) == {"fig4", "fig6", "dependence"}  # no other one shows the static force of a pull
+    assert set(drawn) == {"fig4", "fig6", "dependence", "forces"}  # no other one shows the static force of a pull
 
 
 def test_several_processes_draw_the_same_bytes(measured: Study) -> None:

@@ -33,7 +33,7 @@ def _corrections(context: click.Context, parameter: click.Parameter, given: tupl
         except ValueError:
             raise click.BadParameter(f"{text!r} is not KEY=NUMBER") from None
         if key.strip() not in _KEYS:
-            hint = did_you_mean(key, _KEYS) or f"allowed: {', '.join(_KEYS)}"
+            hint = f"{did_you_mean(key, _KEYS)} Allowed: {', '.join(_KEYS)}".strip()
             raise click.BadParameter(f"{key.strip()!r} is unknown; {hint}")
         if key.strip() == "sign" and found["sign"] not in (1.0, -1.0):
             raise click.BadParameter("sign is 1 or -1")

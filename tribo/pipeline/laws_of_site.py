@@ -50,14 +50,15 @@ def answers_of(current: Path) -> tuple[LawAnswer, ...]:
 
 
 def _in_verdict(path: Path) -> list[LawAnswer]:
+    """The answers of one report; none where its verdict is damaged."""
     try:
         known: Sequence[Mapping[str, Any]] = json.loads(path.read_text(encoding="utf-8"))["model"].get("known_laws", ())
-    except (OSError, ValueError, KeyError, AttributeError):
+        return [
+            LawAnswer(str(law["law"]), str(law["found_in"]), str(law["formula"]), path.parent.name, str(law["answer"]))
+            for law in known
+        ]
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return []
-    return [
-        LawAnswer(str(law["law"]), str(law["found_in"]), str(law["formula"]), path.parent.name, str(law["answer"]))
-        for law in known
-    ]
 
 
 def laws_csv(answers: Sequence[LawAnswer]) -> str:

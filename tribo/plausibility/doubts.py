@@ -163,7 +163,9 @@ def _area_fraction(pattern: Pattern, place: str) -> Iterator[Doubt]:
 
 
 def _load_span(campaign: Campaign) -> Iterator[Doubt]:
-    """Samples whose loads are too close together for a slope."""
+    """Samples whose loads are too close together for a slope; of flat samples, loads meant to be one are none."""
+    patterned = any(not pattern.is_flat for pattern in campaign.samples.values())
+    one_load = 1.0 if patterned else bounds.ONE_LOAD
     by_sample: dict[str, list[float]] = {}
     for test in campaign.tests:
         if test.normal_load_N > 0:
@@ -171,7 +173,7 @@ def _load_span(campaign: Campaign) -> Iterator[Doubt]:
     close = {
         s: 100 * (max(loads) / min(loads) - 1)
         for s, loads in sorted(by_sample.items())
-        if bounds.ONE_LOAD < max(loads) / min(loads) < bounds.SMALLEST_LOAD_SPAN
+        if one_load < max(loads) / min(loads) < bounds.SMALLEST_LOAD_SPAN
     }
     if not close:
         return
