@@ -16,6 +16,7 @@ import re
 import struct
 import tomllib
 import zipfile
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from decimal import Decimal
@@ -453,10 +454,29 @@ HOSTILE_PARTS: tuple[Any, ...] = (
 )  # fmt: skip
 
 
+AXES: Mapping[str, Any] = {
+    "dt_s": st.floats(1e-9, 2e-8), "mu_s": st.floats(0.5, 2.0), "engine": st.sampled_from(("fast", "reference")),
+    "shear_factor": st.floats(0.1, 1.0),
+}  # fmt: skip
+OTHER_DESIGN: Mapping[str, Any] = {
+    "samples": st.lists(st.sampled_from(("F", "A", "B")), min_size=1, max_size=3, unique=True),
+    "pressures_kPa": st.lists(st.floats(0.5, 40.0), min_size=1, max_size=3, unique=True),
+    "angles_deg": st.sampled_from(("midpoints", "random", "nominal")),
+    "repeats": st.integers(1, 4),
+    "seed": st.integers(0, 2**63 - 1),
+    "parameters": st.fixed_dictionaries(
+        {}, optional={name: values | st.lists(values, min_size=1, max_size=3, unique=True)
+                      for name, values in AXES.items()},
+    ),
+}  # fmt: skip
+
+
 def check_design(draw: Draw, folder: Path) -> str:
     """One design file, as TOML or JSON."""
     table = dict(DESIGN)
-    way = draw(st.sampled_from(("spelled", "value", "bytes")))
+    way = draw(st.sampled_from(("spelled", "other", "value", "bytes")))
+    if way == "other":
+        table |= draw(st.fixed_dictionaries({}, optional=OTHER_DESIGN))
     suffix = draw(st.sampled_from((".json", ".toml")))
     if way == "value":
         key = draw(st.sampled_from((*DESIGN, "patterns", "unknown")))
@@ -469,7 +489,7 @@ def check_design(draw: Draw, folder: Path) -> str:
     try:
         runs = read_design(file)
     except SimulationError as why:
-        if way == "spelled":
+        if way in ("spelled", "other"):
             raise DifferentError(f"a clean design is refused: {why}") from why
         refused(why.problems)
         return REFUSED
@@ -479,15 +499,34 @@ def check_design(draw: Draw, folder: Path) -> str:
     written = json.loads(decoded) if suffix == ".json" else tomllib.loads(decoded)
     if runs != runs_of_design({"seed": 0, **written}):
         raise DifferentError("a design is read otherwise than written")
-    axes = [v for n, v in written.get("parameters", {}).items() if isinstance(v, list) and n != "blocks"]
-    angles = written.get("angles_deg", "midpoints")
-    count = len(dict.fromkeys(written["samples"])) * len(written["pressures_kPa"]) * int(written.get("repeats", 4))
-    count *= math.prod(len(axis) for axis in axes) * (len(angles) if isinstance(angles, list) else 1)
-    blocks = written.get("parameters", {}).get("blocks")
-    count *= len(blocks) if isinstance(blocks, list) and any(isinstance(b, list) for b in blocks) else 1
-    if len(runs) != count or {r.pressure_Pa for r in runs} != {1e3 * p for p in written["pressures_kPa"]}:
-        raise DifferentError(f"{count} runs are written and {len(runs)} are laid out")
+    _laid_out(written, runs)
     return SAME if runs == runs_of_design(DESIGN) else CHANGED
+
+
+def _laid_out(written: Mapping[str, Any], runs: Sequence[Any]) -> None:
+    """Every combination of what is written is among the runs, each as often as the others, and nothing else."""
+    parameters = written.get("parameters", {})
+    axes = {name: value for name, value in parameters.items() if isinstance(value, list) and name != "blocks"}
+    blocks = parameters.get("blocks")
+    axes |= {"blocks": blocks} if isinstance(blocks, list) and any(isinstance(b, list) for b in blocks) else {}
+    samples = list(dict.fromkeys(written["samples"]))
+    angles = written.get("angles_deg", "midpoints")
+    count = len(samples) * len(written["pressures_kPa"]) * int(written.get("repeats", 4))
+    count *= math.prod(len(axis) for axis in axes.values()) * (len(angles) if isinstance(angles, list) else 1)
+    if len(runs) != count:
+        raise DifferentError(f"{count} runs are written and {len(runs)} are laid out")
+    said = {"sample": samples, "pressure_Pa": [1e3 * p for p in written["pressures_kPa"]]}
+    said |= {name: value if name in axes else [value] for name, value in parameters.items() if name != "blocks"}
+    for name, values in said.items():
+        found = Counter(_value_of(run, name) for run in runs)
+        if set(found) != set(values) or (len(set(values)) == len(values) and len(set(found.values())) > 1):
+            raise DifferentError(f"{name}: {values} are written and {dict(found)} are laid out")
+
+
+def _value_of(run: Any, name: str) -> Any:
+    """A parameter of a run, which may be one of its law of friction."""
+    holder = next(part for part in (run, run.friction, run.terms) if hasattr(part, name))
+    return getattr(holder, name)
 
 
 def _as_toml(table: Mapping[str, Any]) -> str:
