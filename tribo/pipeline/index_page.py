@@ -19,6 +19,7 @@ from urllib.parse import quote
 
 from tribo import __version__
 from tribo.escaping import for_spreadsheet
+from tribo.file_contents import bytes_of
 from tribo.pipeline.history import CampaignRow, Law, history
 from tribo.pipeline.laws_of_site import answers_of, laws_csv, laws_in_words
 from tribo.pipeline.trend import FEWEST, LEVEL, SHORTEST, Change, change_points
@@ -75,7 +76,7 @@ def write_index(site: Path) -> str:
         texts["laws.csv"] = laws_csv(answers)
     for name, text in texts.items():
         path = site / "current" / name
-        if not path.is_file() or path.read_bytes() != text.encode("utf-8"):
+        if not path.is_file() or bytes_of(path) != text.encode("utf-8"):
             write_text(path, text)
         digest.update(text.encode())
     return digest.hexdigest()

@@ -17,6 +17,7 @@ import pandas as pd
 
 from tribo.display import displayed
 from tribo.errors import CampaignError, Problem
+from tribo.file_contents import bytes_of, text_of
 from tribo.report.provenance import Provenance, read_record, settle_outputs, write_provenance
 from tribo.report.result_tables import to_csv
 from tribo.report.words.numerals import significant
@@ -73,7 +74,7 @@ def read_reported(folder: Path) -> Reported:
 def _json(path: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
-    found = json.loads(path.read_text(encoding="utf-8"))
+    found = json.loads(text_of(path))
     return found if isinstance(found, dict) else {}
 
 
@@ -186,7 +187,7 @@ def _column(report: Reported, out: Path) -> dict[str, Any]:
         "sentence": str(card.get("sentence") or verdict.get("text") or "No diagnosis was made for this report."),
         "counts": str(card.get("counts") or ""),
         "next_test": str(step.get("what") or "") if isinstance(step, dict) else "",
-        "figures": {n: base64.b64encode(p.read_bytes()).decode("ascii") for n, p in found.items() if p.is_file()},
+        "figures": {n: base64.b64encode(bytes_of(p)).decode("ascii") for n, p in found.items() if p.is_file()},
     }
 
 

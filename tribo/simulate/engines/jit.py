@@ -24,6 +24,7 @@ from numba import config, njit, types
 from numba.core.compiler import Compiler
 from numba.extending import intrinsic, register_jitable
 
+from tribo.file_contents import bytes_of, found_below
 from tribo.store.private_folder import private_folder
 
 UNUSED_DAYS = 30.0
@@ -38,8 +39,8 @@ def cache_directory() -> Path:
     to is never used: see :func:`tribo.store.private_folder.private_folder`.
     """
     digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parents[1].rglob("*.py")):
-        digest.update(source.name.encode() + b"\0" + source.read_bytes())
+    for source in found_below(Path(__file__).parents[1], "*.py"):
+        digest.update(source.name.encode() + b"\0" + bytes_of(source))
     name = f"numba-{digest.hexdigest()[:16]}"
     folder = private_folder((base / name for base in _cache_bases()), "tribo-numba-")
     if folder.name == name:
