@@ -105,7 +105,7 @@ def sizes(bench: Bench) -> Iterator[Trial]:
         yield "files not larger than a limit", outcome, [f"limit {limit}: {why}" for why in wrong]
     ready = bench.ready_bytes
     for share in range(few) if os.geteuid() == 0 else ():
-        size = ready + (bench.written_bytes - ready) * share // few + 40960
+        size = ready + max(bench.written_bytes - ready, 0) * share // few + 40960
         outcome, wrong = bench.on_full_disk(size)
         yield "disk full", outcome, [f"{size} bytes: {why}" for why in wrong]
 
@@ -143,6 +143,7 @@ def torture(bench: Bench, table: Table, given: argparse.Namespace, aside: Path) 
     started = time.monotonic(), sum(os.times()[:4])
     for trial in faults(bench, wanted(given.every, given.seed, given.distinct), aside):
         table.add(trial, name)
+    table.write(given.out)
     if name not in ("verify", "report again"):
         for trial in sizes(bench):
             table.add(trial, name)
