@@ -143,11 +143,11 @@ def torture(bench: Bench, table: Table, given: argparse.Namespace, aside: Path) 
     started = time.monotonic(), sum(os.times()[:4])
     for trial in faults(bench, wanted(given.every, given.seed, given.distinct), aside):
         table.add(trial, name)
-    table.write(given.out)
+        table.write(given.out)
     if name not in ("verify", "report again"):
         for trial in sizes(bench):
             table.add(trial, name)
-    table.write(given.out)
+            table.write(given.out)
     took, worked = time.monotonic() - started[0], sum(os.times()[:4]) - started[1]
     of_command = {what: row for what, row in table.rows.items() if what.endswith(f": {name}")}
     print(f"{name}: {len(bench.operations)} file operations, {took:.0f} s, {worked:.0f} s of processor time")
