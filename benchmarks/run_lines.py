@@ -26,7 +26,10 @@ def read_rows(path: Path) -> list[Row]:
 def work_off(
     todo: Iterable[Any], work: Callable[[Any], Row], path: Path, jobs: int, said: Callable[[Row], str]
 ) -> None:
-    """Append a line for each piece of work as it ends, and print what is ``said`` of it and how long the rest takes."""
+    """Append a line for each piece of work as it ends, and print what is ``said`` of it and how long the rest takes.
+
+    An error of one piece ends the run at once, instead of after all the others.
+    """
     todo, begin = list(todo), time.monotonic()
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.exists() and not path.read_bytes().endswith(b"\n"):
@@ -34,6 +37,8 @@ def work_off(
     with ProcessPoolExecutor(jobs) as pool, path.open("a") as file:
         waiting = [pool.submit(work, piece) for piece in todo]
         for done, future in enumerate(as_completed(waiting), start=1):
+            if future.exception() is not None:
+                pool.shutdown(cancel_futures=True)
             row = future.result()
             file.write(json.dumps(row) + "\n")
             file.flush()
