@@ -21,9 +21,9 @@ from urllib.parse import quote
 
 from tribo import __version__
 from tribo.escaping import for_spreadsheet
+from tribo.pipeline.choose_two import comparable
 from tribo.pipeline.history import CampaignRow, Law, history
 from tribo.pipeline.laws_of_site import answers_of, laws_csv, laws_in_words
-from tribo.pipeline.choose_two import comparable
 from tribo.pipeline.trend import FEWEST, LEVEL, SHORTEST, Change, change_points
 
 STATES = {
@@ -135,7 +135,8 @@ def page(
         rows=list(reversed(rows)), states=STATES, verdicts=VERDICTS, link=report_link, panels=by_sample,
         sentences=[change_sentence(c, rows) for c in changes], looked=longest >= FEWEST, fewest=FEWEST,
         shortest=SHORTEST, level=LEVEL, width=WIDTH, height=HEIGHT, left=LEFT, right=RIGHT, top=TOP, bottom=BOTTOM,
-        version=__version__, laws=laws, comparable=set(compared.get("campaigns", ())), compared=script_json(dict(compared)),
+        version=__version__, laws=laws, comparable=set(compared.get("campaigns", ())),
+        compared=script_json(dict(compared)),
         **style_and_script(templates, [STYLE, "index.css"], [*WORKING, "index.js"]),
     )  # fmt: skip
 
