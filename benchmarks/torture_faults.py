@@ -50,19 +50,20 @@ def wanted(every: int, seed: int, distinct: bool) -> Callable[[int, Operation], 
     """An error and a kill at each operation, or at each ``every``-th; the errors that one can give take turns.
 
     With ``distinct`` operations of one kind, from the same lines of tribo, on files of one kind in folders of one kind
-    are tried once.
+    are tried once, and ``every`` counts these. The first one is given by the seed.
     """
     turns = {kind: itertools.count(seed) for kind in KINDS}
     tried: set[tuple[object, ...]] = set()
 
     def names(at: int, operation: Operation) -> list[str]:
-        if at % every != seed % every:
-            return []
         if distinct:
             like = (operation.kind, *kind_of_file(operation.path), *lines_of_tribo())
             if like in tried:
                 return []
+            at = len(tried)
             tried.add(like)
+        if at % every != seed % every:
+            return []
         possible = errors_of(operation.kind)
         return [possible[next(turns[operation.kind]) % len(possible)], KILL]
 

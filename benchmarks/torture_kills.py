@@ -10,11 +10,9 @@ fall into every stage. Exit status 1 where anything differs.
 
 from __future__ import annotations
 
-import argparse
 import random
 import shutil
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -23,10 +21,14 @@ from torture_processes import (
     ENSEMBLE,
     REPORT,
     Command,
+    begun_site,
     differing,
     ensemble,
     finished,
+    first_build,
+    folder_of_trials,
     leftovers,
+    options,
     quick_reports,
     results,
     run,
@@ -34,6 +36,7 @@ from torture_processes import (
     start,
     start_build,
     thinned,
+    told,
 )
 
 Round = Callable[[Path, int, random.Random], list[str]]
@@ -89,20 +92,16 @@ def _kill(starting: Callable[[], Command], kills: int, moments: Callable[[], flo
 
 def kill_build(base: Path) -> Round:
     """Rounds of `tribo build` on a drop folder of one campaign."""
-    small_campaign(base / "drop" / "a")
-    assert start_build(base / "first").wait() == 0
-    kept = base / "first" / "site" / "current" / "a" / "kept"
-    shutil.copytree(kept, base / "untouched" / "site" / "current" / "a" / "kept")
-    (base / "untouched" / "site" / ".tribo").mkdir()  # known as a site of tribo
+    kept = first_build(base)
+    shutil.copytree(kept, begun_site(base / "untouched") / "current" / "a" / "kept")
     began = time.monotonic()
     assert start_build(base / "untouched").wait() == 0
     took = time.monotonic() - began
     expected = results(base / "untouched" / "site" / "current")
 
     def one(folder: Path, kills: int, rng: random.Random) -> list[str]:
-        site = folder / "site"
+        site = begun_site(folder)
         thinned(kept, site / "current" / "a" / "kept", rng)
-        (site / ".tribo").mkdir()
         _kill(lambda: start_build(folder), kills, lambda: rng.random() * took / 2)
         status = start_build(folder).wait()
         found = differing(results(site / "current"), expected) + leftovers(site)
@@ -117,26 +116,23 @@ KINDS = {"report": kill_report, "ensemble": kill_ensemble, "build": kill_build}
 
 def main() -> int:
     """Kill as often as asked for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("kind", choices=KINDS)
-    parser.add_argument("--kills", type=int, default=100)
+    parser = options(__doc__, KINDS, "kills", 100)
     parser.add_argument("--rounds-of", type=int, default=5, help="kills before a start is left to end")
-    parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     rng = random.Random(given.seed)
     failures: list[str] = []
     done = 0
-    with tempfile.TemporaryDirectory(prefix="tribo-torture-") as base:
-        one = KINDS[given.kind](Path(base))
-        while done < given.kills:
-            kills = min(given.rounds_of, given.kills - done)
-            folder = Path(base) / f"trial-{done}"
+    with folder_of_trials() as base:
+        one = KINDS[given.kind](base)
+        while done < given.trials:
+            kills = min(given.rounds_of, given.trials - done)
+            folder = base / f"trial-{done}"
             found = one(folder, kills, rng)
             failures += [f"after kill {done + kills}: {what}" for what in found]
             if not found:
                 shutil.rmtree(folder)
             done += kills
-            print(f"{done} of {given.kills} kills, {len(failures)} differences", file=sys.stderr, flush=True)
+            told(done, given, "kills", failures)
     return finished(f"kills of {given.kind}", {"kills": done, "seed": given.seed}, failures)
 
 

@@ -10,11 +10,9 @@ run may be missing, and `tribo verify` must find no difference. Exit status 1 wh
 
 from __future__ import annotations
 
-import argparse
 import random
 import shutil
 import sys
-import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -23,15 +21,20 @@ from pathlib import Path
 from torture_processes import (
     ENSEMBLE,
     REPORT,
+    begun_site,
     ensemble,
     finished,
+    first_build,
+    folder_of_trials,
     leftovers,
+    options,
     quick_reports,
     results,
     run,
     small_campaign,
     start,
     start_build,
+    told,
 )
 
 BUSY = 75
@@ -101,20 +104,18 @@ def pair_ensembles(base: Path) -> Pair:
 
 def pair_builds(base: Path) -> Pair:
     """Pairs of `tribo build` of one site."""
-    small_campaign(base / "drop" / "a")
-    assert start_build(base / "first").wait() == 0
-    kept = base / "first" / "site" / "current" / "a" / "kept"
+    kept = first_build(base)
     expected, took = results(base / "first" / "site" / "current"), 20.0
 
     def one(folder: Path, number: int, rng: random.Random) -> tuple[tuple[int | None, ...], list[str]]:
-        shutil.copytree(kept, folder / "site" / "current" / "a" / "kept")
-        (folder / "site" / ".tribo").mkdir()  # known as a site of tribo
+        site = begun_site(folder)
+        shutil.copytree(kept, site / "current" / "a" / "kept")
         first = start_build(folder)
         time.sleep(rng.random() * took * (number % 5) / 4)
         second = start_build(folder, *(("--wait", "600") if number % 3 == 0 else ()))
         ended = first.wait(), second.wait()
-        same = results(folder / "site" / "current") == expected
-        return ended, ["mixed or incomplete results"] * (not same) + leftovers(folder / "site")
+        same = results(site / "current") == expected
+        return ended, ["mixed or incomplete results"] * (not same) + leftovers(site)
 
     return one
 
@@ -124,25 +125,23 @@ KINDS = {"report": pair_reports, "ensemble": pair_ensembles, "build": pair_build
 
 def main() -> int:
     """Start as many pairs as asked for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("kind", choices=KINDS)
-    parser.add_argument("--pairs", type=int, default=50)
-    parser.add_argument("--seed", type=int, default=1)
-    given = parser.parse_args()
+    given = options(__doc__, KINDS, "pairs", 50).parse_args()
     rng = random.Random(given.seed)
     failures: list[str] = []
     statuses: Counter[str] = Counter()
-    with tempfile.TemporaryDirectory(prefix="tribo-torture-") as base:
-        one = KINDS[given.kind](Path(base))
-        for number in range(given.pairs):
-            folder = Path(base) / f"pair-{number}"
+    with folder_of_trials() as base:
+        one = KINDS[given.kind](base)
+        for number in range(given.trials):
+            folder = base / f"pair-{number}"
             ended, found = one(folder, number, rng)
             statuses[" and ".join(map(str, sorted(map(int, map(str, ended)))))] += 1
             if not set(ended) <= {0, BUSY} or 0 not in ended:
                 found = [*found, f"statuses {ended}"]
             failures += [f"pair {number}: {what}" for what in found]
-            print(f"{number + 1} of {given.pairs} pairs, {len(failures)} failures", file=sys.stderr, flush=True)
-    record = {"pairs": given.pairs, "seed": given.seed, "statuses": dict(statuses)}
+            if not found:
+                shutil.rmtree(folder)
+            told(number + 1, given, "pairs", failures)
+    record = {"pairs": given.trials, "seed": given.seed, "statuses": dict(statuses)}
     return finished(f"pairs of {given.kind}", record, failures)
 
 

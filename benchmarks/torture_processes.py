@@ -8,6 +8,7 @@ paths are relative, so that equal results are equal bytes.
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import json
 import os
@@ -18,7 +19,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -139,6 +141,20 @@ def start_build(folder: Path, *more: str) -> Command:
     return Command(process.pid, said)
 
 
+def first_build(base: Path) -> Path:
+    """Build a site of one campaign, for the first time; the folder of what it keeps for the next start."""
+    small_campaign(base / "drop" / "a")
+    assert start_build(base / "first").wait() == 0
+    return base / "first" / "site" / "current" / "a" / "kept"
+
+
+def begun_site(folder: Path) -> Path:
+    """A folder that is known as a site of tribo; nothing is built in it yet."""
+    site = folder / "site"
+    (site / ".tribo").mkdir(parents=True)
+    return site
+
+
 def quick_reports(base: Path, *ways: Sequence[str]) -> None:
     """Let the reports of this process and its children be quick: small lattices, and the pages of these ways known."""
     small_lattice()
@@ -202,6 +218,27 @@ def thinned(kept: Path, copy: Path, rng: random.Random) -> None:
     for file in sorted(kept.iterdir()):
         if file.suffix == ".nc" or rng.random() < 0.6:
             shutil.copy(file, copy / file.name)
+
+
+def options(described: str, kinds: Iterable[str], trials: str, many: int) -> argparse.ArgumentParser:
+    """The options of a run: the command it is about, the number of trials by the name that they have, the seed."""
+    parser = argparse.ArgumentParser(description=described, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("kind", choices=list(kinds))
+    parser.add_argument(f"--{trials}", dest="trials", metavar="N", type=int, default=many)
+    parser.add_argument("--seed", type=int, default=1)
+    return parser
+
+
+@contextmanager
+def folder_of_trials() -> Iterator[Path]:
+    """A folder that all trials of a run lie in, gone at its end."""
+    with tempfile.TemporaryDirectory(prefix="tribo-torture-") as base:
+        yield Path(base)
+
+
+def told(done: int, given: argparse.Namespace, trials: str, failures: list[str]) -> None:
+    """How far a run is."""
+    print(f"{done} of {given.trials} {trials}, {len(failures)} failures", file=sys.stderr, flush=True)
 
 
 def finished(name: str, record: dict[str, Any], failures: list[str]) -> int:

@@ -13,8 +13,10 @@ import io
 import json
 import math
 import re
+import struct
 import tomllib
 import zipfile
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from decimal import Decimal
@@ -452,10 +454,29 @@ HOSTILE_PARTS: tuple[Any, ...] = (
 )  # fmt: skip
 
 
+AXES: Mapping[str, Any] = {
+    "dt_s": st.floats(1e-9, 2e-8), "mu_s": st.floats(0.5, 2.0), "engine": st.sampled_from(("fast", "reference")),
+    "shear_factor": st.floats(0.1, 1.0),
+}  # fmt: skip
+OTHER_DESIGN: Mapping[str, Any] = {
+    "samples": st.lists(st.sampled_from(("F", "A", "B")), min_size=1, max_size=3, unique=True),
+    "pressures_kPa": st.lists(st.floats(0.5, 40.0), min_size=1, max_size=3, unique=True),
+    "angles_deg": st.sampled_from(("midpoints", "random", "nominal")),
+    "repeats": st.integers(1, 4),
+    "seed": st.integers(0, 2**63 - 1),
+    "parameters": st.fixed_dictionaries(
+        {}, optional={name: values | st.lists(values, min_size=1, max_size=3, unique=True)
+                      for name, values in AXES.items()},
+    ),
+}  # fmt: skip
+
+
 def check_design(draw: Draw, folder: Path) -> str:
     """One design file, as TOML or JSON."""
     table = dict(DESIGN)
-    way = draw(st.sampled_from(("spelled", "value", "bytes")))
+    way = draw(st.sampled_from(("spelled", "other", "value", "bytes")))
+    if way == "other":
+        table |= draw(st.fixed_dictionaries({}, optional=OTHER_DESIGN))
     suffix = draw(st.sampled_from((".json", ".toml")))
     if way == "value":
         key = draw(st.sampled_from((*DESIGN, "patterns", "unknown")))
@@ -468,7 +489,7 @@ def check_design(draw: Draw, folder: Path) -> str:
     try:
         runs = read_design(file)
     except SimulationError as why:
-        if way == "spelled":
+        if way in ("spelled", "other"):
             raise DifferentError(f"a clean design is refused: {why}") from why
         refused(why.problems)
         return REFUSED
@@ -478,15 +499,34 @@ def check_design(draw: Draw, folder: Path) -> str:
     written = json.loads(decoded) if suffix == ".json" else tomllib.loads(decoded)
     if runs != runs_of_design({"seed": 0, **written}):
         raise DifferentError("a design is read otherwise than written")
-    axes = [v for n, v in written.get("parameters", {}).items() if isinstance(v, list) and n != "blocks"]
-    angles = written.get("angles_deg", "midpoints")
-    count = len(dict.fromkeys(written["samples"])) * len(written["pressures_kPa"]) * int(written.get("repeats", 4))
-    count *= math.prod(len(axis) for axis in axes) * (len(angles) if isinstance(angles, list) else 1)
-    blocks = written.get("parameters", {}).get("blocks")
-    count *= len(blocks) if isinstance(blocks, list) and any(isinstance(b, list) for b in blocks) else 1
-    if len(runs) != count or {r.pressure_Pa for r in runs} != {1e3 * p for p in written["pressures_kPa"]}:
-        raise DifferentError(f"{count} runs are written and {len(runs)} are laid out")
+    _laid_out(written, runs)
     return SAME if runs == runs_of_design(DESIGN) else CHANGED
+
+
+def _laid_out(written: Mapping[str, Any], runs: Sequence[Any]) -> None:
+    """Every combination of what is written is among the runs, each as often as the others, and nothing else."""
+    parameters = written.get("parameters", {})
+    axes = {name: value for name, value in parameters.items() if isinstance(value, list) and name != "blocks"}
+    blocks = parameters.get("blocks")
+    axes |= {"blocks": blocks} if isinstance(blocks, list) and any(isinstance(b, list) for b in blocks) else {}
+    samples = list(dict.fromkeys(written["samples"]))
+    angles = written.get("angles_deg", "midpoints")
+    count = len(samples) * len(written["pressures_kPa"]) * int(written.get("repeats", 4))
+    count *= math.prod(len(axis) for axis in axes.values()) * (len(angles) if isinstance(angles, list) else 1)
+    if len(runs) != count:
+        raise DifferentError(f"{count} runs are written and {len(runs)} are laid out")
+    said = {"sample": samples, "pressure_Pa": [1e3 * p for p in written["pressures_kPa"]]}
+    said |= {name: value if name in axes else [value] for name, value in parameters.items() if name != "blocks"}
+    for name, values in said.items():
+        found = Counter(_value_of(run, name) for run in runs)
+        if set(found) != set(values) or (len(set(values)) == len(values) and len(set(found.values())) > 1):
+            raise DifferentError(f"{name}: {values} are written and {dict(found)} are laid out")
+
+
+def _value_of(run: Any, name: str) -> Any:
+    """A parameter of a run, which may be one of its law of friction."""
+    holder = next(part for part in (run, run.friction, run.terms) if hasattr(part, name))
+    return getattr(holder, name)
 
 
 def _as_toml(table: Mapping[str, Any]) -> str:
@@ -500,6 +540,35 @@ def _as_toml(table: Mapping[str, Any]) -> str:
 # ----------------------------------------------------------------------------------------------------------- zips
 
 
+WHEN = (2026, 3, 2, 9, 0, 0)  # of every entry: what is drawn must not depend on the clock
+END = b"PK\5\6"
+MARKED = st.tuples(st.binary(max_size=4), st.sampled_from((0, 4, 17, 18, 22)), st.integers(0, 8)).map(
+    lambda parts: parts[0] + END + bytes(max(parts[1] - 2, 0)) + struct.pack("<H", parts[2]) + bytes(parts[2])
+)  # comments that hold the mark of the end, with more or less of a record behind it
+
+
+def zip_of(entries: Sequence[tuple[str, bytes, int]], comment: bytes) -> bytes:
+    """A zip of entries (name, contents, method of compression): the same bytes at any time."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as out:
+        for name, content, method in entries:
+            out.writestr(zipfile.ZipInfo(name, WHEN), content, method)
+        out.comment = comment
+    return packed.getvalue()
+
+
+def ends_of(content: bytes) -> set[int]:
+    """Where the last record of a zip begins for programs that look for its mark from the end, and for programs
+    that look for a record whose comment is as long as the record says (APPNOTE.TXT, 4.3.16).
+
+    A comment that holds the mark leads them to different records, and so to different lists of entries.
+    """
+    marks = [found.start() for found in re.finditer(re.escape(END), content)]
+    whole = [at for at in marks if at + 22 <= len(content)]
+    fitting = [at for at in whole if at + 22 + int.from_bytes(content[at + 20 : at + 22], "little") == len(content)]
+    return {*marks[-1:], *fitting} if fitting else set()
+
+
 def check_zip(draw: Draw, folder: Path) -> str:
     """One campaign as a .zip: packed otherwise, or damaged."""
     clean = load_campaign(write_clean(folder / "clean"))
@@ -507,21 +576,16 @@ def check_zip(draw: Draw, folder: Path) -> str:
     files = {p.relative_to(folder / "clean").as_posix(): p.read_bytes() for p in below}
     way = draw(st.sampled_from(("packed", "bytes", "bytes")))
     base = draw(st.sampled_from(("", "series/", "a/b c/", "prüf/")))
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w") as out:
-        if base and draw(st.booleans()):
-            out.writestr(base, b"")
-        for name in draw(st.permutations(sorted(files))):
-            method = draw(st.sampled_from((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)))
-            out.writestr(base + name, files[name], method)
-        if draw(st.booleans()):
-            out.writestr(f"__MACOSX/{base}._tests.csv", b"\0\5\x16\7")
-        out.comment = draw(st.binary(max_size=20))
-    if b"PK\5\6" in out.comment:  # where the list of entries is depends on who reads it
-        way = "bytes"
-    content = damaged(draw, packed.getvalue()) if way == "bytes" else packed.getvalue()
+    methods = st.sampled_from((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED))
+    entries = [(base, b"", zipfile.ZIP_STORED)] if base and draw(st.booleans()) else []
+    entries += [(base + name, files[name], draw(methods)) for name in draw(st.permutations(sorted(files)))]
+    if draw(st.booleans()):
+        entries.append((f"__MACOSX/{base}._tests.csv", b"\0\5\x16\7", zipfile.ZIP_STORED))
+    packed = zip_of(entries, draw(MARKED if draw(st.integers(0, 9)) == 9 else st.binary(max_size=20)))
+    content = damaged(draw, packed) if way == "bytes" else packed
     archive = folder / "campaign.zip"
     archive.write_bytes(content)
+    readers_disagree = len(ends_of(content)) > 1
     try:
         with open_campaign(archive) as found:
             outcome = compare_tests(found, clean)
@@ -531,8 +595,10 @@ def check_zip(draw: Draw, folder: Path) -> str:
                 if (found.root / test.file).read_bytes() != files[test.file]:
                     raise DifferentError(f"the export {test.file} has other bytes")
     except CampaignError as why:
-        if way == "packed":
+        if way == "packed" and not readers_disagree:
             raise DifferentError(f"a clean zip is refused: {why}") from why
         refused(why.problems)
         return REFUSED
+    if readers_disagree:
+        raise DifferentError("a zip is read although readers disagree where its list of entries is")
     return outcome

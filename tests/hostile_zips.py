@@ -143,6 +143,14 @@ def without(name: str, *more: tuple[str | zipfile.ZipInfo, bytes]) -> bytes:
     return packed(*more, good={k: v for k, v in GOOD.items() if k != name})
 
 
+def commented(comment: bytes, good: dict[str, str] = GOOD) -> bytes:
+    """A zip with a comment."""
+    made = io.BytesIO(packed(good=good))
+    with zipfile.ZipFile(made, "a") as out:
+        out.comment = comment
+    return made.getvalue()
+
+
 OUTSIDE = (
     "../evil.txt", "/evil.txt", "raw/../../evil.txt", "C:/evil.txt", "C:evil.txt", "c:\\evil.txt", "..\\evil.txt",
     "\\evil.txt", "raw\\..\\..\\evil.txt", "\\\\server\\share\\evil.txt", "//server/evil.txt", "..", "raw/..",
@@ -223,6 +231,9 @@ def by_damage() -> Iterator[Hostile]:
     yield Hostile("list of entries elsewhere", "bad_zip", lambda: shifted_end(16, 1_000_000))
     yield Hostile("list of entries too short", "bad_zip", lambda: shifted_end(12, 60))
     yield Hostile("a record within the last record", "bad_zip", lambda: packed()[:-22] + b"PK\5\6" * 5 + b"\0\0")
+    yield Hostile("a comment with the mark of the end", "bad_zip", lambda: commented(b"made with PK\5\6"))
+    yield Hostile("a comment that is an empty zip", "bad_zip", lambda: commented(b"PK\5\6" + bytes(18)))
+    yield Hostile("a comment that is another campaign", "bad_zip", lambda: commented(packed()))
     yield Hostile("another name before the contents", "bad_zip",
                   lambda: packed().replace(b"raw/T1.csv", b"raw/T2.csv", 1))  # fmt: skip
     yield Hostile("version 25.5", "bad_zip", lambda: patched(6, "<H", 255))

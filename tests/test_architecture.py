@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
 GROUND = {
     "display", "errors", "limits", "escaping", "input_files", "quantities", "zeroing", "records", "published", "zips",
-    "links", "temporary", "forked", "nearest", "sheets",
+    "file_contents", "links", "temporary", "forked", "nearest", "sheets",
 }  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
     ("escaping", set()),
@@ -27,7 +27,8 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("records", {"display", "errors", "zeroing"}),
     ("published", set()),
     ("zips", {"errors", "limits"}),
-    ("links", set()),
+    ("file_contents", {"errors"}),
+    ("links", {"file_contents"}),
     ("temporary", set()),
     ("forked", set()),
     ("nearest", set()),
@@ -233,3 +234,25 @@ def test_the_records_that_stages_exchange_are_frozen() -> None:
 def test_a_record_that_is_not_frozen_is_seen() -> None:
     assert open_records("@dataclass\nclass A: ...\n@dataclass(frozen=False)\nclass B: ...") == ["A", "B"]
     assert open_records("@dataclass(frozen=True)\nclass A: ...") == []
+
+
+TIDIES_ONLY = {"temporary.py", "own_file.py", "jit.py"}  # what they cannot list stays, and nothing depends on it
+
+
+def silent_reads(source: str) -> list[str]:
+    """Calls that leave out folders which cannot be listed, or whose errors name no file; resources are no files."""
+    calls = [node.func for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
+    named = [ast.unparse(f) for f in calls if isinstance(f, ast.Attribute) and f.attr in SILENT]
+    return [name for name in named if not name.startswith("(files(")]
+
+
+SILENT = {"glob", "rglob", "read_text", "read_bytes"}
+
+
+def test_files_and_folders_are_read_by_functions_that_leave_nothing_out_in_silence() -> None:
+    readers = {m.name for m in ROOMS if silent_reads(m.read_text(encoding="utf-8"))}
+    assert readers == {"file_contents.py", *TIDIES_ONLY}
+
+
+def test_a_silent_read_is_seen() -> None:
+    assert silent_reads("p.rglob('*')\nq = (a / b).read_text()") == ["p.rglob", "(a / b).read_text"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -57,3 +58,17 @@ def test_hostile_decisions_by_hand_are_read_as_they_are_or_refused(ingested: Ing
 
     check()
     assert {hostile.SAME, hostile.REFUSED} <= outcomes <= OUTCOMES
+
+
+def test_what_is_drawn_for_a_zip_does_not_depend_on_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    entries, made = [("series/", b"", 0), ("series/tests.csv", b"test_id\n", 8)], []
+    for year in (2025, 2026):
+        monkeypatch.setattr(time, "localtime", lambda *_, year=year: time.struct_time((year, *[1] * 8)))
+        made.append(hostile.zip_of(entries, b""))
+    assert made[0] == made[1]
+
+
+def test_the_bench_tells_a_comment_that_readers_of_zips_disagree_about() -> None:
+    campaign = hostile.zip_of([("tests.csv", b"", 0)], b"")
+    for comment, readings in ((b"", 1), (b"a comment", 1), (hostile.END, 2), (b"PK", 1), (campaign, 2)):
+        assert len(hostile.ends_of(hostile.zip_of([("tests.csv", b"", 0)], comment))) == readings

@@ -8,7 +8,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from hostile_zips import EXPORT, GOOD, TESTS, Hostile, all_hostile, named, numbers, packed, raw_name, sharing
+from hostile_zips import EXPORT, GOOD, TESTS, Hostile, all_hostile, commented, named, numbers, packed, raw_name, sharing
 
 from tribo.campaign import open_campaign
 from tribo.errors import CampaignError, ReadError
@@ -87,5 +87,13 @@ def test_the_entries_at_fault_are_named_five_at_most_of_each_kind(tmp_path: Path
 def test_a_packed_export_with_a_name_that_is_not_utf8_is_refused_in_a_sentence(tmp_path: Path) -> None:
     (tmp_path / "T1.zip").write_bytes(raw_name(b"raw/\xff.csv"))
     with pytest.raises(ReadError) as caught:
+        read_export(tmp_path / "T1.zip")
+    assert [p.kind for p in caught.value.problems] == ["bad_archive"]
+
+
+def test_a_packed_export_that_programs_unpack_differently_is_refused(tmp_path: Path) -> None:
+    other = packed(good={"raw/T2.csv": EXPORT})
+    (tmp_path / "T1.zip").write_bytes(commented(other, good={"raw/T1.csv": EXPORT}))
+    with pytest.raises(ReadError, match="mark of the end") as caught:
         read_export(tmp_path / "T1.zip")
     assert [p.kind for p in caught.value.problems] == ["bad_archive"]

@@ -32,7 +32,7 @@ _CHUNK = 1 << 20
 _NOT_OF_THE_CAMPAIGN = "__MACOSX"
 _NOT_A_ZIP = (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, RuntimeError, ValueError, zlib.error)
 _END, _END_64, _END_64_PLACE = b"PK\5\6", b"PK\6\6", b"PK\6\7"  # APPNOTE.TXT 6.3.10, 4.3.14 to 4.3.16
-_END_BYTES = 1 << 16  # the longest comment after the record
+LAST_BYTES = (1 << 16) + 22 + 20 + 56  # the longest comment, and the records before it
 
 Fault = tuple[str, str, str]  # kind, sentence, what is allowed
 
@@ -257,11 +257,9 @@ def _check_listing(archive: Path) -> None:
     """Refuse a zip whose list of entries is too long to be read, by the record at its end."""
     size = archive.stat().st_size
     with archive.open("rb") as stream:
-        stream.seek(max(0, size - _END_BYTES - 22 - 20 - 56))
+        stream.seek(max(0, size - LAST_BYTES))
         tail = stream.read()
-    at = tail.rfind(_END)
-    if at < 0 or len(tail) < at + 22:
-        raise zipfile.BadZipFile("it does not end as a .zip does")
+    at = last_record(tail)
     (listing,) = struct.unpack_from("<L", tail, at + 12)
     if at >= 76 and tail[at - 20 : at - 16] == _END_64_PLACE and tail[at - 76 : at - 72] == _END_64:
         (listing,) = struct.unpack_from("<Q", tail, at - 76 + 40)
@@ -269,3 +267,24 @@ def _check_listing(archive: Path) -> None:
         what, allowed = "the list of entries is too long", f"{LARGEST_LISTING_BYTES} bytes, {MOST_ENTRIES} entries"
         found = f"{listing} bytes"
         raise CampaignError(Problem("zip_bomb", what, file=archive.name, found=found, allowed=allowed))
+
+
+def last_record(tail: bytes) -> int:
+    """Where the last record of a zip begins in the last :data:`LAST_BYTES` of its file.
+
+    Some programs look for the mark of this record from the end of the file, others for a record with a comment as long
+    as the rest of the file (APPNOTE.TXT, 4.3.16). Where a comment holds the mark, they read different lists of entries.
+
+    Raises
+    ------
+    zipfile.BadZipFile
+        There is no such record, or the comment holds its mark.
+    """
+    marks = [found.start() for found in re.finditer(re.escape(_END), tail)]
+    complete = [at for at in marks if len(tail) >= at + 22]
+    fitting = [at for at in complete if at + 22 + int.from_bytes(tail[at + 20 : at + 22], "little") == len(tail)]
+    if fitting and fitting != marks[-1:]:
+        raise zipfile.BadZipFile("its comment holds the mark of the end of a .zip; pack it again without the comment")
+    if not complete or marks[-1] != complete[-1]:
+        raise zipfile.BadZipFile("it does not end as a .zip does")
+    return complete[-1]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tribo.diagnose import examine
+from tribo.diagnose.search import naming
 from tribo.diagnose.search.naming import best_beyond_chance
 from tribo.diagnose.search.weighing import weigh
 from tribo.diagnose.statistics.model import Setup
@@ -43,6 +44,13 @@ def test_what_chance_would_give_a_mechanism_is_no_cause_however_certain_the_misf
     assert found.screened.p_adjusted() < 1e-4
     assert found.named is not None
     assert found.named.causes == ()
+
+
+def test_a_mechanism_whose_own_column_is_still_wrong_is_left_out_and_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(naming, "_misfit_in_own_column", lambda cause, *_: cause.name == "humidity")
+    verdict = examine(made(acting("humidity", 0.03), seed=0), replicates=FEW).verdict
+    assert "humidity" not in [cause.mechanism for cause in verdict.causes]
+    assert "Tried and left out: humidity." in verdict.text
 
 
 def test_of_the_mechanisms_weighed_only_one_beyond_chance_can_be_the_cause() -> None:

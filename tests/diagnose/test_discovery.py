@@ -15,20 +15,23 @@ from tribo.diagnose.discovery.held import holds
 from tribo.diagnose.discovery.in_verdict import with_laws
 from tribo.diagnose.discovery.law_file import law_text, read_law
 from tribo.diagnose.discovery.law_words import discovery_text, law_layers
+from tribo.diagnose.discovery.parting import parting_test
 from tribo.diagnose.discovery.scoring import Projection
 from tribo.diagnose.discovery.search import RESCORED, Discovery, Grammar, best_of, discover_laws
-from tribo.diagnose.discovery.written_law import Shape, WrittenLaw
+from tribo.diagnose.discovery.written_law import ADHESION_TERM, LOAD_TERM, Shape, WrittenLaw
+from tribo.diagnose.search.weighing import refitted
 from tribo.diagnose.statistics.chance import drawn_residuals, refit
-from tribo.diagnose.statistics.model import Setup
+from tribo.diagnose.statistics.model import Acting, Setup
 from tribo.diagnose.verdict import Estimate
 from tribo.display import exact_text
 from tribo.errors import CampaignError
 from tribo.figures import law as law_figure
 from tribo.mechanisms.record import Base, Conditions
+from tribo.mechanisms.table import MECHANISMS
 from tribo.report.verdict_file import verdict_in_words
 from tribo.store.kept_results import decoded, encoded
 
-from .known import baseline, made
+from .known import acting, baseline, made
 
 
 def warm_is_best(s: Setup) -> np.ndarray:
@@ -212,3 +215,22 @@ def test_a_column_with_missing_values_is_used_where_it_is_there() -> None:
     course = shape.of(gaps)[:, 0]
     assert np.all(course[::5] == 0)
     assert course.max() == pytest.approx(1.0)
+
+
+def lossy_but_less_on_one_pattern(s: Setup) -> np.ndarray:
+    """Loss of contact area, by 15 % less on C than its law has it."""
+    less = np.where(s.observations.conditions.sample == "C", 0.85, 1.0)[:, None]
+    return acting("contact_area_loss", 6e-11)(s) * less
+
+
+def test_what_a_cause_of_slightly_wrong_form_leaves_is_no_law() -> None:
+    model = baseline(made(lossy_but_less_on_one_pattern, seed=8, repeat_sd=(0.02, 0.02)))
+    with_cause = refitted(model, [Acting(MECHANISMS["contact_area_loss"])])
+    assert discover_laws(with_cause, replicates=20).laws == ()
+
+
+def test_a_day_is_not_to_be_varied_but_what_it_had_in_particular() -> None:
+    shape = Shape("level", "date", level="2026-03-04")
+    one, other = (WrittenLaw((shape,), acts_on=term) for term in (LOAD_TERM, ADHESION_TERM))
+    test = parting_test(one, other, baseline(made(nothing, seed=1)).setup.observations.conditions)
+    assert test.text.startswith("Find out what differed on 2026-03-04, and pull with it and without it at ")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from tribo.mechanisms_in_model.on_blocks import conditions_of_run
 from tribo.records import Run
 from tribo.simulate import SimConfig, simulate
 
+# With this seed the highest force comes with the same avalanche under every mechanism that changes all blocks alike.
+# With others it may come with the next, and static friction of single runs then scatters about the law by 0.3 %.
 SMALL = SimConfig(sample="B", pressure_Pa=8e3, angle_deg=20.0, blocks=(25, 25), seed=3, dt_s=1e-7)
 LONG = SMALL.with_(sample="Sx", angle_deg=4.0, blocks=(45, 25))
 KNOWN = {"humidity_pct": 58.0, "hold_s": 100.0, "temperature_C": 25.0, "speed_m_s": 8e-4, "specimen_run": 2.0}
@@ -24,9 +27,13 @@ EVERY = pytest.mark.parametrize("key", KEYS)
 # the equations of the model are linear in load and adhesion, and only the samples that the mean over stick-slip takes
 # in may shift. More where the law averages over what the blocks do one by one, for the reason given.
 ALIKE = 1e-3
-# Sliding friction of single runs scatters about the law by 0.23 % where the load changes (suction and pattern_geometry,
-# seeds 3 to 10, the same with the engine that moved blocks one by one); three of these standard deviations.
-SCATTER = 7e-3
+# Sliding friction is chaotic. Standard deviation of single runs about the law over the seeds 3 to 10: up to 0.1 % where
+# the strength of all blocks changes by one factor; up to 0.3 % where load and adhesion change differently, because the
+# law is then extrapolated from runs at three loads. The latter are compared as means of several runs.
+SD, SD_OF_LOADED = 1e-3, 3e-3
+LOADED = {"pressure_dependent_friction", "pattern_geometry", "normal_load_error", "bulk_viscoelasticity", "humidity"}
+NO_OTHER_SLIPS = {"load_cell_offset", "load_cell_drift", "pulley_friction", "machine_compliance", "sampling_clip"}
+SEEDS = range(3, 8)
 BLOCK_BY_BLOCK = {
     "velocity_dependence": 0.02,  # blocks slide faster and slower than they are pulled
     "contact_ageing": 0.02,  # a block that has slipped is young again, also while others still stick
@@ -47,26 +54,38 @@ def config_of(key: str) -> SimConfig:
     return LONG if key == "cavity_shear_deformation" else SMALL
 
 
-def base_of(config: SimConfig) -> Base:
-    """The law of the simulated sample without mechanism, from runs at three pressures."""
+@cache
+def started(key: str) -> Run:
+    """The run with the amplitude from which a fit starts; several tests look at it."""
+    return simulate_with(config_of(key), {key: mechanism_of(key).start()}, **KNOWN)
+
+
+def base_of(config: SimConfig, others: tuple[str, ...] = ("C", "F")) -> Base:
+    """The law of the simulated sample without mechanism, and of others, from runs at three pressures."""
     load = conditions_of_run(config, {}).normal_load_N[0]
     rows = []
-    for sample in dict.fromkeys((config.sample, "C", "F")):
+    samples = tuple(dict.fromkeys((config.sample, *others)))
+    for sample in samples:
         own = config.with_(sample=sample)
         light, here, heavy = (simulate(own.with_(pressure_Pa=config.pressure_Pa * f)) for f in (0.8, 1.0, 1.25))
         for regime in ("static_friction", "sliding_friction"):
             low, middle, high = (getattr(run, regime) for run in (light, here, heavy))
             mu = (1.25 * high - 0.8 * low) / 0.45
             rows.append((mu, (middle - mu) * load))
-    laws = {
-        sample: (*rows[2 * k], *rows[2 * k + 1]) for k, sample in enumerate(dict.fromkeys((config.sample, "C", "F")))
-    }
+    laws = {sample: (*rows[2 * k], *rows[2 * k + 1]) for k, sample in enumerate(samples)}
     return Base(*(np.array([v]) for v in laws[config.sample]), by_sample=laws, flat="F")
 
 
 @pytest.fixture(scope="module")
 def bases() -> dict[str, tuple[Base, Run]]:
-    return {c.sample: (base_of(c), simulate(c)) for c in (SMALL, LONG)}
+    return {"B": (base_of(SMALL), simulate(SMALL)), "Sx": (base_of(LONG, ()), simulate(LONG))}
+
+
+@pytest.fixture(scope="module")
+def several() -> list[tuple[SimConfig, Base, Run]]:
+    """The small sample with several draws of its local friction."""
+    configs = [SMALL.with_(seed=seed) for seed in SEEDS]
+    return [(config, base_of(config, ()), simulate(config)) for config in configs]
 
 
 def quick(key: str, config: SimConfig, base: Base, before: Run) -> tuple[float, float]:
@@ -103,19 +122,34 @@ def test_the_simulated_friction_is_that_of_the_law_and_the_stated_error_does_not
 ) -> None:
     m, config = mechanism_of(key), config_of(key)
     base, before = bases[config.sample]
-    run = simulate_with(config, {key: m.start()}, **KNOWN)
+    run = started(key)
     static, sliding = quick(key, config, base, before)
     within = BLOCK_BY_BLOCK.get(key, ALIKE)
     assert run.static_friction == pytest.approx(static, rel=within)
-    assert run.sliding_friction == pytest.approx(sliding, rel=max(within, SCATTER))
+    if key not in LOADED:
+        scatter = 0.0 if key in NO_OTHER_SLIPS else 3 * SD
+        assert run.sliding_friction == pytest.approx(sliding, rel=max(within, scatter))
     assert m.quick_error >= within
+
+
+@pytest.mark.parametrize("key", sorted(LOADED))
+def test_the_mean_sliding_friction_of_several_runs_is_that_of_the_law_where_the_load_changes(
+    key: str, several: list[tuple[SimConfig, Base, Run]]
+) -> None:
+    """Within three standard errors of the mean."""
+    start = {key: mechanism_of(key).start()}
+    off = [
+        simulate_with(config, start, **KNOWN).sliding_friction / quick(key, config, base, before)[1] - 1
+        for config, base, before in several
+    ]
+    assert np.mean(off) == pytest.approx(0.0, abs=3 * SD_OF_LOADED / len(SEEDS) ** 0.5)
 
 
 @EVERY
 def test_the_simulated_change_has_the_declared_sign_and_regimes(key: str, bases: dict[str, tuple[Base, Run]]) -> None:
     m, config = mechanism_of(key), config_of(key)
     before = bases[config.sample][1]
-    run = simulate_with(config, {key: m.start()}, **KNOWN)
+    run = started(key)
     moved = {
         "static": run.static_friction / before.static_friction - 1,
         "sliding": run.sliding_friction / before.sliding_friction - 1,

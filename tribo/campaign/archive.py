@@ -9,6 +9,7 @@ from pathlib import Path
 from tribo.campaign.load import TOML, load_campaign
 from tribo.campaign.table import RAW, TABLES
 from tribo.errors import CampaignError, Problem
+from tribo.file_contents import found_below
 from tribo.nearest import did_you_mean, nearest
 from tribo.records import Campaign
 from tribo.temporary import temporary_folder
@@ -64,7 +65,7 @@ def _campaign_folder(folder: Path, shown: str) -> Path:
     """The folder itself if it holds campaign.toml, else the one folder below that does."""
     if (folder / TOML).is_file():
         return folder
-    found = sorted(p.parent for p in folder.rglob(TOML) if p.is_file() and "__MACOSX" not in p.parts)
+    found = sorted(p.parent for p in found_below(folder, TOML) if p.is_file() and "__MACOSX" not in p.parts)
     if len(found) == 1:
         return found[0]
     if not found:

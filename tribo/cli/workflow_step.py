@@ -20,6 +20,7 @@ from typing import Any
 
 from tribo.cli.console import DONE, SOME_SET_ASIDE, UNUSABLE
 from tribo.errors import is_of_the_system
+from tribo.file_contents import found_below, text_of
 from tribo.pipeline.step_record import read_record
 
 DONE_WORDS = {DONE: "done", SOME_SET_ASIDE: "some_set_aside", UNUSABLE: "unusable"}
@@ -47,7 +48,7 @@ def run_step(
         "status": DONE_WORDS[status],
         "problems": said.get("problems", []) if status == UNUSABLE else [],
         "set_aside": len(said.get("set_aside") or ()),
-        "files": json.loads(files.read_text(encoding="utf-8"))["files"] if files else None,
+        "files": json.loads(text_of(files))["files"] if files else None,
         "seconds": round(time.time() - started, 1),
         "finished": finished,
     }
@@ -90,7 +91,7 @@ def main(arguments: Sequence[str]) -> int:
 
 def with_laws(folder: Path | None) -> list[str]:
     """The option that names a folder of laws, where there are any in it."""
-    return ["--laws", str(folder)] if folder is not None and any(folder.rglob("law*.toml")) else []
+    return ["--laws", str(folder)] if folder is not None and found_below(folder, "law*.toml") else []
 
 
 def _split(arguments: list[str]) -> tuple[list[str], str, list[str]]:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 from tribo.errors import SimulationError
+from tribo.file_contents import found_in
 from tribo.records import Pattern, Run
 from tribo.store.kept_results import Shelf, sources
 
@@ -149,7 +150,7 @@ def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | Non
     from tribo.simulate.stored_rows import UNREADABLE
 
     found = []
-    for path in sorted(kept.glob(f"*@*{SUFFIX}")):
+    for path in found_in(kept, f"*@*{SUFFIX}"):
         try:
             table = read_stored(path)
             cell = _cell_of(path, table, patterns)
@@ -199,6 +200,6 @@ def example_config(cells: Sequence[Cell]) -> SimConfig:
 def remove_strangers(cells: Iterable[Cell], kept: Path) -> None:
     """Delete kept runs that belong to none of the cells: other samples, loads, laws or sources."""
     ours = {cell.path(kept) for cell in cells}
-    for path in kept.glob(f"*@*{SUFFIX}"):
+    for path in found_in(kept, f"*@*{SUFFIX}"):
         if path not in ours:
             path.unlink(missing_ok=True)

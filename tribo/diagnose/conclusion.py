@@ -24,6 +24,7 @@ from tribo.diagnose.sentences import (
     misfits_of,
     misfits_of_patterns,
     misfits_remaining,
+    other_formula,
     patterns_apart,
     summary,
 )
@@ -80,6 +81,8 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
     excluded = exclusions_beside(causes, found.barred, named.weighed if named is not None else ())
     shown_misfits = each_once(misfits)
     text = summary(outcome, causes, equivalent, misfits, smallest)
+    if named is not None and outcome in ("unknown", "partly"):
+        text += other_formula(named.wrong_in_form)
     if excess is not None:
         text = f"{text} {excess_in_words(excess)}"
     return Verdict(

@@ -53,6 +53,7 @@ def next_test(tied: Sequence[Candidate]) -> NextTest | None:
 ALONE = {
     "normal_load_N": "Pull one specimen at nine loads over the range, first upwards, then downwards",
     "sample": "Pull one fresh specimen of every sample in turn, at one load and within one day",
+    "date": "Pull the same specimens of one sample at one load again on several days",
 }
 
 

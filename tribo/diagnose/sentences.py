@@ -305,6 +305,17 @@ def summary(
     return f"The model fails beyond chance, and no mechanism of the library explains it. {where}"
 
 
+def other_formula(mechanisms: Collection[str]) -> str:
+    """Mechanisms that explained a misfit in part only, because what was left followed the same column."""
+    if not mechanisms:
+        return ""
+    names = ", ".join(sorted(name_in_words(name) for name in mechanisms))
+    return (
+        f" Tried and left out: {names}. Beside the formula of the library, a dependence on the same quantity remains "
+        "beyond chance; the true formula may be another one."
+    )
+
+
 def _named(causes: Sequence[Cause], equivalent: Sequence[Sequence[str]]) -> str:
     tied = [" or ".join(name_in_words(n) for n in names) for names in equivalent]
     alone = [name_in_words(c.mechanism) for c in causes if not any(c.mechanism in names for names in equivalent)]

@@ -12,6 +12,7 @@ import numpy as np
 
 from tribo.campaign.stated import Columns
 from tribo.errors import CampaignError, Problem, ReadError, TriboError
+from tribo.file_contents import found_below
 from tribo.ingestion.file_names import NamePattern, proposed_patterns, read_names
 from tribo.quantities import unit_factor
 from tribo.records import Correction, Test, Trace
@@ -90,7 +91,7 @@ def exports_in(raw: Path) -> dict[str, Path]:
     from tribo.readers.core.packed import entries_of
 
     base = raw if raw.is_dir() else raw.parent
-    files = sorted(p for p in raw.rglob("*") if p.is_file()) if raw.is_dir() else [raw]
+    files = [p for p in found_below(raw) if p.is_file()] if raw.is_dir() else [raw]
     found = {}
     for path in files:
         if path.name.startswith(_NOT_LOOKED_AT):

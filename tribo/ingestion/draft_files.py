@@ -12,6 +12,7 @@ from pathlib import Path
 from tribo.campaign.load import RAW, TESTS, TOML
 from tribo.campaign.table import KNOWN
 from tribo.errors import CampaignError, Problem
+from tribo.file_contents import found_below
 from tribo.ingestion.draft import Draft, Stated
 from tribo.records import UNCORRECTED
 
@@ -112,6 +113,6 @@ def write_draft(folder: Path, contents: Mapping[Path, str], raw: Path | None) ->
 def _copies(target: Path, raw: Path) -> dict[Path, Path]:
     """Where each export is copied to; nothing where they are in raw/ of the campaign already."""
     base = raw if raw.is_dir() else raw.parent
-    files = sorted(p for p in raw.rglob("*") if p.is_file()) if raw.is_dir() else [raw]
+    files = [p for p in found_below(raw) if p.is_file()] if raw.is_dir() else [raw]
     inside = target.resolve() in (base.resolve(), *base.resolve().parents)
     return {} if inside else {target / p.relative_to(base): p for p in files}

@@ -21,6 +21,7 @@ from typing import Any
 from tribo.dry_run import Checked, check
 from tribo.errors import CampaignError, Problem, TriboError, unexpected
 from tribo.escaping import well_formed
+from tribo.file_contents import found_below, found_in, text_of
 from tribo.pipeline.dated_copies import CURRENT, clear_unfinished, date_build
 from tribo.pipeline.laws_of_site import collect_laws
 from tribo.pipeline.live import Progress
@@ -154,7 +155,7 @@ def build_site(
 def _clear_leftovers(state: Path) -> None:
     """Remove what a killed build has left; the folders of reports are cleared by the steps that write into them."""
     site = state.parent
-    for path in (*state.rglob(".*"), *site.glob(".*"), *(site / CURRENT).glob(".*")):
+    for path in (*found_below(state, ".*"), *found_in(site, ".*"), *found_in(site / CURRENT, ".*")):
         if is_leftover(path.name) and path.is_file():
             path.unlink()
     clear_unfinished(site)
@@ -358,7 +359,7 @@ def _failures(state: Path, said: str) -> list[Problem]:
 
 
 def _tail(path: Path) -> str:
-    return _last_lines(path.read_text(encoding="utf-8", errors="replace")) if path.is_file() else "no log"
+    return _last_lines(text_of(path, errors="replace")) if path.is_file() else "no log"
 
 
 def _last_lines(text: str, most: int = 8) -> str:

@@ -10,7 +10,8 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from tribo.errors import Problem, TriboError, naming
+from tribo.errors import Problem, TriboError
+from tribo.file_contents import bytes_of, found_below, found_in, text_of
 
 BUILDS, LATEST, CURRENT = "builds", "latest", "current"
 NOT_COPIED = ("kept",)  # work in progress, not results
@@ -49,7 +50,7 @@ def date_build(site: Path, keep: int, now: float | None = None) -> Path | None:
 
 def clear_unfinished(site: Path) -> None:
     """Remove the copies and links that a killed build has left half made; for the holder of the lock of the site."""
-    for part in (site / BUILDS).glob(".*.part"):
+    for part in found_in(site / BUILDS, ".*.part"):
         shutil.rmtree(part)
     (site / f".{LATEST}.part").unlink(missing_ok=True)
 
@@ -64,8 +65,7 @@ def _order(copy: Path) -> tuple[int, str, int]:
     found = _DATED.fullmatch(copy.name)
     assert found is not None
     try:
-        with naming(copy / NUMBER):
-            number = int((copy / NUMBER).read_text(encoding="utf-8"))
+        number = int(text_of(copy / NUMBER))
     except (FileNotFoundError, ValueError):
         number = 0
     return number, found[1], int(found[2] or 1)
@@ -73,8 +73,8 @@ def _order(copy: Path) -> tuple[int, str, int]:
 
 def contents(folder: Path) -> dict[str, str]:
     """SHA-256 of every file that is copied, by its place in the folder."""
-    files = sorted(p for p in folder.rglob("*") if p.is_file() and not _left_out(p.relative_to(folder)))
-    return {p.relative_to(folder).as_posix(): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
+    files = sorted(p for p in found_below(folder) if p.is_file() and not _left_out(p.relative_to(folder)))
+    return {p.relative_to(folder).as_posix(): hashlib.sha256(bytes_of(p)).hexdigest() for p in files}
 
 
 def _left_out(place: Path) -> bool:

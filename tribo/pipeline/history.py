@@ -13,6 +13,7 @@ from typing import Any
 
 from tribo.errors import failed_by_system, naming
 from tribo.escaping import from_spreadsheet
+from tribo.file_contents import found_below, text_of
 from tribo.pipeline.step_record import OF_A_REPORT, read_record
 
 PARAMETERS = {
@@ -61,9 +62,9 @@ class CampaignRow:
 def history(site: Path) -> tuple[CampaignRow, ...]:
     """Every campaign of a site, those in the drop folder and those that once were, in the order of measurement."""
     state = site / ".tribo"
-    config = json.loads((state / "build.json").read_text(encoding="utf-8"))
+    config = json.loads(text_of(state / "build.json"))
     steps = state / "steps"
-    names = set(config["campaigns"]) | ({p.parent.name for p in steps.glob("*/report.json")})
+    names = set(config["campaigns"]) | {p.parent.name for p in found_below(steps, "report.json")}
     rows = [_row(name, site, config) for name in names]
     return tuple(sorted(rows, key=lambda row: (row.measured_s, row.name)))
 

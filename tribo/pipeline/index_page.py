@@ -21,6 +21,7 @@ from urllib.parse import quote
 
 from tribo import __version__
 from tribo.escaping import for_spreadsheet
+from tribo.file_contents import bytes_of
 from tribo.pipeline.choose_two import comparable
 from tribo.pipeline.history import CampaignRow, Law, history
 from tribo.pipeline.laws_of_site import answers_of, laws_csv, laws_in_words
@@ -80,7 +81,7 @@ def write_index(site: Path) -> str:
         texts["laws.csv"] = laws_csv(answers)
     for name, text in texts.items():
         path = current / name
-        if not path.is_file() or path.read_bytes() != text.encode("utf-8"):
+        if not path.is_file() or bytes_of(path) != text.encode("utf-8"):
             write_text(path, text)
         digest.update(text.encode())
     return digest.hexdigest()

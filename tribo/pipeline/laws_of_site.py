@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tribo.escaping import for_spreadsheet
+from tribo.file_contents import found_in, text_of
 from tribo.store.whole_files import write_text
 
 KEPT = "laws"  # folder in the state of a site, with the laws of each campaign in a folder of its name
@@ -33,31 +34,36 @@ def collect_laws(current: Path, state: Path) -> None:
     A campaign that is built is so tested against the laws of all campaigns that were built before it.
     """
     kept = state / KEPT
-    wanted = {f"{law.parent.name}/{law.name}": law for law in sorted(current.glob("*/law-*.toml"))}
-    for path in kept.glob("*/law-*.toml"):
+    wanted = {f"{law.parent.name}/{law.name}": law for law in _of_reports(current, "law-*.toml")}
+    for path in _of_reports(kept, "law-*.toml"):
         if f"{path.parent.name}/{path.name}" not in wanted:
             path.unlink()
     for name, law in wanted.items():
-        text = law.read_text(encoding="utf-8")
-        if not (kept / name).is_file() or (kept / name).read_text(encoding="utf-8") != text:
+        text = text_of(law)
+        if not (kept / name).is_file() or text_of(kept / name) != text:
             write_text(kept / name, text)
 
 
 def answers_of(current: Path) -> tuple[LawAnswer, ...]:
     """The answers of all reports, by law and then by campaign."""
-    found = [answer for verdict in sorted(current.glob("*/verdict.json")) for answer in _in_verdict(verdict)]
+    found = [answer for verdict in _of_reports(current, "verdict.json") for answer in _in_verdict(verdict)]
     return tuple(sorted(found, key=lambda a: (a.law, a.tested_in)))
 
 
+def _of_reports(folder: Path, pattern: str) -> list[Path]:
+    """The files of a pattern in all folders of a folder, by folder and name."""
+    return [path for report in found_in(folder, "*") for path in found_in(report, pattern)]
+
+
 def _in_verdict(path: Path) -> list[LawAnswer]:
-    """The answers of one report; none where its verdict is damaged."""
+    """The answers of one report; none where its verdict is damaged. Raises OSError where it cannot be read."""
     try:
-        known: Sequence[Mapping[str, Any]] = json.loads(path.read_text(encoding="utf-8"))["model"].get("known_laws", ())
+        known: Sequence[Mapping[str, Any]] = json.loads(text_of(path))["model"].get("known_laws", ())
         return [
             LawAnswer(str(law["law"]), str(law["found_in"]), str(law["formula"]), path.parent.name, str(law["answer"]))
             for law in known
         ]
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+    except (FileNotFoundError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return []
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from tribo.file_contents import found_below
 from tribo.pipeline.step_record import read_record
 
 WORDS = {
@@ -106,7 +107,7 @@ def _in_words(rule: str, wildcards: str) -> str:
 def typical_seconds(steps: Path) -> dict[str, float]:
     """Mean duration of each kind of step in the records of a site, in seconds."""
     found: dict[str, list[float]] = {}
-    for path in steps.glob("*/*.json"):
+    for path in found_below(steps, "*.json"):
         record = read_record(path)
         seconds = record.get("seconds") if record else None
         if isinstance(seconds, int | float) and seconds > 0:

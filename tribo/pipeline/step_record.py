@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from tribo.errors import naming
+from tribo.file_contents import text_of
 
 OF_A_REPORT = ("status", "digest", "problems", "finished")
 _TYPES: dict[str, type | tuple[type, ...]] = {
@@ -23,8 +23,7 @@ def read_record(path: Path, *keys: str) -> dict[str, Any] | None:
         It is there and cannot be read.
     """
     try:
-        with naming(path):
-            record = json.loads(path.read_text(encoding="utf-8"))
+        record = json.loads(text_of(path))
     except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
         return None
     whole = isinstance(record, dict) and all(isinstance(record.get(key), _TYPES[key]) for key in keys)

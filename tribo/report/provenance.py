@@ -15,6 +15,7 @@ from typing import Any
 from tribo.display import displayed
 from tribo.errors import naming
 from tribo.escaping import well_formed
+from tribo.file_contents import text_of
 from tribo.links import leads_out, paths_below
 from tribo.records import Study
 from tribo.store.whole_files import write_text
@@ -184,8 +185,7 @@ def read_record(out: Path) -> dict[str, Any] | None:
         It is there and cannot be read.
     """
     try:
-        with naming(out / FILE):
-            record = json.loads((out / FILE).read_text(encoding="utf-8"))
+        record = json.loads(text_of(out / FILE))
     except (FileNotFoundError, NotADirectoryError, ValueError, RecursionError):
         return None
     return record if isinstance(record, dict) and _is_whole(record) else None

@@ -13,6 +13,7 @@ import pandas as pd
 
 from tribo.display import displayed
 from tribo.errors import CampaignError, Problem
+from tribo.file_contents import text_of
 
 SHOWN = ("finding", "agreement", "fig4", "fig6", "fig7", "fig8", "misfit", "evidence", "dependence")
 READ = ("fits.csv", "tests.csv")
@@ -78,7 +79,7 @@ def read_reported(folder: Path) -> Reported:
 def _json(path: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
-    found = json.loads(path.read_text(encoding="utf-8"))
+    found = json.loads(text_of(path))
     return found if isinstance(found, dict) else {}
 
 

@@ -12,6 +12,7 @@ from urllib.parse import quote
 
 import pandas as pd
 
+from tribo.file_contents import bytes_of
 from tribo.report.provenance import Provenance, read_record, settle_outputs, write_provenance
 from tribo.report.reported import SHOWN, Fitted, Reported, fitted, read_reported
 from tribo.report.result_tables import to_csv
@@ -116,7 +117,7 @@ def _column(report: Reported, out: Path) -> dict[str, Any]:
         "sentence": report.sentence(),
         "counts": report.counts(),
         "next_test": report.next_test(),
-        "figures": {n: base64.b64encode(p.read_bytes()).decode("ascii") for n, p in report.pictures().items()},
+        "figures": {n: base64.b64encode(bytes_of(p)).decode("ascii") for n, p in report.pictures().items()},
     }
 
 

@@ -12,6 +12,7 @@ from typing import Any, Literal
 from tribo.display import displayed
 from tribo.errors import CampaignError, Problem
 from tribo.escaping import well_formed
+from tribo.file_contents import bytes_of, found_below
 from tribo.links import leads_out
 from tribo.report.provenance import DESCRIBED_IN, FILE, RAW, file_hash, input_names, read_record
 from tribo.store.own_folder import MARK
@@ -101,7 +102,7 @@ def of_other_runs(out: Path, record: Mapping[str, Any]) -> Iterator[str]:
     for name in record["outputs"] if start else ():
         path = out / name
         if path.suffix in BEAR_THEIR_ORIGIN and path.is_file():
-            text = unescape(path.read_bytes().decode("utf-8", "replace"))
+            text = unescape(bytes_of(path).decode("utf-8", "replace"))
             if any(not part.startswith(rest) for part in text.split(ORIGIN)[1:]):
                 yield name
 
@@ -130,7 +131,7 @@ def _input_hashes(campaign: Path, recorded: Mapping[str, str]) -> Iterator[tuple
 
 
 def _only_campaign_below(folder: Path) -> Path:
-    found = sorted(p.parent for p in folder.rglob(DESCRIBED_IN[0])) if folder.is_dir() else []
+    found = sorted(p.parent for p in found_below(folder, DESCRIBED_IN[0]))
     return found[0] if len(found) == 1 else folder
 
 
@@ -150,7 +151,7 @@ def _zipped_hashes(archive: Path, recorded: Mapping[str, str]) -> Iterator[tuple
 
 def _output_hashes(out: Path) -> Iterator[tuple[str, str]]:
     """Every file of OUT but the record itself, what is hidden, and what is kept for the next start."""
-    for path in sorted(out.rglob("*")):
+    for path in found_below(out):
         inside = path.relative_to(out)
         hidden = any(part.startswith(".") for part in inside.parts)
         if path.is_file() and not hidden and inside.parts[0] != KEPT and inside.as_posix() != FILE:

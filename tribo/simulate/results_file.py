@@ -22,6 +22,7 @@ UNITS = {
     "s": "s", "m": "m", "Pa": "Pa", "N": "N", "deg": "degree", "N_m": "N/m", "kg_m3": "kg/m3", "per_s": "1/s",
     "m_s": "m/s",
 }  # fmt: skip
+Column = tuple[Any, Mapping[str, str]]  # values along the dimension, attributes
 _LONGEST_FIRST = sorted(UNITS, key=len, reverse=True)
 
 
@@ -67,53 +68,51 @@ def attributes(parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 def write_run(run: Run, path: str | Path) -> Path:
     """Write one run: ``time`` (s), ``force`` (N), ``moving``, and every parameter as an attribute."""
-    import xarray as xr
-
-    dataset = xr.Dataset(
-        {
-            "force": ("time", run.force_N, {"units": "N", "long_name": "slider force along the pull"}),
-            "moving": ("time", run.moving, {"units": "1", "long_name": "number of moving contact blocks"}),
-        },
-        coords={"time": ("time", run.time_s, {"units": "s"})},
-        attrs={
-            "title": ONE_RUN,
-            "sample": run.sample,
-            "static_friction": run.static_friction,
-            "sliding_friction": run.sliding_friction,
-            "static_friction_unit": "1",
-            "sliding_friction_unit": "1",
-            "window": np.asarray(run.window_s),
-            "window_unit": "s",
-            "peak_s": run.peak_s,
-            "normal_load_N": run.normal_load_N,
-            "engine": run.engine,
-            **attributes(run.parameters),
-            **versions(),
-        },
-    )
-    with whole_hdf5(Path(path)) as file:
-        dataset.to_netcdf(file, engine="h5netcdf")
-    return Path(path)
+    columns: dict[str, Column] = {
+        "time": (run.time_s, {"units": "s"}),
+        "force": (run.force_N, {"units": "N", "long_name": "slider force along the pull"}),
+        "moving": (run.moving, {"units": "1", "long_name": "number of moving contact blocks"}),
+    }
+    about = {
+        "title": ONE_RUN,
+        "sample": run.sample,
+        "static_friction": run.static_friction,
+        "sliding_friction": run.sliding_friction,
+        "static_friction_unit": "1",
+        "sliding_friction_unit": "1",
+        "window": np.asarray(run.window_s),
+        "window_unit": "s",
+        "peak_s": run.peak_s,
+        "normal_load_N": run.normal_load_N,
+        "engine": run.engine,
+        **attributes(run.parameters),
+    }
+    return _write(Path(path), "time", columns, about)
 
 
 def write_ensemble(table: pd.DataFrame, path: str | Path, parameters: Mapping[str, Any] | None = None) -> Path:
     """Write the table of an ensemble: one variable per column, one entry per run."""
-    import xarray as xr
-
-    dataset = xr.Dataset(
-        {
-            name: ("run", _column(table[name].to_numpy()), {"units": unit_of(str(name))})
-            for name in map(str, table.columns)
-        },
-        attrs={"title": ENSEMBLE, **attributes(parameters or {}), **versions()},
-    )
-    with whole_hdf5(Path(path)) as file:
-        dataset.to_netcdf(file, engine="h5netcdf")
-    return Path(path)
+    columns: dict[str, Column] = {"run": (np.arange(len(table)), {"units": "1"})}
+    columns |= {name: (table[name].to_numpy(), {"units": unit_of(name)}) for name in map(str, table.columns)}
+    return _write(Path(path), "run", columns, {"title": ENSEMBLE, **attributes(parameters or {})})
 
 
-def _column(values: Any) -> Any:
-    return values.astype(str).astype(object) if values.dtype.kind in "OUT" else values
+def _write(path: Path, dimension: str, columns: Mapping[str, Column], about: Mapping[str, Any]) -> Path:
+    """Columns of equal length along one of them. Written without xarray, which takes a second to import."""
+    import h5py
+
+    with whole_hdf5(path) as held, h5py.File(held, "w") as file:
+        for name, value in {**about, **versions()}.items():
+            file.attrs[name] = value
+        for name, (values, attrs) in columns.items():
+            text = values.dtype.kind in "OUT"
+            column = file.create_dataset(name, data=values.astype(str).astype(object) if text else values)
+            column.attrs.update(attrs)
+            if name == dimension:
+                column.make_scale(name)
+            else:
+                column.dims[0].attach_scale(file[dimension])
+    return path
 
 
 def kind_of(path: Path) -> str:

@@ -24,6 +24,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from tribo.file_contents import bytes_of, found_below, found_in
 from tribo.published import PATTERN_SHARES, data_dir
 
 T = TypeVar("T")
@@ -82,7 +83,7 @@ def _head(key: str, body: bytes) -> bytes:
 def _read(path: Path, key: str) -> dict[str, Any] | None:
     """The contents of a kept file made from ``key``; else None, and a warning where it is damaged or unreadable."""
     try:
-        content = path.read_bytes()
+        content = bytes_of(path)
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as why:
@@ -107,8 +108,8 @@ def sources(*rooms: str) -> str:
     digest = hashlib.sha256()
     for room in sorted(rooms):
         folder = _PACKAGE / room
-        for source in sorted(folder.rglob("*.py")) if folder.is_dir() else [folder.with_suffix(".py")]:
-            digest.update(f"{source.relative_to(_PACKAGE)}\0".encode() + source.read_bytes())
+        for source in found_below(folder, "*.py") if folder.is_dir() else [folder.with_suffix(".py")]:
+            digest.update(f"{source.relative_to(_PACKAGE)}\0".encode() + bytes_of(source))
     for library in LIBRARIES:
         digest.update(f"{library} {metadata.version(library)}\0".encode())
     return digest.hexdigest()
@@ -119,10 +120,10 @@ def package_sources() -> str:
     """SHA-256 over every file of the package, templates and style sheets included, the bundled table of pattern shares,
     and the library versions."""
     digest = hashlib.sha256(sources().encode())
-    for file in sorted(p for p in _PACKAGE.rglob("*") if p.is_file() and "__pycache__" not in p.parts):
-        digest.update(f"{file.relative_to(_PACKAGE)}\0".encode() + file.read_bytes())
-    for file in sorted((data_dir() / PATTERN_SHARES).glob("*.csv")):
-        digest.update(f"{file.name}\0".encode() + file.read_bytes())
+    for file in (p for p in found_below(_PACKAGE) if p.is_file() and "__pycache__" not in p.parts):
+        digest.update(f"{file.relative_to(_PACKAGE)}\0".encode() + bytes_of(file))
+    for file in found_in(data_dir() / PATTERN_SHARES, "*.csv"):
+        digest.update(f"{file.name}\0".encode() + bytes_of(file))
     return digest.hexdigest()
 
 

@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from tribo.errors import Problem, TriboError, naming
+from tribo.file_contents import text_of
 
 POLL_S = 0.2
 WAIT = "this one stops (use --wait SECONDS to wait for the other one)"
@@ -112,7 +113,7 @@ def _holder() -> str:
 def _found(path: Path) -> str:
     """The holder of a lock, by what it has written into the lock file."""
     try:
-        return path.read_text(encoding="utf-8", errors="replace") or "unknown"
+        return text_of(path, errors="replace") or "unknown"
     except OSError:
         return "unknown"
 

@@ -13,7 +13,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from tribo.errors import CampaignError, Problem, naming
+from tribo.errors import CampaignError, Problem
+from tribo.file_contents import found_in, text_of
 from tribo.store.lock import only_writer
 
 LOCK = ".tribo.lock"
@@ -174,7 +175,7 @@ def foreign_files(out: Path) -> list[str]:
     written = recorded_outputs(out)
     if written is not None:
         figures = [f"{FIGURES}/{p.name}" for p in (out / FIGURES).iterdir()] if (out / FIGURES).is_dir() else []
-        pages = [path.name for path in out.glob(PULL_PAGES)]
+        pages = [path.name for path in found_in(out, PULL_PAGES)]
         there = {*(name for name in PRODUCTS if (out / name).exists()), *figures, *pages}
         return sorted(name for name in there - written if not is_leftover(name.rpartition("/")[2]))
     return sorted(path.name for path in out.iterdir() if not (_of_system(path) or _holds_kept_results(path)))
@@ -199,8 +200,7 @@ def recorded_outputs(out: Path) -> set[str] | None:
         There is a record, and it cannot be read.
     """
     try:
-        with naming(out / RECORD):
-            record = json.loads((out / RECORD).read_text(encoding="utf-8"))
+        record = json.loads(text_of(out / RECORD))
     except (FileNotFoundError, NotADirectoryError, IsADirectoryError, ValueError, RecursionError):
         return None
     outputs = record.get("outputs") if isinstance(record, dict) else None

@@ -47,7 +47,8 @@ def with_laws(
     if not found.laws and not tested.layers:
         return replace(d, laws=found)
     model = found.laws[-1].model if found.laws else tested.model
-    left = screen_left(model, replicates=REPLICATES_LEFT, rng=rng, progress=progress)
+    allowed = len(tested.model.acting) if found.laws else 0
+    left = screen_left(model, replicates=REPLICATES_LEFT, rng=rng, progress=progress, allowed=allowed)
     verdict = without_causes(d.verdict, lost if found.laws else {})
     return replace(d, laws=found, verdict=_extended(verdict, (tested, found), model, (left, level)))
 

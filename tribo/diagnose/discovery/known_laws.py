@@ -20,6 +20,7 @@ from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting
 from tribo.diagnose.verdict import Estimate, Layer
 from tribo.errors import CampaignError, Problem
+from tribo.file_contents import found_below
 from tribo.mechanisms.record import Conditions
 
 
@@ -64,7 +65,7 @@ def read_laws(folder: Path) -> tuple[KnownLaw, ...]:
     """
     found: list[KnownLaw] = []
     problems: list[Problem] = []
-    for path in sorted(folder.rglob("law*.toml")):
+    for path in found_below(folder, "law*.toml"):
         try:
             law, parameters = read_law(path)
         except CampaignError as why:

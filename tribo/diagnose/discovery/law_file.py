@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from tribo.diagnose.discovery.written_law import ADHESION_TERM, BOTH, LOAD_TERM, Shape, T, WrittenLaw
 from tribo.diagnose.verdict import Estimate
 from tribo.errors import CampaignError, Problem
+from tribo.file_contents import text_of
 
 SCHEMA = "tribo.law/1"
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -122,7 +123,7 @@ def read_title(path: Path) -> str:
 
 def _table(path: Path) -> LawTable:
     try:
-        return LawTable.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        return LawTable.model_validate(tomllib.loads(text_of(path)))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as why:
         raise CampaignError(Problem("bad_toml", f"not a TOML file: {why}", file=path.name)) from None
     except ValidationError as why:

@@ -25,26 +25,38 @@ def parting_test(law: WrittenLaw, other: WrittenLaw, c: Conditions) -> NextTest:
 
 
 def _how(law: WrittenLaw, other: WrittenLaw, c: Conditions) -> tuple[str, dict[str, Any]]:
-    columns = _words(law)
     if set(law.columns) != set(other.columns):
         only = [name for name in (*law.columns, *other.columns) if not (name in law.columns and name in other.columns)]
         varied = " and ".join(dict.fromkeys(in_words(name) for name in only))
         return f"Vary {varied} independently of each other and of all other conditions", {"vary": sorted(set(only))}
     if law.where != other.where:
         sample = _told_by(law, other, c)
-        return f"Vary {columns} on sample {sample} alone, at one load", {"sample": sample, "vary": list(law.columns)}
+        return f"{_vary(law)} on sample {sample} alone, at one load", {"sample": sample, "vary": list(law.columns)}
     if law.acts_on != other.acts_on:
         ends = [float(c.normal_load_N.min()), float(c.normal_load_N.max())]
-        return f"Vary {columns} at {ends[0]:.3g} N and at {ends[1]:.3g} N alone", {"normal_load_N": ends}
+        return f"{_vary(law)} at {ends[0]:.3g} N and at {ends[1]:.3g} N alone", {"normal_load_N": ends}
     if law.regime != other.regime:
         regime = next(r for r in (law.regime, other.regime) if r != BOTH)
-        text = f"Repeat pulls at the lowest and the highest value of {columns} ({regime} friction decides)"
-        return text, {"vary": list(law.columns)}
+        again = _vary(law) if _days(law) else f"Repeat pulls at the lowest and the highest value of {_words(law)}"
+        return f"{again} ({regime} friction decides)", {"vary": list(law.columns)}
     if len(law.shapes) > 1 or law.shapes[0].kind == "level":
-        return f"Pull at the corners of the ranges of {columns}", {"vary": list(law.columns)}
+        again = _vary(law) if _days(law) else f"Pull at the corners of the ranges of {_words(law)}"
+        return again, {"vary": list(law.columns)}
     name = law.columns[0]
     at = _apart(law, other, column_values(c, name))
     return f"Pull at {in_words(name)} = {at:.4g} {UNITS.get(name, '')}".rstrip(), {name: at}
+
+
+def _vary(law: WrittenLaw) -> str:
+    """What to change for a further test: a column, or what a day had in particular, since no day comes back."""
+    days = _days(law)
+    if not days:
+        return f"Vary {_words(law)}"
+    return f"Find out what differed on {' and '.join(days)}, and pull with it and without it"
+
+
+def _days(law: WrittenLaw) -> list[str]:
+    return [s.level for s in law.shapes if s.kind == "level" and s.column == "date"]
 
 
 def _words(law: WrittenLaw) -> str:

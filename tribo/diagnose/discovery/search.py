@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tribo.diagnose.discovery.grammar import Group, groups_of, shapes_of
 from tribo.diagnose.discovery.scoring import Courses, Projection, Scored, acts_of, courses_of, terms_of
 from tribo.diagnose.discovery.settling import FoundLaw, Searched, settled
-from tribo.diagnose.search.screen import decided, share_beyond
+from tribo.diagnose.search.screen import allowed_wrong_form, decided, share_beyond
 from tribo.diagnose.statistics.chance import as_measured, drawn_residuals, refit
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.scatter import Replicates
@@ -45,7 +45,8 @@ def discover_laws(
 ) -> Discovery:
     """Add the best law of the grammar while it is beyond what chance gives the best of all laws.
 
-    A column has one law: what a second one would add is an error in the form of the first.
+    A column has one law: what a second one would add is an error in the form of the first. The causes of the model
+    may be wrong in form, too, so that no law is written of what they leave.
 
     Parameters
     ----------
@@ -64,6 +65,8 @@ def discover_laws(
     found: list[FoundLaw] = []
     table: tuple[Scored, ...] = ()
     searched = 0
+    if model.acting:
+        model = allowed_wrong_form(model)
     while len(found) < MOST_LAWS:
         used = {*without, *(name for law in found for name in law.law.columns)}
         grammar = Grammar.of(model, used)

@@ -44,7 +44,8 @@ class Named:
 
     ``model`` is fitted with the causes and without the remainders. ``rivals`` are distinct mechanisms that explain the
     last cause about equally; ``remainders`` are what follows a column and no mechanism. ``left`` is the screen of what
-    remains after all layers and ``p_left`` its adjusted p value.
+    remains after all layers and ``p_left`` its adjusted p value. ``wrong_in_form`` are mechanisms that were left out
+    because a misfit remained in the very column they depend on.
     """
 
     model: ModelFit
@@ -54,6 +55,7 @@ class Named:
     left: Screen
     p_left: float
     remainders: tuple[Remainder, ...] = ()
+    wrong_in_form: frozenset[str] = frozenset()
 
 
 @displayed()
@@ -105,7 +107,9 @@ def name_causes(start: StartEffects, first: Screen, rules: Rules) -> Named:
         seen = _screen_left(settled.model, rules)
     model = _without_remainders(settled, start.model.setup)
     left_p = float(seen.p.min())
-    return Named(model, settled.causes, settled.rivals, weighed, seen, left_p, settled.remainders)
+    return Named(
+        model, settled.causes, settled.rivals, weighed, seen, left_p, settled.remainders, settled.wrong_in_form
+    )
 
 
 def _screen_left(model: ModelFit, rules: Rules) -> Screen:

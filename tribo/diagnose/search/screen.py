@@ -116,13 +116,20 @@ def _shown(looks: Sequence[Look], strength: FloatArray) -> list[int]:
     return [k for k in range(len(looks)) if k not in weaker]
 
 
+def allowed_wrong_form(model: ModelFit, allowed: int = 0) -> ModelFit:
+    """The model with its laws allowed to be wrong in form by a share of their own effect; the first ``allowed`` of them
+    are already."""
+    acting, values = model.acting[allowed:], model.values[allowed:]
+    wider = with_form_error(model.setup, model.law, acting, values, FORM)
+    return fit(wider, model.acting, start=model, iterations=10)
+
+
 def screen_left(
-    model: ModelFit, *, replicates: int, rng: np.random.Generator, progress: Progress | None = None
+    model: ModelFit, *, replicates: int, rng: np.random.Generator, progress: Progress | None = None, allowed: int = 0
 ) -> Screen:
-    """What is left after a model, its laws allowed to be wrong in form by a share of their own effect."""
-    wider = with_form_error(model.setup, model.law, model.acting, model.values, FORM)
-    widened = fit(wider, model.acting, start=model, iterations=10)
-    looks = all_looks(wider, start_changes(wider, widened.law))
+    """What is left after a model, its laws allowed to be wrong in form (:func:`allowed_wrong_form`)."""
+    widened = allowed_wrong_form(model, allowed)
+    looks = all_looks(widened.setup, start_changes(widened.setup, widened.law))
     return screen(widened, looks, replicates=replicates, rng=rng, progress=progress)
 
 

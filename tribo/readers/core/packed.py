@@ -13,6 +13,7 @@ from typing import IO, Protocol
 from tribo.errors import Problem, ReadError
 from tribo.limits import MOST_UNPACKED_EXPORT_BYTES
 from tribo.readers.core.source import read_bytes
+from tribo.zips import LAST_BYTES, last_record
 
 _CHUNK = 1 << 20
 _MOST_LISTED = 12
@@ -95,6 +96,7 @@ def _files(opened: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
 
 def _from_zip(raw: bytes | mmap.mmap, wanted: str, file: str) -> bytes:
     try:
+        last_record(raw[-LAST_BYTES:])
         with zipfile.ZipFile(_stream(raw)) as opened:
             entry = _chosen(_files(opened), wanted, file)
             if entry.flag_bits & 1:

@@ -13,6 +13,7 @@ from tribo.simulate.config import SimConfig, mask_of
 from tribo.simulate.engines import state as k
 from tribo.simulate.engines.active import Active, active_of, advance
 from tribo.simulate.engines.dense import advance_dense
+from tribo.simulate.engines.jit import uncollected
 from tribo.simulate.engines.lattice import Lattice, make_lattice
 from tribo.simulate.engines.planes import places_of
 from tribo.simulate.engines.strips import planes_of
@@ -147,7 +148,8 @@ def run_fast(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Tra
         if active is None:
             advance_dense(state, samples, numerics, until, lattice, drive.follow)
         else:
-            advance(active, state, samples, numerics, until)
+            with uncollected(advance):
+                advance(active, state, samples, numerics, until)
         chunks.append(_first(samples, int(state.counts[k.N_SAMPLES])))
     if active is not None:
         put_back(active, state, numerics)
