@@ -270,7 +270,8 @@ def fewer_blocks() -> Claim:
 
 def rotation_percent(sample: str, seed: int) -> float:
     """How far springs of the full r_ij move the peak; 45 x 45 blocks."""
-    config = READING.with_(sample=sample, seed=seed, engine="dense", blocks=(45, 45))
+    angle = 90.0 if sample == "Sy" else 0.0
+    config = READING.with_(sample=sample, seed=seed, angle_deg=angle, engine="dense", blocks=(45, 45))
     peaks = [short(config, rotation=how).static_friction for how in ("small", "finite")]
     return 100.0 * (peaks[1] / peaks[0] - 1.0)
 
