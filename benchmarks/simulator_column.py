@@ -6,9 +6,9 @@
     python benchmarks/simulator_column.py steps STORE docs/data     # table2-steps.csv
     python benchmarks/simulator_column.py claims STORE docs/data    # table2-claims.csv
 
-``entries`` compares the mean of every sample at every load with T/N of the printed law. ``angles`` pulls the samples at
-ten angles and says how far that moves the means (four minutes). ``steps`` repeats runs of the column at the paper's step
-of 1e-8 s and three loads (ten minutes for five runs an entry); it goes on where it was stopped. ``claims`` holds what
+``entries`` compares the mean of every sample at every load with T/N of the printed law. ``angles`` pulls samples at ten
+angles and says how far that moves the means (four minutes). ``steps`` repeats runs of the column at the step of the
+paper, 1e-8 s, at three loads (ten minutes, five runs each); it goes on where it was stopped. ``claims`` holds what
 the text and the captions of Figures 5 to 8 say, and what is exact in the model, against the column (a minute).
 """
 
