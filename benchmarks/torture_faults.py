@@ -105,7 +105,7 @@ def sizes(bench: Bench) -> Iterator[Trial]:
         yield "files not larger than a limit", outcome, [f"limit {limit}: {why}" for why in wrong]
     ready = bench.ready_bytes
     for share in range(few) if os.geteuid() == 0 else ():
-        size = ready + (bench.written_bytes - ready) * share // few + 40960
+        size = ready + max(bench.written_bytes - ready, 0) * share // few + 40960
         outcome, wrong = bench.on_full_disk(size)
         yield "disk full", outcome, [f"{size} bytes: {why}" for why in wrong]
 
@@ -143,10 +143,11 @@ def torture(bench: Bench, table: Table, given: argparse.Namespace, aside: Path) 
     started = time.monotonic(), sum(os.times()[:4])
     for trial in faults(bench, wanted(given.every, given.seed, given.distinct), aside):
         table.add(trial, name)
+        table.write(given.out)
     if name not in ("verify", "report again"):
         for trial in sizes(bench):
             table.add(trial, name)
-    table.write(given.out)
+            table.write(given.out)
     took, worked = time.monotonic() - started[0], sum(os.times()[:4]) - started[1]
     of_command = {what: row for what, row in table.rows.items() if what.endswith(f": {name}")}
     print(f"{name}: {len(bench.operations)} file operations, {took:.0f} s, {worked:.0f} s of processor time")

@@ -10,8 +10,6 @@ import pytest
 from made_campaigns import DIALECTS, MadeCampaign, write_made
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
-
-
 @pytest.fixture(scope="session")
 def shared() -> Path:
     """The folder of reference material beside the checkout; tests that need it skip where it is absent."""

@@ -246,12 +246,12 @@ def silent_reads(source: str) -> list[str]:
     return [name for name in named if not name.startswith("(files(")]
 
 
-SILENT = {"glob", "rglob", "read_text", "read_bytes"}
+SILENT = {"glob", "rglob", "read_text", "read_bytes", "write_text", "write_bytes"}
 
 
-def test_files_and_folders_are_read_by_functions_that_leave_nothing_out_in_silence() -> None:
+def test_files_and_folders_are_read_and_written_by_functions_that_leave_nothing_out_in_silence() -> None:
     readers = {m.name for m in ROOMS if silent_reads(m.read_text(encoding="utf-8"))}
-    assert readers == {"file_contents.py", *TIDIES_ONLY}
+    assert readers == {"file_contents.py", "whole_files.py", "sled.py", *TIDIES_ONLY}  # sled.py: made-up exports
 
 
 def test_a_silent_read_is_seen() -> None:

@@ -9,15 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hostile_zips import packed
 
 from tribo.campaign import open_campaign
 from tribo.errors import CampaignError
-from tribo.file_contents import bytes_of, found_below, found_in, text_of
+from tribo.file_contents import bytes_of, found_below, found_in, text_of, write_new
 from tribo.ingestion.draft import exports_in
 from tribo.pipeline.dated_copies import contents
 from tribo.pipeline.laws_of_site import answers_of
 from tribo.report.provenance import input_names
 from tribo.report.verify import _output_hashes
+from tribo.zips import unpack
 
 
 @pytest.fixture
@@ -73,6 +75,21 @@ def test_an_error_while_a_file_is_read_names_the_file(tmp_path: Path, monkeypatc
     for read in (bytes_of, text_of):
         with pytest.raises(OSError, match=r"a\.json"):
             read(tmp_path / "a.json")
+
+
+def test_nothing_is_left_of_a_new_file_that_cannot_be_written(tmp_path: Path) -> None:
+    with pytest.raises(UnicodeEncodeError):
+        write_new(tmp_path / "a.toml", "title\ud800")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_an_error_while_an_entry_of_a_zip_is_unpacked_names_the_new_file(tmp_path: Path) -> None:
+    (tmp_path / "c.zip").write_bytes(packed())
+    (tmp_path / "there").mkdir()
+    (tmp_path / "there" / "tests.csv").symlink_to("/dev/full")
+    with pytest.raises(OSError, match=r"No space left on device: '.*there/tests\.csv'"):
+        unpack(tmp_path / "c.zip", tmp_path / "there")
 
 
 def test_there_is_nothing_in_a_folder_that_is_not_there(tmp_path: Path) -> None:

@@ -1,7 +1,8 @@
 """Files and folders read whole: where the system refuses, the error names the path, and nothing is left out in silence.
 
 ``Path.glob`` and ``Path.rglob`` leave out folders that they may not list, and an error of ``Path.read_text`` while it
-reads names no file; the package uses the functions of this module in their place.
+reads names no file; the package uses the functions of this module in their place. Results are written by
+:mod:`tribo.store.whole_files`.
 """
 
 from __future__ import annotations
@@ -30,6 +31,23 @@ def text_of(path: Path, errors: str = "strict") -> str:
     """The contents of a file in UTF-8; ``errors`` as for :meth:`bytes.decode`, and raises as :func:`bytes_of`."""
     with naming(path):
         return path.read_text(encoding="utf-8", errors=errors)
+
+
+def write_new(path: Path, text: str) -> None:
+    """A new file in UTF-8 with plain newlines; nothing of it is left where it cannot be written.
+
+    Raises
+    ------
+    OSError
+        With the path: it exists, or it cannot be written.
+    """
+    with naming(path), path.open("x", encoding="utf-8", newline="\n") as out:
+        try:
+            out.write(text)
+            out.flush()
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
 
 
 def found_in(folder: Path, pattern: str) -> list[Path]:

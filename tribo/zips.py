@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from tribo.errors import CampaignError, Problem
+from tribo.errors import CampaignError, Problem, naming
 from tribo.limits import (
     DEEPEST_PATH,
     LARGEST_LISTING_BYTES,
@@ -99,7 +99,7 @@ def unpack(archive: Path, folder: Path) -> None:
             (folder / parent).mkdir(parents=True, exist_ok=True)
         for entry in entries:
             if not entry.is_folder:
-                with (folder / entry.name).open("wb") as out:
+                with naming(folder / entry.name), (folder / entry.name).open("wb") as out:
                     out.writelines(pieces(opened, entry, archive.name))
 
 

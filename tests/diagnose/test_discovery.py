@@ -12,9 +12,9 @@ from tribo.diagnose.diagnosis import examine
 from tribo.diagnose.diagnosis_record import Diagnosis
 from tribo.diagnose.discovery.grammar import groups_of, shapes_of
 from tribo.diagnose.discovery.held import holds
-from tribo.diagnose.discovery.in_verdict import with_laws
+from tribo.diagnose.discovery.in_verdict import level_of_laws, with_laws, with_misfits
 from tribo.diagnose.discovery.law_file import law_text, read_law
-from tribo.diagnose.discovery.law_words import discovery_text, law_layers
+from tribo.diagnose.discovery.law_words import discovery_text, law_layers, law_sentence
 from tribo.diagnose.discovery.parting import parting_test
 from tribo.diagnose.discovery.scoring import Projection
 from tribo.diagnose.discovery.search import RESCORED, Discovery, Grammar, best_of, discover_laws
@@ -22,7 +22,7 @@ from tribo.diagnose.discovery.written_law import ADHESION_TERM, LOAD_TERM, Shape
 from tribo.diagnose.search.weighing import refitted
 from tribo.diagnose.statistics.chance import drawn_residuals, refit
 from tribo.diagnose.statistics.model import Acting, Setup
-from tribo.diagnose.verdict import Estimate
+from tribo.diagnose.verdict import Cause, Estimate
 from tribo.display import exact_text
 from tribo.errors import CampaignError
 from tribo.figures import law as law_figure
@@ -83,11 +83,44 @@ def test_a_diagnosis_adds_the_law_of_what_no_mechanism_explains(diagnosed: Diagn
     assert "the remaining differences are within chance" in diagnosed.verdict.text
 
 
-def test_a_campaign_without_misfit_is_not_searched_for_laws() -> None:
-    quiet = with_laws(examine(made(nothing, seed=102), replicates=(40, 40)))
+@pytest.fixture(scope="module")
+def quiet() -> Diagnosis:
+    return with_laws(examine(made(nothing, seed=102), replicates=(40, 40)))
+
+
+def test_a_campaign_without_misfit_is_searched_and_none_is_found(quiet: Diagnosis) -> None:
     assert quiet.verdict.verdict == "no_misfit"
-    assert quiet.laws is None
+    assert quiet.laws is not None
+    assert quiet.laws.laws == ()
     assert all(layer.kind == "pattern_correction" for layer in quiet.verdict.layers)
+
+
+def test_a_law_that_no_look_had_shown_is_a_misfit(found: Discovery, quiet: Diagnosis) -> None:
+    v = with_misfits(quiet.verdict, found)
+    assert v.verdict == "unknown"
+    assert [(m.observable, m.covariate) for m in v.misfits] == [("sliding", "temperature_C")]
+    assert v.misfits[0].low < v.misfits[0].effect_percent < v.misfits[0].high
+    assert law_sentence(found.laws[0]) in v.text
+    assert v.next_test is not None
+    assert "temperature" in v.next_test.text
+
+
+def test_a_law_beside_a_cause_leaves_it_a_part_of_the_answer(found: Discovery, quiet: Diagnosis) -> None:
+    cause = Cause("suction", 1.0, {}, "Suction.")
+    v = with_misfits(replace(quiet.verdict, verdict="named", causes=(cause,)), found)
+    assert (v.verdict, v.causes) == ("partly", (cause,))
+    assert "A misfit remains beyond chance" in v.text
+
+
+@pytest.mark.parametrize(
+    ("p_left", "lost", "level"), [(0.5, {}, 0.001), (0.001, {}, 0.01), (0.5, {"velocity_dependence": 8.0}, 0.01)]
+)
+def test_without_a_misfit_left_a_law_has_to_be_beyond_chance_at_a_tenth_of_the_level(
+    diagnosed: Diagnosis, p_left: float, lost: dict[str, float], level: float
+) -> None:
+    assert diagnosed.named is not None
+    named = replace(diagnosed.named, causes=(("any",),), remainders=(), p_left=p_left)  # type: ignore[arg-type]
+    assert level_of_laws(replace(diagnosed, named=named), lost, 0.01) == pytest.approx(level)
 
 
 def test_the_figure_shows_the_law_over_its_column(diagnosed: Diagnosis) -> None:

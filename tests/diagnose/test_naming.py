@@ -229,7 +229,7 @@ def test_of_several_causes_the_newest_is_left_out_where_its_own_column_is_still_
     found = naming.name_causes(start, left, rules)
     assert [[c.acting.name for c in alike] for alike in found.causes] == [["suction"]]
     assert offered == [set(), set(), {"run_in"}]
-    assert found.wrong_in_form == {"run_in"}
+    assert found.wrong_in_form == ("run_in",)
 
 
 def test_what_explains_as_much_only_before_choices_are_paid_for_is_no_rival(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,6 +23,7 @@ from faults.file_operations import KILL, KILLED, LASTING, Fault, Operation, watc
 from faults.small_site import Place, hashes
 
 SLOW_S = 1200
+PAGE_BYTES = 4096
 TEMPORARY_NAME = re.compile(r"\.(?P<name>.+?)(\.[^.]+)?\.part$")
 TIMES = re.compile(r'\d{4}-\d\d-\d\d[T ]\d\d:?\d\d(:?\d\d)?Z?|"seconds": [\d.]+|process \d+')
 
@@ -272,9 +273,10 @@ class Bench:
 
     @property
     def ready_bytes(self) -> int:
-        """Size of all files that OUT holds at the start."""
+        """What a file system needs for all that OUT holds at the start: whole pages, and one for each name."""
         ready = self.command.ready
-        return sum(p.stat().st_size for p in ready.rglob("*") if p.is_file()) if ready else 0
+        sizes = [p.stat().st_size if p.is_file() else 0 for p in ready.rglob("*")] if ready else []
+        return sum(-(-size // PAGE_BYTES) + 1 for size in sizes) * PAGE_BYTES
 
     def reset(self) -> None:
         """OUT as it is before a trial, no temporary files."""

@@ -10,12 +10,23 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.lines import Line2D
 from matplotlib.text import Text
+from matplotlib.textpath import TextPath
 from report.synthetic import AREA_M2, make_study
 
 from tribo.comparison import study_lookup
 from tribo.figures.catalogue import FIGURES
-from tribo.figures.style import SAMPLE_COLOURS, SAMPLE_MARKERS, house_style, sample_mark, settle
+from tribo.figures.style import (
+    SAMPLE_COLOURS,
+    SAMPLE_MARKERS,
+    house_style,
+    legend_below,
+    page_figure,
+    sample_mark,
+    settle,
+)
 from tribo.records import Study
 
 NAMES = list(FIGURES)
@@ -115,6 +126,24 @@ def test_labels_on_each_other_are_seen() -> None:
     figure.axes[0].text(0.4, 1.01, "on the title", transform=figure.axes[0].transAxes)
     figure.axes[0].text(3.0, 0.5, "outside")
     assert collisions(figure) == [("outside", "the page"), ("on the title", "title")]
+
+
+@house_style()
+def test_a_legend_that_is_too_wide_for_the_page_takes_more_rows() -> None:
+    figure = page_figure(60)
+    figure.subplots()
+    names = [*"FABC", "Sx", "Sy", "mean ± 2 SE", "± 2 SD of a mean, expected", "contribution of the named mechanism"]
+    legend_below(figure, [Line2D([], [], label=name) for name in names], columns=12)
+    assert collisions(figure) == []
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == names
+
+
+@house_style()
+def test_text_is_laid_out_as_wide_as_it_is_drawn() -> None:
+    figure, words = page_figure(60), "pressure-dependent friction"
+    laid_out = figure.text(0, 0, words, fontsize=7.5, fontweight="bold").get_window_extent().width * 72 / figure.dpi
+    drawn = TextPath((0, 0), words, size=7.5, prop=FontProperties(weight="bold")).get_extents().width
+    assert laid_out == pytest.approx(drawn, rel=0.02)
 
 
 @pytest.mark.parametrize("name", ["fig6", "fig7"])

@@ -1,4 +1,7 @@
-"""Two small campaigns, built for real: killed and resumed, two starts at once, nothing to do, exports that change."""
+"""Two small campaigns, built for real: killed and resumed, two starts at once, nothing to do, exports that change.
+
+The second has flat samples alone, so its steps are fewer.
+"""
 
 from __future__ import annotations
 
@@ -109,7 +112,8 @@ def write_rows(campaign: Path, table: list[dict[str, str]]) -> None:
 def story(tmp_path_factory: pytest.TempPathFactory) -> Story:
     """The whole story, told once; each test looks at one of its builds."""
     lab = Lab(tmp_path_factory.mktemp("drop"), tmp_path_factory.mktemp("lab") / "site")
-    a, b = (small(lab.drop / name, seed) for seed, name in enumerate("ab"))
+    a, b = small(lab.drop / "a", 0), small(lab.drop / "b", 1, samples="F")
+    elsewhere = small(tmp_path_factory.mktemp("elsewhere"), 2)
 
     first = lab.start()
     lab.wait_for(lambda: sum(name.endswith("fit.json") for name in lab.records()) > 0)
@@ -126,17 +130,18 @@ def story(tmp_path_factory: pytest.TempPathFactory) -> Story:
     resumed = lab.finish(second)
     idle = lab.finish(fourth)
 
-    # one export of a is measured again and one is taken away, one is on its way to b
+    # one export of a pattern of a is measured again and one is taken away, one is on its way to b
     of_b, gone = [row for row in rows(a) if row["sample"] == "B"][:2]
-    shutil.copy(lab.drop / "b" / of_b["file"], a / of_b["file"])
+    shutil.copy(elsewhere / of_b["file"], a / of_b["file"])
     write_rows(a, [row for row in rows(a) if row != gone])
     (a / gone["file"]).unlink()
     (b / "raw" / "T009.csv.part").write_bytes((a / "raw" / "T001.csv").read_bytes()[:500])
     mixed = lab.build()
 
     (b / "raw" / "T009.csv.part").unlink()
-    shutil.copy(a / of_b["file"], b / "raw" / "T009.csv")
-    write_rows(b, [*rows(b), {**of_b, "test_id": "T009", "file": "raw/T009.csv"}])
+    first_of_b = rows(b)[0]
+    shutil.copy(b / first_of_b["file"], b / "raw" / "T009.csv")
+    write_rows(b, [*rows(b), {**first_of_b, "test_id": "T009", "file": "raw/T009.csv"}])
     added = lab.build()
     for file in lab.drop.rglob("*"):
         os.utime(file, (1.7e9, 1.7e9))

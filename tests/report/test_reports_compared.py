@@ -77,6 +77,18 @@ def test_the_command_writes_a_page_that_is_whole_and_in_which_nothing_runs(
     assert run("compare-reports", written.out, changed, "-o", out, "-q").exit_code == 0
 
 
+def test_a_campaign_beside_two_reports_is_no_input_of_their_comparison(written: Written, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        shutil.copytree(written.out, tmp_path / name, ignore=shutil.ignore_patterns("figures", "*.pdf"))
+    assert run("compare-reports", tmp_path / "a", tmp_path / "b", "-o", tmp_path / "out").exit_code == 0
+    (tmp_path / "campaign" / "raw").mkdir(parents=True)
+    for name in ("campaign.toml", "tests.csv", "raw/T1.csv"):
+        (tmp_path / "campaign" / name).write_text("x")
+    assert verify(tmp_path / "out").unchanged
+    (tmp_path / "b" / "fits.csv").write_text("x")
+    assert [d.file for d in verify(tmp_path / "out").differences] == ["b/fits.csv"]
+
+
 def test_a_folder_without_a_report_is_refused_by_its_name(written: Written, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     result = run("compare-reports", written.out, tmp_path / "empty", "-o", tmp_path / "out")

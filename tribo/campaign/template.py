@@ -6,6 +6,7 @@ from pathlib import Path
 
 from tribo.campaign.load import RAW, TESTS, TOML
 from tribo.errors import CampaignError, Problem
+from tribo.file_contents import write_new
 
 _TOML_TEXT = """\
 # Description of a campaign: sample, counterface and patterns. Replace the example values by your own.
@@ -89,6 +90,5 @@ def write_template(folder: Path | str) -> tuple[Path, ...]:
         raise CampaignError(Problem("exists", what, file=str(path)) for path in there or [folder])
     (folder / RAW).mkdir(parents=True, exist_ok=True)
     for path, text in texts.items():
-        with path.open("x", encoding="utf-8", newline="\n") as out:
-            out.write(text)
+        write_new(path, text)
     return (*texts, folder / RAW)

@@ -16,7 +16,7 @@ from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting
 from tribo.diagnose.statistics.pattern_excess import WITHIN, PatternExcess
 from tribo.diagnose.statistics.percent import percent
-from tribo.diagnose.terms import ABSORBED, in_words, not_varied
+from tribo.diagnose.terms import ABSORBED, in_words, name_in_words, not_varied
 from tribo.diagnose.verdict import Cause, Estimate, Excluded, Layer, Misfit, Outcome
 from tribo.mechanisms.direct_estimates import TraceEvidence
 from tribo.mechanisms.record import Conditions, Mechanism
@@ -139,13 +139,9 @@ def _of_specimen(column: str, sample: str, up: bool) -> str:
 
 def acting_in_words(acting: Acting) -> str:
     """The plain name of a mechanism, with its choice in brackets."""
-    return acting.mechanism.in_words + (f" ({acting.choice})" if acting.choice else "")
-
-
-def name_in_words(name: str) -> str:
-    """The plain name of a mechanism that a verdict names, with the column it may name."""
-    _, _, label = name.partition(":")
-    return mechanism(name).in_words + (f" ({label})" if label else "")
+    name = name_in_words(acting.name)
+    said = acting.name.partition(":")[2]  # a column that the name holds already
+    return name + (f" ({acting.choice})" if acting.choice and acting.choice != said else "")
 
 
 def meaning_in_words(name: str) -> str:

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.diagnose.diagnosis_record import Diagnosis, NotSimulated, SimulatedExtension
-from tribo.diagnose.sentences import name_in_words
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import effect_of
 from tribo.diagnose.statistics.pattern_table import flat_law
 from tribo.diagnose.statistics.percent import rms_percent
+from tribo.diagnose.terms import name_in_words
 from tribo.diagnose.verdict import CERTAIN_CAUSES
 from tribo.errors import SimulationError
 from tribo.mechanisms.record import Conditions, Values

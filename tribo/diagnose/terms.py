@@ -1,8 +1,9 @@
-"""Recorded columns in words, and the reasons why a design says nothing about a mechanism."""
+"""Recorded columns and mechanisms in words, and the reasons why a design says nothing about a mechanism."""
 
 from __future__ import annotations
 
 from tribo.mechanisms.record import Mechanism
+from tribo.mechanisms.table import mechanism
 
 ABSORBED = "the calibration on the flat sample absorbs its effect"
 COLUMN = {
@@ -21,6 +22,20 @@ NEEDED = {
 def in_words(column: str) -> str:
     """A recorded column in words; one that only this campaign has, by its name."""
     return COLUMN.get(column, column)
+
+
+def name_in_words(name: str) -> str:
+    """The plain name of a mechanism that a verdict names; of one that follows any column, with that column.
+
+    A law, and whatever else the library does not know, keeps its name, with spaces.
+    """
+    _, _, column = name.partition(":")
+    if column:
+        return f"a dependence on {in_words(column)}"
+    try:
+        return mechanism(name).in_words
+    except KeyError:
+        return name.replace("_", " ") if name.isidentifier() else name
 
 
 def not_varied(m: Mechanism) -> str:

@@ -150,9 +150,9 @@ DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
         FigureOf(
             "finding",
             "What was found",
-            "100 (measured / model − 1) against what it follows, for the model calibrated on the flat sample. Black: "
-            "means with twice their standard error. Grey: range of 95 % of such means if the model were right. Red: "
-            "what the named cause adds. Small points: tests.",
+            "100 (measured / model − 1) against what it follows, for the model calibrated on the flat sample. Points "
+            "with bars: means with twice their standard error. Band: range of 95 % of such means if the model were "
+            "right. Thick line: what the named cause adds. Small points: tests.",
             finding.numbers,
             finding.draw,
         ),
@@ -174,9 +174,9 @@ DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
             "residuals",
             "The strongest deviations",
             "100 (measured / model − 1) against the recorded variable with which it varies most strongly; if no "
-            "deviation is significant, against the three variables that come closest. Small points: tests; black: "
-            "means with twice their standard error. Grey band: range of 95 % of such means if the model were right, "
-            "given the scatter of repeats and specimens and the error of the model. Red line: contribution of the "
+            "deviation is significant, against the three variables that come closest. Small points: tests; points with "
+            "bars: means with twice their standard error. Band: range of 95 % of such means if the model were right, "
+            "given the scatter of repeats and specimens and the error of the model. Thick line: contribution of the "
             "identified mechanism.",
             residuals.numbers,
             residuals.draw,
@@ -195,10 +195,11 @@ DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
         FigureOf(
             "law",
             "Laws that the remaining misfit follows",
-            "Change of T over the column of each law that was found. Grey points: what the model without the law "
-            "leaves of each test; black: means over stretches of the column with twice their standard error. Red: the "
-            "law with its 90 % band, which is averaged over all forms in proportion to their evidence. Both are about "
-            "the mean of the law. Of a product of two columns, the horizontal axis is the product of its two shapes.",
+            "Change of T over the column of each law that was found. Small points: what the model without the law "
+            "leaves of each test; points with bars: means over stretches of the column with twice their standard "
+            "error. Line: the law with its 90 % band, which is averaged over all forms in proportion to their "
+            "evidence. Both are about the mean of the law. Of a product of two columns, the horizontal axis is the "
+            "product of its two shapes.",
             law.numbers,
             law.draw,
         ),
@@ -253,3 +254,8 @@ PUBLISHED_FIGURES: dict[str, FigureOf[PublishedDiagnosis]] = {
     )
 }
 """The figures of the diagnosis of a published table by name."""
+
+TITLES: dict[str, str] = {
+    name: figure.title for table in (FIGURES, FRICTION_FIGURES, DIAGNOSIS_FIGURES) for name, figure in table.items()
+}
+"""The title of every figure of a report, by name."""

@@ -56,6 +56,15 @@ class Covariate:
         return AXES.get(self.name, self.name)
 
 
+def mechanism_label(name: str) -> str:
+    """The plain name of a mechanism without its article; of one that follows any column, that column."""
+    from tribo.diagnose.terms import name_in_words
+
+    column = name.partition(":")[2]
+    plain = f"dependence on {LABELS.get(column, column)}" if column else name_in_words(name)
+    return plain.removeprefix("a ").removeprefix("an ")
+
+
 def covariates(s: Setup) -> list[Covariate]:
     """The mean, the load and the bend with it, and every recorded column that varies; of text those of two names."""
     c, n = s.observations.conditions, s.observations.n

@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from tribo.figures import style
+from tribo.figures.covariates import mechanism_label
 
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
@@ -82,7 +83,7 @@ def _sizes(ax: Axes, rows: pd.DataFrame) -> None:
     places = np.arange(len(rows))
     ax.hlines(places, rows["found_10_percent"], rows["found_90_percent"], color=style.BLUE, lw=3, alpha=0.45)
     ax.plot(rows["found_50_percent"], places, "o", color=style.BLUE, ms=4)
-    ax.set_yticks(places, [str(n).replace("_", " ") for n in rows["name"]])
+    ax.set_yticks(places, [mechanism_label(str(name)) for name in rows["name"]])
     ax.set_ylim(len(rows) - 0.4, -0.6)
     ax.tick_params(axis="y", length=0)
     if rows.empty:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from tribo.figures import style
+from tribo.figures.covariates import mechanism_label
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def _reach(gains: FloatArray, words: list[str]) -> float:
 
 def _frame(ax: Axes, rows: pd.DataFrame, reach: float) -> None:
     ax.axvline(0, color="0.4", lw=0.8)
-    ax.set_yticks(np.arange(len(rows)), [m.replace("_", " ") for m in rows["mechanism"]])
+    ax.set_yticks(np.arange(len(rows)), [mechanism_label(name) for name in rows["mechanism"]])
     for label, status in zip(ax.get_yticklabels(), rows["status"], strict=True):
         label.set_fontweight("bold" if status in ("cause", "tied") else "normal")
         label.set_color("0.45" if status == "out" else "black")

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from tribo.figures import style
+from tribo.figures.covariates import mechanism_label
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
@@ -159,7 +160,7 @@ def _readings_axes(ax: Axes, readings: pd.DataFrame, mechanisms: list[str], n_gu
         for r in readings.to_dict("records")
     ]
     ax.set_yticks(np.arange(len(labels)) + 0.5, labels, fontsize=6.5)
-    words = [m.replace("_", " ") for m in mechanisms]
+    words = [mechanism_label(m) for m in mechanisms]
     ax.set_xticks(np.arange(len(words)) + 0.5, words, rotation=30, ha="right", rotation_mode="anchor", fontsize=6.5)
     for label in ax.get_xticklabels()[:n_guesses]:
         label.set_fontweight("bold")

@@ -12,12 +12,13 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 import pandas as pd
-from matplotlib import style
+from matplotlib import rcParams, style
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.textpath import TextPath
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 from matplotlib.transforms import ScaledTranslation, Transform
 
@@ -189,6 +190,20 @@ def plain_log_axis(axis: Axis, values: Any) -> None:
 
 
 def legend_below(figure: Figure, handles: list[Any], columns: int = 6) -> None:
-    """One legend for all panels, outside them at the foot, so that it covers no point."""
+    """One legend for all panels, outside them at the foot, in up to so many columns as the page is wide enough for."""
     if handles:
-        figure.legend(handles=handles, loc="outside lower center", ncols=min(columns, len(handles)))
+        labels = [str(handle.get_label()) for handle in handles]
+        fitting = _columns_that_fit(labels, min(columns, len(handles)), 72 * figure.get_figwidth())
+        figure.legend(handles=handles, loc="outside lower center", ncols=fitting)
+
+
+def _columns_that_fit(labels: list[str], most: int, width_points: float) -> int:
+    """The most columns, each as wide as its longest label, its handle and the gaps beside it; the first are filled."""
+    size = float(rcParams["legend.fontsize"])
+    ems = rcParams["legend.handlelength"] + rcParams["legend.handletextpad"] + rcParams["legend.columnspacing"]
+    gaps = size * float(ems)
+    widths = [TextPath((0, 0), text, size=size).get_extents().width + gaps if text else gaps for text in labels]
+    for columns in range(most, 1, -1):
+        if sum(max(part) for part in np.array_split(widths, columns)) < width_points:
+            return columns
+    return 1

@@ -12,7 +12,7 @@ from pathlib import Path
 from tribo.campaign.load import RAW, TESTS, TOML
 from tribo.campaign.table import KNOWN
 from tribo.errors import CampaignError, Problem
-from tribo.file_contents import found_below
+from tribo.file_contents import found_below, write_new
 from tribo.ingestion.draft import Draft, Stated
 from tribo.records import UNCORRECTED
 
@@ -105,8 +105,7 @@ def write_draft(folder: Path, contents: Mapping[Path, str], raw: Path | None) ->
         shutil.copyfile(source, to)
     folder.mkdir(parents=True, exist_ok=True)
     for path, text in contents.items():
-        with path.open("x", encoding="utf-8", newline="\n") as out:
-            out.write(text)
+        write_new(path, text)
     return (*contents, *copies)
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from tribo.errors import Problem, TriboError
 from tribo.file_contents import bytes_of, found_below, found_in, text_of
+from tribo.store.whole_files import write_text
 
 BUILDS, LATEST, CURRENT = "builds", "latest", "current"
 NOT_COPIED = ("kept",)  # work in progress, not results
@@ -95,7 +96,7 @@ def _copy(current: Path, builds: Path, now: float | None) -> Path:
     try:
         shutil.copytree(current, part, ignore=skipped)
         number = max((_order(copy)[0] for copy in dated(builds)), default=0) + 1
-        (part / NUMBER).write_text(f"{number}\n", encoding="utf-8")
+        write_text(part / NUMBER, f"{number}\n")
         part.rename(builds / name)
     except BaseException:
         shutil.rmtree(part, ignore_errors=True)

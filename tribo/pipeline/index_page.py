@@ -15,11 +15,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
+from types import MappingProxyType
+from typing import Any
 from urllib.parse import quote
 
 from tribo import __version__
 from tribo.escaping import for_spreadsheet
 from tribo.file_contents import bytes_of
+from tribo.pipeline.choose_two import comparable
 from tribo.pipeline.history import CampaignRow, Law, history
 from tribo.pipeline.laws_of_site import answers_of, laws_csv, laws_in_words
 from tribo.pipeline.trend import FEWEST, LEVEL, SHORTEST, Change, change_points
@@ -70,12 +73,14 @@ def write_index(site: Path) -> str:
     rows = history(site)
     changes = change_points({series_name(key): values for key, values in series(rows).items()})
     digest = hashlib.sha256()
-    answers = answers_of(site / "current")
-    texts = {"index.html": page(rows, changes, laws_in_words(answers)), "trend.csv": trend_csv(rows)}
+    current = site / "current"
+    answers = answers_of(current)
+    compared = comparable(current, [row.name for row in reversed(rows) if row.has_report])
+    texts = {"index.html": page(rows, changes, laws_in_words(answers), compared), "trend.csv": trend_csv(rows)}
     if answers:
         texts["laws.csv"] = laws_csv(answers)
     for name, text in texts.items():
-        path = site / "current" / name
+        path = current / name
         if not path.is_file() or bytes_of(path) != text.encode("utf-8"):
             write_text(path, text)
         digest.update(text.encode())
@@ -113,23 +118,27 @@ def key_of(name: str) -> Key:
     return sample, regime, parameter
 
 
-def page(rows: Sequence[CampaignRow], changes: Sequence[Change], laws: Sequence[str] = ()) -> str:
-    """The page as text: the same bytes for the same campaigns."""
-    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+def page(
+    rows: Sequence[CampaignRow],
+    changes: Sequence[Change],
+    laws: Sequence[str] = (),
+    compared: Mapping[str, Any] = MappingProxyType({}),
+) -> str:
+    """The page as text: the same bytes for the same campaigns. ``compared`` is that of :func:`comparable`."""
+    from tribo.report.html.shell import STYLE, WORKING, environment, script_json, style_and_script
 
-    loader = ChoiceLoader([PackageLoader("tribo.pipeline"), PackageLoader("tribo.report.html")])
-    environment = Environment(
-        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+    templates = environment("tribo.pipeline")
     by_sample: dict[str, list[Panel]] = {}
     for key in series(rows):
         by_sample.setdefault(key[0], []).append(panel(key, rows, [c for c in changes if key_of(c.series) == key]))
     longest = max((sum(map(math.isfinite, v)) for v in series(rows).values()), default=0)
-    return environment.get_template("index.html").render(
+    return templates.get_template("index.html").render(
         rows=list(reversed(rows)), states=STATES, verdicts=VERDICTS, link=report_link, panels=by_sample,
         sentences=[change_sentence(c, rows) for c in changes], looked=longest >= FEWEST, fewest=FEWEST,
         shortest=SHORTEST, level=LEVEL, width=WIDTH, height=HEIGHT, left=LEFT, right=RIGHT, top=TOP, bottom=BOTTOM,
-        version=__version__, laws=laws,
+        version=__version__, laws=laws, comparable=set(compared.get("campaigns", ())),
+        compared=script_json(dict(compared)),
+        **style_and_script(templates, [STYLE, "index.css"], [*WORKING, "index.js"]),
     )  # fmt: skip
 
 

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import base64
-import json
 import math
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
 import pandas as pd
 
-from tribo.display import displayed
-from tribo.errors import CampaignError, Problem
-from tribo.file_contents import bytes_of, text_of
+from tribo.file_contents import bytes_of
 from tribo.report.provenance import Provenance, read_record, settle_outputs, write_provenance
+from tribo.report.reported import SHOWN, Fitted, Reported, fitted, read_reported
 from tribo.report.result_tables import to_csv
 from tribo.report.words.numerals import significant
 from tribo.store.whole_files import write_text
@@ -28,54 +24,6 @@ COLUMNS = [
     "difference", "difference_low", "difference_high", "difference_percent", "distinct",
 ]  # fmt: skip
 QUANTITIES = {"mu": ("μ", "1"), "tau0_kPa": ("τ₀", "kPa"), "T_N": ("T", "N")}
-SHOWN = ("finding", "agreement", "fig4", "fig6", "fig7", "fig8", "misfit", "evidence", "dependence")
-READ = ("fits.csv", "tests.csv")
-
-
-@displayed(lambda r: r.title)
-@dataclass(frozen=True)
-class Reported:
-    """A folder of results: its title, card and verdict, the fits and the loads of its tests."""
-
-    folder: Path
-    title: str
-    area_m2: float
-    card: dict[str, Any]
-    verdict: dict[str, Any]
-    fits: pd.DataFrame
-    loads_N: tuple[float, float]
-
-
-def read_reported(folder: Path) -> Reported:
-    """A folder that ``tribo report`` has written.
-
-    Raises
-    ------
-    CampaignError
-        It holds no report, or its tables cannot be read.
-    """
-    import h5py
-
-    try:
-        fits, tests = (pd.read_csv(folder / name, dtype={"sample": str}) for name in READ)
-        with h5py.File(folder / "campaign.nc") as file:
-            title, area = str(file.attrs["title"]), float(np.ravel(file.attrs["nominal_area_m2"])[0])
-        loads = pd.to_numeric(tests["normal_load_N"], errors="coerce")
-        card, verdict = (_json(folder / name) for name in ("card.json", "verdict.json"))
-        fits[["sample", "regime", "mu", "tau0_kPa"]]
-    except (OSError, KeyError, ValueError, RuntimeError) as why:
-        reason = " ".join(str(why).split())[:150]
-        problem = Problem("no_report", f"this is no folder of results of tribo report ({reason})", file=str(folder),
-                          allowed="an output folder with fits.csv, tests.csv and campaign.nc")  # fmt: skip
-        raise CampaignError(problem) from why
-    return Reported(folder, title, area, card, verdict, fits, (float(loads.min()), float(loads.max())))
-
-
-def _json(path: Path) -> dict[str, Any]:
-    if not path.is_file():
-        return {}
-    found = json.loads(text_of(path))
-    return found if isinstance(found, dict) else {}
 
 
 def common_load_N(first: Reported, second: Reported) -> float:
@@ -101,8 +49,9 @@ def differences(first: Reported, second: Reported) -> pd.DataFrame:
 
 
 def _rows(one: dict[Any, Any], other: dict[Any, Any], load_N: float, areas: tuple[float, float]) -> Iterator[Any]:
+    fits = fitted(one), fitted(other)
     for quantity, (_, unit) in QUANTITIES.items():
-        a, b = (_value(fit, quantity, load_N, area) for fit, area in zip((one, other), areas, strict=True))
+        a, b = (_value(fit, quantity, load_N, area) for fit, area in zip(fits, areas, strict=True))
         half = math.hypot(a[1], b[1])
         difference = b[0] - a[0]
         if not (math.isfinite(difference) and math.isfinite(half)):
@@ -114,27 +63,11 @@ def _rows(one: dict[Any, Any], other: dict[Any, Any], load_N: float, areas: tupl
         )  # fmt: skip
 
 
-def _value(fit: dict[Any, Any], quantity: str, load_N: float, area_m2: float) -> tuple[float, float]:
-    """A number of a fit and the half width of its 95 % interval, by the combined uncertainty where it is known."""
-
-    def cell(name: str) -> float:
-        value = fit.get(name)
-        return float(value) if isinstance(value, int | float) else math.nan
-
-    combined = math.isfinite(cell("mu_u_combined"))
-    ends = ("mu_combined_low", "mu_combined_high") if combined else ("mu_low", "mu_high")
-    mu_half = (cell(ends[1]) - cell(ends[0])) / 2
+def _value(fit: Fitted, quantity: str, load_N: float, area_m2: float) -> tuple[float, float]:
+    """A number of a fit and the half width of its 95 % interval."""
     if quantity == "mu":
-        return cell("mu"), mu_half
-    if quantity == "tau0_kPa":
-        ends = ("tau0_combined_low_kPa", "tau0_combined_high_kPa") if combined else ("tau0_low_kPa", "tau0_high_kPa")
-        return cell("tau0_kPa"), (cell(ends[1]) - cell(ends[0])) / 2
-    last = "_combined" if combined else ""
-    mu_u, tau_u, cov = cell(f"mu_u{last}"), cell(f"tau0_u{last}_kPa"), cell(f"cov{last}")
-    per_kPa = 1e3 * area_m2
-    variance = (load_N * mu_u) ** 2 + 2 * load_N * per_kPa * cov + (per_kPa * tau_u) ** 2
-    u = math.sqrt(max(variance, 0.0)) if math.isfinite(variance) else math.nan
-    return cell("mu") * load_N + cell("tau0_kPa") * per_kPa, u * mu_half / mu_u if mu_u > 0 else math.nan
+        return fit.mu, fit.mu_half
+    return (fit.tau0_kPa, fit.tau0_half_kPa) if quantity == "tau0_kPa" else fit.force_N(load_N, area_m2)
 
 
 def sentences(table: pd.DataFrame, load_N: float) -> list[str]:
@@ -178,16 +111,13 @@ def _page(both: tuple[Reported, Reported], table: pd.DataFrame, said: list[str],
 
 def _column(report: Reported, out: Path) -> dict[str, Any]:
     """What the page shows of one report. Its figures are pictures: nothing in them can run."""
-    card, verdict = report.card, report.verdict
-    found = {name: report.folder / "figures" / f"{name}.svg" for name in SHOWN}
-    step = card.get("next_test")
     return {
         "title": report.title,
         "link": quote(Path(os.path.relpath(report.folder / "report.html", out)).as_posix()),
-        "sentence": str(card.get("sentence") or verdict.get("text") or "No diagnosis was made for this report."),
-        "counts": str(card.get("counts") or ""),
-        "next_test": str(step.get("what") or "") if isinstance(step, dict) else "",
-        "figures": {n: base64.b64encode(bytes_of(p)).decode("ascii") for n, p in found.items() if p.is_file()},
+        "sentence": report.sentence(),
+        "counts": report.counts(),
+        "next_test": report.next_test(),
+        "figures": {n: base64.b64encode(bytes_of(p)).decode("ascii") for n, p in report.pictures().items()},
     }
 
 

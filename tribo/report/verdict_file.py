@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tribo.diagnose.sentences import name_in_words, sentence_case
+from tribo.diagnose.sentences import sentence_case
+from tribo.diagnose.terms import name_in_words
 from tribo.figures.covariates import LABELS
 from tribo.report.words.numerals import joined, significant
 from tribo.report.words.verdict_headings import OUTCOMES_WITHOUT_MODEL, headings, without_model
@@ -49,8 +50,8 @@ def verdict_in_words(verdict: Mapping[str, Any]) -> dict[str, Any]:
         "gain": _gain(verdict.get("gain")),
         "next_test": str((verdict.get("next_test") or {}).get("text") or ""),
         "misfits": [_misfit(misfit) for misfit in verdict.get("misfits") or ()],
-        "excluded": [(_named(e["mechanism"]), e["reason"]) for e in verdict.get("excluded") or ()],
-        "not_testable": [(_named(e["mechanism"]), _why(e["reason"])) for e in verdict.get("not_testable") or ()],
+        "excluded": [(name_in_words(e["mechanism"]), e["reason"]) for e in verdict.get("excluded") or ()],
+        "not_testable": [(name_in_words(e["mechanism"]), _why(e["reason"])) for e in verdict.get("not_testable") or ()],
         "corrections": [_correction(x) for x in _layers(verdict, "pattern_correction")],
         "laws": [_law(x) for x in _layers(verdict, "law")],
     }
@@ -96,25 +97,17 @@ def _correction(layer: Mapping[str, Any]) -> tuple[str, str, str, str]:
     return layer["name"], layer["regimes"][0], size, "below 0.001" if p < 0.001 else f"{p:.3f}"
 
 
-def _plain(mechanism: str) -> str:
-    return mechanism.replace("_", " ")
-
-
-def _named(mechanism: str) -> str:
-    """The plain name of a mechanism; of one that the library does not know, the name with spaces."""
-    try:
-        return name_in_words(mechanism)
-    except KeyError:
-        return _plain(mechanism)
+def _plain(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def _tie(names: list[str]) -> str:
-    return f"This campaign cannot distinguish between {joined([_named(n) for n in names])}."
+    return f"This campaign cannot distinguish between {joined([name_in_words(n) for n in names])}."
 
 
 def _cause(cause: Mapping[str, Any]) -> dict[str, Any]:
     weight, text = f"{_number(cause['weight']):.2f}", cause.get("text", "")
-    name = sentence_case(_named(cause["mechanism"]))
+    name = sentence_case(name_in_words(cause["mechanism"]))
     return {"mechanism": name, "weight": weight, "sizes": _sizes(cause), "text": text}
 
 

@@ -124,8 +124,11 @@ def _input_hashes(campaign: Path, recorded: Mapping[str, str]) -> Iterator[tuple
     if campaign.is_file():
         yield from _zipped_hashes(campaign, recorded)
         return
-    root = campaign if (campaign / DESCRIBED_IN[0]).is_file() else _only_campaign_below(campaign)
-    for name in dict.fromkeys((*input_names(root), *recorded)):
+    root, names = campaign, list(recorded)
+    if DESCRIBED_IN[0] in recorded:  # not so of two reports that were compared, whose folder may hold anything
+        root = campaign if (campaign / DESCRIBED_IN[0]).is_file() else _only_campaign_below(campaign)
+        names = list(dict.fromkeys((*input_names(root), *recorded)))
+    for name in names:
         if not leads_out(root, root / name) and (root / name).is_file():
             yield well_formed(name), file_hash(root / name)
 

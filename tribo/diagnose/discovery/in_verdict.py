@@ -1,4 +1,4 @@
-"""Laws as a step of a diagnosis: where a misfit is left that no mechanism explains, its law is searched and added."""
+"""Laws as a step of a diagnosis: laws of what its causes leave are searched and added."""
 
 from __future__ import annotations
 
@@ -10,16 +10,19 @@ import numpy as np
 from tribo.diagnose.diagnosis_record import Diagnosis
 from tribo.diagnose.discovery.contested import without_wrong_forms
 from tribo.diagnose.discovery.known_laws import KnownLaw, Tested, try_laws
-from tribo.diagnose.discovery.law_words import law_layers, laws_text
+from tribo.diagnose.discovery.law_words import law_layers, law_misfit, laws_text
 from tribo.diagnose.discovery.parting import parting_test
 from tribo.diagnose.discovery.search import Discovery, Progress, discover_laws
 from tribo.diagnose.layers import pattern_layers
+from tribo.diagnose.next_test import first_test_of
 from tribo.diagnose.search.screen import Screen, screen_left
 from tribo.diagnose.sentences import summary
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.verdict import CERTAIN_CAUSES, Excluded, Layer, Outcome, Verdict
 
 REPLICATES_LEFT = 60
+WITHOUT_MISFIT = 0.1  # of the level, where the diagnosis left no misfit and so did not ask for a law
+AS_MISFIT: dict[Outcome, Outcome] = {"no_misfit": "unknown", "named": "partly"}  # once a law shows a misfit
 
 
 def with_laws(
@@ -32,24 +35,21 @@ def with_laws(
 ) -> Diagnosis:
     """The same diagnosis with laws as further layers: those ``known`` that hold, and those of what is left.
 
-    A cause that loses against a law of its own column is no longer a cause. Where nothing is left, nothing is searched.
+    A cause that loses against a law of its own column is no longer a cause. Where no misfit is left, a law has to be
+    beyond chance at a tenth of the level: a law of one sample, say, that no look at the whole campaign can show.
     """
     rng = np.random.default_rng(seed)
     model, lost = uncontested(d)
     tested = try_laws(model, known, rng)
     d = replace(d, verdict=with_tested(d.verdict, tested))
-    searched = _is_left(d, level)
-    if not (lost or searched or tested.layers):
-        return d
-    found = Discovery((), (), 0)
-    if lost or searched:
-        found = discover_laws(tested.model, level=level, rng=rng, progress=progress, without=tested.columns)
+    strict = level_of_laws(d, lost, level)
+    found = discover_laws(tested.model, level=strict, rng=rng, progress=progress, without=tested.columns)
     if not found.laws and not tested.layers:
         return replace(d, laws=found)
     model = found.laws[-1].model if found.laws else tested.model
     allowed = len(tested.model.acting) if found.laws else 0
     left = screen_left(model, replicates=REPLICATES_LEFT, rng=rng, progress=progress, allowed=allowed)
-    verdict = without_causes(d.verdict, lost if found.laws else {})
+    verdict = with_misfits(without_causes(d.verdict, lost if found.laws else {}), found)
     return replace(d, laws=found, verdict=_extended(verdict, (tested, found), model, (left, level)))
 
 
@@ -80,11 +80,25 @@ def uncontested(d: Diagnosis) -> tuple[ModelFit, dict[str, float]]:
     return without_wrong_forms(model) if model.acting else (model, {})
 
 
-def _is_left(d: Diagnosis, level: float) -> bool:
-    """Whether a misfit is left that no mechanism explains."""
-    if d.named is None:
-        return False
-    return not d.named.causes or bool(d.named.remainders) or d.named.p_left < level
+def level_of_laws(d: Diagnosis, lost: Mapping[str, float], level: float) -> float:
+    """The level at which a law is written: a tenth where the diagnosis left no misfit that no mechanism explains.
+
+    ``lost`` are causes that lost against a law of their own column; without them a misfit is left.
+    """
+    named = d.named
+    left = named is not None and (not named.causes or bool(named.remainders) or named.p_left < level)
+    return level if left or lost else WITHOUT_MISFIT * level
+
+
+def with_misfits(v: Verdict, found: Discovery) -> Verdict:
+    """The verdict with the laws found as its misfits, where it had none beside its causes."""
+    outcome = AS_MISFIT.get(v.verdict)
+    if outcome is None or not found.laws:
+        return v
+    misfits = tuple(law_misfit(f) for f in found.laws)
+    next_test = v.next_test if v.equivalent else first_test_of(misfits[0].covariate)
+    text = summary(outcome, v.causes, v.equivalent, misfits, dict(v.smallest_effects))
+    return replace(v, verdict=outcome, misfits=(*v.misfits, *misfits), next_test=next_test, text=text)
 
 
 def without_causes(v: Verdict, lost: Mapping[str, float]) -> Verdict:
@@ -121,7 +135,7 @@ def _extended(
     if ties and not v.equivalent:
         next_test = parting_test(*ties[0], model.setup.observations.conditions)
     layers = (*pattern_layers(model), *kept, *tested.layers, *law_layers(found), *remainders)
-    said = [v.text, laws_text(found), rest] if found.laws or v.verdict != "no_misfit" else [v.text]
+    said = [v.text, laws_text(found, v.text), rest] if found.laws or v.verdict != "no_misfit" else [v.text]
     return replace(v, layers=layers, next_test=next_test, text=" ".join(filter(None, said)))
 
 

@@ -22,7 +22,7 @@ from tribo.diagnose.discovery.written_law import (
 from tribo.diagnose.sentences import p_text
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.terms import in_words
-from tribo.diagnose.verdict import Estimate, Layer
+from tribo.diagnose.verdict import Estimate, Layer, Misfit
 from tribo.records import REGIMES
 
 NAMED = 3  # tied laws that are written out in a sentence
@@ -104,9 +104,17 @@ def discovery_text(d: Discovery) -> str:
     return f"{laws_text(d)} {d.searched} laws were tried."
 
 
-def laws_text(d: Discovery) -> str:
-    """The laws, each with those that the design cannot distinguish from it."""
-    return " ".join(f"{law_sentence(f)}{_tied(f.ties)}" for f in d.laws)
+def laws_text(d: Discovery, said: str = "") -> str:
+    """The laws that are not ``said`` already, each with those that the design cannot distinguish from it."""
+    each = [("" if law_sentence(f) in said else law_sentence(f)) + _tied(f.ties) for f in d.laws]
+    return " ".join(filter(None, map(str.strip, each)))
+
+
+def law_misfit(f: FoundLaw) -> Misfit:
+    """A law as the misfit that it describes, for where nothing else showed one."""
+    value, low, high = f.effect_percent
+    sample = f.law.where.removeprefix("sample ") if f.law.where.startswith("sample ") else ""
+    return Misfit(f.law.regime, sample, " and ".join(f.law.columns), value, f.p, law_sentence(f), low, high)
 
 
 def _tied(ties: Sequence[WrittenLaw]) -> str:

@@ -9,13 +9,11 @@ import numpy as np
 from tribo.diagnose.diagnosis import examine
 from tribo.diagnose.diagnosis_record import Diagnosis
 from tribo.diagnose.discovery.held import Held, holds
-from tribo.diagnose.discovery.in_verdict import uncontested
+from tribo.diagnose.discovery.in_verdict import level_of_laws, uncontested
 from tribo.diagnose.discovery.search import Discovery, Progress, discover_laws
 from tribo.diagnose.discovery.written_law import WrittenLaw
 from tribo.diagnose.verdict import Estimate
 from tribo.records import Ingested
-
-WITHOUT_MISFIT = 0.1  # of the level: the diagnosis did not ask for a law
 
 
 def discover_in(
@@ -29,10 +27,11 @@ def discover_in(
 def searched_laws(d: Diagnosis, *, seed: int = 0, level: float = 0.01, progress: Progress | None = None) -> Discovery:
     """The laws of what the causes of a diagnosis leave unexplained.
 
-    Where it found no misfit, a law has to be beyond chance at a tenth of the level.
+    Where they leave no misfit, a law has to be beyond chance at a tenth of the level.
     """
-    strict = level if d.named is not None else WITHOUT_MISFIT * level
-    return discover_laws(uncontested(d)[0], level=strict, rng=np.random.default_rng(seed), progress=progress)
+    model, lost = uncontested(d)
+    strict = level_of_laws(d, lost, level)
+    return discover_laws(model, level=strict, rng=np.random.default_rng(seed), progress=progress)
 
 
 def hold_law_against(

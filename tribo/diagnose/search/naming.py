@@ -55,7 +55,7 @@ class Named:
     left: Screen
     p_left: float
     remainders: tuple[Remainder, ...] = ()
-    wrong_in_form: frozenset[str] = frozenset()
+    wrong_in_form: tuple[str, ...] = ()
 
 
 @displayed()
@@ -107,9 +107,8 @@ def name_causes(start: StartEffects, first: Screen, rules: Rules) -> Named:
         seen = _screen_left(settled.model, rules)
     model = _without_remainders(settled, start.model.setup)
     left_p = float(seen.p.min())
-    return Named(
-        model, settled.causes, settled.rivals, weighed, seen, left_p, settled.remainders, settled.wrong_in_form
-    )
+    wrong = tuple(sorted(settled.wrong_in_form))
+    return Named(model, settled.causes, settled.rivals, weighed, seen, left_p, settled.remainders, wrong)
 
 
 def _screen_left(model: ModelFit, rules: Rules) -> Screen:

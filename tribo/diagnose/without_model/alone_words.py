@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tribo.diagnose.sentences import name_in_words, p_text, sentence_case
-from tribo.diagnose.terms import in_words
+from tribo.diagnose.sentences import p_text, sentence_case
+from tribo.diagnose.terms import in_words, name_in_words
 from tribo.diagnose.verdict import Cause, Excluded, Layer, NextTest
 from tribo.diagnose.without_model.along_records import RunningIn
 from tribo.diagnose.without_model.column_search import Follows, Searched
@@ -102,7 +102,7 @@ def summary(
     said = laws[:_MOST_SAID]
     said += [f"The laws of {len(laws) - _MOST_SAID} more are listed below."] if len(laws) > _MOST_SAID else []
     if causes:
-        names = list(dict.fromkeys(cause_in_words(c.mechanism) for c in causes))
+        names = list(dict.fromkeys(name_in_words(c.mechanism) for c in causes))
         said.append(f"Found beside the law of each sample: {'; '.join(names)}.")
         said += [c.text for c in causes]
     elif found:
@@ -112,12 +112,6 @@ def summary(
     said += [too_few] if too_few else []
     said += [e.reason for e in inseparable]
     return " ".join(said)
-
-
-def cause_in_words(mechanism: str) -> str:
-    """A cause as it stands in a list: a mechanism of the library, or the column that friction follows."""
-    _, _, column = mechanism.partition(":")
-    return f"a dependence on {in_words(column)}" if column else name_in_words(mechanism)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 import math
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -15,6 +14,7 @@ from tribo.figures.thinning import thin_trace
 from tribo.records import FloatArray, Pull, Study, Trace
 from tribo.report.html.hover import Series
 from tribo.report.html.pull_cards import doubted_s, reading
+from tribo.report.html.shell import script_json
 
 TRACE_BYTES = 2_000_000  # all traces together
 FULL_SCALE = 65535
@@ -24,7 +24,7 @@ def trace_data(study: Study, test_ids: Iterable[str]) -> Markup:
     """JSON by test id of the thinned traces and the readings, for a script element of its own."""
     wanted = list(test_ids)
     points = int(np.clip(TRACE_BYTES / (5.4 * max(len(wanted), 1)), 100, 1000))
-    return _script_json({test_id: _pull_record(study, test_id, points) for test_id in wanted})
+    return script_json({test_id: _pull_record(study, test_id, points) for test_id in wanted})
 
 
 def _pull_record(study: Study, test_id: str, points: int) -> dict[str, Any]:
@@ -73,7 +73,7 @@ def _short(value: float) -> float | None:
 
 def figure_data(series: Mapping[str, Iterable[Series]]) -> Markup:
     """JSON by figure name of the points someone may hover over: place on the page in points, and values."""
-    return _script_json(
+    return script_json(
         {
             name: [
                 {
@@ -88,9 +88,3 @@ def figure_data(series: Mapping[str, Iterable[Series]]) -> Markup:
             for name, found in series.items()
         }
     )
-
-
-def _script_json(record: object) -> Markup:
-    """JSON that cannot end its script element, whatever names a campaign uses."""
-    text = json.dumps(record, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-    return Markup(text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029"))

@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from hashlib import sha256
-from importlib.resources import files
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from tribo import __version__
-from tribo.figures.catalogue import DIAGNOSIS_FIGURES, FIGURES, FRICTION_FIGURES
-from tribo.figures.record import FigureOf
+from tribo.figures.catalogue import TITLES
 from tribo.records import Study
 from tribo.report.content import content, figure_numbers, figure_places
 from tribo.report.drawings import Drawn, draw_all, inline_svg
 from tribo.report.html.embedded import figure_data, trace_data
 from tribo.report.html.pull_cards import PullCard, on_pages
+from tribo.report.html.shell import STYLE, WORKING, environment, style_and_script
 from tribo.report.provenance import Provenance
-from tribo.report.words.numerals import ratio_text, significant, unbroken
 from tribo.report.words.wording import flags_in_words
 
 PAGE = "report.html"
-SCRIPTS = ("helpers.js", "reading.js", "pulls.js")  # joined in this order, in one function
 
 
 def html(
@@ -59,7 +53,7 @@ def pages_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str,
         shown = figures if number == 1 else {}
         parts = {"lead": places["lead"], "figures": places["figures"], "diagnosis_figures": places}
         pages[name] = (
-            _environment()
+            environment()
             .get_template("report.html" if number == 1 else "further_pulls.html")
             .render(
                 **{**said, "cards": cards},
@@ -71,7 +65,7 @@ def pages_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str,
                 report_key=_key(said),
                 figure_data=figure_data({n: figure.series for n, figure in shown.items()}),
                 trace_data=trace_data(said["study"], [card.test_id for card in cards]),
-                **_style_and_script(),
+                **style_and_script(environment(), [STYLE], [*WORKING, "pulls.js"]),
             )
         )
     return pages
@@ -79,13 +73,11 @@ def pages_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str,
 
 def compared_page(columns: Sequence[Any], rows: Sequence[Any], said: Sequence[str], shown: Sequence[str]) -> str:
     """compare.html: two reports side by side, as :mod:`tribo.report.reports_compared` found them."""
-    tables: tuple[Mapping[str, FigureOf[Any]], ...] = (FIGURES, FRICTION_FIGURES, DIAGNOSIS_FIGURES)
-    titles = {name: figure.title for table in tables for name, figure in table.items()}
     return (
-        _environment()
+        environment()
         .get_template("compared.html")
-        .render(columns=columns, rows=rows, said=said, shown=shown, titles=titles, version=__version__,
-                **_style_and_script(SCRIPTS[:2]))
+        .render(columns=columns, rows=rows, said=said, shown=shown, titles=TITLES, version=__version__,
+                **style_and_script(environment(), [STYLE], WORKING))
     )  # fmt: skip
 
 
@@ -94,24 +86,6 @@ def _key(said: Mapping[str, Any]) -> str:
     campaign = said["campaign"]
     told = [campaign.title, *sorted(campaign.inputs.values()), *sorted(card.test_id for card in said["cards"])]
     return sha256("\0".join(told).encode("utf-8", errors="backslashreplace")).hexdigest()[:16]
-
-
-def _style_and_script(scripts: Sequence[str] = SCRIPTS) -> dict[str, str]:
-    style = _static("style.css")
-    script = '"use strict";\n(() => {\n' + "".join(_static(name) for name in scripts) + "})();\n"
-    return {
-        "style": Markup(style), "style_hash": _csp_hash(style), "script": Markup(script),
-        "script_hash": _csp_hash(script),
-    }  # fmt: skip
-
-
-def _static(name: str) -> str:
-    return (files("tribo.report.html") / "templates" / name).read_text(encoding="utf-8")
-
-
-def _csp_hash(text: str) -> str:
-    """The source expression by which the page allows exactly this style or script and no other."""
-    return "sha256-" + base64.b64encode(sha256(text.encode("utf-8")).digest()).decode("ascii")
 
 
 def _filters(cards: list[PullCard]) -> list[tuple[str, str, list[tuple[str, str]]]]:
@@ -127,22 +101,6 @@ def _filters(cards: list[PullCard]) -> list[tuple[str, str, list[tuple[str, str]
         ("flags", "Flag", [(flag, flags_in_words([flag])) for flag in flags]),
         ("state", "State", [("used", "used"), ("moved", "moved by hand"), ("excluded", "excluded by hand")]),
     ]
-
-
-@lru_cache(maxsize=1)
-def _environment() -> Environment:
-    environment = Environment(
-        loader=PackageLoader("tribo.report.html"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters["sig"] = significant
-    environment.filters["ratio"] = ratio_text
-    environment.filters["unbroken"] = unbroken
-    return environment
 
 
 @dataclass(frozen=True)

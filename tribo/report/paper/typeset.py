@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from datetime import datetime
 from typing import Any
 
+from tribo.store.whole_files import write_bytes, write_text
 from tribo.temporary import temporary_folder
 
 PNG_DPI = 300.0
@@ -22,8 +23,8 @@ def figure_files(svg: bytes, title: str, origin: str) -> dict[str, bytes]:
     import typst
 
     with temporary_folder() as folder:
-        (folder / "figure.svg").write_bytes(svg)
-        (folder / "page.typ").write_text(FIGURE_PAGE, encoding="utf-8")
+        write_bytes(folder / "figure.svg", svg)
+        write_text(folder / "page.typ", FIGURE_PAGE)
         compiler: Any = typst.Compiler(root=folder, ignore_system_fonts=True)
         inputs = {"title": title, "origin": origin}
         pdf = compiler.compile(folder / "page.typ", format="pdf", sys_inputs=inputs)
@@ -37,8 +38,8 @@ def document(source: str, files: Mapping[str, bytes], made_at: datetime | None) 
 
     with temporary_folder() as folder:
         for name, content in files.items():
-            (folder / name).write_bytes(content)
-        (folder / "document.typ").write_text(source, encoding="utf-8")
+            write_bytes(folder / name, content)
+        write_text(folder / "document.typ", source)
         compiler: Any = typst.Compiler(root=folder, ignore_system_fonts=True)
         return bytes(compiler.compile(folder / "document.typ", format="pdf", timestamp=made_at))
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from tribo.comparison import findings, study_lookup
-from tribo.diagnose.sentences import meaning_in_words, name_in_words as plain_name, sentence_case
-from tribo.diagnose.terms import in_words
+from tribo.diagnose.sentences import meaning_in_words, sentence_case
+from tribo.diagnose.terms import in_words, name_in_words
 from tribo.records import Study
 from tribo.report.words.numerals import counted, joined, significant
 from tribo.report.words.verdict_headings import without_model
@@ -19,14 +19,6 @@ OBSERVABLES = {
     "zero": "the force before contact",
 }  # fmt: skip
 MOST_SAMPLES = 3
-
-
-def name_in_words(name: str) -> str:
-    """The plain name of a mechanism; a law, which has none, by its formula."""
-    try:
-        return plain_name(name)
-    except KeyError:
-        return name
 
 
 def sentence(study: Study, verdict: Mapping[str, Any] | None) -> str:

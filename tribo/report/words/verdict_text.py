@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tribo.diagnose.plan import Finding, Plan
+from tribo.diagnose.plan import Plan
+from tribo.diagnose.terms import name_in_words
 from tribo.diagnose.verdict import Verdict
 from tribo.report.verdict_file import verdict_in_words
 
@@ -24,13 +25,11 @@ def plan_text(plan: Plan) -> str:
     shown = [f for f in plan.findings if not f.why]
     lines = [f"{plan.n_tests} planned tests. Smallest effects detected with 90 % probability, easiest first:"]
     for f in shown:
-        size = f"{f.amplitude:.3g} {f.unit}".rstrip()
-        names = ", ".join(name.replace("_", " ") for name in f.confused_with)
+        name, size = name_in_words(f.mechanism), f"{f.amplitude:.3g} {f.unit}".rstrip()
+        names = ", ".join(name_in_words(name) for name in f.confused_with)
         tie = f"; not distinguishable from {names}; to separate them: {f.separates}" if names else ""
-        lines.append(f"  {_name(f)}: {size} or more (changes T by {f.effect_percent:.0f} % over the design){tie}")
-    lines += [f"  {_name(f)}: not detectable with this design ({f.why})" for f in plan.findings if f.why]
+        lines.append(f"  {name}: {size} or more (changes T by {f.effect_percent:.0f} % over the design){tie}")
+    lines += [
+        f"  {name_in_words(f.mechanism)}: not detectable with this design ({f.why})" for f in plan.findings if f.why
+    ]
     return "\n".join(lines)
-
-
-def _name(finding: Finding) -> str:
-    return finding.mechanism.replace("_", " ")
