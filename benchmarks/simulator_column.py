@@ -4,12 +4,14 @@
     python benchmarks/simulator_column.py entries STORE docs/data   # table2-column.csv, table2-column-laws.csv
     python benchmarks/simulator_column.py angles STORE docs/data    # table2-angles.csv
     python benchmarks/simulator_column.py steps STORE docs/data     # table2-steps.csv
+    python benchmarks/simulator_column.py peaks STORE docs/data C Sx Sy    # table2-peaks.csv
     python benchmarks/simulator_column.py claims STORE docs/data    # table2-claims.csv
 
 ``entries`` compares the mean of every sample at every load with T/N of the printed law. ``angles`` pulls samples at ten
 angles and says how far that moves the means (four minutes). ``steps`` repeats runs of the column at the step of the
-paper, 1e-8 s, at three loads (ten minutes, five runs each); it goes on where it was stopped. ``claims`` holds what
-the text and the captions of Figures 5 to 8 say, and what is exact in the model, against the column (a minute).
+paper, 1e-8 s, at three loads (ten minutes, three runs each); it goes on where it was stopped. ``peaks`` does so for
+static friction alone, with all twenty runs (five minutes for three samples). ``claims`` holds what the text and the
+captions of Figures 5 to 8 say, and what is exact in the model, against the column (a minute).
 """
 
 from __future__ import annotations
@@ -124,26 +126,48 @@ def steps(store: str, out: str, repeats: str = "4") -> None:
     path = Path(out) / "table2-steps.csv"
     rows = pd.read_csv(path).to_dict("records") if path.exists() else []
     done = {(r["sample"], r["pressure_kPa"], r["repeat"]) for r in rows}
+    for config, coarse, repeat in pairs(store, int(repeats)):
+        key = (config.sample, config.pressure_Pa / 1e3, repeat)
+        if key in done:
+            continue
+        fine = simulate(config.with_(dt_s=FINE_S))
+        row: Row = dict(zip(("sample", "pressure_kPa", "repeat"), key, strict=True))
+        for regime in REGIMES:
+            here, there = coarse[f"{regime}_friction"], getattr(fine, f"{regime}_friction")
+            row |= {f"{regime}_fine": there, f"{regime}_difference_percent": 100.0 * (here / there - 1.0)}
+        rows.append(row)
+        pd.DataFrame(rows).to_csv(path, index=False, float_format="%.6g")
+    found = pd.DataFrame(rows).groupby("sample", sort=False)[[f"{r}_difference_percent" for r in REGIMES]]
+    print(found.agg(["size", "mean", "sem", "std"]).round(3).to_string())
+
+
+def peaks(store: str, out: str, *samples: str) -> None:
+    """Static friction of all runs at three loads, with both steps up to 1.2 times the peak time of the column."""
+    rows = []
+    for config, coarse, repeat in pairs(store):
+        if config.sample in (samples or SAMPLES):
+            short_run = config.with_(duration_s=1.2 * coarse["peak_s"], window_start_peaks=1.0)
+            here, there = (simulate(short_run.with_(dt_s=dt)).static_friction for dt in (config.dt_s, FINE_S))
+            of = {"sample": config.sample, "pressure_kPa": config.pressure_Pa / 1e3, "repeat": repeat}
+            rows.append(of | {"static_fine": there, "static_difference_percent": 100.0 * (here / there - 1.0)})
+    table = pd.DataFrame(rows)
+    table.to_csv(Path(out) / "table2-peaks.csv", index=False, float_format="%.6g")
+    for by in ("sample", ["sample", "pressure_kPa"]):
+        grouped = table.groupby(by, sort=False)["static_difference_percent"]
+        print(grouped.agg(["size", "mean", "sem"]).round(3).to_string())
+
+
+def pairs(store: str, repeats: int | None = None) -> Iterator[tuple[SimConfig, pd.Series, int]]:
+    """The runs of the column at three loads, the first of every entry first: configuration, stored row, number."""
     runs = read_stored(store)
     per_load = len(runs) // (len(SAMPLES) * len(PRESSURES_PA))
     design = table2_design(READING, per_load, angles="nominal")
-    for repeat in range(int(repeats)):
+    for repeat in range(per_load if repeats is None else repeats):
         for k in range(repeat, len(design), per_load):
-            config, coarse = design[k], runs.iloc[k]
-            key = (config.sample, config.pressure_Pa / 1e3, repeat)
-            if key in done or config.pressure_Pa not in SOME_PRESSURES_PA:
-                continue
-            if config.seed != coarse["seed"]:
+            if design[k].seed != runs.iloc[k]["seed"]:
                 raise SystemExit(f"{store} holds another design")
-            fine = simulate(config.with_(dt_s=FINE_S))
-            row: Row = dict(zip(("sample", "pressure_kPa", "repeat"), key, strict=True))
-            for regime in REGIMES:
-                here, there = coarse[f"{regime}_friction"], getattr(fine, f"{regime}_friction")
-                row |= {f"{regime}_fine": there, f"{regime}_difference_percent": 100.0 * (here / there - 1.0)}
-            rows.append(row)
-            pd.DataFrame(rows).to_csv(path, index=False, float_format="%.6g")
-    found = pd.DataFrame(rows).groupby("sample", sort=False)[[f"{r}_difference_percent" for r in REGIMES]]
-    print(found.agg(["size", "mean", "sem", "std"]).round(3).to_string())
+            if design[k].pressure_Pa in SOME_PRESSURES_PA:
+                yield design[k], runs.iloc[k], repeat
 
 
 def claims(store: str, out: str) -> None:
@@ -286,7 +310,9 @@ def weakest(config: SimConfig) -> float:
     return float(thresholds.static_N.min()) / (config.pressure_Pa * config.spacing_m**2)
 
 
-COMMANDS: dict[str, Callable[..., None]] = {"entries": entries, "angles": angles, "steps": steps, "claims": claims}
+COMMANDS: dict[str, Callable[..., None]] = {
+    "entries": entries, "angles": angles, "steps": steps, "peaks": peaks, "claims": claims,
+}  # fmt: skip
 
 if __name__ == "__main__":
     COMMANDS[sys.argv[1]](*sys.argv[2:])
