@@ -6,6 +6,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from tribo.figures import style
 
@@ -127,6 +128,8 @@ def _spread(ax: Axes, values: pd.Series) -> None:
     if _over_a_decade(values):
         ax.set_xscale("log")
         style.plain_log_axis(ax.xaxis, values)
+    else:
+        ax.xaxis.set_major_locator(MaxNLocator(5))
 
 
 def _sentence(label: str) -> str:
