@@ -16,15 +16,14 @@ from __future__ import annotations
 
 import argparse
 import json
-import time
-from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from blind_cases import ALL_OR_NOTHING, UNSEEN, Case, Plan, answer, cases, design_for, is_seen
 from blind_tables import tables
+from run_lines import read_rows, work_off
 
 import numpy as np  # after blind_cases, which says how many threads it may use  # isort: skip
 from blind.tribometer import EFFECTS, LARGEST  # isort: skip
@@ -57,39 +56,16 @@ def half_of(name: str, errors: Mapping[str, float]) -> dict[str, Any]:
     return {"effect": name, "half": float(f"{np.exp(settled.mean()):.4g}"), "trials": trials}
 
 
-def read_rows(path: Path) -> list[dict[str, Any]]:
-    """The lines of a run; one cut short by a kill is left out."""
-    rows = []
-    for line in path.read_text().splitlines() if path.exists() else ():
-        try:
-            rows.append(json.loads(line))
-        except json.JSONDecodeError:
-            continue
-    return rows
-
-
-def work_off(todo: Iterable[Any], work: Callable[[Any], dict[str, Any]], path: Path, jobs: int) -> None:
-    """Append a line for each piece of work as it ends, and say how long the rest will take."""
-    todo, begin = list(todo), time.monotonic()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if path.exists() and not path.read_bytes().endswith(b"\n"):
-        path.write_bytes(path.read_bytes() + b"\n")
-    with ProcessPoolExecutor(jobs) as pool, path.open("a") as file:
-        waiting = [pool.submit(work, piece) for piece in todo]
-        for done, future in enumerate(as_completed(waiting), start=1):
-            row = future.result()
-            file.write(json.dumps(row) + "\n")
-            file.flush()
-            left = (time.monotonic() - begin) / done * (len(todo) - done)
-            what = row.get("half") or f"{row['verdict']} {row['causes']}"
-            name = row.get("cell") or row["effect"]
-            print(f"{done}/{len(todo)}, {left / 60:.0f} min left: {name}: {what}", flush=True)
+def in_a_line(row: Mapping[str, Any]) -> str:
+    """What a row says, for the progress of a run."""
+    what = row.get("half") or f"{row['verdict']} {row['causes']}"
+    return f"{row.get('cell') or row['effect']}: {what}"
 
 
 def find_half(path: Path, errors: Mapping[str, float], jobs: int) -> None:
     known = {row["effect"] for row in read_rows(path)}
     rest = [n for n in EFFECTS if n not in known and n not in UNSEEN + ALL_OR_NOTHING]
-    work_off(rest, partial(half_of, errors=errors), path, jobs)
+    work_off(rest, partial(half_of, errors=errors), path, jobs, in_a_line)
 
 
 def planned(options: argparse.Namespace) -> list[Case]:
@@ -105,7 +81,7 @@ def run(todo: list[Case], path: Path, jobs: int) -> None:
     known = {(row["cell"], row["seed"]) for row in read_rows(path)}
     rest = [case for case in todo if (case.cell, case.seed) not in known]
     print(f"{len(todo)} campaigns, {len(todo) - len(rest)} of them done", flush=True)
-    work_off(rest, answer, path, jobs)
+    work_off(rest, answer, path, jobs, in_a_line)
 
 
 def put_on_page(rows: list[dict[str, Any]], todo: list[Case], options: argparse.Namespace) -> None:

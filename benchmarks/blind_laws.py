@@ -11,16 +11,15 @@ and one judges. Forces are handed over as a perfect reader would read them.
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from blind_cases import seed_of
 from blind_laws_tables import tables
+from run_lines import read_rows, work_off
 
 import numpy as np  # after blind_cases, which says how many threads it may use  # isort: skip
 from blind.hidden_laws import FORMS, Hidden, as_ingested, hide_law  # isort: skip
@@ -81,7 +80,7 @@ def _one(piece: Piece) -> dict[str, Any]:
     found = searched_laws(d, seed=piece.seed)
     row: dict[str, Any] = {
         "verdict": d.verdict.verdict, "causes": [c.mechanism for c in d.verdict.causes],
-        "laws": len(found.laws), "in_diagnosis": len(found.laws) > 0 and d.verdict.verdict != "no_misfit",
+        "laws": len(found.laws),
     }  # fmt: skip
     if not piece.form or not found.laws:
         return row
@@ -172,33 +171,12 @@ def _pair(piece: Piece) -> dict[str, Any]:
     return {"answer": held.answer, "second": piece.second, "text": held.text, "verdict": d.verdict.verdict}
 
 
-def read_rows(path: Path) -> list[dict[str, Any]]:
-    """The lines of a run; one cut short by a kill is left out."""
-    rows = []
-    for line in path.read_text().splitlines() if path.exists() else ():
-        try:
-            rows.append(json.loads(line))
-        except json.JSONDecodeError:
-            continue
-    return rows
-
-
 def run(todo: list[Piece], path: Path, jobs: int) -> None:
     """Append a line for each campaign as it ends; campaigns that the file holds are left out."""
     known = {(row["cell"], row["form"], row["seed"]) for row in read_rows(path)}
     rest = [p for p in todo if (p.cell, p.form, p.seed) not in known]
     print(f"{len(todo)} campaigns, {len(todo) - len(rest)} of them done", flush=True)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if path.exists() and not path.read_bytes().endswith(b"\n"):
-        path.write_bytes(path.read_bytes() + b"\n")
-    begin = time.monotonic()
-    with ProcessPoolExecutor(jobs) as pool, path.open("a") as file:
-        for done, future in enumerate(as_completed([pool.submit(work, p) for p in rest]), start=1):
-            row = future.result()
-            file.write(json.dumps(row) + "\n")
-            file.flush()
-            left = (time.monotonic() - begin) / done * (len(rest) - done) / 60
-            print(f"{done}/{len(rest)}, {left:.0f} min left: {row['cell']}, {row['form']}", flush=True)
+    work_off(rest, work, path, jobs, lambda row: f"{row['cell']}, {row['form']}")
 
 
 def main() -> None:

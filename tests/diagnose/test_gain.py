@@ -109,3 +109,20 @@ def test_the_gain_of_a_drift_is_that_of_a_line_over_a_load_cell_at_zero() -> Non
     assert found.held_out == "specimens"
     one = o.take(specimen == specimen[0])
     assert gain_of_zero(one, False, np.random.default_rng(0)) is None
+
+
+def test_of_tests_that_a_cause_can_say_nothing_about_it_says_what_the_model_says_without_it() -> None:
+    """The temperature varies on one specimen alone: without it, nothing is known of its effect."""
+    f = baseline(made(lambda s: np.zeros((s.observations.n, 2)), 1, FLAT))
+    c = f.setup.observations.conditions
+    own = c.specimen == c.specimen[0]
+    warm = np.where(own & (c.normal_load_N > np.median(c.normal_load_N)), 30.0, 20.0)
+    observations = replace(f.setup.observations, conditions=replace(c, temperature_C=warm))
+    setup = replace(f.setup, observations=observations)
+    before = fit(setup, (), start=f)
+    after = fit(setup, (Acting(MECHANISMS["temperature"]),), start=before)
+    found, same = gain(before, after, np.random.default_rng(0)), gain(before, before, np.random.default_rng(0))
+    assert found is not None
+    assert same is not None
+    assert found.difference == pytest.approx(0.0, abs=0.05)
+    assert found.rmse_percent_before == pytest.approx(same.rmse_percent_after)

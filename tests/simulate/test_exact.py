@@ -10,6 +10,7 @@ from tribo.simulate import SimConfig, simulate
 from tribo.simulate.calibration import expected_minimum
 from tribo.simulate.config import PAPER
 from tribo.simulate.engines.fast import Thresholds, drive_of, first_failure_s, lattice_of, run_fast, thresholds_of
+from tribo.simulate.readings import READINGS
 
 SHORT = {"blocks": (31, 31), "duration_peaks": 1.3}
 
@@ -75,9 +76,10 @@ def test_moving_blocks_alone_give_what_all_blocks_give(sample: str, angle_deg: f
     assert np.abs(fast.force_N - dense.force_N).max() < 1e-6 * dense.force_N.max()
 
 
-def test_jump_stops_at_the_first_failure():
+@pytest.mark.parametrize("reading", list(READINGS))
+def test_jump_stops_at_the_first_failure(reading: str):
     """At the computed time one block is at its threshold and all others below theirs, cavities condensed."""
-    config = SimConfig(sample="C", angle_deg=33.0, seed=4)
+    config = SimConfig(sample="C", angle_deg=33.0, seed=4).of_reading(reading)
     lattice = lattice_of(config)
     thresholds, drive = thresholds_of(config, lattice), drive_of(config, lattice)
     t = first_failure_s(lattice, thresholds, drive, config.stiffness_N_m)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -49,6 +51,22 @@ def test_a_start_marks_its_directory_as_used(tmp_path: Path, monkeypatch: pytest
     os.utime(folder, (long_ago, long_ago))
     assert fresh() == folder
     assert time.time() - folder.stat().st_mtime < 3600
+
+
+def test_garbage_is_collected_again_after_a_first_call_that_fails():
+    """Collection is off while a function without compiled code runs, and on afterwards; else it stays on."""
+    seen = []
+
+    def failing(signatures: list[str]) -> None:
+        with jit.uncollected(SimpleNamespace(signatures=signatures)):  # type: ignore[arg-type]
+            seen.append(gc.isenabled())
+            raise KeyError
+
+    for signatures in ([], ["compiled"]):
+        with pytest.raises(KeyError):
+            failing(signatures)
+        assert gc.isenabled()
+    assert seen == [False, True]
 
 
 RUN = """

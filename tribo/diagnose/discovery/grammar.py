@@ -74,7 +74,7 @@ def shapes_of(c: Conditions, without: Collection[str] = ()) -> list[tuple[tuple[
     monotone: dict[str, list[Shape]] = {}
     for name, values in columns.items():
         each = list(_of_column(name, values[np.isfinite(values)]))
-        monotone[name] = [s for s in each if s.kind in ("linear", "log")]
+        monotone[name] = [replace(s, place=float("nan")) for s in each if s.kind in ("linear", "log")]
         kinds = [s.kind for s in each]
         found += [((s,), float(np.log(kinds.count(s.kind)))) for s in each]
     for name, names in _named_columns(c).items():
@@ -88,9 +88,9 @@ def shapes_of(c: Conditions, without: Collection[str] = ()) -> list[tuple[tuple[
 
 def _of_column(name: str, x: FloatArray) -> Iterator[Shape]:
     low, high, distinct = float(x.min()), float(x.max()), np.unique(x)
-    yield Shape("linear", name, low, high)
+    yield Shape("linear", name, low, high, place=0.5 * (low + high))
     if low > 0 and high / low > WIDE:
-        yield Shape("log", name, low, high)
+        yield Shape("log", name, low, high, place=float(np.sqrt(low * high)))
     if len(distinct) > 2:
         between = 0.5 * (distinct[1:] + distinct[:-1])
         places = between if len(between) <= 9 else np.unique(np.quantile(x, np.arange(1, 10) / 10))

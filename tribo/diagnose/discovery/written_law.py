@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,14 +24,15 @@ LARGEST = 3.0  # of an amplitude in ln T
 @displayed()
 @dataclass(frozen=True)
 class Shape:
-    """A function of one column x, about one in size.
+    """A function of one column x, about one in size and zero where a campaign mostly is.
 
-    ``linear`` and ``log`` run from 0 at ``low`` to 1 at ``high``; ``step`` is 1 above ``place``; ``soft step`` is a
-    logistic function of the scale ``width`` about it; ``ramp`` is 0 up to ``place`` and runs to 1 at ``high``, which
-    may lie on either side; ``optimum`` is a parabola with 1 at ``place`` and 0 at the farther end; ``hump`` is a
-    Gaussian of standard deviation ``width`` at ``place``; ``saturating`` is 1 - exp(-(x - low) / width), from ``low``
-    upwards or, with a negative ``width``, downwards; ``window`` is 1 from ``place`` to ``place`` + ``width``; ``wave``
-    is sin and cos of the period ``width``; ``level`` is 1 where a column of names has the value ``level``.
+    ``linear`` and ``log`` rise by 1 from ``low`` to ``high`` and are 0 at ``place`` (at ``low`` without one); ``step``
+    is 1 above ``place``; ``soft step`` is a logistic function of the scale ``width`` about it; ``ramp`` is 0 up to
+    ``place`` and runs to 1 at ``high``, which may lie on either side; ``optimum`` is a parabola with 0 at ``place`` and
+    -1 at the farther end; ``hump`` is a Gaussian of standard deviation ``width`` at ``place``; ``saturating`` is
+    -exp(-(x - low) / width), from ``low`` upwards or, with a negative ``width``, downwards; ``window`` is 1 from
+    ``place`` to ``place`` + ``width``; ``wave`` is sin and cos of the period ``width``; ``level`` is 1 where a column
+    of names has the value ``level``.
     """
 
     kind: str
@@ -40,6 +42,11 @@ class Shape:
     place: float = float("nan")
     width: float = float("nan")
     level: str = ""
+
+    @property
+    def zero(self) -> float:
+        """Where a line or a logarithm is zero."""
+        return self.low if math.isnan(self.place) else self.place
 
     def of(self, c: Conditions) -> FloatArray:
         """Values of shape (n, 1), or (n, 2) of a wave; 0 where the column has no value."""
@@ -51,18 +58,18 @@ class Shape:
     def of_numbers(self, x: FloatArray) -> FloatArray:
         """Values at numbers x (n,), NaN where x is."""
         if self.kind == "linear":
-            return ((x - self.low) / (self.high - self.low))[:, None]
+            return ((x - self.zero) / (self.high - self.low))[:, None]
         if self.kind == "log":
-            return (np.log(np.maximum(x, 1e-300) / self.low) / np.log(self.high / self.low))[:, None]
+            return (np.log(np.maximum(x, 1e-300) / self.zero) / np.log(self.high / self.low))[:, None]
         if self.kind == "step":
             return np.where(np.isnan(x), np.nan, (x > self.place) * 1.0)[:, None]
         if self.kind == "optimum":
             half = max(self.high - self.place, self.place - self.low)
-            return (1.0 - ((x - self.place) / half) ** 2)[:, None]
+            return (-(((x - self.place) / half) ** 2))[:, None]
         if self.kind == "hump":
             return np.exp(-0.5 * ((x - self.place) / self.width) ** 2)[:, None]
         if self.kind == "saturating":
-            return (1.0 - np.exp(-np.maximum((x - self.low) / self.width, 0.0)))[:, None]
+            return -np.exp(-np.maximum((x - self.low) / self.width, 0.0))[:, None]
         if self.kind == "ramp":
             return np.maximum((x - self.place) / (self.high - self.place), 0.0)[:, None]
         if self.kind == "soft step":
@@ -174,18 +181,18 @@ class ActingLaw:
 def _formula(s: Shape) -> str:
     x = s.column
     if s.kind == "linear":
-        return f"({x} - {s.low:.4g}) / {s.high - s.low:.4g}"
+        return f"({x} - {s.zero:.4g}) / {s.high - s.low:.4g}"
     if s.kind == "log":
-        return f"ln({x} / {s.low:.4g}) / ln({s.high / s.low:.4g})"
+        return f"ln({x} / {s.zero:.4g}) / ln({s.high / s.low:.4g})"
     if s.kind == "step":
         return f"[{x} > {s.place:.4g}]"
     if s.kind == "optimum":
-        return f"(1 - (({x} - {s.place:.4g}) / {max(s.high - s.place, s.place - s.low):.4g})^2)"
+        return f"(-(({x} - {s.place:.4g}) / {max(s.high - s.place, s.place - s.low):.4g})^2)"
     if s.kind == "hump":
         return f"exp(-(({x} - {s.place:.4g}) / {s.width:.4g})^2 / 2)"
     if s.kind == "saturating":
         from_low = f"{x} - {s.low:.4g}" if s.width > 0 else f"{s.low:.4g} - {x}"
-        return f"(1 - exp(-({from_low}) / {abs(s.width):.4g}))"
+        return f"(-exp(-({from_low}) / {abs(s.width):.4g}))"
     if s.kind == "ramp":
         beyond = f"{x} - {s.place:.4g}" if s.high > s.place else f"{s.place:.4g} - {x}"
         return f"max(0, {beyond}) / {abs(s.high - s.place):.4g}"
