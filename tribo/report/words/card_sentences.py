@@ -34,7 +34,8 @@ def sentence(study: Study, verdict: Mapping[str, Any] | None) -> str:
     if layers and outcome != "unknown":
         return _caused(study, verdict, layers)
     if _layers(verdict, "law"):
-        return str(_layers(verdict, "law")[0]["text"])
+        law = str(_layers(verdict, "law")[0]["text"]).rstrip(".")
+        return f"{law}; no mechanism of the library explains it." if outcome == "unknown" else f"{law}."
     if verdict["causes"] and outcome != "unknown":
         return _direct(verdict)
     return _unknown(verdict)
