@@ -146,7 +146,7 @@ def peaks(store: str, out: str, *samples: str) -> None:
     rows = []
     for config, coarse, repeat in pairs(store):
         if config.sample in (samples or SAMPLES):
-            short_run = config.with_(duration_s=1.2 * coarse["peak_s"], window_start_peaks=1.0)
+            short_run = config.with_(duration_s=1.2 * coarse["peak_s"], window_start_peaks=1.01)
             here, there = (simulate(short_run.with_(dt_s=dt)).static_friction for dt in (config.dt_s, FINE_S))
             of = {"sample": config.sample, "pressure_kPa": config.pressure_Pa / 1e3, "repeat": repeat}
             rows.append(of | {"static_fine": there, "static_difference_percent": 100.0 * (here / there - 1.0)})
