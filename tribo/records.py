@@ -201,7 +201,7 @@ class Campaign:
     chosen_flat: str = ""
     zero: ZeroChoice = DEFAULT
     load_zero: ZeroChoice = DEFAULT
-    contact: str = "sled"
+    contact: str = ""  # as stated: sled, pin_on_disc, ball_on_disc, ring_shear, reciprocating or rotary
     material_class: str = ""  # as stated: elastomer, polymer, metal, ceramic, lubricated or granular
     plausible: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # bounds stated in place of the usual
     inputs: Mapping[str, str] = field(default_factory=dict, compare=False)

@@ -14,11 +14,11 @@ from tribo.diagnose.discovery.grammar import groups_of, shapes_of
 from tribo.diagnose.discovery.held import holds
 from tribo.diagnose.discovery.in_verdict import level_of_laws, with_laws, with_misfits
 from tribo.diagnose.discovery.law_file import law_text, read_law
-from tribo.diagnose.discovery.law_words import discovery_text, law_layers, law_sentence
+from tribo.diagnose.discovery.law_words import discovery_text, law_layers, law_sentence, size_sentence
 from tribo.diagnose.discovery.parting import parting_test
 from tribo.diagnose.discovery.scoring import Projection
 from tribo.diagnose.discovery.search import RESCORED, Discovery, Grammar, best_of, discover_laws
-from tribo.diagnose.discovery.written_law import ADHESION_TERM, LOAD_TERM, Shape, WrittenLaw
+from tribo.diagnose.discovery.written_law import ADHESION_TERM, LOAD_TERM, UNITS, Shape, WrittenLaw
 from tribo.diagnose.search.weighing import refitted
 from tribo.diagnose.statistics.chance import drawn_residuals, refit
 from tribo.diagnose.statistics.model import Acting, Setup
@@ -38,6 +38,20 @@ def warm_is_best(s: Setup) -> np.ndarray:
     """Friction is highest at 23 degrees and falls by 3 % per square degree away from it, in the sliding force alone."""
     t = s.observations.conditions.temperature_C
     return np.column_stack([np.zeros(len(t)), -0.03 * (t - 23.0) ** 2])
+
+
+@pytest.mark.parametrize("column", UNITS)
+def test_no_sentence_on_a_law_shows_the_name_of_a_column_of_the_file(column: str) -> None:
+    law = WrittenLaw((Shape("linear", column, 1.0, 2.0),))
+    said = size_sentence(law, {}, (10.0, 8.0, 12.0))
+    assert column not in said
+    assert "_" not in said
+
+
+def test_a_period_of_the_time_is_told_in_hours() -> None:
+    wave = Shape("wave", "elapsed_s", 0.0, 1e5, width=28_800.0)
+    said = size_sentence(WrittenLaw((wave,)), {}, (38.0, 36.0, 40.0))
+    assert "periodically with the time since the first pull, period 8 h, by 38 %" in said
 
 
 def nothing(s: Setup) -> np.ndarray:

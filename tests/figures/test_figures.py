@@ -17,6 +17,7 @@ from matplotlib.textpath import TextPath
 from report.synthetic import AREA_M2, make_study
 
 from tribo.comparison import study_lookup
+from tribo.figures import friction_panels
 from tribo.figures.catalogue import FIGURES
 from tribo.figures.style import (
     SAMPLE_COLOURS,
@@ -144,6 +145,18 @@ def test_text_is_laid_out_as_wide_as_it_is_drawn() -> None:
     laid_out = figure.text(0, 0, words, fontsize=7.5, fontweight="bold").get_window_extent().width * 72 / figure.dpi
     drawn = TextPath((0, 0), words, size=7.5, prop=FontProperties(weight="bold")).get_extents().width
     assert laid_out == pytest.approx(drawn, rel=0.02)
+
+
+def test_the_laws_of_samples_that_rub_alike_are_told_apart() -> None:
+    loads = np.linspace(1.0, 2.0, 5)
+    frames = [
+        pd.DataFrame({"sample_number": k, "sample": f"S{k}", "regime": "sliding", "mark": mark, "normal_load_N": loads,
+                      "T_N": 0.5 * loads})
+        for k in range(4) for mark in ("measured", "T = μ N")
+    ]  # fmt: skip
+    figure = friction_panels.draw_forces(pd.concat(frames, ignore_index=True))
+    assert len(figure.axes[0].texts) == 4
+    assert collisions(figure) == []
 
 
 @pytest.mark.parametrize("name", ["fig6", "fig7"])

@@ -17,6 +17,7 @@ from tribo.records import CombinedFit, LawFit, SetAside, Study
 from tribo.report.card import Card, card_law, card_of
 from tribo.report.html.page import html
 from tribo.report.verdict_file import verdict_in_words
+from tribo.report.words.card_sentences import why_next
 from tribo.report.words.card_text import card_text
 
 LAYER: dict[str, Any] = {
@@ -87,6 +88,13 @@ def test_causes_that_cannot_be_told_apart_are_not_called_identified(study: Study
     assert any("each of these equally well" in sentence for sentence in card.to_know)
     assert "identified" not in verdict_in_words(tied)["outcome"]
     assert "identified" in verdict_in_words(FOUND)["outcome"]
+
+
+def test_laws_that_a_test_would_part_are_called_by_their_column() -> None:
+    formulas = ("T * exp(a sin(2 pi elapsed_s / 100))", "load term * exp(a sin(2 pi elapsed_s / 100))")
+    law = {"kind": "law", "name": "elapsed_s", "formula": formulas[0], "tied_with": formulas[1:]}
+    verdict = {"verdict": "unknown", "layers": [law], "next_test": {"separates": formulas}}
+    assert why_next(verdict) == "it distinguishes laws of the time since the first pull that fit equally well"
 
 
 def test_the_next_test_says_why_and_how_long(card: Card) -> None:

@@ -46,12 +46,14 @@ def test_conditions_are_those_of_the_tests_that_were_used(study: Study) -> None:
     assert found["Tests per sample and load"].value == "2 to 3"
     assert found["Speed"].in_words == "0.200 mm/s"
     assert "circle 10 µm, pitch 15 µm, AF = 0.651" in found["Surface geometry"].value
-    assert found["Lubrication"].value == "none"
+    assert found["Test geometry"].value == "flat on flat, sled pulled over the counterface"
+    assert found["Motion"].value == "linear, one way"
 
 
 def test_what_was_not_recorded_is_said_to_be_so(study: Study) -> None:
     bare = tuple(replace(t, temperature_C=None, hold_s=None, operator="") for t in study.ingested.campaign.tests)
     campaign = replace(study.ingested.campaign, tests=bare, counterface="")
     found = {c.name: c for c in conditions(replace(study, ingested=replace(study.ingested, campaign=campaign)))}
-    for name in ("Temperature", "Hold time before the pull", "Operator", "Counterface, material"):
+    unsaid = ("Temperature", "Hold time before the pull", "Operator", "Counterface, material", "Lubrication")
+    for name in unsaid:
         assert found[name].in_words == "not recorded"

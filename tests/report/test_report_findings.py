@@ -12,7 +12,7 @@ from tribo.comparison import findings
 from tribo.comparison.findings import Agreement, LoadRatio, Ranking
 from tribo.records import REGIMES, LawFit, Study
 from tribo.report.words import wording
-from tribo.report.words.numerals import percent, significant, span, with_uncertainty
+from tribo.report.words.numerals import loads_in_words, percent, significant, span, with_uncertainty
 from tribo.report.words.terminal_text import summary_text, table2_text
 
 
@@ -181,3 +181,10 @@ def test_numbers_as_people_write_them() -> None:
     assert span([0.55, 0.551]) == "0.55"
     assert percent(0.0123) == "1.2 %"
     assert percent(-0.345) == "−34 %"
+
+
+@pytest.mark.parametrize(
+    ("levels", "words"), [([0.3009], "1 load of 0.301 N"), ([0.1, 0.2, 1.5], "3 loads from 0.100 to 1.50 N")]
+)
+def test_one_load_is_told_once(levels: list[float], words: str) -> None:
+    assert loads_in_words(levels) == words

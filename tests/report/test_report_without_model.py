@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,10 @@ def test_a_campaign_of_flat_samples_is_reported_without_the_model(tmp_path: Path
     assert "No sample has a pattern" in page.replace("\u00a0", " ")
     assert {p.stem for p in (tmp_path / "out" / "figures").glob("*.svg")} >= {"dependence", "records", "forces"}
     assert not (tmp_path / "out" / "comparison.csv").exists()
+    assert "sample on counterface" not in page
+    rows = dict(re.findall(r'<th scope="row">([^<]*)</th><td>([^<]*)</td>', page))
+    unsaid = ("Test geometry", "Motion", "Lubrication", "Counterface, material")
+    assert [rows[name] for name in unsaid] == ["not recorded"] * 4
 
 
 def test_without_a_nominal_area_the_intercept_is_a_force(tmp_path: Path) -> None:
@@ -67,6 +72,7 @@ def test_one_load_has_no_law_over_load_but_what_it_varies_with(tmp_path: Path) -
     drawn = {p.stem for p in (tmp_path / "out" / "figures").glob("*.svg")}
     assert not drawn & {"forces", "fig6", "fig7"}
     assert "What friction varies with" in page
+    assert "1 load of 2.00 N" in page
     assert "Where the model fails" not in page
     found = pd.read_csv(tmp_path / "out" / "dependence.csv").set_index(["regime", "variable"])
     assert found.loc[("sliding", "run_order"), "p_adjusted"] < 0.01

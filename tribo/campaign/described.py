@@ -66,7 +66,7 @@ class CampaignTable(_Strict):
     material: Line = ""
     counterface: Line = ""
     nominal_area_mm2: Positive | None = None
-    contact: Literal["sled", "pin_on_disc", "ball_on_disc", "ring_shear", "reciprocating", "rotary"] = "sled"
+    contact: Literal["", "sled", "pin_on_disc", "ball_on_disc", "ring_shear", "reciprocating", "rotary"] = ""
     material_class: Literal["", "elastomer", "polymer", "metal", "ceramic", "lubricated", "granular"] = ""
     slider_mass_g: NotNegative = 0.0
     pull_speed_mm_s: Positive | None = None

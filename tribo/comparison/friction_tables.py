@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from tribo.comparison.study_lookup import sample_numbers
-from tribo.fitting.dependence import LABELS, measured_points, variables_of
+from tribo.fitting.dependence import LABELS, SPEED, measured_points, test_values, variables_of
 from tribo.fitting.law_choice import force_N
 from tribo.fitting.load_levels import meant_to_be_one
 from tribo.records import REGIMES, Study
@@ -95,11 +95,11 @@ def oscillation_points(study: Study) -> pd.DataFrame:
     rows = []
     order = sample_numbers(study)
     speeds = {t.speed_m_s for t in study.ingested.campaign.tests if t.speed_m_s}
-    variable = "speed_m_s" if len(speeds) > 1 else "normal_load_N"
+    variable = SPEED if len(speeds) > 1 else "normal_load_N"
     for test in study.ingested.campaign.tests if shown(study) else ():
         pull = study.ingested.pulls.get(test.test_id)
         found = pull.oscillation if pull is not None else None
-        value = getattr(test, variable)
+        value = test_values(test).get(variable)
         if found is None or not found.cycles or found.regime == "steady" or not value or not test.normal_load_N > 0:
             continue
         said = {"sample_number": order[test.sample], "sample": test.sample, "test_id": test.test_id,

@@ -9,14 +9,16 @@ ABSORBED = "the calibration on the flat sample absorbs its effect"
 COLUMN = {
     "sample": "the sample", "normal_load_N": "the normal load", "speed_mm_s": "the pull speed",
     "hold_s": "the hold time", "run_order": "the run order", "specimen_run": "the number of the pull on its specimen",
-    "started_at": "the time since the first pull", "temperature_C": "the temperature", "humidity_pct": "the humidity",
-    "time of day": "the time of day", "tau0": "the share of adhesion in the friction force",
+    "started_at": "the time since the first pull", "elapsed_s": "the time since the first pull",
+    "temperature_C": "the temperature", "humidity_pct": "the humidity", "time of day": "the time of day",
+    "speed_m_s": "the pull speed", "pressure_Pa": "the nominal pressure", "contact_pressure_Pa": "the contact pressure",
+    "tau0": "the share of adhesion in the friction force",
 }  # fmt: skip
-NEEDED = {
-    "speed_m_s": "the pull speed", "elapsed_s": "the starting time", "clip_N": "the force lost between two samples",
+NEEDED = COLUMN | {
+    "elapsed_s": "the starting time", "clip_N": "the force lost between two samples",
     "area_fraction": "the area fraction", "rim_per_m": "the length of the cavity edges",
     "elongation": "the pull direction along long cavities",
-} | COLUMN  # fmt: skip
+}  # fmt: skip
 
 
 def in_words(column: str) -> str:

@@ -6,9 +6,11 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from tribo.figures import style
 
+LINE_POINTS = 8.5  # from one formula to the next
 _OPEN = {"static": True, "sliding": False}
 
 
@@ -47,9 +49,9 @@ def draw_forces(numbers: pd.DataFrame) -> Figure:
             ax.plot(load, force, mark.marker, ms=3, color=mark.colour, mfc="none", mew=0.6)
             for formula, line in points[points["mark"] != "measured"].groupby("mark"):
                 ax.plot(line["normal_load_N"], line["T_N"], color=mark.colour, lw=1.1)
-                end = line.iloc[-1]
-                ax.annotate(str(formula), (end["normal_load_N"], end["T_N"]), textcoords="offset points",
-                            xytext=(-4, 6), ha="right", color=mark.colour, fontsize=7)  # fmt: skip
+                below = -LINE_POINTS * (len(ax.texts) + 1)
+                ax.annotate(str(formula), (0.02, 1.0), (0.0, below), xycoords="axes fraction",
+                            textcoords="offset points", color=mark.colour, fontsize=7)  # fmt: skip
         style.panel_title(ax, _sentence(f"{regime} friction"))
         ax.set_xlabel("Normal load N (N)")
         ax.set_ylabel("Friction force T (N)")
@@ -127,6 +129,8 @@ def _spread(ax: Axes, values: pd.Series) -> None:
     if _over_a_decade(values):
         ax.set_xscale("log")
         style.plain_log_axis(ax.xaxis, values)
+    else:
+        ax.xaxis.set_major_locator(MaxNLocator(5))
 
 
 def _sentence(label: str) -> str:

@@ -12,10 +12,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 LABELS = {
-    "normal_load_N": "normal load (N)", "speed_m_s": "speed (m/s)", "hold_s": "hold (s)", "run_order": "run order",
+    "normal_load_N": "normal load (N)", "speed_mm_s": "speed (mm/s)", "hold_s": "hold (s)", "run_order": "run order",
     "specimen_run": "run on the specimen", "repeat": "repeat", "temperature_C": "temperature (°C)",
     "humidity_pct": "relative humidity (%)",
 }  # fmt: skip
+SPEED = "speed_mm_s"
 COLUMNS = ["sample", "regime", "variable", "label", "n", "low", "high", "change_percent", "change_u_percent", "rank",
            "p", "p_adjusted", "inseparable_from"]  # fmt: skip
 NOMINAL_LOAD = "nominal_load_N"  # the load by another name, beside the one that was recorded
@@ -26,7 +27,8 @@ _FEWEST_VALUES = 2
 
 def test_values(test: Test) -> dict[str, float]:
     """Every number recorded for a test, by name."""
-    found = {name: getattr(test, name) for name in LABELS}
+    found = {name: getattr(test, name) for name in LABELS if name != SPEED}
+    found[SPEED] = None if test.speed_m_s is None else 1e3 * test.speed_m_s
     for name, cell in test.covariates.items():
         if name == NOMINAL_LOAD:
             continue

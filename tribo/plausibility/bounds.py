@@ -88,10 +88,12 @@ def material_class(campaign: Campaign) -> str:
     """The class stated in campaign.toml, else one that the words of material and counterface name, else empty.
 
     The softer or lubricated partner decides, as it does about friction: oil before sand, before rubber, before plastic.
+    Where neither body is described, the names of the samples stand for them.
     """
     if campaign.material_class:
         return campaign.material_class
-    words = f"{campaign.material} {campaign.counterface}".lower()
+    words = f"{campaign.material} {campaign.counterface}".strip() or " ".join(campaign.samples).replace("_", " ")
+    words = words.lower()
     return next((name for name, pattern in _WORDS.items() if re.search(rf"\b(?:{pattern})\b", words)), "")
 
 
@@ -104,4 +106,4 @@ def bound_of(quantity: str, campaign: Campaign) -> Bound:
         mu = bound_of("mu", campaign)
         return Bound(mu.low, ADHESION * mu.high, mu.source)
     table = TABLES[quantity]
-    return table.get(material_class(campaign)) or table.get(campaign.contact) or table[""]
+    return table.get(material_class(campaign)) or table.get(campaign.contact or "sled") or table[""]

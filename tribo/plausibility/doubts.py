@@ -51,7 +51,7 @@ def _measured(campaign: Campaign, ingested: Ingested | None, fits: Sequence[LawF
     if campaign.has_area:
         found["area_mm2"] = {"the sample": campaign.nominal_area_m2 * _MM2}
         loads = [t.normal_load_N for t in campaign.tests if t.normal_load_N > 0]
-        if loads and campaign.contact == "sled":
+        if loads and campaign.contact in ("", "sled"):
             found["pressure_kPa"] = {
                 name: campaign.nominal_pressure_Pa(load) * _KPA
                 for name, load in (("the smallest load", min(loads)), ("the largest load", max(loads)))

@@ -18,7 +18,7 @@ from tribo.display import displayed
 from tribo.records import REGIMES, CombinedFit, LawFit, Study
 from tribo.report.result_tables import PA_PER_KPA, all_set_aside
 from tribo.report.words import card_sentences
-from tribo.report.words.numerals import counted, joined, significant, with_uncertainty
+from tribo.report.words.numerals import counted, joined, loads_in_words, with_uncertainty
 from tribo.report.words.wording import specimens_of, uncertainty_kind
 from tribo.store.whole_files import write_text
 
@@ -137,9 +137,7 @@ def _counts(study: Study, used: int, aside: int, specimens: int) -> str:
     samples = [s for s in study_lookup.sample_numbers(study) if any(t.sample == s for t in tests)]
     levels = np.unique(study_lookup.load_levels(np.array([t.normal_load_N for t in tests], float)))
     where = f"{counted(specimens, 'specimen')}, {counted(len(samples), 'sample')} ({joined(samples)})"
-    loads = (
-        f"{counted(len(levels), 'load')} from {significant(levels[0])} to {significant(levels[-1])} N" if used else ""
-    )
+    loads = loads_in_words(levels.tolist()) if used else ""
     left_out = f"{counted(aside, 'test')} set aside" if aside else "no test set aside"
     doubts = f", {counted(len(study.doubts), 'doubtful number')}" if study.doubts else ""
     return f"{counted(used, 'test')} used, {left_out}{doubts}; {where}{f'; {loads}' if loads else ''}."

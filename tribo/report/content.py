@@ -72,8 +72,9 @@ def content(
 
 
 def about(campaign: Campaign) -> str:
-    """The bodies, the nominal area and the speed, in one line."""
-    parts = [f"{campaign.material or 'sample'} on {campaign.counterface or 'counterface'}"]
+    """The bodies, the nominal area and the speed in one line, as far as they are stated."""
+    stated = campaign.material or campaign.counterface
+    parts = [f"{campaign.material or 'sample'} on {campaign.counterface or 'counterface'}"] if stated else []
     if campaign.has_area:
         parts.append(f"nominal area {campaign.nominal_area_m2 * 1e6:g} mm²")
     if campaign.pull_speed_m_s:

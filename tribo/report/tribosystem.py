@@ -67,17 +67,25 @@ def _geometry(pattern: Pattern) -> str:
     return f"{shape}, pitch {' × '.join(f'{v:g}' for v in steps)} µm{staggered}, AF = {pattern.area_fraction:.3f}"
 
 
+SLED = "sled"
 GEOMETRIES = {
-    "sled": "flat on flat, sled pulled over the counterface", "pin_on_disc": "pin on disc",
+    SLED: "flat on flat, sled pulled over the counterface", "pin_on_disc": "pin on disc",
     "ball_on_disc": "ball on disc", "ring_shear": "ring shear tester", "reciprocating": "reciprocating",
     "rotary": "rotary",
 }  # fmt: skip
+MOTIONS = {SLED: "linear, one way", "reciprocating": "reciprocating"}  # the others turn
+
+
+def _rig(campaign: Campaign) -> str:
+    """The kind of contact: as stated; that of the spring-block model where samples have patterns; else empty."""
+    patterned = any(not pattern.is_flat for pattern in campaign.samples.values())
+    return campaign.contact or (SLED if patterned else "")
 
 
 def _contact(campaign: Campaign, tests: list[Test]) -> Iterator[Condition]:
     loads = np.array([t.normal_load_N for t in tests])
     area = campaign.nominal_area_m2
-    yield Condition("Test geometry", GEOMETRIES[campaign.contact])
+    yield Condition("Test geometry", GEOMETRIES.get(_rig(campaign), NOT_RECORDED))
     if campaign.has_area:
         yield Condition("Nominal contact area", f"{area * 1e6:g}", "mm²")
     yield Condition("Normal load", _range(loads), "N", "NormalLoadSetpoint")
@@ -85,13 +93,15 @@ def _contact(campaign: Campaign, tests: list[Test]) -> Iterator[Condition]:
         yield Condition("Nominal pressure", _range(loads / area / PA_PER_KPA), "kPa")
     if campaign.slider_mass_kg:
         yield Condition("Load applied by", "dead weight", term="DeadWeightLoadApplication")
-    yield Condition("Lubrication", "none", term="InterfacialMediumCategory")
+    yield Condition("Lubrication", NOT_RECORDED, term="InterfacialMediumCategory")
 
 
 def _motion(campaign: Campaign, tests: list[Test]) -> Iterator[Condition]:
     speeds = [t.speed_m_s if t.speed_m_s is not None else campaign.pull_speed_m_s for t in tests]
     directions = sorted({t.direction for t in tests if t.direction})
-    yield Condition("Motion", "linear, one way", term="UnidirectionalLinearMotion")
+    rig = _rig(campaign)
+    term = "UnidirectionalLinearMotion" if rig == SLED else ""
+    yield Condition("Motion", MOTIONS.get(rig, "rotation") if rig else NOT_RECORDED, term=term)
     yield Condition("Speed", _range(_known(speeds) * 1e3), "mm/s", "SlidingSpeedSetpoint")
     yield Condition("Hold time before the pull", _range(_known(t.hold_s for t in tests)), "s", "LoadRelaxationSetpoint")
     yield Condition("Pull direction", joined(directions) or NOT_RECORDED)

@@ -25,6 +25,10 @@ from tribo.diagnose.terms import in_words
 from tribo.diagnose.verdict import Estimate, Layer, Misfit
 from tribo.records import REGIMES
 
+READABLE = {
+    "elapsed_s": (1 / 3600, "h"), "speed_m_s": (1e3, "mm/s"), "pressure_Pa": (1e-3, "kPa"),
+    "contact_pressure_Pa": (1e-3, "kPa"),
+}  # fmt: skip
 NAMED = 3  # tied laws that are written out in a sentence
 WHERE = {
     ALL: "", PATTERNED: " of the patterned samples", FLAT: " of the flat sample",
@@ -79,14 +83,15 @@ def _where(law: WrittenLaw, parameters: Mapping[str, Estimate]) -> str:
         return f"where {_name(s)} is above {_value(s, s.place)}"
     if s.kind in ("optimum", "hump"):
         place = parameters["place"]
-        near = f"{_value(s, place.value)} (90 % interval {place.low:.4g} to {place.high:.4g})"
+        factor, _ = _readable(s)
+        near = f"{_value(s, place.value)} (90 % interval {factor * place.low:.4g} to {factor * place.high:.4g})"
         return f"near {_name(s)} = {near} than far from it"
     how = {"log": ", in proportion to its logarithm", "saturating": ", approaching a limit"}.get(s.kind, "")
     return f"at {_name(s)} = {_value(s, s.high)} than at {_value(s, s.low)}{how}"
 
 
 def _wave(s: Shape) -> str:
-    return f"varies periodically with {_name(s)}, period {s.width:.4g} {UNITS.get(s.column, '')}".rstrip()
+    return f"varies periodically with {_name(s)}, period {_value(s, s.width)}"
 
 
 def _name(s: Shape) -> str:
@@ -94,7 +99,13 @@ def _name(s: Shape) -> str:
 
 
 def _value(s: Shape, x: float) -> str:
-    return f"{x:.4g} {UNITS.get(s.column, '')}".rstrip()
+    factor, unit = _readable(s)
+    return f"{factor * x:.4g} {unit}".rstrip()
+
+
+def _readable(s: Shape) -> tuple[float, str]:
+    """The factor and the unit in which a column stands in a sentence."""
+    return READABLE.get(s.column, (1.0, UNITS.get(s.column, "")))
 
 
 def discovery_text(d: Discovery) -> str:

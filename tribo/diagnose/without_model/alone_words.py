@@ -43,7 +43,8 @@ def of_column(f: Follows) -> str:
 
 def of_records(records: Sequence[RunningIn]) -> str:
     """Running-in along records."""
-    shown = ", ".join(f"{r.test_id} ({r.sample}) {r.first_percent:+.0f} %" for r in records[:8])
+    sizes = [f"{r.first_percent:+.0f} %".replace("-", "−") for r in records]
+    shown = ", ".join(f"{r.test_id} ({r.sample}) {size}" for r, size in zip(records[:8], sizes, strict=False))
     more = f" and {len(records) - 8} more" if len(records) > 8 else ""
     share = 100.0 * records[0].distance_m / records[0].whole_m
     return (

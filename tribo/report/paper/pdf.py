@@ -20,6 +20,7 @@ from tribo.report.uncertainty import BudgetTable
 from tribo.report.words.numerals import ratio_text, significant, unbroken
 
 TEMPLATE = "report.typ"
+MOST_TESTS = 24  # of a flag, about two lines
 FRICTION = {
     "samples": "Samples", "laws": "Law of friction against load", "dependence": "Dependence on recorded variables",
     "oscillation": "Sliding regimes and restarts",
@@ -79,7 +80,7 @@ def record_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str
         "measured": summary["measured"],
         "set_aside": [[fault.test_id, fault.reason] for fault in said["set_aside"]],
         "by_hand": said["by_hand"],
-        "flags": [[flag, str(count), ", ".join(tests)] for flag, count, tests in said["flags"]],
+        "flags": [[flag, str(count), _first_tests(tests)] for flag, count, tests in said["flags"]],
         "tribosystem": [[c.name, c.in_words] for c in said["tribosystem"]],
         "uncertainty_kind": said["uncertainty_kind"],
         "load": significant(said["table2"]["load_N"]),
@@ -174,6 +175,12 @@ def _diagnosis_tables(verdict: Mapping[str, Any] | None) -> dict[str, list[Any]]
         "corrections": verdict["corrections"],
         "laws": [[law["formula"], law["text"], law["ties"], law["gain"]] for law in verdict["laws"]],
     }
+
+
+def _first_tests(tests: list[str]) -> str:
+    """The tests that carry a flag; of many the first ones, since tests.csv has all of them."""
+    more = f" and {len(tests) - MOST_TESTS} more; see tests.csv" if len(tests) > MOST_TESTS else ""
+    return ", ".join(tests[:MOST_TESTS]) + more
 
 
 def _pull_row(card: PullCard) -> list[str]:

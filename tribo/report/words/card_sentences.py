@@ -34,7 +34,8 @@ def sentence(study: Study, verdict: Mapping[str, Any] | None) -> str:
     if layers and outcome != "unknown":
         return _caused(study, verdict, layers)
     if _layers(verdict, "law"):
-        return str(_layers(verdict, "law")[0]["text"])
+        law = str(_layers(verdict, "law")[0]["text"]).rstrip(".")
+        return f"{law}; no mechanism of the library explains it." if outcome == "unknown" else f"{law}."
     if verdict["causes"] and outcome != "unknown":
         return _direct(verdict)
     return _unknown(verdict)
@@ -61,6 +62,10 @@ def why_next(verdict: Mapping[str, Any]) -> str:
         return "it is the most informative test"
     if verdict["verdict"] == "unknown" and not _layers(verdict, "law"):
         return f"to see whether friction follows {joined([in_words(s) for s in separates])} when nothing else changes"
+    for law in _layers(verdict, "law"):
+        if set(separates) <= {law["formula"], *law["tied_with"]}:
+            columns = joined([in_words(name) for name in str(law["name"]).split(" and ")])
+            return f"it distinguishes laws of {columns} that fit equally well"
     names = [in_words(s) if without_model(verdict) else name_in_words(s) for s in separates]
     if without_model(verdict) and len(names) > 1:
         return f"it tells the effect of {names[0]} from that of {joined(names[1:])}"

@@ -10,7 +10,7 @@ import numpy as np
 from tribo.comparison.friction_tables import shown
 from tribo.comparison.study_lookup import load_levels, sample_numbers
 from tribo.records import REGIMES, Study
-from tribo.report.words.numerals import counted, joined, percent, significant, with_uncertainty
+from tribo.report.words.numerals import counted, joined, loads_in_words, percent, significant, with_uncertainty
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,8 +44,7 @@ def _samples(study: Study) -> Iterator[str]:
                 continue
             ratio = (part[f"{regime}_N"] / part["normal_load_N"]).to_numpy(float)
             loads = np.unique(load_levels(part["normal_load_N"].to_numpy(float)))
-            span = f"{significant(loads[0])} to {significant(loads[-1])} N"
-            at = f"{significant(loads[0])} N" if loads.size == 1 else f"{counted(loads.size, 'load')} from {span}"
+            at = loads_in_words(loads.tolist())
             spread = f", standard deviation {significant(float(ratio.std(ddof=1)), 2)}" if ratio.size > 1 else ""
             said = f"mean T/N = {significant(float(ratio.mean()))}{spread}"
             yield f"{regime.capitalize()} friction of {sample}: {said} ({counted(ratio.size, 'test')}, {at})."

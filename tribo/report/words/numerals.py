@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 
 
 def significant(value: float, digits: int = 3) -> str:
@@ -58,6 +59,13 @@ def percent(fraction: float) -> str:
 def joined(words: list[str]) -> str:
     """ "A, B and C"."""
     return ", ".join(words[:-1]) + " and " + words[-1] if len(words) > 1 else "".join(words)
+
+
+def loads_in_words(levels_N: Sequence[float]) -> str:
+    """ "6 loads from 0.0638 to 1.37 N", "1 load of 0.301 N", of loads in increasing order."""
+    if len(levels_N) == 1:
+        return f"1 load of {significant(levels_N[0])} N"
+    return f"{counted(len(levels_N), 'load')} from {significant(levels_N[0])} to {significant(levels_N[-1])} N"
 
 
 def counted(number: int, noun: str) -> str:

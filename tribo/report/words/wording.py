@@ -11,7 +11,7 @@ from tribo.comparison.findings import Agreement, DirectionRatio, Ranking, Verdic
 from tribo.records import REGIMES, ByHand, Campaign, LawFit, Pull, Regime, Study, Test
 from tribo.report.oddness import OddPull
 from tribo.report.result_tables import PA_PER_KPA, all_set_aside
-from tribo.report.words.numerals import counted, joined, percent, significant, span, with_uncertainty
+from tribo.report.words.numerals import counted, joined, loads_in_words, percent, significant, span, with_uncertainty
 
 FLAGS = {
     "follows_load": "follows the normal load", "gap_at_peak": "gap in the data at the peak",
@@ -44,11 +44,11 @@ def what_was_measured(study: Study) -> str:
     loads = np.array([t.normal_load_N for t in tests])
     levels = np.unique(study_lookup.load_levels(loads))
     lowest, highest = (significant(p / campaign.nominal_area_m2 / PA_PER_KPA) for p in (levels[0], levels[-1]))
-    pressure = f" (nominal pressure {lowest} to {highest} kPa)" if campaign.has_area else ""
+    pressures = lowest if lowest == highest else f"{lowest} to {highest}"
+    pressure = f" (nominal pressure {pressures} kPa)" if campaign.has_area else ""
     return (
         f"{counted(len(tests), 'pull')} of {counted(len(specimens), 'specimen')} of "
-        f"{counted(len(samples), 'sample')} ({joined(samples)}) at {counted(len(levels), 'load')} from "
-        f"{significant(levels[0])} to {significant(levels[-1])} N{pressure}. "
+        f"{counted(len(samples), 'sample')} ({joined(samples)}) at {loads_in_words(levels.tolist())}{pressure}. "
         f"{_set_aside_clause(aside)}"
     )
 
