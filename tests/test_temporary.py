@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -69,3 +71,20 @@ def test_an_error_inside_leaves_nothing_behind(place: Path) -> None:
     with pytest.raises(OSError, match="no space"):
         fill()
     assert list(place.iterdir()) == []
+
+
+def test_what_could_not_be_removed_goes_at_the_next_start(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    remove = os.unlink
+
+    def refuse(path: Any, **options: Any) -> None:
+        if os.path.basename(path) == "export.csv":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        remove(path, **options)
+
+    with monkeypatch.context() as full:
+        full.setattr(os, "unlink", refuse)
+        with temporary_folder() as folder:
+            (folder / "export.csv").write_text("unpacked")
+    assert (folder / "export.csv").exists()
+    with temporary_folder() as own:
+        assert [p for p in place.iterdir() if p not in own.parents] == []

@@ -44,7 +44,7 @@ def held_folder(prefix: str) -> tuple[Path, Callable[[], None]]:
     holder, lock = _made(prefix)
 
     def release() -> None:
-        shutil.rmtree(holder, ignore_errors=True)
+        _remove(holder)
         os.close(lock)
 
     try:
@@ -94,6 +94,15 @@ def _remove_abandoned(holder: Path) -> None:
         return
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        shutil.rmtree(holder, ignore_errors=True)
+        _remove(holder)
     finally:
         os.close(lock)
+
+
+def _remove(holder: Path) -> None:
+    """The locked file goes last: by it the next start knows a folder that could not be removed."""
+    shutil.rmtree(holder / FILES, ignore_errors=True)
+    with suppress(OSError):
+        if not (holder / FILES).exists():
+            (holder / IN_USE).unlink(missing_ok=True)
+            holder.rmdir()

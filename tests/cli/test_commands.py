@@ -273,3 +273,13 @@ def test_the_diagnosis_of_a_published_table_can_be_verified(tmp_path: Path) -> N
     assert run("verify", tmp_path).exit_code == 0
     (tmp_path / "verdict.json").write_text("{}", encoding="utf-8")
     assert run("verify", tmp_path).exit_code == 1
+
+
+def test_simulations_alone_say_which_tests_were_set_aside_and_why(
+    spoiled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tribo.stages.simulate_cells", lambda *_: ())
+    result = run("predict", spoiled, "-o", tmp_path / "out", "-q")
+    assert result.exit_code == 3
+    assert "T003: raw/T003.csv: the file is empty" in result.stderr
+    assert "T005: tests.csv, row 6, column sample" in result.stderr

@@ -13,6 +13,7 @@ from tribo.diagnose import tabled_predictor
 from tribo.records import Campaign, Test
 from tribo.simulate import LocalFriction, SimConfig, stratified_design
 from tribo.stages import own_predictor
+from tribo.store.kept_results import DamagedResultWarning
 
 AREA_M2 = 55e-6
 FRICTION = LocalFriction(mu_s=5.1, static_adhesion_Pa=20e3)
@@ -54,6 +55,8 @@ def test_runs_that_todays_sources_would_not_make_are_left_out(kept: Path, tmp_pa
     for path in kept.glob("*.nc"):
         (tmp_path / path.name.replace("Pa-", "Pa-0")).write_bytes(path.read_bytes())
     (tmp_path / "F@1Pa-0.nc").write_bytes(b"no HDF5")
-    assert kept_runs(tmp_path, campaign().samples) is None
-    assert own_predictor(campaign(), tmp_path) is None
+    with pytest.warns(DamagedResultWarning, match=r"F@1Pa-0\.nc: these simulations are not used"):
+        assert kept_runs(tmp_path, campaign().samples) is None
+    with pytest.warns(DamagedResultWarning):
+        assert own_predictor(campaign(), tmp_path) is None
     assert own_predictor(campaign(), None) is None

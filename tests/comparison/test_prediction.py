@@ -16,6 +16,7 @@ from tribo.comparison.prediction_runs import ModelRuns
 from tribo.comparison.side_by_side import load_means
 from tribo.errors import CampaignError, FitError
 from tribo.records import LawFit, Regime
+from tribo.store.kept_results import DamagedResultWarning
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +83,8 @@ def test_a_second_start_computes_nothing_and_says_the_same(fitted: Fitted, first
 def test_a_damaged_cell_is_run_again_and_no_other(fitted: Fitted, first: First, kept: Path) -> None:
     damaged = sorted(kept.glob("B@*.nc"))[0]
     damaged.write_bytes(b"not HDF5")
-    again, recomputed = run(fitted, kept)
+    with pytest.warns(DamagedResultWarning, match=f"{damaged.name}: cannot be read .*these simulations are made again"):
+        again, recomputed = run(fitted, kept)
     assert recomputed == {damaged.name}
     assert again.table.equals(first.prediction.table)
 

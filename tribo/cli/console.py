@@ -48,6 +48,11 @@ class Console:
             lines = set_aside_text(tests, all_of_them=self.verbosity > 0)
             self.say(f"{len(tests)} test{'s' if len(tests) != 1 else ''} {what}:\n{lines}", level=level)
 
+    def status_after(self, set_aside: Sequence[SetAside]) -> int:
+        """The exit status of finished work, once the tests that were set aside are listed, even with -q."""
+        self.list_tests("set aside", set_aside, level=-1)
+        return status_of(set_aside)
+
     def list_problems(self, problems: Sequence[Problem]) -> None:
         """What stands in the way, equal ones grouped; shown even with -q, nothing where there is none."""
         if problems:

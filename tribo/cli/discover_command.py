@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from tribo.cli.console import Console, command_options, status_of
+from tribo.cli.console import Console, command_options
 from tribo.cli.given_paths import GivenPath
 from tribo.cli.output import Output, output_options
 from tribo.cli.run_record import provenance_of_run
@@ -51,4 +51,4 @@ def discover(
             found = discover_in(study.ingested, seed=chosen.seed, progress=progress)
             written = write_discovery(found, study.ingested.campaign.title, out.path, record)
     console.result(written.record, written.text)
-    return status_of(study.ingested.set_aside)
+    return console.status_after(study.ingested.set_aside)

@@ -100,7 +100,7 @@ def predict(console: Console, campaign: Path, out: Output, only: str, columns: s
     console.result(
         {"out": str(out.path), "cells": names}, f"model calibrated; simulations run: {', '.join(names) or 'none'}"
     )
-    return status_of(ingested.set_aside)
+    return console.status_after(ingested.set_aside)
 
 
 @click.command()
@@ -175,8 +175,7 @@ def diagnose(
         write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found, card)
     console.result(verdict.as_dict() | {"card": card.as_dict()}, f"{card_text(card)}\n\n{verdict_text(verdict)}")
     console.list_doubts(study.doubts)
-    console.list_tests("set aside", study.ingested.set_aside, level=-1)
-    return status_of(study.ingested.set_aside)
+    return console.status_after(study.ingested.set_aside)
 
 
 def _diagnose_published(console: Console, out: Output, seed: int) -> int:
@@ -321,9 +320,8 @@ def _conclude(
     console.list_doubts(study.doubts)
     for note in study.notes:
         console.say(f"note: {note}", level=-1)
-    console.list_tests("set aside", set_aside, level=-1)
     console.list_tests("used with doubts", doubts)
-    return status_of(set_aside)
+    return console.status_after(set_aside)
 
 
 def _checked(

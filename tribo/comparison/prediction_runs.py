@@ -7,6 +7,7 @@ one finished run is never computed twice. Cells can be run by different processe
 from __future__ import annotations
 
 import hashlib
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
@@ -17,7 +18,7 @@ from urllib.parse import quote
 from tribo.errors import SimulationError
 from tribo.file_contents import found_in
 from tribo.records import Pattern, Run
-from tribo.store.kept_results import Shelf, sources
+from tribo.store.kept_results import DamagedResultWarning, Shelf, sources
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -129,12 +130,13 @@ def run_cells(
 def _run_stored(
     cell: Cell, kept: Path, threads: int, scheduler: str | None, progress: Callable[[int, int], None]
 ) -> pd.DataFrame:
-    """The runs of one cell, from its file as far as it holds them; a damaged file is replaced."""
-    from tribo.simulate.resume import continues, run_stored
+    """The runs of one cell, from its file as far as it holds them; one that is damaged or unreadable is replaced."""
+    from tribo.simulate.resume import fault_of, run_stored
 
     path = cell.path(kept)
     kept.mkdir(parents=True, exist_ok=True)
-    if path.exists() and not continues(cell.configs, path):
+    if path.exists() and (fault := fault_of(cell.configs, path)) is not None:
+        warnings.warn(f"{path}: {fault.what}; these simulations are made again", DamagedResultWarning, stacklevel=2)
         path.unlink(missing_ok=True)
     return run_stored(cell.configs, path, threads, scheduler, progress, wait_s=WAIT_S)
 
@@ -154,7 +156,8 @@ def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | Non
         try:
             table = read_stored(path)
             cell = _cell_of(path, table, patterns)
-        except (SimulationError, *UNREADABLE):  # another program's file, or a damaged one
+        except (SimulationError, *UNREADABLE) as why:
+            warnings.warn(f"{path}: these simulations are not used: {why}", DamagedResultWarning, stacklevel=2)
             continue
         if cell is not None and cell.path(kept) == path and table["done"].all():
             found.append(table)

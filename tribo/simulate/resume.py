@@ -130,7 +130,7 @@ def run_stored(
 
 def _open_store(design: Sequence[SimConfig], path: Path, work: Work) -> None:
     """Let ``path`` be a store of exactly these runs: made where it is absent, and made anew where it is damaged."""
-    fault = _fault(design, path, work) if path.exists() else None
+    fault = fault_of(design, path, work) if path.exists() else None
     if fault is not None and fault.kind == "damaged_store":
         warnings.warn(f"{path}: the file is damaged; all runs are computed again", DamagedResultWarning, stacklevel=3)
     elif fault is not None:
@@ -169,10 +169,11 @@ def identity(design: Sequence[SimConfig], work: Work = FRICTION) -> dict[str, st
 
 def continues(design: Sequence[SimConfig], path: str | Path, work: Work = FRICTION) -> bool:
     """Whether ``path`` is an intact store of exactly these runs, finished or not."""
-    return _fault(design, Path(path), work) is None
+    return fault_of(design, Path(path), work) is None
 
 
-def _fault(design: Sequence[SimConfig], path: Path, work: Work) -> Problem | None:
+def fault_of(design: Sequence[SimConfig], path: Path, work: Work = FRICTION) -> Problem | None:
+    """Why ``path`` is no intact store of exactly these runs; None where it is."""
     given = {"run": np.arange(len(design)), **_given(design)}
     return fault_of_store(path, identity(design, work), _attributes(design, work), given)
 
