@@ -131,13 +131,17 @@ def _run_stored(
     cell: Cell, kept: Path, threads: int, scheduler: str | None, progress: Callable[[int, int], None]
 ) -> pd.DataFrame:
     """The runs of one cell, from its file as far as it holds them; one that is damaged or unreadable is replaced."""
-    from tribo.simulate.resume import fault_of, run_stored
+    from tribo.simulate.resume import fault_of, read_stored, run_stored
 
     path = cell.path(kept)
     kept.mkdir(parents=True, exist_ok=True)
-    if path.exists() and (fault := fault_of(cell.configs, path)) is not None:
-        warnings.warn(f"{path}: {fault.what}; these simulations are made again", DamagedResultWarning, stacklevel=2)
-        path.unlink(missing_ok=True)
+    if path.exists():
+        if (fault := fault_of(cell.configs, path)) is not None:
+            warnings.warn(f"{path}: {fault.what}; these simulations are made again", DamagedResultWarning, stacklevel=2)
+            path.unlink(missing_ok=True)
+        elif (table := read_stored(path))["done"].all():  # finished: nothing to wait for or to check once more
+            progress(len(table), len(table))
+            return table
     return run_stored(cell.configs, path, threads, scheduler, progress, wait_s=WAIT_S)
 
 
