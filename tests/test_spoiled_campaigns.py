@@ -39,6 +39,7 @@ def test_every_kind_of_damage_is_named_in_every_dialect_and_nothing_healthy_touc
     assert counts["healthy tests untouched"] > 80
 
 
+@pytest.mark.slow
 def test_every_kind_of_damage_is_named_in_the_practice_campaigns_and_nothing_healthy_touched(
     spoil_campaign: ModuleType, practice: Callable[[str], Path], tmp_path: Path
 ) -> None:

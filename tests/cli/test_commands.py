@@ -264,6 +264,7 @@ def test_diagnose_takes_a_campaign_or_a_published_table_and_not_both(tmp_path: P
     assert "CAMPAIGN" in neither.output
 
 
+@pytest.mark.slow
 def test_the_diagnosis_of_a_published_table_can_be_verified(tmp_path: Path) -> None:
     """Its record names the two tables it rests on, and every file it wrote."""
     assert run("diagnose", "--published", "berardo2019", "-o", tmp_path, "-q").exit_code == 0

@@ -60,6 +60,7 @@ def test_the_flat_law_of_the_virtual_tribometer_lies_within_the_99_percent_inter
     assert outside(read(dialect), vars(LAWS["F"])) == []
 
 
+@pytest.mark.slow
 def test_the_flat_law_of_the_practice_campaigns_lies_within_the_99_percent_intervals(
     shared: Path, practice: Callable[[str], Path]
 ) -> None:
@@ -106,6 +107,7 @@ def test_the_exponent_of_the_power_law_is_above_zero_where_friction_depends_on_p
     assert low[0] < 0 < low[1]
 
 
+@pytest.mark.slow
 def test_the_practice_campaign_with_hidden_pressure_dependence_bends_and_the_one_without_does_not(
     practice: Callable[[str], Path],
 ) -> None:

@@ -82,6 +82,7 @@ simulate(SimConfig(sample="B", blocks=(24, 24), seed=2))
 """
 
 
+@pytest.mark.slow
 def test_all_starts_give_the_same_bits(tmp_path: Path):
     """One that compiles, one that loads what was compiled, and one that has used another engine before."""
     environment = {**os.environ, "TRIBO_CACHE_DIR": str(tmp_path)}
