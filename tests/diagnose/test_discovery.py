@@ -295,3 +295,14 @@ def test_a_law_of_the_patterned_samples_leaves_their_level_alone() -> None:
     assert law.parameters["place"].low < 23.0 < law.parameters["place"].high
     specimen_gain = law.model.noise.sizes[0]
     assert specimen_gain < 0.15
+
+
+def test_a_law_that_would_be_chance_even_as_the_only_one_is_not_compared_with_simulated_campaigns() -> None:
+    calls: list[str] = []
+    model = baseline(made(nothing, seed=102))
+    found = discover_laws(model, level=1e-9, replicates=20, progress=lambda stage, *_: calls.append(stage))
+    assert found.laws == ()
+    assert found.scored[0].net > 0
+    assert calls == []
+    discover_laws(model, level=0.5, replicates=20, progress=lambda stage, *_: calls.append(stage))
+    assert calls

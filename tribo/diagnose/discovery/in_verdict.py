@@ -135,7 +135,7 @@ def _extended(
     if ties and not v.equivalent:
         next_test = parting_test(*ties[0], model.setup.observations.conditions)
     layers = (*pattern_layers(model), *kept, *tested.layers, *law_layers(found), *remainders)
-    said = [v.text, laws_text(found, v.text), rest] if found.laws or v.verdict != "no_misfit" else [v.text]
+    said = [v.text, laws_text(found, v.text), rest] if v.verdict != "no_misfit" else [v.text]
     return replace(v, layers=layers, next_test=next_test, text=" ".join(filter(None, said)))
 
 

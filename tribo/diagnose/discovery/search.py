@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtrc
 
 from tribo.diagnose.discovery.grammar import Group, groups_of, shapes_of
 from tribo.diagnose.discovery.scoring import Courses, Projection, Scored, acts_of, courses_of, terms_of
@@ -74,6 +75,8 @@ def discover_laws(
             break
         scored = _measured(model, grammar)
         table, searched = table or tuple(scored[:SHOWN]), searched or grammar.size
+        if _by_chance_alone(scored[0].net) >= level:
+            break
         p = share_beyond(_chance(model, grammar, scored[0].net, (replicates, rng), progress), scored[0].net)
         if p >= level:
             break
@@ -135,6 +138,12 @@ def _measured(model: ModelFit, grammar: Grammar) -> list[Scored]:
     each = zip(index, gains, nets, strict=True)
     laws = [Scored(groups[i // len(shapes)].law(shapes[i % len(shapes)]), float(g), float(n)) for i, g, n in each]
     return sorted(laws, key=lambda s: -s.net)
+
+
+def _by_chance_alone(net: float) -> float:
+    """The chance that a law gains so much if it is the only one tried, after Wilks: less than that of the best of all,
+    so that a law which fails here needs no simulated campaigns."""
+    return float(chdtrc(1, 2.0 * max(net, 0.0)))
 
 
 def _chance(
