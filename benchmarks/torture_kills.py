@@ -98,7 +98,7 @@ def kill_build(base: Path) -> Round:
         thinned(builds.kept, site / "current" / "a" / "kept", rng)
         _kill(lambda: builds.start(folder), kills, lambda: rng.random() * builds.seconds / 2)
         status = builds.start(folder).wait()
-        found = differing(results(site / "current"), builds.expected) + leftovers(site)
+        found = differing(results(site / "current"), builds.expected) + leftovers(folder)
         copied = differing(results(site / "latest"), {**builds.expected, ".number": ""}) != [".number"]
         return [f"status {status}"] * (status != 0) + found + ["latest"] * copied
 

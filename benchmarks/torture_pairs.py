@@ -113,7 +113,7 @@ def pair_builds(base: Path) -> Pair:
         second = builds.start(folder, *(("--wait", "600") if number % 3 == 0 else ()))
         ended = first.wait(), second.wait()
         same = results(site / "current") == builds.expected
-        return ended, ["mixed or incomplete results"] * (not same) + leftovers(site)
+        return ended, ["mixed or incomplete results"] * (not same) + leftovers(folder)
 
     return one
 
