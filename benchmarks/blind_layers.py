@@ -208,7 +208,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=("half", "run", "tables", "page"))
     parser.add_argument("path", type=Path, help="JSON lines, one a campaign")
-    parser.add_argument("--half", type=Path, default=DATA / "blind-half.jsonl", help="sizes found half the time of docs/blind.md")
+    parser.add_argument("--half", type=Path, default=DATA / "blind-half.jsonl", help="sizes of docs/blind.md")
     parser.add_argument("--found", type=Path, default=DATA / "blind-layers-half.jsonl", help="what half has found")
     parser.add_argument("--campaigns", type=int, default=20, help="per effect and kind of patterns")
     parser.add_argument("--clean", type=int, default=200)
