@@ -201,7 +201,8 @@ def _step(state: Path, name: str, step: str, words: str, described: dict[str, An
         return True
     files = ["--files", campaign["files"]] if step == "report" else []
     after = ["--after", f"steps/{name}/fit.json"] if step not in ("ingest", "fit") else []
-    given = [f"steps/{name}/{step}.json", "--digest", digest, *after, *files, "--", *shlex.split(words)]
+    laws = ["--laws", "laws"] if step in ("diagnose", "report") else []
+    given = [f"steps/{name}/{step}.json", "--digest", digest, *laws, *after, *files, "--", *shlex.split(words)]
     return _logged(state, f"{name}/{step}.log", lambda: main(given))
 
 

@@ -206,7 +206,7 @@ class Inverse:
         found = np.empty((len(self.own), 3, len(columns.own)))
         for k, tests in enumerate(columns.tests_of):
             own = columns.own[tests].reshape(-1, 4)  # the two rows of every test one after another
-            free = columns.border[tests].reshape(len(own), -1) - own @ self.across[:, k]
+            free = columns.border[tests].reshape(len(own), columns.border.shape[2]) - own @ self.across[:, k]
             moved, alone = free @ self.border, own @ self.own[:, k]
             for i, (a, b) in enumerate(((0, 0), (0, 1), (1, 1))):
                 shared = np.einsum("rtm,rtm->rt", moved[:, a::2], free[:, b::2])
