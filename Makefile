@@ -22,9 +22,10 @@ $(VENV)/.run: pyproject.toml constraints.txt
 	$(PIP) -e .
 	touch $@
 
-$(VENV)/.dev: $(VENV)/.run
+$(VENV)/.dev: pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(PIP) -e '.[dev]'
-	touch $@
+	touch $(VENV)/.run $@
 
 demo: $(VENV)/.run
 	$(BIN)/tribo demo -o out/demo
@@ -38,7 +39,8 @@ types: $(VENV)/.dev
 pytest: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
 
-test: lint types pytest
+test: lint
+	$(MAKE) -j 2 types pytest  # at once: mypy takes one process
 
 $(VENV)/.docs: $(VENV)/.run
 	$(PIP) -e '.[docs]'
