@@ -59,11 +59,8 @@ from tribo.simulate.engines.strips import (
     CAVITY,
     CONTACT,
     LANES,
-    SUM_ALONG,
-    SUM_SQUARES,
-    SUM_WORK,
-    SUMS,
     Planes,
+    Sums,
     forces,
     glides,
     slides,
@@ -90,7 +87,7 @@ class Active(NamedTuple):
     """The blocks of a run, their strips, and what the loops say of each strip."""
 
     planes: Planes
-    sums: FloatArray  # (shares, SUMS)
+    sums: Sums  # a row each share
     layout: Layout
     lists: Lists
     starts: NDArray[np.bool_]  # (strips,) a block at rest gives way
@@ -114,7 +111,7 @@ def active_of(planes: Planes, layout: Layout, numerics: Numerics, threads: int =
     lists.strips[PENDING, :n] = np.arange(n)
     lists.members[PENDING] = n
     starts, calm = np.zeros((2, n), np.bool_)
-    team, sums = team_of(threads, shares), np.zeros((shares, SUMS))
+    team, sums = team_of(threads, shares), Sums(*np.zeros((3, shares, LANES)))
     return Active(planes, sums, layout, lists, starts, calm, np.zeros(n, np.int64), team)
 
 
@@ -176,9 +173,10 @@ def move(thread: int, threads: int, s: State, a: Active, c: Numerics) -> None:
     lists = a.lists
     for share in range(thread, lists.shares, threads):
         row = lists.shares * GLIDING + share
-        glides(a.planes, lists.strips[row, : lists.members[row]], a.calm, c, a.sums[share])
+        sums = Sums(a.sums.along[share], a.sums.squares[share], a.sums.work[share])
+        glides(a.planes, lists.strips[row, : lists.members[row]], a.calm, c, sums)
         row = lists.shares * SLIDING + share
-        slides(a.planes, lists.strips[row, : lists.members[row]], a.moving, c, s.counts[STEP], a.sums[share])
+        slides(a.planes, lists.strips[row, : lists.members[row]], a.moving, c, s.counts[STEP], sums)
 
 
 @compiled
@@ -311,12 +309,12 @@ def admit_due(step: int, lists: Lists) -> None:
 
 
 @inner
-def total(sums: FloatArray, first: int) -> float:
-    """One of the sums over all shares and lanes."""
+def total(values: FloatArray) -> float:
+    """The sum over all shares and lanes."""
     found = 0.0
-    for share in range(sums.shape[0]):
-        for lane in range(first, first + LANES):
-            found += sums[share, lane]
+    for share in range(values.shape[0]):
+        for lane in range(LANES):
+            found += values[share, lane]
     return found
 
 
@@ -325,9 +323,9 @@ def advance(a: Active, s: State, out: Samples, c: Numerics, until_step: int) -> 
     """Integrate to ``until_step``, or until ``counts[CODE]`` says finished or not finite."""
     lists = a.lists
     way = c.dt * c.dt / c.mass
-    along = s.totals[ALONG] - way * total(a.sums, SUM_ALONG)
-    friction = s.totals[FRICTION_WORK] - way * total(a.sums, SUM_WORK)
-    viscous = s.totals[VISCOUS_WORK] - way * c.damping * c.dt * total(a.sums, SUM_SQUARES)
+    along = s.totals[ALONG] - way * total(a.sums.along)
+    friction = s.totals[FRICTION_WORK] - way * total(a.sums.work)
+    viscous = s.totals[VISCOUS_WORK] - way * c.damping * c.dt * total(a.sums.squares)
     while s.counts[STEP] < until_step and s.counts[CODE] == RUNNING:
         if lists.members[PENDING] > 0:
             queue_pending(s, a, c)
@@ -355,7 +353,7 @@ def advance(a: Active, s: State, out: Samples, c: Numerics, until_step: int) -> 
                 for strip in lists.strips[row, : lists.members[row]]:
                     moving += a.moving[strip]
         rest_all(a, c)
-        s.totals[ALONG] = along + way * total(a.sums, SUM_ALONG)
+        s.totals[ALONG] = along + way * total(a.sums.along)
         observe(1, moving, s, out, c)
-    s.totals[FRICTION_WORK] = friction + way * total(a.sums, SUM_WORK)
-    s.totals[VISCOUS_WORK] = viscous + way * c.damping * c.dt * total(a.sums, SUM_SQUARES)
+    s.totals[FRICTION_WORK] = friction + way * total(a.sums.work)
+    s.totals[VISCOUS_WORK] = viscous + way * c.damping * c.dt * total(a.sums.squares)

@@ -26,8 +26,6 @@ LANES = LINE  # blocks in a strip
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 NOTHING, CONTACT, CAVITY = 0.0, 1.0, 2.0  # Planes.kind
-# sums over all steps, LANES numbers each: m v / dt along the pull, its square, and its amount times friction
-SUM_ALONG, SUM_SQUARES, SUM_WORK, SUMS = 0, LANES, 2 * LANES, 3 * LANES
 
 
 class Planes(NamedTuple):
@@ -57,6 +55,14 @@ class Planes(NamedTuple):
     width: int
 
 
+class Sums(NamedTuple):
+    """Sums over all steps, one a lane: m v / dt along the pull, its square, and its amount times friction."""
+
+    along: FloatArray
+    squares: FloatArray
+    work: FloatArray
+
+
 def planes_of(state: State, numerics: Numerics, lattice: Lattice, pull: FloatArray) -> tuple[Planes, Layout]:
     """The blocks of a state, and where they lie. ``pull`` (n, 2): N/s on contact blocks, N on cavity blocks."""
     nx, ny = lattice.nx, lattice.ny
@@ -82,22 +88,21 @@ def planes_of(state: State, numerics: Numerics, lattice: Lattice, pull: FloatArr
     hold[inside] = np.where(moves, np.inf, np.where(contact, cells[:, k.FS], 2.0 * numerics.rest_force))
     again[inside], sliding[inside] = cells[:, k.FA], cells[:, k.FD]
     since[inside] = np.where(contact, cells[:, k.SINCE], np.inf)
-    edge, spare = _spare(lattice, numerics, inside, lanes)
+    edge, spare = _spare(lattice, numerics.stiffness)
     rows: Any = [*planes, place, edge, *spare, layout.width]
     return Planes(*rows), layout
 
 
-def _spare(
-    lattice: Lattice, numerics: Numerics, inside: NDArray[np.int64], lanes: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], FloatArray]:
+def _spare(lattice: Lattice, stiffness: float) -> tuple[NDArray[np.int64], FloatArray]:
     """``Planes.edge``, and the spare stiffness of the blocks of these strips; (3, 8 strips at free edges)."""
-    whole = np.zeros((3, int(lanes.max()) + 1))
-    whole[:, inside] = numerics.stiffness * spare_stiffness(lattice).T
-    by_strip = whole[:, lanes]
-    lacking = np.any(by_strip != 0.0, axis=(0, 2))
+    nx, ny = lattice.nx, lattice.ny
+    rows = np.zeros((ny, -(-nx // LANES) * LANES, 3))
+    rows[:, :nx] = stiffness * spare_stiffness(lattice).reshape(ny, nx, 3)
+    by_strip = rows.reshape(-1, LANES, 3)
+    lacking = by_strip.any(axis=(1, 2))
     edge = np.where(lacking, LANES * (np.cumsum(lacking) - 1), -1)
     spare = aligned(3, max(1, int(lacking.sum())) * LANES)
-    spare[:, : LANES * int(lacking.sum())] = by_strip[:, lacking].reshape(3, -1)
+    spare[:, : LANES * int(lacking.sum())] = by_strip[lacking].reshape(-1, 3).T
     return edge, spare
 
 
@@ -142,7 +147,7 @@ def forces(p: Planes, strips: IntArray, starts: BoolArray, c: Numerics, t: float
 
 
 @inner_vectorised
-def glides(p: Planes, strips: IntArray, calm: BoolArray, c: Numerics, sums: FloatArray) -> None:
+def glides(p: Planes, strips: IntArray, calm: BoolArray, c: Numerics, sums: Sums) -> None:
     """Move the cavity blocks of these gliding strips; ``calm`` of a strip, whether all of them may rest."""
     widest_vectors()
     copied_into_callers()
@@ -169,14 +174,14 @@ def glides(p: Planes, strips: IntArray, calm: BoolArray, c: Numerics, sums: Floa
             p.q_y[i] = y
             p.q_sum[i] = x + y
             p.q_gap[i] = x - y
-            sums[SUM_ALONG + lane] += a * c.direction_x + b * c.direction_y
-            sums[SUM_SQUARES + lane] += squares
+            sums.along[lane] += a * c.direction_x + b * c.direction_y
+            sums.squares[lane] += squares
         if calm[strips[m]] == loud:
             calm[strips[m]] = not loud
 
 
 @inner_vectorised
-def slides(p: Planes, strips: IntArray, moving: IntArray, c: Numerics, step: int, sums: FloatArray) -> None:
+def slides(p: Planes, strips: IntArray, moving: IntArray, c: Numerics, step: int, sums: Sums) -> None:
     """Friction and displacement of all blocks of these sliding strips; ``moving`` contact blocks of each.
 
     Driving force and damping change the velocity, then friction takes an impulse from it, which can stop a block within
@@ -219,9 +224,9 @@ def slides(p: Planes, strips: IntArray, moving: IntArray, c: Numerics, step: int
             p.q_y[i] = y
             p.q_sum[i] = x + y
             p.q_gap[i] = x - y
-            sums[SUM_ALONG + lane] += a * c.direction_x + b * c.direction_y
-            sums[SUM_SQUARES + lane] += length * length
-            sums[SUM_WORK + lane] += length * sliding
+            sums.along[lane] += a * c.direction_x + b * c.direction_y
+            sums.squares[lane] += length * length
+            sums.work[lane] += length * sliding
             p.p_x[i] = 0.0 if stops else a
             p.p_y[i] = 0.0 if stops else b
             p.pace[i] = 0.0 if stops else length
