@@ -214,6 +214,13 @@ def test_the_command_line_starts_without_the_heavy_libraries() -> None:
     assert seen.stdout.strip() == "[]"
 
 
+def test_tables_are_written_without_the_libraries_of_figures_and_diagnosis() -> None:
+    code = "import sys; from tribo.report import write_until; print([m for m in sys.argv[1:] if m in sys.modules])"
+    heavy = ["matplotlib", "xarray", "dask", "statsmodels", "scipy.stats", "numba", "typst", "tribo.diagnose"]
+    seen = subprocess.run([sys.executable, "-c", code, *heavy], capture_output=True, text=True, check=True)
+    assert seen.stdout.strip() == "[]"
+
+
 def test_units_are_converted_in_one_place_only() -> None:
     users = {room_of(m) for m in ROOMS if "import pint" in m.read_text(encoding="utf-8")}
     assert users <= {"quantities", "stages", "console"}

@@ -9,7 +9,8 @@ import pytest
 
 from tribo.records import Study
 from tribo.report import drawings
-from tribo.report.drawings import Drawing, draw_all, inline_svg
+from tribo.report.drawing_choices import Drawing
+from tribo.report.drawings import draw_all, inline_svg
 from tribo.store.kept_results import Shelf
 
 

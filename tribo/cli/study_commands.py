@@ -156,7 +156,7 @@ def diagnose(
     from tribo.campaign import open_campaign
     from tribo.report import write_until
     from tribo.report.card import card_of
-    from tribo.report.drawings import Drawing
+    from tribo.report.drawing_choices import Drawing
     from tribo.report.words.card_text import card_text
     from tribo.report.words.verdict_text import verdict_text
     from tribo.store.kept_results import Shelf
@@ -233,7 +233,7 @@ def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool
     from tribo import stages
     from tribo.campaign import open_campaign
     from tribo.report import write_until
-    from tribo.report.drawings import Drawing
+    from tribo.report.drawing_choices import Drawing
     from tribo.store.kept_results import Shelf
 
     stated = options.pop("stated")
@@ -291,8 +291,6 @@ def _conclude(
 
     from tribo.report import summary_text, table2_text
     from tribo.report.result_tables import fits_table
-    from tribo.report.words.card_text import card_text
-    from tribo.report.words.verdict_text import verdict_text
 
     set_aside = study.ingested.set_aside
     doubts = study.ingested.doubts()
@@ -312,16 +310,31 @@ def _conclude(
         "verdict": verdict.verdict if verdict else None,
         "card": card.as_dict() if card else None,
     }
-    words = [card_text(card)] if card else []
-    words += [table2_text(study)] if study.fits else []
+    table = [table2_text(study)] if study.fits else []
     looks = ["\n".join(lines) for lines in (study.power, study.outlying) if lines]
-    said = [verdict_text(verdict)] if verdict else []
-    console.result(record, "\n\n".join([*words, summary_text(study), *said, *looks]))
+    words = [*_card_words(card), *table, summary_text(study), *_verdict_words(verdict), *looks]
+    console.result(record, "\n\n".join(words))
     console.list_doubts(study.doubts)
     for note in study.notes:
         console.say(f"note: {note}", level=-1)
     console.list_tests("used with doubts", doubts)
     return console.status_after(set_aside)
+
+
+def _card_words(card: Card | None) -> list[str]:
+    if card is None:
+        return []
+    from tribo.report.words.card_text import card_text
+
+    return [card_text(card)]
+
+
+def _verdict_words(verdict: Verdict | None) -> list[str]:
+    if verdict is None:
+        return []
+    from tribo.report.words.verdict_text import verdict_text
+
+    return [verdict_text(verdict)]
 
 
 def _checked(

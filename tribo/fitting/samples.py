@@ -177,7 +177,7 @@ def lack_of_fit(rows: Rows, weight: FloatArray, lines: dict[str, LinearFit]) -> 
     The classical lack-of-fit ratio: weighted mean square of (cell mean - line) over that of the repeats about
     their cell mean; a cell is one specimen at one load. NaN without repeats or with two loads only.
     """
-    from scipy.stats import f as f_distribution
+    from scipy.special import fdtrc
 
     residual, cell, cells = [], [], 0
     for name, fit in lines.items():
@@ -197,7 +197,7 @@ def lack_of_fit(rows: Rows, weight: FloatArray, lines: dict[str, LinearFit]) -> 
     if repeat == 0:
         return float("nan"), ()
     ratio = float((count * mean**2).sum()) / dof_line / repeat
-    p = float(f_distribution.sf(ratio, dof_line, dof_repeat))
+    p = float(fdtrc(dof_line, dof_repeat, ratio))
     if p >= LACK_OF_FIT_LEVEL:
         return ratio, ()
     note = f"the load means deviate from a straight line: chi2_red {ratio:.2f}, p = {p:.1g}"

@@ -1,16 +1,19 @@
-"""campaign.nc: tables and traces of a study in one HDF5 file, readable by plain h5py and by xarray."""
+"""campaign.nc: tables and traces of a study in one HDF5 file, readable by plain h5py and by xarray.
+
+It is written by h5netcdf alone: xarray, and dask where that is installed, take a second to import.
+"""
 
 from __future__ import annotations
 
 import json
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-import xarray as xr
 
 from tribo.errors import failed_by_system
 from tribo.records import Study, Trace
@@ -19,7 +22,11 @@ from tribo.report.provenance import Provenance
 from tribo.store.hdf5_files import whole_hdf5
 
 if TYPE_CHECKING:
+    import h5netcdf
+
     from tribo.diagnose import Diagnosis
+
+Variable = tuple[str, np.ndarray, Mapping[str, Any]]  # dimension, values along it, attributes
 
 # How the end of a column name says its unit; the longest ending wins.
 UNIT_ENDINGS = {
@@ -32,6 +39,26 @@ OF_DIAGNOSIS = ("/residuals", "/extended_runs")  # groups that a diagnosis rewri
 OF_A_TEST = ("test_id", "sample", "specimen", "normal_load_N")  # what identifies a test in the dataset at the root
 _PLAIN_NUMBER = re.compile(r"-?(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d{1,2})?")  # 001 is a name
 UNITLESS = {"mu": "1", "mu_u": "1", "ratio": "1", "ratio_low": "1", "ratio_high": "1", "cov": "kPa"}
+
+
+@dataclass(frozen=True)
+class Group:
+    """A group of the file: variables of one dimension each, by name, and attributes of the group."""
+
+    variables: Mapping[str, Variable]
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+    def about(self, **more: Any) -> Group:
+        """The same with more attributes."""
+        return replace(self, attributes={**self.attributes, **more})
+
+    def with_coordinates(self, names: tuple[str, ...]) -> Group:
+        """The same with these variables as coordinates of all others (CF conventions 5)."""
+        coordinates = {"coordinates": " ".join(names)}
+        return replace(self, variables={
+            name: (dimension, values, attributes if name in names else {**attributes, **coordinates})
+            for name, (dimension, values, attributes) in self.variables.items()
+        })  # fmt: skip
 
 
 def unit_of(column: str) -> str | None:
@@ -54,7 +81,7 @@ def write_store(
     diagnosis: Diagnosis | None = None,
     keep_earlier: bool = False,
 ) -> Path:
-    """Write out/campaign.nc, a DataTree with the groups tests, fits, comparison, simulated and traces.
+    """Write out/campaign.nc, with the groups tests, fits, comparison, simulated and traces.
 
     The root holds the table of tests as well, so that ``xarray.open_dataset`` gives it without a word on groups.
 
@@ -81,7 +108,7 @@ def write_store(
         about["provenance"] = json.dumps(provenance.as_record(), ensure_ascii=False, default=str)
     tests, own = result_tables.tests_table(study), result_tables.covariates(study)
     table = _table(tests, "test", own)
-    groups = {"/": table.set_coords(OF_A_TEST).assign_attrs(about), "/tests": table}
+    groups = {"/": table.with_coordinates(OF_A_TEST).about(**about), "/tests": table}
     groups["/traces"] = _ragged(study)
     if study.fits:
         groups["/fits"] = _table(result_tables.fits_table(study.fits, study.combined), "fit")
@@ -89,8 +116,8 @@ def write_store(
     if study.budget is not None:
         groups["/budget"] = _table(study.budget, "budget_row")
     if study.comparison is not None:
-        groups["/comparison"] = _table(result_tables.comparison_table(study), "comparison_row")
-        groups["/comparison"].attrs["flat"] = study.comparison.flat
+        compared = _table(result_tables.comparison_table(study), "comparison_row")
+        groups["/comparison"] = compared.about(flat=study.comparison.flat)
     if study.simulated is not None:
         groups["/simulated"] = _table(study.simulated, "run")
     if diagnosis is not None:
@@ -99,36 +126,69 @@ def write_store(
     if keep_earlier:
         renewed = OF_DIAGNOSIS if diagnosis is not None else ()
         groups = {name: group for name, group in _earlier(path).items() if name not in renewed} | groups
-    with whole_hdf5(path) as file:
-        xr.DataTree.from_dict(groups).to_netcdf(file, engine="h5netcdf")
+    _write(path, groups)
     return path
 
 
-def _earlier(path: Path) -> dict[str, xr.Dataset]:
+def _write(path: Path, groups: Mapping[str, Group]) -> None:
+    import h5netcdf
+
+    with whole_hdf5(path) as held, h5netcdf.File(held, "w") as file:
+        for name, group in groups.items():
+            _fill(file if name == "/" else file.create_group(name), group)
+
+
+def _fill(place: h5netcdf.Group, group: Group) -> None:
+    """Dimensions, variables and attributes of one group; NaN is the missing value of every floating-point number."""
+    place.dimensions = {dimension: len(values) for dimension, values, _ in group.variables.values()}
+    for name, (dimension, values, attributes) in group.variables.items():
+        missing = np.nan if values.dtype.kind == "f" else None
+        variable = place.create_variable(name, (dimension,), _stored_type(values), values, fillvalue=missing)
+        variable.attrs.update(attributes)
+    place.attrs.update(group.attributes)
+
+
+def _stored_type(values: np.ndarray) -> Any:
+    import h5py
+
+    return h5py.string_dtype() if values.dtype.kind == "O" else values.dtype
+
+
+def _earlier(path: Path) -> dict[str, Group]:
     """The groups of a file that is there, but the root; none where it is damaged."""
+    import h5netcdf
+
     try:
-        with xr.open_datatree(path, engine="h5netcdf") as tree:
-            return {f"/{node.name}": node.to_dataset(inherit=False).load() for node in tree.children.values()}
-    except (OSError, ValueError) as why:
+        with h5netcdf.File(path, "r", decode_vlen_strings=True) as file:
+            return {f"/{name}": _read(place) for name, place in file.groups.items()}
+    except (OSError, ValueError, KeyError, RuntimeError) as why:  # h5py on damaged files
         if failed_by_system(why):
             raise
         return {}
 
 
-def _diagnosed(diagnosis: Diagnosis) -> dict[str, xr.Dataset]:
+def _read(place: h5netcdf.Group) -> Group:
+    variables = {
+        name: (variable.dimensions[0], variable[...], {k: v for k, v in variable.attrs.items() if k != "_FillValue"})
+        for name, variable in place.variables.items()
+    }
+    return Group(variables, dict(place.attrs.items()))
+
+
+def _diagnosed(diagnosis: Diagnosis) -> dict[str, Group]:
     from tribo.diagnose import residual_table
 
     residuals, runs = OF_DIAGNOSIS
     groups = {residuals: _table(residual_table(diagnosis), "residual_row")}
     if diagnosis.simulated is not None:
-        groups[runs] = _table(diagnosis.simulated.table, "pair")
-        groups[runs].attrs["mechanisms"] = ", ".join(diagnosis.simulated.mechanisms)
+        pairs = _table(diagnosis.simulated.table, "pair")
+        groups[runs] = pairs.about(mechanisms=", ".join(diagnosis.simulated.mechanisms))
     return groups
 
 
-def _table(frame: pd.DataFrame, dimension: str, covariates: Iterable[str] = ()) -> xr.Dataset:
+def _table(frame: pd.DataFrame, dimension: str, covariates: Iterable[str] = ()) -> Group:
     """A table as variables of one dimension; texts of ``covariates`` become numbers where all are written as such."""
-    variables: dict[str, Any] = {}
+    variables: dict[str, Variable] = {}
     for name in frame.columns:
         safe = stem = re.sub(r"[/\s\0]+", "_", str(name)).strip(".") or "unnamed"
         number = 2
@@ -136,7 +196,7 @@ def _table(frame: pd.DataFrame, dimension: str, covariates: Iterable[str] = ()) 
             safe, number = f"{stem}_{number}", number + 1
         values = _values(frame[name], as_numbers=name in covariates)
         variables[safe] = (dimension, values, _units(str(name)))
-    return xr.Dataset(variables)
+    return Group(variables)
 
 
 def _values(column: pd.Series, as_numbers: bool = False) -> np.ndarray:
@@ -153,7 +213,7 @@ def _values(column: pd.Series, as_numbers: bool = False) -> np.ndarray:
     return column.fillna("").astype(str).to_numpy(object)
 
 
-def _ragged(study: Study) -> xr.Dataset:
+def _ragged(study: Study) -> Group:
     traces = study.ingested.traces
     sizes = np.array([len(t.time_s) for t in traces.values()], np.int64)
     names = list(dict.fromkeys(name for t in traces.values() for name in t.columns))
@@ -161,15 +221,15 @@ def _ragged(study: Study) -> xr.Dataset:
     if any(t.displacement_m is not None for t in traces.values()):
         data["displacement_m"] = _joined(traces, "displacement_m")
     data |= {name: _joined(traces, name) for name in names if name not in data}
-    variables = {name: ("sample", values, _units(name)) for name, values in data.items()}
+    variables: dict[str, Variable] = {name: ("sample", values, _units(name)) for name, values in data.items()}
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64) if len(sizes) else sizes
-    per_test = {
+    per_test: dict[str, Variable] = {
         "test_id": ("trace", np.array(list(traces), object), {"cf_role": "timeseries_id"}),
         "file": ("trace", np.array([t.file for t in traces.values()], object), {}),
         "row_size": ("trace", sizes, {"sample_dimension": "sample"}),
         "row_start": ("trace", starts, {}),
     }
-    return xr.Dataset({**per_test, **variables}, attrs={"featureType": "timeSeries"})
+    return Group({**per_test, **variables}, {"featureType": "timeSeries"})
 
 
 def _joined(traces: Mapping[str, Trace], name: str) -> np.ndarray:

@@ -6,7 +6,7 @@ import base64
 import logging
 import re
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import metadata
@@ -24,6 +24,7 @@ from tribo.figures.record import FigureOf
 from tribo.figures.style import as_svg, house_style
 from tribo.forked import each
 from tribo.records import Study
+from tribo.report.drawing_choices import DRAWING, Drawing, Keep
 from tribo.report.html.hover import Series, series_of
 from tribo.report.paper.typeset import figure_files
 from tribo.report.result_tables import to_csv
@@ -32,8 +33,6 @@ from tribo.store.whole_files import write_bytes
 if TYPE_CHECKING:
     from tribo.diagnose import Diagnosis
 
-Progress = Callable[[str, int, int], None]
-Keep = Callable[[str, object, Callable[[], Any], Iterable[str]], Any]
 OF_STRAIGHT_LINES = ("fig4", "fig6", "fig7", "fig8")  # without the model, "forces" shows the law chosen by the data
 STAGE = "drawing figures"
 DRAWN_BY = ("figures", "report/drawings", "report/html/hover")
@@ -45,26 +44,6 @@ THEME = {
     r"#([2-8][0-9a-f])\2\2": "var(--soft)",  # greys of lettering
     r"#([c-e][0-9a-f])\2\2": "var(--line)",
 }
-
-
-def make_anew(name: str, made_from: object, make: Callable[[], Any], rooms: Iterable[str]) -> Any:
-    """Keep nothing."""
-    return make()
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """How figures are drawn: where the progress is reported, and in how many processes they are drawn.
-
-    ``keep`` (:meth:`tribo.store.kept_results.Shelf.take`) avoids redrawing a figure whose numbers have not changed.
-    """
-
-    progress: Progress | None = None
-    jobs: int = 1
-    keep: Keep = make_anew
-
-
-DRAWING = Drawing()
 
 
 @dataclass(frozen=True)

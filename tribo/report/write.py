@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from tribo.diagnose.diagnosis_record import Alone, Diagnosis
 from tribo.records import Study
 from tribo.report.campaign_nc import write_store
-from tribo.report.card import Card, card_of, write_card
-from tribo.report.diagnosis_csv import write_diagnosis_tables
-from tribo.report.discovery_files import law_texts
-from tribo.report.drawings import DRAWING, Drawing, Progress, write_figures
+from tribo.report.drawing_choices import DRAWING, Drawing, Progress
 from tribo.report.provenance import (
     Provenance,
     file_hash,
@@ -23,9 +19,12 @@ from tribo.report.provenance import (
     write_provenance,
 )
 from tribo.report.result_tables import write_tables
-from tribo.report.verdict_file import write_verdict
 from tribo.store.own_folder import own_folder
 from tribo.store.whole_files import write_bytes, write_text
+
+if TYPE_CHECKING:
+    from tribo.diagnose.diagnosis_record import Alone, Diagnosis
+    from tribo.report.card import Card
 
 
 def write_until(
@@ -51,22 +50,24 @@ def write_until(
     keep_earlier = before is not None and until != "report" and same_origin(before, made_by) and _is_as_recorded(
         out / "campaign.nc", before
     )
-    modelled = diagnosis if isinstance(diagnosis, Diagnosis) else None
+    modelled = _with_model(diagnosis)
     written = [*write_tables(study, out), write_store(study, out, made_by, modelled, keep_earlier)]
     if verdict is not None:
+        from tribo.report.verdict_file import write_verdict
+
         written.append(write_verdict(verdict, out))
-    if modelled is not None and modelled.laws is not None:
-        laws = law_texts(modelled.laws, study.ingested.campaign.title)
-        written += [write_text(out / name, text) for name, text in laws.items()]
     if modelled is not None:
-        written += write_diagnosis_tables(modelled, out)
+        written += _write_diagnosed(modelled, study.ingested.campaign.title, out)
     if until in ("compare", "report") or diagnosis is not None:
+        from tribo.report.drawings import write_figures
+
         shown = study if until in ("compare", "report") else None
         drawn = write_figures(shown, out, modelled, made_by.origin, drawing)
         written += [out / "figures" / f"{f.name}.{ending}" for f in drawn.values() for ending in f.files]
-    if card is None and until == "report":
-        card = card_of(study, verdict)
-    if card is not None:
+    if card is not None or until == "report":
+        from tribo.report.card import card_of, write_card
+
+        card = card or card_of(study, verdict)
         written.append(write_card(card, out))
     if until == "report":
         from tribo.report.content import content
@@ -79,6 +80,23 @@ def write_until(
         written.append(write_bytes(out / "report.pdf", pdf_of(said, drawn, made_by.origin)))
         written.append(write_crate(study, out, made_by, written))
     write_provenance(made_by, out, settle_outputs(out, before, made_by, written, complete=until == "report"))
+
+
+def _with_model(diagnosis: Diagnosis | Alone | None) -> Diagnosis | None:
+    if diagnosis is None:
+        return None
+    from tribo.diagnose.diagnosis_record import Diagnosis
+
+    return diagnosis if isinstance(diagnosis, Diagnosis) else None
+
+
+def _write_diagnosed(diagnosis: Diagnosis, title: str, out: Path) -> list[Path]:
+    """The tables of a diagnosis, and the laws that were found, if any."""
+    from tribo.report.diagnosis_csv import write_diagnosis_tables
+    from tribo.report.discovery_files import law_texts
+
+    laws = law_texts(diagnosis.laws, title) if diagnosis.laws is not None else {}
+    return [*(write_text(out / name, text) for name, text in laws.items()), *write_diagnosis_tables(diagnosis, out)]
 
 
 def _is_as_recorded(path: Path, record: Mapping[str, Any]) -> bool:
