@@ -96,9 +96,9 @@ def simulate(
     """
     from tribo.mechanisms_in_model import columns_from, parse_given, parse_with
     from tribo.simulate.design_file import asked_runs, described_by_options, read_design, together
-    from tribo.simulate.run import simulate as run_model
     from tribo.simulate.results_file import ENSEMBLE, ONE_RUN, kind_of
     from tribo.simulate.resume import continues, run_stored
+    from tribo.simulate.run import simulate as run_model
     from tribo.store.own_file import check_file, only_writer_of
 
     scheduler, seed, jobs = (options.pop(name) for name in ("scheduler", "seed", "jobs"))

@@ -79,7 +79,6 @@ from tribo.simulate.engines.team import (
 )
 from tribo.simulate.friction import static_threshold
 
-
 MANY = 64  # strips; an order costs about as much as the forces of 20 strips in the cache
 
 

@@ -1,7 +1,7 @@
 """Threads that share the strips of a large lattice: each works on the strips that lie in its part of the lattice.
 
-One thread leads: it keeps the lists of strips, and alone moves strips from one to another. For the forces, and again for
-the motion, it gives an order, works on its own part and waits until the others have done theirs. Within an order no
+One thread leads: it keeps the lists of strips, and alone moves strips from one to another. For the forces, and again
+for the motion, it gives an order, works on its own part and waits until the others have done theirs. Within an order no
 block is written by two threads, and none is read by one while another writes it. The lattice is cut into the same
 :data:`SHARES` whatever the number of threads, and each share has sums of its own, so that the result does not depend
 on how many threads there are.
