@@ -162,7 +162,8 @@ def _pair(piece: Piece) -> dict[str, Any]:
     d = examine(as_ingested(hidden.bench, piece.seed, kept), seed=piece.seed)
     found = searched_laws(d, seed=piece.seed)
     if not found.laws:
-        return {"answer": "no law found", "verdict": d.verdict.verdict, "causes": [c.mechanism for c in d.verdict.causes]}
+        causes = [c.mechanism for c in d.verdict.causes]
+        return {"answer": "no law found", "verdict": d.verdict.verdict, "causes": causes}
     seed = seed_of(piece.seed, "next", 0)
     same = piece.second == piece.form
     later = hide_law(seed, piece.second, piece.seed if same else None)
