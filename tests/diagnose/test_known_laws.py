@@ -11,8 +11,9 @@ from blind.tribometer import hide
 
 from tribo.diagnose.diagnosis import examine
 from tribo.diagnose.discovery.contested import without_wrong_forms
+from tribo.diagnose.discovery.held import holds
 from tribo.diagnose.discovery.in_verdict import with_laws
-from tribo.diagnose.discovery.known_laws import read_laws, try_laws
+from tribo.diagnose.discovery.known_laws import KnownLaw, read_laws, try_laws
 from tribo.diagnose.discovery.law_file import law_text
 from tribo.diagnose.discovery.planned_law import plan_law
 from tribo.diagnose.discovery.written_law import Shape, WrittenLaw
@@ -24,7 +25,7 @@ from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model import columns_from, with_law
 from tribo.simulate.config import SimConfig
 
-from .known import baseline, made
+from .known import Change, baseline, made
 from .synthetic import SMALL, ingested
 
 WARM = WrittenLaw((Shape("linear", "temperature_C", 20.0, 26.0),))
@@ -69,6 +70,34 @@ def test_a_verdict_lists_the_answers_about_known_laws(folder: Path) -> None:
     assert all(layer.kind == "pattern_correction" for layer in quiet.verdict.layers)
 
 
+STEP = WrittenLaw((Shape("step", "temperature_C", 20.0, 26.0, place=23.0),))
+
+
+def stepped(s: Setup) -> np.ndarray:
+    t = s.observations.conditions.temperature_C
+    return np.repeat(0.3 * (t > 23.0)[:, None], 2, axis=1)
+
+
+@pytest.mark.parametrize(("at_work", "a", "answer"), [(stepped, 0.3, "held"), (warming, 0.16, "not held")])
+def test_a_known_law_replaces_a_cause_of_its_column_unless_that_explains_more(
+    at_work: Change, a: float, answer: str
+) -> None:
+    model = refitted(baseline(made(at_work, seed=31)), [Acting(MECHANISMS["temperature"])])
+    known = KnownLaw("law-1.toml", "first", STEP, {"a": Estimate(a, a - 0.04, a + 0.04, "")})
+    tested = try_laws(model, [known], np.random.default_rng(0))
+    assert tested.answers[0][1].answer == answer
+    left = {a.name for a in tested.model.acting}
+    assert ("temperature" in left) == (answer == "not held")
+    assert ("temperature" in tested.replaced) == (answer == "held")
+
+
+def test_the_form_of_a_known_law_may_be_wrong_by_some_of_its_effect() -> None:
+    model = baseline(made(stepped, seed=31))
+    sizes = (0.3, 0.39, 0.5)
+    answers = [holds(model, STEP, {"a": Estimate(a, a - 1e-6, a + 1e-6, "")}).answer for a in sizes]
+    assert answers == ["held", "held", "not held"]
+
+
 def test_every_faulty_law_of_a_folder_is_named(folder: Path) -> None:
     (folder / "law-3.toml").write_text("x = 1")
     (folder / "law-4.toml").write_text("y = [")
@@ -88,6 +117,18 @@ def test_a_mechanism_whose_form_is_wrong_loses_against_a_law_of_its_column() -> 
     right = refitted(baseline(made(warming, seed=33)), [temperature])
     assert set(without_wrong_forms(wrong)[1]) == {"temperature"}
     assert without_wrong_forms(right)[1] == {}
+
+
+def test_a_cause_that_follows_one_name_of_a_column_loses_against_a_law_of_that_name_on_some_samples() -> None:
+    def by_op2(s: Setup, where: np.ndarray) -> np.ndarray:
+        here = (s.observations.conditions.columns["operator"] == "op2") & where
+        return np.repeat(0.3 * here[:, None], 2, axis=1)
+
+    one_name = [Acting(MECHANISMS["covariate"], "operator is op2")]
+    everywhere = made(lambda s: by_op2(s, np.ones(s.observations.n, bool)), seed=33)
+    patterned = made(lambda s: by_op2(s, s.observations.conditions.area_fraction < 1.0), seed=33)
+    assert without_wrong_forms(refitted(baseline(everywhere), one_name))[1] == {}
+    assert set(without_wrong_forms(refitted(baseline(patterned), one_name))[1]) == {"covariate:operator"}
 
 
 def test_a_plan_says_whether_a_design_would_show_a_law() -> None:

@@ -145,7 +145,7 @@ class Mechanism:
 
     def column(self, choice: str = "") -> str:
         """The recorded column or columns that it follows."""
-        return self.choosing.column or choice or ", ".join(self.needs)
+        return self.choosing.column or self.choosing.label(choice) or choice or ", ".join(self.needs)
 
     def on_test(self, values: Values, choice: str, conditions: Conditions, test: int) -> OnTest | None:
         """How it acts on one test; None where the choice does not concern that test."""
