@@ -32,6 +32,14 @@ class ModelColumns:
     parameters: int
     tests_of: tuple[NDArray[np.int64], ...]
 
+    @property
+    def specimen(self) -> NDArray[np.int64]:
+        """The number of the specimen of every test, (n,)."""
+        found = np.empty(len(self.own), np.int64)
+        for k, tests in enumerate(self.tests_of):
+            found[tests] = k
+        return found
+
     def vector(self, own: FloatArray, border: FloatArray) -> FloatArray:
         """Values of specimens (r, S, 4) and of the border (r, m) in one order: parameters, specimens, shared."""
         p = self.parameters
@@ -103,9 +111,9 @@ class Weighted:
     def with_residual(self, residual: FloatArray) -> Sides:
         """Products with the residual (r, 2, n) of each replicate: (r, S, 4) and (r, m)."""
         by_test = residual.transpose(0, 2, 1)
-        each = np.einsum("rnik,rni->rnk", self.own, by_test, optimize=True)
+        each = np.einsum("rnik,rni->rnk", self.own, by_test)
         own = np.stack([each[:, tests].sum(axis=1) for tests in self.columns.tests_of], axis=1)
-        return own, np.einsum("rnik,rni->rk", self.border, by_test, optimize=True)
+        return own, (self.flat_border @ by_test.reshape(len(residual), -1, 1))[..., 0]
 
 
 def weighted_columns(columns: ModelColumns, precision: FloatArray) -> Weighted:
@@ -190,10 +198,12 @@ class Inverse:
 
     def solution(self, own: FloatArray, border: FloatArray) -> Sides:
         """Coefficients for right sides (r, S, 4) and (r, m)."""
-        right = border - np.einsum("rsam,rsa->rm", self.across, own, optimize=True)
-        shared = np.einsum("rmk,rk->rm", self.border, right)
-        alone = np.einsum("rsab,rsb->rsa", self.own, own, optimize=True)
-        return alone - np.einsum("rsam,rm->rsa", self.across, shared, optimize=True), shared
+        r, specimens, _, m = self.across.shape
+        wide = self.across.reshape(r, 4 * specimens, m)
+        right = border - (own.reshape(r, 1, -1) @ wide)[:, 0]
+        shared = self.border @ right[..., None]
+        alone = (self.own @ own[..., None])[..., 0]
+        return alone - (wide @ shared).reshape(own.shape), shared[..., 0]
 
     @property
     def variances(self) -> Sides:
@@ -203,15 +213,15 @@ class Inverse:
 
     def spread(self, columns: ModelColumns) -> FloatArray:
         """Variance of what the model predicts for every test: static, mixed and sliding entries, (r, 3, n)."""
-        found = np.empty((len(self.own), 3, len(columns.own)))
-        for k, tests in enumerate(columns.tests_of):
-            own = columns.own[tests]
-            free = columns.border[tests] - np.tensordot(own, self.across[:, k], axes=(2, 1)).transpose(2, 0, 1, 3)
-            moved = free @ self.border[:, None]
-            alone = np.tensordot(own, self.own[:, k], axes=(2, 1)).transpose(2, 0, 1, 3)
-            for i, (a, b) in enumerate(((0, 0), (0, 1), (1, 1))):
-                shared = np.sum(moved[:, :, a] * free[:, :, b], axis=2)
-                found[:, i, tests] = shared + np.sum(alone[:, :, a] * own[:, b], axis=2)
+        r, (n, _, m) = len(self.own), columns.border.shape
+        specimen = columns.specimen
+        free = columns.border - columns.own @ self.across[:, specimen]
+        moved = (free.reshape(r, 2 * n, m) @ self.border).reshape(free.shape)
+        alone = columns.own @ self.own[:, specimen]
+        found = np.empty((r, 3, n))
+        for i, (a, b) in enumerate(((0, 0), (0, 1), (1, 1))):
+            found[:, i] = np.einsum("rnm,rnm->rn", moved[:, :, a], free[:, :, b])
+            found[:, i] += np.einsum("rnm,nm->rn", alone[:, :, a], columns.own[:, b])
         return found
 
     def between(self, columns: ModelColumns, specimen: NDArray[np.int64]) -> FloatArray:
