@@ -4,6 +4,7 @@
 #   make docs    the documentation, into out/docs; warnings are errors, internal links are checked
 #   make blind   campaigns with hidden effects, about an hour on two cores; continues a run that was stopped
 #   make blind-laws   campaigns with hidden laws, about half an hour on two cores; continues a run that was stopped
+#   make blind-layers causes on top of wrong patterns, three causes, next tests; about 1.5 hours on one core
 #   make mutants 300 changes of the code at random, each tried against the quick tests; about two hours; continues too
 #   make release the wheel and the source archive in dist/, tried outside of the checkout; see SECURITY.md
 #   make hashes  the pins with hashes anew, after a change of constraints.txt; needs a connection
@@ -14,7 +15,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
-.PHONY: demo test lint types pytest docs links bench blind blind-laws mutants release hashes audit torture clean
+.PHONY: demo test lint types pytest docs links bench blind blind-laws blind-layers mutants release hashes audit torture clean
 
 $(VENV)/.run: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -60,6 +61,9 @@ blind: $(VENV)/.dev
 
 blind-laws: $(VENV)/.dev
 	$(BIN)/python benchmarks/blind_laws.py run out/blind-laws.jsonl
+
+blind-layers: $(VENV)/.dev
+	$(BIN)/python benchmarks/blind_layers.py run out/blind-layers.jsonl
 
 $(VENV)/.mutants: $(VENV)/.dev
 	$(PIP) -e '.[mutants]'

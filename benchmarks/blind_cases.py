@@ -32,6 +32,7 @@ from blind.tribometer import EFFECTS, LARGEST, Design, hide, write
 
 if TYPE_CHECKING:
     from tribo.diagnose.diagnosis import Diagnosis
+    from tribo.diagnose.statistics.model import Setup
     from tribo.records import Ingested
 
 SPEEDS, HOLDS = (0.06, 0.2, 0.7), (3.0, 30.0, 600.0)
@@ -51,6 +52,7 @@ PAIRS = (
 REPRESENTATIVE = ("suction", "run_in", "contact_area_loss", "pattern_geometry", "cavity_shear_deformation")
 FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0)
 SLOPES = (0.0, 0.02, 0.04, 0.06)
+EXACT = {"repeat_sd": (1e-6, 1e-6), "specimen_sd": 1e-9, "specimen_slope": 0.0}
 IN_FILES = 5  # one campaign in so many goes through raw files and the reader
 Effects = tuple[tuple[str, float], ...]
 Cell = tuple[str, Effects, dict[str, Any]]
@@ -234,8 +236,25 @@ def true_parameter(name: str, size: float) -> dict[str, float]:
         "contact_ageing": ("b", per_efold / (1 + per_efold * math.log(1 / 0.79))), "run_in": ("c", 0.237 * size),
         "temperature": ("c", 43.4e3 * size / 8.314 / 296.0**2), "edge_adhesion": ("e", 0.0847 * size),
         "covariate:operator": ("g", math.log(1 + 0.117 * size)), "load_cell_offset": ("F_0", 0.113 * size),
+        "cavity_shear_deformation": ("d", math.log(1 + 0.277 * size) / math.log(200 / 40)),
+        "tilt": ("h_over_L", 0.0187 * size),
     }  # fmt: skip
     return {truths[name][0]: truths[name][1]} if name in truths else {}
+
+
+def true_corrections(case: Case, s: Setup) -> dict[tuple[str, str], float]:
+    """What every patterned sample is over the model at the true flat law, in percent: geometric mean over its tests."""
+    from tribo.diagnose.statistics.model import predict
+
+    exact = hide(case.seed, list(case.effects), replace(case.design, **EXACT))
+    order = [list(exact.tests.test_id).index(name) for name in s.observations.test_ids]
+    true = np.log(np.column_stack([exact.static, exact.sliding]))[order]
+    wrong_by = true - predict(s, np.array(exact.law), (), ())
+    sample = s.observations.conditions.sample
+    return {
+        (name, regime): 100.0 * float(np.expm1(wrong_by[sample == name, k].mean()))
+        for name in set(sample.tolist()) for k, regime in enumerate(("static", "sliding"))
+    }  # fmt: skip
 
 
 def gain_of_the_best(d: Diagnosis, seed: int) -> list[float]:

@@ -10,38 +10,29 @@ from __future__ import annotations
 
 import argparse
 from collections import defaultdict
-from dataclasses import replace
 
-from blind_cases import design_for
+from blind_cases import Case, design_for, true_corrections
 
 import numpy as np  # after blind_cases, which says how many threads it may use  # isort: skip
 from blind.direct import ingested  # isort: skip
 from blind.tribometer import hide  # isort: skip
 
 from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.model import predict, setup
+from tribo.diagnose.statistics.model import setup
 from tribo.diagnose.statistics.observations import observe
 from tribo.diagnose.statistics.pattern_correction import pattern_corrections
 from tribo.diagnose.statistics.predictor import tabled_predictor
 
 FACTORS = (0.5, 1.0, 1.5, 2.0, 3.0)
-EXACT = {"repeat_sd": (1e-6, 1e-6), "specimen_sd": 1e-9, "specimen_slope": 0.0}
 
 
 def held(seed: int, factor: float) -> list[bool]:
     """Whether each correction of one campaign holds its drawn error."""
-    design = design_for(pattern_error=factor, specimen_slope=0.03)
-    exact = hide(seed, [], replace(design, **EXACT))
-    o = observe(ingested(hide(seed, [], design), seed))
+    case = Case("corrections", seed, (), design_for(pattern_error=factor, specimen_slope=0.03))
+    o = observe(ingested(hide(seed, [], case.design), seed))
     s = setup(o, tabled_predictor(o.patterns))
-    order = [list(exact.tests.test_id).index(name) for name in o.test_ids]
-    true = np.log(np.column_stack([exact.static, exact.sliding]))[order]
-    wrong_by = true - predict(s, np.array(exact.law), (), ())
-    found = []
-    for c in pattern_corrections(fit(s)):
-        here = wrong_by[o.conditions.sample == c.sample, ("static", "sliding").index(c.regime)]
-        found.append(bool(c.mean.low <= 100 * np.expm1(here.mean()) <= c.mean.high))
-    return found
+    truth = true_corrections(case, s)
+    return [c.mean.low <= truth[c.sample, c.regime] <= c.mean.high for c in pattern_corrections(fit(s))]
 
 
 def main() -> None:

@@ -204,6 +204,7 @@ class Campaign:
     contact: str = ""  # as stated: sled, pin_on_disc, ball_on_disc, ring_shear, reciprocating or rotary
     material_class: str = ""  # as stated: elastomer, polymer, metal, ceramic, lubricated or granular
     plausible: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # bounds stated in place of the usual
+    measured: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # amplitude of a mechanism, and its u
     inputs: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @property

@@ -19,6 +19,7 @@ AREA_MM2 = 55.0
 GRAVITY = 9.80665
 STIFFNESS_N_PER_MM = 6.0
 Noise = Literal["relative", "absolute", "heavy", "unequal"]
+Shares = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,9 @@ class Design:
 
     ``repeat_sd`` (static, sliding) and ``specimen_sd`` are standard deviations of ln T, ``specimen_slope`` is the
     standard deviation of a specimen's slope per e-fold of load. ``pattern_error`` multiplies ``error_sizes``, which
-    stand for every pattern that they do not name. ``missing`` is the share of tests that were never made.
+    stand for every pattern that they do not name. ``missing`` is the share of tests that were never made. With
+    ``measured_shares`` each pattern lies half way, in ln T, from the engine to a measured one: coefficient and adhesion
+    over those of the flat sample, static then sliding.
     """
 
     samples: tuple[str, ...] = ("F", "A", "B", "C", "Sx", "Sy")
@@ -44,6 +47,7 @@ class Design:
     pattern_error: float = 1.0
     pattern_draw: Draw = "uniform"
     error_sizes: Mapping[str, ErrorSize] = field(default_factory=dict)
+    measured_shares: Mapping[str, Shares] = field(default_factory=dict)
 
     def sizes(self) -> dict[str, ErrorSize]:
         """The size of the pattern error of every sample with cavities."""
@@ -64,6 +68,7 @@ class Bench:
     tests: pd.DataFrame
     law: tuple[float, float, float, float]
     errors: Mapping[str, np.ndarray]
+    measured_shares: Mapping[str, Shares] = field(default_factory=dict)
     static: np.ndarray = field(init=False)
     sliding: np.ndarray = field(init=False)
     zero: np.ndarray = field(init=False)
@@ -86,7 +91,17 @@ class Bench:
         mu, tau_kPa = np.array(self.law).reshape(2, 2).T
         flat = load[:, None] * mu + tau_kPa * AREA_MM2 * 1e-3
         ratio = engine_ratio(samples, pressure_Pa) * error_gain(self.errors, samples, pressure_Pa)
-        return np.asarray(flat * ratio)
+        return np.asarray(flat * ratio * self._half_way(load, samples, ratio))
+
+    def _half_way(self, load: np.ndarray, samples: list[str], ratio: np.ndarray) -> np.ndarray:
+        """Root of the measured ratio to the flat sample over ``ratio``, shape (n, 2); one where none was measured."""
+        if not self.measured_shares:
+            return np.ones_like(ratio)
+        shares = np.array([self.measured_shares.get(s, (1.0, 1.0, 1.0, 1.0)) for s in samples]).reshape(-1, 2, 2)
+        parts = np.stack([np.outer(load, self.law[::2]), np.full((len(load), 2), self.law[1::2]) * AREA_MM2 * 1e-3], 2)
+        measured = np.sum(shares * parts, axis=2) / np.sum(parts, axis=2)
+        there = np.array([[s in self.measured_shares] for s in samples])
+        return np.where(there, np.sqrt(measured / ratio), 1.0)
 
     def adhesion_N(self) -> np.ndarray:
         """The part of each baseline force that does not grow with the load, shape (n, 2)."""

@@ -8,6 +8,7 @@ files (``tribometer.write``) instead.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +30,12 @@ def pattern_of(sample: str) -> Pattern:
     return Pattern(sample[0], shape, (x * 1e-6, y * 1e-6), (pitch_x * 1e-6, pitch_y * 1e-6), shape == "rectangle")
 
 
+def _removed(row: Any) -> dict[str, str]:
+    """The column ``without`` of tests.csv, where a campaign has it."""
+    removed = getattr(row, "without", None)
+    return {"without": removed} if isinstance(removed, str) else {}
+
+
 def ingested(bench: Bench, seed: int = 0) -> Ingested:
     """The campaign as it looks once its exports are read."""
     rng = np.random.default_rng(seed)
@@ -38,7 +45,7 @@ def ingested(bench: Bench, seed: int = 0) -> Ingested:
             row.test_id, f"raw/{row.test_id}.csv", row.sample, row.N, row.specimen, row.direction,
             row.speed_mm_s * 1e-3, row.hold_s, row.repeat, row.run_order, row.specimen_run, row.started_at,
             row.temperature_C, row.humidity_pct, row.operator, correction=Correction(speed_m_s=row.speed_mm_s * 1e-3),
-            load_from="mass_g", mass_kg=row.mass_g * 1e-3,
+            load_from="mass_g", mass_kg=row.mass_g * 1e-3, covariates=_removed(row),
         )  # fmt: skip
         tests.append(test)
         stiffness = float(bench.stiffness_N_per_mm[k]) * 1e3 * np.exp(0.05 * rng.normal())

@@ -10,11 +10,16 @@ TOGETHER = 0.4  # correlation of the static and the sliding force of one specime
 FREEDOM = 4  # of Student's t where the tails are heavy
 
 
-def specimen_gains(bench: Bench, design: Design, rng: np.random.Generator) -> np.ndarray:
-    """Factor of every force, shape (n, 2): each specimen has a gain and a slope in the logarithm of the load."""
-    load = bench.column("N")
-    x = np.log(load / np.exp(np.log(load).mean()))
-    names = sorted(set(bench.tests["specimen"]))
+def specimen_gains(
+    bench: Bench, design: Design, rng: np.random.Generator, first: Bench | None = None
+) -> np.ndarray:
+    """Factor of every force, shape (n, 2): each specimen has a gain and a slope in the logarithm of the load.
+
+    For further pulls with the specimens of a ``first`` bench, the same draws as there.
+    """
+    first = first or bench
+    x = np.log(bench.column("N")) - np.log(first.column("N")).mean()
+    names = sorted(set(first.tests["specimen"]))
     drawn = {name: _pair(rng, 2) * [[design.specimen_sd], [design.specimen_slope]] for name in names}
     rows = np.array([drawn[name] for name in bench.tests["specimen"]])
     return np.exp(rows[:, 0] + x[:, None] * rows[:, 1])

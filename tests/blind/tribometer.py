@@ -22,16 +22,56 @@ def hide(seed: int, effects: list[tuple[str, float]], design: Design = STANDARD)
 
     The draws do not depend on the effects, so that the same seed without them is the campaign to compare with.
     """
-    tests, law, errors, chance, scatter = (np.random.default_rng([seed, k]) for k in range(5))
+    tests, law, errors, chance, scatter = _draws(seed)
     flat = (law.uniform(4.07, 5.57), law.uniform(19, 28), law.uniform(2.57, 3.47), law.uniform(10, 13))
     drawn = draw_errors(design.sizes(), design.pattern_error, design.pattern_draw, errors)
-    bench = Bench(_table(design, tests), flat, drawn)
-    for name, size in sorted(effects, key=lambda e: e[0] not in FIRST):
-        EFFECTS[name](bench, size, chance)
+    bench = Bench(_table(design, tests), flat, drawn, design.measured_shares)
+    _apply(effects, bench, chance)
     gains = specimen_gains(bench, design, scatter)
     bench.static, bench.sliding = bench.static * gains[:, 0], bench.sliding * gains[:, 1]
     add_noise(bench, design, scatter)
     return bench
+
+
+def _draws(seed: int) -> list[np.random.Generator]:
+    return [np.random.default_rng([seed, k]) for k in range(5)]
+
+
+def _apply(effects: list[tuple[str, float]], bench: Bench, rng: np.random.Generator) -> None:
+    for name, size in sorted(effects, key=lambda e: e[0] not in FIRST):
+        EFFECTS[name](bench, size, rng)
+
+
+def with_further(
+    bench: Bench, rows: pd.DataFrame, seed: int, effects: list[tuple[str, float]], design: Design
+) -> Bench:
+    """A bench with further pulls on the same specimens, made after all others.
+
+    ``rows`` are tests of the bench to be made again, as they are or at another load ``N``; where they have a column
+    ``without``, the effect that it names does not act. Effects that draw something at random are not allowed.
+    """
+    made = len(bench.tests)
+    rng = np.random.default_rng([seed, made])
+    rows = rows.reset_index(drop=True).copy()
+    rows["test_id"] = [f"P{made + k + 1:04d}" for k in range(len(rows))]
+    rows["mass_g"] = rows["N"] / GRAVITY * 1e3 - 1.5
+    rows["run_order"] = made + 1 + np.arange(len(rows))
+    last = bench.tests.groupby("specimen")["specimen_run"].max()
+    rows["specimen_run"] = rows["specimen"].map(last) + rows.groupby("specimen").cumcount() + 1
+    rows["started_at"] = _stamps(made + len(rows))[made:]
+    rows["temperature_C"] = (23 + rng.normal(0, 1.1, len(rows))).round(1)
+    rows["humidity_pct"] = (48 + rng.normal(0, 3, len(rows))).round(1)
+    rows["operator"] = rng.choice(["op1", "op2"], len(rows))
+    removed = set(rows.get("without", pd.Series([""])))
+    more = Bench(rows, bench.law, bench.errors, bench.measured_shares)
+    _apply([(name, size) for name, size in effects if name not in removed], more, rng)
+    gains = specimen_gains(more, design, _draws(seed)[4], bench)
+    more.static, more.sliding = more.static * gains[:, 0], more.sliding * gains[:, 1]
+    add_noise(more, design, rng)
+    both = Bench(pd.concat([bench.tests, rows], ignore_index=True), bench.law, bench.errors, bench.measured_shares)
+    for name in ("static", "sliding", "zero", "stiffness_N_per_mm"):
+        setattr(both, name, np.concatenate([getattr(bench, name), getattr(more, name)]))
+    return both
 
 
 def _table(design: Design, rng: np.random.Generator) -> pd.DataFrame:

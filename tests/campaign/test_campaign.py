@@ -408,3 +408,17 @@ def test_a_load_that_is_not_the_weight_put_on_is_noted_and_used(folder: Path) ->
     assert [t.normal_load_N for t in campaign.tests] == [0.505, 5.05, 5.05]
     (note,) = campaign.problems
     assert (note.kind, note.test_id, note.row, note.column) == ("loads_disagree", "T2", 3, "normal_load_N")
+
+
+def test_amplitudes_that_were_measured_are_taken_with_their_uncertainties(folder: Path) -> None:
+    measured = '\n[measured]\nnormal_load_error = [0.002, 0.005]\n"pattern_geometry:B" = [-0.01, 0.02]\n'
+    write(folder, [GOOD.format(k=1)], toml=TOML + measured)
+    assert load_campaign(folder).measured == {"normal_load_error": (0.002, 0.005), "pattern_geometry:B": (-0.01, 0.02)}
+
+
+@pytest.mark.parametrize("given", ["0.002", "[0.002]", "[0.002, 0.0]", '["a", 1.0]', "[nan, 1.0]"])
+def test_a_measured_amplitude_without_an_uncertainty_is_a_fault(folder: Path, given: str) -> None:
+    write(folder, [GOOD.format(k=1)], toml=f"{TOML}\n[measured]\nsuction = {given}\n")
+    with pytest.raises(CampaignError) as caught:
+        load_campaign(folder)
+    assert {(p.file, p.row) for p in caught.value.problems} == {("campaign.toml", TOML.count("\n") + 3)}

@@ -27,7 +27,7 @@ def made(
 ) -> Ingested:
     """A campaign of ``design``: the model's own prediction, plus ``change`` (n, 2), plus the noise of repeats."""
     bench = hide(3, [], design)
-    s = _setup(ingested(bench))
+    s = setup_of(ingested(bench))
     noise = np.random.default_rng(seed).normal(size=(s.observations.n, 2)) * repeat_sd
     bench.static, bench.sliding = np.exp(predict(s, LAW, (), ()) + change(s) + noise).T
     return ingested(bench)
@@ -35,7 +35,7 @@ def made(
 
 def baseline(campaign: Ingested) -> ModelFit:
     """The model without mechanisms, fitted."""
-    return fit(_setup(campaign))
+    return fit(setup_of(campaign))
 
 
 def acting(name: str, *values: float) -> Change:
@@ -43,7 +43,7 @@ def acting(name: str, *values: float) -> Change:
     return lambda s: predict(s, LAW, (Acting(MECHANISMS[name]),), (np.array(values),)) - predict(s, LAW, (), ())
 
 
-def _setup(campaign: Ingested) -> Setup:
+def setup_of(campaign: Ingested) -> Setup:
     o = observe(campaign)
     return setup(o, tabled_predictor(o.patterns))
 

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 
 from tribo.diagnose.diagnosis import examine
 from tribo.diagnose.diagnosis_record import Diagnosis
+from tribo.diagnose.discovery import in_verdict, on_campaign
 from tribo.diagnose.discovery.grammar import groups_of, shapes_of
 from tribo.diagnose.discovery.held import holds
-from tribo.diagnose.discovery.in_verdict import level_of_laws, with_laws, with_misfits
+from tribo.diagnose.discovery.in_verdict import with_laws, with_misfits
 from tribo.diagnose.discovery.law_file import law_text, read_law
 from tribo.diagnose.discovery.law_words import discovery_text, law_layers, law_sentence, size_sentence
+from tribo.diagnose.discovery.on_campaign import searched_laws
 from tribo.diagnose.discovery.parting import parting_test
 from tribo.diagnose.discovery.scoring import Projection
 from tribo.diagnose.discovery.search import RESCORED, Discovery, Grammar, best_of, discover_laws
@@ -126,15 +130,19 @@ def test_a_law_beside_a_cause_leaves_it_a_part_of_the_answer(found: Discovery, q
     assert "A misfit remains beyond chance" in v.text
 
 
-@pytest.mark.parametrize(
-    ("p_left", "lost", "level"), [(0.5, {}, 0.001), (0.001, {}, 0.01), (0.5, {"velocity_dependence": 8.0}, 0.01)]
-)
-def test_without_a_misfit_left_a_law_has_to_be_beyond_chance_at_a_tenth_of_the_level(
-    diagnosed: Diagnosis, p_left: float, lost: dict[str, float], level: float
+@pytest.mark.parametrize(("room", "step"), [(in_verdict, with_laws), (on_campaign, searched_laws)])
+def test_a_law_has_to_be_beyond_chance_at_a_tenth_of_the_level_of_a_misfit(
+    quiet: Diagnosis, monkeypatch: pytest.MonkeyPatch, room: ModuleType, step: Callable[..., object]
 ) -> None:
-    assert diagnosed.named is not None
-    named = replace(diagnosed.named, causes=(("any",),), remainders=(), p_left=p_left)  # type: ignore[arg-type]
-    assert level_of_laws(replace(diagnosed, named=named), lost, 0.01) == pytest.approx(level)
+    levels = []
+
+    def nothing_found(model: object, *, level: float, **_: object) -> Discovery:
+        levels.append(level)
+        return Discovery((), (), 0)
+
+    monkeypatch.setattr(room, "discover_laws", nothing_found)
+    step(quiet, level=0.05)
+    assert levels == [pytest.approx(0.005)]
 
 
 def test_the_figure_shows_the_law_over_its_column(diagnosed: Diagnosis) -> None:

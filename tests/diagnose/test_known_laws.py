@@ -90,6 +90,18 @@ def test_a_mechanism_whose_form_is_wrong_loses_against_a_law_of_its_column() -> 
     assert without_wrong_forms(right)[1] == {}
 
 
+def test_a_cause_that_follows_one_name_of_a_column_loses_against_a_law_of_that_name_on_some_samples() -> None:
+    def by_op2(s: Setup, where: np.ndarray) -> np.ndarray:
+        here = (s.observations.conditions.columns["operator"] == "op2") & where
+        return np.repeat(0.3 * here[:, None], 2, axis=1)
+
+    one_name = [Acting(MECHANISMS["covariate"], "operator is op2")]
+    everywhere = made(lambda s: by_op2(s, np.ones(s.observations.n, bool)), seed=33)
+    patterned = made(lambda s: by_op2(s, s.observations.conditions.area_fraction < 1.0), seed=33)
+    assert without_wrong_forms(refitted(baseline(everywhere), one_name))[1] == {}
+    assert set(without_wrong_forms(refitted(baseline(patterned), one_name))[1]) == {"covariate:operator"}
+
+
 def test_a_plan_says_whether_a_design_would_show_a_law() -> None:
     campaign = ingested(hide(3, [], SMALL)).campaign
     large = plan_law(campaign, WARM, SIZE)

@@ -167,6 +167,16 @@ class PlausibleTable(_Strict):
     humidity_pct: Range | None = None
 
 
+def _value_and_uncertainty(given: list[float]) -> list[float]:
+    if len(given) != 2 or not given[1] > 0:
+        raise ValueError("must be [value, standard uncertainty], the uncertainty more than 0")
+    return given
+
+
+Measured = Annotated[
+    list[Annotated[float, Field(allow_inf_nan=False, ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]],
+    AfterValidator(_value_and_uncertainty),
+]
 Stated = dict[str, str | list[str] | dict[str, str | list[str]]]
 
 
@@ -194,6 +204,7 @@ class CampaignFile(_Strict):
     columns: Annotated[Stated, AfterValidator(_only_quantities)] = {}
     instrument: InstrumentTable = InstrumentTable()
     plausible: PlausibleTable = PlausibleTable()
+    measured: dict[Name, Measured] = {}  # amplitudes of mechanisms that were measured directly
 
 
 def _pair(value: float | list[float] | None) -> tuple[float, float] | None:

@@ -134,6 +134,7 @@ def _campaign(
         contact=general.contact,
         material_class=general.material_class,
         plausible={k: (v[0], v[1]) for k, v in described.plausible.model_dump(exclude_none=True).items()},
+        measured={name: (value[0], value[1]) for name, value in described.measured.items()},
         tests=tests,
         samples={name: patterns[pattern_of(name, patterns)] for name in names},
         material=general.material,

@@ -12,7 +12,7 @@ from tribo.diagnose.search.naming import Named
 from tribo.diagnose.search.weighing import Candidate
 from tribo.diagnose.statistics.bordered import model_columns
 from tribo.diagnose.statistics.linearisation import ModelFit
-from tribo.diagnose.statistics.model import effect_of, log_forces
+from tribo.diagnose.statistics.model import effect_of, predict
 from tribo.diagnose.terms import in_words
 from tribo.diagnose.verdict import Misfit, NextTest, Outcome
 from tribo.mechanisms.record import Conditions
@@ -93,27 +93,37 @@ def _direct(first: Candidate, second: Candidate) -> list[NextTest]:
     found = []
     for candidate in (first, second):
         m = candidate.acting.mechanism.measurement
-        if m is not None:
-            information = bits(float((candidate.values[0] / m.uncertainty) ** 2))
-            found.append(_named(first, second, m.text, {"hours": m.hours}, information))
+        if m is not None and candidate.acting.measured is None:
+            acting, size = candidate.acting, candidate.acting.mechanism.amplitude
+            information = bits(float(((candidate.values[0] - size.zero) / m.uncertainty) ** 2))
+            measured = ":".join(filter(None, (acting.mechanism.name, acting.choice)))
+            design = {"measure": measured, "parameter": size.name, "unit": size.unit, "uncertainty": m.uncertainty}
+            design["hours"] = m.hours
+            found.append(_named(first, second, m.text, design, information))
     return found
 
 
 def _without(first: Candidate, second: Candidate) -> list[NextTest]:
-    """Repeating the most affected sample with the cause of one of the two removed (vented, controlled, fresh)."""
+    """Repeating pulls of the most affected sample with one of the two removed (cavities vented, wire lowered)."""
     found = []
     for candidate in (first, second):
-        f = candidate.fit
+        m, f = candidate.acting.mechanism, candidate.fit
+        if not m.removed_by:
+            continue
         change = effect_of(f.setup, f.law, candidate.acting, candidate.values)
         conditions = f.setup.observations.conditions
         strongest = max(set(conditions.sample.tolist()), key=lambda n: np.abs(change[conditions.sample == n]).mean())
         rows = np.flatnonzero(conditions.sample == strongest)
         rows = rows[np.argsort(-np.abs(change[rows]).sum(axis=1))][:PULLS]
-        for remedy in candidate.acting.mechanism.silenced_by:
-            text = f"{remedy[0].upper()}{remedy[1:]}: {len(rows)} pulls of {strongest}."
-            design = {"sample": strongest, "pulls": len(rows), "hours": 1.0 + len(rows) * HOURS_PER_PULL}
-            found.append(_named(first, second, text, design, bits(_distance2(f, change[rows], rows))))
+        text = f"{m.removed_by[0].upper()}{m.removed_by[1:]}: {len(rows)} pulls of {strongest}."
+        design = {"without": m.name, "sample": strongest, "repeat_tests": _test_ids(f, rows), "pulls": len(rows)}
+        design["hours"] = 1.0 + len(rows) * HOURS_PER_PULL
+        found.append(_named(first, second, text, design, bits(_distance2(f, change[rows], rows))))
     return found
+
+
+def _test_ids(f: ModelFit, rows: np.ndarray) -> list[str]:
+    return [str(name) for name in f.setup.observations.test_ids[rows]]
 
 
 def _loads(first: Candidate, second: Candidate) -> list[NextTest]:
@@ -141,12 +151,8 @@ def _predicted_at(f: ModelFit, rows: np.ndarray, load_N: float) -> FloatArray:
     s = f.setup
     observations = s.observations.take(rows)
     conditions = replace(observations.conditions, normal_load_N=np.full(len(rows), load_N))
-    base = replace(s, observations=replace(observations, conditions=conditions), shares=s.shares[rows]).base(f.law)
-    before = log_forces(base.forces(conditions.normal_load_N))
-    total = before.copy()
-    for a, v in zip(f.acting, f.values, strict=True):
-        total += log_forces(a.mechanism.law(v, base, conditions, a.choice)) - before
-    return total
+    moved = replace(s, observations=replace(observations, conditions=conditions), shares=s.shares[rows])
+    return predict(moved, f.law, f.acting, f.values)
 
 
 def _distance2(f: ModelFit, difference: FloatArray, rows: np.ndarray) -> float:

@@ -75,6 +75,7 @@ MECHANISM = Mechanism(
     confused_with="pressure-dependent friction",
     separates="test a series of cavity depths, or unload after loading",
     silenced_by=("the same pattern with deeper cavities",),
+    removed_by="use the same pattern with deeper cavities",
     needs=("area_fraction", "normal_load_N"),
     plain="collapse of the cavities",
     meaning="above a certain load the floors of the cavities touch the counterface, so that the "

@@ -63,6 +63,11 @@ class Base:
         )
 
 
+def names_in(cell: str) -> list[str]:
+    """The names in a cell that may hold several, separated by semicolons."""
+    return [name.strip() for name in cell.split(";") if name.strip()]
+
+
 @displayed()
 @dataclass(frozen=True)
 class Conditions:
@@ -73,7 +78,8 @@ class Conditions:
     negative across it, ``specimen_run`` counts the pulls of a specimen from 1, ``elapsed_s`` the time since
     the first pull, ``clip_N`` = k v / (2 f_s), the mean loss of a peak between two samples of the recorder.
     ``columns`` holds every further recorded column as text. ``pattern`` names the pattern of each
-    test: ``Sx`` and ``Sy`` may be S along x and y, or patterns of these names.
+    test: ``Sx`` and ``Sy`` may be S along x and y, or patterns of these names. ``without`` names the mechanisms that
+    were removed for a test, separated by semicolons; it is empty where none was removed for any test.
     """
 
     normal_load_N: FloatArray
@@ -94,6 +100,13 @@ class Conditions:
     humidity_pct: FloatArray
     clip_N: FloatArray
     columns: Mapping[str, StringArray] = field(default_factory=dict)
+    without: StringArray = field(default_factory=lambda: np.array([], str))
+
+    def present(self, mechanism: str) -> NDArray[np.bool_]:
+        """Tests for which this mechanism was not removed, (n,)."""
+        if not len(self.without):
+            return np.ones(len(self.normal_load_N), bool)
+        return np.array([mechanism not in names_in(cell) for cell in self.without])
 
     @property
     def pressure_Pa(self) -> FloatArray:

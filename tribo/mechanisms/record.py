@@ -73,6 +73,8 @@ class Mechanism:
     enters, shows, confused_with, separates, silenced_by
         Where it acts in the model; its signs; what gives similar signs; how to distinguish them; extra measurements
         that remove or settle it. All in words.
+    removed_by
+        How to pull so that it does not act; empty where no such pull is known.
     quick_error
         Relative error of T by which the law may differ from the spring-block model with the mechanism in it, at the
         start amplitude.
@@ -105,6 +107,7 @@ class Mechanism:
     confused_with: str
     separates: str
     silenced_by: tuple[str, ...] = ()
+    removed_by: str = ""
     needs: tuple[str, ...] = ()
     quick_error: float = 0.03
     rise: Rise | None = None
@@ -142,7 +145,7 @@ class Mechanism:
 
     def column(self, choice: str = "") -> str:
         """The recorded column or columns that it follows."""
-        return self.choosing.column or choice or ", ".join(self.needs)
+        return self.choosing.column or self.choosing.label(choice) or choice or ", ".join(self.needs)
 
     def on_test(self, values: Values, choice: str, conditions: Conditions, test: int) -> OnTest | None:
         """How it acts on one test; None where the choice does not concern that test."""

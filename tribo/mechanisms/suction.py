@@ -34,6 +34,7 @@ MECHANISM = Mechanism(
     confused_with="an error of the normal load, or an offset of the load cell",
     separates="vent the cavities, vary the hold time, read the force before contact, weigh the sled",
     silenced_by=("repeat with vented cavities",),
+    removed_by="repeat with vented cavities",
     needs=("area_fraction",),
     plain="suction under the cavities",
     meaning="the air in the cavities is below room pressure, which presses the sample down",

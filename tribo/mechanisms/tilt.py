@@ -73,6 +73,7 @@ MECHANISM = Mechanism(
     confused_with="pressure-dependent friction",
     separates="lower the wire to the height of the interface",
     silenced_by=("lower the wire to the height of the interface",),
+    removed_by="lower the wire to the height of the interface",
     needs=("normal_load_N",),
     plain="a tilt of the sled",
     meaning="the pull tips the sled, which relieves its trailing edge",

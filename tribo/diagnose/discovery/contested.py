@@ -19,7 +19,9 @@ from tribo.mechanisms.record import Conditions
 # Log likelihood by which a law has to be better than mechanisms of the library: odds of 400 to 1. With 3, one of seven
 # effects of the library (benchmarks/blind_cases.py, seed 7000, three times the half-found size) lost; none with 6.
 MARGIN = 2.0 * CLOSE
-MARGIN_OF_COVARIATE = CLOSE  # a covariate is a law of the grammar itself, on all samples and in both regimes
+# A covariate is a law of the grammar itself, on all samples and in both regimes. It stays where another law of its own
+# column cannot be told from it; between its column and another one of the series, the likelier counts.
+MARGIN_OF_COVARIATE = {True: CLOSE, False: 0.0}
 SAME = {"speed_mm_s": "speed_m_s", "started_at": "elapsed_s"}  # columns of mechanisms by their names in the grammar
 SERIES = {"run_order", "specimen_run", "elapsed_s", "date"}  # columns that follow each other through a series
 
@@ -31,15 +33,16 @@ def without_wrong_forms(model: ModelFit) -> tuple[ModelFit, dict[str, float]]:
     for together in (*((a,) for a in model.acting), *combinations(model.acting, 2)):
         if not all(a in model.acting for a in together):
             continue
-        by = _lost_by(model, together)
-        if by > (MARGIN_OF_COVARIATE if all(a.mechanism.any_column for a in together) else MARGIN):
+        by, own_column = _lost_by(model, together)
+        if by > (MARGIN_OF_COVARIATE[own_column] if all(a.mechanism.any_column for a in together) else MARGIN):
             lost |= {a.name: by for a in together}
             model = refitted(model, [a for a in model.acting if a not in together])
     return model, lost
 
 
-def _lost_by(model: ModelFit, together: Sequence[Acting]) -> float:
-    """Log likelihood by which the best law of the columns of one or two mechanisms is better; negative where none is.
+def _lost_by(model: ModelFit, together: Sequence[Acting]) -> tuple[float, bool]:
+    """Log likelihood by which the best law of the columns of one or two mechanisms is better, negative where none is,
+    and whether that law follows their own columns.
 
     Both are judged at the noise that the law leaves. The law pays for its choices among those of these columns, the
     mechanisms do not.
@@ -49,11 +52,12 @@ def _lost_by(model: ModelFit, together: Sequence[Acting]) -> float:
     c = model.setup.observations.conditions
     shapes = _of_columns(c, columns) if len(columns) == len(together) else []
     if not shapes:
-        return -np.inf
+        return -np.inf, True
     changes = [effect_of(model.setup, model.law, a, model.values[model.acting.index(a)]) for a in together]
     without = refitted(model, [a for a in model.acting if a not in together])
     form, state = best_form(without, Searched(courses_of(shapes, c), tuple(groups_of(c))))
-    return form.evidence - state.projected.joint_gain(np.stack(changes, axis=2))
+    by = form.evidence - state.projected.joint_gain(np.stack(changes, axis=2))
+    return by, set(form.best.columns) <= columns
 
 
 def _of_columns(c: Conditions, columns: set[str]) -> list[tuple[tuple[Shape, ...], float]]:

@@ -106,10 +106,17 @@ def _of_column(name: str, x: FloatArray) -> Iterator[Shape]:
         for p in np.quantile(x, np.arange(1, 8) / 8):
             yield from (Shape("hump", name, low, high, place=float(p), width=(high - low) / k) for k in (16, 8, 4))
     if name == "run_order" and len(distinct) > 18:
-        yield from (Shape("wave", name, low, high, width=(high - low + 1) / k) for k in np.arange(1.0, CYCLES, 0.5))
+        yield from _waves(name, low, high, 0.5)
         yield from _windows(name, low, high, TENTHS)
     if name == "elapsed_s" and high - low > DAY_S:
-        yield from (Shape("wave", name, low, high, width=DAY_S / k) for k in (1, 2, 3))
+        yield from _waves(name, low, high, 1.0)
+
+
+def _waves(name: str, low: float, high: float, step: float) -> Iterator[Shape]:
+    """Periods of whole steps of the turns: in the series, up to so many; of the time, in one day, up to three."""
+    whole, most = (DAY_S, 3.0) if name == "elapsed_s" else (high - low + 1, CYCLES - 0.5)
+    turns = np.arange(1.0, most + 0.5 * step, step)
+    yield from (Shape("wave", name, low, high, width=float(whole / k)) for k in turns)
 
 
 def _saturating(name: str, low: float, high: float, times: Sequence[float]) -> Iterator[Shape]:
@@ -154,9 +161,9 @@ def fine_shapes(s: Shape, c: Conditions) -> list[Shape]:
     if s.kind == "optimum":
         return [Shape("optimum", s.column, low, high, place=float(p)) for p in np.linspace(low, high, FINE)]
     if s.kind == "window":
-        return list(_windows(s.column, low, high, 2 * TENTHS))
+        return list(_windows(s.column, low, high, 4 * TENTHS))
     if s.kind == "wave":
-        return [replace(s, width=s.width / (1.0 + k)) for k in np.linspace(-0.25, 0.25, FINE) * s.width / reach]
+        return list(_waves(s.column, low, high, 0.1))
     places = np.linspace(low, high, FINE)[1:-1]
     widths = [reach / k for k in (WIDTHS if s.kind == "hump" else SOFT)]
     return [Shape(s.kind, s.column, low, high, place=float(p), width=w) for p in places for w in widths]
@@ -176,11 +183,16 @@ def _from_zero(s: Shape, share: float) -> Shape:
 
 def refined_shapes(s: Shape, c: Conditions) -> list[Shape]:
     """Shapes about one of the fine grid, with places between its neighbours; none where the grid says all there is."""
-    if s.kind not in ("step", "ramp", "optimum", "hump", "soft step"):
+    if s.kind not in ("step", "ramp", "optimum", "hump", "soft step", "window", "wave"):
         return []
     values = column_values(c, s.column)
     x = np.unique(values[np.isfinite(values)])
     near = 2.0 * float(np.ptp(x)) / (FINE - 1)
+    if s.kind == "wave":
+        return [replace(s, width=s.width / (1.0 + k)) for k in np.linspace(-0.1, 0.1, FINE) * s.width / np.ptp(x)]
+    if s.kind == "window":
+        ends = np.linspace(-near, near, 9)
+        return [replace(s, place=s.place + a, width=s.width + b - a) for a in ends for b in ends if s.width + b > a]
     if s.kind == "step":
         between = 0.5 * (x[1:] + x[:-1])
         near = max(near, 3.0 * float(np.min(np.abs(np.diff(between)))) if len(between) > 1 else 0.0)

@@ -9,7 +9,7 @@ import numpy as np
 from tribo.diagnose.diagnosis import examine
 from tribo.diagnose.diagnosis_record import Diagnosis
 from tribo.diagnose.discovery.held import Held, holds
-from tribo.diagnose.discovery.in_verdict import level_of_laws, uncontested
+from tribo.diagnose.discovery.in_verdict import LEVEL_OF_LAWS, uncontested
 from tribo.diagnose.discovery.search import Discovery, Progress, discover_laws
 from tribo.diagnose.discovery.written_law import WrittenLaw
 from tribo.diagnose.verdict import Estimate
@@ -27,11 +27,10 @@ def discover_in(
 def searched_laws(d: Diagnosis, *, seed: int = 0, level: float = 0.01, progress: Progress | None = None) -> Discovery:
     """The laws of what the causes of a diagnosis leave unexplained.
 
-    Where they leave no misfit, a law has to be beyond chance at a tenth of the level.
+    ``level`` is that of a misfit; a law has to be beyond chance at a tenth of it.
     """
-    model, lost = uncontested(d)
-    strict = level_of_laws(d, lost, level)
-    return discover_laws(model, level=strict, rng=np.random.default_rng(seed), progress=progress)
+    strict = LEVEL_OF_LAWS * level
+    return discover_laws(uncontested(d)[0], level=strict, rng=np.random.default_rng(seed), progress=progress)
 
 
 def hold_law_against(

@@ -10,7 +10,16 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from tribo.diagnose.discovery.grammar import Group, groups_of, shapes_of
-from tribo.diagnose.discovery.scoring import Courses, Projection, Scored, acts_of, courses_of, terms_of
+from tribo.diagnose.discovery.scoring import (
+    Acts,
+    Courses,
+    Projection,
+    Scored,
+    acts_of,
+    acts_of_one,
+    courses_of,
+    terms_of,
+)
 from tribo.diagnose.discovery.settling import FoundLaw, Searched, settled
 from tribo.diagnose.search.screen import allowed_wrong_form, decided, share_beyond
 from tribo.diagnose.statistics.chance import as_measured, drawn_residuals, refit
@@ -92,13 +101,15 @@ class Grammar:
 
     courses: Courses
     groups: tuple[Group, ...]
-    acts: tuple[FloatArray, ...]
+    acts: Acts
+    acts_of_each: tuple[FloatArray, ...]
 
     @classmethod
     def of(cls, model: ModelFit, without: Collection[str]) -> Grammar:
         c = model.setup.observations.conditions
         groups, terms = tuple(groups_of(c)), terms_of(model)
-        return cls(courses_of(shapes_of(c, without), c), groups, tuple(acts_of(g, c, terms) for g in groups))
+        each = tuple(acts_of_one(g, c, terms) for g in groups)
+        return cls(courses_of(shapes_of(c, without), c), groups, acts_of(groups, model.setup, terms), each)
 
     @property
     def size(self) -> int:
@@ -106,21 +117,22 @@ class Grammar:
 
     def net(self, projected: Projection) -> FloatArray:
         """What each law gains less its cost, (r, groups * shapes)."""
-        each = [
-            projected.gains(self.courses, acts) - self.courses.cost - group.cost
-            for group, acts in zip(self.groups, self.acts, strict=True)
-        ]
-        return np.concatenate(each, axis=1)
+        found = projected.gains(self.courses, self.acts) - self.courses.cost - self._costs[:, None]
+        return found.reshape(len(found), -1)
+
+    @property
+    def _costs(self) -> FloatArray:
+        return np.array([group.cost for group in self.groups])
 
     def cost(self, index: NDArray[np.int64]) -> FloatArray:
         group, shape = np.divmod(index, len(self.courses.shapes))
-        return np.asarray(self.courses.cost[shape] + np.array([g.cost for g in self.groups])[group])
+        return np.asarray(self.courses.cost[shape] + self._costs[group])
 
     def gains(self, fitted: Replicates, index: NDArray[np.int64]) -> FloatArray:
         """Log likelihood that the laws at ``index`` gain at the noise of a campaign, (r, laws)."""
         columns, spans, at = [], [], 0
         for group, shape in zip(*np.divmod(index, len(self.courses.shapes)), strict=True):
-            column = self.courses.column(int(shape))[:, None, :] * self.acts[group][:, :, None]
+            column = self.courses.column(int(shape))[:, None, :] * self.acts_of_each[group][:, :, None]
             columns.append(column)
             spans.append(slice(at, at + column.shape[2]))
             at += column.shape[2]
@@ -168,7 +180,7 @@ def _chance(
             chance.append(float((grammar.gains(made.one(k), index)[0] - grammar.cost(index)).max()))
         if progress is not None:
             progress("discover", len(chance), replicates)
-        if decided(np.array(chance), strongest):
+        if decided(np.array(chance), strongest, AT_ONCE):
             break
     return np.array(chance)
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from tribo.diagnose.discovery.grammar import Group, fine_products, fine_shapes, refined_shapes
-from tribo.diagnose.discovery.scoring import Courses, Projection, acts_of, courses_of, terms_of
+from tribo.diagnose.discovery.scoring import Acts, Courses, Projection, acts_of, acts_of_one, courses_of, terms_of
 from tribo.diagnose.discovery.written_law import LOAD_TERM, UNITS, Shape, WrittenLaw
 from tribo.diagnose.search.screen import FORM
 from tribo.diagnose.search.weighing import PER_PARAMETER
@@ -17,7 +17,7 @@ from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.gain import gain
 from tribo.diagnose.statistics.interval import NORMAL_90, estimates, informed_share
 from tribo.diagnose.statistics.linearisation import Linear, ModelFit
-from tribo.diagnose.statistics.model import Acting, effect_of
+from tribo.diagnose.statistics.model import Acting, Setup, effect_of
 from tribo.diagnose.verdict import Estimate, Gain
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray
@@ -113,10 +113,10 @@ def settled(model: ModelFit, found: Searched, first: WrittenLaw, rng: np.random.
 
 def best_form(model: ModelFit, found: Searched) -> tuple[Form, State]:
     """The best form of these laws at the noise that it leaves, and the campaign at that noise."""
-    c, terms = model.setup.observations.conditions, terms_of(model)
     projected = Projection(model.linear, model.linear.residual[None])
-    gains = [projected.gains(found.courses, acts_of(g, c, terms))[0] - g.cost for g in found.groups]
-    group, shape = np.unravel_index(int(np.argmax(gains)), (len(gains), len(found.courses.shapes)))
+    gains = projected.gains(found.courses, acts_of(found.groups, model.setup, terms_of(model)))[0]
+    net = gains - np.array([g.cost for g in found.groups])[:, None]
+    group, shape = np.unravel_index(int(np.argmax(net)), net.shape)
     first = found.groups[int(group)].law(found.courses.shapes[int(shape)])
     best = _decided(model, found, first)
     return best.forms[0], best.state
@@ -166,7 +166,7 @@ class State:
     without it, ``residual`` (n, 2) what that leaves."""
 
     law: WrittenLaw
-    conditions: Conditions
+    setup: Setup
     terms: dict[str, FloatArray]
     linear: Linear
     residual: FloatArray
@@ -181,8 +181,12 @@ class State:
         """The same with every test counting alike."""
         return replace(self, linear=replace(self.linear, weight=np.ones(len(self.residual))))
 
-    def acts(self, group: Group) -> FloatArray:
-        return acts_of(group, self.conditions, self.terms)
+    @property
+    def conditions(self) -> Conditions:
+        return self.setup.observations.conditions
+
+    def acts(self, *groups: Group) -> Acts:
+        return acts_of(groups, self.setup, self.terms)
 
 
 def _with_law(model: ModelFit, law: WrittenLaw) -> tuple[ModelFit, State]:
@@ -191,43 +195,40 @@ def _with_law(model: ModelFit, law: WrittenLaw) -> tuple[ModelFit, State]:
     after = fit(model.setup, (*model.acting, acting), start=model)
     residual = after.residual + effect_of(after.setup, after.law, acting, after.values[-1])
     jacobian = after.linear.jacobian[:, :, : -len(acting.mechanism.parameters)]
-    linear, conditions = replace(after.linear, jacobian=jacobian), after.setup.observations.conditions
-    return after, State(law, conditions, terms_of(after), linear, residual, informed_share(after.noise))
+    linear = replace(after.linear, jacobian=jacobian)
+    return after, State(law, after.setup, terms_of(after), linear, residual, informed_share(after.noise))
 
 
 def _forms(state: State, found: Searched) -> list[Form]:
     """The forms in reach of the best on the fine grid, the best first."""
-    coarse: dict[tuple[int, object], list[float]] = {}
-    leading: dict[tuple[int, object], tuple[float, tuple[Shape, ...]]] = {}
-    for g, group in enumerate(found.groups):
-        gains = state.projected.gains(found.courses, state.acts(group))[0] - group.cost
-        for shapes, value in zip(found.courses.shapes, gains.tolist(), strict=True):
-            key = (g, tuple((s.kind, s.column, s.level) for s in shapes))
-            coarse.setdefault(key, []).append(value)
-            if key not in leading or value > leading[key][0]:
-                leading[key] = value, shapes
-    worth = {key: leading[key][0] - np.log(len(each)) for key, each in coarse.items()}
-    ranked = sorted(worth, key=lambda key: -worth[key])[:LOOKED_AT]
-    near = [key for key in ranked if worth[key] > worth[ranked[0]] - IN_REACH]
-    forms = [_on_fine_grid(state, found.groups[key[0]], *_priced(found, leading[key][1])) for key in near]
+    order, begins, count = found.courses.by_form
+    gains = state.projected.gains(found.courses, state.acts(*found.groups))[0, :, order].T
+    costs = np.array([group.cost for group in found.groups])[:, None]
+    worth = (np.maximum.reduceat(gains, begins, axis=1) - costs - np.log(count)).ravel()
+    ranked = np.argsort(-worth, kind="stable")[:LOOKED_AT]
+    forms = []
+    for g, f in zip(*np.divmod(ranked[worth[ranked] > worth[ranked[0]] - IN_REACH], len(count)), strict=True):
+        leading = begins[f] + int(gains[g, begins[f] : begins[f] + count[f]].argmax())
+        forms.append(_on_fine_grid(state, found.groups[g], *_priced(found, int(order[leading]))))
     return sorted(forms, key=lambda f: -f.evidence)
 
 
-def _priced(found: Searched, shapes: tuple[Shape, ...]) -> tuple[tuple[Shape, ...], float]:
-    """The shapes of a form, with what a product of two columns costs."""
-    return shapes, float(found.courses.cost[found.courses.shapes.index(shapes)]) if len(shapes) > 1 else 0.0
+def _priced(found: Searched, leading: int) -> tuple[tuple[Shape, ...], float]:
+    """The leading shapes of a form, with what a product of two columns costs."""
+    shapes = found.courses.shapes[leading]
+    return shapes, float(found.courses.cost[leading]) if len(shapes) > 1 else 0.0
 
 
 def _on_fine_grid(state: State, group: Group, shapes: tuple[Shape, ...], cost: float) -> Form:
     c, acts = state.conditions, state.acts(group)
     grid = fine_products(shapes) if len(shapes) > 1 else [(s,) for s in fine_shapes(shapes[0], c)]
     courses = courses_of([(s, 0.0) for s in grid], c)
-    gains = state.projected.gains(courses, acts)[0]
+    gains = state.projected.gains(courses, acts)[0, 0]
     evidence = _log_mean(gains) - group.cost - cost - PER_PARAMETER * sum(map(_further, courses.shapes[0]))
     finer = refined_shapes(courses.shapes[int(gains.argmax())][0], c) if len(shapes) == 1 else []
     if finer:
         courses = courses_of([((s,), 0.0) for s in finer], c)
-        gains = state.projected.gains(courses, acts)[0]
+        gains = state.projected.gains(courses, acts)[0, 0]
     return Form(group, courses, gains, evidence)
 
 
@@ -268,7 +269,7 @@ def _wider(state: State, form: Form, a: Estimate) -> float:
         return 1.0
     one = courses_of([(form.best.shapes, 0.0)], state.conditions)
     own = state.projected.products(one.first, state.acts(form.group))[0]
-    return max((a.high - a.low) / (2.0 * NORMAL_90) * float(np.sqrt(own[0] * state.informed)), 1.0)
+    return max((a.high - a.low) / (2.0 * NORMAL_90) * float(np.sqrt(own[0, 0] * state.informed)), 1.0)
 
 
 @dataclass(frozen=True)
@@ -283,13 +284,13 @@ class _Amplitudes:
 
 
 def _amplitudes(state: State, form: Form) -> _Amplitudes:
-    own, pull, _ = state.projected.products(form.courses.first, state.acts(form.group))
+    (own,), ((pull,),) = state.projected.products(form.courses.first, state.acts(form.group))
     nothing = np.zeros(len(own))
-    found = _Amplitudes(pull[0] / own, 1.0 / (own * state.informed), nothing, nothing)
+    found = _Amplitudes(pull / own, 1.0 / (own * state.informed), nothing, nothing)
     if not len(form.courses.two):
         return found
-    own2, pull2, _ = state.projected.products(form.courses.second, state.acts(form.group))
-    return replace(found, second=pull2[0] / own2, second_variance=1.0 / (own2 * state.informed))
+    (own2,), ((pull2,),) = state.projected.products(form.courses.second, state.acts(form.group))
+    return replace(found, second=pull2 / own2, second_variance=1.0 / (own2 * state.informed))
 
 
 def _percent(
@@ -328,7 +329,7 @@ def _band(state: State, forms: list[Form], wider: float) -> Band:
         if form.evidence < forms[0].evidence + np.log(WEIGHTLESS):
             continue
         share = float(np.exp(form.evidence - forms[0].evidence))
-        acts, each = state.acts(form.group), _amplitudes(state, form)
+        acts, each = acts_of_one(form.group, state.conditions, state.terms), _amplitudes(state, form)
         two = {int(k): j for j, k in enumerate(form.courses.two)}
         for k in np.flatnonzero(form.weight > WEIGHTLESS * form.weight.max()):
             parts = [(form.courses.first[:, k], each.value[k], each.variance[k])]

@@ -146,8 +146,13 @@ def _grown(layers: Layers, ranked: Sequence[Candidate], seen: Screen, level: flo
 
 
 def _misfit_in_own_column(cause: Candidate, left: Screen, level: float) -> bool:
-    """Whether what is left follows the column of a mechanism that was to explain it: its form is wrong."""
-    column = cause.acting.mechanism.column(cause.acting.choice)
+    """Whether what is left follows the column of a mechanism that was to explain it: its form is wrong.
+
+    One name of a column of several may leave another one.
+    """
+    column, choice = cause.acting.mechanism.column(cause.acting.choice), cause.acting.choice
+    if cause.acting.mechanism.any_column and choice != column:
+        return False
     return any(
         p < level and look.kind in ("trend", "shape", "level", "period") and look.covariate.split(",")[0] == column
         for look, p in zip(left.looks, left.p, strict=True)

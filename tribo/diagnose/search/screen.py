@@ -139,13 +139,13 @@ def _strongest(strengths: FloatArray, library: NDArray[np.bool_]) -> FloatArray:
     return np.column_stack([strengths.max(axis=1), alone])
 
 
-def decided(chance: FloatArray, strongest: float) -> bool:
+def decided(chance: FloatArray, strongest: float, fewest: int = FEWEST) -> bool:
     """Whether further replicates could not change the decision at one percent: a sequential Monte Carlo test.
 
     Ten replicates as strong say "within chance" (Besag and Clifford 1991); ten standard deviations beyond
     their mean say the opposite.
     """
-    if len(chance) < FEWEST:
+    if len(chance) < fewest:
         return False
     beyond = strongest > float(np.mean(chance) + 10.0 * np.std(chance))
     return bool(np.sum(chance >= strongest) >= 10 or beyond)

@@ -97,9 +97,11 @@ def refitted(f: ModelFit, acting: Sequence[Acting], to_the_end: bool = True) -> 
 
 
 def judged(start: ModelFit, fitted: ModelFit, choosing: float) -> Candidate:
-    """What a fit earns beyond ``start``: its parameters and the choosing, in log likelihood, are paid for."""
+    """What a fit earns beyond ``start``, a direct measurement included: its parameters and the choosing, in log
+    likelihood, are paid for."""
     acting = fitted.acting[-1]
-    raw = fitted.score - start.score - PER_PARAMETER * (len(acting.mechanism.parameters) - 1)
+    measured = acting.measured_evidence(float(fitted.values[-1][0]))
+    raw = fitted.score - start.score + measured - PER_PARAMETER * (len(acting.mechanism.parameters) - 1)
     sd = acting.mechanism.choosing.all_or_nothing_sd
     if sd is not None:
         raw -= 0.5 * ((fitted.values[-1][0] - acting.mechanism.amplitude.start) / sd) ** 2

@@ -32,14 +32,6 @@ class ModelColumns:
     parameters: int
     tests_of: tuple[NDArray[np.int64], ...]
 
-    @property
-    def specimen(self) -> NDArray[np.int64]:
-        """The number of the specimen of every test, (n,)."""
-        found = np.empty(len(self.own), np.int64)
-        for k, tests in enumerate(self.tests_of):
-            found[tests] = k
-        return found
-
     def vector(self, own: FloatArray, border: FloatArray) -> FloatArray:
         """Values of specimens (r, S, 4) and of the border (r, m) in one order: parameters, specimens, shared."""
         p = self.parameters
@@ -50,6 +42,12 @@ class ModelColumns:
         p, q = self.parameters, 4 * len(self.tests_of)
         own = values[:, p : p + q].reshape(len(values), -1, 4)
         return own, np.concatenate([values[:, :p], values[:, p + q :]], axis=1)
+
+    @property
+    def in_order(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """The tests specimen by specimen, and the specimen of each."""
+        sizes = [len(tests) for tests in self.tests_of]
+        return np.concatenate(self.tests_of), np.repeat(np.arange(len(sizes)), sizes)
 
     def on_tests(self, own: FloatArray, border: FloatArray) -> FloatArray:
         """What coefficients of specimens (r, S, 4) and of the border (r, m) add to every test, (r, 2, n)."""
@@ -101,6 +99,18 @@ class Weighted:
         r, k = len(self.own), other.shape[2]
         own = self.own[:, tests].reshape(r, 2 * len(tests), 4).transpose(0, 2, 1).reshape(4 * r, -1)
         return np.asarray((own @ other.reshape(2 * len(tests), k)).reshape(r, 4, k))
+
+    def own_with(self, other: FloatArray) -> FloatArray:
+        """The same of every specimen: with others (n, 2, k), (r, S, 4, k)."""
+        if len(self.own) > 1:
+            return np.stack([self.own_times(tests, other[tests]) for tests in self.columns.tests_of], axis=1)
+        own = self.own[0]
+        each = own[:, 0, :, None] * other[:, 0, None] + own[:, 1, :, None] * other[:, 1, None]
+        order, specimen = self.columns.in_order
+        found = np.zeros((1, len(self.columns.tests_of), *each.shape[1:]))
+        there, first = np.unique(specimen, return_index=True)
+        found[0, there] = np.add.reduceat(each[order], first)
+        return found
 
     def border_times(self, tests: NDArray[np.int64], other: FloatArray) -> FloatArray:
         """The same of the border, (r, m, k)."""
@@ -180,8 +190,7 @@ def _raised(matrix: FloatArray, prior: FloatArray) -> FloatArray:
 def normal_of(found: Weighted) -> Normal:
     """The normal matrix of a model without the prior."""
     columns = found.columns
-    both = np.concatenate([columns.own, columns.border], axis=2)
-    own = np.stack([found.own_times(tests, both[tests]) for tests in columns.tests_of], axis=1)
+    own = found.own_with(np.concatenate([columns.own, columns.border], axis=2))
     n, _, m = columns.border.shape
     return Normal(own[..., :4], own[..., 4:], found.flat_border @ columns.border.reshape(2 * n, m))
 
@@ -213,15 +222,29 @@ class Inverse:
 
     def spread(self, columns: ModelColumns) -> FloatArray:
         """Variance of what the model predicts for every test: static, mixed and sliding entries, (r, 3, n)."""
-        r, (n, _, m) = len(self.own), columns.border.shape
-        specimen = columns.specimen
-        free = columns.border - columns.own @ self.across[:, specimen]
-        moved = (free.reshape(r, 2 * n, m) @ self.border).reshape(free.shape)
-        alone = columns.own @ self.own[:, specimen]
-        found = np.empty((r, 3, n))
+        if len(self.own) == 1:
+            return self._spread_of_one(columns)[None]
+        found = np.empty((len(self.own), 3, len(columns.own)))
+        for k, tests in enumerate(columns.tests_of):
+            own = columns.own[tests]
+            free = columns.border[tests] - np.tensordot(own, self.across[:, k], axes=(2, 1)).transpose(2, 0, 1, 3)
+            moved = free @ self.border[:, None]
+            alone = np.tensordot(own, self.own[:, k], axes=(2, 1)).transpose(2, 0, 1, 3)
+            for i, (a, b) in enumerate(((0, 0), (0, 1), (1, 1))):
+                shared = np.sum(moved[:, :, a] * free[:, :, b], axis=2)
+                found[:, i, tests] = shared + np.sum(alone[:, :, a] * own[:, b], axis=2)
+        return found
+
+    def _spread_of_one(self, columns: ModelColumns) -> FloatArray:
+        """The same of a batch of one, all specimens at once, (3, n)."""
+        order, specimen = columns.in_order
+        own, found = columns.own[order], np.empty((3, len(order)))
+        free = columns.border[order] - own @ self.across[0, specimen]
+        moved = (free.reshape(-1, free.shape[2]) @ self.border[0]).reshape(free.shape)
+        alone = own @ self.own[0, specimen]
         for i, (a, b) in enumerate(((0, 0), (0, 1), (1, 1))):
-            found[:, i] = np.einsum("rnm,rnm->rn", moved[:, :, a], free[:, :, b])
-            found[:, i] += np.einsum("rnm,nm->rn", alone[:, :, a], columns.own[:, b])
+            shared = np.einsum("nm,nm->n", moved[:, a], free[:, b])
+            found[i, order] = shared + np.einsum("nm,nm->n", alone[:, a], own[:, b])
         return found
 
     def between(self, columns: ModelColumns, specimen: NDArray[np.int64]) -> FloatArray:

@@ -92,6 +92,7 @@ def _fitted(target: Target, x: FloatArray, noise: Noise, estimate: bool, until: 
     along with them."""
     s, log_force = target.setup, target.setup.observations.log_force
     iterations, least_gain = until
+    x = np.clip(x, *target.bounds)
     residual = target.residual(x)
     jacobian = target.jacobian(x, log_force - residual)
     state = begin(s, x, residual, noise)

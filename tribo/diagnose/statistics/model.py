@@ -19,12 +19,13 @@ from tribo.diagnose.statistics.observations import Observations
 from tribo.diagnose.statistics.predictor import Predictor
 from tribo.diagnose.statistics.random_effects import RandomEffects
 from tribo.display import displayed
-from tribo.mechanisms.record import Base, Forces, Mechanism
+from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray
 
 N_LAW = 4  # mu static, tau0 static (kPa), mu sliding, tau0 sliding (kPa)
 FLOOR_N = 1e-6
+WITHIN_MEASURED = 3.0  # standard uncertainties: one measurement in 400 lies further off
 LAW_SCALE = np.array([1.0, 5.0, 1.0, 5.0])
 LAW_BOUNDS = (np.array([0.01, -200.0, 0.01, -200.0]), np.array([100.0, 1000.0, 100.0, 1000.0]))
 # Groups of random effects that share one size: gain and slope of the specimens, each in the mean of both regimes and
@@ -37,10 +38,14 @@ FIXED = -1  # the group of effects whose size is not estimated
 @displayed()
 @dataclass(frozen=True)
 class Acting:
-    """A mechanism that takes part in a model, with its choice (which specimen, which column)."""
+    """A mechanism that takes part in a model, with its choice (which specimen, which column).
+
+    ``measured`` is its amplitude with its standard uncertainty, where that was measured directly.
+    """
 
     mechanism: Mechanism
     choice: str = ""
+    measured: tuple[float, float] | None = None
 
     @property
     def name(self) -> str:
@@ -51,6 +56,14 @@ class Acting:
     def start(self) -> FloatArray:
         """The parameters from which a fit starts, at the mechanism's full amplitude."""
         return self.mechanism.start()
+
+    def measured_evidence(self, amplitude: float) -> float:
+        """Log likelihood by which a direct measurement favours this amplitude over none."""
+        if self.measured is None:
+            return 0.0
+        value, uncertainty = self.measured
+        zero = self.mechanism.amplitude.zero
+        return 0.5 * (((zero - value) / uncertainty) ** 2 - ((amplitude - value) / uncertainty) ** 2)
 
 
 @displayed()
@@ -174,15 +187,20 @@ def predict(s: Setup, law: FloatArray, acting: Sequence[Acting], values: Sequenc
     before = log_forces(base.forces(conditions.normal_load_N))
     total = before.copy()
     for a, v in zip(acting, values, strict=True):
-        total += log_forces(a.mechanism.law(v, base, conditions, a.choice)) - before
+        total += _change(a, v, base, conditions)
     return total
 
 
 def effect_of(s: Setup, law: FloatArray, acting: Acting, values: FloatArray) -> FloatArray:
     """Change of ln T by one mechanism on top of the flat law, (n, 2)."""
-    base, conditions = s.base(law), s.observations.conditions
+    return _change(acting, values, s.base(law), s.observations.conditions)
+
+
+def _change(acting: Acting, values: FloatArray, base: Base, conditions: Conditions) -> FloatArray:
+    """Change of ln T by one mechanism, none for tests for which it was removed, (n, 2)."""
     after = acting.mechanism.law(values, base, conditions, acting.choice)
-    return log_forces(after) - log_forces(base.forces(conditions.normal_load_N))
+    change = log_forces(after) - log_forces(base.forces(conditions.normal_load_N))
+    return change * conditions.present(acting.mechanism.name)[:, None]
 
 
 def with_form_error(
@@ -231,8 +249,25 @@ def candidates(s: Setup, law: FloatArray) -> list[Acting]:
     for mechanism in MECHANISMS.values():
         if not mechanism.changes_forces or not mechanism.applies(conditions):
             continue
-        found += [Acting(mechanism, str(choice)) for choice in mechanism.choices(base, conditions)]
+        found += [_known(s, Acting(mechanism, str(choice))) for choice in mechanism.choices(base, conditions)]
     return found
+
+
+def _known(s: Setup, a: Acting) -> Acting:
+    """A candidate with its amplitude as measured directly, where it was."""
+    every = s.observations.measured
+    measured = every.get(f"{a.mechanism.name}:{a.choice}", every.get(a.mechanism.name))
+    if measured is None:
+        return a
+    return replace(a, mechanism=as_measured_directly(a.mechanism, *measured), measured=measured)
+
+
+def as_measured_directly(mechanism: Mechanism, value: float, uncertainty: float) -> Mechanism:
+    """The mechanism with its amplitude kept within WITHIN_MEASURED standard uncertainties of a measured one."""
+    first, reach = mechanism.amplitude, WITHIN_MEASURED * uncertainty
+    low, high = np.clip([value - reach, value + reach], first.low, first.high)
+    amplitude = replace(first, low=float(low), high=float(high), tries=())
+    return replace(mechanism, parameters=(amplitude, *mechanism.parameters[1:]))
 
 
 @displayed()

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
 import numpy as np
 
 from tribo.display import displayed
 from tribo.errors import FitError, Problem
+from tribo.mechanisms.conditions import names_in
 from tribo.mechanisms.record import Conditions, StringArray
+from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray, Ingested, Pattern, Pull, SetAside, Test, Trace
 
 STATIC, SLIDING = 0, 1
 FEWEST_TESTS = 12
+WITHOUT = "without"  # column of tests.csv: the mechanisms that were removed for a test
 NO_FLAT = "flat"  # stands for the flat law where no flat sample was measured or chosen
 
 
@@ -24,7 +27,8 @@ class Observations:
     """Every usable test: ln T, shape (n, 2) with static first, and what else its trace showed, shape (n,).
 
     ``reading`` is the relative standard uncertainty of each force within its trace, (n, 2).
-    ``zero_slope_N_per_s`` is the slope of the force before contact.
+    ``zero_slope_N_per_s`` is the slope of the force before contact. ``measured`` holds amplitudes of mechanisms that
+    were measured directly, with their standard uncertainties.
     """
 
     test_ids: StringArray
@@ -42,6 +46,7 @@ class Observations:
     day: StringArray
     flat: str
     set_aside: tuple[SetAside, ...] = ()
+    measured: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def n(self) -> int:
@@ -96,11 +101,20 @@ def observe(ingested: Ingested) -> Observations:
         day=np.array([t.started_at[:10] for t in tests], str),
         flat=campaign.flat_sample or NO_FLAT,
         set_aside=(*ingested.set_aside, *left_out),
+        measured=dict(campaign.measured),
     )
 
 
 def enough(o: Observations) -> Observations:
-    """The same observations. Raises FitError below twelve tests or two loads."""
+    """The same observations. Raises FitError below twelve tests or two loads, or where a name is no mechanism."""
+    stated = {name.partition(":")[0] for name in o.measured} | {n for c in o.conditions.without for n in names_in(c)}
+    allowed = ", ".join(MECHANISMS)
+    unknown = [
+        Problem("unknown_mechanism", f"[measured] or column {WITHOUT}: not a mechanism", found=name, allowed=allowed)
+        for name in sorted(stated - set(MECHANISMS))
+    ]
+    if unknown:
+        raise FitError(unknown)
     loads = len(np.unique(o.conditions.normal_load_N))
     if o.n < FEWEST_TESTS or loads < 2:
         raise FitError(
@@ -144,7 +158,14 @@ def conditions_of(
         clip_N=clip,
         columns=_further_columns(tests),
         pattern=np.array([p.name for p in patterns], str),
+        without=_without(tests),
     )
+
+
+def _without(tests: list[Test]) -> StringArray:
+    """What was removed for each test, nothing where no test names any."""
+    cells = [str(t.covariates.get(WITHOUT, "")) for t in tests]
+    return np.array(cells if any(cells) else [], str)
 
 
 def _elongation(test: Test, pattern: Pattern) -> float:
@@ -170,7 +191,7 @@ def _specimen_runs(tests: list[Test]) -> FloatArray:
 
 def _further_columns(tests: list[Test]) -> dict[str, StringArray]:
     """Recorded columns that take part only as covariates, where every test has a value."""
-    names = sorted({name for t in tests for name in t.covariates})
+    names = sorted({name for t in tests for name in t.covariates} - {WITHOUT})
     columns = {name: np.array([str(t.covariates.get(name, "")) for t in tests], str) for name in names}
     columns["operator"] = np.array([t.operator for t in tests], str)
     columns["date"] = np.array([t.started_at[:10] for t in tests], str)

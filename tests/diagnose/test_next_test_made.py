@@ -1,0 +1,95 @@
+"""A proposed test is made: what was measured directly, and pulls for which a mechanism was removed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tribo.diagnose.next_test import next_test
+from tribo.diagnose.search.weighing import Candidate, weigh
+from tribo.diagnose.statistics.model import Acting, candidates, effect_of
+from tribo.diagnose.statistics.observations import enough, observe
+from tribo.diagnose.statistics.start_effects import start_effects
+from tribo.errors import FitError
+from tribo.mechanisms.table import MECHANISMS
+from tribo.records import Ingested
+
+from .known import LAW, acting, baseline, made, setup_of
+
+PAIR = {"suction", "normal_load_error"}
+OTHERS = set(MECHANISMS) - PAIR
+
+
+@cache
+def campaign() -> Ingested:
+    return made(acting("suction", 8e3), seed=4)
+
+
+def with_measured(name: str, value: float, uncertainty: float) -> Ingested:
+    c = campaign()
+    return replace(c, campaign=replace(c.campaign, measured={name: (value, uncertainty)}))
+
+
+def ranked(ingested: Ingested) -> dict[str, Candidate]:
+    others = {a.name for a in candidates(setup_of(ingested), LAW)} - PAIR
+    return {c.name: c for c in weigh(start_effects(baseline(ingested)), others)}
+
+
+def test_a_load_error_that_was_weighed_and_is_not_there_leaves_the_campaign_to_suction() -> None:
+    free, weighed = ranked(campaign()), ranked(with_measured("normal_load_error", 0.0, 0.005))
+    assert abs(free["normal_load_error"].gain - free["suction"].gain) < 6
+    assert abs(weighed["normal_load_error"].values[0]) <= 0.015
+    assert weighed["suction"].gain - weighed["normal_load_error"].gain > 10
+    assert weighed["suction"].gain == pytest.approx(free["suction"].gain)
+
+
+def test_a_load_error_that_was_weighed_and_is_there_wins_over_suction() -> None:
+    value = float(ranked(campaign())["normal_load_error"].values[0])
+    weighed = ranked(with_measured("normal_load_error", value, 0.005))
+    assert weighed["normal_load_error"].values[0] == pytest.approx(value, abs=0.015)
+    assert weighed["normal_load_error"].gain - weighed["suction"].gain > 10
+
+
+def test_a_mechanism_that_was_removed_for_a_test_does_not_change_it() -> None:
+    c = campaign().campaign
+    vented = tuple(
+        replace(t, covariates={"without": "suction; tilt" if k % 2 else "tilt"}) for k, t in enumerate(c.tests)
+    )
+    s = setup_of(replace(campaign(), campaign=replace(c, tests=vented)))
+    change = effect_of(s, LAW, Acting(MECHANISMS["suction"]), np.array([8e3]))
+    whole = effect_of(setup_of(campaign()), LAW, Acting(MECHANISMS["suction"]), np.array([8e3]))
+    assert not change[1::2].any()
+    assert change[::2] == pytest.approx(whole[::2])
+    assert np.abs(change[::2]).max() > 0.1
+    load = effect_of(s, LAW, Acting(MECHANISMS["normal_load_error"]), np.array([0.1]))
+    assert np.all(np.abs(load[1::2]) > 0.01)
+    assert "without" not in s.observations.conditions.columns
+
+
+def test_a_name_that_is_no_mechanism_is_said_with_those_that_are() -> None:
+    c = campaign().campaign
+    vented = (replace(c.tests[0], covariates={"without": "succion"}), *c.tests[1:])
+    both = replace(campaign(), campaign=replace(c, tests=vented, measured={"weight": (0.0, 1.0)}))
+    with pytest.raises(FitError) as caught:
+        enough(observe(both))
+    assert [p.found for p in caught.value.problems] == ["succion", "weight"]
+    assert "normal_load_error" in str(caught.value.problems[0].allowed)
+
+
+def test_the_design_of_a_next_test_says_in_full_what_to_make() -> None:
+    both = ranked(campaign())
+    first, second = both["suction"], both["normal_load_error"]
+    measured = next_test([first, second])
+    assert measured is not None
+    expected = {"measure": "normal_load_error", "parameter": "dN", "unit": "N", "uncertainty": 0.005, "hours": 0.25}
+    assert measured.design == expected
+    known = replace(second, acting=replace(second.acting, measured=(0.1, 0.005)))
+    pulls = next_test([first, known])
+    assert pulls is not None
+    assert pulls.design["pulls"] == 18
+    assert pulls.design["without"] == "suction" or pulls.design["normal_load_N"] > 0
+    vented = set(pulls.design.get("repeat_tests", ()))
+    assert vented <= {t.test_id for t in campaign().campaign.tests if t.sample == pulls.design["sample"]}
