@@ -31,12 +31,12 @@ def partly_pooled(
     """The fits of one regime with the covariance of their specimens moved towards the mean of all samples.
 
     ``fits`` are those of ``fit_samples``, ``rows`` the tests of each sample. What is averaged is the covariance of T at
-    the lowest and at the highest load, relative to the sample's own forces. Where a sample scatters more, ``dof`` becomes
-    ``prior_dof`` plus that of the sample, at most that of all specimens together. A sample that scatters less gets the
-    mean and its degrees of freedom; no covariance is smaller than the mean in any combination of mu and tau0. A sample
-    of one specimen gets the mean of the others, so that
-    its interval applies to the pattern. Samples without values, with a force that is not positive, or without another
-    sample to compare with, keep their own covariance.
+    the lowest and at the highest load, relative to the sample's own forces. Where a sample scatters more than it,
+    ``dof`` becomes ``prior_dof`` plus that of the sample, at most that of all specimens together. Where it scatters
+    less, it gets the mean with all degrees of freedom; no covariance is smaller than the mean in any combination of mu
+    and tau0. A sample of one specimen gets the mean of the others, so that its interval applies to the pattern. Samples
+    without values, with a force that is not positive, or without another sample to compare with, keep their own
+    covariance.
     """
     shares = {f.sample: s for f in fits if (s := _shares(f, rows[f.sample])) is not None}
     several = [f for f in fits if f.sample in shares and len(f.specimens) > 1]
@@ -94,7 +94,7 @@ def _shares(fit: LawFit, rows: Rows) -> FloatArray | None:
 def at_least(fit: LawFit, floor: FloatArray) -> LawFit:
     """The fit with a covariance that is in no combination of its parameters smaller than ``floor`` (2, 2).
 
-    A floor without a width in some combination changes nothing. For a sample without others to compare with: the scatter of repeats alone explains ``floor``.
+    A floor without a width in some combination changes nothing.
     """
     if not np.linalg.det(floor) > ROUNDING * np.prod(np.diagonal(floor)):
         return fit
