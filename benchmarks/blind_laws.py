@@ -159,16 +159,21 @@ def _pair(piece: Piece) -> dict[str, Any]:
     """The law found in one campaign, tried on the next."""
     hidden = hide_law(piece.seed, piece.form)
     kept = hidden.bench.column("repeat") <= KEPT
-    found = searched_laws(examine(as_ingested(hidden.bench, piece.seed, kept), seed=piece.seed), seed=piece.seed)
+    d = examine(as_ingested(hidden.bench, piece.seed, kept), seed=piece.seed)
+    found = searched_laws(d, seed=piece.seed)
     if not found.laws:
-        return {"answer": "no law found"}
+        causes = [c.mechanism for c in d.verdict.causes]
+        return {"answer": "no law found", "verdict": d.verdict.verdict, "causes": causes}
     seed = seed_of(piece.seed, "next", 0)
     same = piece.second == piece.form
     later = hide_law(seed, piece.second, piece.seed if same else None)
     kept = later.bench.column("repeat") <= KEPT
     d = examine(as_ingested(later.bench, seed, kept), seed=seed)
     held = holds(uncontested(d)[0], found.laws[0].law, found.laws[0].parameters)
-    return {"answer": held.answer, "second": piece.second, "text": held.text, "verdict": d.verdict.verdict}
+    return {
+        "answer": held.answer, "second": piece.second, "text": held.text, "verdict": d.verdict.verdict,
+        "strength": round(later.strength, 2),
+    }  # fmt: skip
 
 
 def run(todo: list[Piece], path: Path, jobs: int) -> None:

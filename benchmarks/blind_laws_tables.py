@@ -11,6 +11,7 @@ from blind_tables import share
 
 Row = dict[str, Any]
 MOST_TIES = 3
+SHOWN = 6.0  # strength of a law in another campaign: half of what is hidden in the first
 WITHIN = 1.10  # of the error of the true law
 
 
@@ -49,6 +50,8 @@ def overall(rows: list[Row]) -> str:
         ("the 90 % band holds the hidden change (mean share of tests)", "85 to 95 %", _mean(tested, "band")),
         ("clean campaigns: a law written", "at most 1 %", share(clean, lambda r: r["laws"] > 0)),
         ("the same law in the next campaign: held", "95 %", share(same, lambda r: r["answer"] == "held")),
+        ("the same, where it is found and acts there at a strength of six or more", "",
+         share([r for r in same if r.get("strength", 0.0) >= SHOWN], lambda r: r["answer"] == "held")),
         ("another law in the next campaign: held", "at most 3 %", share(other, lambda r: r["answer"] == "held")),
         ("processor time of a campaign, median", "", _seconds(laws)),
     ]  # fmt: skip

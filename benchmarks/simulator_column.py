@@ -29,9 +29,9 @@ from tribo.published import load_table2
 from tribo.records import FloatArray, Run
 from tribo.simulate import SimConfig, read_stored, simulate, stratified_design, table2_design
 from tribo.simulate.calibration import expected_minimum
-from tribo.simulate.config import PAPER
 from tribo.simulate.engines.fast import lattice_of, thresholds_of
 from tribo.simulate.ensemble import run_row
+from tribo.simulate.local_friction import PAPER
 from tribo.simulate.table2_column import PRESSURES_PA, SAMPLES, beside, fitted, means
 
 READING = SimConfig().of_reading("berardo2019")

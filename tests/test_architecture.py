@@ -14,7 +14,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
 GROUND = {
-    "display", "errors", "limits", "escaping", "input_files", "quantities", "zeroing", "records", "published", "zips",
+    "display", "errors", "limits", "escaping", "input_files", "quantity_names", "quantities", "zeroing", "records",
+    "published", "zips",
     "file_contents", "links", "temporary", "forked", "nearest", "sheets",
 }  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
@@ -23,7 +24,8 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("errors", {"display"}),
     ("limits", set()),
     ("input_files", {"errors", "limits"}),
-    ("quantities", {"errors"}),
+    ("quantity_names", set()),
+    ("quantities", {"errors", "quantity_names"}),
     ("zeroing", {"display"}),
     ("records", {"display", "errors", "zeroing"}),
     ("published", set()),

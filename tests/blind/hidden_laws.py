@@ -43,11 +43,13 @@ class Truth:
 
 @dataclass(frozen=True)
 class Hidden:
-    """A campaign with a law hidden in it: the ``bench``, the ``change`` (n, 2) of ln T, and what is right to say."""
+    """A campaign with a law hidden in it: the ``bench``, the ``change`` (n, 2) of ln T, what is right to say, and the
+    ``strength`` in this campaign."""
 
     bench: Bench
     change: np.ndarray
     truth: Truth
+    strength: float
 
 
 @dataclass(frozen=True)
@@ -206,14 +208,14 @@ def hide_law(seed: int, form: str, law: int | None = None, strength: float = STR
     bench = _bench(seed, design)
     if not form:
         nothing = Truth((), (0.0, 0.0), frozenset(), frozenset())
-        return Hidden(bench, np.zeros((len(bench.tests), 2)), nothing)
+        return Hidden(bench, np.zeros((len(bench.tests), 2)), nothing, 0.0)
     first = bench if law is None else _bench(law, law_design(law))
     number = seed if law is None else law
     size = strength / _strength(_change(first, first.tests, FORMS[form], number)[0], first, law_design(number))
     change, truth = _change(bench, first.tests, FORMS[form], number)
     change = size * change
     bench.static, bench.sliding = bench.static * np.exp(change[:, 0]), bench.sliding * np.exp(change[:, 1])
-    return Hidden(bench, change, truth)
+    return Hidden(bench, change, truth, _strength(change, bench, design))
 
 
 def _bench(seed: int, design: Design) -> Bench:

@@ -11,8 +11,9 @@ from blind.tribometer import hide
 
 from tribo.diagnose.diagnosis import examine
 from tribo.diagnose.discovery.contested import without_wrong_forms
+from tribo.diagnose.discovery.held import holds
 from tribo.diagnose.discovery.in_verdict import with_laws
-from tribo.diagnose.discovery.known_laws import read_laws, try_laws
+from tribo.diagnose.discovery.known_laws import KnownLaw, read_laws, try_laws
 from tribo.diagnose.discovery.law_file import law_text
 from tribo.diagnose.discovery.planned_law import plan_law
 from tribo.diagnose.discovery.written_law import Shape, WrittenLaw
@@ -24,7 +25,7 @@ from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model import columns_from, with_law
 from tribo.simulate.config import SimConfig
 
-from .known import baseline, made
+from .known import Change, baseline, made
 from .synthetic import SMALL, ingested
 
 WARM = WrittenLaw((Shape("linear", "temperature_C", 20.0, 26.0),))
@@ -67,6 +68,34 @@ def test_a_verdict_lists_the_answers_about_known_laws(folder: Path) -> None:
     assert [law["answer"] for law in quiet.verdict.model["known_laws"]] == ["not held", "cannot be told"]
     assert "0 of 2 known laws held." in quiet.verdict.text
     assert all(layer.kind == "pattern_correction" for layer in quiet.verdict.layers)
+
+
+STEP = WrittenLaw((Shape("step", "temperature_C", 20.0, 26.0, place=23.0),))
+
+
+def stepped(s: Setup) -> np.ndarray:
+    t = s.observations.conditions.temperature_C
+    return np.repeat(0.3 * (t > 23.0)[:, None], 2, axis=1)
+
+
+@pytest.mark.parametrize(("at_work", "a", "answer"), [(stepped, 0.3, "held"), (warming, 0.16, "not held")])
+def test_a_known_law_replaces_a_cause_of_its_column_unless_that_explains_more(
+    at_work: Change, a: float, answer: str
+) -> None:
+    model = refitted(baseline(made(at_work, seed=31)), [Acting(MECHANISMS["temperature"])])
+    known = KnownLaw("law-1.toml", "first", STEP, {"a": Estimate(a, a - 0.04, a + 0.04, "")})
+    tested = try_laws(model, [known], np.random.default_rng(0))
+    assert tested.answers[0][1].answer == answer
+    left = {a.name for a in tested.model.acting}
+    assert ("temperature" in left) == (answer == "not held")
+    assert ("temperature" in tested.replaced) == (answer == "held")
+
+
+def test_the_form_of_a_known_law_may_be_wrong_by_some_of_its_effect() -> None:
+    model = baseline(made(stepped, seed=31))
+    sizes = (0.3, 0.39, 0.5)
+    answers = [holds(model, STEP, {"a": Estimate(a, a - 1e-6, a + 1e-6, "")}).answer for a in sizes]
+    assert answers == ["held", "held", "not held"]
 
 
 def test_every_faulty_law_of_a_folder_is_named(folder: Path) -> None:

@@ -137,10 +137,11 @@ def test_loops_over_strips_use_vector_instructions():
     numerics = _numerics(config, lattice, thresholds_of(config, lattice), drive, 3e-3)
     state = _initial_state(config, lattice, thresholds_of(config, lattice), drive, numerics)
     a = active_set(state, numerics, lattice, drive, config)
+    sums = strips.Sums(*(rows[0] for rows in a.sums))
     given = {
-        strips.forces: (a.planes, a.lists.strips, 0, 0, a.starts, numerics, 0.0),
-        strips.glides: (a.planes, a.lists.strips, 0, a.calm, numerics, a.sums),
-        strips.slides: (a.planes, a.lists.strips, 0, a.moving, numerics, 0, a.sums),
+        strips.forces: (a.planes, a.lists.strips[0], a.starts, numerics, 0.0),
+        strips.glides: (a.planes, a.lists.strips[0], a.calm, numerics, sums),
+        strips.slides: (a.planes, a.lists.strips[0], a.moving, numerics, 0, sums),
     }
     for loop, arguments in given.items():
         fresh = njit(error_model="numpy", **VECTOR_OPTIONS)(loop)

@@ -8,8 +8,8 @@ import pytest
 from tribo.records import FloatArray
 from tribo.simulate import SimConfig, simulate
 from tribo.simulate.calibration import expected_minimum
-from tribo.simulate.config import PAPER
 from tribo.simulate.engines.fast import Thresholds, drive_of, first_failure_s, lattice_of, run_fast, thresholds_of
+from tribo.simulate.local_friction import PAPER
 from tribo.simulate.readings import READINGS
 
 SHORT = {"blocks": (31, 31), "duration_peaks": 1.3}

@@ -98,6 +98,7 @@ def simulate(
     from tribo.simulate.design_file import asked_runs, described_by_options, read_design, together
     from tribo.simulate.results_file import ENSEMBLE, ONE_RUN, kind_of
     from tribo.simulate.resume import continues, run_stored
+    from tribo.simulate.run import simulate as run_model
     from tribo.store.own_file import check_file, only_writer_of
 
     scheduler, seed, jobs = (options.pop(name) for name in ("scheduler", "seed", "jobs"))
@@ -120,7 +121,8 @@ def simulate(
     check_file(out, ONE_RUN if one else ENSEMBLE, kind_of, force)
     if one:
         with only_writer_of(out, wait_s):
-            _one_run(console, pulled(runs[0], added), out)
+            run = pulled(runs[0], added) if acting or laws else run_model(runs[0], jobs)
+            _one_run(console, run, out)
     else:
         work = _work(added)
         if force and out.exists() and not continues(runs, out, work):

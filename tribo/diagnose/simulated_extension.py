@@ -26,8 +26,9 @@ from tribo.errors import SimulationError
 from tribo.mechanisms.record import Conditions, Values
 from tribo.mechanisms_in_model.extended_run import simulate_pair
 from tribo.records import FloatArray, Run
-from tribo.simulate.config import PAPER, LocalFriction, SimConfig
+from tribo.simulate.config import SimConfig
 from tribo.simulate.ensemble import angle_range_deg, run_seed
+from tribo.simulate.local_friction import PAPER, LocalFriction
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -18,10 +18,11 @@ from tribo.mechanisms.placement import Contact, Placement
 from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray, Pattern, Run
-from tribo.simulate.config import LocalFriction, SimConfig
+from tribo.simulate.config import SimConfig
 from tribo.simulate.engines.fast import Thresholds, lattice_of, run_fast, thresholds_of
 from tribo.simulate.engines.lattice import Lattice
 from tribo.simulate.engines.reference import run_reference
+from tribo.simulate.local_friction import LocalFriction
 from tribo.simulate.run import run_of, simulate
 from tribo.virtual_tribometer.measuring_chain import SLED_AREA_M2
 

@@ -1,15 +1,11 @@
 from .calibration import CalibrationRuns as CalibrationRuns, calibrate as calibrate
-from .config import (
-    PAPER as PAPER,
-    FrictionTerms as FrictionTerms,
-    LocalFriction as LocalFriction,
-    SimConfig as SimConfig,
-)
+from .config import SimConfig as SimConfig
 from .ensemble import (
     angle_range_deg as angle_range_deg,
     run_ensemble as run_ensemble,
     stratified_design as stratified_design,
 )
+from .local_friction import PAPER as PAPER, FrictionTerms as FrictionTerms, LocalFriction as LocalFriction
 from .masks import PAPER_PATTERNS as PAPER_PATTERNS, contact_mask as contact_mask
 from .results_file import write_ensemble as write_ensemble, write_run as write_run
 from .resume import read_stored as read_stored, run_stored as run_stored

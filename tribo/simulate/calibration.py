@@ -10,8 +10,9 @@ import numpy as np
 
 from tribo.display import displayed
 from tribo.records import FloatArray
-from tribo.simulate.config import PAPER, LocalFriction, SimConfig
+from tribo.simulate.config import SimConfig
 from tribo.simulate.ensemble import Progress, run_ensemble, stratified_design
+from tribo.simulate.local_friction import PAPER, LocalFriction
 
 Law = tuple[float, float]
 """mu and tau0 (Pa) of T = mu N + tau0 A."""

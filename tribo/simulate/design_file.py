@@ -39,8 +39,9 @@ from tribo.input_files import nests_too_deeply, read_input
 from tribo.limits import DEEPEST_NESTING, LARGEST_DESCRIPTION_BYTES, MOST_RUNS
 from tribo.nearest import did_you_mean
 from tribo.records import Pattern
-from tribo.simulate.config import FrictionTerms, LocalFriction, SimConfig
+from tribo.simulate.config import SimConfig
 from tribo.simulate.ensemble import AngleRule, angle_range_deg, check_all, middle_deg, stratified_design
+from tribo.simulate.local_friction import FrictionTerms, LocalFriction
 from tribo.simulate.readings import ANGLES
 from tribo.simulate.table2_column import PRESSURES_PA, SAMPLES
 

@@ -108,10 +108,21 @@ def size_scaling(blocks: int = 1000, dt_s: float = 2e-8) -> Iterator[Timing]:
         seconds, run = timed_run(config)
         costs[n] = seconds / (run.active_block_steps + run.dense_steps * n * n)
         if n == blocks:
-            yield Timing(f"{n} x {n} blocks, 10 ms", seconds, "s", 60.0, "lower", note=f"dt = {dt_s:g} s")
+            yield Timing(f"{n} x {n} blocks, 10 ms, one thread", seconds, "s", note=f"dt = {dt_s:g} s")
+            yield _by_the_clock(config, threads=2)
             yield Timing("peak memory", _peak_memory_GB(), "GB", 1.0, "lower", note="of the whole process")
     ratio = costs[blocks] / costs[85]
     yield Timing("time per block event, large over 85 x 85", ratio, "ratio", 4.0, "lower")
+
+
+def _by_the_clock(config: SimConfig, threads: int) -> Timing:
+    """Elapsed time of one run on several threads, which processor time does not show."""
+    lattice, thresholds = _prepared(config)
+    run_fast(config.with_(duration_s=1e-6), lattice, thresholds, threads)
+    began = time.perf_counter()
+    run_fast(config, lattice, thresholds, threads)
+    name = f"{config.blocks[0]} x {config.blocks[1]} blocks, 10 ms, {threads} threads by the clock"
+    return Timing(name, time.perf_counter() - began, "s", 25.0, "lower", note="on cores that do nothing else")
 
 
 def reference_cost(config: SimConfig, steps: int) -> float:

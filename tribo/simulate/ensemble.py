@@ -147,8 +147,9 @@ def run_ensemble(
 
     check_all(design)
     rows: list[dict[str, Any] | None] = [None] * len(design)
+    threads = max(1, jobs // max(1, len(design)))
     with ThreadPoolExecutor(max(1, jobs)) as pool:
-        pending = {pool.submit(simulate, config): k for k, config in enumerate(design)}
+        pending = {pool.submit(simulate, config, threads): k for k, config in enumerate(design)}
         done = 0
         try:
             while pending:

@@ -14,8 +14,8 @@ import math
 import numpy as np
 
 from tribo.records import FloatArray
-from tribo.simulate.config import FrictionTerms
 from tribo.simulate.engines.jit import inner
+from tribo.simulate.local_friction import FrictionTerms
 
 # places in the parameter array
 AGEING_B, AGEING_T0, SPEED_A, SPEED_V0, N_PARAMETERS = range(5)

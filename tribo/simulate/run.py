@@ -11,8 +11,10 @@ from tribo.simulate.engines.fast import Trajectory, lattice_of, run_fast, thresh
 from tribo.simulate.engines.reference import run_reference
 
 
-def simulate(config: SimConfig) -> Run:
+def simulate(config: SimConfig, threads: int = 1) -> Run:
     """Simulate one pull of one sample at one load; static and sliding friction follow from the slider force.
+
+    Up to ``threads`` threads share a lattice of 100,000 blocks or more; the result does not depend on their number.
 
     Static friction is T/N at the peak, sliding friction the mean of T/N over the window of the configuration,
     by default from 1.05 times the peak time to the end. N is the nominal load p l2 Nx Ny.
@@ -26,8 +28,11 @@ def simulate(config: SimConfig) -> Run:
     config.check()
     lattice = lattice_of(config)
     thresholds = thresholds_of(config, lattice)
-    run = run_reference if config.engine == "reference" else run_fast
-    return run_of(config, run(config, lattice, thresholds), float(lattice.area_fraction))
+    if config.engine == "reference":
+        trajectory = run_reference(config, lattice, thresholds)
+    else:
+        trajectory = run_fast(config, lattice, thresholds, threads)
+    return run_of(config, trajectory, float(lattice.area_fraction))
 
 
 def run_of(config: SimConfig, trajectory: Trajectory, area_fraction: float) -> Run:

@@ -1,4 +1,4 @@
-"""Causes whose form is wrong: a law of the same column explains the campaign better than the mechanism does."""
+"""Causes and laws of the same column: which of them explains a campaign."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from tribo.diagnose.discovery.grammar import groups_of, shapes_of
 from tribo.diagnose.discovery.scoring import courses_of
 from tribo.diagnose.discovery.settling import CLOSE, Searched, best_form
-from tribo.diagnose.discovery.written_law import Shape
+from tribo.diagnose.discovery.written_law import Shape, WrittenLaw
 from tribo.diagnose.search.weighing import refitted
 from tribo.diagnose.statistics.linearisation import ModelFit
 from tribo.diagnose.statistics.model import Acting, effect_of
@@ -47,8 +47,7 @@ def _lost_by(model: ModelFit, together: Sequence[Acting]) -> tuple[float, bool]:
     Both are judged at the noise that the law leaves. The law pays for its choices among those of these columns, the
     mechanisms do not.
     """
-    named = [a.mechanism.column(a.choice) for a in together]
-    columns = {SAME.get(name, name) for name in named}
+    columns = set().union(*(_followed(a) for a in together))
     c = model.setup.observations.conditions
     shapes = _of_columns(c, columns) if len(columns) == len(together) else []
     if not shapes:
@@ -58,6 +57,28 @@ def _lost_by(model: ModelFit, together: Sequence[Acting]) -> tuple[float, bool]:
     form, state = best_form(without, Searched(courses_of(shapes, c), tuple(groups_of(c))))
     by = form.evidence - state.projected.joint_gain(np.stack(changes, axis=2))
     return by, set(form.best.columns) <= columns
+
+
+def _followed(a: Acting) -> set[str]:
+    """What a mechanism follows, by its name in the grammar."""
+    name = a.mechanism.column(a.choice)
+    return {SAME.get(name, name)}
+
+
+def without_rivals(model: ModelFit, law: WrittenLaw) -> tuple[ModelFit, dict[str, float]]:
+    """The model without the mechanisms of the columns of a law of another campaign, and the log likelihood by which the
+    law in their place is better.
+
+    They stay where they are clearly better: what this campaign cannot tell apart, the other one has told.
+    """
+    columns = set(law.columns) | (SERIES if set(law.columns) & SERIES else set())
+    rivals = [a for a in model.acting if _followed(a) & columns]
+    if not rivals:
+        return model, {}
+    without = refitted(model, [a for a in model.acting if a not in rivals])
+    instead = refitted(without, [*without.acting, Acting(law.mechanism())])
+    by = instead.score - model.score
+    return (without, {a.name: by for a in rivals}) if by > -CLOSE else (model, {})
 
 
 def _of_columns(c: Conditions, columns: set[str]) -> list[tuple[tuple[Shape, ...], float]]:

@@ -8,7 +8,9 @@ from typing import Literal
 
 import numpy as np
 
+from tribo.diagnose.discovery.contested import without_rivals
 from tribo.diagnose.discovery.written_law import UNITS, WrittenLaw
+from tribo.diagnose.search.screen import FORM
 from tribo.diagnose.statistics.fit import fit
 from tribo.diagnose.statistics.interval import NORMAL_90, recovered
 from tribo.diagnose.statistics.linearisation import ModelFit
@@ -35,8 +37,10 @@ def holds(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimate], tri
     """Fit the amplitude of a law, its form as written, on a campaign that it was not made from.
 
     It held if the amplitude is beyond chance (1 % over all laws ``tried``) and differs from the earlier one by less
-    than 2.58 standard errors of the difference; of a wave, both amplitudes. Nothing can be told where a column is
-    missing or does not vary, or the effect is below four standard errors in this design.
+    than 2.58 standard errors of the difference; of a wave, both amplitudes. The form may be wrong by a share of the
+    effect, which adds to this error: another design shows another part of it. Causes of the columns of the law are left
+    out unless they explain the campaign clearly better than the law (:func:`without_rivals`). Nothing can be told where
+    a column is missing or does not vary, or the effect is below four standard errors in this design.
     """
     c, a0 = model.setup.observations.conditions, earlier["a"]
     if (why := not_tested(c, law)) or not np.any(law.weight(c)):
@@ -46,11 +50,14 @@ def holds(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimate], tri
     before = [earlier[name] for name in names]
     if np.abs(effect_of(model.setup, model.law, acting, np.array([e.value for e in before]))).max() < 1e-9:
         return Held("cannot be told", None, a0, "The law changes nothing in this design.")
+    model, _ = without_rivals(model, law)
     after = fit(model.setup, (*model.acting, acting), start=model)
     found = [Estimate(*ends, a0.unit) for ends in recovered(after, len(after.acting) - 1)]
     beyond = max(np.sign(e0.value) * e.value / _error(e) for e, e0 in zip(found, before, strict=True))
+    wrong_form = FORM * float(np.linalg.norm([e.value for e in before]))
     alike = all(
-        abs(e.value - e0.value) < SURE * np.hypot(_error(e), _error(e0)) for e, e0 in zip(found, before, strict=True)
+        abs(e.value - e0.value) < SURE * np.linalg.norm([_error(e), _error(e0), wrong_form])
+        for e, e0 in zip(found, before, strict=True)
     )
     said = "; ".join(_both(*each) for each in zip(names, found, before, strict=True))
     if beyond > sure(tried) and alike:

@@ -43,15 +43,15 @@ def with_laws(
     rng = np.random.default_rng(seed)
     model, lost = uncontested(d)
     tested = try_laws(model, known, rng)
-    d = replace(d, verdict=with_tested(d.verdict, tested))
     strict = LEVEL_OF_LAWS * level
     found = discover_laws(tested.model, level=strict, rng=rng, progress=progress, without=tested.columns)
     if not found.laws and not tested.layers:
-        return replace(d, laws=found)
+        return replace(d, verdict=with_tested(d.verdict, tested), laws=found)
     model = found.laws[-1].model if found.laws else tested.model
     allowed = len(tested.model.acting) if found.laws else 0
     left = screen_left(model, replicates=REPLICATES_LEFT, rng=rng, progress=progress, allowed=allowed)
-    verdict = with_misfits(without_causes(d.verdict, lost if found.laws else {}), found)
+    gone = {**(lost if found.laws else {}), **tested.replaced}
+    verdict = with_tested(with_misfits(without_causes(d.verdict, gone), found), tested)
     return replace(d, laws=found, verdict=_extended(verdict, (tested, found), model, (left, level)))
 
 

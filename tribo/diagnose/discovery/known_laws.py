@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.special import erfc
 
+from tribo.diagnose.discovery.contested import without_rivals
 from tribo.diagnose.discovery.held import Held, holds
 from tribo.diagnose.discovery.law_file import read_law, read_title
 from tribo.diagnose.discovery.law_words import law_layer, size_sentence
@@ -36,11 +37,16 @@ class KnownLaw:
 
 @dataclass(frozen=True)
 class Tested:
-    """The answers of a campaign about known laws, the layers of those that held, and the model with these."""
+    """The answers of a campaign about known laws, the layers of those that held, and the model with these.
+
+    ``replaced`` are causes of the same columns that explain the campaign less well, each with the log likelihood by
+    which the law is better.
+    """
 
     model: ModelFit
     answers: tuple[tuple[KnownLaw, Held], ...]
     layers: tuple[Layer, ...]
+    replaced: Mapping[str, float]
 
     @property
     def text(self) -> str:
@@ -81,20 +87,25 @@ def read_laws(folder: Path) -> tuple[KnownLaw, ...]:
 
 def try_laws(model: ModelFit, known: Sequence[KnownLaw], rng: np.random.Generator) -> Tested:
     """Test every law on a fitted campaign; those that held are added, the surest first, while they hold beside the
-    others. A column has one law."""
+    others. A column has one law; a cause that explains the campaign as well stays in its place."""
     answers = {k.name: holds(model, k.law, k.parameters, len(known)) for k in known}
     layers: list[Layer] = []
+    replaced: dict[str, float] = {}
     taken: set[str] = set()
     for k in sorted(known, key=lambda k: -_strength(answers[k.name])):
         if answers[k.name].answer != "held" or taken & set(k.law.columns):
             continue
         if layers and holds(model, k.law, k.parameters, len(known)).answer != "held":
             continue
-        after = fit(model.setup, (*model.acting, Acting(k.law.mechanism())), start=model)
-        layers.append(_layer(k, model, after, rng))
+        without, rivals = without_rivals(model, k.law)
+        if any(by <= 0.0 for by in rivals.values()):
+            continue
+        after = fit(without.setup, (*without.acting, Acting(k.law.mechanism())), start=without)
+        layers.append(_layer(k, without, after, rng))
         taken |= set(k.law.columns)
+        replaced |= rivals
         model = after
-    return Tested(model, tuple((k, answers[k.name]) for k in known), tuple(layers))
+    return Tested(model, tuple((k, answers[k.name]) for k in known), tuple(layers), replaced)
 
 
 def _strength(held: Held) -> float:

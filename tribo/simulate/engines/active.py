@@ -34,6 +34,7 @@ from tribo.simulate.engines.lists import (
     enqueue,
     join,
     leave,
+    listed,
     lists_of,
     rest,
     set_reach,
@@ -54,27 +55,52 @@ from tribo.simulate.engines.state import (
     State,
     observe,
 )
-from tribo.simulate.engines.strips import CAVITY, CONTACT, LANES, Planes, Sums, forces, glides, slides
+from tribo.simulate.engines.strips import (
+    CAVITY,
+    CONTACT,
+    LANES,
+    Planes,
+    Sums,
+    forces,
+    glides,
+    slides,
+)
+from tribo.simulate.engines.team import (
+    END,
+    FORCES,
+    MOTION,
+    Team,
+    done,
+    give,
+    next_order,
+    shares_of,
+    team_of,
+    wait_for_all,
+)
 from tribo.simulate.friction import static_threshold
+
+MANY = 64  # strips; an order costs about as much as the forces of 20 strips in the cache
 
 
 class Active(NamedTuple):
     """The blocks of a run, their strips, and what the loops say of each strip."""
 
     planes: Planes
-    sums: Sums
+    sums: Sums  # a row each share
     layout: Layout
     lists: Lists
     starts: NDArray[np.bool_]  # (strips,) a block at rest gives way
     calm: NDArray[np.bool_]  # (strips,) all cavity blocks may rest
     moving: NDArray[np.int64]  # (strips,) contact blocks that move
+    team: Team
 
 
-def active_of(planes: Planes, layout: Layout, numerics: Numerics) -> Active:
-    """Lists of a lattice whose blocks move where ``planes.pace`` says so."""
+def active_of(planes: Planes, layout: Layout, numerics: Numerics, threads: int = 1) -> Active:
+    """Lists of a lattice whose blocks move where ``planes.pace`` says so; a large one has up to ``threads`` threads."""
     n = len(planes.place)
+    shares = shares_of(numerics.nx * numerics.ny)
     lanes = planes.place[:, None] + np.arange(LANES)
-    lists = lists_of(planes.kind[lanes] == CAVITY, numerics)
+    lists = lists_of(planes.kind[lanes] == CAVITY, numerics, shares)
     for strip in np.flatnonzero((planes.pace[lanes] != 0.0).any(axis=1)):
         here = lanes[strip]
         planes.hold[here[planes.kind[here] == CAVITY]] = np.inf
@@ -84,7 +110,8 @@ def active_of(planes: Planes, layout: Layout, numerics: Numerics) -> Active:
     lists.strips[PENDING, :n] = np.arange(n)
     lists.members[PENDING] = n
     starts, calm = np.zeros((2, n), np.bool_)
-    return Active(planes, Sums(*np.zeros((3, LANES))), layout, lists, starts, calm, np.zeros(n, np.int64))
+    team, sums = team_of(threads, shares), Sums(*np.zeros((3, shares, LANES)))
+    return Active(planes, sums, layout, lists, starts, calm, np.zeros(n, np.int64), team)
 
 
 @inner
@@ -122,17 +149,64 @@ def slipping(strip: int, s: State, p: Planes, layout: Layout, c: Numerics) -> in
 
 
 @inner
+def threads_for(strips: int, team: Team) -> int:
+    """The whole team where many strips are worked on, else the leader alone."""
+    return team.threads if strips >= MANY else 1
+
+
+@inner
+def find_forces(thread: int, threads: int, s: State, a: Active, c: Numerics) -> None:
+    """Forces of the strips that listen, glide or slide, in the shares of one of so many threads."""
+    copied_into_callers()
+    lists = a.lists
+    t = c.start + s.counts[STEP] * c.dt
+    for row in range(lists.shares * ASLEEP):
+        if row % threads == thread:
+            forces(a.planes, lists.strips[row, : lists.members[row]], a.starts, c, t)
+
+
+@inner
+def move(thread: int, threads: int, s: State, a: Active, c: Numerics) -> None:
+    """Move the strips that glide or slide, in the shares of one of so many threads."""
+    copied_into_callers()
+    lists = a.lists
+    for share in range(thread, lists.shares, threads):
+        row = lists.shares * GLIDING + share
+        sums = Sums(a.sums.along[share], a.sums.squares[share], a.sums.work[share])
+        glides(a.planes, lists.strips[row, : lists.members[row]], a.calm, c, sums)
+        row = lists.shares * SLIDING + share
+        slides(a.planes, lists.strips[row, : lists.members[row]], a.moving, c, s.counts[STEP], sums)
+
+
+@compiled
+def assist(a: Active, s: State, c: Numerics, thread: int) -> None:
+    """What another thread of the team than the leader does, until the leader has no more orders."""
+    kind = next_order(thread, a.team)
+    while kind != END:
+        if kind == FORCES:
+            find_forces(thread, a.team.threads, s, a, c)
+        else:
+            move(thread, a.team.threads, s, a, c)
+        done(thread, a.team)
+        kind = next_order(thread, a.team)
+
+
+@inner
 def start_all(s: State, a: Active, c: Numerics) -> None:
     """Find forces of the strips that listen, glide or slide, and start those of their blocks that give way."""
     copied_into_callers()
     lists = a.lists
-    t = c.start + s.counts[STEP] * c.dt
-    for status in range(3):
-        forces(a.planes, lists.strips, status, lists.members[status], a.starts, c, t)
-    for status in range(3):  # strips that begin to listen now join a list that has been seen
-        m = lists.members[status] - 1
+    threads = threads_for(listed(LISTENING, lists), a.team)
+    if threads > 1:
+        give(FORCES, a.team)
+    find_forces(0, threads, s, a, c)
+    if threads > 1:
+        wait_for_all(a.team)
+    for row in range(lists.shares * ASLEEP):  # strips that begin to listen now join a list that has been seen
+        status = row // lists.shares
+        m = lists.members[row] - 1
         while m >= 0:  # from the end: one that leaves is replaced by one that has been seen or has just joined
-            strip = lists.strips[status, m]
+            strip = lists.strips[row, m]
             m -= 1
             if not a.starts[strip]:
                 continue
@@ -151,26 +225,28 @@ def rest_all(a: Active, c: Numerics) -> None:
     """Gliding strips rest once they are calm; sliding ones in which all contact blocks stopped glide on, or rest."""
     copied_into_callers()
     lists = a.lists
-    m = lists.members[GLIDING] - 1
-    while m >= 0:
-        strip = lists.strips[GLIDING, m]
-        m -= 1
-        if a.calm[strip]:
-            hold_cavities(strip, 2.0 * c.rest_force, a.planes)
-            leave(strip, lists)
-            rest(strip, lists)
-            set_reach(strip, 0, lists)
-    m = lists.members[SLIDING] - 1
-    while m >= 0:
-        strip = lists.strips[SLIDING, m]
-        m -= 1
-        if a.moving[strip] == 0:
-            leave(strip, lists)
-            if lists.links[strip, OWN_REACH] != 0:
-                join(strip, GLIDING, lists)
-            else:
+    for row in range(lists.shares * GLIDING, lists.shares * SLIDING):
+        m = lists.members[row] - 1
+        while m >= 0:
+            strip = lists.strips[row, m]
+            m -= 1
+            if a.calm[strip]:
+                hold_cavities(strip, 2.0 * c.rest_force, a.planes)
+                leave(strip, lists)
                 rest(strip, lists)
-            set_reach(strip, lists.links[strip, OWN_REACH], lists)
+                set_reach(strip, 0, lists)
+    for row in range(lists.shares * SLIDING, lists.shares * ASLEEP):
+        m = lists.members[row] - 1
+        while m >= 0:
+            strip = lists.strips[row, m]
+            m -= 1
+            if a.moving[strip] == 0:
+                leave(strip, lists)
+                if lists.links[strip, OWN_REACH] != 0:
+                    join(strip, GLIDING, lists)
+                else:
+                    rest(strip, lists)
+                set_reach(strip, lists.links[strip, OWN_REACH], lists)
 
 
 @inner
@@ -188,8 +264,9 @@ def queue_pending(s: State, a: Active, c: Numerics) -> None:
             lists.strips[PENDING, n] = strip
             n += 1
     lists.members[PENDING] = 0
-    forces(a.planes, lists.strips, PENDING, n, a.starts, c, 0.0)
+    forces(a.planes, lists.strips[PENDING, :n], a.starts, c, 0.0)
     for m in range(n):
+        a.starts[lists.strips[PENDING, m]] = False  # the comparison with the force at t = 0 means nothing
         t_fail = first_failure(lists.strips[PENDING, m], s, a.planes, c)
         if t_fail < np.inf:
             enqueue(lists.strips[PENDING, m], s.counts[STEP], math.ceil((t_fail - c.start) / c.dt), lists)
@@ -232,9 +309,11 @@ def admit_due(step: int, lists: Lists) -> None:
 
 @inner
 def total(values: FloatArray) -> float:
+    """The sum over all shares and lanes."""
     found = 0.0
-    for value in values:
-        found += value
+    for share in range(values.shape[0]):
+        for lane in range(LANES):
+            found += values[share, lane]
     return found
 
 
@@ -249,23 +328,29 @@ def advance(a: Active, s: State, out: Samples, c: Numerics, until_step: int) -> 
     while s.counts[STEP] < until_step and s.counts[CODE] == RUNNING:
         if lists.members[PENDING] > 0:
             queue_pending(s, a, c)
-        if lists.members[GLIDING] + lists.members[SLIDING] == 0:
+        if listed(GLIDING, lists) == 0:
             wait = steps_to_next_failure(s.counts[STEP], until_step - s.counts[STEP], lists.head)
             if wait > 0:
                 observe(wait, 0, s, out, c)
                 continue
         admit_due(s.counts[STEP], lists)
         start_all(s, a, c)
-        s.counts[ACTIVE_STEPS] += LANES * (lists.members[GLIDING] + lists.members[SLIDING])
-        glides(a.planes, lists.strips, lists.members[GLIDING], a.calm, c, a.sums)
-        slides(a.planes, lists.strips, lists.members[SLIDING], a.moving, c, s.counts[STEP], a.sums)
+        active = listed(GLIDING, lists)
+        s.counts[ACTIVE_STEPS] += LANES * active
+        threads = threads_for(active, a.team)
+        if threads > 1:
+            give(MOTION, a.team)
+        move(0, threads, s, a, c)
+        if threads > 1:
+            wait_for_all(a.team)
         if c.periodic:
             for plane in (a.planes.q_x, a.planes.q_y, a.planes.q_sum, a.planes.q_gap):
                 wrap(plane, a.layout, c.nx, c.ny)
         moving = 0
         if (s.counts[STEP] + 1) % c.stride == 0:
-            for m in range(lists.members[SLIDING]):
-                moving += a.moving[lists.strips[SLIDING, m]]
+            for row in range(lists.shares * SLIDING, lists.shares * ASLEEP):
+                for strip in lists.strips[row, : lists.members[row]]:
+                    moving += a.moving[strip]
         rest_all(a, c)
         s.totals[ALONG] = along + way * total(a.sums.along)
         observe(1, moving, s, out, c)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +12,13 @@ from tribo.errors import Problem, SimulationError
 from tribo.records import FloatArray
 from tribo.simulate.config import SimConfig, mask_of
 from tribo.simulate.engines import state as k
-from tribo.simulate.engines.active import Active, active_of, advance
+from tribo.simulate.engines.active import Active, active_of, advance, assist
 from tribo.simulate.engines.dense import advance_dense
 from tribo.simulate.engines.jit import uncollected
 from tribo.simulate.engines.lattice import Lattice, make_lattice
 from tribo.simulate.engines.planes import places_of
 from tribo.simulate.engines.strips import planes_of
+from tribo.simulate.engines.team import helped
 from tribo.simulate.friction import packed
 
 _CHUNK = 4096  # samples between two returns from the compiled loop
@@ -122,8 +124,10 @@ def first_failure_s(lattice: Lattice, thresholds: Thresholds, drive: Drive, stif
     return float(np.nanmin(np.where(a > 0, times, np.nan)))
 
 
-def run_fast(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Trajectory:
+def run_fast(config: SimConfig, lattice: Lattice, thresholds: Thresholds, threads: int = 1) -> Trajectory:
     """One run on the fast engine (or on its dense step alone, for ``engine="dense"``).
+
+    The fast engine uses up to ``threads`` threads for a large lattice. The result does not depend on their number.
 
     Raises
     ------
@@ -136,32 +140,42 @@ def run_fast(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Tra
     # half a step off, so that no rounding decides in which step the first block fails
     numerics = _numerics(config, lattice, thresholds, drive, failure - 1.5 * config.dt_s)
     state = _initial_state(config, lattice, thresholds, drive, numerics)
-    active = None if config.engine == "dense" else active_set(state, numerics, lattice, drive, config)
-    chunks: list[k.Samples] = []
-    last_step = _last_step(config, thresholds, numerics)
-    while state.counts[k.CODE] == k.RUNNING and state.counts[k.STEP] < last_step:
-        samples = k.Samples(
-            np.zeros(_CHUNK + 1), np.zeros(_CHUNK + 1), np.zeros(_CHUNK + 1), np.zeros(_CHUNK + 1, np.int64)
+    until = _last_step(config, thresholds, numerics)
+    if config.engine == "dense":
+        chunks = _in_chunks(
+            state, numerics, until, lambda out, step: advance_dense(state, out, numerics, step, lattice, drive.follow)
         )
-        state.counts[k.N_SAMPLES] = 0
-        until = min(int(state.counts[k.STEP]) + _CHUNK * numerics.stride, last_step)
-        if active is None:
-            advance_dense(state, samples, numerics, until, lattice, drive.follow)
-        else:
-            with uncollected(advance):
-                advance(active, state, samples, numerics, until)
-        chunks.append(_first(samples, int(state.counts[k.N_SAMPLES])))
-    if active is not None:
+    else:
+        active = active_set(state, numerics, lattice, drive, config, threads)
+        with uncollected(advance), helped(active.team, lambda k: assist(active, state, numerics, k)):
+            chunks = _in_chunks(state, numerics, until, lambda out, step: advance(active, state, out, numerics, step))
         put_back(active, state, numerics)
     _refuse_not_finite(state, numerics)
     return _trajectory(chunks, state, numerics, drive, failure)
 
 
-def active_set(state: k.State, numerics: k.Numerics, lattice: Lattice, drive: Drive, config: SimConfig) -> Active:
+def _in_chunks(
+    state: k.State, numerics: k.Numerics, until: int, advance_to: Callable[[k.Samples, int], None]
+) -> list[k.Samples]:
+    """Integrate to a step, or until the run has finished, and return what was kept."""
+    chunks: list[k.Samples] = []
+    while state.counts[k.CODE] == k.RUNNING and state.counts[k.STEP] < until:
+        samples = k.Samples(
+            np.zeros(_CHUNK + 1), np.zeros(_CHUNK + 1), np.zeros(_CHUNK + 1), np.zeros(_CHUNK + 1, np.int64)
+        )
+        state.counts[k.N_SAMPLES] = 0
+        advance_to(samples, min(int(state.counts[k.STEP]) + _CHUNK * numerics.stride, until))
+        chunks.append(_first(samples, int(state.counts[k.N_SAMPLES])))
+    return chunks
+
+
+def active_set(
+    state: k.State, numerics: k.Numerics, lattice: Lattice, drive: Drive, config: SimConfig, threads: int = 1
+) -> Active:
     """What the compiled loop of the fast engine works on."""
     drag = -config.mass_kg * config.damping_per_s * drive.follow
     pull = np.where(lattice.contact[:, None], drive.rate, drag)
-    return active_of(*planes_of(state, numerics, lattice, pull), numerics)
+    return active_of(*planes_of(state, numerics, lattice, pull), numerics, threads)
 
 
 def put_back(active: Active, state: k.State, numerics: k.Numerics) -> None:

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from tribo.simulate.engines.jit import inner
 from tribo.simulate.engines.state import Numerics
 
-# states of a strip, and rows of Lists.strips and .members; those PENDING fell asleep and are not in the queue yet
-LISTENING, GLIDING, SLIDING, ASLEEP, PENDING, ROWS = range(6)
+LISTENING, GLIDING, SLIDING, ASLEEP = range(4)  # states of a strip
+PENDING = -1  # row of Lists.strips and .members: strips that fell asleep and are not in the queue yet
 # columns of Lists.links: state, number of moving strips that reach it, which neighbours it reaches itself (a bit each)
-# and would with its cavities alone, place in its list, bucket of the queue, the strips before and after it there, and
-# the eight neighbours, -1 where there is none
-STATUS, TOUCHED, REACH, OWN_REACH, PLACE, BUCKET, BEFORE, AFTER, NEAR = range(9)
+# and would with its cavities alone, place in its list, share of the lattice, bucket of the queue, the strips before and
+# after it there, and the eight neighbours, -1 where there is none
+STATUS, TOUCHED, REACH, OWN_REACH, PLACE, SHARE, BUCKET, BEFORE, AFTER, NEAR = range(10)
 LINKS = NEAR + 8
 AROUND = ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))  # a bit of REACH each
 WEST, MIDDLE, EAST = 0b00000111, 0b00011000, 0b11100000
@@ -23,16 +23,20 @@ RING = 1 << 15  # steps the queue looks ahead
 
 
 class Lists(NamedTuple):
-    """Every strip is in the list of its state or, asleep, in the queue."""
+    """Every strip is in the list of its state and share or, asleep, in the queue.
+
+    The list of a state and a share is row ``shares * state + share`` of ``strips``; the last row is for PENDING.
+    """
 
     links: NDArray[np.int64]  # (strips, LINKS)
-    strips: NDArray[np.int64]  # (ROWS, 2 strips)
-    members: NDArray[np.int64]  # (ROWS,) how many are in each list
+    strips: NDArray[np.int64]  # (rows, 2 strips)
+    members: NDArray[np.int64]  # (rows,) how many are in each list
+    shares: int
     head: NDArray[np.int64]  # the queue: first strip of each bucket, one bucket per step, used as a ring
 
 
-def lists_of(cavity: NDArray[np.bool_], c: Numerics) -> Lists:
-    """All strips asleep. ``cavity`` (strips, lanes) tells the cavity blocks."""
+def lists_of(cavity: NDArray[np.bool_], c: Numerics, shares: int) -> Lists:
+    """All strips asleep, in so many shares. ``cavity`` (strips, lanes) tells the cavity blocks."""
     n, lanes = cavity.shape
     across = -(-c.nx // lanes)
     y, x = np.divmod(np.arange(n), across)
@@ -48,17 +52,29 @@ def lists_of(cavity: NDArray[np.bool_], c: Numerics) -> Lists:
             to_x, to_y = to_x % across, to_y % c.ny
         inside = (to_x >= 0) & (to_x < across) & (to_y >= 0) & (to_y < c.ny)
         links[inside, NEAR + bit] = (to_y * across + to_x)[inside]
-    strips, members = np.zeros((ROWS, 2 * n), np.int64), np.zeros(ROWS, np.int64)
-    return Lists(links, strips, members, np.full(RING, -1, np.int64))
+    links[:, SHARE] = shares * np.arange(n) // n
+    rows = shares * ASLEEP + 1
+    strips, members = np.zeros((rows, 2 * n), np.int64), np.zeros(rows, np.int64)
+    return Lists(links, strips, members, shares, np.full(RING, -1, np.int64))
+
+
+@inner
+def listed(status: int, lists: Lists) -> int:
+    """Number of strips of this state and those after it, without those asleep."""
+    found = 0
+    for row in range(lists.shares * status, lists.shares * ASLEEP):
+        found += lists.members[row]
+    return found
 
 
 @inner
 def join(strip: int, status: int, lists: Lists) -> None:
     """Put a strip into the list of a state."""
+    row = lists.shares * status + lists.links[strip, SHARE]
     lists.links[strip, STATUS] = status
-    lists.links[strip, PLACE] = lists.members[status]
-    lists.strips[status, lists.members[status]] = strip
-    lists.members[status] += 1
+    lists.links[strip, PLACE] = lists.members[row]
+    lists.strips[row, lists.members[row]] = strip
+    lists.members[row] += 1
 
 
 @inner
@@ -67,9 +83,10 @@ def leave(strip: int, lists: Lists) -> None:
     links = lists.links
     status = links[strip, STATUS]
     if status != ASLEEP:
-        lists.members[status] -= 1
-        last = lists.strips[status, lists.members[status]]
-        lists.strips[status, links[strip, PLACE]] = last
+        row = lists.shares * status + links[strip, SHARE]
+        lists.members[row] -= 1
+        last = lists.strips[row, lists.members[row]]
+        lists.strips[row, links[strip, PLACE]] = last
         links[last, PLACE] = links[strip, PLACE]
         return
     bucket = links[strip, BUCKET]

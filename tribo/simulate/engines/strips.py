@@ -18,7 +18,6 @@ from tribo.records import FloatArray
 from tribo.simulate.engines import state as k
 from tribo.simulate.engines.jit import copied_into_callers, inner, inner_vectorised, widest_vectors
 from tribo.simulate.engines.lattice import Lattice
-from tribo.simulate.engines.lists import GLIDING, SLIDING
 from tribo.simulate.engines.planes import LINE, Layout, aligned, interleaved, places_of, spare_stiffness, wrap
 from tribo.simulate.engines.state import Numerics, State
 from tribo.simulate.friction import sliding_threshold, static_threshold
@@ -89,35 +88,34 @@ def planes_of(state: State, numerics: Numerics, lattice: Lattice, pull: FloatArr
     hold[inside] = np.where(moves, np.inf, np.where(contact, cells[:, k.FS], 2.0 * numerics.rest_force))
     again[inside], sliding[inside] = cells[:, k.FA], cells[:, k.FD]
     since[inside] = np.where(contact, cells[:, k.SINCE], np.inf)
-    edge, spare = _spare(lattice, numerics, inside, lanes)
+    edge, spare = _spare(lattice, numerics.stiffness)
     rows: Any = [*planes, place, edge, *spare, layout.width]
     return Planes(*rows), layout
 
 
-def _spare(
-    lattice: Lattice, numerics: Numerics, inside: NDArray[np.int64], lanes: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], FloatArray]:
+def _spare(lattice: Lattice, stiffness: float) -> tuple[NDArray[np.int64], FloatArray]:
     """``Planes.edge``, and the spare stiffness of the blocks of these strips; (3, 8 strips at free edges)."""
-    whole = np.zeros((3, int(lanes.max()) + 1))
-    whole[:, inside] = numerics.stiffness * spare_stiffness(lattice).T
-    by_strip = whole[:, lanes]
-    lacking = np.any(by_strip != 0.0, axis=(0, 2))
+    nx, ny = lattice.nx, lattice.ny
+    rows = np.zeros((ny, -(-nx // LANES) * LANES, 3))
+    rows[:, :nx] = stiffness * spare_stiffness(lattice).reshape(ny, nx, 3)
+    by_strip = rows.reshape(-1, LANES, 3)
+    lacking = by_strip.any(axis=(1, 2))
     edge = np.where(lacking, LANES * (np.cumsum(lacking) - 1), -1)
     spare = aligned(3, max(1, int(lacking.sum())) * LANES)
-    spare[:, : LANES * int(lacking.sum())] = by_strip[:, lacking].reshape(3, -1)
+    spare[:, : LANES * int(lacking.sum())] = by_strip[lacking].reshape(-1, 3).T
     return edge, spare
 
 
 @inner_vectorised
-def forces(p: Planes, strips: IntArray, row: int, n: int, starts: BoolArray, c: Numerics, t: float) -> None:
-    """Force on all blocks of the first ``n`` strips of a list at time t; ``starts``: one that rests gives way."""
+def forces(p: Planes, strips: IntArray, starts: BoolArray, c: Numerics, t: float) -> None:
+    """Force on all blocks of these strips at time t; ``starts`` becomes true where one that rests gives way."""
     widest_vectors()
     copied_into_callers()
     one, width = np.uint64(1), np.uint64(p.width)
     quarter = 0.25 * c.stiffness
     own = 12.0 + 4.0 * c.shear_stiffness / c.stiffness
-    for m in range(n):
-        first = np.uint64(p.place[strips[row, m]])  # unsigned, so that no index counts from the end
+    for m in range(len(strips)):
+        first = np.uint64(p.place[strips[m]])  # unsigned, so that no index counts from the end
         beyond = False
         for lane in range(LANES):
             i = first + np.uint64(lane)
@@ -133,8 +131,8 @@ def forces(p: Planes, strips: IntArray, row: int, n: int, starts: BoolArray, c: 
             p.f_y[i] = f_y
             hold = static_threshold(p.hold[i], t - p.since[i], c.law)
             beyond |= f_x * f_x + f_y * f_y > hold * hold
-        if p.edge[strips[row, m]] >= 0:
-            near = np.uint64(p.edge[strips[row, m]])
+        if p.edge[strips[m]] >= 0:
+            near = np.uint64(p.edge[strips[m]])
             beyond = False
             for lane in range(LANES):
                 i, j = first + np.uint64(lane), near + np.uint64(lane)
@@ -144,20 +142,21 @@ def forces(p: Planes, strips: IntArray, row: int, n: int, starts: BoolArray, c: 
                 p.f_y[i] = f_y
                 hold = static_threshold(p.hold[i], t - p.since[i], c.law)
                 beyond |= f_x * f_x + f_y * f_y > hold * hold
-        starts[strips[row, m]] = beyond
+        if beyond:  # written only where it changes: other threads use what lies beside it
+            starts[strips[m]] = True
 
 
 @inner_vectorised
-def glides(p: Planes, strips: IntArray, n: int, calm: BoolArray, c: Numerics, sums: Sums) -> None:
-    """Move the cavity blocks of the ``n`` gliding strips; ``calm`` of a strip, whether all of them may rest."""
+def glides(p: Planes, strips: IntArray, calm: BoolArray, c: Numerics, sums: Sums) -> None:
+    """Move the cavity blocks of these gliding strips; ``calm`` of a strip, whether all of them may rest."""
     widest_vectors()
     copied_into_callers()
     keep = 1.0 - c.damping * c.dt
     way = c.dt * c.dt / c.mass
     quiet = c.rest_force * c.rest_force
     slow = quiet * c.mass / (c.stiffness * c.dt * c.dt)
-    for m in range(n):
-        first = np.uint64(p.place[strips[GLIDING, m]])
+    for m in range(len(strips)):
+        first = np.uint64(p.place[strips[m]])
         loud = False
         for lane in range(LANES):
             i = first + np.uint64(lane)
@@ -177,12 +176,13 @@ def glides(p: Planes, strips: IntArray, n: int, calm: BoolArray, c: Numerics, su
             p.q_gap[i] = x - y
             sums.along[lane] += a * c.direction_x + b * c.direction_y
             sums.squares[lane] += squares
-        calm[strips[GLIDING, m]] = not loud
+        if calm[strips[m]] == loud:
+            calm[strips[m]] = not loud
 
 
 @inner_vectorised
-def slides(p: Planes, strips: IntArray, n: int, moving: IntArray, c: Numerics, step: int, sums: Sums) -> None:
-    """Friction and displacement of all blocks of the ``n`` sliding strips; ``moving`` contact blocks of each.
+def slides(p: Planes, strips: IntArray, moving: IntArray, c: Numerics, step: int, sums: Sums) -> None:
+    """Friction and displacement of all blocks of these sliding strips; ``moving`` contact blocks of each.
 
     Driving force and damping change the velocity, then friction takes an impulse from it, which can stop a block within
     a step but never turn it round. A block at rest meets its static threshold, and its first kick is half a step long:
@@ -193,8 +193,8 @@ def slides(p: Planes, strips: IntArray, n: int, moving: IntArray, c: Numerics, s
     t = c.start + step * c.dt
     keep = 1.0 - c.damping * c.dt
     way = c.dt * c.dt / c.mass
-    for m in range(n):
-        first = np.uint64(p.place[strips[SLIDING, m]])
+    for m in range(len(strips)):
+        first = np.uint64(p.place[strips[m]])
         on_the_way = 0
         for lane in range(LANES):
             i = first + np.uint64(lane)
@@ -236,7 +236,8 @@ def slides(p: Planes, strips: IntArray, n: int, moving: IntArray, c: Numerics, s
             if c.law is not None:
                 p.since[i] = t if stops else p.since[i]
             on_the_way += 1 if rubs & slips & (not stops) else 0
-        moving[strips[SLIDING, m]] = on_the_way
+        if moving[strips[m]] != on_the_way:
+            moving[strips[m]] = on_the_way
 
 
 @inner
