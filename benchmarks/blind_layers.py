@@ -41,6 +41,7 @@ RMS, PARTS = 0.15, (0.264, 0.101, 0.022)
 TIED_TOO = ({"suction", "normal_load_error"}, {"tilt", "pressure_dependent_friction"})  # never hidden together
 LOOPED = ("suction", "normal_load_error", "pressure_dependent_friction", "contact_area_loss", "tilt")
 TRIALS, FIRST_COUNTED = 12, 4  # of a staircase, and the first that counts
+STRENGTHS = 8  # campaigns of each effect and kind of patterns
 HALF_SEED = 600_000_000
 
 
@@ -175,18 +176,42 @@ def half_work(task: tuple[str, str, float, int]) -> dict[str, Any]:
     return half_of(*task)
 
 
+def strength_of(task: tuple[str, str, float, int]) -> dict[str, Any]:
+    """How strongly the score test shows an effect of one ``size`` in the same campaigns with these patterns: normal
+    deviates. For an effect that wrong patterns do not resemble, the size seen half the time goes as one over their
+    mean, without the chance of a staircase."""
+    from tribo.diagnose.statistics.fit import fit
+    from tribo.diagnose.statistics.model import setup
+    from tribo.diagnose.statistics.observations import observe
+    from tribo.diagnose.statistics.predictor import tabled_predictor
+    from tribo.diagnose.statistics.start_effects import start_effects
+
+    name, which, size, seed = task
+    found = []
+    for k in range(STRENGTHS):
+        number = seed + 100_000 + 1000 * ALL.index(name) + k
+        o = observe(make_campaign(Case("strength", number, ((name, size),), designed(which, name))))
+        e = start_effects(fit(setup(o, tabled_predictor(o.patterns))))
+        here = [p / s for a, p, s in zip(e.acting, e.pull, e.length, strict=True) if a.name == name]
+        found.append(round(float(max(here)), 3))
+    return {"effect": name, "patterns": which, "size": size, "strengths": found}
+
+
 def in_a_line(row: dict[str, Any]) -> str:
+    if "strengths" in row:
+        return f"{row['patterns']}: {row['effect']}: strength {np.mean(row['strengths']):.2f}"
     what = row.get("half") or f"{row['verdict']} {row['causes']}"
     return f"{row.get('cell') or (row['patterns'] + ': ' + row['effect'])}: {what}"
 
 
 def find_half(options: argparse.Namespace) -> None:
-    known = {(row["effect"], row["patterns"]) for row in read_rows(options.path)}
+    known = {(row["effect"], row["patterns"], "half" in row) for row in read_rows(options.path)}
     begin = {row["effect"]: row["half"] for row in read_rows(options.half)}
-    every = [(n, w) for n in ALL for w in (RIGHT, OFF, HALF_WAY) if (n, w) not in known]
-    tasks = [(n, w, begin[n], options.half_seed) for n, w in every]
-    np.random.default_rng(options.seed).shuffle(tasks)  # type: ignore[arg-type]
-    work_off(tasks, half_work, options.path, options.jobs, in_a_line)
+    every = [(n, w) for n in ALL for w in (RIGHT, OFF, HALF_WAY)]
+    np.random.default_rng(options.seed).shuffle(every)
+    for work_of, in_steps in ((strength_of, False), (half_work, True)):
+        tasks = [(n, w, begin[n], options.half_seed) for n, w in every if (n, w, in_steps) not in known]
+        work_off(tasks, work_of, options.path, options.jobs, in_a_line)
 
 
 def run(todo: list[Piece], options: argparse.Namespace) -> None:
@@ -224,7 +249,8 @@ def main() -> None:
         return
     half = {row["effect"]: row["half"] for row in read_rows(options.half)}
     halves = read_rows(options.found)
-    found = {w: {row["effect"]: row["half"] for row in halves if row["patterns"] == w} for w in (OFF, HALF_WAY)}
+    stairs = [row for row in halves if "half" in row]
+    found = {w: {r["effect"]: r["half"] for r in stairs if r["patterns"] == w} for w in (OFF, HALF_WAY)}
     todo = [p for p in pieces(half, found, options) if options.only in ("", p.kind)]
     if options.what == "run":
         np.random.default_rng(options.seed).shuffle(todo)  # type: ignore[arg-type]

@@ -16,6 +16,8 @@ LOADS = (
     "suction", "normal_load_error", "pressure_dependent_friction", "edge_adhesion", "tilt", "cavity_shear_deformation",
 )  # fmt: skip
 ASKED_RATIO = {"columns": 1.3, "patterns and loads": 2.5}
+# A wrong pattern can look like an effect of patterns and loads, and then adds to its strength.
+WAYS = {"columns": ("strength", "staircase"), "patterns and loads": ("staircase",)}
 GROUPS = {"columns": COLUMNS, "patterns and loads": LOADS}
 
 
@@ -52,10 +54,10 @@ def asked(rows: list[Row], halves: list[Row]) -> str:
             ("the same campaigns: a wrong cause", "at most 2 %", share(named, wrong)),
             ("90 % interval of a size holds the hidden one", "85 to 95 %", share(_sized(named), held)),
         ]
-    for group, found in _ratios(halves).items():
-        worst = max(found, key=lambda name: max(found[name]), default="")
-        said = f"{max(found[worst]):.2f} ({worst})" if worst else "not measured"
-        lines.append((f"half-found size over that with right patterns, {group}", f"at most {ASKED_RATIO[group]}", said))
+    for group, names in GROUPS.items():
+        for by in WAYS[group]:
+            what = f"size seen half the time over that with right patterns, {group}, by {by}"
+            lines.append((what, f"at most {ASKED_RATIO[group]}", _largest(halves, by, names)))
     counts = [x for r in clean for x in r["held"]]
     lines += [
         ("nothing hidden, patterns off by 15 %: a cause or law named", "at most 1 %", share(clean, blamed)),
@@ -108,26 +110,46 @@ def _answer(row: Row) -> str:
     return causes if row["verdict"] == "named" else f"{row['verdict']} {causes}".strip()
 
 
-def _ratios(halves: list[Row]) -> dict[str, dict[str, tuple[float, float]]]:
-    """Half-found sizes with both kinds of wrong patterns over that with right ones, by group and effect."""
-    sizes = {(r["effect"], r["patterns"]): r["half"] for r in halves}
-    found: dict[str, dict[str, tuple[float, float]]] = {group: {} for group in GROUPS}
-    for group, names in GROUPS.items():
-        for name in names:
-            each = [sizes.get((name, which)) for which in (RIGHT, OFF, HALF_WAY)]
-            if all(each):
-                found[group][name] = (each[1] / each[0], each[2] / each[0])
+def _sizes(halves: list[Row], by: str) -> dict[tuple[str, str], float]:
+    """Sizes found half the time by effect and patterns: of staircases, or (up to a factor) one over a mean strength."""
+    if by == "staircase":
+        return {(r["effect"], r["patterns"]): r["half"] for r in halves if "half" in r}
+    return {(r["effect"], r["patterns"]): 1.0 / float(np.mean(r["strengths"])) for r in halves if "strengths" in r}
+
+
+def _ratios(halves: list[Row], by: str) -> dict[str, tuple[float, float]]:
+    """Sizes with both kinds of wrong patterns over that with right ones, by effect."""
+    sizes, found = _sizes(halves, by), {}
+    for name in (*COLUMNS, *LOADS):
+        each = [sizes.get((name, which)) for which in (RIGHT, OFF, HALF_WAY)]
+        if all(each):
+            right_one, off, half_way = (float(x or 0.0) for x in each)
+            found[name] = (off / right_one, half_way / right_one)
     return found
 
 
+def _largest(halves: list[Row], by: str, names: tuple[str, ...]) -> str:
+    """Median and largest ratio of these effects, over both kinds of patterns."""
+    found = {name: pair for name, pair in _ratios(halves, by).items() if name in names}
+    if not found:
+        return "not measured"
+    worst = max(found, key=lambda name: max(found[name]))
+    return f"{np.median(list(found.values())):.2f} in the median, {max(found[worst]):.2f} at most ({worst})"
+
+
 def ratios(halves: list[Row]) -> str:
-    sizes = {(r["effect"], r["patterns"]): r["half"] for r in halves}
+    """One line an effect: sizes of the staircases, and their ratios by both ways."""
+    sizes, stairs, strengths = _sizes(halves, "staircase"), _ratios(halves, "staircase"), _ratios(halves, "strength")
     lines: list[tuple[object, ...]] = []
-    for group, names in _ratios(halves).items():
-        for name, (off, half_way) in names.items():
-            own = (f"{sizes[name, which]:.3g}" for which in (RIGHT, OFF, HALF_WAY))
-            lines.append((name, group, *own, f"{off:.2f}", f"{half_way:.2f}"))
-    head = ("effect", "of", RIGHT, OFF, HALF_WAY, "off by 15 % over right", "half way over right")
+    for group, names in GROUPS.items():
+        for name in names:
+            if name in stairs:
+                own = (f"{sizes[name, which]:.3g}" for which in (RIGHT, OFF, HALF_WAY))
+                by_strength = strengths.get(name, ()) if "strength" in WAYS[group] else ("", "")
+                each = (x and f"{x:.2f}" for x in (*stairs[name], *by_strength))
+                lines.append((name, group, *own, *each))
+    head = ("effect", "of", "right", "off by 15 %", "half way", "off, ratio", "half way, ratio", "off, by strength",
+            "half way, by strength")  # fmt: skip
     return _table(head, lines)
 
 

@@ -134,30 +134,32 @@ def write_store(
 
 
 def _write(path: Path, groups: Mapping[str, Group]) -> None:
+    """Everything in the order of its name: what is taken over from an earlier file comes in that order, and a second
+    run is to make the same bytes."""
     import h5py
 
     numbers = count()
-    with whole_hdf5(path) as held, h5py.File(held, "w", track_order=True) as file:
-        for name, group in groups.items():
-            _fill(file if name == "/" else file.create_group(name, track_order=True), group, numbers)
+    with whole_hdf5(path) as held, h5py.File(held, "w") as file:
+        for name, group in sorted(groups.items()):
+            _fill(file if name == "/" else file.create_group(name), group, numbers)
 
 
 def _fill(place: h5py.Group, group: Group, numbers: Iterator[int]) -> None:
     """Dimensions, variables and attributes of one group."""
     lengths = {dimension: len(values) for dimension, values, _ in group.variables.values()}
-    for dimension, length in lengths.items():
+    for dimension, length in sorted(lengths.items()):
         if dimension not in group.variables:
             scale = place.create_dataset(dimension, (length,), ">f4")
             scale.make_scale(f"This is a netCDF dimension but not a netCDF variable.{length:10d}")
             scale.attrs["_Netcdf4Dimid"] = np.int32(next(numbers))
-    for name, (_, values, attributes) in group.variables.items():
-        _create(place, name, values).attrs.update(attributes)
+    for name, (_, values, attributes) in sorted(group.variables.items()):
+        _create(place, name, values).attrs.update(sorted(attributes.items()))
         if name in lengths:
             place[name].make_scale(name)
-    for name, (dimension, _, _) in group.variables.items():
+    for name, (dimension, _, _) in sorted(group.variables.items()):
         if name != dimension:
             place[name].dims[0].attach_scale(place[dimension])
-    place.attrs.update(group.attributes)
+    place.attrs.update(sorted(group.attributes.items()))
 
 
 def _create(place: h5py.Group, name: str, values: np.ndarray) -> h5py.Dataset:
