@@ -1,16 +1,14 @@
 """campaign.nc: tables and traces of a study in one HDF5 file, readable by plain h5py and by xarray.
 
-It is written by h5py alone, as netCDF-4 lays files out: with xarray or h5netcdf, which write variable by variable in
-Python, this would be most of what a command on a small campaign does.
+It is written by h5netcdf alone: xarray, and dask where that is installed, take a second to import.
 """
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +23,6 @@ from tribo.store.hdf5_files import whole_hdf5
 
 if TYPE_CHECKING:
     import h5netcdf
-    import h5py
 
     from tribo.diagnose import Diagnosis
 
@@ -136,43 +133,27 @@ def write_store(
 def _write(path: Path, groups: Mapping[str, Group]) -> None:
     """Everything in the order of its name: what is taken over from an earlier file comes in that order, and a second
     run is to make the same bytes."""
-    import h5py
+    import h5netcdf
 
-    numbers = count()
-    with whole_hdf5(path) as held, h5py.File(held, "w") as file:
+    with whole_hdf5(path) as held, h5netcdf.File(held, "w") as file:
         for name, group in sorted(groups.items()):
-            _fill(file if name == "/" else file.create_group(name), group, numbers)
+            _fill(file if name == "/" else file.create_group(name), group)
 
 
-def _fill(place: h5py.Group, group: Group, numbers: Iterator[int]) -> None:
-    """Dimensions, variables and attributes of one group."""
-    lengths = {dimension: len(values) for dimension, values, _ in group.variables.values()}
-    for dimension, length in sorted(lengths.items()):
-        if dimension not in group.variables:
-            scale = place.create_dataset(dimension, (length,), ">f4")
-            scale.make_scale(f"This is a netCDF dimension but not a netCDF variable.{length:10d}")
-            scale.attrs["_Netcdf4Dimid"] = np.int32(next(numbers))
-    for name, (_, values, attributes) in sorted(group.variables.items()):
-        _create(place, name, values).attrs.update(sorted(attributes.items()))
-        if name in lengths:
-            place[name].make_scale(name)
-    for name, (dimension, _, _) in sorted(group.variables.items()):
-        if name != dimension:
-            place[name].dims[0].attach_scale(place[dimension])
+def _fill(place: h5netcdf.Group, group: Group) -> None:
+    """Dimensions, variables and attributes of one group; NaN is the missing value of every floating-point number."""
+    place.dimensions = dict(sorted((dimension, len(values)) for dimension, values, _ in group.variables.values()))
+    for name, (dimension, values, attributes) in sorted(group.variables.items()):
+        missing = np.nan if values.dtype.kind == "f" else None
+        variable = place.create_variable(name, (dimension,), _stored_type(values), values, fillvalue=missing)
+        variable.attrs.update(sorted(attributes.items()))
     place.attrs.update(sorted(group.attributes.items()))
 
 
-def _create(place: h5py.Group, name: str, values: np.ndarray) -> h5py.Dataset:
-    """A variable; NaN is the missing value of floating-point numbers."""
+def _stored_type(values: np.ndarray) -> Any:
     import h5py
 
-    if values.dtype.kind == "O":
-        return place.create_dataset(name, data=values, dtype=h5py.string_dtype())
-    if values.dtype.kind != "f":
-        return place.create_dataset(name, data=values)
-    variable = place.create_dataset(name, data=values, fillvalue=np.nan)
-    variable.attrs["_FillValue"] = np.array([np.nan])
-    return variable
+    return h5py.string_dtype() if values.dtype.kind == "O" else values.dtype
 
 
 def _earlier(path: Path) -> dict[str, Group]:
