@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from torture_processes import REPORT, differing, ensemble, finished, quick_reports, results, run, small_campaign
+from torture_processes import REPORT, differing, ensemble, finished, quick_reports, results, run, zipped_campaign
 
 from tribo.errors import TriboError
 from tribo.simulate import SimConfig, simulate, stratified_design
@@ -168,7 +168,7 @@ def main() -> int:
     rng = random.Random(given.seed)
     with tempfile.TemporaryDirectory(prefix="tribo-torture-") as name:
         base = Path(name)
-        small_campaign(base / "campaign")
+        zipped_campaign(base / "campaign")
         quick_reports(base, REPORT)
         assert run(base / "first", *REPORT) == 0
         outcomes = {"kept": flip_kept(base / "first" / "out" / "kept", base / "kept", given.flips // 2, rng)}

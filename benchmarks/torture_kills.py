@@ -25,18 +25,17 @@ from torture_processes import (
     differing,
     ensemble,
     finished,
-    first_build,
     folder_of_trials,
     leftovers,
     options,
+    quick_builds,
     quick_reports,
     results,
     run,
-    small_campaign,
     start,
-    start_build,
     thinned,
     told,
+    zipped_campaign,
 )
 
 Round = Callable[[Path, int, random.Random], list[str]]
@@ -44,7 +43,7 @@ Round = Callable[[Path, int, random.Random], list[str]]
 
 def kill_report(base: Path) -> Round:
     """Rounds of `tribo report` on one small campaign."""
-    small_campaign(base / "campaign")
+    zipped_campaign(base / "campaign")
     quick_reports(base, REPORT)
     run(base / "first", *REPORT)
     shutil.copytree(base / "first" / "out" / "kept", base / "untouched" / "out" / "kept")
@@ -92,20 +91,15 @@ def _kill(starting: Callable[[], Command], kills: int, moments: Callable[[], flo
 
 def kill_build(base: Path) -> Round:
     """Rounds of `tribo build` on a drop folder of one campaign."""
-    kept = first_build(base)
-    shutil.copytree(kept, begun_site(base / "untouched") / "current" / "a" / "kept")
-    began = time.monotonic()
-    assert start_build(base / "untouched").wait() == 0
-    took = time.monotonic() - began
-    expected = results(base / "untouched" / "site" / "current")
+    builds = quick_builds(base)
 
     def one(folder: Path, kills: int, rng: random.Random) -> list[str]:
         site = begun_site(folder)
-        thinned(kept, site / "current" / "a" / "kept", rng)
-        _kill(lambda: start_build(folder), kills, lambda: rng.random() * took / 2)
-        status = start_build(folder).wait()
-        found = differing(results(site / "current"), expected) + leftovers(site)
-        copied = differing(results(site / "latest"), {**expected, ".number": ""}) != [".number"]
+        thinned(builds.kept, site / "current" / "a" / "kept", rng)
+        _kill(lambda: builds.start(folder), kills, lambda: rng.random() * builds.seconds / 2)
+        status = builds.start(folder).wait()
+        found = differing(results(site / "current"), builds.expected) + leftovers(folder)
+        copied = differing(results(site / "latest"), {**builds.expected, ".number": ""}) != [".number"]
         return [f"status {status}"] * (status != 0) + found + ["latest"] * copied
 
     return one

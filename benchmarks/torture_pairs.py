@@ -24,17 +24,16 @@ from torture_processes import (
     begun_site,
     ensemble,
     finished,
-    first_build,
     folder_of_trials,
     leftovers,
     options,
+    quick_builds,
     quick_reports,
     results,
     run,
-    small_campaign,
     start,
-    start_build,
     told,
+    zipped_campaign,
 )
 
 BUSY = 75
@@ -43,7 +42,7 @@ Pair = Callable[[Path, int, random.Random], tuple[tuple[int | None, ...], list[s
 
 def pair_reports(base: Path) -> Pair:
     """Pairs of `tribo report` with other weights."""
-    small_campaign(base / "campaign")
+    zipped_campaign(base / "campaign")
     ways = [REPORT, (*REPORT, "--weights", "force")]
     quick_reports(base, *ways)
     expected, took = [], 1.0
@@ -104,18 +103,17 @@ def pair_ensembles(base: Path) -> Pair:
 
 def pair_builds(base: Path) -> Pair:
     """Pairs of `tribo build` of one site."""
-    kept = first_build(base)
-    expected, took = results(base / "first" / "site" / "current"), 20.0
+    builds = quick_builds(base)
 
     def one(folder: Path, number: int, rng: random.Random) -> tuple[tuple[int | None, ...], list[str]]:
         site = begun_site(folder)
-        shutil.copytree(kept, site / "current" / "a" / "kept")
-        first = start_build(folder)
-        time.sleep(rng.random() * took * (number % 5) / 4)
-        second = start_build(folder, *(("--wait", "600") if number % 3 == 0 else ()))
+        shutil.copytree(builds.kept, site / "current" / "a" / "kept")
+        first = builds.start(folder)
+        time.sleep(rng.random() * builds.seconds * (number % 5) / 4)
+        second = builds.start(folder, *(("--wait", "600") if number % 3 == 0 else ()))
         ended = first.wait(), second.wait()
-        same = results(site / "current") == expected
-        return ended, ["mixed or incomplete results"] * (not same) + leftovers(site)
+        same = results(site / "current") == builds.expected
+        return ended, ["mixed or incomplete results"] * (not same) + leftovers(folder)
 
     return one
 

@@ -1,8 +1,8 @@
 """Shared by the runs that kill, pair and damage: a small campaign, commands in forked processes, and their results.
 
 Commands run in children forked from a process that has imported tribo, so that a start costs no import; their
-lattices are small, and pages that typst has set once are remembered. Builds are the exception: they and the steps that
-Snakemake starts for them are processes of their own. The clock of the outputs is fixed (SOURCE_DATE_EPOCH) and all
+lattices are small, and pages that typst has set once are remembered. So do Snakemake and the steps that it starts for
+a build (see forked_starts.py). The clock of the outputs is fixed (SOURCE_DATE_EPOCH) and all
 paths are relative, so that equal results are equal bytes.
 """
 
@@ -10,24 +10,28 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import io
 import json
 import os
 import random
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 from faults.commands import RememberedPages, small_lattice
+from faults.trial import TIMES, run_command
+from forked_starts import stand_in_for_python, start_here
 
 from tribo.virtual_tribometer.sled import SledDesign, SledLaw, write_campaign
 
@@ -42,14 +46,19 @@ ENSEMBLE = (
     "1e-7", "--set", "rest_tolerance=0.01", "--jobs", "2", "-q", "-o", "e.nc", "--repeats",
 )  # fmt: skip
 BUILD = ("build", "../drop", "-o", "site", "--settle", "0", "--runs", "2", "--jobs", "2", "-q")
+OF_A_BUILD = ("snakemake.cli", "tribo.cli.workflow_step", "tribo.pipeline.index_page")
 
 
 def small_campaign(folder: Path, specimens: int = 2, seed: int = 3) -> Path:
-    """Two samples at two loads, as a folder that other folders stand beside, and as a zip of it."""
+    """Two samples at two loads, as a folder."""
     laws = {"F": SledLaw(4.8, 23e3, 2.9, 12e3), "B": SledLaw(3.6, 10e3, 2.9, 6e3)}
     write_campaign(folder, SledDesign(laws, masses_g=(25.0, 138.5), specimens=specimens, repeats=2), TOML, seed=seed)
-    shutil.make_archive(str(folder), "zip", folder)
     return folder
+
+
+def zipped_campaign(folder: Path) -> None:
+    """The same campaign, and a zip of it beside the folder."""
+    shutil.make_archive(str(folder), "zip", small_campaign(folder))
 
 
 @dataclass
@@ -79,36 +88,35 @@ class Command:
         self.wait()
 
 
-def start(folder: Path, *arguments: str) -> Command:
-    """Start a command in ``folder``, in a process group of its own."""
+def start(folder: Path, *arguments: str, script: Path | None = None) -> Command:
+    """Start a command in ``folder``, in a process group of its own; the Python that it starts is ``script``."""
     folder.mkdir(parents=True, exist_ok=True)
-    said = folder.parent / f"{folder.name}-{time.monotonic_ns()}.log"
+    beside = folder.parent.resolve() / f"{folder.name}-{time.monotonic_ns()}"
     surroundings(folder)
     pid = os.fork()
     if pid:
-        return Command(pid, said)
+        return Command(pid, beside.with_name(f"{beside.name}.log"))
+    starter = None
     try:
         os.setsid()
         os.chdir(folder)
-        stream = os.open(said, os.O_WRONLY | os.O_CREAT, 0o644)
+        stream = os.open(f"{beside}.log", os.O_WRONLY | os.O_CREAT, 0o644)
         for number in (1, 2):
             os.dup2(stream, number)
-        os.environ |= surroundings(folder)
+        os.environ |= surroundings(Path.cwd())
         tempfile.tempdir = None
-        sys.argv = ["tribo", *arguments]
-        from tribo.cli import main
-
-        main(list(arguments), prog_name="tribo")
-    except SystemExit as ended:
+        if script is not None:
+            starter = start_here(script, beside)
+        status = run_command(arguments)
         sys.stdout.flush()
         sys.stderr.flush()
-        os._exit(ended.code if isinstance(ended.code, int) else 1)
     except BaseException:
-        import traceback
-
+        status = 70
         traceback.print_exc()
-        os._exit(70)
-    os._exit(0)
+    finally:
+        if starter is not None:
+            os.kill(starter, signal.SIGKILL)
+        os._exit(status)
 
 
 def surroundings(folder: Path) -> dict[str, str]:
@@ -129,23 +137,45 @@ def run(folder: Path, *arguments: str) -> int:
     return status
 
 
-def start_build(folder: Path, *more: str) -> Command:
-    """Start `tribo build` in ``folder``, in a process group of its own, with Snakemake and all its steps."""
-    folder.mkdir(exist_ok=True)
-    said = folder.parent / f"{folder.name}.log"
-    with said.open("ab") as log:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "tribo", *BUILD, *more], cwd=folder, start_new_session=True,
-            stdout=log, stderr=log, env={**os.environ, **surroundings(folder)},
-        )  # fmt: skip
-    return Command(process.pid, said)
+@dataclass(frozen=True)
+class Builds:
+    """Builds of a site of one campaign; ``kept`` is the folder of what the first one kept, ``seconds`` what one takes.
+
+    The first one is made here, and a second one from what it kept.
+    """
+
+    base: Path
+    script: Path
+    expected: dict[str, str]
+    seconds: float
+
+    @property
+    def kept(self) -> Path:
+        return self.base / "first" / "site" / "current" / "a" / "kept"
+
+    def start(self, folder: Path, *more: str) -> Command:
+        """Start `tribo build` in ``folder``, in a process group of its own, with Snakemake and all its steps."""
+        return start(folder, *BUILD, *more, script=self.script)
 
 
-def first_build(base: Path) -> Path:
-    """Build a site of one campaign, for the first time; the folder of what it keeps for the next start."""
-    small_campaign(base / "drop" / "a")
-    assert start_build(base / "first").wait() == 0
-    return base / "first" / "site" / "current" / "a" / "kept"
+def quick_builds(base: Path) -> Builds:
+    """Let builds start no Python anew, with small lattices and known pages; the results of one that was left alone."""
+    campaign = str(small_campaign(base / "drop" / "a"))
+    where = (campaign, "-o", "out")
+    pages = _warm(base, ("report", *where, *REPORT[4:]), ("ingest", *where), ("diagnose", *where))
+    for module in OF_A_BUILD:
+        import_module(module)
+    builds = Builds(base, stand_in_for_python(base), {}, 0.0)
+    took = 0.0
+    for name in ("first", "untouched"):
+        if name == "untouched":
+            shutil.copytree(builds.kept, begun_site(base / name) / "current" / "a" / "kept")
+        began = time.monotonic()
+        command = builds.start(base / name)
+        assert command.wait() == 0, command.said.read_text(encoding="utf-8")
+        took = time.monotonic() - began
+        pages.read()
+    return replace(builds, expected=results(base / "untouched" / "site" / "current"), seconds=took)
 
 
 def begun_site(folder: Path) -> Path:
@@ -156,35 +186,54 @@ def begun_site(folder: Path) -> Path:
 
 
 def quick_reports(base: Path, *ways: Sequence[str]) -> None:
-    """Let the reports of this process and its children be quick: small lattices, and the pages of these ways known."""
-    small_lattice()
-    pages = base / "pages.pickle"
+    """Let the reports of this process and its children be quick: lattices small, pages known, modules loaded."""
+    pages = _warm(base, ways[0])
     for number, way in enumerate(ways):
-        child = os.fork()  # typst starts threads, which a process that forks must not have
-        if not child:
-            remembered = RememberedPages(pages)
-            status = _here(base / f"pages-{number}", *way)
-            remembered.save()
-            os._exit(status)
-        assert os.waitpid(child, 0)[1] == 0, way
-    RememberedPages(pages)
+        assert run(base / f"pages-{number}", *way) == 0, way
+        pages.read()
 
 
-def _here(folder: Path, *arguments: str) -> int:
-    from faults.trial import run_command
+def _warm(base: Path, *commands: Sequence[str]) -> RememberedPages:
+    """Run commands in this process, so that modules and compiled code are loaded, with small lattices and no pages."""
+    import typst
 
-    folder.mkdir()
-    os.environ |= surroundings(folder)
-    os.chdir(folder)
-    for number in (1, 2):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), number)
-    return run_command(arguments)
+    small_lattice()
+    real, typst.Compiler = typst.Compiler, _NoPages  # typst starts threads, which a process that forks must not have
+    here, before = Path.cwd(), dict(os.environ)
+    os.environ |= surroundings(base / "warm")
+    (base / "warm").mkdir()
+    os.chdir(base / "warm")
+    for words in commands:
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()) as said:
+            status = run_command(words)
+        assert status == 0, said.getvalue()
+    os.chdir(here)
+    os.environ.clear()
+    os.environ |= before
+    typst.Compiler = real
+    return RememberedPages(base / "pages.pickle")
+
+
+class _NoPages:
+    def __init__(self, **_: Any):
+        pass
+
+    def compile(self, *_: Any, **__: Any) -> bytes:
+        return b"\0\0\0\0IDAT"  # a PNG gets lines of text before this
 
 
 def results(out: Path) -> dict[str, str]:
-    """Every file of a folder of results and its hash; what is kept for the next start and hidden locks left out."""
+    """Every file of a folder of results and its hash; what is kept for the next start and hidden locks left out.
+
+    Of the index of a site the times of its builds do not count.
+    """
     files = (p for p in sorted(out.rglob("*")) if p.is_file() and "kept" not in p.relative_to(out).parts)
-    return {p.relative_to(out).as_posix(): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
+    return {p.relative_to(out).as_posix(): hashlib.sha256(_but_for_times(p)).hexdigest() for p in files}
+
+
+def _but_for_times(file: Path) -> bytes:
+    content = file.read_bytes()
+    return TIMES.sub("", content.decode()).encode() if file.name == "index.html" else content
 
 
 def leftovers(folder: Path) -> list[str]:

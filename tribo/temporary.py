@@ -6,8 +6,9 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 try:
@@ -30,30 +31,50 @@ def temporary_folder() -> Iterator[Path]:
     OSError
         There is no place for temporary files, or it cannot be written to.
     """
-    folder, release = held_folder(PREFIX)
+    held = held_folder(PREFIX)
     try:
-        yield folder
+        yield held.folder
     finally:
-        release()
+        held.release()
 
 
-def held_folder(prefix: str) -> tuple[Path, Callable[[], None]]:
-    """The same folder until the function that comes with it is called. No error of the removal is raised."""
-    place = Path(tempfile.gettempdir())
-    clear_abandoned(place, prefix)
-    holder, lock = _made(prefix)
+@contextmanager
+def temporary_folder_of_child() -> Iterator[tuple[Path, int]]:
+    """The same folder for a child process, with a descriptor: the folder is in use as long as a process has it open.
 
-    def release() -> None:
-        _remove(holder)
-        os.close(lock)
-
+    It is for temporary files of other programs, which leave them there when they are killed.
+    """
+    held = held_folder(PREFIX)
     try:
-        folder = holder / FILES
-        folder.mkdir(mode=_OWNER_ONLY)
+        yield held.folder, held.lock
+    finally:
+        held.release()
+
+
+@dataclass(frozen=True)
+class Held:
+    """A temporary folder that is in use until it is released; ``lock`` is the descriptor that says so."""
+
+    folder: Path
+    lock: int
+
+    def release(self) -> None:
+        """Remove the folder. No error of the removal is raised."""
+        _remove(self.folder.parent)
+        os.close(self.lock)
+
+
+def held_folder(prefix: str) -> Held:
+    """The same folder until it is released."""
+    clear_abandoned(Path(tempfile.gettempdir()), prefix)
+    holder, lock = _made(prefix)
+    held = Held(holder / FILES, lock)
+    try:
+        held.folder.mkdir(mode=_OWNER_ONLY)
     except BaseException:
-        release()
+        held.release()
         raise
-    return folder, release
+    return held
 
 
 def _made(prefix: str) -> tuple[Path, int]:

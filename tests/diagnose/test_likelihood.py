@@ -444,6 +444,8 @@ def test_the_covariance_of_predictions_is_that_of_the_whole_matrix_and_random_ef
     flat = np.concatenate([np.zeros((len(rows), 2, 4)), s.random[rows]], axis=2).reshape(2 * len(rows), -1)
     expected = flat @ system.inverse.dense(system.columns)[0] @ flat.T
     assert system.inverse.between(some, effects.specimen[rows]) == pytest.approx(expected)
+    of_tests_alone = np.einsum("nanb->abn", expected.reshape(len(rows), 2, len(rows), 2))  # some specimens have none
+    assert system.inverse.spread(some)[0] == pytest.approx(of_tests_alone[[0, 0, 1], [0, 1, 1]])
 
 
 def test_steps_of_the_sizes_have_the_density_of_the_sizes_they_lead_to() -> None:

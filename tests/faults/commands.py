@@ -32,11 +32,27 @@ class RememberedPages:
         import typst
 
         self.file, self.real = file, typst.Compiler
-        self.known: dict[str, bytes] = pickle.loads(file.read_bytes()) if file.is_file() else {}
+        self.known: dict[str, bytes] = {}
+        self.read()
         typst.Compiler = lambda root, **options: _Page(self, Path(root), options)  # type: ignore[misc, assignment]
 
-    def save(self) -> None:
-        self.file.write_bytes(pickle.dumps(self.known))
+    def read(self) -> None:
+        """What other processes have set since."""
+        if self.file.is_file():
+            with real_open(self.file, "rb") as file:
+                self.known |= pickle.load(file)
+
+    def page(self, key: str, make: Callable[[], bytes]) -> bytes:
+        """A page that this process or another has set, or else will set now."""
+        if key not in self.known:
+            self.read()
+        if key not in self.known:
+            self.known[key] = make()
+            whole = self.file.with_name(f"{self.file.name}-{os.getpid()}")
+            with real_open(whole, "wb") as file:
+                pickle.dump(self.known, file)
+            os.replace(whole, self.file)
+        return self.known[key]
 
 
 class _Page:
@@ -48,10 +64,12 @@ class _Page:
         for name in sorted(real_listdir(self.root)):
             with real_open(self.root / name, "rb") as file:
                 key.update(name.encode() + b"\0" + file.read())
-        if (found := self.pages.known.get(key.hexdigest())) is None:
+
+        def make() -> bytes:
             compiler: Any = self.pages.real(root=self.root, **self.options)
-            found = self.pages.known[key.hexdigest()] = bytes(compiler.compile(source, **options))
-        return found
+            return bytes(compiler.compile(source, **options))
+
+        return self.pages.page(key.hexdigest(), make)
 
 
 def prepared(place: Place, aside: Path, build: bool = True) -> dict[str, Command]:
@@ -65,14 +83,10 @@ def prepared(place: Place, aside: Path, build: bool = True) -> dict[str, Command
     complete, kept, partly, site = (aside / name for name in ("complete", "kept-only", "partly-kept", "site"))
     pages = RememberedPages(aside / "pages.pickle")
 
-    def first() -> int:
-        status = run_command(report)
-        pages.save()
-        return status
-
-    ended = in_child(first, place)  # typst starts threads, which a process that forks must not have
+    # typst starts threads, which a process that forks must not have
+    ended = in_child(lambda: run_command(report), place)
     assert ended.status == 0, ended
-    pages = RememberedPages(pages.file)
+    pages.read()
     with _quiet(place):
         assert run_command(report) == 0
     shutil.copytree(out, complete)
@@ -187,7 +201,8 @@ def _step(state: Path, name: str, step: str, words: str, described: dict[str, An
         return True
     files = ["--files", campaign["files"]] if step == "report" else []
     after = ["--after", f"steps/{name}/fit.json"] if step not in ("ingest", "fit") else []
-    given = [f"steps/{name}/{step}.json", "--digest", digest, *after, *files, "--", *shlex.split(words)]
+    laws = ["--laws", "laws"] if step in ("diagnose", "report") else []
+    given = [f"steps/{name}/{step}.json", "--digest", digest, *laws, *after, *files, "--", *shlex.split(words)]
     return _logged(state, f"{name}/{step}.log", lambda: main(given))
 
 

@@ -78,6 +78,17 @@ def test_a_workflow_is_followed_while_it_runs(tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
+def test_temporary_files_that_a_workflow_leaves_are_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    place = tmp_path / "temporary"
+    place.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(place))
+    monkeypatch.setenv("TMPDIR", str(place))
+    leaving = "import tempfile; print(tempfile.mkdtemp())"
+    ended = run_workflow([sys.executable, "-c", leaving], tmp_path / "state", None, lambda progress: None)
+    assert Path(ended.stdout.strip()).is_relative_to(place)
+    assert list(place.iterdir()) == []
+
+
 def test_a_line_is_printed_when_other_steps_run_and_not_twice(capsys: pytest.CaptureFixture[str]) -> None:
     with build_progress(Console()) as report:
         for _ in range(3):

@@ -15,7 +15,7 @@ import xarray as xr
 from report.conftest import PROVENANCE, Written
 from tribo.records import Study
 from tribo.report import gather_provenance, write_report, write_until
-from tribo.report.campaign_nc import unit_of
+from tribo.report.campaign_nc import unit_of, write_store
 from tribo.store.whole_files import whole_file, write_text
 
 FIGURES = ["agreement", *(f"fig{k}" for k in range(3, 9))]
@@ -35,6 +35,13 @@ def test_the_same_study_gives_the_same_bytes(written: Written, study: Study, tmp
     names = [p.relative_to(tmp_path) for p in tmp_path.rglob("*") if p.is_file() and p.suffix != ".nc"]
     assert len(names) > 20
     assert not [name for name in names if (tmp_path / name).read_bytes() != (written.out / name).read_bytes()]
+
+
+def test_a_file_that_takes_over_earlier_groups_has_the_same_bytes(study: Study, tmp_path: Path) -> None:
+    write_store(study, tmp_path)
+    first = (tmp_path / "campaign.nc").read_bytes()
+    write_store(study, tmp_path, keep_earlier=True)
+    assert (tmp_path / "campaign.nc").read_bytes() == first
 
 
 def test_an_error_while_writing_leaves_the_old_file_and_no_part(tmp_path: Path) -> None:

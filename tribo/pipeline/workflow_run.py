@@ -12,6 +12,7 @@ from threading import Thread
 from typing import IO
 
 from tribo.pipeline.live import Follower, Progress, typical_seconds
+from tribo.temporary import temporary_folder_of_child
 
 END_S = 60.0  # how long the steps of an interrupted build may take to end
 TICK_S = 1.0  # how often the progress is told where nothing changes
@@ -22,15 +23,16 @@ def run_workflow(
 ) -> subprocess.CompletedProcess[str]:
     """Run a Snakemake command to its end, and ``tell`` how far it is at every change and every second.
 
-    The lock of the site, ``descriptor``, is passed on, so that it is held as long as any step runs.
+    The lock of the site, ``descriptor``, is passed on, so that it is held as long as Snakemake runs. Temporary files
+    of Snakemake are in a folder of tribo: what it leaves when it is killed goes at the next start.
     """
     (state / "log").mkdir(parents=True, exist_ok=True)
     follower = Follower(typical_seconds(state / "steps"))
     said: list[str] = []
-    with subprocess.Popen(
+    with temporary_folder_of_child() as (temporary, in_use), subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
-        env={**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONSAFEPATH": "1"},
-        pass_fds=() if descriptor is None else (descriptor,),
+        env={**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONSAFEPATH": "1", "TMPDIR": str(temporary)},
+        pass_fds=(in_use,) if descriptor is None else (in_use, descriptor),
     ) as process:  # fmt: skip
         assert process.stdout is not None
         try:

@@ -131,21 +131,23 @@ def write_store(
 
 
 def _write(path: Path, groups: Mapping[str, Group]) -> None:
+    """Everything in the order of its name: what is taken over from an earlier file comes in that order, and a second
+    run is to make the same bytes."""
     import h5netcdf
 
     with whole_hdf5(path) as held, h5netcdf.File(held, "w") as file:
-        for name, group in groups.items():
+        for name, group in sorted(groups.items()):
             _fill(file if name == "/" else file.create_group(name), group)
 
 
 def _fill(place: h5netcdf.Group, group: Group) -> None:
     """Dimensions, variables and attributes of one group; NaN is the missing value of every floating-point number."""
-    place.dimensions = {dimension: len(values) for dimension, values, _ in group.variables.values()}
-    for name, (dimension, values, attributes) in group.variables.items():
+    place.dimensions = dict(sorted((dimension, len(values)) for dimension, values, _ in group.variables.values()))
+    for name, (dimension, values, attributes) in sorted(group.variables.items()):
         missing = np.nan if values.dtype.kind == "f" else None
         variable = place.create_variable(name, (dimension,), _stored_type(values), values, fillvalue=missing)
-        variable.attrs.update(attributes)
-    place.attrs.update(group.attributes)
+        variable.attrs.update(sorted(attributes.items()))
+    place.attrs.update(sorted(group.attributes.items()))
 
 
 def _stored_type(values: np.ndarray) -> Any:

@@ -79,9 +79,9 @@ def _writable(folder: Path) -> bool:
 
 
 def _fresh(prefix: str) -> Path:
-    folder, release = held_folder(prefix)
-    atexit.register(_release, release, os.getpid())
-    return folder
+    held = held_folder(prefix)
+    atexit.register(_release, held.release, os.getpid())
+    return held.folder
 
 
 def _release(release: Callable[[], None], maker: int) -> None:

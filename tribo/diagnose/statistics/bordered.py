@@ -224,13 +224,12 @@ class Inverse:
             return self._spread_of_one(columns)[None]
         found = np.empty((len(self.own), 3, len(columns.own)))
         for k, tests in enumerate(columns.tests_of):
-            own = columns.own[tests]
-            free = columns.border[tests] - np.tensordot(own, self.across[:, k], axes=(2, 1)).transpose(2, 0, 1, 3)
-            moved = free @ self.border[:, None]
-            alone = np.tensordot(own, self.own[:, k], axes=(2, 1)).transpose(2, 0, 1, 3)
+            own = columns.own[tests].reshape(-1, 4)  # the two rows of every test one after another
+            free = columns.border[tests].reshape(len(own), columns.border.shape[2]) - own @ self.across[:, k]
+            moved, alone = free @ self.border, own @ self.own[:, k]
             for i, (a, b) in enumerate(((0, 0), (0, 1), (1, 1))):
-                shared = np.sum(moved[:, :, a] * free[:, :, b], axis=2)
-                found[:, i, tests] = shared + np.sum(alone[:, :, a] * own[:, b], axis=2)
+                shared = np.einsum("rtm,rtm->rt", moved[:, a::2], free[:, b::2])
+                found[:, i, tests] = shared + np.einsum("rta,ta->rt", alone[:, a::2], own[b::2])
         return found
 
     def _spread_of_one(self, columns: ModelColumns) -> FloatArray:
