@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from made_campaigns import DIALECTS, MadeCampaign, write_made
+from on_the_command_line import run
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+
 @pytest.fixture(scope="session")
 def shared() -> Path:
     """The folder of reference material beside the checkout; tests that need it skip where it is absent."""
@@ -49,33 +53,54 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], MadeCampai
     return write
 
 
+Once = Callable[[str, Callable[[Path], object]], Path]
+
+
 @pytest.fixture(scope="session")
-def small_campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
+    """once(name, make) -> a folder that ``make`` filled, the same in every process of this run of the tests."""
+    from tribo.store.lock import only_writer
+
+    base = tmp_path_factory.getbasetemp()
+    shared_by_all = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+    def made(name: str, make: Callable[[Path], object]) -> Path:
+        folder = shared_by_all / name
+        with only_writer(shared_by_all / f"{name}.lock", wait_s=600, lasting=True):
+            if not folder.is_dir():
+                part = folder.with_name(f"{name}.part")
+                make(part)
+                part.rename(folder)
+        return folder
+
+    return made
+
+
+@pytest.fixture(scope="session")
+def small_campaign(once: Once) -> Path:
     """A campaign of 24 pulls of the virtual tribometer: samples F and B, three specimens, two loads, two repeats."""
     from tribo.virtual_tribometer.sled import SledDesign, SledLaw, write_campaign
 
-    folder = tmp_path_factory.mktemp("small") / "campaign"
     laws = {"F": SledLaw(4.8, 23e3, 2.9, 12e3), "B": SledLaw(3.6, 10e3, 2.9, 6e3)}
     toml = (
         '[campaign]\ntitle = "small"\nnominal_area_mm2 = 55.0\nslider_mass_g = 1.5\n'
         '[patterns.F]\ncavity = "none"\n'
         '[patterns.B]\ncavity = "circle"\ndiameter_um = 10.0\npitch_um = [15.0, 15.0]\n'
     )
-    write_campaign(folder, SledDesign(laws, masses_g=(25.0, 138.5)), toml, seed=7)
-    return folder
+    design = SledDesign(laws, masses_g=(25.0, 138.5))
+    return once("small", lambda folder: write_campaign(folder / "campaign", design, toml, seed=7)) / "campaign"
 
 
 @pytest.fixture(scope="session")
-def small_report(small_campaign: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """`tribo report` on the small campaign."""
-    from click.testing import CliRunner
+def small_report(small_campaign: Path, once: Once) -> Path:
+    """`tribo report` on the small campaign; what it said with --json lies beside its folder."""
 
-    from tribo.cli import main
+    def report(folder: Path) -> None:
+        result = run("report", small_campaign, "-o", folder / "out", "--runs", 2, "--json")
+        assert result.exit_code == 0, result.output
+        (folder / "said.json").write_text(result.stdout, encoding="utf-8")
 
-    folder = tmp_path_factory.mktemp("small_report") / "out"
-    result = CliRunner().invoke(main, ["report", str(small_campaign), "-o", str(folder), "--runs", "2", "-q"])
-    assert result.exit_code == 0, result.output
-    return folder
+    return once("small_report", report) / "out"
 
 
 LONG_FILES = ("pipeline", "test_spoiled_campaigns", "faults", "blind", "cli", "simulate", "diagnose")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -64,6 +65,12 @@ MAY_IMPORT["__init__"] = set()
 ROOMS = sorted(p for p in PACKAGE.rglob("*.py"))
 
 
+@cache
+def parsed(source: str) -> ast.Module:
+    """A source as its tree: several tests look at every module."""
+    return ast.parse(source)
+
+
 def room_of(module: Path) -> str:
     """The room a file belongs to: its package below tribo, or its own name."""
     return module.relative_to(PACKAGE).parts[0].removesuffix(".py")
@@ -72,7 +79,7 @@ def room_of(module: Path) -> str:
 def imported_rooms(source: str) -> set[str]:
     """Rooms of tribo that a module imports anywhere in it."""
     found = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(parsed(source)):
         if isinstance(node, ast.ImportFrom) and node.module:
             names = [node.module] if node.module != "tribo" else [f"tribo.{a.name}" for a in node.names]
         elif isinstance(node, ast.Import):
@@ -102,7 +109,7 @@ def arguments(function: ast.FunctionDef) -> int:
 
 def long_signatures(source: str) -> list[str]:
     """Functions and methods with more than seven arguments."""
-    functions = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef)]
+    functions = [node for node in ast.walk(parsed(source)) if isinstance(node, ast.FunctionDef)]
     return [f.name for f in functions if arguments(f) > MOST_ARGUMENTS]
 
 
@@ -132,7 +139,7 @@ def at_run_time(tree: ast.AST) -> list[ast.AST]:
 def imported_modules(source: str, package: str, known: set[str], faces: dict[str, dict[str, str]]) -> set[str]:
     """Modules of tribo that a source imports at run time, at its top or late; through the face of a package as well."""
     found = set()
-    for node in at_run_time(ast.parse(source)):
+    for node in at_run_time(parsed(source)):
         if isinstance(node, ast.ImportFrom):
             base = ".".join(filter(None, (package if node.level else "", node.module)))
             for name in (a.name for a in node.names):
@@ -163,7 +170,7 @@ def test_no_files_import_each_other_in_a_circle() -> None:
     for name, module in names.items():
         stub = module.with_suffix(".pyi")
         if stub.exists():
-            lines = [n for n in ast.parse(stub.read_text("utf-8")).body if isinstance(n, ast.ImportFrom)]
+            lines = [n for n in parsed(stub.read_text("utf-8")).body if isinstance(n, ast.ImportFrom)]
             faces[name] = {a.asname or a.name: f"{name}.{line.module}" for line in lines for a in line.names}
     known = set(names)
     imports = {
@@ -230,7 +237,7 @@ def test_units_are_converted_in_one_place_only() -> None:
 
 def open_records(source: str) -> list[str]:
     """Data classes whose fields can be set after they were made."""
-    classes = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ClassDef)]
+    classes = [node for node in ast.walk(parsed(source)) if isinstance(node, ast.ClassDef)]
     decorators = [(c.name, ast.unparse(d)) for c in classes for d in c.decorator_list]
     return [name for name, text in decorators if text.startswith("dataclass") and "frozen=True" not in text]
 
@@ -250,7 +257,7 @@ TIDIES_ONLY = {"temporary.py", "own_file.py", "jit.py"}  # what they cannot list
 
 def silent_reads(source: str) -> list[str]:
     """Calls that leave out folders which cannot be listed, or whose errors name no file; resources are no files."""
-    calls = [node.func for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
+    calls = [node.func for node in ast.walk(parsed(source)) if isinstance(node, ast.Call)]
     named = [ast.unparse(f) for f in calls if isinstance(f, ast.Attribute) and f.attr in SILENT]
     return [name for name in named if not name.startswith("(files(")]
 

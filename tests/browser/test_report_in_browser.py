@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pandas as pd
@@ -184,6 +185,7 @@ def test_what_the_page_hands_back_is_applied_and_comes_back_on_the_next_page(
     assert report.messages == []
 
     anew = tmp_path / "out"
+    shutil.copytree(out / "kept", anew / "kept")  # what does not hang on the decisions is not made again
     result = CliRunner().invoke(
         main, ["report", str(small_campaign), "-o", str(anew), "--runs", "2", "-q", "--overrides", str(overrides)]
     )

@@ -55,7 +55,12 @@ def test_no_sentence_on_a_law_shows_the_name_of_a_column_of_the_file(column: str
 def test_a_period_of_the_time_is_told_in_hours() -> None:
     wave = Shape("wave", "elapsed_s", 0.0, 1e5, width=28_800.0)
     said = size_sentence(WrittenLaw((wave,)), {}, (38.0, 36.0, 40.0))
-    assert "periodically with the time since the first pull, period 8 h, by 38 %" in said
+    assert "periodically with the time since the first pull, period 8 h; highest relative to lowest: +38 %" in said
+
+
+def test_a_law_that_lowers_friction_has_a_negative_size_and_interval() -> None:
+    law = WrittenLaw((Shape("linear", "humidity_pct", 30.0, 60.0),))
+    assert "Friction is lower (-21 %, 90 % interval -25 to -17 %) at" in size_sentence(law, {}, (-21.0, -25.0, -17.0))
 
 
 def nothing(s: Setup) -> np.ndarray:
@@ -81,7 +86,7 @@ def test_the_column_the_form_the_regime_and_the_place_are_found(found: Discovery
 
 def test_the_law_is_said_in_a_sentence_and_as_a_layer(found: Discovery) -> None:
     text, layer = discovery_text(found), law_layers(found)[0]
-    assert "Sliding friction is higher by" in text
+    assert "Sliding friction is higher (+" in text
     assert "near the temperature = 2" in text
     assert (layer.kind, layer.regimes) == ("law", ("sliding",))
     assert layer.low < layer.effect_percent < layer.high

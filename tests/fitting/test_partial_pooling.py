@@ -36,14 +36,14 @@ def share(fit: LawFit) -> float:
     return fit.standard_uncertainty("mu") / fit.value("mu")
 
 
-def test_specimens_that_agree_by_luck_get_most_of_the_scatter_of_the_others() -> None:
+def test_specimens_that_agree_by_luck_get_the_mean_scatter_of_all_samples() -> None:
     fits, rows = made({"C": 0.0})
     pooled = {fit.sample: fit for fit in partly_pooled(fits, rows)}
     own = {fit.sample: fit for fit in fits}
     others = np.sqrt(np.mean([share(own[s]) ** 2 for s in LAWS]))
     assert share(own["C"]) < 1e-9
-    assert share(pooled["C"]) == pytest.approx(others * np.sqrt(PRIOR_DOF / (PRIOR_DOF + 2)), rel=1e-6)
-    assert pooled["C"].dof == PRIOR_DOF + 2
+    assert share(pooled["C"]) == pytest.approx(others, rel=1e-6)
+    assert pooled["C"].dof == 2 * len(LAWS)
     np.testing.assert_array_equal(pooled["C"].values, own["C"].values)
 
 
@@ -53,6 +53,16 @@ def test_a_sample_that_scatters_more_than_the_others_keeps_an_interval_wider_tha
         pooled = {fit.sample: fit for fit in partly_pooled(*made({"B": 0.3}, seed=seed))}
         ratios.append(share(pooled["B"]) / np.mean([share(pooled[s]) for s in ("A", "C", "F")]))
     assert np.median(ratios) > 1.3
+
+
+def test_specimens_that_differ_more_than_the_others_are_believed_in_part() -> None:
+    fits, rows = made({"B": 0.3})
+    pooled, own = ({f.sample: f for f in each} for each in (partly_pooled(fits, rows), fits))
+    mean = np.mean([share(own[s]) ** 2 for s in LAWS])
+    assert share(own["B"]) ** 2 > mean
+    expected = (PRIOR_DOF * mean + 2 * share(own["B"]) ** 2) / (PRIOR_DOF + 2)
+    assert share(pooled["B"]) ** 2 == pytest.approx(expected, rel=1e-6)
+    assert pooled["B"].dof == PRIOR_DOF + 2
 
 
 def test_a_sample_of_one_specimen_gets_an_interval_for_its_pattern() -> None:

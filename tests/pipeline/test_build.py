@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from on_the_command_line import run
 
 from pipeline.campaigns import TOML, small
 
@@ -43,11 +44,15 @@ class Lab:
     drop: Path
     site: Path
 
+    def words(self, *more: str) -> list[str]:
+        """The command and its options."""
+        chosen = ["--json", "--settle", "0", "--runs", "2", "--jobs", str(JOBS)]
+        return ["build", str(self.drop), "-o", str(self.site), *chosen, *more]
+
     def start(self, *more: str) -> subprocess.Popen[str]:
         """Start `tribo build` in a process group of its own."""
-        command = [sys.executable, "-m", "tribo", "build", str(self.drop), "-o", str(self.site), "--json"]
         return subprocess.Popen(
-            [*command, "--settle", "0", "--runs", "2", "--jobs", str(JOBS), *more], text=True, start_new_session=True,
+            [sys.executable, "-m", "tribo", *self.words(*more)], text=True, start_new_session=True,
             stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         )  # fmt: skip
 
@@ -58,7 +63,9 @@ class Lab:
         return Round(json.loads(said or "{}"), process.returncode, self.files())
 
     def build(self, *more: str) -> Round:
-        return self.finish(self.start(*more))
+        """A build of which the command runs in this process, and its steps in theirs."""
+        ended = run(*self.words(*more))
+        return Round(json.loads(ended.stdout or "{}"), ended.exit_code, self.files())
 
     def files(self) -> dict[str, bytes]:
         """Records of finished steps and outputs: every file of the site that a build may not touch without need."""

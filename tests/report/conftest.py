@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,6 +26,13 @@ class Written(NamedTuple):
 def study() -> Study:
     """Six samples, six loads, one repeat of three specimens; the last test and T9001 are set aside."""
     return make_study()
+
+
+@pytest.fixture(scope="session")
+def measured() -> Study:
+    """Only what was measured on two samples: seven figures that are drawn in little time."""
+    small = make_study(samples=("F", "B"), n_specimens=2, n_samples=60)
+    return replace(small, comparison=None, fits=(), other_fits=(), example_runs=())
 
 
 @pytest.fixture(scope="session")

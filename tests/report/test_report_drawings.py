@@ -14,12 +14,6 @@ from tribo.report.drawings import draw_all, inline_svg
 from tribo.store.kept_results import Shelf
 
 
-@pytest.fixture(scope="module")
-def measured(study: Study) -> Study:
-    """Only what was measured: four figures."""
-    return replace(study, comparison=None, fits=(), other_fits=(), example_runs=())
-
-
 def test_a_kept_figure_is_not_drawn_again_unless_its_numbers_change(
     measured: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

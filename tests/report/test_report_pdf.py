@@ -14,9 +14,8 @@ from tribo.report.paper.typeset import with_text
 
 
 @pytest.fixture(scope="module")
-def drawn(study: Study) -> dict[str, Drawn]:
-    only = replace(study, comparison=None, fits=(), other_fits=(), example_runs=())
-    return {"fig3": draw_all(only)["fig3"]}
+def drawn(measured: Study) -> dict[str, Drawn]:
+    return {"fig3": draw_all(measured)["fig3"]}
 
 
 def test_another_day_and_another_command_give_the_same_bytes(study: Study, drawn: dict[str, Drawn]) -> None:

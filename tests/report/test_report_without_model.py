@@ -48,6 +48,8 @@ def test_a_campaign_of_flat_samples_is_reported_without_the_model(tmp_path: Path
     assert laws.loc[("sliding", "proportional"), "chosen"]
     assert "is described best by" in page
     assert "No sample has a pattern" in page.replace("\u00a0", " ")
+    assert "Weights" in page
+    assert "Simulations per load" not in page
     assert {p.stem for p in (tmp_path / "out" / "figures").glob("*.svg")} >= {"dependence", "records", "forces"}
     assert not (tmp_path / "out" / "comparison.csv").exists()
     assert "sample on counterface" not in page

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -45,19 +46,24 @@ def disagreements(pulls: dict[str, Pull], truth: pd.DataFrame) -> list[str]:
     return wrong
 
 
+@pytest.fixture(scope="module")
+def made_pulls(made: Callable[[str], MadeCampaign]) -> Callable[[str], dict[str, Pull]]:
+    """made_pulls("bluehill") -> the pulls of the campaign of the virtual tribometer in that dialect, read once."""
+    return lru_cache(lambda dialect: pulls_of(made(dialect).folder))
+
+
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_pulls_agree_with_the_forces_of_the_virtual_tribometer(
-    dialect: str, made: Callable[[str], MadeCampaign]
+    dialect: str, made: Callable[[str], MadeCampaign], made_pulls: Callable[[str], dict[str, Pull]]
 ) -> None:
-    campaign = made(dialect)
-    assert disagreements(pulls_of(campaign.folder), campaign.truth) == []
+    assert disagreements(made_pulls(dialect), made(dialect).truth) == []
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_no_healthy_trace_of_the_virtual_tribometer_raises_an_alarm(
-    dialect: str, made: Callable[[str], MadeCampaign]
+    dialect: str, made_pulls: Callable[[str], dict[str, Pull]]
 ) -> None:
-    pulls = pulls_of(made(dialect).folder)
+    pulls = made_pulls(dialect)
     assert len(pulls) == 180
     assert alarms(pulls) == []
 
@@ -67,6 +73,7 @@ def alarms(pulls: dict[str, Pull]) -> list[str]:
     return [p.test_id for p in pulls.values() if p.problems or set(p.flags) - described]
 
 
+@pytest.mark.slow
 def test_pulls_agree_with_what_the_practice_traces_were_made_with(
     practice: Callable[[str], Path], shared: Path
 ) -> None:
@@ -95,6 +102,7 @@ def test_every_kind_of_spoiled_trace_is_named_and_its_clean_twin_is_not(
             assert pull.static_N == pytest.approx(twin.static_N, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_no_healthy_practice_trace_raises_an_alarm(practice: Callable[[str], Path]) -> None:
     pulls = {number: pulls_of(practice(number)) for number in ("06", "08", "10", "11-clean")}
     assert [len(p) for p in pulls.values()] == [324] * 4

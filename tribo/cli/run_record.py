@@ -15,12 +15,15 @@ def provenance_of_run(study: Study, campaign: Path, chosen: StudyOptions) -> Pro
     """Provenance of a study run by this command."""
     from tribo.report import gather_provenance
 
+    options = {**chosen.as_words(), "flat": study.ingested.campaign.flat_sample}
+    if study.simulated is None:
+        del options["runs"]  # nothing was simulated
     return gather_provenance(
         study,
         command=command_line(),
         seed=chosen.seed,
         started_at=now(),
-        options={**chosen.as_words(), "flat": study.ingested.campaign.flat_sample},
+        options=options,
         campaign=campaign,
         overrides=chosen.overrides,
     )

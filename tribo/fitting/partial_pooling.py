@@ -3,8 +3,9 @@
 Three specimens that agree by chance give an interval that is far too narrow: among the tenth of samples whose
 specimens scatter least, the intervals by t(2) hold the law in two of three cases. The covariance of each sample is
 therefore moved towards the mean of all samples, as if that mean were known from PRIOR_DOF further specimens (moderated
-variances: Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004) 3). A sample that really scatters otherwise keeps most of its
-own scatter.
+variances: Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004) 3). A sample that scatters more than the others keeps part of
+its own scatter. One that scatters less gets the mean of all: with few specimens a small scatter is luck more often than
+a quieter pattern, and two thirds of the mean are too little for the luckiest.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from tribo.records import FloatArray, LawFit
 
 PRIOR_DOF = 4.0  # swept in benchmarks/combined_coverage.py: from 2 to 8 the coverage hardly depends on it
 
+ROUNDING = 1e-12
+
 
 def partly_pooled(
     fits: tuple[LawFit, ...], rows: Mapping[str, Rows], prior_dof: float = PRIOR_DOF
@@ -28,10 +31,12 @@ def partly_pooled(
     """The fits of one regime with the covariance of their specimens moved towards the mean of all samples.
 
     ``fits`` are those of ``fit_samples``, ``rows`` the tests of each sample. What is averaged is the covariance of T at
-    the lowest and at the highest load, relative to the sample's own forces. ``dof`` becomes ``prior_dof`` plus that of
-    the sample, at most that of all specimens together. A sample of one specimen gets the mean of the others, so that
-    its interval applies to the pattern. Samples without values, with a force that is not positive, or without another
-    sample to compare with, keep their own covariance.
+    the lowest and at the highest load, relative to the sample's own forces. Where a sample scatters more than it,
+    ``dof`` becomes ``prior_dof`` plus that of the sample, at most that of all specimens together. Where it scatters
+    less, it gets the mean with all degrees of freedom; no covariance is smaller than the mean in any combination of mu
+    and tau0. A sample of one specimen gets the mean of the others, so that its interval applies to the pattern. Samples
+    without values, with a force that is not positive, or without another sample to compare with, keep their own
+    covariance.
     """
     shares = {f.sample: s for f in fits if (s := _shares(f, rows[f.sample])) is not None}
     several = [f for f in fits if f.sample in shares and len(f.specimens) > 1]
@@ -47,18 +52,28 @@ def partly_pooled(
 
 
 def _moved(fit: LawFit, shares: FloatArray, mean: FloatArray, rows: Rows, dof: tuple[float, float]) -> LawFit:
-    prior, most = dof
-    own = len(shares) - 1.0
-    scatter = mean if own == 0 else (prior * mean + own * np.cov(shares, rowvar=False)) / (prior + own)
     forces = _forces(fit, rows)
     inverse = np.linalg.inv(forces / (forces @ fit.values)[:, None])
-    return replace(
+    scatter, freedom = _believed(shares, mean, *dof)
+    moved = replace(
         fit,
         covariance=inverse @ scatter @ inverse.T / len(shares),
-        dof=min(prior + own, most),
+        dof=freedom,
         method=f"{fit.method}; scatter of specimens partly pooled over samples",
         notes=tuple(note for note in fit.notes if note != ONE_SPECIMEN),
     )
+    return at_least(moved, inverse @ mean @ inverse.T / len(shares))
+
+
+def _believed(shares: FloatArray, mean: FloatArray, prior: float, most: float) -> tuple[FloatArray, float]:
+    """The scatter that is taken for the specimens of one sample, and its degrees of freedom."""
+    own = len(shares) - 1.0
+    if own == 0:
+        return mean, min(prior, most)
+    scatter = np.cov(shares, rowvar=False)
+    if np.trace(scatter) < np.trace(mean):
+        return mean, most
+    return (prior * mean + own * scatter) / (prior + own), min(prior + own, most)
 
 
 def _forces(fit: LawFit, rows: Rows) -> FloatArray:
@@ -79,9 +94,9 @@ def _shares(fit: LawFit, rows: Rows) -> FloatArray | None:
 def at_least(fit: LawFit, floor: FloatArray) -> LawFit:
     """The fit with a covariance that is in no combination of its parameters smaller than ``floor`` (2, 2).
 
-    For a sample without others to compare with: the scatter of repeats alone explains ``floor``.
+    A floor without a width in some combination changes nothing.
     """
-    if not np.all(np.linalg.eigvalsh(floor) > 0):
+    if not np.linalg.det(floor) > ROUNDING * np.prod(np.diagonal(floor)):
         return fit
     root = np.linalg.cholesky(floor)
     inverse = np.linalg.inv(root)

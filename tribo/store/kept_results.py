@@ -135,9 +135,14 @@ def fingerprint(*values: object) -> str:
     return digest.hexdigest()
 
 
+_PLAIN = {str, float, int, bool, type(None)}
+
+
 def _feed(update: Callable[[bytes], object], value: object) -> None:
     update(f"<{type(value).__name__}".encode())
-    if isinstance(value, FunctionType):
+    if type(value) in _PLAIN:  # most values: the cells of tables
+        update(repr(value).encode())
+    elif isinstance(value, FunctionType):
         update(f"{value.__module__}:{value.__qualname__}".encode())
     elif isinstance(value, np.ndarray) and value.dtype.kind != "O":
         update(f"{value.dtype}{value.shape}".encode())

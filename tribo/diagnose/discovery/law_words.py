@@ -48,15 +48,10 @@ def size_sentence(
 ) -> str:
     """The same of any law with these parameters, without evidence and full stop."""
     value, low, high = effect_percent
-    size = f"by {abs(value):.0f} % (90 % interval {_span(low, high)})"
+    size = f"{value:+.0f} %, 90 % interval {low:+.0f} to {high:+.0f} %"
     if law.shapes[0].kind == "wave":
-        return f"{subject(law)} {_wave(law.shapes[0])}, {size} from lowest to highest"
-    return f"{subject(law)} {'is higher' if value > 0 else 'is lower'} {size} {_where(law, parameters)}"
-
-
-def _span(low: float, high: float) -> str:
-    ends = sorted((abs(low), abs(high))) if low * high > 0 else [low, high]
-    return f"{ends[0]:.0f} to {ends[1]:.0f} %"
+        return f"{subject(law)} {_wave(law.shapes[0])}; highest relative to lowest: {size}"
+    return f"{subject(law)} {'is higher' if value > 0 else 'is lower'} ({size}) {_where(law, parameters)}"
 
 
 def subject(law: WrittenLaw) -> str:

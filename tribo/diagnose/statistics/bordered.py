@@ -121,9 +121,9 @@ class Weighted:
     def with_residual(self, residual: FloatArray) -> Sides:
         """Products with the residual (r, 2, n) of each replicate: (r, S, 4) and (r, m)."""
         by_test = residual.transpose(0, 2, 1)
-        each = np.einsum("rnik,rni->rnk", self.own, by_test, optimize=True)
+        each = np.einsum("rnik,rni->rnk", self.own, by_test)
         own = np.stack([each[:, tests].sum(axis=1) for tests in self.columns.tests_of], axis=1)
-        return own, np.einsum("rnik,rni->rk", self.border, by_test, optimize=True)
+        return own, (self.flat_border @ by_test.reshape(len(residual), -1, 1))[..., 0]
 
 
 def weighted_columns(columns: ModelColumns, precision: FloatArray) -> Weighted:
@@ -207,10 +207,12 @@ class Inverse:
 
     def solution(self, own: FloatArray, border: FloatArray) -> Sides:
         """Coefficients for right sides (r, S, 4) and (r, m)."""
-        right = border - np.einsum("rsam,rsa->rm", self.across, own, optimize=True)
-        shared = np.einsum("rmk,rk->rm", self.border, right)
-        alone = np.einsum("rsab,rsb->rsa", self.own, own, optimize=True)
-        return alone - np.einsum("rsam,rm->rsa", self.across, shared, optimize=True), shared
+        r, specimens, _, m = self.across.shape
+        wide = self.across.reshape(r, 4 * specimens, m)
+        right = border - (own.reshape(r, 1, -1) @ wide)[:, 0]
+        shared = self.border @ right[..., None]
+        alone = (self.own @ own[..., None])[..., 0]
+        return alone - (wide @ shared).reshape(own.shape), shared[..., 0]
 
     @property
     def variances(self) -> Sides:

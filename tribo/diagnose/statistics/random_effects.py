@@ -60,10 +60,10 @@ class RandomEffects:
     def on_tests(self, effects: FloatArray) -> FloatArray:
         """What effects (..., q) add to ln T of every test, (..., n, 2)."""
         own, shared = self.parts(effects)
-        return np.asarray(
-            np.einsum("nrk,...nk->...nr", self.own, own[..., self.specimen, :])
-            + np.tensordot(shared, self.shared, axes=(-1, 2))
-        )
+        n, regimes, c = self.shared.shape
+        of_shared = shared @ self.shared.reshape(n * regimes, c).T
+        of_own = np.einsum("nrk,...nk->...nr", self.own, own[..., self.specimen, :])
+        return np.asarray(of_own + of_shared.reshape(of_own.shape))
 
     def summed(self, weight: FloatArray) -> FloatArray:
         """The columns of all effects (q,), regimes added with ``weight`` (2,) and tests added up."""
