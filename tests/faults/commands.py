@@ -177,7 +177,9 @@ def _steps_in_order(state: Path, config: Path, *_: Any) -> subprocess.CompletedP
                 said = f"\nError in rule {step}:\n    log: log/{name}/{step}.log (check log file(s))\n"
                 _index(state, "-")
                 return subprocess.CompletedProcess([], 1, said)
-    return subprocess.CompletedProcess([], 0 if _index(state, "index.json") else 1, "")
+    if _index(state, "index.json"):
+        return subprocess.CompletedProcess([], 0, "")
+    return subprocess.CompletedProcess([], 1, "\nError in rule index:\n    log: log/index.log (check log file(s))\n")
 
 
 def _steps(name: str, campaign: dict[str, Any], options: dict[str, str]) -> list[tuple[str, str]]:

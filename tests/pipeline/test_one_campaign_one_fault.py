@@ -5,11 +5,16 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
+from tribo.cli import main
+from tribo.pipeline import build, index_page
 from tribo.pipeline.build import BuildOptions, _configuration, _to_simulate
 from tribo.pipeline.history import CampaignRow, Law, history
 from tribo.pipeline.index_page import page, series_name, trend_csv, write_index
@@ -57,6 +62,40 @@ def test_refused_campaigns_stand_in_the_index_with_their_reason(tmp_path: Path) 
     assert {row.state for row in rows} == {"unusable"}
     write_index(tmp_path / "site")
     assert (tmp_path / "site" / "current" / "index.html").read_text(encoding="utf-8").count("rename it") == len(rows)
+
+
+def test_a_build_says_on_the_terminal_why_a_campaign_is_unusable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(build, "_snakemake", lambda *_: subprocess.CompletedProcess([], 0, ""))
+    (refused,) = drop_of(tmp_path / "drop", "index.html").iterdir()
+    said = CliRunner().invoke(main, ["build", str(refused.parent), "-o", str(tmp_path / "site"), "--settle", "0"])
+    assert said.exit_code == 3
+    assert re.search(r"unusable: index\.html: the name of this campaign .*; rename it", said.stdout)
+
+
+def test_an_index_that_cannot_be_written_is_a_sentence_in_its_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fails(site: Path) -> str:
+        raise OSError(errno.EIO, os.strerror(errno.EIO), str(site / "current" / "index.html"))
+
+    monkeypatch.setattr(index_page, "write_index", fails)
+    assert index_page.main([str(tmp_path), "-"]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith(f"{tmp_path}/current/index.html: ")
+    assert "input/output error" in said
+    assert "Traceback" not in said
+
+
+def test_a_build_shows_the_log_of_an_index_that_failed(tmp_path: Path) -> None:
+    (tmp_path / "log").mkdir()
+    (tmp_path / "log" / "index.log").write_text("current/index.html: no space left on device")
+    workflow = (build.workflow_dir() / "Snakefile").read_text(encoding="utf-8")
+    assert 'log:\n        "log/index.log",' in workflow  # so that Snakemake names it, as below
+    failed = "\nError in rule index:\n    log: log/index.log (check log file(s) for error details)\n"
+    (problem,) = build._failures(tmp_path, failed)
+    assert problem.found == "current/index.html: no space left on device"
 
 
 def test_a_slash_or_a_brace_in_the_name_of_a_sample_reaches_no_path_of_the_workflow(tmp_path: Path) -> None:

@@ -79,7 +79,10 @@ def _words(built: Built, dry_run: bool, *, all_of_them: bool) -> str:
     verb = "would build" if dry_run else "built"
     lines = [f"{verb} {name}: {why}" for name, why in built.due.items()]
     lines += [f"postponed to the next build: {name}: {'; '.join(why)}" for name, why in built.waiting.items()]
-    lines += [f"unusable: {name}" for name, status in built.status.items() if status == "unusable"]
+    lines += [
+        ": ".join(("unusable", name, *("; ".join(why) for why in (built.refused.get(name),) if why)))
+        for name, status in built.status.items() if status == "unusable"
+    ]  # fmt: skip
     if dry_run:
         lines += [f"  {step}" for step in built.steps]
         for name, found in built.checked.items():

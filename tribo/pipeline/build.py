@@ -102,6 +102,7 @@ class Built:
     steps: tuple[str, ...] = ()
     dated: Path | None = None
     checked: Mapping[str, Checked] = field(default_factory=dict)  # of a dry run: what each campaign would meet
+    refused: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # why a campaign cannot be built as it is
 
     def as_dict(self) -> dict[str, Any]:
         """The same as plain types."""
@@ -109,6 +110,7 @@ class Built:
             "site": str(self.site), "due": dict(self.due), "waiting": {k: list(v) for k, v in self.waiting.items()},
             "status": dict(self.status), "steps": list(self.steps), "dated": str(self.dated) if self.dated else None,
             "checked": {name: found.as_record() for name, found in self.checked.items()},
+            "refused": {name: list(why) for name, why in self.refused.items()},
         }  # fmt: skip
 
 
@@ -172,7 +174,8 @@ def _planned(drop: Path, state: Path, options: BuildOptions, watch: Watch) -> Bu
     status = {c.name: "unusable" if c.refused else _status(c.name, state) for c in found if c.name not in due}
     status |= {name: "unusable" if look.faults else "to be built" for name, look in checked.items()}
     return Built(
-        state.parent, due, _waiting(found), status, tuple(planned_steps(said.stdout)), checked=checked
+        state.parent, due, _waiting(found), status, tuple(planned_steps(said.stdout)), checked=checked,
+        refused=_refused(found),
     )  # fmt: skip
 
 
@@ -193,6 +196,10 @@ def _waiting(found: Sequence[Dropped]) -> dict[str, tuple[str, ...]]:
     return {c.name: c.waiting for c in found if c.waiting}
 
 
+def _refused(found: Sequence[Dropped]) -> dict[str, tuple[str, ...]]:
+    return {c.name: c.refused for c in found if c.refused}
+
+
 def _built(drop: Path, state: Path, options: BuildOptions, watch: Watch, descriptor: int | None) -> Built:
     found, due = _due(drop, state, options)
     config = _configuration(found, state / "inputs", state, options)
@@ -203,7 +210,9 @@ def _built(drop: Path, state: Path, options: BuildOptions, watch: Watch, descrip
     if said.returncode:
         raise BuildError(_failures(state, said.stdout))
     status = {c.name: "unusable" if c.refused else _status(c.name, state) for c in found}
-    return Built(state.parent, due, _waiting(found), status, tuple(planned_steps(said.stdout)), dated)
+    return Built(
+        state.parent, due, _waiting(found), status, tuple(planned_steps(said.stdout)), dated, refused=_refused(found)
+    )
 
 
 def _why_due(campaign: Dropped, state: Path, options: BuildOptions) -> str:

@@ -20,6 +20,7 @@ from typing import Any
 from urllib.parse import quote
 
 from tribo import __version__
+from tribo.errors import unexpected
 from tribo.escaping import for_spreadsheet
 from tribo.file_contents import bytes_of
 from tribo.pipeline.choose_two import comparable
@@ -229,10 +230,14 @@ def main(arguments: Sequence[str]) -> int:
     from tribo.store.whole_files import write_text
 
     site, marker = arguments
-    digest = write_index(Path(site))
-    if marker != "-":
-        record: Mapping[str, str] = {"index": digest}
-        write_text(Path(marker), json.dumps(record) + "\n")
+    try:
+        digest = write_index(Path(site))
+        if marker != "-":
+            record: Mapping[str, str] = {"index": digest}
+            write_text(Path(marker), json.dumps(record) + "\n")
+    except OSError as why:
+        print(unexpected(why, "the index of the site cannot be written"), file=sys.stderr)
+        return 1
     return 0
 
 
