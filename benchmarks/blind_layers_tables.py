@@ -156,12 +156,17 @@ def ratios(halves: list[Row]) -> str:
 def by_triple(rows: list[Row]) -> str:
     three = _of(rows, "three")
     lines: list[tuple[object, ...]] = []
+    for number in range(4):
+        alike = [r for r in three if len(hidden(r) & set(LOADS)) == number]
+        if alike:
+            counts = len(alike), sum(map(right, alike)), "", sum(map(wrong, alike))
+            lines.append((f"{number} of patterns and loads", *counts))
     for name in (*COLUMNS, *LOADS):
         with_it = [r for r in three if name in hidden(r)]
         if with_it:
             missed = [r for r in with_it if not any(name in c for c in r["causes"])]
             lines.append((name, len(with_it), sum(map(right, with_it)), len(missed), sum(map(wrong, with_it))))
-    return _table(("one of the three", "campaigns", "all three named", "this one not named", "a wrong one"), lines)
+    return _table(("among the three", "campaigns", "all three named", "this one not named", "a wrong one"), lines)
 
 
 def one_right(row: Row) -> bool:
