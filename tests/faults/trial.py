@@ -162,8 +162,11 @@ def state_of(out: Path) -> dict[str, str]:
 
 
 def masked(name: str) -> str:
-    """A path without times, process numbers and the random names of temporary folders."""
-    return RANDOM.sub("", TIMES.sub("TIME", name))
+    """A path without times, process numbers and the random names of temporary folders.
+
+    A second dated copy of one second has a number behind its time.
+    """
+    return RANDOM.sub("", re.sub(r"TIME-\d+", "TIME", TIMES.sub("TIME", name)))
 
 
 def files_read(seen: Iterable[Operation]) -> set[str]:

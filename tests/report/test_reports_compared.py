@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import math
+import os
 import re
 import shutil
 from pathlib import Path
@@ -13,7 +15,8 @@ import pytest
 from on_the_command_line import run
 
 from report.conftest import Written
-from tribo.report import verify
+from tribo.pipeline.choose_two import comparable
+from tribo.report import reported, verify
 from tribo.report.reports_compared import common_load_N, differences, read_reported
 
 
@@ -87,6 +90,18 @@ def test_a_campaign_beside_two_reports_is_no_input_of_their_comparison(written: 
     assert verify(tmp_path / "out").unchanged
     (tmp_path / "b" / "fits.csv").write_text("x")
     assert [d.file for d in verify(tmp_path / "out").differences] == ["b/fits.csv"]
+
+
+@pytest.mark.parametrize("name", ["fits.csv", "campaign.nc"])
+def test_a_report_that_the_system_cannot_read_is_not_left_out_of_a_comparison(
+    written: Written, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    def failing(*_: object, **__: object) -> None:
+        raise OSError(errno.EMFILE, os.strerror(errno.EMFILE), name)
+
+    monkeypatch.setattr(*((h5py, "File") if name == "campaign.nc" else (reported, "text_of")), failing)
+    with pytest.raises(OSError, match=name):
+        comparable(written.out.parent, [written.out.name])
 
 
 def test_a_folder_without_a_report_is_refused_by_its_name(written: Written, tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from tribo.display import displayed
-from tribo.errors import CampaignError, Problem
+from tribo.errors import CampaignError, Problem, failed_by_system
 from tribo.file_contents import text_of
 
 SHOWN = ("finding", "agreement", "fig4", "fig6", "fig7", "fig8", "misfit", "evidence", "dependence")
@@ -57,18 +58,22 @@ def read_reported(folder: Path) -> Reported:
     Raises
     ------
     CampaignError
-        It holds no report, or its tables cannot be read.
+        It holds no report, or its tables are damaged.
+    OSError
+        The system cannot read them.
     """
     import h5py
 
     try:
-        fits, tests = (pd.read_csv(folder / name, dtype={"sample": str}) for name in READ)
+        fits, tests = (pd.read_csv(StringIO(text_of(folder / name)), dtype={"sample": str}) for name in READ)
         with h5py.File(folder / "campaign.nc") as file:
             title, area = str(file.attrs["title"]), float(np.ravel(file.attrs["nominal_area_m2"])[0])
         loads = pd.to_numeric(tests["normal_load_N"], errors="coerce")
         card, verdict = (_json(folder / name) for name in ("card.json", "verdict.json"))
         fits[["sample", "regime", "mu", "tau0_kPa"]]
     except (OSError, KeyError, ValueError, RuntimeError) as why:
+        if failed_by_system(why):
+            raise
         reason = " ".join(str(why).split())[:150]
         problem = Problem("no_report", f"this is no folder of results of tribo report ({reason})", file=str(folder),
                           allowed="an output folder with fits.csv, tests.csv and campaign.nc")  # fmt: skip
