@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from in_one_test import in_one_test
 
 from tribo.records import STANDARD_GRAVITY, Pull, Test, Trace
 from tribo.traces import read_record
@@ -33,6 +34,11 @@ def a_test(zero: str, load_N: float = math.nan, speed: float | None = None, stif
     )  # fmt: skip
 
 
+@pytest.fixture
+def exports() -> Path:
+    return REAL
+
+
 @pytest.fixture(scope="module")
 def quartz() -> list[Pull]:
     (file,) = (REAL / "quartz-sand-ring-shear").glob("443*")
@@ -52,35 +58,32 @@ def published(name: str) -> np.ndarray:
     return np.array(values[8:] + values[:8])
 
 
-def test_the_peak_of_every_sand_record_is_the_published_one(quartz: list[Pull]) -> None:
+def test_peak_and_reactivation_of_every_sand_record_are_the_published_ones(quartz: list[Pull]) -> None:
     peaks = np.array([pull.static_N for pull in quartz]) * STRESS_PER_FORCE
     assert peaks == pytest.approx(published("peak"), rel=0.01)
-
-
-def test_the_reactivation_is_found_in_every_sand_record(quartz: list[Pull]) -> None:
     assert [len(pull.restarts) for pull in quartz] == [1] * 10
     again = np.array([pull.restarts[0].static_N for pull in quartz]) * STRESS_PER_FORCE
     assert again == pytest.approx(published("reactivation"), rel=0.01)
 
 
-@pytest.mark.parametrize("name", ["peak", "dynamic", "reactivation"])
-def test_the_lines_through_the_sand_are_the_published_ones(quartz: list[Pull], name: str) -> None:
-    forces = {
+def test_the_lines_through_the_sand_are_the_published_ones(quartz: list[Pull]) -> None:
+    found = {
         "peak": [p.static_N for p in quartz], "dynamic": [p.sliding_N for p in quartz],
         "reactivation": [p.restarts[0].static_N for p in quartz],
-    }[name]  # fmt: skip
-    ours = np.polyfit(STRESSES, np.array(forces) * STRESS_PER_FORCE, 1)
-    theirs = np.polyfit(STRESSES, published(name), 1)
-    assert ours[0] == pytest.approx(theirs[0], rel=0.01)
-    assert ours[1] == pytest.approx(theirs[1], abs=3.0)
+    }  # fmt: skip
+    for name, forces in found.items():
+        ours = np.polyfit(STRESSES, np.array(forces) * STRESS_PER_FORCE, 1)
+        theirs = np.polyfit(STRESSES, published(name), 1)
+        assert ours[0] == pytest.approx(theirs[0], rel=0.01), name
+        assert ours[1] == pytest.approx(theirs[1], abs=3.0), name
 
 
-@pytest.mark.parametrize("rig", PAPER, ids=lambda rig: f"k{rig[0]}-v{rig[1]}")
-def test_the_paper_slider_is_read_while_it_slides(rig: tuple[str, str]) -> None:
+@in_one_test(PAPER)
+def test_the_paper_slider_is_read_while_it_slides(exports: Path, *rig: str) -> None:
     from scipy.io import loadmat
 
-    mean, peak, trough, loading, regime = PAPER[rig]
-    file = loadmat(REAL / "paper-slider-stick-slip" / f"k{rig[0]}Nm_v{rig[1]}.mat")
+    mean, peak, trough, loading, regime = PAPER[rig[0], rig[1]]
+    file = loadmat(exports / "paper-slider-stick-slip" / f"k{rig[0]}Nm_v{rig[1]}.mat")
     trace = Trace("paper", file["t"].ravel(), file["Fnorm"].ravel() * SLIDER_N)
     pull = read_record(trace, test=a_test("", SLIDER_N, float(rig[1]) * 1e-6, float(rig[0])))
     found = pull.oscillation
@@ -110,10 +113,10 @@ def test_friction_in_motor_oil_is_a_constant_and_a_slope() -> None:
     assert constant == pytest.approx(0.954, rel=0.03)
 
 
-@pytest.mark.parametrize("file", ["PPS_60N_2", "PPS_100N_1", "PPS+45PTFE_100N_200RPM_30MINS_1"])
-def test_a_pin_on_disc_record_has_no_static_force_above_its_samples(file: str) -> None:
+@in_one_test(["PPS_60N_2", "PPS_100N_1", "PPS+45PTFE_100N_200RPM_30MINS_1"])
+def test_a_pin_on_disc_record_has_no_static_force_above_its_samples(exports: Path, file: str) -> None:
     from tribo.readers import read_export
 
-    trace = read_export(REAL / "ptfe-pin-on-disc" / f"{file}.tsv")
+    trace = read_export(exports / "ptfe-pin-on-disc" / f"{file}.tsv")
     pull = read_record(trace, test=a_test(""))
     assert pull.static_N + pull.zero_N <= trace.force_N.max() + 0.5
