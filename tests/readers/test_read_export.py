@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings, strategies as st
+from hypothesis import HealthCheck, assume, given, settings, strategies as st
 from made_campaigns import MadeCampaign
 
 from tribo.errors import ReadError
@@ -44,6 +45,8 @@ def tables(draw: st.DrawFn) -> tuple[bytes, dict[str, np.ndarray]]:
         "friction force": np.array(draw(st.lists(st.floats(-1e4, 1e4), min_size=n, max_size=n))),
     }
     texts = {q: [f"{v:.{decimals}f}" for v in values[q]] for q in quantities}
+    # 1.000 may be a thousand: a table with nothing but such numbers is refused, as tests/readers/test_shapes.py states
+    assume(not all(re.fullmatch(r"-?[1-9]\d{0,2}\.\d{3}", text) for column in texts.values() for text in column))
     names = [draw(st.sampled_from(SPELLED[q])) for q in quantities]
     units = [draw(st.sampled_from(sorted(TO_SI[q]))) for q in quantities]
     delimiter = draw(st.sampled_from(",;\t|"))
