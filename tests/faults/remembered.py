@@ -16,7 +16,7 @@ from typing import Any
 from faults import file_operations
 from faults.file_operations import Operation, Watch, real_listdir, real_open
 from faults.small_site import Place
-from faults.trial import TIMES, masked
+from faults.trial import but_for_times, masked
 
 
 class Remembered:
@@ -196,15 +196,13 @@ class RememberedSteps:
         return found
 
     def _key(self, words: Sequence[str], entries: dict[str, str]) -> str:
-        state = {masked(name): self._but_for_times(name, digest) for name, digest in entries.items()}
+        state = {masked(name): self._as_found(name, digest) for name, digest in entries.items()}
         return hashlib.sha256(repr((list(words), sorted(state.items()))).encode()).hexdigest()
 
-    def _but_for_times(self, name: str, digest: str) -> str:
+    def _as_found(self, name: str, digest: str) -> str:
         if name.startswith("tmp/") or name.endswith("lock"):
             return ""
-        if digest != FOLDER and name.endswith((".json", ".html", ".log")):
-            return TIMES.sub("", (self.root / name).read_text("utf-8", "replace"))
-        return digest
+        return digest if digest == FOLDER else but_for_times(self.root / name, digest)
 
 
 def _is_of_steps(operation: Operation) -> bool:

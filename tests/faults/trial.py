@@ -16,6 +16,8 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import NoReturn
 
@@ -30,6 +32,7 @@ TIMES = re.compile(
     r'\d{4}-\d\d-\d\d[T ]\d\d:?\d\d(:?\d\d)?Z?|"seconds": [\d.]+|process \d+|(?<="index": ")[0-9a-f]{64}'
 )
 
+PROGRESS = re.compile(r"(?m)^.+: \d+ of \d+ \(\d+ s(, \d+ s left)?\)\n")  # said every few seconds
 RANDOM = re.compile(r"(?<=\.)\d+(?=\.part$)|(?<=-)\w{8}(?=/|$)")  # process numbers, names of temporary folders
 
 
@@ -164,12 +167,24 @@ def state_of(out: Path) -> dict[str, str]:
         file = out.parent / name
         if "lock" in file.name or file.name == ".number":
             continue
-        if file.suffix in (".json", ".html", ".log") and TIMES.search(text := file.read_text("utf-8", "replace")):
-            digest = TIMES.sub("", text)
-        found[masked(name)] = digest
+        found[masked(name)] = but_for_times(file, digest)
     return found
 
 
+_KNOWN: dict[str, str] = {}  # by the hash of a file: that of its text without times
+
+
+def but_for_times(file: Path, digest: str) -> str:
+    """The hash of a file; of a record, page or log, that of its text without times."""
+    if file.suffix not in (".json", ".html", ".log"):
+        return digest
+    if digest not in _KNOWN:
+        text = TIMES.sub("", PROGRESS.sub("", file.read_text("utf-8", "replace")))
+        _KNOWN[digest] = sha256(text.encode()).hexdigest()
+    return _KNOWN[digest]
+
+
+@cache
 def masked(name: str) -> str:
     """A path without times, process numbers and the random names of temporary folders.
 
