@@ -115,8 +115,8 @@ def test_a_mechanism_whose_form_is_wrong_loses_against_a_law_of_its_column() -> 
     temperature = Acting(MECHANISMS["temperature"])
     wrong = refitted(baseline(made(curved, seed=33)), [temperature])
     right = refitted(baseline(made(warming, seed=33)), [temperature])
-    assert set(without_wrong_forms(wrong)[1]) == {"temperature"}
-    assert without_wrong_forms(right)[1] == {}
+    assert set(without_wrong_forms(wrong).lost) == {"temperature"}
+    assert without_wrong_forms(right).lost == {}
 
 
 def test_a_cause_that_follows_one_name_of_a_column_loses_against_a_law_of_that_name_on_some_samples() -> None:
@@ -127,8 +127,27 @@ def test_a_cause_that_follows_one_name_of_a_column_loses_against_a_law_of_that_n
     one_name = [Acting(MECHANISMS["covariate"], "operator is op2")]
     everywhere = made(lambda s: by_op2(s, np.ones(s.observations.n, bool)), seed=33)
     patterned = made(lambda s: by_op2(s, s.observations.conditions.area_fraction < 1.0), seed=33)
-    assert without_wrong_forms(refitted(baseline(everywhere), one_name))[1] == {}
-    assert set(without_wrong_forms(refitted(baseline(patterned), one_name))[1]) == {"covariate:operator"}
+    assert without_wrong_forms(refitted(baseline(everywhere), one_name)).lost == {}
+    assert set(without_wrong_forms(refitted(baseline(patterned), one_name)).lost) == {"covariate:operator"}
+
+
+def test_other_forms_of_a_recorded_column_that_explain_as_much_are_told_with_its_cause() -> None:
+    def film_of(test_id: str) -> float:
+        return 1.0 + 0.05 * (37 * int(test_id[1:]) % 101)
+
+    def by_film(s: Setup) -> np.ndarray:
+        return np.array([[0.02, 0.02]]) * np.array([[film_of(name)] for name in s.observations.test_ids])
+
+    plain = made(by_film, seed=33)
+    tests = tuple(replace(t, covariates={"film_um": str(film_of(t.test_id))}) for t in plain.campaign.tests)
+    filmed = replace(plain, campaign=replace(plain.campaign, tests=tests))
+    line = refitted(baseline(filmed), [Acting(MECHANISMS["covariate"], "film_um")])
+    (forms,) = without_wrong_forms(line).forms
+    assert forms.cause == "covariate:film_um"
+    assert forms.law.form == ((("linear", "film_um", ""),), "T", "both", "all")
+    assert "saturating" in {tie.shapes[0].kind for tie in forms.ties}
+    assert {tie.columns for tie in forms.ties} == {("film_um",)}
+    assert forms.law.form not in {tie.form for tie in forms.ties}
 
 
 def test_a_plan_says_whether_a_design_would_show_a_law() -> None:
