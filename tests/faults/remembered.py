@@ -112,10 +112,11 @@ class Step:
 
 
 class RememberedSteps:
-    """Steps of a build. In a start without a fault, one that is known from the same state is done over from memory.
+    """Steps of a build. One that starts without a fault and is known from the same state is done over from memory.
 
     The state is that of all results and records of the site, but for times, and of temporary files. The file
-    operations of the step count as if it had been done.
+    operations of the step count as if it had been done. Errors that do not last, of earlier steps and of the build
+    itself, cannot reach a step, which is a process of its own.
     """
 
     def __init__(self, folder: Path, place: Place):
@@ -125,7 +126,7 @@ class RememberedSteps:
     def done(self, words: Sequence[str], work: Callable[[], int | None]) -> int | None:
         """Do a step, or have it done over; its exit status."""
         watched = file_operations.current
-        if watched is None or not watched.remembers:
+        if watched is None or not watched.is_undisturbed:
             return work()
         with watched.unseen():
             before = self._entries()

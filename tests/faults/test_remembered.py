@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
 
 import pytest
 
@@ -71,6 +72,26 @@ def test_no_step_of_a_start_with_a_fault_comes_from_memory(place: Place) -> None
     failed = site.start("one", site.step, Fault(len(first.seen) - 1, "EIO"))
     assert site.done == 2
     assert failed.struck == first.seen[-1]
+
+
+def test_a_step_after_an_error_comes_from_memory_unless_the_error_lasts(place: Place) -> None:
+    site = Site(place)
+    site.start("one", site.step)
+    before = place.campaign / "tests.csv"
+
+    def after_an_error() -> int:
+        with suppress(OSError):
+            before.stat()
+        return site.steps.done(["double"], site.step) or 0
+
+    for name, done in (("EIO", 1), ("ENOSPC", 2)):
+        site.start("one", site.step)
+        (place.out / "current" / "text").write_text("one")
+        (place.out / "current" / "folder" / "double").unlink()
+        (place.out / "current" / "folder").rmdir()
+        ended = in_child(after_an_error, place, Fault(0, name))
+        assert ended.struck is not None
+        assert site.done == done
 
 
 def test_a_step_that_depends_on_other_files_of_a_site_is_an_error_of_the_bench(place: Place) -> None:
