@@ -288,7 +288,7 @@ def _inputs(campaign: Dropped, folder: Path) -> dict[str, Any]:
 
 
 def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
-    """Samples and cells as the description of a campaign has them; none where it cannot be read (ingest says why)."""
+    """Samples and cells as the description of a campaign has them; none where it cannot be read (fit says why)."""
     from tribo.campaign import open_campaign
     from tribo.comparison.prediction import loads_to_simulate
     from tribo.comparison.prediction_runs import cell_name, sample_as_word
@@ -301,7 +301,7 @@ def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
             pressures = [opened.nominal_pressure_Pa(load) for load in loads_to_simulate(opened)]
     except (CampaignError, OSError):
         return [], []
-    except Exception as why:  # ingest will say it again, as the fault of this campaign
+    except Exception as why:  # fit will say it again, as the fault of this campaign
         unexpected(why, "the samples of this campaign cannot be listed", campaign.name)
         return [], []
     return words, [cell_name(s, p) for s in samples for p in pressures]
