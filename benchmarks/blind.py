@@ -21,7 +21,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from blind_cases import ALL_OR_NOTHING, UNSEEN, Case, Plan, answer, cases, design_for, is_seen
+from blind_cases import ALL_OR_NOTHING, UNSEEN, Case, Plan, Staircase, answer, cases, design_for, is_seen
 from blind_tables import tables
 from run_lines import read_rows, work_off
 
@@ -41,19 +41,15 @@ PARTS: dict[str, Callable[[str], bool]] = {
 
 
 def half_of(name: str, errors: Mapping[str, float]) -> dict[str, Any]:
-    """Size at which a misfit is seen half the time: a staircase, up after a miss and down after a hit."""
-    size, step, seen_before = 0.4 * min(LARGEST.get(name, 1.0), 1.0), 1.6, None
-    trials: list[tuple[float, bool]] = []
-    turns = 0
-    for k in range(TRIALS):
-        number = HALF_SEED + 1000 * sorted(EFFECTS).index(name) + k
-        seen = is_seen(Case("half", number, ((name, size),), design_for(name, **errors)))
-        trials.append((round(size, 5), seen))
-        turns += seen_before is not None and seen != seen_before
-        size = min(size / step if seen else size * step, LARGEST.get(name, np.inf))
-        step, seen_before = (1.6 if turns < 2 else 1.25), seen
-    settled = np.log([s for s, _ in trials[5:]] + [size])
-    return {"effect": name, "half": float(f"{np.exp(settled.mean()):.4g}"), "trials": trials}
+    """Size at which a misfit is seen half the time."""
+    largest = LARGEST.get(name, np.inf)
+    first = HALF_SEED + 1000 * sorted(EFFECTS).index(name)
+
+    def seen_at(size: float, k: int) -> bool:
+        return is_seen(Case("half", first + k, ((name, size),), design_for(name, **errors)))
+
+    half, trials = Staircase(TRIALS, 5, 1.6, largest).settled(0.4 * min(largest, 1.0), seen_at)
+    return {"effect": name, "half": half, "trials": trials}
 
 
 def in_a_line(row: Mapping[str, Any]) -> str:

@@ -17,7 +17,7 @@ import math
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -265,6 +265,31 @@ def gain_of_the_best(d: Diagnosis, seed: int) -> list[float]:
 
     found = gain(d.baseline, weigh(start_effects(d.baseline))[0].fit, np.random.default_rng(seed))
     return [round(found.difference, 5), round(found.se, 5)] if found is not None else []
+
+
+@dataclass(frozen=True)
+class Staircase:
+    """A search for the size that is seen half the time: up by a ``step`` after a miss and down after a hit, from the
+    second turn on by the ``fine`` one; the trials from ``first_counted`` on settle the size."""
+
+    trials: int
+    first_counted: int
+    step: float
+    largest: float
+    fine: float = 1.25
+
+    def settled(self, size: float, seen_at: Callable[[float, int], bool]) -> tuple[float, list[tuple[float, bool]]]:
+        """The size and the trials, beginning at ``size``; ``seen_at`` makes the campaign of a size and a number."""
+        step, seen_before, turns = self.step, None, 0
+        made: list[tuple[float, bool]] = []
+        for k in range(self.trials):
+            seen = seen_at(size, k)
+            made.append((round(size, 5), seen))
+            turns += seen_before is not None and seen != seen_before
+            size = min(size / step if seen else size * step, self.largest)
+            step, seen_before = (self.step if turns < 2 else self.fine), seen
+        logs = np.log([s for s, _ in made[self.first_counted :]] + [size])
+        return float(f"{np.exp(logs.mean()):.4g}"), made
 
 
 def is_seen(case: Case) -> bool:

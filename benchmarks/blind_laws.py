@@ -25,6 +25,7 @@ import numpy as np  # after blind_cases, which says how many threads it may use 
 from blind.hidden_laws import FORMS, Hidden, as_ingested, hide_law  # isort: skip
 
 from tribo.diagnose.diagnosis import examine
+from tribo.diagnose.discovery.contested import CauseForms
 from tribo.diagnose.discovery.held import holds
 from tribo.diagnose.discovery.in_verdict import uncontested
 from tribo.diagnose.discovery.on_campaign import searched_laws
@@ -82,9 +83,24 @@ def _one(piece: Piece) -> dict[str, Any]:
         "verdict": d.verdict.verdict, "causes": [c.mechanism for c in d.verdict.causes],
         "laws": len(found.laws),
     }  # fmt: skip
-    if not piece.form or not found.laws:
-        return row
-    return row | judged(hidden, found, kept, piece.seed)
+    if piece.form and found.laws:
+        return row | judged(hidden, found, kept, piece.seed)
+    if piece.form and found.of_causes:
+        return row | judged_cause(hidden, found.of_causes[0])
+    return row
+
+
+def judged_cause(hidden: Hidden, cause: CauseForms) -> dict[str, Any]:
+    """The same where a cause of the library is the law of a recorded column: its form with those it cannot be told
+    from. It acts on all samples, in both regimes."""
+    law, truth = cause.law, hidden.truth
+    return {
+        "cause": cause.cause, "columns": list(law.columns), "kind": _kind(law), "where": law.where,
+        "regime": law.regime, "ties": [[*t.columns, _kind(t), t.regime, t.where] for t in cause.ties],
+        "column_right": _same_columns(law.columns, truth.columns), "regime_right": truth.regimes == (1.0, 1.0),
+        "samples_right": set(hidden.bench.column("sample").tolist()) == set(truth.samples),
+        "form_right": _kind(law) in truth.kinds, "form_tied": any(_kind(t) in truth.kinds for t in cause.ties),
+    }  # fmt: skip
 
 
 def judged(hidden: Hidden, found: Discovery, kept: np.ndarray, seed: int) -> dict[str, Any]:
@@ -169,7 +185,7 @@ def _pair(piece: Piece) -> dict[str, Any]:
     later = hide_law(seed, piece.second, piece.seed if same else None)
     kept = later.bench.column("repeat") <= KEPT
     d = examine(as_ingested(later.bench, seed, kept), seed=seed)
-    held = holds(uncontested(d)[0], found.laws[0].law, found.laws[0].parameters)
+    held = holds(uncontested(d).model, found.laws[0].law, found.laws[0].parameters)
     return {
         "answer": held.answer, "second": piece.second, "text": held.text, "verdict": d.verdict.verdict,
         "strength": round(later.strength, 2),

@@ -20,7 +20,18 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from blind_cases import LADDER, Case, answer, design_for, is_seen, make_campaign, seed_of, times_half, true_corrections
+from blind_cases import (
+    LADDER,
+    Case,
+    Staircase,
+    answer,
+    design_for,
+    is_seen,
+    make_campaign,
+    seed_of,
+    times_half,
+    true_corrections,
+)
 from blind_layers_tables import COLUMNS, HALF_WAY, LOADS, OFF, RIGHT, tables
 from blind_loop import closed_loop
 from run_lines import read_rows, work_off
@@ -158,18 +169,14 @@ def of_clean(case: Case) -> dict[str, Any]:
 
 def half_of(name: str, which: str, size: float, seed: int) -> dict[str, Any]:
     """Size at which a misfit is seen half the time: a staircase that begins at ``size``."""
-    step, seen_before = 1.5, None
-    trials: list[tuple[float, bool]] = []
-    turns = 0
-    for k in range(TRIALS):
-        number = seed + 1000 * ALL.index(name) + k  # the same for all patterns, so that the ratio is of like campaigns
-        seen = is_seen(Case("half", number, ((name, size),), designed(which, name)))
-        trials.append((round(size, 5), seen))
-        turns += seen_before is not None and seen != seen_before
-        size = min(size / step if seen else size * step, LARGEST.get(name, np.inf))
-        step, seen_before = (1.5 if turns < 2 else 1.25), seen
-    settled = np.log([s for s, _ in trials[FIRST_COUNTED:]] + [size])
-    return {"effect": name, "patterns": which, "half": float(f"{np.exp(settled.mean()):.4g}"), "trials": trials}
+    first = seed + 1000 * ALL.index(name)  # the same for all patterns, so that the ratio is of like campaigns
+
+    def seen_at(size: float, k: int) -> bool:
+        return is_seen(Case("half", first + k, ((name, size),), designed(which, name)))
+
+    stairs = Staircase(TRIALS, FIRST_COUNTED, 1.5, LARGEST.get(name, np.inf))
+    half, trials = stairs.settled(size, seen_at)
+    return {"effect": name, "patterns": which, "half": half, "trials": trials}
 
 
 def half_work(task: tuple[str, str, float, int]) -> dict[str, Any]:

@@ -90,7 +90,7 @@ def _right(d: Diagnosis, hidden: Hidden, name: str, factor: float) -> list[bool]
             module = import_module(f"{HOUSE}.{room}")
             changed = constant.change(getattr(module, constant.name), factor) if constant is not None else None
             stack.enter_context(patch.object(module, constant.name if constant is not None else "", changed))
-        model = uncontested(d)[0]
+        model = uncontested(d).model
         grammar = Grammar.of(model, ())
         form, _ = best_form(model, Searched(grammar.courses, grammar.groups))
     return [*_judged(form.best, d, hidden), len(model.acting) == 0]

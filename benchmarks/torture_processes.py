@@ -29,7 +29,8 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from faults.commands import RememberedPages, small_lattice
+from faults.commands import small_lattice
+from faults.remembered import RememberedPages
 from faults.trial import TIMES, run_command
 from forked_starts import stand_in_for_python, start_here
 

@@ -102,6 +102,7 @@ def test_columns_that_run_alike_are_named_as_tied_with_the_test_that_parts_them(
     assert {frozenset(names) for names in found.equivalent} == {frozenset({"covariate:run_order", "covariate:wear_m"})}
     assert found.next_test is not None
     assert set(found.next_test.separates) == {"run_order", "wear_m"}
+    assert found.next_test.text == "Choose the values of wear_m at random, independently of the run order: 12 pulls."
 
 
 def test_a_column_that_varies_only_with_the_load_cannot_be_told_from_it(tmp_path: Path) -> None:

@@ -3,73 +3,23 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import io
 import json
 import os
-import pickle
 import shlex
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from faults.file_operations import real_listdir, real_open
+from faults.file_operations import real_open
+from faults.remembered import RememberedFigures, RememberedPages, RememberedSteps
 from faults.small_site import Place
 from faults.trial import Bench, Command, in_child, run_command
 
 RUNS = ("--runs", "2", "--jobs", "1")
-
-
-class RememberedPages:
-    """typst, with the pages that it has set before: setting them takes most of the time of a report.
-
-    The files for typst are written all the same; typst itself is asked only for pages that it has not set yet.
-    """
-
-    def __init__(self, file: Path):
-        import typst
-
-        self.file, self.real = file, typst.Compiler
-        self.known: dict[str, bytes] = {}
-        self.read()
-        typst.Compiler = lambda root, **options: _Page(self, Path(root), options)  # type: ignore[misc, assignment]
-
-    def read(self) -> None:
-        """What other processes have set since."""
-        if self.file.is_file():
-            with real_open(self.file, "rb") as file:
-                self.known |= pickle.load(file)
-
-    def page(self, key: str, make: Callable[[], bytes]) -> bytes:
-        """A page that this process or another has set, or else will set now."""
-        if key not in self.known:
-            self.read()
-        if key not in self.known:
-            self.known[key] = make()
-            whole = self.file.with_name(f"{self.file.name}-{os.getpid()}")
-            with real_open(whole, "wb") as file:
-                pickle.dump(self.known, file)
-            os.replace(whole, self.file)
-        return self.known[key]
-
-
-class _Page:
-    def __init__(self, pages: RememberedPages, root: Path, options: dict[str, Any]):
-        self.pages, self.root, self.options = pages, root, options
-
-    def compile(self, source: Path, **options: Any) -> bytes:
-        key = hashlib.sha256(repr((source.name, sorted(options.items()))).encode())
-        for name in sorted(real_listdir(self.root)):
-            with real_open(self.root / name, "rb") as file:
-                key.update(name.encode() + b"\0" + file.read())
-
-        def make() -> bytes:
-            compiler: Any = self.pages.real(root=self.root, **self.options)
-            return bytes(compiler.compile(source, **options))
-
-        return self.pages.page(key.hexdigest(), make)
 
 
 def prepared(place: Place, aside: Path, build: bool = True) -> dict[str, Command]:
@@ -81,12 +31,13 @@ def prepared(place: Place, aside: Path, build: bool = True) -> dict[str, Command
     report = ("report", campaign, "-o", out, *RUNS)
     small_lattice()
     complete, kept, partly, site = (aside / name for name in ("complete", "kept-only", "partly-kept", "site"))
-    pages = RememberedPages(aside / "pages.pickle")
+    pages, figures = RememberedPages(aside / "pages.pickle"), RememberedFigures(aside / "figures.pickle")
 
     # typst starts threads, which a process that forks must not have
     ended = in_child(lambda: run_command(report), place)
     assert ended.status == 0, ended
     pages.read()
+    figures.read()
     with _quiet(place):
         assert run_command(report) == 0
     shutil.copytree(out, complete)
@@ -116,15 +67,16 @@ def _builds(place: Place, aside: Path, site: Path) -> list[Command]:
     """tribo build with kept results at hand, and where only the index and the dated copy are missing."""
     arguments = ("build", str(place.drop), "-o", str(place.out), "--settle", "0", *RUNS)
     indexed = aside / "indexed-site"
+    run = partial(build_in_one_process, RememberedSteps(aside / "steps", place))
     shutil.rmtree(place.out)
     shutil.copytree(site, place.out)
     with _quiet(place) as said:
-        status = build_in_one_process(arguments)
+        status = run(arguments)
     assert status == 0, said.getvalue()
     shutil.copytree(place.out, indexed, symlinks=True, ignore=shutil.ignore_patterns("builds", "latest", "index.json"))
     return [
-        Command("build", arguments, site, build_in_one_process),
-        Command("build of the index", arguments, indexed, build_in_one_process),
+        Command("build", arguments, site, run),
+        Command("build of the index", arguments, indexed, run),
     ]
 
 
@@ -160,20 +112,23 @@ def _quiet(place: Place) -> Iterator[io.StringIO]:
         os.environ |= before
 
 
-def build_in_one_process(arguments: Sequence[str]) -> int:
+def build_in_one_process(steps: RememberedSteps, arguments: Sequence[str]) -> int:
     """tribo build with the steps of its workflow run one after another in this process, in place of Snakemake."""
     from tribo.pipeline import build
 
-    build._snakemake = _steps_in_order  # type: ignore[assignment]
+    build._snakemake = partial(_steps_in_order, steps)  # type: ignore[assignment]
     return run_command(arguments)
 
 
-def _steps_in_order(state: Path, config: Path, *_: Any) -> subprocess.CompletedProcess[str]:
+def _steps_in_order(
+    steps: RememberedSteps, state: Path, config: Path, *_: Any
+) -> subprocess.CompletedProcess[str]:
     with real_open(config, encoding="utf-8") as file:
         described = json.load(file)
     for name, campaign in described["ready"].items():
         for step, words in _steps(name, campaign, described["options"]):
-            if not _step(state, name, step, words, described):
+            given = _arguments(state, name, step, words, described)
+            if given and not _logged(state, f"{name}/{step}.log", partial(_step, steps, given)):
                 said = f"\nError in rule {step}:\n    log: log/{name}/{step}.log (check log file(s))\n"
                 _index(state, "-")
                 return subprocess.CompletedProcess([], 1, said)
@@ -190,18 +145,21 @@ def _steps(name: str, campaign: dict[str, Any], options: dict[str, str]) -> list
     ]
 
 
-def _step(state: Path, name: str, step: str, words: str, described: dict[str, Any]) -> bool:
-    """Run one step unless its record says that it has been run on the same; whether it succeeded."""
-    from tribo.cli.workflow_step import main
-
+def _arguments(state: Path, name: str, step: str, words: str, described: dict[str, Any]) -> list[str]:
+    """What one step is started with; nothing where its record says that it has been run on the same."""
     campaign = described["ready"][name]
     digest = f"{campaign['digest']} {described['sources']} {described['options']['words']}"
     if _is_done(state / "steps" / name / f"{step}.json", digest):
-        return True
+        return []
     files = ["--files", campaign["files"]] if step == "report" else []
     laws = ["--laws", "laws"] if step == "report" else []
-    given = [f"steps/{name}/{step}.json", "--digest", digest, *laws, *files, "--", *shlex.split(words)]
-    return _logged(state, f"{name}/{step}.log", lambda: main(given))
+    return [f"steps/{name}/{step}.json", "--digest", digest, *laws, *files, "--", *shlex.split(words)]
+
+
+def _step(steps: RememberedSteps, given: list[str]) -> int | None:
+    from tribo.cli.workflow_step import main
+
+    return steps.done(given, lambda: main(given))
 
 
 def _is_done(record: Path, digest: str) -> bool:

@@ -12,7 +12,8 @@ import builtins
 import errno
 import io
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import wraps
 from pathlib import Path
@@ -58,6 +59,7 @@ class Watch:
     """What happens below ``root``: every operation in order, and the fault that was let happen, if any.
 
     ``branching`` is told every operation before it is done; where it returns a fault, this process has that fault.
+    Where it ``remembers``, steps that have been done before need not be done again (see ``remembered``).
     """
 
     root: str
@@ -66,6 +68,17 @@ class Watch:
     struck: Operation | None = None
     on_strike: Callable[[Operation], object] = lambda operation: None
     branching: Callable[[int, Operation], Fault | None] | None = None
+    remembers: bool = False
+    is_off: bool = False
+
+    @contextmanager
+    def unseen(self) -> Iterator[None]:
+        """What the bench itself does to files while this lasts does not count."""
+        self.is_off = True
+        try:
+            yield
+        finally:
+            self.is_off = False
 
     def inside(self, path: Any) -> str | None:
         """The path relative to the watched folder; None where it lies elsewhere."""
@@ -83,7 +96,7 @@ class Watch:
 
     def at(self, kind: str, path: Any, half: Callable[[], object] = lambda: None) -> None:
         """Count this operation, and let it fail where it is the chosen one; ``half`` does the first half of it."""
-        inside = self.inside(path)
+        inside = None if self.is_off else self.inside(path)
         if inside is None:
             return
         operation = Operation(kind, inside)
@@ -110,11 +123,13 @@ class Watch:
 
 real_open, real_listdir = _io.open, os.listdir
 real_os_open, _real_readlink = os.open, os.readlink
+current: Watch | None = None  # that of this process
 
 
 def watch(root: Path, fault: Fault | None = None) -> Watch:
     """Patch this process, for good: meant for a forked child."""
-    watched = Watch(str(root), fault)
+    global current
+    watched = current = Watch(str(root), fault)
     for module in (builtins, io, _io):
         module.open = _opener(watched)  # type: ignore[attr-defined]
     for name, kind in _OF_PATHS.items():

@@ -61,11 +61,13 @@ def test_report_and_build_withstand_a_fault_at_each_kind_of_file_operation(
     import typst
 
     from tribo.pipeline import build
+    from tribo.report import drawings
     from tribo.simulate import SimConfig
 
     # what the bench replaces in this process is put back afterwards
     monkeypatch.setattr(typst, "Compiler", typst.Compiler)
     monkeypatch.setattr(build, "_snakemake", build._snakemake)
+    monkeypatch.setattr(drawings, "_svg_and_series", drawings._svg_and_series)
     monkeypatch.setattr(SimConfig.__init__, "__defaults__", SimConfig.__init__.__defaults__)
     place = write_inputs(tmp_path.resolve() / "watched")
     commands = prepared(place, tmp_path.resolve())

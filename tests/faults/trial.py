@@ -16,6 +16,8 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import NoReturn
 
@@ -25,8 +27,12 @@ from faults.small_site import Place, hashes
 SLOW_S = 1200
 PAGE_BYTES = 4096
 TEMPORARY_NAME = re.compile(r"\.(?P<name>.+?)(\.[^.]+)?\.part$")
-TIMES = re.compile(r'\d{4}-\d\d-\d\d[T ]\d\d:?\d\d(:?\d\d)?Z?|"seconds": [\d.]+|process \d+')
+# times, and what holds them as a hash: the marker of the index of a site
+TIMES = re.compile(
+    r'\d{4}-\d\d-\d\d[T ]\d\d:?\d\d(:?\d\d)?Z?|"seconds": [\d.]+|process \d+|(?<="index": ")[0-9a-f]{64}'
+)
 
+PROGRESS = re.compile(r"(?m)^.+: \d+ of \d+ \(\d+ s(, \d+ s left)?\)\n")  # said every few seconds
 RANDOM = re.compile(r"(?<=\.)\d+(?=\.part$)|(?<=-)\w{8}(?=/|$)")  # process numbers, names of temporary folders
 
 
@@ -67,16 +73,21 @@ def run_command(arguments: Sequence[str]) -> int:
 
 
 def in_child(
-    work: Callable[[], int], place: Place, fault: Fault | None = None, largest_file: int | None = None
+    work: Callable[[], int],
+    place: Place,
+    fault: Fault | None = None,
+    largest_file: int | None = None,
+    remembers: bool = False,
 ) -> Outcome:
     """Run ``work`` in a forked child with its file operations watched; everything it prints is read back.
 
-    With ``largest_file`` (bytes) no file may grow beyond that, whoever writes it.
+    With ``largest_file`` (bytes) no file may grow beyond that, whoever writes it. Where it ``remembers``, steps of a
+    build that have been done from the same state are done over from memory.
     """
     printed, listed = os.pipe(), os.pipe()
     child = os.fork()
     if child == 0:
-        be_child(work, Orders(place, fault, largest_file), printed[1], listed[1])
+        be_child(work, Orders(place, fault, largest_file, remembers=remembers), printed[1], listed[1])
     os.close(printed[1])
     os.close(listed[1])
     said, lines = _read_both(printed[0], listed[0])
@@ -115,6 +126,7 @@ class Orders:
     fault: Fault | None = None
     largest_file: int | None = None
     branching: Callable[[int, Operation], Fault | None] | None = None
+    remembers: bool = False
 
 
 def be_child(work: Callable[[], int], orders: Orders, printed: int, listed: int) -> NoReturn:
@@ -129,7 +141,7 @@ def be_child(work: Callable[[], int], orders: Orders, printed: int, listed: int)
         tempfile.tempdir = None
         watched = watch(orders.place.root, orders.fault)
         watched.on_strike = lambda o: report(listed, f"!{o.kind}\t{o.path}\n".encode("utf-8", "replace"))
-        watched.branching = orders.branching
+        watched.branching, watched.remembers = orders.branching, orders.remembers
         if orders.largest_file is not None:
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (orders.largest_file, resource.RLIM_INFINITY))
@@ -155,12 +167,24 @@ def state_of(out: Path) -> dict[str, str]:
         file = out.parent / name
         if "lock" in file.name or file.name == ".number":
             continue
-        if file.suffix in (".json", ".html", ".log") and TIMES.search(text := file.read_text("utf-8", "replace")):
-            digest = TIMES.sub("", text)
-        found[masked(name)] = digest
+        found[masked(name)] = but_for_times(file, digest)
     return found
 
 
+_KNOWN: dict[str, str] = {}  # by the hash of a file: that of its text without times
+
+
+def but_for_times(file: Path, digest: str) -> str:
+    """The hash of a file; of a record, page or log, that of its text without times."""
+    if file.suffix not in (".json", ".html", ".log"):
+        return digest
+    if digest not in _KNOWN:
+        text = TIMES.sub("", PROGRESS.sub("", file.read_text("utf-8", "replace")))
+        _KNOWN[digest] = sha256(text.encode()).hexdigest()
+    return _KNOWN[digest]
+
+
+@cache
 def masked(name: str) -> str:
     """A path without times, process numbers and the random names of temporary folders.
 
@@ -220,7 +244,7 @@ class Bench:
     def __post_init__(self) -> None:
         self.inputs = self._inputs()
         self.reset()
-        self.expected = self._run(None)
+        self.expected = self._run_undisturbed()
         self.result = state_of(self.place.out)
         self.written_bytes = sum(p.stat().st_size for p in self.place.out.rglob("*") if p.is_file())
 
@@ -299,6 +323,9 @@ class Bench:
     def _run(self, fault: Fault | None, largest_file: int | None = None) -> Outcome:
         return in_child(self.work, self.place, fault, largest_file)
 
+    def _run_undisturbed(self) -> Outcome:
+        return in_child(self.work, self.place, remembers=True)
+
     def _inputs(self) -> dict[str, str]:
         return {name: digest for folder in self.place.inputs for name, digest in hashes(folder).items()}
 
@@ -335,7 +362,7 @@ class Bench:
         state = self._state()
         known = next((mended for mended in self.mended if mended.tells(state)), None)
         if known is None:
-            again = self._run(None)
+            again = self._run_undisturbed()
             after = self._state()
             replaced = {name for name, digest in state.items() if after.get(name) != digest}
             unread = frozenset(replaced - files_read(again.seen))

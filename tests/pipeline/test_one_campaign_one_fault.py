@@ -13,11 +13,13 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
+from tribo.campaign import load
 from tribo.cli import main
 from tribo.pipeline import build, index_page
-from tribo.pipeline.build import BuildOptions, _configuration, _to_simulate
+from tribo.pipeline.build import BuildOptions, _configuration
 from tribo.pipeline.history import CampaignRow, Law, history
 from tribo.pipeline.index_page import page, series_name, trend_csv, write_index
+from tribo.pipeline.inputs_of_steps import inputs_of
 from tribo.pipeline.scan import scan
 from tribo.pipeline.trend import change_points
 from tribo.report.provenance import read_record
@@ -33,6 +35,12 @@ def drop_of(folder: Path, *names: str | bytes) -> Path:
         with open(os.path.join(place, b"campaign.toml"), "w") as file:
             file.write("x")
     return folder
+
+
+def described(drop: Path, state: Path) -> None:
+    """What a build tells its workflow, in the state of a site."""
+    found, ready = inputs_of(scan(drop, settle_s=0.0), state / "inputs")
+    _configuration(found, ready, state / "build.json", BuildOptions())
 
 
 def test_a_name_that_cannot_be_used_is_refused_with_its_reason_and_the_others_are_taken(tmp_path: Path) -> None:
@@ -57,7 +65,7 @@ def test_a_file_of_a_name_that_is_not_utf8_is_listed_and_hashed(tmp_path: Path) 
 
 def test_refused_campaigns_stand_in_the_index_with_their_reason(tmp_path: Path) -> None:
     drop, state = drop_of(tmp_path / "drop", *BAD_NAMES), tmp_path / "site" / ".tribo"
-    _configuration(scan(drop, settle_s=0.0), state / "inputs", state, BuildOptions())
+    described(drop, state)
     rows = history(tmp_path / "site")
     assert {row.state for row in rows} == {"unusable"}
     write_index(tmp_path / "site")
@@ -72,6 +80,35 @@ def test_a_build_says_on_the_terminal_why_a_campaign_is_unusable(
     said = CliRunner().invoke(main, ["build", str(refused.parent), "-o", str(tmp_path / "site"), "--settle", "0"])
     assert said.exit_code == 3
     assert re.search(r"unusable: index\.html: the name of this campaign .*; rename it", said.stdout)
+
+
+def test_a_campaign_that_the_system_cannot_read_is_refused_for_this_build_and_listed_by_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drop = drop_of(tmp_path / "drop", "a", "b")
+    real = load.tests_file
+
+    def failing(root: Path) -> Path:
+        if root.name == "a":
+            raise OSError(errno.EIO, os.strerror(errno.EIO), str(root / "tests.csv"))
+        return real(root)
+
+    for campaign in drop.iterdir():
+        (campaign / "campaign.toml").write_text(
+            '[campaign]\ntitle = "t"\nnominal_area_mm2 = 55.0\n[patterns.F]\ncavity = "none"\n'
+        )
+        (campaign / "raw").mkdir()
+        (campaign / "raw" / "1.csv").write_text("1,2\n")
+        (campaign / "tests.csv").write_text("test_id,file,sample,normal_load_N\nT1,raw/1.csv,F,1\n")
+    with monkeypatch.context() as patched:
+        patched.setattr(load, "tests_file", failing)
+        found, ready = inputs_of(scan(drop, settle_s=0.0), tmp_path / "inputs")
+    (refused,) = [campaign.refused for campaign in found if campaign.refused]
+    assert "a/tests.csv" in refused[0]
+    assert "input/output error" in refused[0]
+    assert list(ready) == ["b"]
+    _, ready = inputs_of(scan(drop, settle_s=0.0), tmp_path / "inputs")
+    assert ready["a"]["samples"] == ["F"]
 
 
 def test_an_index_that_cannot_be_written_is_a_sentence_in_its_log(
@@ -109,8 +146,8 @@ def test_a_slash_or_a_brace_in_the_name_of_a_sample_reaches_no_path_of_the_workf
         (drop / "a" / "raw" / f"{k}.csv").write_text("1,2\n")
         rows.append(f"T{k},raw/{k}.csv,{name},{k + 1}")
     (drop / "a" / "tests.csv").write_text("\n".join(rows) + "\n")
-    (campaign,) = scan(drop, settle_s=0.0)
-    samples, cells = _to_simulate(campaign)
+    _, ready = inputs_of(scan(drop, settle_s=0.0), tmp_path / "inputs")
+    samples, cells = ready["a"]["samples"], ready["a"]["cells"]
     assert samples == ["F", "A%2FB", "%7Bx%7D", "..", "%24%5Cfrac%24"]
     assert len(cells) == 25
     assert not any(set("/{}\\") & set(word) for word in (*samples, *cells))
@@ -127,7 +164,7 @@ RESULTS = ("verdict.json", "tests.csv", "fits.csv", "campaign.nc", "../../.tribo
 @pytest.mark.parametrize("name", RESULTS)
 def test_damaged_results_of_one_campaign_leave_the_index(tmp_path: Path, name: str) -> None:
     drop, state = drop_of(tmp_path / "drop", "a", "b"), tmp_path / "site" / ".tribo"
-    _configuration(scan(drop, settle_s=0.0), state / "inputs", state, BuildOptions())
+    described(drop, state)
     place = (tmp_path / "site" / "current" / "a" / name).resolve()
     place.parent.mkdir(parents=True)
     for content in DAMAGED:
@@ -148,7 +185,7 @@ def test_results_that_the_system_cannot_read_are_not_taken_for_missing(
         return real(self, *given, **named)
 
     state = tmp_path / "site" / ".tribo"
-    _configuration(scan(drop_of(tmp_path / "drop", "a"), settle_s=0.0), state / "inputs", state, BuildOptions())
+    described(drop_of(tmp_path / "drop", "a"), state)
     monkeypatch.setattr(Path, "open", failing)
     with pytest.raises(OSError, match="Input/output"):
         history(tmp_path / "site")
@@ -169,7 +206,7 @@ def test_a_damaged_provenance_is_said_to_be_damaged(tmp_path: Path, content: byt
 
 def test_campaigns_are_in_the_order_of_their_times_and_not_of_their_texts(tmp_path: Path) -> None:
     drop, state = drop_of(tmp_path / "drop", "later", "earlier"), tmp_path / "site" / ".tribo"
-    _configuration(scan(drop, settle_s=0.0), state / "inputs", state, BuildOptions())
+    described(drop, state)
     for name, started in {"later": "2026-01-01T23:30:00-05:00", "earlier": "2026-01-02T01:00:00+01:00"}.items():
         out = tmp_path / "site" / "current" / name
         out.mkdir(parents=True)

@@ -63,6 +63,15 @@ def test_ink_and_paper_follow_the_theme_but_not_under_a_colour_scale() -> None:
     assert 'class="on-paper"' in scaled
 
 
+def test_points_that_look_alike_say_their_style_once() -> None:
+    alike = "".join(f'<use xlink:href="#m1" x="{k}.123456" y="2" style="fill: #0072b2"/>\n' for k in range(3))
+    other = '<use xlink:href="#m1" x="9" y="2" style="fill: #d55e00"/>'
+    body = inline_svg(f'<svg viewBox="0 0 1 1">{alike}{other}</svg>', "fig6", "label")
+    assert body.count("fill: var(--blue)") == 1
+    assert [f'<use xlink:href="#fig6-m1" x="{k}.12" y="2.00"/>' in body for k in range(3)] == [True] * 3
+    assert '<use xlink:href="#fig6-m1" x="9" y="2" style="fill: #d55e00"/>' in body
+
+
 def test_the_names_inside_a_figure_are_its_own() -> None:
     body = inline_svg('<svg viewBox="0 0 1 1"><defs><path id="m1"/></defs><use href="#m1"/></svg>', "fig6", "label")
     assert 'id="fig6-m1"' in body

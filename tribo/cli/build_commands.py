@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -72,6 +73,10 @@ def build(console: Console, drop: Path, site: Path, dry_run: bool, **options: An
     return SOME_SET_ASIDE if unusable or built.waiting else DONE
 
 
+def _unusable(name: str, why: Sequence[str]) -> str:
+    return f"unusable: {name}: {'; '.join(why)}" if why else f"unusable: {name}"
+
+
 def _words(built: Built, dry_run: bool, *, all_of_them: bool) -> str:
     """What was built, or would be built, and why."""
     from tribo.cli.dry_run_text import findings_text
@@ -79,10 +84,8 @@ def _words(built: Built, dry_run: bool, *, all_of_them: bool) -> str:
     verb = "would build" if dry_run else "built"
     lines = [f"{verb} {name}: {why}" for name, why in built.due.items()]
     lines += [f"postponed to the next build: {name}: {'; '.join(why)}" for name, why in built.waiting.items()]
-    lines += [
-        ": ".join(("unusable", name, *("; ".join(why) for why in (built.refused.get(name),) if why)))
-        for name, status in built.status.items() if status == "unusable"
-    ]  # fmt: skip
+    unusable = [name for name, status in built.status.items() if status == "unusable"]
+    lines += [_unusable(name, built.refused.get(name, ())) for name in unusable]
     if dry_run:
         lines += [f"  {step}" for step in built.steps]
         for name, found in built.checked.items():

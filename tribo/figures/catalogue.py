@@ -152,7 +152,7 @@ DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = {
             "What was found",
             "100 (measured / model − 1) against what it follows, for the model calibrated on the flat sample. Points "
             "with bars: means with twice their standard error. Band: range of 95 % of such means if the model were "
-            "right. Thick line: what the named cause adds. Small points: tests.",
+            "right. Thick line, if a cause is named: what it adds. Small points, if shown: tests.",
             finding.numbers,
             finding.draw,
         ),

@@ -55,6 +55,8 @@ class Choosing:
         What a verdict appends to the name, as in ``covariate:operator``.
     column
         The recorded column that the mechanism follows; empty: the choice itself, or the columns it needs.
+    level
+        The one name of a column of several that a choice concerns; empty: the whole column.
     on_test
         How it acts on the test of an index; None where the choice does not concern that test.
     in_one_run
@@ -71,6 +73,7 @@ class Choosing:
 
     label: Callable[[str], str] = unnamed
     column: str = ""
+    level: Callable[[str], str] = unnamed
     on_test: Callable[[Values, str, Conditions, int], OnTest | None] = same_on_every_test
     in_one_run: Callable[[Conditions], str] = nothing_to_choose
     held_out: Literal["samples", "loads"] = "samples"

@@ -60,6 +60,11 @@ def column_of(choice: str) -> str:
     return choice.split(IS, 1)[0]
 
 
+def level_of(choice: str) -> str:
+    """The one name of several that a choice concerns, or nothing."""
+    return choice.partition(IS)[2]
+
+
 def _numbers(column: StringArray) -> FloatArray | None:
     try:
         numbers = np.asarray(column, float)
@@ -95,7 +100,7 @@ MECHANISM = Mechanism(
     choices=choices,
     plain="a recorded column",
     meaning="friction follows a recorded column that no other mechanism uses",
-    choosing=Choosing(label=column_of, on_test=on_test, in_one_run=in_one_run),
+    choosing=Choosing(label=column_of, level=level_of, on_test=on_test, in_one_run=in_one_run),
     in_table=InTable(missing="no further column is printed"),
     any_column=True,
 )

@@ -19,10 +19,11 @@ from pathlib import Path
 from typing import Any
 
 from tribo.dry_run import Checked, check
-from tribo.errors import CampaignError, Problem, TriboError, unexpected
+from tribo.errors import Problem, TriboError
 from tribo.escaping import well_formed
 from tribo.file_contents import found_below, found_in, text_of
 from tribo.pipeline.dated_copies import CURRENT, clear_unfinished, date_build
+from tribo.pipeline.inputs_of_steps import inputs_of
 from tribo.pipeline.laws_of_site import collect_laws
 from tribo.pipeline.live import Progress
 from tribo.pipeline.scan import Dropped, difference, scan
@@ -165,8 +166,8 @@ def _clear_leftovers(state: Path) -> None:
 
 def _planned(drop: Path, state: Path, options: BuildOptions, watch: Watch) -> Built:
     """What a build would do, and what it would meet in the campaigns that are due."""
-    found, due = _due(drop, state, options)
-    config = _configuration(found, state / "dry-run", state, options)
+    found, ready, due = _due(drop, state / "dry-run", options)
+    config = _configuration(found, ready, state / "dry-run.json", options)
     said = _snakemake(state, config, options, ("--dry-run", *_forced(due, state)), None, UNWATCHED)
     if said.returncode:
         raise BuildError(_failures(state, said.stdout))
@@ -186,10 +187,12 @@ def _checked(campaign: Dropped, options: BuildOptions, watch: Watch) -> Checked:
     return check(campaign.path, options.of_study(campaign.overrides), "report", progress=progress)
 
 
-def _due(drop: Path, state: Path, options: BuildOptions) -> tuple[tuple[Dropped, ...], dict[str, str]]:
-    """The campaigns of a drop folder, and which of them are to be built and why."""
-    found = scan(drop.resolve(), options.settle_s)
-    return found, {c.name: why for c in found if c.is_ready and (why := _why_due(c, state, options))}
+def _due(
+    drop: Path, inputs: Path, options: BuildOptions
+) -> tuple[tuple[Dropped, ...], dict[str, Any], dict[str, str]]:
+    """The campaigns of a drop folder, what the workflow needs to know of each, and which are to be built and why."""
+    found, ready = inputs_of(scan(drop.resolve(), options.settle_s), inputs)
+    return found, ready, {c.name: why for c in found if c.is_ready and (why := _why_due(c, inputs.parent, options))}
 
 
 def _waiting(found: Sequence[Dropped]) -> dict[str, tuple[str, ...]]:
@@ -201,8 +204,8 @@ def _refused(found: Sequence[Dropped]) -> dict[str, tuple[str, ...]]:
 
 
 def _built(drop: Path, state: Path, options: BuildOptions, watch: Watch, descriptor: int | None) -> Built:
-    found, due = _due(drop, state, options)
-    config = _configuration(found, state / "inputs", state, options)
+    found, ready, due = _due(drop, state / "inputs", options)
+    config = _configuration(found, ready, state / "build.json", options)
     said = _snakemake(state, config, options, _forced(due, state), descriptor, watch)
     write_text(state / "log" / "snakemake.log", said.stdout)
     collect_laws(state.parent / CURRENT, state)
@@ -248,12 +251,8 @@ def step_digest(digest: str, options: BuildOptions) -> str:
     return f"{digest} {package_sources()} {options.of_commands()['words']}"
 
 
-def _configuration(found: Sequence[Dropped], inputs: Path, state: Path, options: BuildOptions) -> Path:
+def _configuration(found: Sequence[Dropped], ready: Mapping[str, Any], file: Path, options: BuildOptions) -> Path:
     """Write what the workflow needs to know; returns the file."""
-    ready: dict[str, Any] = {}
-    for campaign in found:
-        if campaign.is_ready:
-            ready[campaign.name] = _inputs(campaign, inputs)
     campaigns = {
         c.name: {"path": well_formed(str(c.path)), "waiting": list(c.waiting), "refused": list(c.refused)}
         for c in found
@@ -268,43 +267,7 @@ def _configuration(found: Sequence[Dropped], inputs: Path, state: Path, options:
         "python": sys.executable,
         "threads": options.jobs,
     }
-    file = inputs.parent / ("build.json" if inputs.name == "inputs" else "dry-run.json")
     return write_text(file, json.dumps(config, indent=1) + "\n")
-
-
-def _inputs(campaign: Dropped, folder: Path) -> dict[str, Any]:
-    """Path, digest, samples and cells of a campaign, and the file that lists its exports by content."""
-    file = folder / f"{campaign.name}.json"
-    known = read_record(file, "digest", "samples", "cells")
-    if known is None or known["digest"] != campaign.digest:
-        samples, cells = _to_simulate(campaign)
-        known = {"digest": campaign.digest, "samples": samples, "cells": cells, "files": dict(campaign.files)}
-        write_text(file, json.dumps(known, indent=1) + "\n")
-    return {
-        "path": str(campaign.path), "digest": campaign.digest, "samples": known["samples"], "cells": known["cells"],
-        "files": f"inputs/{campaign.name}.json",
-        "overrides": shlex.join(["--overrides", str(campaign.overrides)]) if campaign.overrides else "",
-    }  # fmt: skip
-
-
-def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
-    """Samples and cells as the description of a campaign has them; none where it cannot be read (fit says why)."""
-    from tribo.campaign import open_campaign
-    from tribo.comparison.prediction import loads_to_simulate
-    from tribo.comparison.prediction_runs import cell_name, sample_as_word
-
-    try:
-        with open_campaign(campaign.path) as opened:
-            measured = {test.sample for test in opened.tests}
-            samples = [s for s in opened.samples if s in measured]
-            words = [sample_as_word(s) for s in samples]
-            pressures = [opened.nominal_pressure_Pa(load) for load in loads_to_simulate(opened)]
-    except (CampaignError, OSError):
-        return [], []
-    except Exception as why:  # fit will say it again, as the fault of this campaign
-        unexpected(why, "the samples of this campaign cannot be listed", campaign.name)
-        return [], []
-    return words, [cell_name(s, p) for s in samples for p in pressures]
 
 
 def _snakemake(

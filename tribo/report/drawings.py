@@ -182,7 +182,8 @@ def inline_svg(svg: str, name: str, label: str) -> str:
 
     White paper becomes transparent and black ink the colour of the text, so that it reads on light and dark; a figure
     with a colour scale keeps its white paper, since its ink was chosen for the colours under it. A style sheet of its
-    own would hold for the whole page, so it is taken out.
+    own would hold for the whole page, so it is taken out. Points that look alike share one group, which halves the size
+    of a figure of thousands of them.
     """
     body = svg[svg.index("<svg") :]
     body = re.sub(r"<(metadata|style)\b.*?</\1>\s*|<title>.*?</title>\s*", "", body, flags=re.DOTALL)
@@ -193,6 +194,20 @@ def inline_svg(svg: str, name: str, label: str) -> str:
         body = re.sub(rf"\b(fill|stroke): {colour}\b", rf"\1: {theme}", body)
     body = re.sub(r'<svg([^>]*?) (width|height)="[^"]*"', r"<svg\1", body, count=1)
     body = re.sub(r'<svg([^>]*?) (width|height)="[^"]*"', r"<svg\1", body, count=1)
+    body = _ALIKE.sub(_in_one_group, body)
     paper = ' class="on-paper"' if has_colour_scale else ""
     body = body.replace("<svg", f'<svg{paper} role="img" aria-label="{label}"', 1)
     return "\n".join(line.rstrip() for line in body.splitlines())
+
+
+_ALIKE = re.compile(
+    r'<use xlink:href="([^"]+)" x="[^"]*" y="[^"]*" style="([^"]*)"/>'
+    r'(?:\s*<use xlink:href="\1" x="[^"]*" y="[^"]*" style="\2"/>)+'
+)
+_PLACE = re.compile(r' x="([^"]*)" y="([^"]*)" style="[^"]*"/>\s*')
+
+
+def _in_one_group(alike: re.Match[str]) -> str:
+    """Points of one shape and style, one after the other: the style said once, places to a hundredth of a point."""
+    points = _PLACE.sub(lambda at: f' x="{float(at[1]):.2f}" y="{float(at[2]):.2f}"/>\n', alike[0])
+    return f'<g style="{alike[2]}">\n{points}</g>'

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tribo.diagnose.discovery.written_law import (
     ADHESION_TERM,
@@ -37,8 +38,9 @@ SOFT = (120.0, 60.0, 40.0, 28.0, 20.0, 14.0, 10.0)  # the same of soft steps
 ZEROS = (-1.0, -0.4, 0.0, 0.15, 0.3, 0.5)  # of a factor, from the lowest value in shares of the range
 FINE = 41  # places of a shape that is looked at closely
 # Columns that say the same in another unit or count, so that their product is no law of two columns.
+PRESSURES = frozenset({"pressure_Pa", "contact_pressure_Pa"})
 ALIKE = (
-    frozenset({"pressure_Pa", "contact_pressure_Pa"}), frozenset({"run_order", "specimen_run", "elapsed_s"}),
+    PRESSURES, frozenset({"run_order", "specimen_run", "elapsed_s"}),
 )  # fmt: skip
 
 
@@ -83,7 +85,9 @@ def shapes_of(c: Conditions, without: Collection[str] = ()) -> list[tuple[tuple[
         found += [((Shape("level", name, level=level),), float(np.log(len(names)))) for level in names]
     pairs = [p for p in combinations(columns, 2) if not any(set(p) <= alike for alike in ALIKE)]
     products = [(one, other) for a, b in pairs for one in monotone[a] for other in monotone[b]]
-    return found + [(both, float(np.log(len(products)))) for both in products]
+    # the column of a law is free of charge; a product pays for the choice of its second column and of both shapes
+    cost = float(np.log(max(2.0 * len(products) / max(len(columns), 1), 1.0)))
+    return found + [(both, cost) for both in products]
 
 
 def _of_column(name: str, x: FloatArray) -> Iterator[Shape]:
@@ -226,6 +230,15 @@ def groups_of(c: Conditions) -> list[Group]:
                 if name in (ALL, PATTERNED)
             ]
     return found
+
+
+def corrects_a_pattern(groups: Sequence[Group], shapes: Sequence[tuple[Shape, ...]]) -> NDArray[np.bool_]:
+    """Which laws, (groups, shapes), follow the pressure alone on some of the patterns: no laws of their own, since they
+    say how wrong the model is about these patterns. What holds for all patterns is judged by patterns left out
+    (:mod:`tribo.diagnose.discovery.across_patterns`)."""
+    some = np.array([group.where not in (ALL, FLAT) for group in groups])
+    pressure_alone = np.array([{s.column for s in each} <= PRESSURES for each in shapes], bool)
+    return some[:, None] & pressure_alone
 
 
 def _places(c: Conditions) -> list[tuple[str, float]]:

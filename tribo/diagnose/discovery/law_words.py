@@ -112,7 +112,7 @@ def discovery_text(d: Discovery) -> str:
 
 def laws_text(d: Discovery, said: str = "") -> str:
     """The laws that are not ``said`` already, each with those that the design cannot distinguish from it."""
-    each = [("" if law_sentence(f) in said else law_sentence(f)) + _tied(f.ties) for f in d.laws]
+    each = [("" if law_sentence(f) in said else law_sentence(f)) + tied_text(f.ties) for f in d.laws]
     return " ".join(filter(None, map(str.strip, each)))
 
 
@@ -123,7 +123,8 @@ def law_misfit(f: FoundLaw) -> Misfit:
     return Misfit(f.law.regime, sample, " and ".join(f.law.columns), value, f.p, law_sentence(f), low, high)
 
 
-def _tied(ties: Sequence[WrittenLaw]) -> str:
+def tied_text(ties: Sequence[WrittenLaw]) -> str:
+    """The laws that the design cannot distinguish from one, as a sentence; nothing without any."""
     if not ties:
         return ""
     names = "; ".join(f"{tie.formula()} ({subject(tie)})" for tie in ties[:NAMED])

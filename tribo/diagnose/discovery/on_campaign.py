@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,14 +28,15 @@ def discover_in(
 def searched_laws(d: Diagnosis, *, seed: int = 0, level: float = 0.01, progress: Progress | None = None) -> Discovery:
     """The laws of what the causes of a diagnosis leave unexplained.
 
-    ``level`` is that of a misfit; a law has to be beyond chance at a tenth of it.
+    ``level`` is that of a misfit; a law has to be beyond chance at LEVEL_OF_LAWS times it.
     """
-    strict = LEVEL_OF_LAWS * level
-    return discover_laws(uncontested(d)[0], level=strict, rng=np.random.default_rng(seed), progress=progress)
+    strict, contested = LEVEL_OF_LAWS * level, uncontested(d)
+    found = discover_laws(contested.model, level=strict, rng=np.random.default_rng(seed), progress=progress)
+    return replace(found, of_causes=contested.forms)
 
 
 def hold_law_against(
     ingested: Ingested, law: WrittenLaw, parameters: Mapping[str, Estimate], *, seed: int = 0, level: float = 0.01
 ) -> Held:
     """Whether a law of another campaign holds in this one, its own causes taken into account."""
-    return holds(uncontested(examine(ingested, seed=seed, level=level))[0], law, parameters)
+    return holds(uncontested(examine(ingested, seed=seed, level=level)).model, law, parameters)

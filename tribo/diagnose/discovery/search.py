@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from tribo.diagnose.discovery.grammar import Group, groups_of, shapes_of
+from tribo.diagnose.discovery.contested import CauseForms
+from tribo.diagnose.discovery.grammar import Group, corrects_a_pattern, groups_of, shapes_of
 from tribo.diagnose.discovery.scoring import (
     Acts,
     Courses,
@@ -37,11 +38,15 @@ MOST_LAWS = 3
 
 @dataclass(frozen=True)
 class Discovery:
-    """What the search found: laws in the order of their strength, and the best of the table of scores."""
+    """What the search found: laws in the order of their strength, and the best of the table of scores.
+
+    ``of_causes`` are the other forms that the laws of the causes may have, where these are recorded columns.
+    """
 
     laws: tuple[FoundLaw, ...]
     scored: tuple[Scored, ...]
     searched: int
+    of_causes: tuple[CauseForms, ...] = ()
 
 
 def discover_laws(
@@ -118,6 +123,7 @@ class Grammar:
     def net(self, projected: Projection) -> FloatArray:
         """What each law gains less its cost, (r, groups * shapes)."""
         found = projected.gains(self.courses, self.acts) - self.courses.cost - self._costs[:, None]
+        found[:, corrects_a_pattern(self.groups, self.courses.shapes)] = -np.inf
         return found.reshape(len(found), -1)
 
     @property

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tribo.diagnose.discovery.grammar import Group, fine_products, fine_shapes, refined_shapes
+from tribo.diagnose.discovery.grammar import Group, corrects_a_pattern, fine_products, fine_shapes, refined_shapes
 from tribo.diagnose.discovery.scoring import Acts, Courses, Projection, acts_of, acts_of_one, courses_of, terms_of
 from tribo.diagnose.discovery.written_law import LOAD_TERM, UNITS, Shape, WrittenLaw
 from tribo.diagnose.search.screen import FORM
@@ -111,15 +111,17 @@ def settled(model: ModelFit, found: Searched, first: WrittenLaw, rng: np.random.
     )  # fmt: skip
 
 
-def best_form(model: ModelFit, found: Searched) -> tuple[Form, State]:
-    """The best form of these laws at the noise that it leaves, and the campaign at that noise."""
+def forms_in_reach(model: ModelFit, found: Searched) -> tuple[list[Form], State]:
+    """The forms of these laws at the noise that the best of them leaves, the best first, and the campaign at that
+    noise."""
     projected = Projection(model.linear, model.linear.residual[None])
     gains = projected.gains(found.courses, acts_of(found.groups, model.setup, terms_of(model)))[0]
     net = gains - np.array([g.cost for g in found.groups])[:, None]
+    net[corrects_a_pattern(found.groups, found.courses.shapes)] = -np.inf
     group, shape = np.unravel_index(int(np.argmax(net)), net.shape)
     first = found.groups[int(group)].law(found.courses.shapes[int(shape)])
     best = _decided(model, found, first)
-    return best.forms[0], best.state
+    return best.forms, best.state
 
 
 @dataclass(frozen=True)
@@ -204,7 +206,9 @@ def _forms(state: State, found: Searched) -> list[Form]:
     order, begins, count = found.courses.by_form
     gains = state.projected.gains(found.courses, state.acts(*found.groups))[0, :, order].T
     costs = np.array([group.cost for group in found.groups])[:, None]
-    worth = (np.maximum.reduceat(gains, begins, axis=1) - costs - np.log(count)).ravel()
+    worth = np.maximum.reduceat(gains, begins, axis=1) - costs - np.log(count)
+    worth[corrects_a_pattern(found.groups, [found.courses.shapes[k] for k in order[begins]])] = -np.inf
+    worth = worth.ravel()
     ranked = np.argsort(-worth, kind="stable")[:LOOKED_AT]
     forms = []
     for g, f in zip(*np.divmod(ranked[worth[ranked] > worth[ranked[0]] - IN_REACH], len(count)), strict=True):

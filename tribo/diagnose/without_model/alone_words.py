@@ -17,6 +17,7 @@ SHOWN_BY = {shown: m.name for m in MECHANISMS.values() for shown in m.without_mo
 ANY_COLUMN = next(m.name for m in MECHANISMS.values() if m.any_column)
 MECHANISMS_OF_COLUMNS = {k: name for k, name in SHOWN_BY.items() if k not in (ALONG_RECORDS, STROKES_APART)}
 UNITS = {"speed_mm_s": " mm/s", "hold_s": " s", "temperature_C": " °C", "humidity_pct": " %"}
+SERIES = ("run_order", "specimen_run", "started_at", "date")  # columns that no one can vary
 _MOST_SAID = 4
 
 
@@ -90,7 +91,12 @@ def load_test(columns: Sequence[str]) -> NextTest:
 def parting_test(f: Follows) -> NextTest:
     """For columns with the same effect in this design."""
     names = (f.name, *f.alike)
-    text = f"Vary {in_words(f.name)} alone, in random order of {_listed([in_words(n) for n in f.alike])}: 12 pulls."
+    varied = next((name for name in names if name not in SERIES), "")
+    others = _listed([in_words(name) for name in names if name != varied])
+    how = f"Choose the values of {in_words(varied)} at random, independently of {others}"
+    if not varied:
+        how = f"Repeat pulls of the beginning of the series after all others, to separate {others}"
+    text = f"{how}: 12 pulls."
     return NextTest(text, names, {"covariate": f.name, "pulls": 12, "hours": 1.4}, float("nan"))
 
 

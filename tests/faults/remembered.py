@@ -1,0 +1,214 @@
+"""Costly work of a command under test that is done once: pages of typst, figures, and steps of an undisturbed build."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import pickle
+import shutil
+from collections.abc import Callable, Sequence
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from faults import file_operations
+from faults.file_operations import Operation, Watch, real_listdir, real_open
+from faults.small_site import Place
+from faults.trial import but_for_times, masked
+
+
+class Remembered:
+    """Results by key, in a file that the processes of a bench share."""
+
+    def __init__(self, file: Path):
+        self.file = file
+        self.known: dict[str, Any] = {}
+        self.read()
+
+    def read(self) -> None:
+        """What other processes have made since."""
+        if self.file.is_file():
+            with real_open(self.file, "rb") as file:
+                self.known |= pickle.load(file)
+
+    def made(self, key: str, make: Callable[[], Any]) -> Any:
+        """What this process or another has made, or else will make now."""
+        if key not in self.known:
+            self.read()
+        if key not in self.known:
+            self.known[key] = make()
+            whole = self.file.with_name(f"{self.file.name}-{os.getpid()}")
+            with real_open(whole, "wb") as file:
+                pickle.dump(self.known, file)
+            os.replace(whole, self.file)
+        return self.known[key]
+
+
+class RememberedPages(Remembered):
+    """typst, with the pages that it has set before: setting them takes most of the time of a report.
+
+    The files for typst are written all the same; typst itself is asked only for pages that it has not set yet.
+    """
+
+    def __init__(self, file: Path):
+        import typst
+
+        super().__init__(file)
+        self.real = typst.Compiler
+        typst.Compiler = lambda root, **options: _Page(self, Path(root), options)  # type: ignore[misc, assignment]
+
+
+class _Page:
+    def __init__(self, pages: RememberedPages, root: Path, options: dict[str, Any]):
+        self.pages, self.root, self.options = pages, root, options
+
+    def compile(self, source: Path, **options: Any) -> bytes:
+        key = hashlib.sha256(repr((source.name, sorted(options.items()))).encode())
+        for name in sorted(real_listdir(self.root)):
+            with real_open(self.root / name, "rb") as file:
+                key.update(name.encode() + b"\0" + file.read())
+
+        def make() -> bytes:
+            compiler: Any = self.pages.real(root=self.root, **self.options)
+            return bytes(compiler.compile(source, **options))
+
+        return bytes(self.pages.made(key.hexdigest(), make))
+
+
+class RememberedFigures(Remembered):
+    """Figures that have been drawn before: drawing reads and writes no file of the bench. They are written as ever."""
+
+    def __init__(self, file: Path):
+        from tribo.report import drawings
+        from tribo.store.kept_results import fingerprint
+
+        super().__init__(file)
+        real = drawings._svg_and_series
+
+        def drawn(record: Any, numbers: Any, origin: str) -> Any:
+            key = fingerprint((numbers, record.title, origin))
+            return self.made(key, lambda: real(record, numbers, origin))
+
+        drawings._svg_and_series = drawn
+
+
+OF_STEPS = ("out/current", "out/.tribo", "out/campaign.toml")  # what a step reads and writes of a site
+NOT_OF_STEPS = ("out/.tribo/lock", "out/.tribo/log")
+FOLDER = "folder"
+
+
+@dataclass(frozen=True)
+class Step:
+    """What a step of a build has done: the files below the watched folder that it made or changed, with their
+    contents (None: a folder), and those that it removed."""
+
+    status: int | None
+    said: str
+    seen: list[Operation]
+    made: dict[str, bytes | None]
+    removed: list[str]
+
+
+class RememberedSteps:
+    """Steps of a build. In a start without a fault, one that is known from the same state is done over from memory.
+
+    The state is that of all results and records of the site, but for times, and of temporary files. The file
+    operations of the step count as if it had been done.
+    """
+
+    def __init__(self, folder: Path, place: Place):
+        self.folder, self.root, self.temporary = folder, place.root, place.temporary
+        folder.mkdir()
+
+    def done(self, words: Sequence[str], work: Callable[[], int | None]) -> int | None:
+        """Do a step, or have it done over; its exit status."""
+        watched = file_operations.current
+        if watched is None or not watched.remembers:
+            return work()
+        with watched.unseen():
+            before = self._entries()
+            file = self.folder / self._key(words, before)
+            known = self._known(file)
+        if known is None:
+            return self._first(work, watched, before, file)
+        with watched.unseen():
+            self._do_over(known)
+        watched.seen += known.seen
+        print(known.said, end="")
+        return known.status
+
+    def _first(self, work: Callable[[], int | None], watched: Watch, before: dict[str, str], file: Path) -> int | None:
+        at, said = len(watched.seen), io.StringIO()
+        try:
+            with redirect_stdout(said), redirect_stderr(said):
+                status = work()
+        finally:
+            print(said.getvalue(), end="")
+        seen = watched.seen[at:]
+        strange = [o for o in seen if not _is_of_steps(o)]
+        assert not strange, f"a step does not depend on results and records alone: {strange[:5]}"
+        with watched.unseen():
+            after = self._entries()
+            changed = [name for name, digest in after.items() if before.get(name) != digest]
+            made = {name: self._content(name, after[name]) for name in changed}
+            step = Step(status, said.getvalue(), seen, made, sorted(before.keys() - after.keys()))
+            whole = file.with_name(f"{file.name}-{os.getpid()}")
+            with real_open(whole, "wb") as stream:
+                pickle.dump(step, stream)
+            os.replace(whole, file)
+        return status
+
+    def _known(self, file: Path) -> Step | None:
+        if not file.exists():
+            return None
+        with real_open(file, "rb") as stream:
+            step: Step = pickle.load(stream)
+        return step
+
+    def _content(self, name: str, digest: str) -> bytes | None:
+        return None if digest == FOLDER else (self.root / name).read_bytes()
+
+    def _do_over(self, step: Step) -> None:
+        for name in step.removed:
+            path = self.root / name
+            if path.is_dir():
+                shutil.rmtree(path)
+            else:
+                path.unlink(missing_ok=True)
+        for name, content in sorted(step.made.items()):
+            path = self.root / name
+            if content is None:
+                path.mkdir(parents=True, exist_ok=True)
+            else:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(content)
+
+    def _entries(self) -> dict[str, str]:
+        """Every file and folder that a step may find, by place, with a hash of the contents."""
+        found = {}
+        for folder in (*(self.root / name for name in OF_STEPS), self.temporary):
+            for path in (folder, *folder.rglob("*")):
+                name = str(path.relative_to(self.root))
+                if path.exists() and not name.startswith(NOT_OF_STEPS):
+                    found[name] = FOLDER if path.is_dir() else hashlib.sha256(path.read_bytes()).hexdigest()
+        return found
+
+    def _key(self, words: Sequence[str], entries: dict[str, str]) -> str:
+        state = {masked(name): self._as_found(name, digest) for name, digest in entries.items()}
+        return hashlib.sha256(repr((list(words), sorted(state.items()))).encode()).hexdigest()
+
+    def _as_found(self, name: str, digest: str) -> str:
+        if name.startswith("tmp/") or name.endswith("lock"):
+            return ""
+        return digest if digest == FOLDER else but_for_times(self.root / name, digest)
+
+
+def _is_of_steps(operation: Operation) -> bool:
+    """Whether an operation leaves aside all that is not part of the state: other files of a site."""
+    path = operation.path
+    if path.startswith(NOT_OF_STEPS):
+        return False
+    looked_at = operation.kind == "stat" and "out".startswith(path)
+    return looked_at or not path.startswith("out") or path.startswith(OF_STEPS)
