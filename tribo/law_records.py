@@ -60,9 +60,9 @@ class LawFit:
 
     def interval(self, parameter: str, level: float = 0.95) -> tuple[float, float]:
         """Two-sided t interval at ``level``."""
-        from scipy.stats import t
+        from scipy.special import stdtrit  # quantile of t, without the start of scipy.stats
 
-        half = float(t.ppf(0.5 + level / 2, self.dof)) * self.standard_uncertainty(parameter)
+        half = float(stdtrit(self.dof, 0.5 + level / 2)) * self.standard_uncertainty(parameter)
         return self.value(parameter) - half, self.value(parameter) + half
 
     def force_N(self, normal_load_N: float | FloatArray) -> FloatArray:
@@ -98,10 +98,10 @@ class CombinedFit(LawFit):
 
     def interval(self, parameter: str, level: float = 0.95) -> tuple[float, float]:
         """Two-sided t interval at ``level`` of the combined uncertainty."""
-        from scipy.stats import t
+        from scipy.special import stdtrit
 
         k = self.parameters.index(parameter)
-        factor = float(t.ppf(0.5 + level / 2, self.effective_dof(np.eye(2)[k])))
+        factor = float(stdtrit(self.effective_dof(np.eye(2)[k]), 0.5 + level / 2))
         half = factor * self.standard_uncertainty(parameter)
         return self.value(parameter) - half, self.value(parameter) + half
 
