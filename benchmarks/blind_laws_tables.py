@@ -42,6 +42,7 @@ def overall(rows: list[Row]) -> str:
     tested = [r for r in laws if "band" in r]
     lines: list[tuple[object, ...]] = [
         ("a law is written", "", share(laws, lambda r: r["laws"] > 0)),
+        ("the same, or a cause that is the law of a recorded column", "", share(laws, lambda r: "columns" in r)),
         ("column", "97 %", share(laws, lambda r: bool(r.get("column_right")))),
         ("regime and samples", "95 %", share(laws, where_right)),
         ("form, or among at most three ties", "85 %", share(laws, form_right)),
@@ -100,6 +101,8 @@ def confusion(rows: list[Row]) -> str:
 
 def _said(r: Row) -> str:
     causes = " with " + " and ".join(r["causes"]) if r["causes"] else ""
+    if "cause" in r:
+        return f"{r['kind']} of {r['columns'][0]} as a cause, {len(r['ties'])} ties"
     if not r["laws"]:
         return f"no law ({r['verdict']}{causes})"
     law = f"{r['kind']} of {' and '.join(r['columns'])}, {r['acts_on']}, {r['regime']}, {r['where']}"

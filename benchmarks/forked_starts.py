@@ -3,7 +3,7 @@
 A build, Snakemake and every step of it are processes of their own, and most of their time is spent on imports. Here the
 build is a fork of this process, with a second fork beside it, the starter, that does nothing but fork. What the build
 takes for the Python interpreter (``sys.executable``) is a short script: it hands its arguments, folder, environment and
-open descriptors to the starter and waits; the new fork does the work. All are of one process group. Linux only.
+open descriptors to the starter and waits; the new fork does the work, in the process group of the script. Linux only.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def is_open(number):
 descriptors = [number for number in range({MOST_DESCRIPTORS}) if is_open(number)]
 with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as starter:
     starter.connect(os.environ["{STARTER}"])
-    order = json.dumps([sys.argv[1:], os.getcwd(), dict(os.environ), descriptors])
+    order = json.dumps([sys.argv[1:], os.getcwd(), dict(os.environ), descriptors, os.getpgrp()])
     socket.send_fds(starter, [order.encode()], descriptors)
     answer = starter.recv(100)
 sys.exit(int(answer or 70))
@@ -79,7 +79,8 @@ def _answer(connection: socket.socket) -> NoReturn:
     away = socket.socket(fileno=fcntl.fcntl(connection, fcntl.F_DUPFD_CLOEXEC, OUT_OF_THE_WAY))
     connection.close()
     order, handed, _, _ = socket.recv_fds(away, LONGEST_MESSAGE, MOST_DESCRIPTORS)
-    arguments, folder, environment, numbers = json.loads(order)
+    arguments, folder, environment, numbers, group = json.loads(order)
+    os.setpgid(0, group)
     handed = [fcntl.fcntl(number, fcntl.F_DUPFD_CLOEXEC, OUT_OF_THE_WAY) for number in handed]
     os.closerange(0, OUT_OF_THE_WAY)
     for number, descriptor in zip(numbers, handed, strict=True):

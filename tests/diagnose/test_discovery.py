@@ -77,6 +77,15 @@ def test_a_law_of_the_pressure_alone_acts_on_all_samples_or_on_the_flat_one() ->
     assert any(np.isfinite(net[g]).any() for g, group in enumerate(groups) if group.where == "patterned")
 
 
+def test_laws_of_the_two_pressures_are_told_apart_at_equal_contact_pressures() -> None:
+    one, other = (
+        WrittenLaw((Shape("linear", "film_um", 1.0, 2.0), Shape("linear", name, 1.0, 2.0)))
+        for name in ("pressure_Pa", "contact_pressure_Pa")
+    )
+    conditions = baseline(made(nothing, seed=1)).setup.observations.conditions
+    assert "at equal contact pressures" in parting_test(one, other, conditions).text
+
+
 def nothing(s: Setup) -> np.ndarray:
     return np.zeros((s.observations.n, 2))
 

@@ -10,16 +10,17 @@ import pytest
 from blind.tribometer import hide
 
 from tribo.diagnose.diagnosis import examine
+from tribo.diagnose.discovery import contested
 from tribo.diagnose.discovery.contested import without_wrong_forms
 from tribo.diagnose.discovery.held import holds
-from tribo.diagnose.discovery.in_verdict import with_laws
+from tribo.diagnose.discovery.in_verdict import with_laws, without_causes
 from tribo.diagnose.discovery.known_laws import KnownLaw, read_laws, try_laws
 from tribo.diagnose.discovery.law_file import law_text
 from tribo.diagnose.discovery.planned_law import plan_law
 from tribo.diagnose.discovery.written_law import Shape, WrittenLaw
 from tribo.diagnose.search.weighing import refitted
 from tribo.diagnose.statistics.model import Acting, Setup
-from tribo.diagnose.verdict import Estimate
+from tribo.diagnose.verdict import Cause, Estimate, Layer, Verdict
 from tribo.errors import CampaignError, SimulationError
 from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model import columns_from, with_law
@@ -98,6 +99,15 @@ def test_the_form_of_a_known_law_may_be_wrong_by_some_of_its_effect() -> None:
     assert answers == ["held", "held", "not held"]
 
 
+def test_a_law_of_the_right_size_but_of_another_form_does_not_hold() -> None:
+    sharp: Change = lambda s: 2.0 * stepped(s)  # noqa: E731
+    model = baseline(made(sharp, seed=31))
+    line = holds(model, WARM, {"a": Estimate(1.0, 0.6, 1.4, "")})
+    assert line.answer == "not held"
+    assert "another form of the same column explains this campaign better" in line.text
+    assert holds(model, STEP, {"a": Estimate(0.6, 0.5, 0.7, "")}).answer == "held"
+
+
 def test_every_faulty_law_of_a_folder_is_named(folder: Path) -> None:
     (folder / "law-3.toml").write_text("x = 1")
     (folder / "law-4.toml").write_text("y = [")
@@ -148,6 +158,32 @@ def test_other_forms_of_a_recorded_column_that_explain_as_much_are_told_with_its
     assert "saturating" in {tie.shapes[0].kind for tie in forms.ties}
     assert {tie.columns for tie in forms.ties} == {("film_um",)}
     assert forms.law.form not in {tie.form for tie in forms.ties}
+
+
+@pytest.mark.parametrize(("own_column", "by", "lost"), [(True, 5.0, False), (True, 7.0, True), (False, 5.0, True)])
+def test_a_law_of_the_same_column_has_to_be_better_by_more_than_one_of_another_column(
+    own_column: bool, by: float, lost: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(contested, "_best_laws", lambda model, together: contested._BestLaws(by, own_column, ()))
+    model = refitted(baseline(made(warming, seed=33)), [Acting(MECHANISMS["temperature"])])
+    assert set(without_wrong_forms(model).lost) == ({"temperature"} if lost else set())
+
+
+def undetermined() -> Verdict:
+    """Humidity, then a film that a load error and a tilt explain as well."""
+    causes = [Cause(name, 0.3, {}, "") for name in ("humidity", "covariate:film_um", "normal_load_error", "tilt")]
+    layers = [Layer("cause", c.mechanism, (), (), 0.0, 0.0, 0.0, 0.0) for c in causes[:2]]
+    return Verdict("undetermined", causes=tuple(causes), layers=tuple(layers))
+
+
+@pytest.mark.parametrize(
+    ("lost", "left"),
+    [("covariate:film_um", {"humidity"}), ("humidity", {"covariate:film_um", "normal_load_error", "tilt"})],
+)
+def test_alternatives_to_a_cause_that_a_law_replaces_are_no_causes_either(lost: str, left: set[str]) -> None:
+    after = without_causes(undetermined(), {lost: 9.0})
+    assert {c.mechanism for c in after.causes} == left
+    assert {e.mechanism for e in after.excluded} == {lost}
 
 
 def test_a_plan_says_whether_a_design_would_show_a_law() -> None:

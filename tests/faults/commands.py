@@ -136,12 +136,9 @@ def _steps_in_order(
 def _steps(name: str, campaign: dict[str, Any], options: dict[str, str]) -> list[tuple[str, str]]:
     where = f"{shlex.quote(campaign['path'])} -o ../current/{shlex.quote(name)}"
     return [
-        ("ingest", f"ingest {where} {options['fit']}"), ("fit", f"fit {where} {options['fit']}"),
-        ("calibrate", f"predict --only calibration --jobs 1 {where} {options['model']}"),
-        *((f"simulate-{s}", f"predict --only {s} --jobs 1 {where} {options['model']}") for s in campaign["samples"]),
-        ("diagnose", f"diagnose --jobs 1 {where} {options['diagnose']}"),
+        ("predict", f"predict --jobs 1 {where} {options['model']}"),
         ("report", f"report --jobs 1 {where} {options['model']}"),
-    ]  # fmt: skip
+    ]
 
 
 def _arguments(state: Path, name: str, step: str, words: str, described: dict[str, Any]) -> list[str]:
@@ -151,9 +148,8 @@ def _arguments(state: Path, name: str, step: str, words: str, described: dict[st
     if _is_done(state / "steps" / name / f"{step}.json", digest):
         return []
     files = ["--files", campaign["files"]] if step == "report" else []
-    after = ["--after", f"steps/{name}/fit.json"] if step not in ("ingest", "fit") else []
-    laws = ["--laws", "laws"] if step in ("diagnose", "report") else []
-    return [f"steps/{name}/{step}.json", "--digest", digest, *laws, *after, *files, "--", *shlex.split(words)]
+    laws = ["--laws", "laws"] if step == "report" else []
+    return [f"steps/{name}/{step}.json", "--digest", digest, *laws, *files, "--", *shlex.split(words)]
 
 
 def _step(steps: RememberedSteps, given: list[str]) -> int | None:

@@ -1,6 +1,7 @@
 """Two small campaigns, built for real: killed and resumed, two starts at once, nothing to do, exports that change.
 
-The second has flat samples alone, so its steps are fewer.
+The second has flat samples alone. The processes of these builds are forked from one that has loaded its modules, and
+simulate small lattices; the tests at the end start Python for every step.
 """
 
 from __future__ import annotations
@@ -14,15 +15,15 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
-from on_the_command_line import run
 
 from pipeline.campaigns import TOML, small
+from pipeline.quick_starts import quick_starts
 
 pytest.importorskip("snakemake")
 JOBS = 2
@@ -37,12 +38,19 @@ class Round:
     after: dict[str, bytes]
 
 
+def records_in(names: Iterable[str]) -> set[str]:
+    """Names of records of finished steps; one that is being written has a name of its own."""
+    return {name for name in names if re.fullmatch(r"\.tribo/steps/[^/]+/[^./][^/]*\.json", name)}
+
+
 @dataclass(frozen=True)
 class Lab:
-    """A drop folder and its site."""
+    """A drop folder and its site; what is started as Python, and its environment."""
 
     drop: Path
     site: Path
+    python: str = sys.executable
+    environment: Mapping[str, str] = field(default_factory=lambda: dict(os.environ))
 
     def words(self, *more: str) -> list[str]:
         """The command and its options."""
@@ -52,7 +60,7 @@ class Lab:
     def start(self, *more: str) -> subprocess.Popen[str]:
         """Start `tribo build` in a process group of its own."""
         return subprocess.Popen(
-            [sys.executable, "-m", "tribo", *self.words(*more)], text=True, start_new_session=True,
+            [self.python, "-m", "tribo", *self.words(*more)], text=True, process_group=0, env=self.environment,
             stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         )  # fmt: skip
 
@@ -63,9 +71,8 @@ class Lab:
         return Round(json.loads(said or "{}"), process.returncode, self.files())
 
     def build(self, *more: str) -> Round:
-        """A build of which the command runs in this process, and its steps in theirs."""
-        ended = run(*self.words(*more))
-        return Round(json.loads(ended.stdout or "{}"), ended.exit_code, self.files())
+        """Run a build to its end."""
+        return self.finish(self.start(*more))
 
     def files(self) -> dict[str, bytes]:
         """Records of finished steps and outputs: every file of the site that a build may not touch without need."""
@@ -83,8 +90,7 @@ class Lab:
     def records(self) -> set[str]:
         """Names alone: while a build runs, a file that is listed may be gone before it is read."""
         steps = self.site / ".tribo" / "steps"
-        found = [p for p in steps.rglob("*") if p.is_file()] if steps.is_dir() else []
-        return {str(p.relative_to(self.site)) for p in found}
+        return records_in(str(p.relative_to(self.site)) for p in steps.rglob("*")) if steps.is_dir() else set()
 
 
 @dataclass(frozen=True)
@@ -116,20 +122,25 @@ def write_rows(campaign: Path, table: list[dict[str, str]]) -> None:
 
 
 @pytest.fixture(scope="module")
-def story(tmp_path_factory: pytest.TempPathFactory) -> Story:
+def story(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Story]:
     """The whole story, told once; each test looks at one of its builds."""
-    lab = Lab(tmp_path_factory.mktemp("drop"), tmp_path_factory.mktemp("lab") / "site")
+    drop, lab, starts, elsewhere = map(tmp_path_factory.mktemp, ("drop", "lab", "starts", "elsewhere"))
+    with quick_starts(starts) as started:
+        yield told(Lab(drop, lab / "site", *started), elsewhere)
+
+
+def told(lab: Lab, other: Path) -> Story:
     a, b = small(lab.drop / "a", 0), small(lab.drop / "b", 1, samples="F")
-    elsewhere = small(tmp_path_factory.mktemp("elsewhere"), 2)
+    elsewhere = small(other, 2)
 
     first = lab.start()
-    lab.wait_for(lambda: sum(name.endswith("fit.json") for name in lab.records()) > 0)
+    lab.wait_for(lambda: len(lab.records()) >= 2)
     os.killpg(first.pid, signal.SIGKILL)
     first.communicate()
     killed = lab.files()
 
     second = lab.start()
-    lab.wait_for(lambda: lab.records() > {n for n in killed if n.startswith(".tribo")})
+    lab.wait_for(lambda: lab.records() > records_in(killed))
     third = lab.start()
     refused = subprocess.CompletedProcess("third", 0, *third.communicate())
     refused.returncode = third.returncode
@@ -165,7 +176,7 @@ def touched(before: dict[str, bytes], after: dict[str, bytes]) -> set[str]:
 
 
 def test_a_killed_build_leaves_whole_files_only(story: Story) -> None:
-    assert 0 < len([n for n in story.killed if n.startswith(".tribo")]) < 14
+    assert 0 < len(records_in(story.killed)) < 4
     for name, content in story.killed.items():
         if name.endswith(".json"):
             json.loads(content)
@@ -173,7 +184,7 @@ def test_a_killed_build_leaves_whole_files_only(story: Story) -> None:
 
 def test_the_next_build_goes_on_where_the_killed_one_stopped(story: Story) -> None:
     assert story.resumed.status == 0
-    kept = {name for name in story.killed if name.startswith(".tribo")}
+    kept = records_in(story.killed)
     again = {name for name in kept if story.resumed.after[name] != story.killed[name]}
     assert len(again) <= JOBS  # at most those that were ending when they were killed
     assert kept - again
@@ -253,7 +264,7 @@ def test_a_dry_run_says_why_each_step_would_run_and_does_nothing(tmp_path: Path)
     dry = lab.build("--dry-run")
     assert dry.said["due"] == {"a": "new"}
     steps = {step.split(" (")[0].split(":")[0] for step in dry.said["steps"]}
-    assert steps == {"ingest", "fit", "calibrate", "simulate", "diagnose", "report", "index"}
+    assert steps == {"predict", "report", "index"}
     assert all(step.endswith(": not finished before") for step in dry.said["steps"])
     assert dry.after == {}
 

@@ -16,23 +16,23 @@ SAID = """\
 Job stats:
 job          count
 ---------  -------
-ingest           2
+fit              2
 simulate         1
 index            1
 all              1
 total            5
 
 [Sun Nov 22 01:44:25 2026]
-localrule ingest:
-    output: steps/a/ingest.json
+localrule fit:
+    output: steps/a/fit.json
     jobid: 4
-    reason: Missing output files: steps/a/ingest.json
+    reason: Missing output files: steps/a/fit.json
     wildcards: name=a
 [Sun Nov 22 01:44:26 2026]
 rule simulate:
     jobid: 7
     wildcards: name=b, cell=Sx
-Finished jobid: 4 (Rule: ingest)
+Finished jobid: 4 (Rule: fit)
 1 of 5 steps (20%) done
 """
 
@@ -50,8 +50,8 @@ def test_running_steps_are_named_by_campaign_and_finished_ones_counted() -> None
 
 
 def test_steps_weigh_as_long_as_they_took_before() -> None:
-    """Two readings of 10 s, one simulation of 70 s and an index of the usual 40 s: one reading is 10 of 130 s."""
-    progress = followed(SAID, {"ingest": 10.0, "simulate": 70.0}).progress
+    """Two fits of 10 s, one simulation of 70 s and an index of the usual 40 s: one fit is 10 of 130 s."""
+    progress = followed(SAID, {"fit": 10.0, "simulate": 70.0}).progress
     assert progress.share == pytest.approx(10 / 130)
     assert seconds_left(progress, 12.0) == pytest.approx(12.0 * 12)
     assert in_words(progress, 12.0) == "1 of 5 steps (12 s, about 2 min left): b: simulating Sx"
@@ -74,7 +74,8 @@ def test_a_workflow_is_followed_while_it_runs(tmp_path: Path) -> None:
     ended = run_workflow([sys.executable, "-c", f"print({SAID!r}, end='')"], tmp_path, None, told.append)
     assert (ended.returncode, ended.stdout) == (0, SAID)
     assert [p.running for p in told] == [
-        ("a: reading exports",), ("a: reading exports", "b: simulating Sx"), ("b: simulating Sx",),
+        ("a: reading exports and fitting laws",), ("a: reading exports and fitting laws", "b: simulating Sx"),
+        ("b: simulating Sx",),
     ]  # fmt: skip
 
 

@@ -9,11 +9,13 @@ import json
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tribo.cli import workflow_step
 from tribo.pipeline.build import BuildOptions, build_site, workflow_dir
 
 pytest.importorskip("snakemake")
@@ -29,6 +31,7 @@ NAMES = (
     "-o", "a'b\"c; touch evil $(touch evil) `touch evil` && touch evil",
     "--config=evil > evil | tee evil * ~ !! $HOME %i back\\slash é #a",
 )  # fmt: skip
+JOBS = ("--jobs", "1")
 ODD = "x y; touch evil $(touch evil) `touch evil` '\" \\ {output} {{}} > evil"
 
 
@@ -39,7 +42,7 @@ def written(folder: Path) -> Path:
     stand_in.chmod(0o755)
     ready = {
         name: {
-            "path": f"/drop/{name}", "digest": f"d {name}", "samples": [name], "cells": [],
+            "path": f"/drop/{name}", "digest": f"d {name}", "samples": [], "cells": [name],
             "files": f"inputs/{name}.json", "overrides": shlex.join(["--overrides", f"/drop/{name}{ODD}"]),
         }
         for name in NAMES
@@ -51,21 +54,23 @@ def written(folder: Path) -> Path:
     return file
 
 
-def notes(folder: Path) -> list[list[str]]:
+def notes(folder: Path, by: str) -> list[list[str]]:
+    """The words of every step, in the order in which they ran; ``by`` is what a step runs the simulations of."""
     state = folder / "site" / ".tribo"
     state.mkdir(parents=True)
     command = [
         sys.executable, "-P", "-m", "snakemake", "--snakefile", str(workflow_dir() / "Snakefile"), "--directory",
         str(state), "--configfile", str(written(folder)), "--profile", str(workflow_dir() / "profiles" / "local"),
         "--workflow-profile", "none", "--cores", "1", "--nolock", "--nocolor", "--quiet", "all",
+        "--config", f"simulate_by={by}",
     ]  # fmt: skip
     ended = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr[-3000:]
     return [line.split("\0")[:-2] for line in (folder / "notes").read_text().splitlines()]
 
 
-def expected(name: str, step: str, *more: str, after: str, first: str = "") -> list[Any]:
-    record = f"steps/{name}/{first or step}.json"
+def expected(name: str, step: str, *more: str, after: str = "fit", record: str = "") -> list[Any]:
+    record = f"steps/{name}/{record or step}.json"
     digest = f"d {name} s {shlex.join(['--flat', ODD])}"
     own = ["-P", "-m", "tribo.cli.workflow_step", record, "--digest", digest]
     own += ["--laws", "laws"] if step in ("diagnose", "report") else []
@@ -73,24 +78,47 @@ def expected(name: str, step: str, *more: str, after: str, first: str = "") -> l
     own += ["--files", f"inputs/{name}.json"] if step == "report" else []
     given = ["--flat", ODD, "--overrides", f"/drop/{name}{ODD}"]
     out = ["-o", f"../current/{name}", "--wait", "600"]
-    return [*own, "--", "predict" if first else step, *more, f"/drop/{name}", *out, *given]
+    return [*own, "--", step, *more, f"/drop/{name}", *out, *given]
 
 
-def test_every_step_gets_the_words_meant_for_it_and_nothing_else_runs(tmp_path: Path) -> None:
-    found = notes(tmp_path)
-    wanted = [["-P", "-m", "tribo.pipeline.index_page", "..", "index.json"]]
+def on_this_machine(name: str) -> list[list[Any]]:
+    return [expected(name, "predict", *JOBS, after=""), expected(name, "report", *JOBS, after="")]
+
+
+def on_a_cluster(name: str) -> list[list[Any]]:
+    """The cell of each campaign is called as the campaign is."""
+    return [
+        expected(name, "fit", after=""),
+        expected(name, "predict", "--only", "calibration", *JOBS, record="calibrate"),
+        expected(name, "predict", "--only", name, *JOBS, after="calibrate", record=f"simulate-{name}"),
+        expected(name, "diagnose", *JOBS),
+        expected(name, "report", *JOBS),
+    ]
+
+
+@pytest.mark.parametrize(("by", "words_of"), [("campaign", on_this_machine), ("cell", on_a_cluster)])
+def test_every_step_gets_the_words_meant_for_it_and_nothing_else_runs(
+    tmp_path: Path, by: str, words_of: Callable[[str], list[list[Any]]]
+) -> None:
+    found = notes(tmp_path, by)
+    assert found.pop() == ["-P", "-m", "tribo.pipeline.index_page", "..", "index.json"]
     for name in NAMES:
-        jobs = ("--jobs", "1")
-        wanted += [
-            expected(name, "ingest", after=""),
-            expected(name, "fit", after="ingest"),
-            expected(name, "calibrate", "--only", "calibration", *jobs, after="fit", first="calibrate"),
-            expected(name, "simulate", "--only", name, *jobs, after="calibrate", first=f"simulate-{name}"),
-            expected(name, "diagnose", *jobs, after="fit"),
-            expected(name, "report", *jobs, after="fit"),
-        ]
-    assert sorted(found) == sorted(wanted)
+        of_campaign = [words for words in found if f"/drop/{name}" in words]
+        wanted = words_of(name)
+        assert of_campaign == wanted
+    assert len(found) == len(NAMES) * len(wanted)
     assert not list(tmp_path.rglob("evil"))
+
+
+def test_a_step_is_not_run_where_an_earlier_one_could_not_use_the_campaign(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tribo.cli.workflow_step._run", lambda command: pytest.fail("the step was run"))
+    fit, diagnose, problems = tmp_path / "fit.json", tmp_path / "diagnose.json", [{"what": "no such sample"}]
+    fit.write_text(json.dumps({"status": "unusable", "problems": problems}))
+    assert workflow_step.main([str(diagnose), "--digest", "d", "--after", str(fit), "--", "diagnose", "a"]) == 0
+    written = json.loads(diagnose.read_text())
+    assert (written["status"], written["problems"]) == ("unusable", problems)
 
 
 PLANTED = "import pathlib\npathlib.Path({mark!r}).touch()\n"
@@ -108,5 +136,5 @@ def test_nothing_in_the_folder_where_a_build_starts_is_run_or_obeyed(
     (drop / "a" / "campaign.toml").write_text("")
     monkeypatch.chdir(start)
     built = build_site(drop, tmp_path / "site", BuildOptions(settle_s=0.0), dry_run=True)
-    assert any(step.startswith("ingest (a)") for step in built.steps)
+    assert any(step.startswith("predict (a)") for step in built.steps)
     assert not (tmp_path / "ran").exists()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -12,6 +14,7 @@ from report.synthetic import make_study
 from tribo.records import Study
 from tribo.report import Provenance, write_report
 
+Once = Callable[[str, Callable[[Path], object]], Path]
 PROVENANCE = Provenance("tribo report 'a b' -o out", "2026-01-01T00:00:00", 3, {"rule": "seed"})
 
 
@@ -36,8 +39,13 @@ def measured() -> Study:
 
 
 @pytest.fixture(scope="session")
-def written(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Written:
+def written(study: Study, once: Once) -> Written:
     """The whole report of the study."""
-    out, told = tmp_path_factory.mktemp("written"), []
-    write_report(study, out, lambda *step: told.append(step), PROVENANCE)
-    return Written(out, told)
+
+    def write(folder: Path) -> None:
+        told: list[tuple[str, int, int]] = []
+        write_report(study, folder / "out", lambda *step: told.append(step), PROVENANCE)
+        (folder / "told.json").write_text(json.dumps(told), encoding="utf-8")
+
+    folder = once("written_report", write)
+    return Written(folder / "out", [tuple(step) for step in json.loads((folder / "told.json").read_text("utf-8"))])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -10,15 +11,28 @@ import pytest
 from tribo.records import Study
 from tribo.report import drawings
 from tribo.report.drawing_choices import Drawing
-from tribo.report.drawings import draw_all, inline_svg
+from tribo.report.drawings import Drawn, draw_all, inline_svg
 from tribo.store.kept_results import Shelf
 
 
+@dataclass(frozen=True)
+class Kept:
+    """All figures of a study, drawn in this process, and the folder that keeps them."""
+
+    figures: Mapping[str, Drawn]
+    folder: Path
+
+
+@pytest.fixture(scope="module")
+def kept(measured: Study, tmp_path_factory: pytest.TempPathFactory) -> Kept:
+    folder = tmp_path_factory.mktemp("kept")
+    return Kept(draw_all(measured, drawing=Drawing(keep=Shelf(folder).take)), folder)
+
+
 def test_a_kept_figure_is_not_drawn_again_unless_its_numbers_change(
-    measured: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    measured: Study, kept: Kept, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    keep = Shelf(tmp_path).take
-    first = draw_all(measured, drawing=Drawing(keep=keep))
+    first, keep = kept.figures, Shelf(kept.folder).take
     drawn = []
     noted = lambda record, numbers, origin: drawn.append(record.name) or ("", ())  # noqa: E731
     monkeypatch.setattr(drawings, "_svg_and_series", noted)
@@ -32,8 +46,8 @@ def test_a_kept_figure_is_not_drawn_again_unless_its_numbers_change(
     assert set(drawn) == {"fig4", "fig6", "dependence", "forces"}  # no other one shows the static force of a pull
 
 
-def test_several_processes_draw_the_same_bytes(measured: Study) -> None:
-    one, two = draw_all(measured), draw_all(measured, drawing=Drawing(jobs=2))
+def test_several_processes_draw_the_same_bytes(measured: Study, kept: Kept) -> None:
+    one, two = kept.figures, draw_all(measured, drawing=Drawing(jobs=2))
     assert list(one) == list(two)
     assert all(one[name].files == two[name].files for name in one)
 

@@ -54,7 +54,7 @@ def _listed(campaign: Dropped, folder: Path) -> tuple[list[str], list[str]]:
 
 
 def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
-    """Samples and cells as the description of a campaign has them; none where it cannot be used (ingest says why).
+    """Samples and cells as a campaign describes them; none where it cannot be used (its first step says why).
 
     Raises
     ------
@@ -74,7 +74,7 @@ def _to_simulate(campaign: Dropped) -> tuple[list[str], list[str]]:
             return words, [cell_name(s, p) for s in samples for p in pressures]
     except CampaignError as why:
         problems = why.problems
-    except Exception as why:  # of an error in tribo, ingest will say it again, as the fault of this campaign
+    except Exception as why:  # of an error in tribo, its first step will say it again, as the fault of this campaign
         problems = (unexpected(why, "the samples of this campaign cannot be listed", str(campaign.path)),)
     of_system = [problem for problem in problems if is_of_the_system(problem.kind)]
     if of_system:

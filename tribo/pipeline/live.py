@@ -11,8 +11,9 @@ from tribo.file_contents import found_below
 from tribo.pipeline.step_record import read_record
 
 WORDS = {
-    "ingest": "reading exports", "fit": "fitting laws", "calibrate": "calibrating the model", "simulate": "simulating",
-    "compare": "comparing", "diagnose": "diagnosing", "report": "writing the report", "index": "writing the index page",
+    "fit": "reading exports and fitting laws", "predict": "reading exports and simulating",
+    "calibrate": "calibrating the model", "simulate": "simulating", "diagnose": "diagnosing",
+    "report": "writing the report", "index": "writing the index page",
 }  # fmt: skip
 _TOTAL = re.compile(r"^total\s+(\d+)\s*$")
 _COUNTED = re.compile(r"^(\w+)\s+(\d+)\s*$")

@@ -112,10 +112,13 @@ def with_misfits(v: Verdict, found: Discovery) -> Verdict:
 
 
 def without_causes(v: Verdict, lost: Mapping[str, float]) -> Verdict:
-    """The verdict without the causes that a law replaces; they are excluded with the reason."""
+    """The verdict without the causes that a law replaces; they are excluded with the reason.
+
+    What could not be told from such a cause goes with it.
+    """
     if not lost:
         return v
-    gone = set(lost) | {n for names in v.equivalent if set(names) & set(lost) for n in names}
+    gone = set(lost) | {n for names in v.equivalent if set(names) & set(lost) for n in names} | _alternatives(v, lost)
     causes = tuple(c for c in v.causes if c.mechanism not in gone)
     outcome: Outcome = "partly" if causes else "unknown"
     equivalent = tuple(names for names in v.equivalent if not set(names) & gone)
@@ -128,6 +131,15 @@ def without_causes(v: Verdict, lost: Mapping[str, float]) -> Verdict:
         v, verdict=outcome, causes=causes, equivalent=equivalent, excluded=(*v.excluded, *excluded), layers=layers,
         gain=v.gain if causes else None, text=summary(outcome, causes, equivalent, v.misfits, dict(v.smallest_effects)),
     )  # fmt: skip
+
+
+def _alternatives(v: Verdict, lost: Mapping[str, float]) -> set[str]:
+    """Mechanisms of an undetermined verdict that stand for its last cause, where that one is lost: causes alone have a
+    layer."""
+    layers = [{layer.name, *layer.tied_with} for layer in v.layers if layer.kind == "cause"]
+    if v.verdict != "undetermined" or not layers or not layers[-1] & set(lost):
+        return set()
+    return {c.mechanism for c in v.causes}.difference(*layers)
 
 
 def _extended(

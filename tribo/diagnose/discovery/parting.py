@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tribo.diagnose.discovery.grammar import PRESSURES
 from tribo.diagnose.discovery.written_law import BOTH, UNITS, WrittenLaw, column_values
 from tribo.diagnose.next_test import HOURS_PER_PULL, PULLS
 from tribo.diagnose.terms import in_words
@@ -15,6 +16,9 @@ from tribo.records import FloatArray
 
 BEYOND = 0.25  # of the measured range, on either side, within which a further test may lie
 PLACES = 61
+PARTS_PRESSURES = (
+    "Pull patterned samples and the flat one at equal contact pressures, with loads in proportion to the contact area"
+)
 
 
 def parting_test(law: WrittenLaw, other: WrittenLaw, c: Conditions) -> NextTest:
@@ -25,6 +29,8 @@ def parting_test(law: WrittenLaw, other: WrittenLaw, c: Conditions) -> NextTest:
 
 
 def _how(law: WrittenLaw, other: WrittenLaw, c: Conditions) -> tuple[str, dict[str, Any]]:
+    if set(law.columns) ^ set(other.columns) == PRESSURES:
+        return PARTS_PRESSURES, {"vary": sorted(PRESSURES)}
     if set(law.columns) != set(other.columns):
         only = [name for name in (*law.columns, *other.columns) if not (name in law.columns and name in other.columns)]
         varied = " and ".join(dict.fromkeys(in_words(name) for name in only))
