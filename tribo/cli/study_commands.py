@@ -99,10 +99,10 @@ def predict(console: Console, campaign: Path, out: Output, only: str, columns: s
             fits = stages.fit(ingested, weights=chosen.weights)
             cells = stages.simulate_cells(ingested, fits, chosen, only, progress)
     names = [cell.name for cell in cells]
-    console.result(
-        {"out": str(out.path), "cells": names}, f"model calibrated; simulations run: {', '.join(names) or 'none'}"
-    )
-    return console.status_after(ingested.set_aside)
+    set_aside = ingested.set_aside
+    record = {"out": str(out.path), "cells": names, "set_aside": set_aside_record(set_aside)}
+    console.result(record, f"model calibrated; simulations run: {', '.join(names) or 'none'}")
+    return console.status_after(set_aside)
 
 
 @click.command()
