@@ -6,6 +6,7 @@ import errno
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -88,3 +89,23 @@ def test_what_could_not_be_removed_goes_at_the_next_start(place: Path, monkeypat
     assert (folder / "export.csv").exists()
     with temporary_folder() as own:
         assert [p for p in place.iterdir() if p not in own.parents] == []
+
+
+def test_no_file_is_written_to_find_the_place_of_temporary_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The standard library tries a folder with a file, which stays if the process is killed just then."""
+    opened = []
+    real = os.open
+
+    def watched(path: str, *given: Any, **named: Any) -> int:
+        opened.append(Path(path).parent)
+        return real(path, *given, **named)
+
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setattr(os, "open", watched)
+    with temporary_folder() as folder:
+        assert folder.is_relative_to(tmp_path)
+    assert opened
+    assert tmp_path not in opened

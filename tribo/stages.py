@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -174,7 +174,13 @@ def study(
     ingested = ingest(chosen, rule=options.rule, jobs=options.jobs, overrides=options.overrides, progress=progress)
     if until == "ingest":
         return with_doubts(Study(ingested))
-    without = without_model(chosen, options) if until != "fit" else ""
+    with naming_set_aside(ingested):
+        return _from_pulls(ingested, options, until, progress)
+
+
+def _from_pulls(ingested: Ingested, options: StudyOptions, until: Until, progress: Progress) -> Study:
+    """The stages after the reading of exports."""
+    without = without_model(ingested.campaign, options) if until != "fit" else ""
     fits: tuple[LawFit, ...] = ()
     no_law = ""
     try:
@@ -186,6 +192,16 @@ def study(
     if until == "fit" or without:
         return assess(with_doubts(Study(ingested, fits, notes=tuple(filter(None, (without, no_law))))), options)
     return assess(with_doubts(compare(ingested, fits, options, progress=progress)), options)
+
+
+@contextmanager
+def naming_set_aside(ingested: Ingested) -> Iterator[None]:
+    """Add to an error for want of usable tests why tests were set aside."""
+    try:
+        yield
+    except FitError as why:
+        problems = [p.at(test_id=s.test_id) for s in ingested.set_aside for p in s.problems]
+        raise FitError((*why.problems, *problems)) from why
 
 
 def with_doubts(walked: Study) -> Study:

@@ -66,7 +66,7 @@ class Held:
 
 def held_folder(prefix: str) -> Held:
     """The same folder until it is released."""
-    clear_abandoned(Path(tempfile.gettempdir()), prefix)
+    clear_abandoned(place_of_temporary_files(), prefix)
     holder, lock = _made(prefix)
     held = Held(holder / FILES, lock)
     try:
@@ -75,6 +75,16 @@ def held_folder(prefix: str) -> Held:
         held.release()
         raise
     return held
+
+
+def place_of_temporary_files() -> Path:
+    """As :func:`tempfile.gettempdir`, which tries a folder with a file that stays where a kill falls on it."""
+    if tempfile.tempdir is None:
+        stated = [os.environ.get(name, "") for name in ("TMPDIR", "TEMP", "TMP")]
+        usable = (place for place in (*stated, "/tmp") if os.path.isdir(place) and os.access(place, os.W_OK | os.X_OK))
+        place = next(usable, None)
+        tempfile.tempdir = os.path.abspath(place) if place is not None else None
+    return Path(tempfile.gettempdir())
 
 
 def _made(prefix: str) -> tuple[Path, int]:

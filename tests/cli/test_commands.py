@@ -278,3 +278,16 @@ def test_simulations_alone_say_which_tests_were_set_aside_and_why(
     assert result.exit_code == 3
     assert "T003: raw/T003.csv: the file is empty" in result.stderr
     assert "T005: tests.csv, row 6, column sample" in result.stderr
+
+
+@pytest.mark.parametrize("command", ["diagnose", "discover"])
+def test_where_too_few_tests_are_left_it_is_said_which_were_set_aside_and_why(
+    spoiled: Path, tmp_path: Path, command: str
+) -> None:
+    table = spoiled / "tests.csv"
+    table.write_text("".join(table.read_text(encoding="utf-8").splitlines(keepends=True)[:9]), encoding="utf-8")
+    result = run(command, spoiled, "-o", tmp_path / "out", "-q")
+    assert result.exit_code == 1
+    assert "too few usable tests" in result.stderr
+    assert "T003: raw/T003.csv: the file is empty" in result.stderr
+    assert "T005: tests.csv, row 6, column sample" in result.stderr

@@ -93,6 +93,16 @@ def test_a_step_of_a_build_that_the_machine_failed_is_tried_again(
     assert (tmp_path / "fit.json").is_file() is recorded
 
 
+@pytest.mark.parametrize(("kind", "status", "recorded"), [("system", 3, False), ("no_load", 0, True)])
+def test_a_step_of_a_build_without_a_test_that_the_machine_could_not_read_is_tried_again(
+    kind: str, status: int, recorded: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = {"set_aside": [{"test_id": "T1", "reason": "x", "problems": [{"kind": kind, "what": "x"}]}]}
+    monkeypatch.setattr("tribo.cli.workflow_step._run", lambda command: (3, said))
+    assert run_step(tmp_path / "report.json", ["report"], "digest") == status
+    assert (tmp_path / "report.json").is_file() is recorded
+
+
 def test_a_diagnosis_that_fails_leaves_the_report_with_a_note(
     small_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -60,3 +63,20 @@ def test_runs_that_todays_sources_would_not_make_are_left_out(kept: Path, tmp_pa
     with pytest.warns(DamagedResultWarning):
         assert own_predictor(campaign(), tmp_path) is None
     assert own_predictor(campaign(), None) is None
+
+
+def test_runs_that_the_system_cannot_read_now_are_not_left_out(
+    kept: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import h5py
+
+    class Failing(h5py.File):
+        def __init__(self, path: Path, *given: Any):
+            if Path(path).name.startswith("B@"):
+                raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
+            super().__init__(path, *given)
+
+    monkeypatch.setattr(h5py, "File", Failing)
+    with pytest.raises(OSError, match="Too many open files") as raised:
+        own_predictor(campaign(), kept)
+    assert Path(raised.value.filename).name.startswith("B@")

@@ -59,7 +59,7 @@ class Watch:
     """What happens below ``root``: every operation in order, and the fault that was let happen, if any.
 
     ``branching`` is told every operation before it is done; where it returns a fault, this process has that fault.
-    Where it ``remembers``, steps that have been done before need not be done again (see ``remembered``).
+    Where it ``remembers``, steps of a build that are known need not be done (see ``remembered``).
     """
 
     root: str
@@ -79,6 +79,11 @@ class Watch:
             yield
         finally:
             self.is_off = False
+
+    @property
+    def is_undisturbed(self) -> bool:
+        """Whether a step that starts now meets no fault; in a build it would be a process of its own."""
+        return self.remembers or (self.struck is not None and self.fault is not None and self.fault.name not in LASTING)
 
     def inside(self, path: Any) -> str | None:
         """The path relative to the watched folder; None where it lies elsewhere."""

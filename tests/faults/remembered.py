@@ -11,12 +11,14 @@ from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from faults import file_operations
 from faults.file_operations import Operation, Watch, real_listdir, real_open
 from faults.small_site import Place
 from faults.trial import but_for_times, masked
+
+T = TypeVar("T")
 
 
 class Remembered:
@@ -33,7 +35,7 @@ class Remembered:
             with real_open(self.file, "rb") as file:
                 self.known |= pickle.load(file)
 
-    def made(self, key: str, make: Callable[[], Any]) -> Any:
+    def made(self, key: str, make: Callable[[], T]) -> T:
         """What this process or another has made, or else will make now."""
         if key not in self.known:
             self.read()
@@ -43,7 +45,8 @@ class Remembered:
             with real_open(whole, "wb") as file:
                 pickle.dump(self.known, file)
             os.replace(whole, self.file)
-        return self.known[key]
+        found: T = self.known[key]
+        return found
 
 
 class RememberedPages(Remembered):
@@ -74,7 +77,26 @@ class _Page:
             compiler: Any = self.pages.real(root=self.root, **self.options)
             return bytes(compiler.compile(source, **options))
 
-        return bytes(self.pages.made(key.hexdigest(), make))
+        return self.pages.made(key.hexdigest(), lambda: _in_own_process(make))
+
+
+def _in_own_process(make: Callable[[], bytes]) -> bytes:
+    """What ``make`` gives in a fork of this process: typst starts threads, which the forks of a process do not have."""
+    answer = os.pipe()
+    child = os.fork()
+    if not child:
+        try:
+            with real_open(answer[1], "wb") as stream:
+                stream.write(make())
+            os._exit(0)
+        finally:
+            os._exit(1)
+    os.close(answer[1])
+    with real_open(answer[0], "rb") as stream:
+        content: bytes = stream.read()
+    _, ended = os.waitpid(child, 0)
+    assert ended == 0, "typst failed"
+    return content
 
 
 class RememberedFigures(Remembered):
@@ -112,10 +134,11 @@ class Step:
 
 
 class RememberedSteps:
-    """Steps of a build. In a start without a fault, one that is known from the same state is done over from memory.
+    """Steps of a build. One that starts without a fault and is known from the same state is done over from memory.
 
     The state is that of all results and records of the site, but for times, and of temporary files. The file
-    operations of the step count as if it had been done.
+    operations of the step count as if it had been done. Errors that do not last, of earlier steps and of the build
+    itself, cannot reach a step, which is a process of its own.
     """
 
     def __init__(self, folder: Path, place: Place):
@@ -125,7 +148,7 @@ class RememberedSteps:
     def done(self, words: Sequence[str], work: Callable[[], int | None]) -> int | None:
         """Do a step, or have it done over; its exit status."""
         watched = file_operations.current
-        if watched is None or not watched.remembers:
+        if watched is None or not watched.is_undisturbed:
             return work()
         with watched.unseen():
             before = self._entries()

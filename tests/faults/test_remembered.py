@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
+import typst
 
 from faults.file_operations import Fault
-from faults.remembered import RememberedSteps
+from faults.remembered import RememberedPages, RememberedSteps
 from faults.small_site import Place
 from faults.test_bench import place as place
 from faults.trial import Outcome, in_child, state_of
@@ -71,6 +74,41 @@ def test_no_step_of_a_start_with_a_fault_comes_from_memory(place: Place) -> None
     failed = site.start("one", site.step, Fault(len(first.seen) - 1, "EIO"))
     assert site.done == 2
     assert failed.struck == first.seen[-1]
+
+
+def test_a_step_after_an_error_comes_from_memory_unless_the_error_lasts(place: Place) -> None:
+    site = Site(place)
+    site.start("one", site.step)
+    before = place.campaign / "tests.csv"
+
+    def after_an_error() -> int:
+        with suppress(OSError):
+            before.stat()
+        return site.steps.done(["double"], site.step) or 0
+
+    for name, done in (("EIO", 1), ("ENOSPC", 2)):
+        site.start("one", site.step)
+        (place.out / "current" / "text").write_text("one")
+        (place.out / "current" / "folder" / "double").unlink()
+        (place.out / "current" / "folder").rmdir()
+        ended = in_child(after_an_error, place, Fault(0, name))
+        assert ended.struck is not None
+        assert site.done == done
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="counts the threads of a process of Linux")
+def test_typst_leaves_no_thread_in_a_process_that_is_going_to_fork(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(typst, "Compiler", typst.Compiler)  # what the bench replaces is put back afterwards
+    RememberedPages(tmp_path / "pages.pickle")
+    folder = tmp_path / "page"
+    folder.mkdir()
+    (folder / "page.typ").write_text("text")
+    threads = os.listdir("/proc/self/task")
+    page = typst.Compiler(root=folder).compile(folder / "page.typ", format="pdf")
+    assert page.startswith(b"%PDF")
+    assert os.listdir("/proc/self/task") == threads
 
 
 def test_a_step_that_depends_on_other_files_of_a_site_is_an_error_of_the_bench(place: Place) -> None:

@@ -32,7 +32,6 @@ TIMES = re.compile(
     r'\d{4}-\d\d-\d\d[T ]\d\d:?\d\d(:?\d\d)?Z?|"seconds": [\d.]+|process \d+|(?<="index": ")[0-9a-f]{64}'
 )
 
-PROGRESS = re.compile(r"(?m)^.+: \d+ of \d+ \(\d+ s(, \d+ s left)?\)\n")  # said every few seconds
 RANDOM = re.compile(r"(?<=\.)\d+(?=\.part$)|(?<=-)\w{8}(?=/|$)")  # process numbers, names of temporary folders
 
 
@@ -160,12 +159,14 @@ def be_child(work: Callable[[], int], orders: Orders, printed: int, listed: int)
 def state_of(out: Path) -> dict[str, str]:
     """Every file below OUT by place, hidden ones included, as a hash; times masked in records, locks left out.
 
+    Logs are left out, too: they hold what the steps of a build have said.
+
     Of several dated copies the last one counts, and their numbers do not: one may show that a campaign was unusable.
     """
     found = {}
     for name, digest in (hashes(out) if out.exists() else {}).items():
         file = out.parent / name
-        if "lock" in file.name or file.name == ".number":
+        if "lock" in file.name or file.name == ".number" or "/.tribo/log/" in f"/{name}":
             continue
         found[masked(name)] = but_for_times(file, digest)
     return found
@@ -175,11 +176,11 @@ _KNOWN: dict[str, str] = {}  # by the hash of a file: that of its text without t
 
 
 def but_for_times(file: Path, digest: str) -> str:
-    """The hash of a file; of a record, page or log, that of its text without times."""
-    if file.suffix not in (".json", ".html", ".log"):
+    """The hash of a file; of a record or page, that of its text without times."""
+    if file.suffix not in (".json", ".html"):
         return digest
     if digest not in _KNOWN:
-        text = TIMES.sub("", PROGRESS.sub("", file.read_text("utf-8", "replace")))
+        text = TIMES.sub("", file.read_text("utf-8", "replace"))
         _KNOWN[digest] = sha256(text.encode()).hexdigest()
     return _KNOWN[digest]
 
@@ -343,6 +344,9 @@ class Bench:
             named = named or f"{self.place.root}/" in said
         same = outcome.status == self.expected.status and state_of(self.place.out) == self.result
         if same:
+            logged = " ".join((said, *self._logs().split()))
+            named = named or names_path(logged, outcome.struck.path, self.place)
+            caused = caused or names_cause(logged, fault.name)
             if not (named and caused) and _wanted(outcome.struck):
                 wrong.append("done in silence")
         elif outcome.status == 3 and outcome.struck.path.startswith(("campaign/raw/", "drop/")):
@@ -356,6 +360,11 @@ class Bench:
         if left and not (fault.name in ("EROFS", "EACCES") or outcome.struck.kind == "delete"):
             wrong.append(f"left over: {', '.join(left[:3])}")
         return wrong
+
+    def _logs(self) -> str:
+        """What the steps of a build have said."""
+        logs = sorted((self.place.out / ".tribo" / "log").rglob("*.log"))
+        return "\n".join(log.read_text("utf-8", "replace") for log in logs)
 
     def _mends(self) -> list[str]:
         """What does not hold after an undisturbed start from the present state."""

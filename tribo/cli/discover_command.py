@@ -45,10 +45,11 @@ def discover(
         chosen = stages.StudyOptions(kept=out.kept, **options)
         study = stages.study(opened, chosen, until="ingest", progress=progress)
         record = provenance_of_run(study, campaign, chosen)
-        if law is not None:
-            written = write_held(hold_law_against(study.ingested, *law, seed=chosen.seed), out.path, record)
-        else:
-            found = discover_in(study.ingested, seed=chosen.seed, progress=progress)
-            written = write_discovery(found, study.ingested.campaign.title, out.path, record)
+        with stages.naming_set_aside(study.ingested):
+            if law is not None:
+                written = write_held(hold_law_against(study.ingested, *law, seed=chosen.seed), out.path, record)
+            else:
+                found = discover_in(study.ingested, seed=chosen.seed, progress=progress)
+                written = write_discovery(found, study.ingested.campaign.title, out.path, record)
     console.result(written.record, written.text)
     return console.status_after(study.ingested.set_aside)

@@ -95,12 +95,14 @@ def predict(console: Console, campaign: Path, out: Output, only: str, columns: s
     ):
         stated_so = with_reading_options(described, columns, stated)
         ingested = stages.study(stated_so, chosen, until="ingest", progress=progress).ingested
-        cells = stages.simulate_cells(ingested, stages.fit(ingested, weights=chosen.weights), chosen, only, progress)
+        with stages.naming_set_aside(ingested):
+            fits = stages.fit(ingested, weights=chosen.weights)
+            cells = stages.simulate_cells(ingested, fits, chosen, only, progress)
     names = [cell.name for cell in cells]
-    console.result(
-        {"out": str(out.path), "cells": names}, f"model calibrated; simulations run: {', '.join(names) or 'none'}"
-    )
-    return console.status_after(ingested.set_aside)
+    set_aside = ingested.set_aside
+    record = {"out": str(out.path), "cells": names, "set_aside": set_aside_record(set_aside)}
+    console.result(record, f"model calibrated; simulations run: {', '.join(names) or 'none'}")
+    return console.status_after(set_aside)
 
 
 @click.command()
@@ -168,7 +170,8 @@ def diagnose(
         stated_so = with_reading_options(opened, columns, stated)
         until: Until = "compare" if stages.without_model(stated_so, chosen) else "ingest"
         study = stages.study(stated_so, chosen, until=until, progress=progress)
-        found = _diagnosis(study, chosen, progress)
+        with stages.naming_set_aside(study.ingested):
+            found = _diagnosis(study, chosen, progress)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
         verdict = found.verdict
         card = card_of(stages.with_fits(study), verdict.as_dict())

@@ -13,7 +13,7 @@ import io
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,7 @@ def run_step(
         status, said = _run(command)
     if status not in DONE_WORDS:
         return status
-    if status == UNUSABLE and any(is_of_the_system(str(p.get("kind"))) for p in said.get("problems", ())):
+    if status != DONE and any(is_of_the_system(str(problem.get("kind"))) for problem in _problems(said)):
         return status  # no fault of the input: the next build tries again
     finished = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     written = {
@@ -56,6 +56,11 @@ def run_step(
 
     write_text(record, json.dumps(written, indent=1) + "\n")
     return 0
+
+
+def _problems(said: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Those of a command, and of the tests that it set aside."""
+    return [*said.get("problems", ()), *(p for test in said.get("set_aside") or () for p in test["problems"])]
 
 
 def _run(command: Sequence[str]) -> tuple[int, dict[str, Any]]:

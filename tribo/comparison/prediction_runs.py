@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from tribo.errors import SimulationError
+from tribo.errors import SimulationError, failed_by_system, naming
 from tribo.file_contents import found_in
 from tribo.records import Pattern, Run
 from tribo.store.kept_results import DamagedResultWarning, Shelf, sources
@@ -149,6 +149,11 @@ def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | Non
     """Finished runs of the baseline in ``kept`` that the current sources would reproduce, one row per run, or None.
 
     A file counts where its name is the one that its own runs would be given.
+
+    Raises
+    ------
+    OSError
+        A file is there and cannot be read.
     """
     import pandas as pd
 
@@ -161,6 +166,10 @@ def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | Non
             table = read_stored(path)
             cell = _cell_of(path, table, patterns)
         except (SimulationError, *UNREADABLE) as why:
+            cause = why.__cause__ or why
+            if failed_by_system(cause):  # the runs may be whole, and without them the result would be another one
+                with naming(path):
+                    raise cause from None
             warnings.warn(f"{path}: these simulations are not used: {why}", DamagedResultWarning, stacklevel=2)
             continue
         if cell is not None and cell.path(kept) == path and table["done"].all():

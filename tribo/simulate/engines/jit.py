@@ -12,7 +12,6 @@ import gc
 import hashlib
 import os
 import shutil
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -26,6 +25,7 @@ from numba.extending import intrinsic, register_jitable
 
 from tribo.file_contents import bytes_of, found_below
 from tribo.store.private_folder import private_folder
+from tribo.temporary import place_of_temporary_files
 
 UNUSED_DAYS = 30.0
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -70,7 +70,7 @@ def _cache_bases() -> list[Path]:
     chosen = os.environ.get("TRIBO_CACHE_DIR")
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     own = f"tribo-cache-{os.getuid()}" if hasattr(os, "getuid") else "tribo-cache"
-    return ([Path(chosen)] if chosen else []) + [Path(home) / "tribo", Path(tempfile.gettempdir()) / own]
+    return ([Path(chosen)] if chosen else []) + [Path(home) / "tribo", place_of_temporary_files() / own]
 
 
 def compiled(function: Function) -> Function:
