@@ -64,7 +64,7 @@ class Constant:
 
 
 CONSTANTS = {
-    "margin of a law over a mechanism": Constant("MARGIN", ("contested",)),
+    "margin of a law over a mechanism": Constant("MARGIN", ("contested",), _each),
     "margin of a law over a covariate": Constant("MARGIN_OF_COVARIATE", ("contested",), _each),
     "cost of a place or width": Constant("PER_PARAMETER", ("settling",)),
     "cost of regime, term and samples": Constant("groups_of", ("search", "contested"), _dearer),

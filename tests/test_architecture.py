@@ -14,8 +14,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
 GROUND = {
-    "display", "errors", "limits", "escaping", "input_files", "quantity_names", "quantities", "zeroing", "records",
-    "published", "zips",
+    "display", "errors", "limits", "escaping", "input_files", "quantity_names", "quantities", "zeroing",
+    "trace_records", "law_records", "records", "published", "zips",
     "file_contents", "links", "temporary", "forked", "nearest", "sheets",
 }  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
@@ -27,7 +27,9 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("quantity_names", set()),
     ("quantities", {"errors", "quantity_names"}),
     ("zeroing", {"display"}),
-    ("records", {"display", "errors", "zeroing"}),
+    ("trace_records", {"display", "errors"}),
+    ("law_records", {"display", "trace_records"}),
+    ("records", {"display", "errors", "zeroing", "trace_records", "law_records"}),
     ("published", set()),
     ("zips", {"errors", "limits"}),
     ("file_contents", {"errors"}),

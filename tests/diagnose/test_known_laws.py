@@ -10,6 +10,7 @@ import pytest
 from blind.tribometer import hide
 
 from tribo.diagnose.diagnosis import examine
+from tribo.diagnose.discovery import contested
 from tribo.diagnose.discovery.contested import without_wrong_forms
 from tribo.diagnose.discovery.held import holds
 from tribo.diagnose.discovery.in_verdict import with_laws, without_causes
@@ -157,6 +158,15 @@ def test_other_forms_of_a_recorded_column_that_explain_as_much_are_told_with_its
     assert "saturating" in {tie.shapes[0].kind for tie in forms.ties}
     assert {tie.columns for tie in forms.ties} == {("film_um",)}
     assert forms.law.form not in {tie.form for tie in forms.ties}
+
+
+@pytest.mark.parametrize(("own_column", "by", "lost"), [(True, 5.0, False), (True, 7.0, True), (False, 5.0, True)])
+def test_a_law_of_the_same_column_has_to_be_better_by_more_than_one_of_another_column(
+    own_column: bool, by: float, lost: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(contested, "_best_laws", lambda model, together: contested._BestLaws(by, own_column, ()))
+    model = refitted(baseline(made(warming, seed=33)), [Acting(MECHANISMS["temperature"])])
+    assert set(without_wrong_forms(model).lost) == ({"temperature"} if lost else set())
 
 
 def undetermined() -> Verdict:

@@ -233,12 +233,11 @@ def groups_of(c: Conditions) -> list[Group]:
 
 
 def corrects_a_pattern(groups: Sequence[Group], shapes: Sequence[tuple[Shape, ...]]) -> NDArray[np.bool_]:
-    """Which laws, (groups, shapes), follow the pressure alone on some of the patterns: no laws of their own, since they
-    say how wrong the model is about these patterns. What holds for all patterns is judged by patterns left out
-    (:mod:`tribo.diagnose.discovery.across_patterns`)."""
-    some = np.array([group.where not in (ALL, FLAT) for group in groups])
+    """Which laws, (groups, shapes), follow the pressure alone on one sample, or by the elongation, which two samples
+    have at most: no laws of their own, since they say how wrong the model is about that pattern."""
+    one = np.array([group.where == ELONGATION or group.where.startswith("sample ") for group in groups])
     pressure_alone = np.array([{s.column for s in each} <= PRESSURES for each in shapes], bool)
-    return some[:, None] & pressure_alone
+    return one[:, None] & pressure_alone
 
 
 def _places(c: Conditions) -> list[tuple[str, float]]:
