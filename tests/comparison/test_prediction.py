@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from small_lattices import small_lattices
 
 from tribo import stages
 from tribo.campaign import load_campaign
@@ -17,6 +19,12 @@ from tribo.comparison.side_by_side import load_means
 from tribo.errors import CampaignError, FitError
 from tribo.records import LawFit, Regime
 from tribo.store.kept_results import DamagedResultWarning
+
+
+@pytest.fixture(scope="module", autouse=True)
+def on_small_lattices() -> Iterator[None]:
+    with small_lattices():
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -232,6 +232,54 @@ def test_of_several_causes_the_newest_is_left_out_where_its_own_column_is_still_
     assert found.wrong_in_form == ("run_in",)
 
 
+def chosen_of(monkeypatch: pytest.MonkeyPatch, best: Candidate | None, strength: float | None) -> str:
+    """Which layer is added where a mechanism and a free course of a column, of this strength, are beyond chance."""
+    look: Any = SimpleNamespace(columns=np.ones((4, 2)))
+    other = None if strength is None else naming.Remainder(look, strength, np.zeros(1), 0.1, 0.001)
+    monkeypatch.setattr(naming, "best_beyond_chance", lambda *_: best)
+    monkeypatch.setattr(naming, "strongest_beside_mechanisms", lambda *_: other)
+    monkeypatch.setattr(naming, "sort_rivals", lambda model, best, ranked: ((best,), ()))
+    monkeypatch.setattr(naming, "with_free_columns", lambda *_: None)
+    monkeypatch.setattr(naming, "fit", lambda *_, **__: None)
+    setup: Any = SimpleNamespace(observations=SimpleNamespace(flat="F"))
+    model: Any = SimpleNamespace(setup=setup, acting=())
+    seen: Any = None
+    grown = naming._grown(Layers(model), [], seen, 0.01)
+    if grown is None:
+        return "neither"
+    assert len(grown.causes) + len(grown.remainders) == 1
+    return "mechanism" if grown.causes else "column"
+
+
+def test_a_free_course_of_a_column_goes_first_only_where_it_explains_more_by_what_counts_as_equal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A course of strength z explains z^2 / 2, here 12.5; what lies within 3 of it explains about equally."""
+    assert CLOSE == 3.0
+    assert chosen_of(monkeypatch, candidate(9.6), 5.0) == "mechanism"
+    assert chosen_of(monkeypatch, candidate(9.4), 5.0) == "column"
+    assert chosen_of(monkeypatch, candidate(0.1), None) == "mechanism"
+    assert chosen_of(monkeypatch, None, 5.0) == "column"
+    assert chosen_of(monkeypatch, None, None) == "neither"
+
+
+def look_of(kind: str, taken_up: bool = False) -> Any:
+    return SimpleNamespace(kind=kind, is_taken_up=lambda flat: taken_up and flat == "F")
+
+
+def test_what_is_left_beside_mechanisms_is_the_strongest_look_beyond_chance_that_no_law_takes_up() -> None:
+    looks = (look_of("column"), look_of("mechanism"), look_of("bend", taken_up=True), look_of("column"))
+    strength, p = np.array([3.0, 6.0, 5.0, 4.0]), np.array([0.004, 0.001, 0.002, 0.003])
+    seen: Any = SimpleNamespace(looks=looks, strength=strength, p=p, size=strength / 10, coefficients=list("abcd"))
+    found = naming.strongest_beside_mechanisms(seen, 0.01, "F")
+    assert found is not None
+    assert (found.look, found.strength, found.p, found.size) == (looks[3], 4.0, 0.003, 0.4)
+    other = naming.strongest_beside_mechanisms(seen, 0.01, "B")
+    assert other is not None
+    assert other.look is looks[2]
+    assert naming.strongest_beside_mechanisms(seen, 0.003, "F") is None  # at the level itself: within chance
+
+
 def test_what_explains_as_much_only_before_choices_are_paid_for_is_no_rival(monkeypatch: pytest.MonkeyPatch) -> None:
     best = candidate(100.0, raw=100.0)
     many, few = candidate(96.5, raw=99.5), candidate(97.5, raw=99.5)

@@ -8,6 +8,9 @@ import pytest
 
 from tribo.errors import FitError
 from tribo.fitting import fit_errors_in_both, fit_power_law, fit_samples
+from tribo.fitting.curves import _start
+from tribo.fitting.rows import sample_rows
+from tribo.fitting.weighting import weights_of
 from tribo.laws.table import LAWS
 
 AREA = 55e-6
@@ -97,3 +100,13 @@ def test_a_pull_at_zero_load_takes_part_where_loads_are_known_to_a_share() -> No
 def test_no_error_of_the_load_is_refused(constant: float, share: float) -> None:
     with pytest.raises(FitError, match="above zero"):
         fit_errors_in_both(pulls(), "static", AREA, load_u_N=constant, load_u_share=share)
+
+
+def test_forces_that_are_all_zero_are_weighed_alike_and_give_a_law_of_zeros() -> None:
+    table = pulls().assign(static_N=0.0)
+    rows = sample_rows(table, "static")[0]
+    np.testing.assert_array_equal(weights_of(rows, AREA, "relative"), 1.0)
+    (line,) = fit_samples(table, "static", AREA)
+    np.testing.assert_allclose(line.values, 0.0, atol=1e-12)
+    law, load, force = LAWS["pressure_power_adhesion"], rows.load_N, rows.force_N
+    np.testing.assert_array_equal(_start(law, load, force, AREA, 10e3), [1.0, 0.0, 0.0])

@@ -83,6 +83,14 @@ def test_a_mark_that_may_be_either_is_refused_until_it_is_given(tmp_path: Path) 
     assert [p.kind for p in problems_of(path, columns={"decimal": ";"})] == ["unknown_decimal"]
 
 
+@pytest.mark.parametrize("whole", [1, 3])
+def test_a_mark_that_may_be_either_is_named_with_the_first_row_that_has_it(tmp_path: Path, whole: int) -> None:
+    """The rows before it hold whole numbers."""
+    rows = [[str(k + 1), f"{k + 1},250" if k >= whole else str(k + 1)] for k in K]
+    (problem,) = problems_of(saved(tmp_path, table("Time [s];Force [N]", rows, ";")))
+    assert (problem.kind, problem.row, problem.found) == ("ambiguous_mark", 2 + whole, f"{whole + 1},250")
+
+
 def test_one_number_settles_the_mark_of_the_whole_table(tmp_path: Path) -> None:
     rows = [[str(k + 1), f"{k + 1},250"] for k in K]
     rows[-1][1] = "9,25"

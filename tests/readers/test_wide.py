@@ -160,3 +160,26 @@ def test_a_record_left_out_by_its_position_leaves_the_others(tmp_path: Path, lef
 def test_a_column_given_by_its_position_serves_every_record(tmp_path: Path) -> None:
     path = saved(tmp_path, "clock\tF1 [N]\tF2 [N]\tF3 [N]", forces())
     assert records_in(path, columns={"time": "#1 [s]", "force": "F* [N]"}) == RECORDS
+
+
+def test_a_column_left_out_by_its_position_is_left_out_of_every_record(tmp_path: Path) -> None:
+    rows = [[*row[:3], "20.0", row[3]] for row in forces()]
+    path = saved(tmp_path, "Time [s]\tF1 [N]\tF2 [N]\tFz [N]\tF3 [N]", rows)
+    columns = {"time": "Time [s]", "force": "F? [N]", "ignore": "#4"}
+    assert records_in(path, columns=columns) == RECORDS
+    assert all("normal_force_N" not in trace.columns for trace in read_blocks(path, columns=columns))
+
+
+def test_a_time_given_by_a_position_behind_the_forces_serves_every_record(tmp_path: Path) -> None:
+    path = saved(tmp_path, "F1 [N]\tF2 [N]\tF3 [N]\tclock", [[*row[1:], row[0]] for row in forces()])
+    assert records_in(path, columns={"time": "#4 [s]", "force": "F* [N]"}) == RECORDS
+
+
+def test_a_pattern_that_fits_nothing_is_refused_with_all_columns_those_without_a_name_by_position(
+    tmp_path: Path,
+) -> None:
+    path = saved(tmp_path, "Time [s]\tF1 [N]\t\tF3 [N]", forces())
+    with pytest.raises(ReadError) as refused:
+        read_blocks(path, columns={"force": "D* [N]"})
+    (problem,) = refused.value.problems
+    assert problem.allowed == "Time [s], F1 [N], #3, F3 [N]"

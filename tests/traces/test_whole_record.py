@@ -11,6 +11,7 @@ import pytest
 from tribo.errors import TraceError
 from tribo.records import Pull, Test, Trace
 from tribo.traces import read_pull, read_record
+from tribo.traces.course import _drive_stops
 from tribo.traces.oscillation import oscillation_of
 from tribo.traces.rules import RULES
 from tribo.traces.sliding import settled
@@ -311,3 +312,28 @@ def test_slow_waves_that_do_not_repeat_are_no_oscillation() -> None:
     noise = rng.normal(0.0, 0.01, time.size)
     assert oscillation_of(time, 10.0 + wave + noise).regime == "irregular"
     assert oscillation_of(time, 10.0 + regular + noise).regime == "inertial oscillation"
+
+
+def ranges_of(*parts: tuple[bool, int]) -> np.ndarray:
+    """Whether the drive moves, sample by sample: so many samples of each."""
+    return np.concatenate([np.full(n, moves) for moves, n in parts])
+
+
+def test_a_drive_stands_still_from_five_samples_on() -> None:
+    moving = ranges_of((False, 5), (True, 20), (False, 4), (True, 20), (False, 5), (True, 20), (False, 5))
+    stops, end, rests = _drive_stops(moving, (0, moving.size))
+    assert stops == [(49, 54)]
+    assert end == 74  # behind it the drive does not move again
+    assert rests == [(0, 5), (49, 54), (74, 79)]
+    stops, end, rests = _drive_stops(moving[:-1], (0, 78))
+    assert (end, rests) == (78, [(0, 5), (49, 54)])  # four samples are no end
+
+
+def test_a_stop_of_the_drive_counts_where_the_bodies_touch_before_and_after_it() -> None:
+    moving = ranges_of((True, 20), (False, 10), (True, 20), (False, 10), (True, 20))
+    assert _drive_stops(moving, (0, 80))[0] == [(20, 30), (50, 60)]
+    assert _drive_stops(moving, (20, 80))[0] == [(50, 60)]
+    assert _drive_stops(moving, (19, 80))[0] == [(20, 30), (50, 60)]
+    assert _drive_stops(moving, (0, 60))[0] == [(20, 30)]
+    assert _drive_stops(moving, (0, 61))[0] == [(20, 30), (50, 60)]
+    assert _drive_stops(np.zeros(9, bool), (2, 7)) == ([], 7, [])
