@@ -40,7 +40,7 @@ def holds(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimate], tri
     than 2.58 standard errors of the difference; of a wave, both amplitudes. The form may be wrong by a share of the
     effect, which adds to this error: another design shows another part of it. Causes of the columns of the law are left
     out unless they explain the campaign clearly better than the law (:func:`without_rivals`). It did not hold where
-    another law of its columns is better by 12 units of log likelihood (REFUTED). Nothing can be told where
+    another form of its columns is better by 12 units of log likelihood (REFUTED). Nothing can be told where
     a column is missing or does not vary, or the effect is below four standard errors in this design.
     """
     c, a0 = model.setup.observations.conditions, earlier["a"]
