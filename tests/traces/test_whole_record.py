@@ -11,7 +11,7 @@ import pytest
 from tribo.errors import TraceError
 from tribo.records import Pull, Test, Trace
 from tribo.traces import read_pull, read_record
-from tribo.traces.course import _drive_stops
+from tribo.traces.course import _drive_stops, _moving
 from tribo.traces.oscillation import oscillation_of
 from tribo.traces.rules import RULES
 from tribo.traces.sliding import settled
@@ -337,3 +337,15 @@ def test_a_stop_of_the_drive_counts_where_the_bodies_touch_before_and_after_it()
     assert _drive_stops(moving, (0, 60))[0] == [(20, 30)]
     assert _drive_stops(moving, (0, 61))[0] == [(20, 30), (50, 60)]
     assert _drive_stops(np.zeros(9, bool), (2, 7)) == ([], 7, [])
+
+
+def test_a_displacement_that_goes_one_way_tells_where_the_drive_stands_still() -> None:
+    travel = np.concatenate([np.arange(1000), np.full(1000, 999), np.arange(1000) + 999]) * 1e-6
+    record = Trace("x", np.arange(3000) / 100, np.ones(3000), displacement_m=travel)
+    moving = _moving(record)
+    assert moving is not None
+    assert moving[:990].all()
+    assert not moving[1010:1990].any()
+    assert moving[2010:].all()
+    assert _moving(replace(record, displacement_m=1e-4 * np.sin(np.arange(3000) / 100))) is None  # to and fro
+    assert _moving(replace(record, displacement_m=np.zeros(3000))) is None
