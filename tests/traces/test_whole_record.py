@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.errors import TraceError
+from tribo.errors import Problem, TraceError
 from tribo.records import Pull, Test, Trace
 from tribo.traces import read_pull, read_record
 from tribo.traces.course import _drive_stops, _moving
@@ -16,11 +16,13 @@ from tribo.traces.oscillation import oscillation_of
 from tribo.traces.rules import RULES
 from tribo.traces.sliding import settled
 from tribo.traces.whole_record import Reading
+from tribo.traces.zero import _level
 from tribo.zeroing import zero_choice
 
 from .synthetic import Shape
 
 RATE = 50.0
+NO_ZERO = Problem("no_zero_there", "the record has no part before contact")
 
 
 def a_test(zero: str = "", load_N: float = math.nan, **more: float) -> Test:
@@ -349,3 +351,15 @@ def test_a_displacement_that_goes_one_way_tells_where_the_drive_stands_still() -
     assert moving[2010:].all()
     assert _moving(replace(record, displacement_m=1e-4 * np.sin(np.arange(3000) / 100))) is None  # to and fro
     assert _moving(replace(record, displacement_m=np.zeros(3000))) is None
+
+
+def test_what_a_zero_drifts_is_in_its_uncertainty_as_a_rectangular_distribution() -> None:
+    """From 0 to 0.5 N: the medians of the first and the last fifth lie 0.4 N apart."""
+    time = np.arange(400) / RATE
+    steady = _level(time, noise(400, sd=1e-3), (0, 400), "before contact", NO_ZERO)
+    drifting = _level(time, np.linspace(0.0, 0.5, 400) + noise(400, sd=1e-3), (0, 400), "before contact", NO_ZERO)
+    assert not steady.drifts
+    assert steady.u_N < 1e-3
+    assert drifting.drifts
+    assert drifting.force_N == pytest.approx(0.25, abs=1e-3)
+    assert drifting.u_N == pytest.approx(0.4 / math.sqrt(12.0), rel=0.01)
