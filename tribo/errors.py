@@ -123,9 +123,11 @@ def system_problem(why: OSError, file: str | None = None) -> Problem:
     """An error of the operating system with its path and cause."""
     place = next((str(part) for part in (why.filename2, why.filename) if part), None) or file
     cause = why.strerror or str(why) or type(why).__name__
-    if why.args and isinstance(why.args[0], list):  # shutil.Error: one (source, target, cause) for each file
+    of_many = bool(why.args) and isinstance(why.args[0], list)
+    if of_many:  # shutil.Error: one (source, target, cause) for each file
         _, place, cause = (str(part) for part in why.args[0][0])
-    return Problem(_OF_THE_SYSTEM, cause[:1].lower() + cause[1:], file=place)
+    damaged = why.errno is None and not of_many  # libraries say so of contents
+    return Problem("unreadable" if damaged else _OF_THE_SYSTEM, cause[:1].lower() + cause[1:], file=place)
 
 
 def unexpected(why: Exception, what: str, file: str | None = None) -> Problem:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import errno
 import logging
+import os
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from on_the_command_line import run
 
+from tribo.campaign import load_campaign
 from tribo.cli.console import Console
 from tribo.cli.workflow_step import run_step
-from tribo.errors import Problem, TriboError
+from tribo.errors import Problem, ReadError, TriboError, is_of_the_system, system_problem
+from tribo.readers.core import source
 
 
 @pytest.fixture(autouse=True)
@@ -101,6 +105,32 @@ def test_a_step_of_a_build_without_a_test_that_the_machine_could_not_read_is_tri
     monkeypatch.setattr("tribo.cli.workflow_step._run", lambda command: (3, said))
     assert run_step(tmp_path / "report.json", ["report"], "digest") == status
     assert (tmp_path / "report.json").is_file() is recorded
+
+
+def test_an_export_that_the_machine_cannot_open_is_no_fault_of_the_export(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(path: Path, *_: object) -> bytes:
+        raise OSError(errno.EIO, os.strerror(errno.EIO), str(path))
+
+    monkeypatch.setattr(source, "read_or_map", failing)
+    with pytest.raises(ReadError, match=r"^raw/T1\.csv: cannot be opened: input/output error$") as raised:
+        source.read_bytes(tmp_path / "T1.csv", "raw/T1.csv")
+    assert is_of_the_system(raised.value.problems[0].kind)
+
+
+def test_a_path_that_no_machine_can_follow_and_damaged_contents_are_faults_of_the_input(
+    small_campaign: Path, tmp_path: Path
+) -> None:
+    campaign, name = tmp_path / "campaign", f"raw/{'x' * 300}.csv"
+    shutil.copytree(small_campaign, campaign)
+    table = (campaign / "tests.csv").read_text(encoding="utf-8")
+    (campaign / "tests.csv").write_text(table.replace("raw/T001.csv", name), encoding="utf-8")
+    (problem,) = [p for p in load_campaign(campaign).problems if p.column == "file"]
+    assert "this path cannot be followed: file name too long" in str(problem)
+    assert not is_of_the_system(problem.kind)
+    assert not is_of_the_system(system_problem(OSError("Unable to open file (truncated file)")).kind)
+    assert is_of_the_system(system_problem(OSError(errno.EIO, "Input/output error")).kind)
 
 
 def test_a_diagnosis_that_fails_leaves_the_report_with_a_note(

@@ -12,6 +12,7 @@ import builtins
 import errno
 import io
 import os
+import stat
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -127,7 +128,7 @@ class Watch:
 
 
 real_open, real_listdir = _io.open, os.listdir
-real_os_open, _real_readlink = os.open, os.readlink
+real_os_open, _real_readlink, _real_stat = os.open, os.readlink, os.stat
 current: Watch | None = None  # that of this process
 
 
@@ -203,11 +204,18 @@ def _os_opener(watched: Watch) -> Callable[..., int]:
     @wraps(real_os_open)
     def opened(path: Any, flags: int, mode: int = 0o777, *, dir_fd: int | None = None) -> int:
         writes = flags & (os.O_WRONLY | os.O_RDWR | os.O_CREAT)
-        kind = "open to write" if writes else "list" if flags & os.O_DIRECTORY else "open to read"
+        kind = "open to write" if writes else "list" if _is_folder(path, dir_fd) else "open to read"
         watched.at(kind, _joined(watched, path, dir_fd))
         return real_os_open(path, flags, mode, dir_fd=dir_fd)
 
     return opened
+
+
+def _is_folder(path: Any, folder: int | None) -> bool:
+    try:
+        return stat.S_ISDIR(_real_stat(path, dir_fd=folder).st_mode)
+    except OSError:
+        return False
 
 
 def _by_path(watched: Watch, kind: str, real: Callable[..., Any]) -> Callable[..., Any]:

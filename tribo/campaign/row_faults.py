@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import errno
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 from tribo.campaign.choice import split_choice
@@ -97,9 +97,16 @@ def _file_faults(root: Path, row: TestRow) -> list[Problem]:
             return [Problem("not_a_file", "not a regular file", *place, "a file of the campaign")]
         hint = _meant_file(root, path)
     except (OSError, ValueError, RuntimeError) as why:  # too long, no permission, links in a circle
-        return [replace(unexpected(why, "this path cannot be followed"), file=row.file, row=row.row, column="file")]
+        problem = unexpected(why, "this path cannot be followed")
+        kind = "path_not_usable" if _is_of_the_name(why) else problem.kind
+        return [Problem(kind, problem.what, *place)]
     allowed = f"a file of the campaign{f'; {hint}' if hint else ''}"
     return [Problem("missing", "this file does not exist" if name else "no file is given", *place, allowed)]
+
+
+def _is_of_the_name(why: Exception) -> bool:
+    """Whether the path itself is at fault, and not the system that could not follow it now."""
+    return isinstance(why, OSError) and why.errno in (errno.ENAMETOOLONG, errno.ELOOP)
 
 
 def _meant_file(root: Path, path: PurePosixPath) -> str:

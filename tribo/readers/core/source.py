@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from tribo.errors import Problem, ReadError
+from tribo.errors import Problem, ReadError, unexpected
 from tribo.input_files import MAPPED_BYTES, NotRegularError, TooLargeError, read_or_map
 from tribo.limits import LARGEST_EXPORT_BYTES as LARGEST_FILE_BYTES
 from tribo.quantities import match_quantity
@@ -190,7 +190,7 @@ def read_bytes(path: Path, file: str) -> bytes | mmap.mmap:
     except NotRegularError as why:
         raise ReadError(Problem("not_a_file", "not a regular file", file=file)) from why
     except OSError as why:
-        raise ReadError(Problem("unreadable", f"cannot be opened ({why.strerror})", file=file)) from why
+        raise ReadError(replace(unexpected(why, "cannot be opened"), file=file)) from why
 
 
 def _too_large(size: int, limit: int, file: str) -> ReadError:
