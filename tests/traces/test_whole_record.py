@@ -93,9 +93,10 @@ def test_a_record_that_begins_while_sliding_has_a_mean_and_no_static_force_and_n
     assert pull.sliding_N == pytest.approx(force.mean(), rel=0.01)
 
 
-def test_a_sliding_record_with_the_wrong_sign_says_so() -> None:
+@pytest.mark.parametrize("level_N", [-3.0, -0.5])
+def test_a_sliding_record_with_the_wrong_sign_says_so(level_N: float) -> None:
     with pytest.raises(TraceError, match="sign may be reversed"):
-        read_record(Trace("slides", np.arange(500) / RATE, -3.0 + noise(500)), test=a_test())
+        read_record(Trace("slides", np.arange(500) / RATE, level_N + noise(500)), test=a_test())
 
 
 def test_a_record_in_which_nothing_pulls_is_not_taken_for_sliding() -> None:
