@@ -216,9 +216,13 @@ def drawn(copy: Path, out: Path, n: int, seed: int) -> list[dict[str, Any]]:
 
 
 def tests_of(watched: dict[str, Any], mutant: dict[str, Any]) -> list[int]:
-    """Tests that run the line, the quickest first, within the limit; of a line run on import, those of the module."""
+    """Tests that run the line, the quickest first, within the limit.
+
+    Of a line run on import, those of its module; any test where all of the module is run on import.
+    """
     lines = watched["lines"].get(mutant["file"], {})
     found = set(lines.get(str(mutant["line"]), [])) or {test for tests in lines.values() for test in tests}
+    found = found or set(range(len(watched["tests"])))
     chosen, spent = [], 0.0
     for test in sorted(found, key=lambda k: (watched["seconds"][k], k)):
         spent += watched["seconds"][test]

@@ -126,3 +126,15 @@ def test_of_tests_that_a_cause_can_say_nothing_about_it_says_what_the_model_says
     assert same is not None
     assert found.difference == pytest.approx(0.0, abs=0.05)
     assert found.rmse_percent_before == pytest.approx(same.rmse_percent_after)
+
+
+def test_what_is_left_out_is_scored_with_the_uncertainty_of_its_own_reading() -> None:
+    """Forces read to 30 % and repeated to 3 %: the density has to allow for both."""
+    rng, read_sd = np.random.default_rng(2), 0.3
+    begun = baseline(made(lambda s: read_sd * rng.normal(size=(s.observations.n, 2)), 0, FLAT, (REPEAT_SD, REPEAT_SD)))
+    o = begun.setup.observations
+    f = fit(replace(begun.setup, observations=replace(o, reading=np.full((o.n, 2), read_sd))), (), start=begun)
+    found = gain(f, f, np.random.default_rng(0))
+    assert found is not None
+    expected = -np.log(2 * np.pi * (read_sd**2 + REPEAT_SD**2)) - 1.0
+    assert found.log_score_baseline == pytest.approx(expected, abs=0.3)

@@ -90,3 +90,17 @@ def test_single_pulls_have_no_repeats_to_scatter() -> None:
     table = campaign(1).drop_duplicates(["specimen", "normal_load_N"])
     assert repeat_scatter(sample_rows(table, "static")) is None
     assert np.isfinite(fit_samples(table, "static", AREA, weights="repeats")[0].values).all()
+
+
+@pytest.mark.parametrize(("off_N", "cells"), [(3.0, 40), (2.0, 41)])
+def test_a_cell_of_repeats_counts_unless_chance_gives_its_scatter_less_than_once_in_a_thousand(
+    off_N: float, cells: int
+) -> None:
+    """Three pulls of 10 N a cell, 1 N apart: chance reaches 6.9 times the variance once in a thousand cells."""
+    apart = [1.0] * 40 + [off_N]
+    rows = [("A", f"A{k}", 1.0, 10.0 + shift * d) for k, d in enumerate(apart) for shift in (-1, 0, 1)]
+    table = pd.DataFrame(rows, columns=["sample", "specimen", "normal_load_N", "static_N"])
+    found = repeat_scatter(sample_rows(table, "static"))
+    assert found is not None
+    assert found.dof == 2 * cells
+    assert found.variance(np.array([10.0]))[0] == pytest.approx(1.0 if cells == 40 else 44 / 41, rel=1e-3)

@@ -8,19 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.errors import TraceError
+from tribo.errors import Problem, TraceError
 from tribo.records import Pull, Test, Trace
 from tribo.traces import read_pull, read_record
-from tribo.traces.course import _drive_stops
+from tribo.traces.course import _drive_stops, _moving
 from tribo.traces.oscillation import oscillation_of
 from tribo.traces.rules import RULES
 from tribo.traces.sliding import settled
 from tribo.traces.whole_record import Reading
+from tribo.traces.zero import _level
 from tribo.zeroing import zero_choice
 
 from .synthetic import Shape
 
 RATE = 50.0
+NO_ZERO = Problem("no_zero_there", "the record has no part before contact")
 
 
 def a_test(zero: str = "", load_N: float = math.nan, **more: float) -> Test:
@@ -91,9 +93,10 @@ def test_a_record_that_begins_while_sliding_has_a_mean_and_no_static_force_and_n
     assert pull.sliding_N == pytest.approx(force.mean(), rel=0.01)
 
 
-def test_a_sliding_record_with_the_wrong_sign_says_so() -> None:
+@pytest.mark.parametrize("level_N", [-3.0, -0.5])
+def test_a_sliding_record_with_the_wrong_sign_says_so(level_N: float) -> None:
     with pytest.raises(TraceError, match="sign may be reversed"):
-        read_record(Trace("slides", np.arange(500) / RATE, -3.0 + noise(500)), test=a_test())
+        read_record(Trace("slides", np.arange(500) / RATE, level_N + noise(500)), test=a_test())
 
 
 def test_a_record_in_which_nothing_pulls_is_not_taken_for_sliding() -> None:
@@ -337,3 +340,27 @@ def test_a_stop_of_the_drive_counts_where_the_bodies_touch_before_and_after_it()
     assert _drive_stops(moving, (0, 60))[0] == [(20, 30)]
     assert _drive_stops(moving, (0, 61))[0] == [(20, 30), (50, 60)]
     assert _drive_stops(np.zeros(9, bool), (2, 7)) == ([], 7, [])
+
+
+def test_a_displacement_that_goes_one_way_tells_where_the_drive_stands_still() -> None:
+    travel = np.concatenate([np.arange(1000), np.full(1000, 999), np.arange(1000) + 999]) * 1e-6
+    record = Trace("x", np.arange(3000) / 100, np.ones(3000), displacement_m=travel)
+    moving = _moving(record)
+    assert moving is not None
+    assert moving[:990].all()
+    assert not moving[1010:1990].any()
+    assert moving[2010:].all()
+    assert _moving(replace(record, displacement_m=1e-4 * np.sin(np.arange(3000) / 100))) is None  # to and fro
+    assert _moving(replace(record, displacement_m=np.zeros(3000))) is None
+
+
+def test_what_a_zero_drifts_is_in_its_uncertainty_as_a_rectangular_distribution() -> None:
+    """From 0 to 0.5 N: the medians of the first and the last fifth lie 0.4 N apart."""
+    time = np.arange(400) / RATE
+    steady = _level(time, noise(400, sd=1e-3), (0, 400), "before contact", NO_ZERO)
+    drifting = _level(time, np.linspace(0.0, 0.5, 400) + noise(400, sd=1e-3), (0, 400), "before contact", NO_ZERO)
+    assert not steady.drifts
+    assert steady.u_N < 1e-3
+    assert drifting.drifts
+    assert drifting.force_N == pytest.approx(0.25, abs=1e-3)
+    assert drifting.u_N == pytest.approx(0.4 / math.sqrt(12.0), rel=0.01)
