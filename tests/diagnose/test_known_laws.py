@@ -99,15 +99,6 @@ def test_the_form_of_a_known_law_may_be_wrong_by_some_of_its_effect() -> None:
     assert answers == ["held", "held", "not held"]
 
 
-def test_a_law_of_the_right_size_but_of_another_form_does_not_hold() -> None:
-    sharp: Change = lambda s: 2.0 * stepped(s)  # noqa: E731
-    model = baseline(made(sharp, seed=31))
-    line = holds(model, WARM, {"a": Estimate(1.0, 0.6, 1.4, "")})
-    assert line.answer == "not held"
-    assert "another form of the same column explains this campaign better" in line.text
-    assert holds(model, STEP, {"a": Estimate(0.6, 0.5, 0.7, "")}).answer == "held"
-
-
 def test_every_faulty_law_of_a_folder_is_named(folder: Path) -> None:
     (folder / "law-3.toml").write_text("x = 1")
     (folder / "law-4.toml").write_text("y = [")

@@ -8,8 +8,8 @@ from itertools import combinations
 
 import numpy as np
 
-from tribo.diagnose.discovery.grammar import Group, groups_of, shapes_of
-from tribo.diagnose.discovery.scoring import acts_of_one, courses_of, terms_of
+from tribo.diagnose.discovery.grammar import groups_of, shapes_of
+from tribo.diagnose.discovery.scoring import courses_of
 from tribo.diagnose.discovery.settling import CLOSE, Searched, forms_in_reach
 from tribo.diagnose.discovery.written_law import Shape, WrittenLaw, column_values
 from tribo.diagnose.search.weighing import refitted
@@ -25,8 +25,6 @@ from tribo.mechanisms.record import Conditions
 # 7100); where a start of the series is taken for run-in, one is by 2 to 7 in eight of nine (tests/blind/hidden_laws.py,
 # seed 4001).
 MARGIN = {True: 2.0 * CLOSE, False: CLOSE}
-# By which another form of the columns of a known law has to be better to refute its form.
-REFUTED = 4.0 * CLOSE
 # A covariate is a law of the grammar itself, on all samples and in both regimes. It stays where another law of its own
 # column cannot be told from it; between its column and another one of the series, the likelier counts.
 MARGIN_OF_COVARIATE = {True: CLOSE, False: 0.0}
@@ -139,24 +137,6 @@ def without_rivals(model: ModelFit, law: WrittenLaw) -> tuple[ModelFit, dict[str
     instead = refitted(without, [*without.acting, Acting(law.mechanism())])
     by = instead.score - model.score
     return (without, {a.name: by for a in rivals}) if by > -CLOSE else (model, {})
-
-
-def better_form(model: ModelFit, law: WrittenLaw) -> float:
-    """Log likelihood by which the best form of the columns of a ``law`` explains what a model leaves better than its
-    own form, at the noise that the best one leaves; not above zero where none does.
-
-    Its own form may have other places here: those of the law are known from another campaign, and not exactly.
-    """
-    c = model.setup.observations.conditions
-    shapes = _of_columns(c, set(law.columns))
-    if not shapes:
-        return -np.inf
-    forms, state = forms_in_reach(model, Searched(courses_of(shapes, c), tuple(groups_of(c))))
-    group = Group(law.acts_on, law.regime, law.where, law.where_scale, 0.0)
-    acts = acts_of_one(group, c, terms_of(model))
-    gained = state.projected.joint_gain(law.course(c)[:, None, :] * acts[:, :, None])
-    own = max([gained, *(form.evidence for form in forms if form.best.form == law.form)])
-    return forms[0].evidence - own
 
 
 def _of_columns(c: Conditions, columns: set[str]) -> list[tuple[tuple[Shape, ...], float]]:
