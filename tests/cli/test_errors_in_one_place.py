@@ -97,6 +97,14 @@ def test_a_step_of_a_build_that_the_machine_failed_is_tried_again(
     assert (tmp_path / "fit.json").is_file() is recorded
 
 
+def test_a_step_of_a_build_that_ends_without_a_word_on_its_input_is_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tribo.cli.workflow_step._run", lambda command: (1, {}))
+    assert run_step(tmp_path / "fit.json", ["fit"], "digest") == 1
+    assert not (tmp_path / "fit.json").exists()
+
+
 @pytest.mark.parametrize(("kind", "status", "recorded"), [("system", 3, False), ("no_load", 0, True)])
 def test_a_step_of_a_build_without_a_test_that_the_machine_could_not_read_is_tried_again(
     kind: str, status: int, recorded: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -41,6 +41,8 @@ def run_step(
         return status
     if status != DONE and any(is_of_the_system(str(problem.get("kind"))) for problem in _problems(said)):
         return status  # no fault of the input: the next build tries again
+    if status == UNUSABLE and not said.get("problems"):
+        return status  # what the input lacks was not told, so that this says nothing about it
     finished = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     written = {
         "command": ["tribo", *command],

@@ -34,6 +34,7 @@ from tribo.store.kept_results import package_sources
 from tribo.store.lock import WAIT, only_writer
 from tribo.store.own_folder import STATE, check_site, is_leftover
 from tribo.store.whole_files import write_text
+from tribo.temporary import PREFIX, clear_abandoned, place_of_temporary_files
 from tribo.traces.pull import named_rule
 
 GONE = "report.html has been deleted"
@@ -162,6 +163,7 @@ def _clear_leftovers(state: Path) -> None:
         if is_leftover(path.name) and path.is_file():
             path.unlink()
     clear_unfinished(site)
+    clear_abandoned(place_of_temporary_files(), PREFIX)
 
 
 def _planned(drop: Path, state: Path, options: BuildOptions, watch: Watch) -> Built:
