@@ -145,6 +145,11 @@ def unexpected(why: Exception, what: str, file: str | None = None) -> Problem:
     return Problem("unexpected", f"{what} because of an error in tribo ({detail})", file=file)
 
 
+def of_the_system(problem: Problem) -> Problem:
+    """The same problem as one of the machine and not of the input."""
+    return replace(problem, kind=_OF_THE_SYSTEM)
+
+
 def is_of_the_system(kind: str) -> bool:
     """Whether a problem of this kind is one of the machine and not of the input."""
     return kind in (_OF_THE_SYSTEM, "out_of_memory")

@@ -13,9 +13,9 @@ import pytest
 from on_the_command_line import run
 
 from tribo.campaign import load_campaign
-from tribo.cli.console import Console
+from tribo.cli.console import Console, problems_of
 from tribo.cli.workflow_step import run_step
-from tribo.errors import Problem, ReadError, TriboError, is_of_the_system, system_problem
+from tribo.errors import Problem, ReadError, SimulationError, TriboError, is_of_the_system, system_problem
 from tribo.readers.core import source
 
 
@@ -95,6 +95,13 @@ def test_a_step_of_a_build_that_the_machine_failed_is_tried_again(
     monkeypatch.setattr("tribo.cli.workflow_step._run", lambda command: (1, said))
     assert run_step(tmp_path / "fit.json", ["fit"], "digest") == status
     assert (tmp_path / "fit.json").is_file() is recorded
+
+
+@pytest.mark.parametrize(("cause", "kind"), [(PermissionError(13, "x"), "system"), (FileNotFoundError(2, "x"), "no")])
+def test_what_an_error_of_the_system_caused_is_no_fault_of_the_input(cause: OSError, kind: str) -> None:
+    why = SimulationError(Problem("no", "cannot be read", file="a.nc"))
+    why.__cause__ = cause
+    assert [(p.kind, p.what, p.file) for p in problems_of(why)] == [(kind, "cannot be read", "a.nc")]
 
 
 def test_a_step_of_a_build_that_ends_without_a_word_on_its_input_is_tried_again(

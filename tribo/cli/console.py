@@ -20,7 +20,7 @@ import click
 
 from tribo.cli.grouped_faults import doubts_text, faults_text, set_aside_text
 from tribo.cli.interruption import damage_said, ended_by_terminate
-from tribo.errors import Problem, TriboError, system_problem, unexpected
+from tribo.errors import Problem, TriboError, failed_by_system, of_the_system, system_problem, unexpected
 from tribo.escaping import printable
 from tribo.records import Doubt, SetAside
 from tribo.store.lock import BusyError
@@ -210,9 +210,13 @@ def _report_faults(console: Console, why: Exception) -> None:
 
 
 def problems_of(why: Exception) -> tuple[Problem, ...]:
-    """What ended a command: the problems it found, an error of the system with its path, or an error of tribo."""
+    """What ended a command: the problems it found, an error of the system with its path, or an error of tribo.
+
+    Problems that an error of the system caused are problems of the system, whatever they are called.
+    """
     if isinstance(why, TriboError):
-        return why.problems
+        by_system = why.__cause__ is not None and failed_by_system(why.__cause__)
+        return tuple(map(of_the_system, why.problems)) if by_system else why.problems
     if isinstance(why, OSError):
         logging.getLogger("tribo").debug("an error of the system", exc_info=why)
         return (system_problem(why),)
