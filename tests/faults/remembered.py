@@ -31,9 +31,7 @@ class Remembered:
 
     def read(self) -> None:
         """What other processes have made since."""
-        if self.file.is_file():
-            with real_open(self.file, "rb") as file:
-                self.known |= pickle.load(file)
+        self.known |= _kept_in(self.file) or {}
 
     def made(self, key: str, make: Callable[[], T]) -> T:
         """What this process or another has made, or else will make now."""
@@ -41,12 +39,25 @@ class Remembered:
             self.read()
         if key not in self.known:
             self.known[key] = make()
-            whole = self.file.with_name(f"{self.file.name}-{os.getpid()}")
-            with real_open(whole, "wb") as file:
-                pickle.dump(self.known, file)
-            os.replace(whole, self.file)
+            _keep(self.known, self.file)
         found: T = self.known[key]
         return found
+
+
+def _keep(value: Any, file: Path) -> None:
+    """Write a value, so that no process reads half of it."""
+    whole = file.with_name(f"{file.name}-{os.getpid()}")
+    with real_open(whole, "wb") as stream:
+        pickle.dump(value, stream)
+    os.replace(whole, file)
+
+
+def _kept_in(file: Path) -> Any:
+    """The value that a file keeps; None without the file."""
+    if not file.is_file():
+        return None
+    with real_open(file, "rb") as stream:
+        return pickle.load(stream)
 
 
 class RememberedPages(Remembered):
@@ -153,7 +164,7 @@ class RememberedSteps:
         with watched.unseen():
             before = self._entries()
             file = self.folder / self._key(words, before)
-            known = self._known(file)
+            known: Step | None = _kept_in(file)
         if known is None:
             return self._first(work, watched, before, file)
         with watched.unseen():
@@ -176,19 +187,8 @@ class RememberedSteps:
             after = self._entries()
             changed = [name for name, digest in after.items() if before.get(name) != digest]
             made = {name: self._content(name, after[name]) for name in changed}
-            step = Step(status, said.getvalue(), seen, made, sorted(before.keys() - after.keys()))
-            whole = file.with_name(f"{file.name}-{os.getpid()}")
-            with real_open(whole, "wb") as stream:
-                pickle.dump(step, stream)
-            os.replace(whole, file)
+            _keep(Step(status, said.getvalue(), seen, made, sorted(before.keys() - after.keys())), file)
         return status
-
-    def _known(self, file: Path) -> Step | None:
-        if not file.exists():
-            return None
-        with real_open(file, "rb") as stream:
-            step: Step = pickle.load(stream)
-        return step
 
     def _content(self, name: str, digest: str) -> bytes | None:
         return None if digest == FOLDER else (self.root / name).read_bytes()

@@ -44,6 +44,12 @@ THEME = {
     r"#([2-8][0-9a-f])\2\2": "var(--soft)",  # greys of lettering
     r"#([c-e][0-9a-f])\2\2": "var(--line)",
 }
+# Points of one shape and style, one after the other, and the place of each.
+_ALIKE = re.compile(
+    r'<use xlink:href="([^"]+)" x="[^"]*" y="[^"]*" style="([^"]*)"/>'
+    r'(?:\s*<use xlink:href="\1" x="[^"]*" y="[^"]*" style="\2"/>)+'
+)
+_PLACE = re.compile(r' x="([^"]*)" y="([^"]*)" style="[^"]*"/>\s*')
 
 
 @dataclass(frozen=True)
@@ -198,13 +204,6 @@ def inline_svg(svg: str, name: str, label: str) -> str:
     paper = ' class="on-paper"' if has_colour_scale else ""
     body = body.replace("<svg", f'<svg{paper} role="img" aria-label="{label}"', 1)
     return "\n".join(line.rstrip() for line in body.splitlines())
-
-
-_ALIKE = re.compile(
-    r'<use xlink:href="([^"]+)" x="[^"]*" y="[^"]*" style="([^"]*)"/>'
-    r'(?:\s*<use xlink:href="\1" x="[^"]*" y="[^"]*" style="\2"/>)+'
-)
-_PLACE = re.compile(r' x="([^"]*)" y="([^"]*)" style="[^"]*"/>\s*')
 
 
 def _in_one_group(alike: re.Match[str]) -> str:
