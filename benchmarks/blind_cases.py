@@ -31,8 +31,8 @@ from blind.patterns import ErrorSize
 from blind.tribometer import EFFECTS, LARGEST, Design, hide, write
 
 if TYPE_CHECKING:
-    from tribo.diagnose.diagnosis import Diagnosis
-    from tribo.diagnose.statistics.model import Setup
+    from tribo.diagnostics.diagnosis import Diagnosis
+    from tribo.diagnostics.model import Setup
     from tribo.records import Ingested
 
 SPEEDS, HOLDS = (0.06, 0.2, 0.7), (3.0, 30.0, 600.0)
@@ -74,7 +74,7 @@ def assumed_errors() -> Mapping[str, ErrorSize]:
 
     Read from the diagnosis here, where campaigns are counted; the generator is only told the numbers.
     """
-    from tribo.diagnose.statistics.predictor import tabled_predictor
+    from tribo.diagnostics.predictor import tabled_predictor
 
     samples = [s for s in Design.samples if s != "F"]
     p = tabled_predictor({s: pattern_of(s) for s in Design.samples})
@@ -195,7 +195,7 @@ def through_files(case: Case) -> bool:
 
 def answer(case: Case, replicates: tuple[int, int] | None = None) -> dict[str, Any]:
     """Hide, read, diagnose: what the diagnosis said, beside what was hidden."""
-    from tribo.diagnose import examine
+    from tribo.diagnostics import examine
 
     begin = time.process_time()
     options: dict[str, Any] = {} if replicates is None else {"replicates": replicates}
@@ -244,7 +244,7 @@ def true_parameter(name: str, size: float) -> dict[str, float]:
 
 def true_corrections(case: Case, s: Setup) -> dict[tuple[str, str], float]:
     """What every patterned sample is over the model at the true flat law, in percent: geometric mean over its tests."""
-    from tribo.diagnose.statistics.model import predict
+    from tribo.diagnostics.model import predict
 
     exact = hide(case.seed, list(case.effects), replace(case.design, **EXACT))
     order = [list(exact.tests.test_id).index(name) for name in s.observations.test_ids]
@@ -259,9 +259,9 @@ def true_corrections(case: Case, s: Setup) -> dict[tuple[str, str], float]:
 
 def gain_of_the_best(d: Diagnosis, seed: int) -> list[float]:
     """What the mechanism that fits best by chance gains on samples left out: mean log score, standard error."""
-    from tribo.diagnose.search.weighing import weigh
-    from tribo.diagnose.statistics.gain import gain
-    from tribo.diagnose.statistics.start_effects import start_effects
+    from tribo.diagnostics.candidates import weigh
+    from tribo.diagnostics.gain import gain
+    from tribo.diagnostics.score_statistics import start_effects
 
     found = gain(d.baseline, weigh(start_effects(d.baseline))[0].fit, np.random.default_rng(seed))
     return [round(found.difference, 5), round(found.se, 5)] if found is not None else []
@@ -294,13 +294,12 @@ class Staircase:
 
 def is_seen(case: Case) -> bool:
     """Whether anything is seen at all: the first part of a diagnosis, without naming."""
-    from tribo.diagnose.search.looks import all_looks
-    from tribo.diagnose.search.screen import screen
-    from tribo.diagnose.statistics.direct_evidence import rise_stiffening, zero_drift, zero_offset
-    from tribo.diagnose.statistics.fit import fit
-    from tribo.diagnose.statistics.model import setup, start_changes
-    from tribo.diagnose.statistics.observations import observe
-    from tribo.diagnose.statistics.predictor import tabled_predictor
+    from tribo.diagnostics.contrasts import all_looks, screen
+    from tribo.diagnostics.direct_evidence import rise_stiffening, zero_drift, zero_offset
+    from tribo.diagnostics.fit import fit
+    from tribo.diagnostics.model import setup, start_changes
+    from tribo.diagnostics.observations import observe
+    from tribo.diagnostics.predictor import tabled_predictor
 
     o = observe(make_campaign(case))
     if any(e is not None and e.certain for e in (zero_offset(o), zero_drift(o), rise_stiffening(o))):

@@ -24,18 +24,17 @@ from run_lines import read_rows, work_off
 import numpy as np  # after blind_cases, which says how many threads it may use  # isort: skip
 from blind.hidden_laws import FORMS, Hidden, as_ingested, hide_law  # isort: skip
 
-from tribo.diagnose.diagnosis import examine
-from tribo.diagnose.discovery.contested import CauseForms
-from tribo.diagnose.discovery.held import holds
-from tribo.diagnose.discovery.in_verdict import uncontested
-from tribo.diagnose.discovery.on_campaign import searched_laws
-from tribo.diagnose.discovery.scoring import terms_of
-from tribo.diagnose.discovery.search import Discovery
-from tribo.diagnose.discovery.settling import FoundLaw, centred
-from tribo.diagnose.discovery.written_law import LOAD_TERM
-from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.model import Acting, Setup, predict, setup
-from tribo.diagnose.statistics.observations import observe
+from tribo.diagnostics.diagnosis import examine
+from tribo.diagnostics.fit import fit
+from tribo.diagnostics.model import Acting, Setup, predict, setup
+from tribo.diagnostics.observations import observe
+from tribo.lawsearch.diagnosis_with_laws import uncontested
+from tribo.lawsearch.discovery import searched_laws
+from tribo.lawsearch.grammar import LOAD_TERM
+from tribo.lawsearch.known_laws import holds
+from tribo.lawsearch.model_choice import CauseForms, FoundLaw, centred
+from tribo.lawsearch.scoring import terms_of
+from tribo.lawsearch.search import Discovery
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "results" / "blind-laws.md"
 MARK = "<!-- below: python benchmarks/blind_laws.py page -->"

@@ -151,9 +151,9 @@ def work(piece: Piece) -> dict[str, Any]:
 
 def of_clean(case: Case) -> dict[str, Any]:
     """Causes and laws of a campaign with nothing but wrong patterns, and how many corrections hold the truth."""
-    from tribo.diagnose.diagnosis import examine
-    from tribo.diagnose.discovery.in_verdict import with_laws
-    from tribo.diagnose.statistics.pattern_correction import pattern_corrections
+    from tribo.diagnostics.diagnosis import examine
+    from tribo.diagnostics.intervals import pattern_corrections
+    from tribo.lawsearch.diagnosis_with_laws import with_laws
 
     d = examine(make_campaign(case), seed=case.seed)
     corrections = pattern_corrections(d.baseline)
@@ -187,11 +187,11 @@ def strength_of(task: tuple[str, str, float, int]) -> dict[str, Any]:
     """How strongly the score test shows an effect of one ``size`` in the same campaigns with these patterns: normal
     deviates. For an effect that wrong patterns do not resemble, the size seen half the time goes as one over their
     mean, without the chance of a staircase."""
-    from tribo.diagnose.statistics.fit import fit
-    from tribo.diagnose.statistics.model import setup
-    from tribo.diagnose.statistics.observations import observe
-    from tribo.diagnose.statistics.predictor import tabled_predictor
-    from tribo.diagnose.statistics.start_effects import start_effects
+    from tribo.diagnostics.fit import fit
+    from tribo.diagnostics.model import setup
+    from tribo.diagnostics.observations import observe
+    from tribo.diagnostics.predictor import tabled_predictor
+    from tribo.diagnostics.score_statistics import start_effects
 
     name, which, size, seed = task
     found = []

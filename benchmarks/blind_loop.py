@@ -13,7 +13,7 @@ from blind.direct import ingested  # isort: skip
 from blind.tribometer import Bench, hide, with_further  # isort: skip
 
 if TYPE_CHECKING:
-    from tribo.diagnose.verdict import Verdict
+    from tribo.diagnostics.verdict import Verdict
     from tribo.records import Ingested
 
 MOST_TESTS = 3
@@ -21,7 +21,7 @@ MOST_TESTS = 3
 
 def closed_loop(case: Case) -> dict[str, Any]:
     """Diagnose, make the proposed test, diagnose again, until one answer stands; the tests made are in ``steps``."""
-    from tribo.diagnose.diagnosis import examine
+    from tribo.diagnostics.diagnosis import examine
 
     bench, measured = hide(case.seed, list(case.effects), case.design), dict[str, tuple[float, float]]()
     steps: list[dict[str, Any]] = []

@@ -24,8 +24,8 @@ from interval_coverage import AREA_M2, STANDARD, Design, campaign, laws
 
 from tribo.fitting import fit_samples, uncertainty_budget
 from tribo.fitting.budget import DEFAULTS, PRESSURE_PA, Budget
+from tribo.fitting.linear import sample_rows
 from tribo.fitting.partial_pooling import PRIOR_DOF, partly_pooled
-from tribo.fitting.rows import sample_rows
 from tribo.records import STANDARD_GRAVITY
 
 NUMBERS = ("mu", "tau0_kPa", "T_N")

@@ -38,7 +38,7 @@ EFFECTS = {
     "run_in": 2.0, "edge_adhesion": 2.1, "pattern_geometry": 1.9, "cavity_shear_deformation": 1.9,
     "mislabelled_specimen": 1.0, "load_cell_offset": 0.05,
 }  # fmt: skip
-STATISTICS, SEARCH = "tribo.diagnose.statistics", "tribo.diagnose.search"
+STATISTICS, SEARCH = "tribo.diagnostics.statistics", "tribo.diagnostics.search"
 Value = Any
 
 

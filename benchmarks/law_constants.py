@@ -25,15 +25,15 @@ from run_lines import read_rows, work_off
 import numpy as np  # after blind_cases, which says how many threads it may use  # isort: skip
 from blind.hidden_laws import FORMS, Hidden, as_ingested, hide_law  # isort: skip
 
-from tribo.diagnose.diagnosis import examine
-from tribo.diagnose.diagnosis_record import Diagnosis
-from tribo.diagnose.discovery.in_verdict import uncontested
-from tribo.diagnose.discovery.search import Grammar
-from tribo.diagnose.discovery.settling import Searched, best_form
-from tribo.diagnose.discovery.written_law import WrittenLaw
+from tribo.diagnostics.diagnosis import examine
+from tribo.diagnostics.diagnosis_record import Diagnosis
+from tribo.lawsearch.diagnosis_with_laws import uncontested
+from tribo.lawsearch.grammar import WrittenLaw
+from tribo.lawsearch.model_choice import Searched, best_form
+from tribo.lawsearch.search import Grammar
 
 SEED = 7_701
-HOUSE = "tribo.diagnose.discovery"
+HOUSE = "tribo.lawsearch"
 Change = Callable[[Any, float], Any]
 
 

@@ -20,7 +20,7 @@ from tribo.mechanisms.record import Base
 from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model.extended_run import SIMULATED, simulate_with
 from tribo.mechanisms_in_model.on_blocks import RECORDED, conditions_of_run
-from tribo.simulate import SimConfig, simulate
+from tribo.springblock import SimConfig, simulate
 
 CASES = (("F", 8e3, 20.0), ("B", 4e3, 20.0), ("B", 16e3, 20.0), ("C", 8e3, 20.0), ("Sx", 8e3, 5.0))
 GIVEN = {"humidity_pct": 58.0, "hold_s": 100.0, "temperature_C": 25.0, "speed_m_s": 8e-4, "specimen_run": 2.0}

@@ -38,8 +38,8 @@ ROOMS = {
     "diagnose: statistics": "tribo/diagnose/statistics",
     "diagnose: search": "tribo/diagnose/search",
     "mechanisms": "tribo/mechanisms",
-    "readers: reading": "tribo/readers/core/reading.py",
-    "readers: wide tables": "tribo/readers/core/wide.py",
+    "readers: reading": "tribo/readers/reading.py",
+    "readers: wide tables": "tribo/readers/wide_tables.py",
 }
 TESTS = ("traces", "fitting", "diagnose", "mechanisms", "mechanisms_in_model", "readers", "ingestion")
 LIMIT_S = 12.0  # of processor time for the tests of one mutant, as they take without it

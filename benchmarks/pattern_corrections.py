@@ -17,11 +17,11 @@ import numpy as np  # after blind_cases, which says how many threads it may use 
 from blind.direct import ingested  # isort: skip
 from blind.tribometer import hide  # isort: skip
 
-from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.model import setup
-from tribo.diagnose.statistics.observations import observe
-from tribo.diagnose.statistics.pattern_correction import pattern_corrections
-from tribo.diagnose.statistics.predictor import tabled_predictor
+from tribo.diagnostics.fit import fit
+from tribo.diagnostics.intervals import pattern_corrections
+from tribo.diagnostics.model import setup
+from tribo.diagnostics.observations import observe
+from tribo.diagnostics.predictor import tabled_predictor
 
 FACTORS = (0.5, 1.0, 1.5, 2.0, 3.0)
 

@@ -19,12 +19,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tribo.diagnose.statistics import pattern_error
-from tribo.diagnose.statistics.pattern_table import flat_law, simulated_patterns
-from tribo.simulate import run_stored
-from tribo.simulate.pattern_laws import KEPT, origin, pattern_laws, write_table
-from tribo.simulate.table2_column import table2_design
-from tribo.store.kept_results import sources
+from tribo.cache.kept_results import sources
+from tribo.diagnostics import pattern_error
+from tribo.diagnostics.predictor import flat_law, simulated_patterns
+from tribo.springblock import run_stored
+from tribo.springblock.pattern_laws import KEPT, origin, pattern_laws, write_table
+from tribo.springblock.table2_column import table2_design
 
 SEED = 0
 COMMAND = "python benchmarks/pattern_shares.py"

@@ -29,11 +29,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tribo.simulate import SimConfig, simulate
-from tribo.simulate.energy import energy_balance
-from tribo.simulate.engines import reference as r
-from tribo.simulate.engines.fast import Trajectory, drive_of, first_failure_s, lattice_of, run_fast, thresholds_of
-from tribo.simulate.engines.reference import run_reference
+from tribo.springblock import SimConfig, simulate
+from tribo.springblock.energy import energy_balance
+from tribo.springblock.engines import reference as r
+from tribo.springblock.engines.fast import Trajectory, drive_of, first_failure_s, lattice_of, run_fast, thresholds_of
+from tribo.springblock.engines.reference import run_reference
 
 SAMPLES = ("F", "A", "B", "C", "Sx", "Sy")
 PRESSURES_PA = (2e3, 3e3, 5e3, 10e3, 15e3, 25e3, 40e3)

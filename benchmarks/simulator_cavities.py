@@ -20,12 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.records import FloatArray
-from tribo.simulate import SimConfig
-from tribo.simulate.engines.fast import drive_of, first_failure_s, lattice_of, run_fast, thresholds_of
-from tribo.simulate.engines.jit import compiled
-from tribo.simulate.engines.lattice import Lattice
-from tribo.simulate.engines.strips import last_stretch
-from tribo.simulate.run import run_of
+from tribo.springblock import SimConfig
+from tribo.springblock.engines.fast import drive_of, first_failure_s, lattice_of, run_fast, thresholds_of
+from tribo.springblock.engines.jit import compiled
+from tribo.springblock.engines.strips import last_stretch
+from tribo.springblock.lattice import Lattice
+from tribo.springblock.run import run_of
 
 CASES = (("A", 20.0), ("C", 20.0))
 

@@ -27,12 +27,12 @@ import pandas as pd
 
 from tribo.published import load_table2
 from tribo.records import FloatArray, Run
-from tribo.simulate import SimConfig, read_stored, simulate, stratified_design, table2_design
-from tribo.simulate.calibration import expected_minimum
-from tribo.simulate.engines.fast import lattice_of, thresholds_of
-from tribo.simulate.ensemble import run_row
-from tribo.simulate.local_friction import PAPER
-from tribo.simulate.table2_column import PRESSURES_PA, SAMPLES, beside, fitted, means
+from tribo.springblock import SimConfig, read_stored, simulate, stratified_design, table2_design
+from tribo.springblock.calibration import expected_minimum
+from tribo.springblock.config import PAPER
+from tribo.springblock.engines.fast import lattice_of, thresholds_of
+from tribo.springblock.ensemble import run_row
+from tribo.springblock.table2_column import PRESSURES_PA, SAMPLES, beside, fitted, means
 
 READING = SimConfig().of_reading("berardo2019")
 REGIMES = ("static", "sliding")

@@ -53,8 +53,8 @@ def ours() -> list[Figure]:
     """The step of all blocks, and the steps a run does without doing them: blocks times steps over its time."""
     from importlib.metadata import version
 
-    from tribo.simulate import SimConfig
-    from tribo.simulate.engine_speed import dense_rate, timed_run
+    from tribo.springblock import SimConfig
+    from tribo.springblock.engine_speed import dense_rate, timed_run
 
     figures = [Figure("tribo", version("tribo"), "step of all blocks", next(iter(dense_rate())).value)]
     for sample, angle_deg in (("F", 20.0), ("C", 20.0)):

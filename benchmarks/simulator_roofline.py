@@ -5,7 +5,7 @@
 One core, float64, best of several rounds in processor time: products and sums, roots and quotients on numbers that lie
 in the nearest cache, and the traffic of a sum of arrays that together are as large as the planes of 85 x 85 blocks, or
 far larger than any cache. Then what the step needs of each, counted from the two loops in
-``tribo.simulate.engines.dense``.
+``tribo.springblock.engines.dense``.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from collections.abc import Callable
 import numpy as np
 
 from tribo.records import FloatArray
-from tribo.simulate.engine_speed import dense_rate
-from tribo.simulate.engines.jit import vectorised, widest_vectors
+from tribo.springblock.engine_speed import dense_rate
+from tribo.springblock.engines.jit import vectorised, widest_vectors
 
 # of one block and step: sums and products of both loops, roots, quotients, bytes read and written (planes of float64)
 FLOPS, ROOTS, QUOTIENTS = 26 + 24, 1, 1

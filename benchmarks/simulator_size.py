@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tribo.simulate import PAPER, SimConfig, simulate, stratified_design
-from tribo.simulate.calibration import expected_minimum
+from tribo.springblock import PAPER, SimConfig, simulate, stratified_design
+from tribo.springblock.calibration import expected_minimum
 
 SIDES = {10: 40, 20: 40, 43: 40, 85: 40, 170: 20, 340: 12, 680: 6, 1000: 4}  # blocks a side: seeds
 MESHES = ((5.0, "square"), (2.5, "square"), (2.5, "round"))

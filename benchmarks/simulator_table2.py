@@ -17,9 +17,9 @@ import time
 from pathlib import Path
 
 from tribo.published import load_table2
-from tribo.simulate import SimConfig, read_stored
-from tribo.simulate.table2_column import beside, distance, fitted
-from tribo.simulate.table2_readings import combinations, run_study, study_designs
+from tribo.springblock import SimConfig, read_stored
+from tribo.springblock.table2_column import beside, distance, fitted
+from tribo.springblock.table2_readings import combinations, run_study, study_designs
 
 BASE = SimConfig(dt_s=1e-7, rest_tolerance=1e-2)
 

@@ -29,10 +29,10 @@ from unittest.mock import patch
 
 from torture_processes import REPORT, differing, ensemble, finished, quick_reports, results, run, zipped_campaign
 
+from tribo.cache.kept_results import Shelf, fingerprint
 from tribo.errors import TriboError
-from tribo.simulate import SimConfig, simulate, stratified_design
-from tribo.simulate.resume import run_stored
-from tribo.store.kept_results import Shelf, fingerprint
+from tribo.springblock import SimConfig, simulate, stratified_design
+from tribo.springblock.ensemble import run_stored
 
 PROCESSOR_S, WALL_S = 20, 120.0
 SAME, MADE_AGAIN, REFUSED, DIFFERENT, CRASHED = range(5)
@@ -57,7 +57,7 @@ def kept_outcome(path: Path, key: str, expected: str) -> int:
     def again() -> Any:
         raise MadeAgainError
 
-    with warnings.catch_warnings(), patch("tribo.store.kept_results.fingerprint", lambda *_: key):
+    with warnings.catch_warnings(), patch("tribo.cache.kept_results.fingerprint", lambda *_: key):
         warnings.simplefilter("ignore")
         try:
             found = Shelf(path.parent).take(path.stem, None, again)
@@ -74,7 +74,7 @@ def store_outcome(path: Path, design: list[SimConfig], runs: dict[SimConfig, Any
         made.append(config)
         return runs[config]
 
-    with warnings.catch_warnings(), patch("tribo.simulate.resume.simulate", look_up):
+    with warnings.catch_warnings(), patch("tribo.springblock.ensemble.simulate", look_up):
         warnings.simplefilter("ignore")
         try:
             run_stored(design, path, 1)
@@ -121,7 +121,7 @@ def flip_kept(kept: Path, work: Path, flips: int, rng: random.Random) -> Counter
         found = re.match(rb'\{"made_from": "([0-9a-f]{64})"', content)
         assert found is not None
         key = found[1].decode()
-        with patch("tribo.store.kept_results.fingerprint", lambda *_, key=key: key):
+        with patch("tribo.cache.kept_results.fingerprint", lambda *_, key=key: key):
             expected = fingerprint(Shelf(kept).take(intact.stem, None, dict))
         (work / intact.name).write_bytes(flipped(content, rng))
         outcomes[in_child(kept_outcome, work / intact.name, key, expected)] += 1

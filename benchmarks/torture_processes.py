@@ -34,7 +34,7 @@ from faults.remembered import RememberedPages
 from faults.trial import TIMES, run_command
 from forked_starts import stand_in_for_python, start_here
 
-from tribo.virtual_tribometer.sled import SledDesign, SledLaw, write_campaign
+from tribo.mechanisms_in_model.sled import SledDesign, SledLaw, write_campaign
 
 TOML = (
     '[campaign]\ntitle = "torture"\nnominal_area_mm2 = 55.0\nslider_mass_g = 1.5\n'
@@ -47,7 +47,7 @@ ENSEMBLE = (
     "1e-7", "--set", "rest_tolerance=0.01", "--jobs", "2", "-q", "-o", "e.nc", "--repeats",
 )  # fmt: skip
 BUILD = ("build", "../drop", "-o", "site", "--settle", "0", "--runs", "2", "--jobs", "2", "-q")
-OF_A_BUILD = ("snakemake.cli", "tribo.cli.workflow_step", "tribo.pipeline.index_page")
+OF_A_BUILD = ("snakemake.cli", "tribo.cli.workflow_step", "tribo.site.index_page")
 
 
 def small_campaign(folder: Path, specimens: int = 2, seed: int = 3) -> Path:
@@ -252,7 +252,7 @@ def ensemble(path: Path) -> str:
     """All rows and attributes of an ensemble as one hash; says where a run is not done."""
     import h5py
 
-    from tribo.simulate import read_stored
+    from tribo.springblock import read_stored
 
     table = read_stored(path)
     if not table["done"].all():

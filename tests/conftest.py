@@ -64,7 +64,7 @@ Once = Callable[[str, Callable[[Path], object]], Path]
 @pytest.fixture(scope="session")
 def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
     """once(name, make) -> a folder that ``make`` filled, the same in every process of this run of the tests."""
-    from tribo.store.lock import only_writer
+    from tribo.cache.own_folder import only_writer
 
     base = tmp_path_factory.getbasetemp()
     shared_by_all = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
@@ -84,7 +84,7 @@ def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
 @pytest.fixture(scope="session")
 def small_campaign(once: Once) -> Path:
     """A campaign of 24 pulls of the virtual tribometer: samples F and B, three specimens, two loads, two repeats."""
-    from tribo.virtual_tribometer.sled import SledDesign, SledLaw, write_campaign
+    from tribo.mechanisms_in_model.sled import SledDesign, SledLaw, write_campaign
 
     laws = {"F": SledLaw(4.8, 23e3, 2.9, 12e3), "B": SledLaw(3.6, 10e3, 2.9, 6e3)}
     toml = (

@@ -29,7 +29,7 @@ from tribo.campaign import load_campaign, open_campaign
 from tribo.errors import CampaignError, Problem, SimulationError
 from tribo.ingestion.overrides import TIMES, apply_overrides, read_overrides
 from tribo.records import Campaign, Ingested, Test
-from tribo.simulate.design_file import read_design, runs_of_design
+from tribo.springblock.design_file import read_design, runs_of_design
 
 Draw = Callable[[Any], Any]
 SAME, REFUSED, IN_PART, CHANGED = "same", "refused", "in part", "changed"

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tribo.virtual_tribometer.sled import EXPORTERS, SledDesign, SledLaw, SledTribometer, write_campaign
+from tribo.mechanisms_in_model.sled import EXPORTERS, SledDesign, SledLaw, SledTribometer, write_campaign
 
 DIALECTS = ("bluehill", "testxpert", "testsuite", "delimited")
 PATTERNS = """

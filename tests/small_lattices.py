@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from tribo.simulate import SimConfig
+from tribo.springblock import SimConfig
 
 
 @contextmanager

@@ -23,7 +23,7 @@ def test_every_public_name_is_there_documented_and_no_package(name: str) -> None
 
 
 def test_a_public_name_stays_what_it_is_after_its_package_was_imported() -> None:
-    code = "import tribo, tribo.cli, tribo.diagnose, tribo.report, tribo.simulate, tribo.fitting, types\n"
+    code = "import tribo, tribo.cli, tribo.diagnostics, tribo.report, tribo.springblock, tribo.fitting, types\n"
     code += "print([n for n in tribo.__all__ if isinstance(getattr(tribo, n), types.ModuleType)])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip()
     assert found == str(sorted(MODULES))

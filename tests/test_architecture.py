@@ -14,54 +14,48 @@ PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
 GROUND = {
-    "display", "errors", "limits", "escaping", "input_files", "quantity_names", "quantities", "zeroing",
-    "trace_records", "law_records", "records", "published", "zips",
-    "file_contents", "links", "temporary", "forked", "nearest", "sheets",
+    "display", "errors", "user_text", "input_files", "units", "zeroing", "records", "published", "files", "temporary",
+    "forked", "laws",
 }  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
-    ("escaping", set()),
-    ("display", {"escaping"}),
+    ("user_text", set()),
+    ("display", {"user_text"}),
     ("errors", {"display"}),
-    ("limits", set()),
-    ("input_files", {"errors", "limits"}),
-    ("quantity_names", set()),
-    ("quantities", {"errors", "quantity_names"}),
+    ("units", {"errors"}),
     ("zeroing", {"display"}),
-    ("trace_records", {"display", "errors"}),
-    ("law_records", {"display", "trace_records"}),
-    ("records", {"display", "errors", "zeroing", "trace_records", "law_records"}),
+    ("records", {"display", "errors", "zeroing"}),
+    ("laws", {"records", "display"}),
     ("published", set()),
-    ("zips", {"errors", "limits"}),
-    ("file_contents", {"errors"}),
-    ("links", {"file_contents"}),
-    ("temporary", set()),
+    ("files", {"errors"}),
+    ("temporary", {"files", "errors"}),
     ("forked", set()),
-    ("nearest", set()),
-    ("sheets", {"errors", "limits", "zips"}),
-    ("store", GROUND),
+    ("input_files", {"errors", "files"}),
+    ("cache", GROUND),
     ("campaign", GROUND),
     ("readers", GROUND),
     ("traces", GROUND),
-    ("laws", GROUND),
-    ("virtual_tribometer", GROUND),
     ("ingestion", GROUND | {"campaign", "readers", "traces"}),
-    ("fitting", GROUND | {"laws"}),
+    ("drafting", GROUND | {"campaign", "readers", "traces"}),
+    ("fitting", GROUND),
     ("plausibility", GROUND),
-    ("simulate", GROUND | {"campaign", "laws", "store"}),
-    ("mechanisms", GROUND | {"laws"}),
-    ("mechanisms_in_model", GROUND | {"mechanisms", "simulate", "virtual_tribometer"}),
-    ("comparison", GROUND | {"fitting", "laws", "simulate", "store"}),
-    ("diagnose", GROUND | {"laws", "fitting", "simulate", "mechanisms", "mechanisms_in_model"}),
-    ("figures", GROUND | {"laws", "comparison", "diagnose"}),
-    ("plot", GROUND | {"diagnose", "figures"}),
-    ("report", GROUND | {"laws", "store", "comparison", "diagnose", "figures"}),
+    ("springblock", GROUND | {"campaign", "cache"}),
+    ("mechanisms", GROUND),
+    ("mechanisms_in_model", GROUND | {"mechanisms", "springblock"}),
+    ("comparison", GROUND | {"fitting", "springblock", "cache"}),
+    ("diagnostics", GROUND | {"fitting", "springblock", "mechanisms", "mechanisms_in_model", "lawsearch"}),
+    ("lawsearch", GROUND | {"fitting", "springblock", "mechanisms", "mechanisms_in_model", "diagnostics"}),
+    ("berardo2019", GROUND | {"fitting", "springblock", "mechanisms", "diagnostics", "lawsearch"}),
+    ("wording", GROUND | {"mechanisms", "comparison", "diagnostics", "lawsearch", "berardo2019"}),
+    ("figures", GROUND | {"comparison", "diagnostics", "lawsearch", "berardo2019", "wording"}),
+    ("plot", GROUND | {"diagnostics", "berardo2019", "figures"}),
+    ("report", GROUND | {"cache", "comparison", "diagnostics", "lawsearch", "berardo2019", "wording", "figures"}),
 )
 MAY_IMPORT = dict(STREET)
 BELOW = set(MAY_IMPORT)
 MAY_IMPORT["stages"] = BELOW - {"figures", "report"}
 MAY_IMPORT["dry_run"] = MAY_IMPORT["stages"] | {"stages"}
-MAY_IMPORT["pipeline"] = BELOW | {"stages", "dry_run"}
-MAY_IMPORT["cli"] = BELOW | {"stages", "dry_run", "pipeline"}
+MAY_IMPORT["site"] = BELOW | {"stages", "dry_run"}
+MAY_IMPORT["cli"] = BELOW | {"stages", "dry_run", "site"}
 MAY_IMPORT["__main__"] = {"cli"}
 MAY_IMPORT["__init__"] = set()
 ROOMS = sorted(p for p in PACKAGE.rglob("*.py"))
@@ -179,7 +173,7 @@ def test_no_files_import_each_other_in_a_circle() -> None:
         name: imported_modules(module.read_text("utf-8"), name.rpartition(".")[0], known, faces) - {name}
         for name, module in names.items()
     }
-    assert imports["tribo.comparison.prediction"] >= {"tribo.comparison.prediction_runs", "tribo.simulate.calibration"}
+    assert imports["tribo.comparison.prediction"] >= {"tribo.comparison.prediction", "tribo.springblock.calibration"}
     assert circles(imports) == []
 
 
@@ -227,14 +221,14 @@ def test_the_command_line_starts_without_the_heavy_libraries() -> None:
 
 def test_tables_are_written_without_the_libraries_of_figures_and_diagnosis() -> None:
     code = "import sys; from tribo.report import write_until; print([m for m in sys.argv[1:] if m in sys.modules])"
-    heavy = ["matplotlib", "xarray", "dask", "statsmodels", "scipy.stats", "numba", "typst", "tribo.diagnose"]
+    heavy = ["matplotlib", "xarray", "dask", "statsmodels", "scipy.stats", "numba", "typst", "tribo.diagnostics"]
     seen = subprocess.run([sys.executable, "-c", code, *heavy], capture_output=True, text=True, check=True)
     assert seen.stdout.strip() == "[]"
 
 
 def test_units_are_converted_in_one_place_only() -> None:
     users = {room_of(m) for m in ROOMS if "import pint" in m.read_text(encoding="utf-8")}
-    assert users <= {"quantities", "stages", "console"}
+    assert users <= {"units", "stages", "console"}
 
 
 def open_records(source: str) -> list[str]:
@@ -254,7 +248,7 @@ def test_a_record_that_is_not_frozen_is_seen() -> None:
     assert open_records("@dataclass(frozen=True)\nclass A: ...") == []
 
 
-TIDIES_ONLY = {"temporary.py", "own_file.py", "jit.py"}  # what they cannot list stays, and nothing depends on it
+TIDIES_ONLY = {"temporary.py", "own_folder.py", "jit.py"}  # what they cannot list stays, and nothing depends on it
 
 
 def silent_reads(source: str) -> list[str]:
@@ -269,7 +263,7 @@ SILENT = {"glob", "rglob", "read_text", "read_bytes", "write_text", "write_bytes
 
 def test_files_and_folders_are_read_and_written_by_functions_that_leave_nothing_out_in_silence() -> None:
     readers = {m.name for m in ROOMS if silent_reads(m.read_text(encoding="utf-8"))}
-    assert readers == {"file_contents.py", "whole_files.py", "sled.py", *TIDIES_ONLY}  # sled.py: made-up exports
+    assert readers == {"files.py", "sled.py", *TIDIES_ONLY}  # sled.py: made-up exports
 
 
 def test_a_silent_read_is_seen() -> None:

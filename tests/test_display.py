@@ -15,13 +15,13 @@ from report.synthetic import make_study
 
 import tribo
 from tribo import errors, records
-from tribo.diagnose import examine
+from tribo.diagnostics import examine
 from tribo.display import displayed, exact_text, in_short
 
 MOST_LINES, MOST_LETTERS = 40, 120
 FACES = (
-    "tribo", "tribo.records", "tribo.errors", "tribo.simulate", "tribo.diagnose", "tribo.report", "tribo.fitting",
-    "tribo.traces", "tribo.readers", "tribo.mechanisms.record", "tribo.laws.record", "tribo.figures.record",
+    "tribo", "tribo.records", "tribo.errors", "tribo.springblock", "tribo.diagnostics", "tribo.report", "tribo.fitting",
+    "tribo.traces", "tribo.readers", "tribo.mechanisms.record", "tribo.laws", "tribo.figures.record",
 )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tribo.virtual_tribometer.sled import SledDesign, SledLaw, SledTribometer, write_campaign
+from tribo.mechanisms_in_model.sled import SledDesign, SledLaw, SledTribometer, write_campaign
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "data" / "example"
 LAW = {"F": SledLaw(5.0, 20e3, 3.0, 10e3)}

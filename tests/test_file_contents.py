@@ -12,14 +12,14 @@ import pytest
 from hostile_zips import packed
 
 from tribo.campaign import open_campaign
+from tribo.drafting.draft import exports_in
 from tribo.errors import CampaignError
-from tribo.file_contents import bytes_of, found_below, found_in, text_of, write_new
-from tribo.ingestion.draft import exports_in
-from tribo.pipeline.dated_copies import contents
-from tribo.pipeline.laws_of_site import answers_of
+from tribo.files import bytes_of, found_below, found_in, text_of, write_new
+from tribo.input_files import unpack
 from tribo.report.provenance import input_names
 from tribo.report.verify import _output_hashes
-from tribo.zips import unpack
+from tribo.site.history import answers_of
+from tribo.site.scan import contents
 
 
 @pytest.fixture

@@ -11,11 +11,11 @@ import pytest
 from tribo import stages
 from tribo.campaign import load_campaign, open_campaign
 from tribo.errors import CampaignError, TriboError
+from tribo.files import LEADS_OUT, leads_out
 from tribo.ingestion.overrides import apply_overrides
-from tribo.links import LEADS_OUT, leads_out
-from tribo.pipeline.scan import scan
 from tribo.report.provenance import file_hash, input_names
 from tribo.report.verify import verify
+from tribo.site.scan import scan
 
 SECRET = "secret-name,secret content\n"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tribo.errors import ReadError
-from tribo.quantities import QUANTITIES, match_quantity, plain_name, unit_factor
+from tribo.units import QUANTITIES, match_quantity, plain_name, unit_factor
 
 
 @pytest.mark.parametrize(

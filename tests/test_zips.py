@@ -12,8 +12,8 @@ from hostile_zips import EXPORT, GOOD, TESTS, Hostile, all_hostile, commented, n
 
 from tribo.campaign import open_campaign
 from tribo.errors import CampaignError, ReadError
+from tribo.input_files import opened_zip, pieces, unpack
 from tribo.readers import read_export
-from tribo.zips import opened_zip, pieces, unpack
 
 HOSTILE = all_hostile()
 

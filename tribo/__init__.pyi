@@ -1,6 +1,6 @@
 from . import plot as plot
 from .campaign import load_campaign as load_campaign, open_campaign as open_campaign, write_template as write_template
-from .diagnose import plan_design as plan_design
+from .diagnostics import plan_design as plan_design
 from .errors import Problem as Problem, TriboError as TriboError
 from .mechanisms_in_model import simulate_with as simulate_with
 from .published import (
@@ -21,7 +21,7 @@ from .records import (
     Trace as Trace,
 )
 from .report import verify as verify, write_report as write_report
-from .simulate import (
+from .springblock import (
     SimConfig as SimConfig,
     calibrate as calibrate,
     run_ensemble as run_ensemble,

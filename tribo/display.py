@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
 
-from tribo.escaping import printable
+from tribo.user_text import printable
 
 R = TypeVar("R", bound=type)
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from tribo import stages
 from tribo.campaign import open_campaign
-from tribo.campaign.flat_sample import required_flat_sample, with_flat_sample
-from tribo.campaign.zeros import with_zeros
+from tribo.campaign.load import required_flat_sample, with_flat_sample, with_zeros
 from tribo.errors import Problem, TraceError, TriboError
 from tribo.records import Campaign, Doubt, Ingested, LawFit, SetAside
 from tribo.stages import DEFAULTS, Progress, StudyOptions
@@ -72,7 +71,7 @@ def check(
 
 def _with_known_rule(options: StudyOptions, faults: list[Problem]) -> StudyOptions:
     """The options; with the usual rule, and a fault, where the rule is not known."""
-    from tribo.traces.pull import named_rule
+    from tribo.traces.evaluation import named_rule
 
     try:
         named_rule(options.rule, None)
@@ -85,7 +84,7 @@ def _with_known_rule(options: StudyOptions, faults: list[Problem]) -> StudyOptio
 def _checked(
     campaign: Campaign, options: StudyOptions, until: Until, faults: list[Problem], progress: Progress
 ) -> Checked:
-    from tribo.plausibility.doubts import doubts_of
+    from tribo.plausibility import doubts_of
 
     campaign = with_zeros(campaign, options.zero, options.load_zero)
     campaign = _collecting(faults, lambda: with_flat_sample(campaign, options.flat)) or campaign
@@ -131,7 +130,7 @@ def _fits(ingested: Ingested, options: StudyOptions, until: Until, faults: list[
     optional = alone or until in ("ingest", "diagnose")
     fits = _collecting([] if optional else faults, lambda: stages.fit(ingested, weights=options.weights))
     if until == "diagnose":
-        from tribo.diagnose.statistics.observations import enough, observe
+        from tribo.diagnostics.observations import enough, observe
 
         _collecting(faults, lambda: enough(observe(ingested)))
     return fits or ()

@@ -1,20 +1,79 @@
-"""Files of the user, read whole: only regular files of bounded size, each with the hash of the bytes that were read."""
+"""Limits on everything that is read, in one place; each is checked before the work that it bounds.
+
+The reasons are in docs/reference/limits.md. Numbers are limits of a computer unless a source is named.
+
+Files of the user, read whole: only regular files of bounded size, each with the hash of the bytes that were read.
+
+Zip archives that are not trusted: everything is checked by the list of entries, before any of them is unpacked.
+
+Workbooks (.xlsx, .xls, .xlsb, .ods): each sheet as the tab-separated text it could have been saved from.
+"""
 
 from __future__ import annotations
 
+import datetime
 import errno
+import io
 import mmap
 import os
+import re
 import stat
-from collections.abc import Iterator
+import struct
+import unicodedata
+import zipfile
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
-from tribo.errors import naming
-from tribo.limits import DEEPEST_NESTING
+from tribo.errors import CampaignError, Problem, ReadError, naming
+
+# Files
+LARGEST_EXPORT_BYTES = 2 << 30
+LARGEST_TABLE_BYTES = 100_000_000  # tests.csv, overrides.csv
+LARGEST_DESCRIPTION_BYTES = 1_000_000  # campaign.toml, a design file
+LONGEST_NAME = 150  # characters of a campaign folder: files named after it stay below the 255 bytes of file systems
+
+# Tables
+LONGEST_CELL = 10_000  # characters
+MOST_TABLE_ROWS = 200_000  # rows of tests.csv or overrides.csv
+MOST_COLUMNS = 1_000
+MOST_EXPORT_ROWS = 40_000_000  # reading takes 8 bytes a number, and a pull about 110 bytes a row: 4.4 GB
+
+# Texts with levels
+DEEPEST_NESTING = 50  # arrays and tables within each other in TOML and JSON
+
+# Designs of simulations
+MOST_RUNS = 50_000
+MOST_BLOCKS = 4_000_000  # 2000 x 2000; a run of them takes about 2 GB
+MOST_STEPS = 100_000_000  # of a run
+
+# Zip archives
+MOST_ENTRIES = 50_000
+MOST_UNPACKED_BYTES = 2_000_000_000
+MOST_UNPACKED_EXPORT_BYTES = 400_000_000  # of an export in a .zip or .gz, which is held in memory
+MOST_EXPANSION = 200  # text of numbers shrinks about three- to tenfold
+SMALL_ENTRY_BYTES = 10_000_000  # below this no expansion is a danger
+MOST_WORKBOOK_BYTES = 200_000_000  # an Excel export, unpacked
+LONGEST_ENTRY_NAME_BYTES = 1_000
+LONGEST_PATH_PART_BYTES = 255  # on all common file systems
+DEEPEST_PATH = 32
+LARGEST_LISTING_BYTES = 200 * MOST_ENTRIES  # of the list of entries: 46 bytes, a name and time stamps each
+
+# Numbers in SI units. Squares of these, summed over the longest table, stay finite and above zero in double precision;
+# no friction test comes near them.
+LARGEST_NUMBER = 1e15
+SMALLEST_NUMBER = 1e-18  # a force or time base whose largest number is below this was not measured
+LARGEST_LOAD_N = 1e12
+SMALLEST_LOAD_N = 1e-15  # a tenth of the thermal noise of the finest force microscopes is above this
+LARGEST_COUNT = 2**53  # larger whole numbers are not exact in double precision
+ABSOLUTE_ZERO_C = -273.15
+FIRST_YEAR, LAST_YEAR = 1900, 2199  # of a measurement
+
 
 MAPPED_BYTES = 64 << 20  # larger files are mapped and read in pieces, so that memory holds the numbers only
 
@@ -93,3 +152,351 @@ def nests_too_deeply(parsed: Any) -> bool:
             return False
         level = below
     return True
+
+
+MOST_NAMED = 5
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+_CHUNK = 1 << 20
+_NOT_OF_THE_CAMPAIGN = "__MACOSX"
+_NOT_A_ZIP = (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, RuntimeError, ValueError, zlib.error)
+_END, _END_64, _END_64_PLACE = b"PK\5\6", b"PK\6\6", b"PK\6\7"  # APPNOTE.TXT 6.3.10, 4.3.14 to 4.3.16
+LAST_BYTES = (1 << 16) + 22 + 20 + 56  # the longest comment, and the records before it
+
+Fault = tuple[str, str, str]  # kind, sentence, what is allowed
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An entry of a zip: its path inside with "/" between its parts, and what the zip says about it."""
+
+    name: str
+    info: zipfile.ZipInfo
+
+    @property
+    def is_folder(self) -> bool:
+        return self.info.filename.endswith(("/", "\\"))
+
+
+@contextmanager
+def opened_zip(archive: Path) -> Iterator[tuple[zipfile.ZipFile, tuple[Entry, ...]]]:
+    """A zip and its entries, once all of them are found to be harmless.
+
+    Raises
+    ------
+    CampaignError
+        It is no zip; its entries are too many, too large, or compressed to an implausibly small size; or an entry is a
+        link, a device, encrypted, compressed by an unusual method, leads out of the folder, has an unusable name, or
+        would overwrite another one on this or another system.
+    """
+    opened, infos = _listing(archive)
+    with opened:
+        problems = size_problems(infos, archive.stat().st_size, archive.name, MOST_UNPACKED_BYTES)
+        if problems:
+            raise CampaignError(problems)
+        entries = [e for info in infos if (e := _entry(info)).name.split("/")[0] != _NOT_OF_THE_CAMPAIGN]
+        problems = _entry_problems(entries, archive.name)
+        if problems:
+            raise CampaignError(problems)
+        yield opened, tuple(entry for entry in entries if entry.name)
+
+
+def _listing(archive: Path) -> tuple[zipfile.ZipFile, list[zipfile.ZipInfo]]:
+    file = archive.name
+    try:
+        _check_listing(archive)
+        opened = zipfile.ZipFile(archive)
+    except UnicodeDecodeError as why:
+        name = bytes(why.object).decode("utf-8", errors="backslashreplace")
+        what = "the name of an entry is marked as UTF-8 but is not"
+        raise CampaignError(Problem("bad_entry_name", what, file=file, found=name)) from None
+    except _NOT_A_ZIP as why:
+        raise CampaignError(Problem("bad_zip", f"not a readable .zip ({why})", file=file)) from why
+    return opened, opened.infolist()
+
+
+def unpack(archive: Path, folder: Path) -> None:
+    """Unpack a zip into a folder.
+
+    Raises
+    ------
+    CampaignError
+        As :func:`opened_zip`; or an entry is longer than it says.
+    """
+    with opened_zip(archive) as (opened, entries):
+        for parent in {_parent(entry) for entry in entries}:
+            (folder / parent).mkdir(parents=True, exist_ok=True)
+        for entry in entries:
+            if not entry.is_folder:
+                with naming(folder / entry.name), (folder / entry.name).open("wb") as out:
+                    out.writelines(pieces(opened, entry, archive.name))
+
+
+def pieces(opened: zipfile.ZipFile, entry: Entry, file: str) -> Iterator[bytes]:
+    """The contents of an entry in pieces of bounded size.
+
+    Raises
+    ------
+    CampaignError
+        It is longer than it says, or damaged.
+    """
+    left = entry.info.file_size
+    packed = _opened_entry(opened, entry, file)
+    with packed:
+        while piece := _read(packed, entry, file):
+            left -= len(piece)
+            if left < 0:
+                what = "an entry is longer than its declared size"
+                raise CampaignError(Problem("zip_bomb", what, file=file, found=entry.name))
+            yield piece
+
+
+def _opened_entry(opened: zipfile.ZipFile, entry: Entry, file: str) -> IO[bytes]:
+    try:
+        return opened.open(entry.info)
+    except _NOT_A_ZIP as why:
+        raise _damaged(why, entry, file) from why
+
+
+def _read(packed: IO[bytes], entry: Entry, file: str) -> bytes:
+    try:
+        return packed.read(_CHUNK)
+    except _NOT_A_ZIP as why:
+        raise _damaged(why, entry, file) from why
+
+
+def _damaged(why: Exception, entry: Entry, file: str) -> CampaignError:
+    return CampaignError(Problem("bad_zip", f"not a readable .zip ({why})", file=file, found=entry.name))
+
+
+def size_problems(
+    infos: Sequence[zipfile.ZipInfo], archive_bytes: int, file: str, most_bytes: int
+) -> list[Problem]:
+    """Why a zip must not be unpacked, by the number and the sizes of its entries."""
+    problems = []
+    total = sum(info.file_size for info in infos)
+    if total > most_bytes or len(infos) > MOST_ENTRIES:
+        found = f"{len(infos)} entries, {total} bytes"
+        what, allowed = "too large when unpacked", f"at most {MOST_ENTRIES} entries, {most_bytes} bytes"
+        problems.append(Problem("zip_bomb", what, file=file, found=found, allowed=allowed))
+    names = [i.filename for i in infos if _expands(i.file_size, i.compress_size)]
+    if names or _expands(total, archive_bytes):
+        what = "compressed to an implausibly small size"
+        found = _listed(names) if names else f"{total} bytes in a file of {archive_bytes}"
+        allowed = f"at most {MOST_EXPANSION} times its compressed size"
+        problems.append(Problem("zip_bomb", what, file=file, found=found, allowed=allowed))
+    return problems
+
+
+def _expands(size: int, packed: int) -> bool:
+    return size > SMALL_ENTRY_BYTES and size > MOST_EXPANSION * max(packed, 1)
+
+
+def _parent(entry: Entry) -> str:
+    return entry.name if entry.is_folder else entry.name.rpartition("/")[0]
+
+
+def _entry(info: zipfile.ZipInfo) -> Entry:
+    """Backslashes, doubled slashes and single dots mean what they mean as a path."""
+    parts = info.filename.replace("\\", "/").split("/")
+    return Entry("/".join(part for part in parts if part not in ("", ".")), info)
+
+
+def _entry_problems(entries: Sequence[Entry], file: str) -> list[Problem]:
+    """One problem for each kind of fault, with the entries it was found in."""
+    found: dict[Fault, list[str]] = {}
+    for entry in entries:
+        fault = _name_fault(entry) or _kind_fault(entry.info)
+        if fault:
+            found.setdefault(fault, []).append(entry.info.orig_filename)
+    if not found:
+        twice = list(_colliding(entries))
+        if twice:
+            what = "entries that overwrite each other, on this system or on one that takes their names for the same"
+            allowed = "names that differ in more than case, slashes or the coding of letters"
+            found["duplicate_entry", what, allowed] = twice
+    return [
+        Problem(kind, what, file=file, found=_listed(names), allowed=allowed or None)
+        for (kind, what, allowed), names in found.items()
+    ]
+
+
+def _listed(names: Iterable[str]) -> str:
+    names = list(names)
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(name[:LONGEST_PATH_PART_BYTES] for name in names[:MOST_NAMED]) + more
+
+
+def _name_fault(entry: Entry) -> Fault | None:
+    given = entry.info.orig_filename
+    parts = entry.name.split("/")
+    if not given.isprintable() and any(unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in given):
+        return "bad_entry_name", "the name of an entry contains a control character", ""
+    if given.startswith(("/", "\\")) or ".." in parts or re.match(r"[A-Za-z]:", given):
+        return "entry_outside", "the path of an entry leads outside the folder", ""
+    if len(parts) > DEEPEST_PATH or len(given.encode()) > LONGEST_ENTRY_NAME_BYTES:
+        return "bad_entry_name", "the path of an entry is too long", (
+            f"at most {DEEPEST_PATH} levels, {LONGEST_ENTRY_NAME_BYTES} bytes"
+        )
+    if any(len(part.encode()) > LONGEST_PATH_PART_BYTES for part in parts):
+        return "bad_entry_name", "the name of an entry is too long", f"at most {LONGEST_PATH_PART_BYTES} bytes"
+    if not entry.name and not entry.is_folder:
+        return "bad_entry_name", "an entry has no name", ""
+    return None
+
+
+def _kind_fault(info: zipfile.ZipInfo) -> Fault | None:
+    if stat.S_IFMT(info.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
+        return "link", "an entry is a link or a device", ""
+    if info.flag_bits & 1:
+        return "encrypted", "an entry is encrypted", ""
+    if info.compress_type not in _METHODS:
+        return "unusual_compression", "an entry is compressed by a method that is not supported", "Deflate"
+    return None
+
+
+def _colliding(entries: Sequence[Entry]) -> Iterator[str]:
+    """Entries whose place is taken by another one, and folders spelled in two ways."""
+    files: dict[str, str] = {}
+    folders: dict[str, str] = {}
+    for entry in entries:
+        for folder in _folders_of(entry):
+            if folders.setdefault(_alike(folder), folder) != folder:
+                yield entry.name
+        if not entry.is_folder:
+            if _alike(entry.name) in files:
+                yield entry.info.filename
+            files[_alike(entry.name)] = entry.name
+    yield from (name for key, name in files.items() if key in folders)
+
+
+def _folders_of(entry: Entry) -> Iterator[str]:
+    parts = _parent(entry).split("/")
+    return ("/".join(parts[: k + 1]) for k in range(len(parts)) if parts[k])
+
+
+def _alike(name: str) -> str:
+    """The same for names that some file system takes for one: case, coding of letters, dots and blanks at an end."""
+    parts = (part.rstrip(" .") for part in name.split("/"))
+    folded = unicodedata.normalize("NFD", "/".join(parts)).casefold()
+    return unicodedata.normalize("NFD", folded)
+
+
+def _check_listing(archive: Path) -> None:
+    """Refuse a zip whose list of entries is too long to be read, by the record at its end."""
+    size = archive.stat().st_size
+    with archive.open("rb") as stream:
+        stream.seek(max(0, size - LAST_BYTES))
+        tail = stream.read()
+    at = last_record(tail)
+    (listing,) = struct.unpack_from("<L", tail, at + 12)
+    if at >= 76 and tail[at - 20 : at - 16] == _END_64_PLACE and tail[at - 76 : at - 72] == _END_64:
+        (listing,) = struct.unpack_from("<Q", tail, at - 76 + 40)
+    if listing > LARGEST_LISTING_BYTES:
+        what, allowed = "the list of entries is too long", f"{LARGEST_LISTING_BYTES} bytes, {MOST_ENTRIES} entries"
+        found = f"{listing} bytes"
+        raise CampaignError(Problem("zip_bomb", what, file=archive.name, found=found, allowed=allowed))
+
+
+def last_record(tail: bytes) -> int:
+    """Where the last record of a zip begins in the last :data:`LAST_BYTES` of its file.
+
+    Some programs look for the mark of this record from the end of the file, others for a record with a comment as long
+    as the rest of the file (APPNOTE.TXT, 4.3.16). Where a comment holds the mark, they read different lists of entries.
+
+    Raises
+    ------
+    zipfile.BadZipFile
+        There is no such record, or the comment holds its mark.
+    """
+    marks = [found.start() for found in re.finditer(re.escape(_END), tail)]
+    complete = [at for at in marks if len(tail) >= at + 22]
+    fitting = [at for at in complete if at + 22 + int.from_bytes(tail[at + 20 : at + 22], "little") == len(tail)]
+    if fitting and fitting != marks[-1:]:
+        raise zipfile.BadZipFile("its comment holds the mark of the end of a .zip; pack it again without the comment")
+    if not complete or marks[-1] != complete[-1]:
+        raise zipfile.BadZipFile("it does not end as a .zip does")
+    return complete[-1]
+
+
+OLD_EXCEL = b"\xd0\xcf\x11\xe0"
+ZIP = b"PK\x03\x04"
+_MOST_CELLS = 20_000_000  # of the rectangle that a sheet spans, filled or not: its reader keeps all of them
+_CELL = re.compile(rb'<c [^>]*?r="([A-Z]{1,3})(\d{1,7})"')
+
+
+def sheets_as_text(data: bytes, file: str) -> dict[str, str]:
+    """The sheets that hold anything, by name: one line per row, cells separated by tabs.
+
+    Raises
+    ------
+    ReadError
+        bad_workbook, too_large or empty.
+    """
+    try:
+        if data[:4] == ZIP:
+            _refuse_large(data, file)
+        sheets = _sheets(data)
+    except ReadError:
+        raise
+    except BaseException as why:
+        if not isinstance(why, Exception) and type(why).__name__ != "PanicException":  # of Rust, on damaged files
+            raise
+        raise ReadError(Problem("bad_workbook", f"not a readable workbook ({why})", file=file)) from None
+    texts = {name: text for name, text in sheets.items() if text.strip()}
+    if not texts:
+        raise ReadError(Problem("empty", "the workbook contains no filled cells", file=file))
+    return texts
+
+
+def _refuse_large(data: bytes, file: str) -> None:
+    with zipfile.ZipFile(io.BytesIO(data)) as packed:
+        entries = packed.infolist()
+        if problems := size_problems(entries, len(data), file, MOST_WORKBOOK_BYTES):
+            raise ReadError(replace(problem, kind="too_large") for problem in problems)
+        for entry in entries:
+            if entry.filename.startswith("xl/worksheets/") and entry.filename.endswith(".xml"):
+                cells = _spanned(packed.read(entry))
+                if cells > _MOST_CELLS:
+                    raise _too_large(f"{cells} cells in {entry.filename}", f"at most {_MOST_CELLS}", file)
+
+
+def _too_large(found: str, allowed: str, file: str) -> ReadError:
+    return ReadError(Problem("too_large", "the file is too large", file=file, found=found, allowed=allowed))
+
+
+def _spanned(sheet: bytes) -> int:
+    """Cells of the rectangle from the first to the last cell of a sheet."""
+    found = {(letters, int(row)) for letters, row in _CELL.findall(sheet)}
+    rows = {row for _, row in found}
+    columns = {_column(letters) for letters, _ in found}
+    return (max(rows) - min(rows) + 1) * (max(columns) - min(columns) + 1) if found else 0
+
+
+def _column(letters: bytes) -> int:
+    number = 0
+    for letter in letters:
+        number = 26 * number + letter - 64
+    return number
+
+
+def _sheets(data: bytes) -> dict[str, str]:
+    from python_calamine import CalamineWorkbook
+
+    book = CalamineWorkbook.from_filelike(io.BytesIO(data))
+    try:
+        return {name: _text(book.get_sheet_by_name(name).to_python(skip_empty_area=False)) for name in book.sheet_names}
+    finally:
+        book.close()
+
+
+def _text(rows: Iterable[Iterable[object]]) -> str:
+    return "\n".join("\t".join(map(_cell, row)) for row in rows) + "\n"
+
+
+def _cell(value: object) -> str:
+    """A cell as text: whole numbers without a decimal point, dates as they are in tests.csv."""
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+        return str(int(value))
+    if isinstance(value, datetime.datetime):
+        return value.isoformat(" ")
+    return " ".join(str(value).split())

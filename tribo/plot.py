@@ -14,8 +14,8 @@ from tribo.errors import Problem, TriboError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tribo.diagnose import Diagnosis
-    from tribo.diagnose.from_table.published_diagnosis import PublishedDiagnosis
+    from tribo.berardo2019.table_diagnosis import PublishedDiagnosis
+    from tribo.diagnostics import Diagnosis
     from tribo.records import Ingested, Run, Study
 
 __all__ = [

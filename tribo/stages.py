@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from tribo.campaign.flat_sample import required_flat_sample, with_flat_sample
-from tribo.campaign.zeros import with_zeros
+from tribo.cache.kept_results import Shelf
+from tribo.campaign.load import required_flat_sample, with_flat_sample, with_zeros
 from tribo.display import displayed
 from tribo.errors import FitError
 from tribo.records import (
@@ -18,19 +18,18 @@ from tribo.records import (
     LawFit,
     Study,
 )
-from tribo.store.kept_results import Shelf
 
 if TYPE_CHECKING:
-    from tribo.comparison.prediction_runs import Cell, ModelRuns
-    from tribo.diagnose import Diagnosis
-    from tribo.diagnose.diagnosis_record import Alone
-    from tribo.diagnose.statistics.predictor import Predictor
+    from tribo.comparison.prediction import Cell, ModelRuns
+    from tribo.diagnostics import Diagnosis
+    from tribo.diagnostics.diagnosis_record import Alone
+    from tribo.diagnostics.predictor import Predictor
 
 Progress = Callable[[str, int, int], None]
 Weights = Literal["relative", "ratio", "force", "repeats"]
 Until = Literal["ingest", "fit", "compare", "report"]
 DIAGNOSED_BY = (
-    "diagnose", "mechanisms", "mechanisms_in_model", "virtual_tribometer", "fitting", "laws", "simulate", "records",
+    "diagnostics", "lawsearch", "mechanisms", "mechanisms_in_model", "fitting", "laws", "springblock", "records",
 )  # fmt: skip
 ASSESSED_BY = ("fitting", "laws", "records")
 
@@ -61,7 +60,7 @@ class StudyOptions:
     @property
     def model_runs(self) -> ModelRuns:
         """How the model is run."""
-        from tribo.comparison.prediction_runs import ModelRuns
+        from tribo.comparison.prediction import ModelRuns
 
         return ModelRuns(self.runs, self.seed, self.jobs, self.kept, self.scheduler)
 
@@ -94,7 +93,7 @@ def ingest(
     CampaignError
         No test could be read, or the overrides have errors.
     """
-    from tribo.ingestion.ingested import ingest_campaign
+    from tribo.ingestion.exports import ingest_campaign
     from tribo.ingestion.overrides import apply_overrides
 
     ingested = ingest_campaign(campaign, rule, jobs, progress)
@@ -206,7 +205,7 @@ def naming_set_aside(ingested: Ingested) -> Iterator[None]:
 
 def with_doubts(walked: Study) -> Study:
     """The study with the numbers that lie outside their broad physical bounds."""
-    from tribo.plausibility.doubts import doubts_of
+    from tribo.plausibility import doubts_of
 
     fits = walked.fits
     with suppress(FitError):
@@ -270,11 +269,9 @@ def diagnosis(
     FitError
         Fewer than twelve usable tests.
     """
-    from tribo.diagnose import examine, with_simulation
-    from tribo.diagnose.discovery.across_verdict import with_law_across
-    from tribo.diagnose.discovery.in_verdict import with_laws
-    from tribo.diagnose.discovery.known_laws import read_laws
-    from tribo.diagnose.statistics import pattern_table
+    from tribo.diagnostics import examine, predictor as pattern_table, with_simulation
+    from tribo.lawsearch.diagnosis_with_laws import with_law_across, with_laws
+    from tribo.lawsearch.known_laws import read_laws
 
     predictor = own_predictor(ingested.campaign, kept)
     title = ingested.campaign.title
@@ -295,8 +292,8 @@ def diagnosis_without_model(study: Study, *, seed: int = 0, kept: Path | None = 
     ``study`` holds the laws of its samples (:func:`assess`), as that of :func:`study` does where the spring-block model
     was not run.
     """
-    from tribo.diagnose.diagnosis_record import Alone
-    from tribo.diagnose.without_model.alone import diagnose_alone
+    from tribo.diagnostics.diagnosis_record import Alone
+    from tribo.diagnostics.without_model import diagnose_alone
 
     made_from = (study.ingested, study.laws, seed)
     return Shelf(kept).take("alone", made_from, lambda: Alone(diagnose_alone(study, seed=seed)), DIAGNOSED_BY)
@@ -304,8 +301,8 @@ def diagnosis_without_model(study: Study, *, seed: int = 0, kept: Path | None = 
 
 def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:
     """The predictor from simulations of this campaign, where ``kept`` holds them for the flat sample at least."""
-    from tribo.comparison.prediction_runs import kept_runs
-    from tribo.diagnose import simulated_predictor
+    from tribo.comparison.prediction import kept_runs
+    from tribo.diagnostics import simulated_predictor
 
     runs = kept_runs(kept, campaign.samples) if kept is not None else None
     if runs is None:

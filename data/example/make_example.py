@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from tribo.virtual_tribometer.sled import SledDesign, SledLaw, write_campaign
+from tribo.mechanisms_in_model.sled import SledDesign, SledLaw, write_campaign
 
 # mu and tau0 (kPa) measured by Berardo et al. 2019, Table 2, columns "fit T/N = mu + tau0/p"
 MEASURED = {

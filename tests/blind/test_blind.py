@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from tribo.campaign import load_campaign
-from tribo.diagnose import examine
-from tribo.diagnose.verdict import Verdict
+from tribo.diagnostics import examine
+from tribo.diagnostics.verdict import Verdict
 from tribo.stages import ingest
 
 from .tribometer import LARGEST, Design, hide, write

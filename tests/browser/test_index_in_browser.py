@@ -11,11 +11,9 @@ from axe_playwright_python.sync_playwright import Axe
 from pipeline.test_index_page import campaigns, rendered
 from playwright.sync_api import Browser, expect
 
-from tribo.pipeline.choose_two import comparable
-from tribo.pipeline.history import CampaignRow
-from tribo.pipeline.index_page import page as index_page
-from tribo.report.reported import read_reported
-from tribo.report.reports_compared import common_load_N, differences, sentences
+from tribo.report.compare_reports import common_load_N, differences, read_reported, sentences
+from tribo.site.history import CampaignRow
+from tribo.site.index_page import comparable, page as index_page
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -10,10 +10,10 @@ import pytest
 
 from tribo import stages
 from tribo.campaign import load_campaign
-from tribo.campaign.flat_sample import required_flat_sample, with_flat_sample
+from tribo.campaign.load import required_flat_sample, with_flat_sample
 from tribo.comparison.study_lookup import flat_sample
-from tribo.diagnose.plan import plan_design
-from tribo.diagnose.statistics.observations import observe
+from tribo.diagnostics.observations import observe
+from tribo.diagnostics.planning import plan_design
 from tribo.errors import CampaignError
 from tribo.records import Campaign, Study
 

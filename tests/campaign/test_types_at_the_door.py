@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from tribo.campaign import load_campaign
-from tribo.campaign.dates import order_of, parsed
+from tribo.campaign.table import order_of, parsed
 from tribo.errors import CampaignError, Problem
-from tribo.limits import LARGEST_TABLE_BYTES
+from tribo.input_files import LARGEST_TABLE_BYTES
 
 TOML = '[campaign]\ntitle = "door"\nnominal_area_mm2 = 55.0\n[patterns.F]\ncavity = "none"\n'
 HEADER = "test_id,file,sample,specimen,normal_load_N,started_at,run_order,note"

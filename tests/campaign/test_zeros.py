@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from tribo.campaign import load_campaign
-from tribo.campaign.zeros import with_zeros
+from tribo.campaign.load import with_zeros
 from tribo.cli import main
 from tribo.errors import CampaignError
 

@@ -16,7 +16,7 @@ from tribo.campaign import load_campaign
 from tribo.cli.console import Console, problems_of
 from tribo.cli.workflow_step import run_step
 from tribo.errors import Problem, ReadError, SimulationError, TriboError, is_of_the_system, system_problem
-from tribo.readers.core import source
+from tribo.readers import source
 
 
 @pytest.fixture(autouse=True)

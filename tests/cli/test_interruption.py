@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tribo.cli.interruption import ended_by_terminate
-from tribo.store.whole_files import whole_file
+from tribo.cli.console import ended_by_terminate
+from tribo.files import whole_file
 
 
 def test_a_second_request_does_not_interrupt_the_removal_of_unfinished_files(

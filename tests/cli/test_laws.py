@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from on_the_command_line import run
 
-from tribo.diagnose.discovery.law_file import law_text
-from tribo.diagnose.discovery.written_law import Shape, WrittenLaw
-from tribo.diagnose.verdict import Estimate
+from tribo.diagnostics.verdict import Estimate
+from tribo.lawsearch.grammar import Shape, WrittenLaw
+from tribo.lawsearch.law_file import law_text
 
 SIZE = {"a": Estimate(0.7, 0.6, 0.8, "")}
 

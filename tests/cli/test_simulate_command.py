@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from tribo.published import load_table2
-from tribo.simulate import SimConfig, simulate as library_run
+from tribo.springblock import SimConfig, simulate as library_run
 
 QUICK = ("--blocks", 45, "--dt", 1e-7, "--set", "rest_tolerance=0.01", "--set", "duration_peaks=1.5")
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from diagnose.synthetic import PATTERNS
 
-from tribo.comparison.prediction_runs import cells_of, kept_runs, run_cells
-from tribo.diagnose import tabled_predictor
+from tribo.cache.kept_results import DamagedResultWarning
+from tribo.comparison.prediction import cells_of, kept_runs, run_cells
+from tribo.diagnostics import tabled_predictor
 from tribo.records import Campaign, Test
-from tribo.simulate import LocalFriction, SimConfig, stratified_design
+from tribo.springblock import LocalFriction, SimConfig, stratified_design
 from tribo.stages import own_predictor
-from tribo.store.kept_results import DamagedResultWarning
 
 AREA_M2 = 55e-6
 FRICTION = LocalFriction(mu_s=5.1, static_adhesion_Pa=20e3)

@@ -12,13 +12,12 @@ import pytest
 from small_lattices import small_lattices
 
 from tribo import stages
+from tribo.cache.kept_results import DamagedResultWarning
 from tribo.campaign import load_campaign
-from tribo.comparison.prediction import MOST_LOADS, Prediction, loads_to_simulate, predict
-from tribo.comparison.prediction_runs import ModelRuns
+from tribo.comparison.prediction import MOST_LOADS, ModelRuns, Prediction, loads_to_simulate, predict
 from tribo.comparison.side_by_side import load_means
 from tribo.errors import CampaignError, FitError
 from tribo.records import LawFit, Regime
-from tribo.store.kept_results import DamagedResultWarning
 
 
 @pytest.fixture(scope="module", autouse=True)

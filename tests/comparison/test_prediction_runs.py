@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tribo.comparison.prediction_runs import Cell, cell_name, cells_of, remove_strangers, run_cells
-from tribo.simulate import SimConfig
+from tribo.comparison.prediction import Cell, cell_name, cells_of, remove_strangers, run_cells
+from tribo.springblock import SimConfig
 
 DESIGN = [
     SimConfig(sample=sample, pressure_Pa=pressure, blocks=(12, 12), dt_s=1e-7, seed=seed, duration_peaks=1.5)

@@ -7,12 +7,11 @@ from collections.abc import Callable
 import numpy as np
 from blind.tribometer import Design, hide
 
-from tribo.diagnose.search.looks import Look, all_looks
-from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linearisation import ModelFit
-from tribo.diagnose.statistics.model import Acting, Setup, predict, setup, start_changes
-from tribo.diagnose.statistics.observations import observe
-from tribo.diagnose.statistics.predictor import tabled_predictor
+from tribo.diagnostics.contrasts import Look, all_looks
+from tribo.diagnostics.fit import ModelFit, fit
+from tribo.diagnostics.model import Acting, Setup, predict, setup, start_changes
+from tribo.diagnostics.observations import observe
+from tribo.diagnostics.predictor import tabled_predictor
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Ingested
 

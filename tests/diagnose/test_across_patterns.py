@@ -10,18 +10,10 @@ import pytest
 from blind.direct import ingested
 from blind.tribometer import Design, hide
 
-from tribo.diagnose.discovery.across_patterns import (
-    Deviations,
-    Term,
-    across_patterns,
-    grammar,
-    left_out_errors,
-    predicted,
-)
-from tribo.diagnose.discovery.across_words import deviations_of, formula, geometry_of, sentence, table_of
-from tribo.diagnose.from_table.table_across import table_deviations
-from tribo.diagnose.from_table.table_diagnosis import readings
-from tribo.diagnose.from_table.table_observations import read_table
+from tribo.berardo2019.table_diagnosis import readings, table_deviations
+from tribo.berardo2019.table_model import read_table
+from tribo.lawsearch.across_patterns import Deviations, Term, across_patterns, grammar, left_out_errors, predicted
+from tribo.lawsearch.across_words import deviations_of, formula, geometry_of, sentence, table_of
 from tribo.published import load_table2
 
 from .known import baseline

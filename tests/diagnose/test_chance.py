@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose.search.screen import screen
-from tribo.diagnose.statistics.chance import as_measured, drawn_residuals, refit, refit_sizes, standardised
-from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.model import setup
-from tribo.diagnose.statistics.observations import observe
-from tribo.diagnose.statistics.predictor import tabled_predictor
-from tribo.diagnose.statistics.scores import columns_in, scores
+from tribo.diagnostics.contrasts import screen
+from tribo.diagnostics.fit import fit
+from tribo.diagnostics.model import setup
+from tribo.diagnostics.observations import observe
+from tribo.diagnostics.predictor import tabled_predictor
+from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit, refit_sizes, standardised
+from tribo.diagnostics.score_statistics import columns_in, scores
 
 from .known import looks_at
 from .synthetic import SMALL, hidden

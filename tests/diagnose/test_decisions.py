@@ -7,12 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose import examine
-from tribo.diagnose.search import naming
-from tribo.diagnose.search.naming import best_beyond_chance
-from tribo.diagnose.search.weighing import weigh
-from tribo.diagnose.statistics.model import Setup
-from tribo.diagnose.statistics.start_effects import start_effects
+from tribo.diagnostics import candidates as naming, examine
+from tribo.diagnostics.candidates import best_beyond_chance, weigh
+from tribo.diagnostics.model import Setup
+from tribo.diagnostics.score_statistics import start_effects
 
 from .known import acting, baseline, made
 

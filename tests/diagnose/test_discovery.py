@@ -10,30 +10,28 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from tribo.diagnose.diagnosis import examine
-from tribo.diagnose.diagnosis_record import Diagnosis
-from tribo.diagnose.discovery import in_verdict, on_campaign
-from tribo.diagnose.discovery.grammar import groups_of, shapes_of
-from tribo.diagnose.discovery.held import holds
-from tribo.diagnose.discovery.in_verdict import with_laws, with_misfits
-from tribo.diagnose.discovery.law_file import law_text, read_law
-from tribo.diagnose.discovery.law_words import discovery_text, law_layers, law_sentence, size_sentence
-from tribo.diagnose.discovery.on_campaign import searched_laws
-from tribo.diagnose.discovery.parting import parting_test
-from tribo.diagnose.discovery.scoring import Projection
-from tribo.diagnose.discovery.search import RESCORED, Discovery, Grammar, best_of, discover_laws
-from tribo.diagnose.discovery.written_law import ADHESION_TERM, LOAD_TERM, UNITS, Shape, WrittenLaw
-from tribo.diagnose.search.weighing import refitted
-from tribo.diagnose.statistics.chance import drawn_residuals, refit
-from tribo.diagnose.statistics.model import Acting, Setup
-from tribo.diagnose.verdict import Cause, Estimate
+from tribo.cache.kept_results import decoded, encoded
+from tribo.diagnostics.candidates import refitted
+from tribo.diagnostics.diagnosis import examine
+from tribo.diagnostics.diagnosis_record import Diagnosis
+from tribo.diagnostics.model import Acting, Setup
+from tribo.diagnostics.replicates import drawn_residuals, refit
+from tribo.diagnostics.verdict import Cause, Estimate
 from tribo.display import exact_text
 from tribo.errors import CampaignError
 from tribo.figures import law as law_figure
+from tribo.lawsearch import diagnosis_with_laws as in_verdict, discovery as on_campaign
+from tribo.lawsearch.diagnosis_with_laws import parting_test, with_laws, with_misfits
+from tribo.lawsearch.discovery import searched_laws
+from tribo.lawsearch.grammar import ADHESION_TERM, LOAD_TERM, UNITS, Shape, WrittenLaw, groups_of, shapes_of
+from tribo.lawsearch.known_laws import holds
+from tribo.lawsearch.law_file import law_text, read_law
+from tribo.lawsearch.law_words import discovery_text, law_layers, law_sentence, size_sentence
+from tribo.lawsearch.scoring import Projection
+from tribo.lawsearch.search import RESCORED, Discovery, Grammar, best_of, discover_laws
 from tribo.mechanisms.record import Base, Conditions
 from tribo.mechanisms.table import MECHANISMS
 from tribo.report.verdict_file import verdict_in_words
-from tribo.store.kept_results import decoded, encoded
 
 from .known import acting, baseline, made
 

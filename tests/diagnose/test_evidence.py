@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose.statistics.direct_evidence import (
+from tribo.diagnostics.direct_evidence import (
     Evidence,
     certain_evidence,
     direct_evidence,
@@ -15,7 +15,7 @@ from tribo.diagnose.statistics.direct_evidence import (
     zero_drift,
     zero_offset,
 )
-from tribo.diagnose.statistics.observations import Observations, observe
+from tribo.diagnostics.observations import Observations, observe
 from tribo.records import Trace
 
 from .synthetic import Design, hidden

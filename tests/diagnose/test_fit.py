@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from blind.tribometer import Design, hide
 
-from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linearisation import ModelFit
-from tribo.diagnose.statistics.model import Acting, predict, setup
-from tribo.diagnose.statistics.observations import observe
-from tribo.diagnose.statistics.predictor import tabled_predictor
+from tribo.diagnostics.fit import ModelFit, fit
+from tribo.diagnostics.model import Acting, predict, setup
+from tribo.diagnostics.observations import observe
+from tribo.diagnostics.predictor import tabled_predictor
 from tribo.mechanisms.table import MECHANISMS
 
 from .synthetic import PATTERNS, SMALL, hidden

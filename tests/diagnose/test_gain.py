@@ -9,10 +9,10 @@ import pytest
 from blind.tribometer import Design
 from scipy.stats import norm
 
-from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.gain import _folds, gain, gain_of_zero
-from tribo.diagnose.statistics.model import Acting, Setup
-from tribo.diagnose.statistics.observations import observe
+from tribo.diagnostics.fit import fit
+from tribo.diagnostics.gain import _folds, gain, gain_of_zero
+from tribo.diagnostics.model import Acting, Setup
+from tribo.diagnostics.observations import observe
 from tribo.mechanisms.table import MECHANISMS
 
 from .known import acting, baseline, made

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.interval import (
+from tribo.diagnostics.fit import ModelFit, fit
+from tribo.diagnostics.intervals import (
     DROP_90,
     _averaged,
     _log_freedom,
@@ -19,8 +19,7 @@ from tribo.diagnose.statistics.interval import (
     understated,
     with_pattern_error,
 )
-from tribo.diagnose.statistics.linearisation import ModelFit
-from tribo.diagnose.statistics.model import FIXED, PATTERN, candidates
+from tribo.diagnostics.model import FIXED, PATTERN, candidates
 
 from .test_screen import baseline
 

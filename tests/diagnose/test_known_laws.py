@@ -9,22 +9,20 @@ import numpy as np
 import pytest
 from blind.tribometer import hide
 
-from tribo.diagnose.diagnosis import examine
-from tribo.diagnose.discovery import contested
-from tribo.diagnose.discovery.contested import without_wrong_forms
-from tribo.diagnose.discovery.held import holds
-from tribo.diagnose.discovery.in_verdict import with_laws, without_causes
-from tribo.diagnose.discovery.known_laws import KnownLaw, read_laws, try_laws
-from tribo.diagnose.discovery.law_file import law_text
-from tribo.diagnose.discovery.planned_law import plan_law
-from tribo.diagnose.discovery.written_law import Shape, WrittenLaw
-from tribo.diagnose.search.weighing import refitted
-from tribo.diagnose.statistics.model import Acting, Setup
-from tribo.diagnose.verdict import Cause, Estimate, Layer, Verdict
+from tribo.diagnostics.candidates import refitted
+from tribo.diagnostics.diagnosis import examine
+from tribo.diagnostics.model import Acting, Setup
+from tribo.diagnostics.verdict import Cause, Estimate, Layer, Verdict
 from tribo.errors import CampaignError, SimulationError
+from tribo.lawsearch import model_choice as contested
+from tribo.lawsearch.diagnosis_with_laws import with_laws, without_causes
+from tribo.lawsearch.grammar import Shape, WrittenLaw
+from tribo.lawsearch.known_laws import KnownLaw, holds, plan_law, read_laws, try_laws
+from tribo.lawsearch.law_file import law_text
+from tribo.lawsearch.model_choice import without_wrong_forms
 from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model import columns_from, with_law
-from tribo.simulate.config import SimConfig
+from tribo.springblock.config import SimConfig
 
 from .known import Change, baseline, made
 from .synthetic import SMALL, ingested

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tribo.diagnose.discovery.grammar import fine_shapes, refined_shapes, shapes_of
-from tribo.diagnose.discovery.scoring import Projection
-from tribo.diagnose.discovery.search import Grammar
-from tribo.diagnose.statistics.linearisation import ModelFit
+from tribo.diagnostics.fit import ModelFit
+from tribo.lawsearch.grammar import fine_shapes, refined_shapes, shapes_of
+from tribo.lawsearch.scoring import Projection
+from tribo.lawsearch.search import Grammar
 from tribo.mechanisms.record import Conditions
 
 from .known import baseline, made

@@ -10,13 +10,13 @@ from blind.direct import ingested
 from blind.tribometer import Design, hide
 from scipy.stats import norm
 
-from tribo.diagnose import examine
-from tribo.diagnose.diagnosis_record import Diagnosis
-from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.model import Setup, predict, setup
-from tribo.diagnose.statistics.observations import observe
-from tribo.diagnose.statistics.pattern_correction import pattern_corrections
-from tribo.diagnose.statistics.predictor import tabled_predictor
+from tribo.diagnostics import examine
+from tribo.diagnostics.diagnosis_record import Diagnosis
+from tribo.diagnostics.fit import fit
+from tribo.diagnostics.intervals import pattern_corrections
+from tribo.diagnostics.model import Setup, predict, setup
+from tribo.diagnostics.observations import observe
+from tribo.diagnostics.predictor import tabled_predictor
 
 from .known import acting, made
 

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from tribo.diagnose.statistics.bordered import model_columns, normal_of, weighted_columns
-from tribo.diagnose.statistics.linearisation import (
+from tribo.diagnostics.fit import (
     Linear,
     State,
     begin,
@@ -25,10 +24,11 @@ from tribo.diagnose.statistics.linearisation import (
     whitened,
     with_noise_estimated,
 )
-from tribo.diagnose.statistics.model import FIXED, GAIN, PATTERN, SLOPE, Setup, Target, setup
-from tribo.diagnose.statistics.observations import observe
-from tribo.diagnose.statistics.predictor import tabled_predictor
-from tribo.diagnose.statistics.scatter import (
+from tribo.diagnostics.model import FIXED, GAIN, PATTERN, SLOPE, Setup, Target, setup
+from tribo.diagnostics.normal_equations import model_columns, normal_of, weighted_columns
+from tribo.diagnostics.observations import observe
+from tribo.diagnostics.predictor import tabled_predictor
+from tribo.diagnostics.scatter import (
     REPEAT_PRIOR,
     SCATTER_SD,
     SIZE_PRIORS,

@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tribo.diagnose.search.looks import BENT, Look, all_looks, numeric_covariates
-from tribo.diagnose.statistics.model import Acting, Setup, setup, start_changes
-from tribo.diagnose.statistics.observations import Observations, observe
-from tribo.diagnose.statistics.predictor import tabled_predictor
+from tribo.diagnostics.contrasts import BENT, Look, all_looks, numeric_covariates
+from tribo.diagnostics.model import Acting, Setup, setup, start_changes
+from tribo.diagnostics.observations import Observations, observe
+from tribo.diagnostics.predictor import tabled_predictor
 from tribo.mechanisms.table import MECHANISMS
 
 from .synthetic import Design, hidden

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tribo.diagnose.statistics.model import (
+from tribo.diagnostics.model import (
     ALIKE_IN_BOTH,
     APART,
     FIXED,
@@ -28,8 +28,8 @@ from tribo.diagnose.statistics.model import (
     with_form_error,
     with_free_columns,
 )
-from tribo.diagnose.statistics.observations import observe
-from tribo.diagnose.statistics.predictor import tabled_predictor
+from tribo.diagnostics.observations import observe
+from tribo.diagnostics.predictor import tabled_predictor
 from tribo.mechanisms.table import MECHANISMS
 
 from .synthetic import SMALL, hidden

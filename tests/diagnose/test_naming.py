@@ -8,12 +8,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tribo.diagnose.search import naming, rivals, weighing
-from tribo.diagnose.search.naming import Layers, best_beyond_chance
-from tribo.diagnose.search.rivals import CLOSE, IN_COMMON, TIED, sort_rivals, weights_of
-from tribo.diagnose.search.screen import FEWEST, Screen, _strongest as strongest, decided, deviate
-from tribo.diagnose.search.weighing import CHOICES_FITTED, PER_PARAMETER, Candidate, judged
-from tribo.diagnose.statistics.model import Acting
+from tribo.diagnostics import candidates as naming, candidates as rivals, candidates as weighing
+from tribo.diagnostics.candidates import (
+    CHOICES_FITTED,
+    CLOSE,
+    IN_COMMON,
+    PER_PARAMETER,
+    TIED,
+    Candidate,
+    Layers,
+    best_beyond_chance,
+    judged,
+    sort_rivals,
+    weights_of,
+)
+from tribo.diagnostics.contrasts import FEWEST, Screen, _strongest as strongest, decided, deviate
+from tribo.diagnostics.model import Acting
 from tribo.mechanisms.table import MECHANISMS
 
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose import examine, plan_design
-from tribo.diagnose.diagnosis_record import Diagnosis
-from tribo.diagnose.search.weighing import weigh
-from tribo.diagnose.statistics.start_effects import start_effects
+from tribo.diagnostics import examine, plan_design
+from tribo.diagnostics.candidates import weigh
+from tribo.diagnostics.diagnosis_record import Diagnosis
+from tribo.diagnostics.score_statistics import start_effects
 from tribo.mechanisms.record import (
     Base,
     Conditions,
@@ -24,7 +24,7 @@ from tribo.mechanisms.record import (
 from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model import parse_with, simulate_with
 from tribo.records import Ingested
-from tribo.simulate import SimConfig, simulate
+from tribo.springblock import SimConfig, simulate
 
 from .synthetic import hidden
 

@@ -8,11 +8,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tribo.diagnose.next_test import next_test
-from tribo.diagnose.search.weighing import Candidate, weigh
-from tribo.diagnose.statistics.model import Acting, candidates, effect_of
-from tribo.diagnose.statistics.observations import enough, observe
-from tribo.diagnose.statistics.start_effects import start_effects
+from tribo.diagnostics.candidates import Candidate, weigh
+from tribo.diagnostics.model import Acting, candidates, effect_of
+from tribo.diagnostics.observations import enough, observe
+from tribo.diagnostics.planning import next_test
+from tribo.diagnostics.score_statistics import start_effects
 from tribo.errors import FitError
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Ingested

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tribo.diagnose.statistics.observations import Observations, enough, observe
+from tribo.diagnostics.observations import Observations, enough, observe
 from tribo.errors import FitError
 from tribo.records import Campaign, Ingested, Pattern, Pull, SetAside, Test, Trace
 

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tribo.diagnose.statistics import pattern_error as e
-from tribo.diagnose.statistics.pattern_table import error_sizes, simulated_patterns
+from tribo.diagnostics import pattern_error as e
+from tribo.diagnostics.predictor import error_sizes, simulated_patterns
 from tribo.published import data_dir
 from tribo.records import Pattern
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from tribo.diagnose import examine
-from tribo.diagnose.statistics.pattern_excess import pattern_excess
+from tribo.diagnostics import examine
+from tribo.diagnostics.intervals import pattern_excess
 
 from .synthetic import hidden
 from .test_scatter import baseline, off

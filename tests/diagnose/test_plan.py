@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose import examine, look_table, misfit_map, plan_design, residual_table, weighing_table
-from tribo.diagnose.diagnosis import Diagnosis
-from tribo.diagnose.plan import Finding, Plan
+from tribo.diagnostics import examine, look_table, misfit_map, plan_design, residual_table, weighing_table
+from tribo.diagnostics.diagnosis import Diagnosis
+from tribo.diagnostics.planning import Finding, Plan
 
 from .synthetic import Design, hidden
 

@@ -10,9 +10,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tribo.diagnose.statistics import pattern_table, predictor as module
-from tribo.diagnose.statistics.pattern_table import error_sizes, flat_law, simulated_patterns
-from tribo.diagnose.statistics.predictor import Predictor, simulated_predictor, tabled_predictor
+from tribo.diagnostics import predictor as module, predictor as pattern_table
+from tribo.diagnostics.predictor import (
+    Predictor,
+    error_sizes,
+    flat_law,
+    simulated_patterns,
+    simulated_predictor,
+    tabled_predictor,
+)
 from tribo.published import data_dir
 from tribo.records import Pattern
 

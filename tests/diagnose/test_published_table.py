@@ -6,20 +6,21 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tribo.diagnose.from_table.published_diagnosis import PublishedDiagnosis, diagnose_published
-from tribo.diagnose.from_table.table_diagnosis import (
+from tribo.berardo2019.table_diagnosis import (
     LEAST_CORRELATION,
+    PublishedDiagnosis,
+    diagnose_published,
     look_at,
     readings,
 )
-from tribo.diagnose.from_table.table_observations import (
+from tribo.berardo2019.table_model import (
     design_correlation,
     even_loads,
     fit_table,
     predict_table,
     read_table,
+    upper_limit,
 )
-from tribo.diagnose.from_table.table_outlook import upper_limit
 from tribo.figures.catalogue import PUBLISHED_FIGURES
 from tribo.mechanisms.table import MECHANISMS
 from tribo.published import load_table2, load_table2_simulated_anew
@@ -73,7 +74,7 @@ def test_a_table_made_by_the_model_itself_shows_no_misfit() -> None:
 
 @pytest.mark.parametrize("name", ["suction", "contact_area_loss", "cavity_shear_deformation"])
 def test_a_mechanism_put_into_the_table_is_found_again_with_its_size(name: str) -> None:
-    from tribo.diagnose.statistics.model import Acting
+    from tribo.diagnostics.model import Acting
 
     exact = published("experiment").assign(mu_sd=0.05, tau0_sd_kPa=0.4)
     table = read_table(exact, published("simulation"), -0.79)

@@ -9,14 +9,13 @@ import pytest
 from blind.patterns import ErrorSize
 from blind.tribometer import Design
 
-from tribo.diagnose import examine
-from tribo.diagnose.search.screen import screen
-from tribo.diagnose.statistics.chance import drawn_residuals, refit_sizes
-from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linearisation import ModelFit
-from tribo.diagnose.statistics.model import setup
-from tribo.diagnose.statistics.observations import observe
-from tribo.diagnose.statistics.predictor import tabled_predictor
+from tribo.diagnostics import examine
+from tribo.diagnostics.contrasts import screen
+from tribo.diagnostics.fit import ModelFit, fit
+from tribo.diagnostics.model import setup
+from tribo.diagnostics.observations import observe
+from tribo.diagnostics.predictor import tabled_predictor
+from tribo.diagnostics.replicates import drawn_residuals, refit_sizes
 
 from .known import looks_at
 from .synthetic import PATTERNS, SMALL, hidden

@@ -5,18 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tribo.diagnose.statistics.bordered import model_columns
-from tribo.diagnose.statistics.courses import EVERY, Course, added, course
-from tribo.diagnose.statistics.model import Setup, Target
-from tribo.diagnose.statistics.scatter import (
-    SIZE_STEPS,
-    Noise,
-    Replicates,
-    fitted_sizes,
-    log_size_prior,
-    replicates_at,
-)
-from tribo.diagnose.statistics.scores import AS_FITTED, columns_in, columns_of, informations, scores
+from tribo.diagnostics.model import EVERY, Course, Setup, Target, added, course
+from tribo.diagnostics.normal_equations import model_columns
+from tribo.diagnostics.scatter import SIZE_STEPS, Noise, Replicates, fitted_sizes, log_size_prior, replicates_at
+from tribo.diagnostics.score_statistics import AS_FITTED, columns_in, columns_of, informations, scores
 
 from .test_likelihood import campaign, dense, noise_of, residual_of
 

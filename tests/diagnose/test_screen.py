@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from tribo.diagnose.search.screen import deviate, screen
-from tribo.diagnose.statistics.chance import as_measured
-from tribo.diagnose.statistics.fit import fit
-from tribo.diagnose.statistics.linearisation import ModelFit
-from tribo.diagnose.statistics.model import setup
-from tribo.diagnose.statistics.observations import observe
-from tribo.diagnose.statistics.predictor import tabled_predictor
-from tribo.diagnose.statistics.scores import AS_FITTED, columns_in, scores
+from tribo.diagnostics.contrasts import deviate, screen
+from tribo.diagnostics.fit import ModelFit, fit
+from tribo.diagnostics.model import setup
+from tribo.diagnostics.observations import observe
+from tribo.diagnostics.predictor import tabled_predictor
+from tribo.diagnostics.replicates import as_measured
+from tribo.diagnostics.score_statistics import AS_FITTED, columns_in, scores
 
 from .known import looks_at
 from .synthetic import hidden

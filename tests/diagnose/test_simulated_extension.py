@@ -7,17 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnose import examine, residual_table, with_simulation
-from tribo.diagnose.diagnosis_record import Diagnosis, SimulatedExtension
-from tribo.diagnose.simulated_extension import (
-    MOST_LOADS,
-    local_friction,
-    representatives,
-    residual_percent,
-)
-from tribo.diagnose.statistics.model import effect_of
-from tribo.diagnose.statistics.pattern_table import flat_law
-from tribo.simulate import SimConfig, simulate
+from tribo.diagnostics import examine, residual_table, with_simulation
+from tribo.diagnostics.diagnosis_record import Diagnosis, SimulatedExtension
+from tribo.diagnostics.model import effect_of
+from tribo.diagnostics.predictor import flat_law
+from tribo.diagnostics.simulated_extension import MOST_LOADS, local_friction, representatives, residual_percent
+from tribo.springblock import SimConfig, simulate
 
 from .synthetic import hidden
 
@@ -98,7 +93,7 @@ def test_local_friction_gives_the_flat_law_it_was_made_for() -> None:
 def test_a_diagnosis_with_its_simulation_can_be_kept_and_read_back(hot: Diagnosis) -> None:
     import json
 
-    from tribo.store.kept_results import decoded, encoded
+    from tribo.cache.kept_results import decoded, encoded
 
     again = decoded(json.loads(json.dumps(encoded(hot))))
     assert again.verdict.to_json() == hot.verdict.to_json()
@@ -106,7 +101,7 @@ def test_a_diagnosis_with_its_simulation_can_be_kept_and_read_back(hot: Diagnosi
 
 
 def test_a_simulation_that_fails_is_reported_with_its_reason(hot: Diagnosis, monkeypatch: pytest.MonkeyPatch) -> None:
-    from tribo.diagnose import simulated_extension
+    from tribo.diagnostics import simulated_extension
     from tribo.errors import Problem, SimulationError
 
     def fails(*args: object) -> None:

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from tribo.diagnose import examine
-from tribo.diagnose.diagnosis import Diagnosis
-from tribo.diagnose.next_test import bits
-from tribo.diagnose.verdict import Misfit, Verdict
+from tribo.diagnostics import examine
+from tribo.diagnostics.diagnosis import Diagnosis
+from tribo.diagnostics.planning import bits
+from tribo.diagnostics.verdict import Misfit, Verdict
 from tribo.errors import FitError
 from tribo.records import SetAside
 

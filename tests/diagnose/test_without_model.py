@@ -15,12 +15,12 @@ from click.testing import CliRunner
 from tribo import stages
 from tribo.campaign import load_campaign
 from tribo.cli import main
-from tribo.diagnose.verdict import Verdict
-from tribo.diagnose.without_model.along_records import running_in
-from tribo.diagnose.without_model.tested_columns import load_levels, points_of
+from tribo.diagnostics.column_search import load_levels, points_of
+from tribo.diagnostics.verdict import Verdict
+from tribo.diagnostics.within_records import running_in
+from tribo.fitting.alternatives import compared_laws
 from tribo.fitting.dependence import dependence
-from tribo.fitting.law_choice import compared_laws
-from tribo.plausibility.doubts import doubts_of
+from tribo.plausibility import doubts_of
 from tribo.records import Campaign, Ingested, Pattern, Pull, Study, Test, Trace
 
 Change = Callable[[dict[str, Any]], float]

@@ -22,7 +22,7 @@ from pathlib import Path
 
 from faults.file_operations import Fault, Operation, real_os_open
 from faults.trial import SLOW_S, Bench, Orders, Outcome, be_child
-from tribo.store import lock
+from tribo.cache import own_folder as lock
 
 NEW_MOUNTS, PRIVATE = 0x20000, 0x44000  # CLONE_NEWNS; MS_REC | MS_PRIVATE
 OF_OPENING = os.O_CREAT | os.O_EXCL | os.O_TRUNC

@@ -85,7 +85,7 @@ def warm(place: Place, command: Command) -> Bench:
 
 def small_lattice() -> None:
     """Simulations of 21 x 21 blocks unless a command says otherwise, for the rest of this process."""
-    from tribo.simulate import SimConfig
+    from tribo.springblock import SimConfig
 
     given = SimConfig.__init__.__defaults__
     assert given is not None
@@ -110,7 +110,7 @@ def _quiet(place: Place) -> Iterator[io.StringIO]:
 
 def build_in_one_process(steps: RememberedSteps, arguments: Sequence[str]) -> int:
     """tribo build with the steps of its workflow run one after another in this process, in place of Snakemake."""
-    from tribo.pipeline import build
+    from tribo.site import build
 
     build._snakemake = partial(_steps_in_order, steps)  # type: ignore[assignment]
     return run_command(arguments)
@@ -167,7 +167,7 @@ def _is_done(record: Path, digest: str) -> bool:
 
 
 def _index(state: Path, target: str) -> bool:
-    from tribo.pipeline.index_page import main
+    from tribo.site.index_page import main
 
     return _logged(state, "index.log", lambda: main(["..", target]))
 

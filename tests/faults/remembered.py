@@ -114,8 +114,8 @@ class RememberedFigures(Remembered):
     """Figures that have been drawn before: drawing reads and writes no file of the bench. They are written as ever."""
 
     def __init__(self, file: Path):
+        from tribo.cache.kept_results import fingerprint
         from tribo.report import drawings
-        from tribo.store.kept_results import fingerprint
 
         super().__init__(file)
         real = drawings._svg_and_series

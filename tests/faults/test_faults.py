@@ -60,9 +60,9 @@ def test_report_and_build_withstand_a_fault_at_each_kind_of_file_operation(
 ) -> None:
     import typst
 
-    from tribo.pipeline import build
     from tribo.report import drawings
-    from tribo.simulate import SimConfig
+    from tribo.site import build
+    from tribo.springblock import SimConfig
 
     # what the bench replaces in this process is put back afterwards
     monkeypatch.setattr(typst, "Compiler", typst.Compiler)

@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from figures.test_figures import collisions
-from tribo.diagnose import examine
-from tribo.diagnose.diagnosis import Diagnosis
-from tribo.diagnose.statistics.fit import fit, residual_on_flat
-from tribo.diagnose.statistics.model import PATTERN
+from tribo.diagnostics import examine
+from tribo.diagnostics.diagnosis import Diagnosis
+from tribo.diagnostics.fit import fit, residual_on_flat
+from tribo.diagnostics.model import PATTERN
 from tribo.figures import detectable, extended, misfit, residuals
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
 from tribo.figures.style import house_style

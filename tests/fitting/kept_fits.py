@@ -17,14 +17,11 @@ import pandas as pd
 from kept_numbers import scatter, write
 
 from tribo.fitting import fit_power_law, fit_samples, fit_three_term, power_of_campaign, uncertainty_budget
+from tribo.fitting.assessment import outlying_pulls, outlying_specimens
 from tribo.fitting.both_variables import fit_errors_in_both
-from tribo.fitting.outlying import outlying_pulls, outlying_specimens
-from tribo.fitting.paired import paired_differences
+from tribo.fitting.differences import paired_differences, smallest_difference
+from tribo.fitting.linear import WEIGHTS, repeat_scatter, sample_rows
 from tribo.fitting.pooled_scatter import pool_specimen_scatter
-from tribo.fitting.power import smallest_difference
-from tribo.fitting.repeats import repeat_scatter
-from tribo.fitting.rows import sample_rows
-from tribo.fitting.weighting import WEIGHTS
 from tribo.records import REGIMES, LawFit, Regime
 
 KEPT = Path(__file__).with_name("kept_fits.json")

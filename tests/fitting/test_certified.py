@@ -11,8 +11,7 @@ from nist_strd import DANWOOD, MISRA1A, NOINT1, NOINT2, NORRIS, PONTIUS, Certifi
 from tribo.errors import FitError
 from tribo.fitting.curves import fit_curve
 from tribo.fitting.linear import LinearFit, least_squares
-from tribo.laws.record import Law, Parameter, Variable
-from tribo.laws.table import LAWS
+from tribo.laws import LAWS, Law, Parameter, Variable
 
 LINEAR_DIGITS = 10
 NONLINEAR_DIGITS = 8

@@ -9,9 +9,8 @@ import pytest
 from tribo.errors import FitError
 from tribo.fitting import fit_errors_in_both, fit_power_law, fit_samples
 from tribo.fitting.curves import _start
-from tribo.fitting.rows import sample_rows
-from tribo.fitting.weighting import weights_of
-from tribo.laws.table import LAWS
+from tribo.fitting.linear import sample_rows, weights_of
+from tribo.laws import LAWS
 
 AREA = 55e-6
 LOADS = np.array([0.06, 0.13, 0.26, 0.5, 0.9, 1.4])

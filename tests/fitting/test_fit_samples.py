@@ -9,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 from tribo.errors import FitError
 from tribo.fitting import fit_samples
-from tribo.fitting.weighting import WEIGHTS
+from tribo.fitting.linear import WEIGHTS
 from tribo.records import LawFit
 
 AREA = 55e-6

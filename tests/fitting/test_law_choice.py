@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tribo.fitting.alternatives import CANDIDATES, compared_laws, fit_candidate, force_N
 from tribo.fitting.dependence import dependence
-from tribo.fitting.law_choice import CANDIDATES, compared_laws, fit_candidate, force_N
-from tribo.fitting.load_levels import levels_of, meant_to_be_one
+from tribo.fitting.linear import levels_of, meant_to_be_one
 from tribo.records import Campaign, Ingested, Pattern, Pull, Test
 
 LOADS = np.repeat([1.0, 2.0, 4.0, 8.0, 16.0, 32.0], 3)

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from tribo.fitting import fit_samples, outlying_pulls, outlying_specimens, repeat_scatter
-from tribo.fitting.rows import sample_rows
+from tribo.fitting.linear import sample_rows
 
 AREA = 55e-6
 LOADS = np.array([0.06, 0.13, 0.26, 0.5, 0.9, 1.4])

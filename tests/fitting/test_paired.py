@@ -12,7 +12,7 @@ from made_campaigns import MadeCampaign
 from tribo import stages
 from tribo.campaign import load_campaign
 from tribo.fitting import fit_samples, paired_differences
-from tribo.fitting.paired import PairedDifference, differences_table
+from tribo.fitting.differences import PairedDifference, differences_table
 
 AREA_M2 = 55e-6
 LOADS_N = np.array([0.1, 0.3, 0.6, 1.2])

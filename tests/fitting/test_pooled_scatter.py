@@ -8,8 +8,7 @@ import pytest
 
 from tribo.errors import FitError
 from tribo.fitting import fit_power_law, fit_samples, pool_specimen_scatter, repeat_scatter
-from tribo.fitting.rows import sample_rows
-from tribo.fitting.weighting import weights_of
+from tribo.fitting.linear import sample_rows, weights_of
 from tribo.records import LawFit
 
 AREA = 55e-6

@@ -14,9 +14,9 @@ from made_campaigns import DESIGN, DIALECTS, LAWS, MadeCampaign, write_made
 
 from tribo.campaign import load_campaign
 from tribo.fitting import campaign_budgets, fit_power_law, fit_samples, fit_three_term, power_of_campaign
+from tribo.mechanisms_in_model.sled import SledLaw
 from tribo.records import Ingested, LawFit, Regime
 from tribo.stages import ingest
-from tribo.virtual_tribometer.sled import SledLaw
 
 PULLS = replace(DESIGN, laws={"F": LAWS["F"]}, specimens=5)
 Read = Callable[[str], Ingested]

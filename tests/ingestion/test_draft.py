@@ -13,9 +13,8 @@ from on_the_command_line import run
 
 from tribo import stages
 from tribo.campaign import load_campaign
+from tribo.drafting.draft import name_pattern, proposed_patterns, read_names, started_at
 from tribo.errors import CampaignError
-from tribo.ingestion.draft import started_at
-from tribo.ingestion.file_names import name_pattern, proposed_patterns, read_names
 
 NAMES = "{sample}_{normal_load_N}N_{speed_rpm}RPM_{repeat}"
 

@@ -63,7 +63,7 @@ def test_a_doubt_stands_in_the_table_with_its_row_and_can_be_found_on_the_trace(
     import shutil
 
     from tribo.records import Study
-    from tribo.report.result_tables import tests_table
+    from tribo.report.tables import tests_table
 
     shutil.copytree(EXAMPLE, tmp_path / "campaign")
     path = tmp_path / "campaign" / "raw" / "T005.csv"

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from tribo import stages
 from tribo.campaign import load_campaign
-from tribo.campaign.choice import is_chosen, overlap, split_choice
+from tribo.campaign.table import is_chosen, overlap, split_choice
 from tribo.cli import main
 from tribo.readers import read_blocks
 from tribo.records import Campaign, Ingested

@@ -10,8 +10,7 @@ import pint
 import pytest
 from hypothesis import given, strategies as st
 
-from tribo.laws.record import Law
-from tribo.laws.table import LAWS
+from tribo.laws import LAWS, Law
 
 every_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS.keys())
 

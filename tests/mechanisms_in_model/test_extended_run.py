@@ -14,7 +14,7 @@ from tribo.mechanisms.table import MECHANISMS, NAMES
 from tribo.mechanisms_in_model.extended_run import SIMULATED, choice_of, parse_given, parse_with, simulate_with
 from tribo.mechanisms_in_model.on_blocks import conditions_of_run
 from tribo.records import Run
-from tribo.simulate import SimConfig, simulate
+from tribo.springblock import SimConfig, simulate
 
 # With this seed the highest force comes with the same avalanche under every mechanism that changes all blocks alike.
 # With others it may come with the next, and static friction of single runs then scatters about the law by 0.3 %.
@@ -193,7 +193,7 @@ def test_a_tilted_sample_has_its_load_off_the_middle_by_what_was_asked() -> None
 
     from tribo.mechanisms.tilt import uneven
     from tribo.mechanisms_in_model.on_blocks import even, with_profile
-    from tribo.simulate.engines.fast import lattice_of
+    from tribo.springblock.engines.fast import lattice_of
 
     flat = SMALL.with_(sample="F", angle_deg=0.0, blocks=(60, 60))
     lattice = lattice_of(flat)

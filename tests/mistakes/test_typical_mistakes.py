@@ -14,8 +14,8 @@ from mistakes.slips import Mistake, each_row, workbook
 from tribo import stages
 from tribo.campaign import load_campaign
 from tribo.errors import CampaignError
-from tribo.report.html.page import html
-from tribo.virtual_tribometer.sled import SledDesign, SledLaw, write_campaign
+from tribo.mechanisms_in_model.sled import SledDesign, SledLaw, write_campaign
+from tribo.report.page import html
 
 MOST_LINES = 6
 TOML = """\

@@ -19,9 +19,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 OF_A_BUILD = (
-    "snakemake.cli", "snakemake.executors.local", "tribo.cli", "tribo.cli.workflow_step", "tribo.pipeline.index_page",
-    "tribo.pipeline.build", "tribo.report.write", "tribo.report.html.page", "tribo.report.paper.pdf", "tribo.stages",
-    "tribo.comparison.findings", "tribo.fitting.assessment", "tribo.diagnose", "tribo.simulate.resume",
+    "snakemake.cli", "snakemake.executors.local", "tribo.cli", "tribo.cli.workflow_step", "tribo.site.index_page",
+    "tribo.site.build", "tribo.report.write", "tribo.report.page", "tribo.report.pdf", "tribo.stages",
+    "tribo.comparison.findings", "tribo.fitting.assessment", "tribo.diagnostics", "tribo.springblock.ensemble",
     "matplotlib.figure", "matplotlib.backends.backend_svg", "scipy.stats", "statsmodels.api", "xarray", "h5netcdf",
     "typst", "psutil",
 )  # fmt: skip
@@ -52,7 +52,7 @@ def main(folder: Path) -> None:
     from faults.commands import small_lattice
     from forked_starts import STARTER, stand_in_for_python, start_here
 
-    from tribo.quantities import unit_factor
+    from tribo.units import unit_factor
 
     for module in OF_A_BUILD:
         import_module(module)

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from tribo.errors import TriboError
-from tribo.pipeline.dated_copies import clear_unfinished, date_build, dated
-from tribo.store.whole_files import write_text
+from tribo.files import write_text
+from tribo.site.scan import clear_unfinished, date_build, dated
 
 DAY = 86400.0
 

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tribo.pipeline.history import CampaignRow, Law, history
-from tribo.pipeline.index_page import (
+from tribo.site.history import CampaignRow, Law, history
+from tribo.site.index_page import (
     _range,
+    change_points,
     change_sentence,
     page,
     series,
@@ -23,7 +24,6 @@ from tribo.pipeline.index_page import (
     trend_csv,
     write_index,
 )
-from tribo.pipeline.trend import change_points
 
 
 def campaigns(jump: float = 0.0) -> list[CampaignRow]:

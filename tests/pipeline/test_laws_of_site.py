@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from tribo.cli.workflow_step import with_laws
-from tribo.pipeline.index_page import page
-from tribo.pipeline.laws_of_site import answers_of, collect_laws, laws_csv, laws_in_words
+from tribo.site.history import answers_of, collect_laws, laws_csv, laws_in_words
+from tribo.site.index_page import page
 
 
 @pytest.fixture

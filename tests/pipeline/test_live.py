@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from tribo.cli.build_progress import build_progress, in_words, seconds_left
+from tribo.cli.build_commands import build_progress, in_words, seconds_left
 from tribo.cli.console import Console
-from tribo.pipeline.live import Follower, Progress, typical_seconds
-from tribo.pipeline.workflow_run import run_workflow
+from tribo.site.workflow import Follower, Progress, run_workflow, typical_seconds
 
 SAID = """\
 Job stats:

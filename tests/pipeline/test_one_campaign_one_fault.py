@@ -15,14 +15,13 @@ from click.testing import CliRunner
 
 from tribo.campaign import load
 from tribo.cli import main
-from tribo.pipeline import build, index_page
-from tribo.pipeline.build import BuildOptions, _configuration
-from tribo.pipeline.history import CampaignRow, Law, history
-from tribo.pipeline.index_page import page, series_name, trend_csv, write_index
-from tribo.pipeline.inputs_of_steps import inputs_of
-from tribo.pipeline.scan import scan
-from tribo.pipeline.trend import change_points
 from tribo.report.provenance import read_record
+from tribo.site import build, index_page
+from tribo.site.build import BuildOptions, _configuration
+from tribo.site.history import CampaignRow, Law, history
+from tribo.site.index_page import change_points, page, series_name, trend_csv, write_index
+from tribo.site.scan import scan
+from tribo.site.steps import inputs_of
 
 BAD_NAMES = (b"a{b}c", b"x" * 250, b"not-\xff-utf8", b"index.html", b"trend.csv", b"esc\x1b[31m", b"back\\slash")
 GOOD_NAMES = ("plain", "with space", "ümlaut", "-dash", "a'b\"c", "$HOME", "A|B", "100%")

@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import pytest
 
 from tribo.errors import CampaignError
-from tribo.pipeline import scan as scanning
-from tribo.pipeline.scan import UPLOAD_SUFFIXES, difference, scan
+from tribo.site import scan as scanning
+from tribo.site.scan import UPLOAD_SUFFIXES, difference, scan
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from tribo.errors import TriboError
-from tribo.pipeline.schedule import Schedule, cron_line, in_words, units
+from tribo.site.schedule import Schedule, cron_line, in_words, units
 
 ODD = "my drop 100% $HOME \"x\" 'y'"
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from tribo.pipeline.trend import FEWEST, SHORTEST, change_points, split_p
+from tribo.site.index_page import FEWEST, SHORTEST, change_points, split_p
 
 
 def test_the_p_of_a_split_is_that_of_the_t_test() -> None:

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from tribo.cli import workflow_step
-from tribo.pipeline.build import BuildOptions, build_site, workflow_dir
+from tribo.site.build import BuildOptions, build_site, workflow_dir
 
 pytest.importorskip("snakemake")
 
@@ -101,7 +101,7 @@ def test_every_step_gets_the_words_meant_for_it_and_nothing_else_runs(
     tmp_path: Path, by: str, words_of: Callable[[str], list[list[Any]]]
 ) -> None:
     found = notes(tmp_path, by)
-    assert found.pop() == ["-P", "-m", "tribo.pipeline.index_page", "..", "index.json"]
+    assert found.pop() == ["-P", "-m", "tribo.site.index_page", "..", "index.json"]
     for name in NAMES:
         of_campaign = [words for words in found if f"/drop/{name}" in words]
         wanted = words_of(name)

@@ -14,8 +14,7 @@ import pytest
 from nptdms import ChannelObject, TdmsWriter  # type: ignore[import-untyped]
 
 from tribo.errors import ReadError
-from tribo.readers import inspect_export, read_blocks, read_export
-from tribo.readers.core import packed
+from tribo.readers import inspect_export, read_blocks, read_export, source as packed
 
 CSV = "Time [s],Force [N]\n" + "".join(f"{0.1 * k:.1f},{0.5 * k + 0.25}\n" for k in range(6))
 # The same table as a workbook of Excel 97, made by xlwt and compressed.

@@ -315,8 +315,8 @@ def test_wherever_an_export_breaks_off_it_is_noticed(path: Path, dialect: Dialec
 @pytest.fixture
 def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """Files above 2 kB count as large: they are mapped, and read in pieces of 1 kB."""
-    monkeypatch.setattr("tribo.readers.core.source.MAPPED_BYTES", 2000)
-    monkeypatch.setattr("tribo.readers.core.source.CHUNK_BYTES", 1000)
+    monkeypatch.setattr("tribo.readers.source.MAPPED_BYTES", 2000)
+    monkeypatch.setattr("tribo.readers.source.CHUNK_BYTES", 1000)
 
 
 @pytest.mark.usefixtures("small_pieces")
@@ -345,7 +345,7 @@ def test_a_large_file_without_line_ends_is_refused(path: Path) -> None:
 
 
 def test_a_file_above_the_limit_is_refused_without_reading_it(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tribo.readers.core.source.LARGEST_FILE_BYTES", 100)
+    monkeypatch.setattr("tribo.readers.source.LARGEST_FILE_BYTES", 100)
     assert [p.kind for p in problems_of(path, written(ramp(), NAMES, UNITS))] == ["too_large"]
 
 

@@ -21,10 +21,10 @@ HOLDS_THREE_COLUMNS = 3 * 8
 @pytest.fixture
 def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """Files above 100 kB count as large, and are read in pieces of 50 kB."""
-    monkeypatch.setattr("tribo.readers.core.source.MAPPED_BYTES", 100_000)
-    monkeypatch.setattr("tribo.readers.core.inspect.MAPPED_BYTES", 100_000)
-    monkeypatch.setattr("tribo.readers.core.source.CHUNK_BYTES", 50_000)
-    monkeypatch.setattr("tribo.readers.core.source.LARGEST_HEAD_BYTES", 50_000)
+    monkeypatch.setattr("tribo.readers.source.MAPPED_BYTES", 100_000)
+    monkeypatch.setattr("tribo.readers.inspection.MAPPED_BYTES", 100_000)
+    monkeypatch.setattr("tribo.readers.source.CHUNK_BYTES", 50_000)
+    monkeypatch.setattr("tribo.readers.source.LARGEST_HEAD_BYTES", 50_000)
 
 
 def long_export(path: Path, rows: int) -> Path:
@@ -74,7 +74,7 @@ def test_a_pull_is_read_off_a_long_record_in_bounded_memory(tmp_path: Path) -> N
 
 
 def test_a_table_of_too_many_rows_is_refused_with_its_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tribo.readers.core.body.LARGEST_TABLE_ROWS", 500)
+    monkeypatch.setattr("tribo.readers.parsing.LARGEST_TABLE_ROWS", 500)
     with pytest.raises(ReadError) as caught:
         read_export(long_export(tmp_path / "long.csv", 600))
     (problem,) = caught.value.problems

@@ -14,11 +14,9 @@ from report.conftest import Written
 from tribo.errors import Problem
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import CombinedFit, LawFit, SetAside, Study
-from tribo.report.card import Card, card_law, card_of
-from tribo.report.html.page import html
+from tribo.report.card import Card, card_law, card_of, card_text, why_next
+from tribo.report.page import html
 from tribo.report.verdict_file import verdict_in_words
-from tribo.report.words.card_sentences import why_next
-from tribo.report.words.card_text import card_text
 
 LAYER: dict[str, Any] = {
     "kind": "cause", "name": "suction", "samples": ["B", "C"], "regimes": ["static"], "p_adjusted": 1e-9,

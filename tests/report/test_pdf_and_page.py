@@ -18,8 +18,8 @@ from report.test_report_uncertainty import components
 from tribo.records import Study
 from tribo.report import Provenance
 from tribo.report.content import content
-from tribo.report.html.page import page_of
-from tribo.report.paper.pdf import record_of
+from tribo.report.page import page_of
+from tribo.report.pdf import record_of
 
 SAID = {"td", "th", "p", "li", "dd", "dt", "caption", "h1", "h2", "h3", "summary"}
 FOR_A_SCREEN = {"nav", "dialog", "header", "footer", "script", "style", "svg", "figure"}

@@ -9,8 +9,8 @@ from dataclasses import replace
 import pytest
 
 from tribo.records import ByHand, Override, SetAside, Study
-from tribo.report.html.page import html
-from tribo.report.html.pull_cards import pull_cards
+from tribo.report.page import html
+from tribo.report.pulls import pull_cards
 from tribo.report.words.wording import by_hand_sentence
 
 

@@ -9,7 +9,7 @@ from rocrate.rocrate import ROCrate
 
 from report.conftest import Written
 from tribo.records import Study
-from tribo.report.tribosystem import ONTOLOGY, conditions
+from tribo.report.crate import ONTOLOGY, conditions
 
 
 def test_the_crate_is_read_by_its_own_library_and_names_every_file_with_its_hash(written: Written) -> None:

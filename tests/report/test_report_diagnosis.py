@@ -10,7 +10,7 @@ import pytest
 
 from tribo.records import Study
 from tribo.report import write_verdict
-from tribo.report.html.page import html
+from tribo.report.page import html
 from tribo.report.verdict_file import OUTCOMES, verdict_in_words
 
 NAMED: dict[str, Any] = {

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from tribo.cache.kept_results import Shelf
 from tribo.records import Study
 from tribo.report import drawings
 from tribo.report.drawing_choices import Drawing
 from tribo.report.drawings import Drawn, draw_all, inline_svg
-from tribo.store.kept_results import Shelf
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,8 @@ import pytest
 
 from tribo.errors import Problem
 from tribo.records import Study
-from tribo.report.html.embedded import figure_data, trace_data
-from tribo.report.html.hover import Series
-from tribo.report.html.pull_cards import trace_picture
+from tribo.report.drawings import Series
+from tribo.report.pulls import figure_data, trace_data, trace_picture
 
 
 def unpacked(record: dict[str, object]) -> np.ndarray:

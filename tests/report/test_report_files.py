@@ -13,10 +13,10 @@ import pytest
 import xarray as xr
 
 from report.conftest import PROVENANCE, Written
+from tribo.files import whole_file, write_text
 from tribo.records import Study
 from tribo.report import gather_provenance, write_report, write_until
 from tribo.report.campaign_nc import unit_of, write_store
-from tribo.store.whole_files import whole_file, write_text
 
 FIGURES = ["agreement", *(f"fig{k}" for k in range(3, 9))]
 
@@ -60,7 +60,7 @@ def test_an_error_while_writing_leaves_the_old_file_and_no_part(tmp_path: Path) 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
 def test_a_killed_run_leaves_no_half_written_file_under_a_final_name(tmp_path: Path) -> None:
     program = (
-        "import os, signal, sys\nfrom pathlib import Path\nfrom tribo.store.whole_files import whole_file\n"
+        "import os, signal, sys\nfrom pathlib import Path\nfrom tribo.files import whole_file\n"
         "with whole_file(Path(sys.argv[1]) / 'a.txt') as part:\n"
         "    part.write_text('ha')\n    os.kill(os.getpid(), signal.SIGKILL)\n"
     )

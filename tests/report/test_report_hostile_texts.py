@@ -17,14 +17,13 @@ import pytest
 
 from report.synthetic import make_study
 from tribo.figures.catalogue import FIGURES
-from tribo.pipeline.history import CampaignRow, Law
-from tribo.pipeline.index_page import page as index_page
-from tribo.pipeline.trend import change_points
 from tribo.records import SetAside, Study
 from tribo.report import Provenance
 from tribo.report.drawings import Drawn, svg_text
-from tribo.report.html.page import html
-from tribo.report.paper.pdf import pdf
+from tribo.report.page import html
+from tribo.report.pdf import pdf
+from tribo.site.history import CampaignRow, Law
+from tribo.site.index_page import change_points, page as index_page
 
 TEXTS = (
     "<script>alert(1)</script>", '"><img src=x onerror=alert(1)>', "'><svg/onload=alert(1)>",

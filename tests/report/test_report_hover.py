@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from tribo.report.drawings import svg_text
-from tribo.report.html.hover import MOST_POINTS, series_of
+from tribo.report.drawings import MOST_POINTS, series_of, svg_text
 
 
 @pytest.fixture

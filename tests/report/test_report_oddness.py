@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from tribo.comparison.oddness import odd_pulls
 from tribo.records import Study
-from tribo.report.html.page import html
-from tribo.report.oddness import odd_pulls
+from tribo.report.page import html
 from tribo.report.words import wording
 
 

@@ -15,8 +15,8 @@ import pytest
 from report.conftest import Written
 from tribo.records import Study
 from tribo.report.content import content
-from tribo.report.html.page import html, pages_of
-from tribo.report.html.pull_cards import trace_picture
+from tribo.report.page import html, pages_of
+from tribo.report.pulls import trace_picture
 
 VOID = {"meta", "br", "link", "img", "hr", "input"}
 
@@ -160,7 +160,7 @@ def test_a_sample_that_could_not_be_fitted_leaves_dashes(study: Study) -> None:
 
 
 def test_many_pulls_are_spread_over_pages_that_link_each_other(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tribo.report.html.pull_cards.PULLS_A_PAGE", 40)
+    monkeypatch.setattr("tribo.report.pulls.PULLS_A_PAGE", 40)
     pages = pages_of(content(study, None, None), {})
     read = {t.test_id for t in study.ingested.campaign.tests if t.test_id in study.ingested.traces}
     read |= set(study.ingested.by_hand)

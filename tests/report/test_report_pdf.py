@@ -8,9 +8,8 @@ import pytest
 
 from report.conftest import PROVENANCE, Written
 from tribo.records import Study
-from tribo.report.drawings import Drawn, draw_all
-from tribo.report.paper.pdf import pdf
-from tribo.report.paper.typeset import with_text
+from tribo.report.drawings import Drawn, draw_all, with_text
+from tribo.report.pdf import pdf
 
 
 @pytest.fixture(scope="module")

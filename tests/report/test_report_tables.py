@@ -12,8 +12,8 @@ import pytest
 
 from tribo.errors import Problem
 from tribo.records import SetAside, Study
-from tribo.report import result_tables
-from tribo.report.result_tables import to_csv, write_tables
+from tribo.report import tables as result_tables
+from tribo.report.tables import to_csv, write_tables
 
 CONTRACT = {
     "tests.csv": "test_id, static_N, static_u_N, sliding_N, sliding_u_N, rule, window, zero_N, flags, set_aside",

@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 
 from tribo.records import Study
-from tribo.report.html.page import html
-from tribo.report.result_tables import write_tables
-from tribo.report.uncertainty import budget_origins, budget_tables, paired_sentences
+from tribo.report.content import budget_origins, budget_tables, paired_sentences
+from tribo.report.page import html
+from tribo.report.tables import write_tables
 
 
 def components(sample: str, regime: str, specimens: float) -> list[dict[str, object]]:

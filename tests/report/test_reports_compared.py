@@ -15,9 +15,9 @@ import pytest
 from on_the_command_line import run
 
 from report.conftest import Written
-from tribo.pipeline.choose_two import comparable
-from tribo.report import reported, verify
-from tribo.report.reports_compared import common_load_N, differences, read_reported
+from tribo.report import compare_reports as reported, verify
+from tribo.report.compare_reports import common_load_N, differences, read_reported
+from tribo.site.index_page import comparable
 
 
 @pytest.fixture(scope="module")

@@ -15,14 +15,14 @@ from matplotlib.figure import Figure
 
 from tribo import stages
 from tribo.campaign import load_campaign
-from tribo.escaping import for_spreadsheet, from_spreadsheet
 from tribo.figures.catalogue import FIGURES, FRICTION_FIGURES
 from tribo.figures.style import house_style
 from tribo.records import Study
-from tribo.report import result_tables
+from tribo.report import tables as result_tables
 from tribo.report.campaign_nc import write_store
 from tribo.report.drawings import draw_all, svg_text
-from tribo.report.result_tables import to_csv
+from tribo.report.tables import to_csv
+from tribo.user_text import for_spreadsheet, from_spreadsheet
 
 IDS = ("001", "1", "1.0", "1e5", "01", "+1", "1e05", "nan", "inf", "None", "True", "-0")
 NAMES = ("=1+1", "@SUM(A1)", "+cmd|' /C calc'!A0", "-2+3", "'=1", "''@x", "'", "-1.5", "+1", "1e5", "plain", "'quoted'")

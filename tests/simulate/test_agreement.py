@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tribo.simulate import SimConfig
-from tribo.simulate.engines.fast import Trajectory, lattice_of, run_fast, thresholds_of
-from tribo.simulate.engines.reference import run_reference
-from tribo.simulate.run import run_of
+from tribo.springblock import SimConfig
+from tribo.springblock.engines.fast import Trajectory, lattice_of, run_fast, thresholds_of
+from tribo.springblock.engines.reference import run_reference
+from tribo.springblock.run import run_of
 
 RECORD = Path(__file__).resolve().parents[2] / "docs" / "data"
 ONE_CAVITY_OF_S = {"blocks": (44, 14), "pattern_first": (2, 3)}

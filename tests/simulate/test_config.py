@@ -8,7 +8,7 @@ import pytest
 
 from tribo.errors import SimulationError
 from tribo.records import Pattern
-from tribo.simulate import LocalFriction, SimConfig
+from tribo.springblock import LocalFriction, SimConfig
 
 UM = 1e-6
 

@@ -11,10 +11,10 @@ from numba import njit, typeof, types
 
 from tribo.errors import SimulationError
 from tribo.records import FloatArray
-from tribo.simulate import FrictionTerms, SimConfig
-from tribo.simulate.engines import dense, state as k, strips
-from tribo.simulate.engines.active import advance
-from tribo.simulate.engines.fast import (
+from tribo.springblock import FrictionTerms, SimConfig
+from tribo.springblock.engines import dense, state as k, strips
+from tribo.springblock.engines.active import advance
+from tribo.springblock.engines.fast import (
     Drive,
     Thresholds,
     _initial_state,
@@ -27,9 +27,9 @@ from tribo.simulate.engines.fast import (
     run_fast,
     thresholds_of,
 )
-from tribo.simulate.engines.jit import VECTOR_OPTIONS
-from tribo.simulate.engines.lattice import Lattice
-from tribo.simulate.friction import sliding_threshold, static_threshold
+from tribo.springblock.engines.jit import VECTOR_OPTIONS
+from tribo.springblock.engines.state import sliding_threshold, static_threshold
+from tribo.springblock.lattice import Lattice
 
 STEPS = 14
 

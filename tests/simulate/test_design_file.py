@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tribo.errors import SimulationError
-from tribo.simulate.design_file import described_by_options, read_design, runs_of_design, setting
+from tribo.springblock.design_file import described_by_options, read_design, runs_of_design, setting
 
 DESIGN = """
 samples = ["F", "Gx"]

@@ -12,7 +12,7 @@ import xarray as xr
 
 from tribo.errors import SimulationError
 from tribo.records import Pattern
-from tribo.simulate import (
+from tribo.springblock import (
     CalibrationRuns,
     SimConfig,
     angle_range_deg,
@@ -23,7 +23,7 @@ from tribo.simulate import (
     write_ensemble,
     write_run,
 )
-from tribo.simulate.calibration import simulated_law
+from tribo.springblock.calibration import simulated_law
 
 SMALL = SimConfig(blocks=(24, 24), dt_s=1e-7, rest_tolerance=1e-2)
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from tribo.records import FloatArray
-from tribo.simulate import SimConfig, simulate
-from tribo.simulate.calibration import expected_minimum
-from tribo.simulate.engines.fast import Thresholds, drive_of, first_failure_s, lattice_of, run_fast, thresholds_of
-from tribo.simulate.local_friction import PAPER
-from tribo.simulate.readings import READINGS
+from tribo.springblock import SimConfig, simulate
+from tribo.springblock.calibration import expected_minimum
+from tribo.springblock.config import PAPER, READINGS
+from tribo.springblock.engines.fast import Thresholds, drive_of, first_failure_s, lattice_of, run_fast, thresholds_of
 
 SHORT = {"blocks": (31, 31), "duration_peaks": 1.3}
 

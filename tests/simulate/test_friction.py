@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tribo.errors import SimulationError
-from tribo.simulate import FrictionTerms, SimConfig, simulate
-from tribo.simulate.friction import packed, sliding_threshold, static_threshold
+from tribo.springblock import FrictionTerms, SimConfig, simulate
+from tribo.springblock.engines.state import packed, sliding_threshold, static_threshold
 
 SMALL = SimConfig(blocks=(30, 30), seed=4, angle_deg=20.0, duration_peaks=1.5)
 

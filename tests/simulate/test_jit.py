@@ -13,7 +13,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from tribo.simulate.engines import jit
+from tribo.springblock.engines import jit
 
 
 def aged(folder: Path, days: float) -> Path:
@@ -70,14 +70,14 @@ def test_garbage_is_collected_again_after_a_first_call_that_fails():
 
 
 RUN = """
-from tribo.simulate import SimConfig, simulate
+from tribo.springblock import SimConfig, simulate
 run = simulate(SimConfig(sample="B", blocks=(24, 24), engine="dense", seed=2))
 print(run.sliding_friction.hex(), run.static_friction.hex())
 """
 
 
 ANOTHER_ENGINE = """
-from tribo.simulate import SimConfig, simulate
+from tribo.springblock import SimConfig, simulate
 simulate(SimConfig(sample="B", blocks=(24, 24), seed=2))
 """
 

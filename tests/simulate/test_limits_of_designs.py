@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 
 from tribo.errors import SimulationError
-from tribo.simulate import resume
-from tribo.simulate.config import SimConfig
-from tribo.simulate.design_file import read_design, runs_of_design
+from tribo.springblock import ensemble as resume
+from tribo.springblock.config import SimConfig
+from tribo.springblock.design_file import read_design, runs_of_design
 
 BASE = {"samples": ["F"], "pressures_kPa": [10.0]}
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tribo.records import Pattern
-from tribo.simulate.masks import PAPER_PATTERNS, contact_mask
+from tribo.springblock.lattice import PAPER_PATTERNS, contact_mask
 
 UM = 1e-6
 REFERENCE = {

@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 
 from tribo.published import data_dir
-from tribo.simulate import simulate
-from tribo.simulate.pattern_laws import origin, pattern_laws, write_table
-from tribo.simulate.table2_column import table2_design
+from tribo.springblock import simulate
+from tribo.springblock.pattern_laws import origin, pattern_laws, write_table
+from tribo.springblock.table2_column import table2_design
 
 FOLDER = data_dir() / "pattern_shares"
 RUNS = pd.read_csv(FOLDER / "runs.csv", comment="#")

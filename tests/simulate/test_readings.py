@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 
 from tribo.errors import SimulationError
-from tribo.simulate import SimConfig, simulate, stratified_design
-from tribo.simulate.design_file import runs_of_design
-from tribo.simulate.engines.fast import lattice_of, thresholds_of
-from tribo.simulate.readings import ANGLES, OPEN_CHOICES, READINGS
+from tribo.springblock import SimConfig, simulate, stratified_design
+from tribo.springblock.config import ANGLES, OPEN_CHOICES, READINGS
+from tribo.springblock.design_file import runs_of_design
+from tribo.springblock.engines.fast import lattice_of, thresholds_of
 
 RECORD = Path(__file__).resolve().parents[2] / "docs" / "data"
 DESIGN = {"samples": ["A", "Sy"], "pressures_kPa": [5.0], "repeats": 2}

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tribo.errors import SimulationError
-from tribo.simulate import SimConfig, simulate
-from tribo.simulate.energy import energy_balance
-from tribo.simulate.engines.fast import lattice_of, run_fast, thresholds_of
-from tribo.simulate.engines.reference import run_reference
+from tribo.springblock import SimConfig, simulate
+from tribo.springblock.energy import energy_balance
+from tribo.springblock.engines.fast import lattice_of, run_fast, thresholds_of
+from tribo.springblock.engines.reference import run_reference
 
 SMALL = SimConfig(blocks=(17, 17), dt_s=1e-8, duration_peaks=1.01)
 

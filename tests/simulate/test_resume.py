@@ -19,13 +19,13 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 
+from tribo.cache.kept_results import DamagedResultWarning
+from tribo.cache.own_folder import BusyError
 from tribo.cli import main
 from tribo.errors import SimulationError
 from tribo.records import Run
-from tribo.simulate import SimConfig, run_ensemble, stratified_design
-from tribo.simulate.resume import Work, read_stored, run_stored, varied_columns
-from tribo.store.kept_results import DamagedResultWarning
-from tribo.store.lock import BusyError
+from tribo.springblock import SimConfig, run_ensemble, stratified_design
+from tribo.springblock.ensemble import Work, read_stored, run_stored, varied_columns
 
 SMALL = SimConfig(blocks=(40, 40), dt_s=1e-7, rest_tolerance=1e-2)
 RESULTS = ["static_friction", "sliding_friction", "peak_s", "window_end_s"]
@@ -61,7 +61,7 @@ def test_stored_ensemble_is_the_ensemble(tmp_path: Path):
 def test_a_second_start_computes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """All rows are there, so no run is made."""
     first = run_stored(design(1), tmp_path / "e.h5")
-    monkeypatch.setattr("tribo.simulate.resume.simulate", lambda config: pytest.fail("ran again"))
+    monkeypatch.setattr("tribo.springblock.ensemble.simulate", lambda config: pytest.fail("ran again"))
     pd.testing.assert_frame_equal(run_stored(design(1), tmp_path / "e.h5"), first, check_exact=True)
 
 
@@ -159,7 +159,7 @@ HOLDING = """
 import sys, time
 sys.path.insert(0, {folder!r})
 from test_resume import design
-from tribo.simulate.resume import run_stored
+from tribo.springblock.ensemble import run_stored
 run_stored(design(1), {store!r}, jobs=1, progress=lambda done, total: (print(done, flush=True), time.sleep(60)))
 """
 
@@ -204,7 +204,7 @@ KILLED = """
 import sys
 sys.path.insert(0, {folder!r})
 from test_resume import design
-from tribo.simulate.resume import run_stored
+from tribo.springblock.ensemble import run_stored
 run_stored(design(20), {store!r}, jobs=2, progress=lambda done, total: print(done, flush=True))
 """
 
@@ -247,7 +247,7 @@ def test_a_scheduler_without_dask_is_an_error_that_says_so(tmp_path: Path, monke
 
 def test_a_scheduler_that_does_not_answer_is_an_error_that_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Naming the address; what was asked for can be started again."""
-    monkeypatch.setattr("tribo.simulate.resume.SCHEDULER_TIMEOUT_S", 0.5)
+    monkeypatch.setattr("tribo.springblock.ensemble.SCHEDULER_TIMEOUT_S", 0.5)
     with pytest.raises(SimulationError, match="no dask scheduler answers"):
         run_stored(design(1), tmp_path / "e.h5", scheduler="tcp://127.0.0.1:9")
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tribo.errors import SimulationError
-from tribo.simulate import SimConfig, simulate
-from tribo.simulate.engines.fast import lattice_of, run_fast, thresholds_of
-from tribo.simulate.engines.reference import run_reference
+from tribo.springblock import SimConfig, simulate
+from tribo.springblock.engines.fast import lattice_of, run_fast, thresholds_of
+from tribo.springblock.engines.reference import run_reference
 
 SMALL = SimConfig(blocks=(12, 12), pressure_Pa=3e3, angle_deg=10.0, seed=2, edges="periodic", duration_peaks=1.5)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from tribo.simulate import SimConfig, run_ensemble, stratified_design
+from tribo.springblock import SimConfig, run_ensemble, stratified_design
 
 # sample: static mu, tau0 kPa, sliding mu, tau0 kPa; Berardo 2019, Table 2, numerical simulation
 TABLE2 = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from tribo.simulate import SimConfig, table2
-from tribo.simulate.table2_column import beside, distance, fitted, table2_design, table2_text
+from tribo.springblock import SimConfig, table2
+from tribo.springblock.table2_column import beside, distance, fitted, table2_design, table2_text
 
 
 def runs_of(law: dict[str, tuple[float, float]]) -> pd.DataFrame:

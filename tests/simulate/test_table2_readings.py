@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tribo.simulate import SimConfig, simulate
-from tribo.simulate.table2_readings import (
+from tribo.springblock import SimConfig, simulate
+from tribo.springblock.table2_readings import (
     VARIANTS,
     Variant,
     combinations,

@@ -11,8 +11,8 @@ import h5py
 import numpy as np
 import pytest
 
-from tribo.store import hdf5_files
-from tribo.store.hdf5_files import HeldBackErrors, whole_hdf5
+from tribo import files as hdf5_files
+from tribo.files import HeldBackErrors, whole_hdf5
 
 
 class _Full(io.FileIO):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tribo.store.private_folder import private_folder
+from tribo.temporary import private_folder
 
 needs_users = pytest.mark.skipif(not hasattr(os, "getuid"), reason="no user numbers on this system")
 needs_root = pytest.mark.skipif(getattr(os, "getuid", lambda: 1)() != 0, reason="only root can give files away")
@@ -107,7 +107,7 @@ def test_a_link_above_the_folder_is_resolved_once_for_all(tmp_path: Path) -> Non
 
 
 def test_the_fresh_folder_is_gone_when_the_process_ends(tmp_path: Path) -> None:
-    code = "from tribo.store.private_folder import private_folder; print(private_folder([], 'tribo-test-'))"
+    code = "from tribo.temporary import private_folder; print(private_folder([], 'tribo-test-'))"
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
     said = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert tmp_path in Path(said.stdout.strip()).parents
@@ -125,7 +125,7 @@ class Marks:
 
 
 COMPILES = """
-from tribo.simulate.engines.jit import cache_directory, compiled
+from tribo.springblock.engines.jit import cache_directory, compiled
 
 @compiled
 def doubled(x):

@@ -19,7 +19,7 @@ from kept_numbers import scatter, write
 from tribo.errors import TraceError
 from tribo.records import Pull, Trace
 from tribo.traces import RULES, orient_strokes, read_pull, read_pulls, split_pulls
-from tribo.traces.cycles import stick_slip_cycles
+from tribo.traces.oscillation import stick_slip_cycles
 
 from .synthetic import Shape, with_samples
 

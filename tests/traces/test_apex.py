@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tribo.traces.apex import sharp_apex, with_shape_left_open
+from tribo.traces.peak import sharp_apex, with_shape_left_open
 
 RATE_HZ, PEAK_N, PEAK_S, LEVEL_N, NOISE_N = 50.0, 2.0, 3.007, 1.2, 1e-4
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from tribo.ingestion.exports import under_the_wrong_test
 from tribo.records import Trace
-from tribo.traces.copies import under_the_wrong_test
 
 IDS = [f"T{k:02d}" for k in range(1, 11)]
 

@@ -9,7 +9,7 @@ import pytest
 
 from tribo.errors import TraceError
 from tribo.records import Trace
-from tribo.traces.cycles import stick_slip_cycles
+from tribo.traces.oscillation import stick_slip_cycles
 
 STIFFNESS_N_PER_M, SPEED_M_S, LOW_N, MEAN_PEAK_N, CYCLES = 168.0, 42e-6, 0.085, 0.097, 60
 LOADING_N_PER_S = STIFFNESS_N_PER_M * SPEED_M_S

@@ -11,8 +11,8 @@ from in_one_test import in_one_test
 from tribo.readers import read_blocks, read_export
 from tribo.records import Trace
 from tribo.traces import pieces_of, read_pull, read_pulls, split_pulls
-from tribo.traces.cycles import stick_slip_cycles
-from tribo.traces.strokes import load_of
+from tribo.traces.evaluation import load_of
+from tribo.traces.oscillation import stick_slip_cycles
 
 GF = 9.80665e-3
 PAPER_SLIDER_N = 0.0307 * 9.80665

@@ -14,9 +14,8 @@ from hypothesis import given, settings, strategies as st
 from tribo.errors import TraceError
 from tribo.records import Trace
 from tribo.traces import RULES, read_pull, read_pulls, split_pulls
-from tribo.traces.pull import _gap_at as gap_at
+from tribo.traces.evaluation import _gap_at as gap_at, read_record
 from tribo.traces.signal import _beyond_chance as beyond_chance
-from tribo.traces.whole_record import read_record
 
 from .synthetic import Shape, with_samples
 

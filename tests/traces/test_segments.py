@@ -11,14 +11,14 @@ import pytest
 from tribo.errors import TraceError
 from tribo.records import Trace
 from tribo.traces import orient_strokes, read_pulls, split_pulls
-from tribo.traces.segments import reversals, steps
-from tribo.traces.strokes import (
+from tribo.traces.evaluation import (
     _slides_at_once as slides_at_once,
     load_of,
     pieces_of,
     sampling_clip_N,
     sampling_rate_Hz,
 )
+from tribo.traces.phases import reversals, steps
 
 from .synthetic import Shape
 

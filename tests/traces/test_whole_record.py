@@ -11,11 +11,11 @@ import pytest
 from tribo.errors import Problem, TraceError
 from tribo.records import Pull, Test, Trace
 from tribo.traces import read_pull, read_record
-from tribo.traces.course import _drive_stops, _moving
+from tribo.traces.evaluation import Reading
 from tribo.traces.oscillation import oscillation_of
+from tribo.traces.phases import _drive_stops, _moving
 from tribo.traces.rules import RULES
 from tribo.traces.sliding import settled
-from tribo.traces.whole_record import Reading
 from tribo.traces.zero import _level
 from tribo.zeroing import zero_choice
 

@@ -1,19 +1,33 @@
-"""From campaign.toml and tests.csv to a Campaign in SI units."""
+"""From campaign.toml and tests.csv to a Campaign in SI units.
+
+A campaign in a folder or in a .zip that is not trusted.
+
+The flat sample that calibrates the model: chosen once, checked once, carried by the campaign.
+
+The zeros of a campaign replaced by those of the command line; a test with a zero of its own keeps it.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from tribo.campaign.choice import overlap
-from tribo.campaign.dates import order_of, parsed
-from tribo.campaign.described import CampaignFile, PatternTable, read_description
-from tribo.campaign.numbers import number
-from tribo.campaign.row_faults import date_faults, export_of, pattern_of, relative_path, row_faults
-from tribo.campaign.stated import columns_by_file, correction_of, evaluated_forces
+from tribo.campaign.description import CampaignFile, PatternTable, read_description
+from tribo.campaign.rows import (
+    columns_by_file,
+    correction_of,
+    date_faults,
+    evaluated_forces,
+    export_of,
+    number,
+    pattern_of,
+    relative_path,
+    row_faults,
+)
 from tribo.campaign.table import (
     COUNTS,
     KNOWN,
@@ -22,15 +36,19 @@ from tribo.campaign.table import (
     RAW,
     TABLES,
     TestRow,
+    order_of,
+    overlap,
+    parsed,
     read_tests_table,
     tests_file,
 )
 from tribo.errors import CampaignError, Problem, system_problem
-from tribo.escaping import well_formed
-from tribo.input_files import hashes_of_reads
-from tribo.links import LEADS_OUT, leads_out, paths_below
+from tribo.files import LEADS_OUT, found_below, leads_out, paths_below
+from tribo.input_files import hashes_of_reads, unpack
 from tribo.records import NO_AREA_M2, STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
-from tribo.zeroing import zero_choice
+from tribo.temporary import temporary_folder
+from tribo.user_text import did_you_mean, nearest, well_formed
+from tribo.zeroing import DEFAULT, ZeroChoice, zero_choice
 
 _NOT_WORTH_A_NOTE = (".", "~$", "Thumbs.db")
 TOML = "campaign.toml"
@@ -296,3 +314,139 @@ def _holds_numbers(path: Path) -> bool:
             return len(_NUMBER_ROW.findall(stream.read(8000))) > 2
     except OSError:
         return False
+
+
+_TABLES_OF_EXPORTS = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".xls", ".ods", ".tra", ".mat", ".tdms")
+
+
+@contextmanager
+def open_campaign(path: Path | str, *, measured: bool = True) -> Iterator[Campaign]:
+    """Open a campaign folder, or a .zip that holds one (unpacked into a temporary folder while it is open).
+
+    ``measured`` as in :func:`tribo.campaign.load_campaign`.
+
+    Raises
+    ------
+    CampaignError
+        The campaign is unusable; or the archive is refused (:func:`tribo.input_files.opened_zip`), or contains no
+        campaign.toml, or more than one.
+    """
+    path = Path(path)
+    if path.is_dir():
+        yield load_campaign(_campaign_folder(path, path.name), measured=measured)
+    elif path.is_file():
+        _refuse_a_file_of_a_campaign(path)
+        with temporary_folder() as folder:
+            unpack(path, folder)
+            yield load_campaign(_campaign_folder(folder, path.name), measured=measured)
+    else:
+        beside = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+        allowed = did_you_mean(path.name, beside) or None
+        raise CampaignError(Problem("missing", "this folder or .zip does not exist", file=str(path), allowed=allowed))
+
+
+def _refuse_a_file_of_a_campaign(path: Path) -> None:
+    """Raises CampaignError where a file of a campaign, or an export, is given in place of the folder."""
+    if path.suffix.lower() == ".zip":
+        return
+    if path.name in (TOML, *TABLES) or (path.parent / TOML).is_file():
+        what, folder = "this is a file of a campaign; give the folder", path.parent
+    elif path.parent.name == RAW and (path.parent.parent / TOML).is_file():
+        what, folder = "this is an export of a campaign; give the folder", path.parent.parent
+    elif path.suffix.lower() in _TABLES_OF_EXPORTS:
+        what = "this is neither a campaign folder nor a .zip of one; an export alone is no campaign"
+        allowed = f"tribo inspect {path} shows what is in it; tribo init NEW --from {path.parent} makes a campaign"
+        raise CampaignError(Problem("not_a_campaign", what, file=str(path), allowed=allowed))
+    else:
+        return
+    raise CampaignError(Problem("file_of_a_campaign", what, file=str(path), allowed=str(folder)))
+
+
+def _campaign_folder(folder: Path, shown: str) -> Path:
+    """The folder itself if it holds campaign.toml, else the one folder below that does."""
+    if (folder / TOML).is_file():
+        return folder
+    found = sorted(p.parent for p in found_below(folder, TOML) if p.is_file() and "__MACOSX" not in p.parts)
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        raise CampaignError(Problem("missing_file", f"no {TOML} in this folder", shown, allowed=_instead(folder)))
+    names = ", ".join(p.relative_to(folder).as_posix() for p in found)
+    raise CampaignError(Problem("several_campaigns", f"more than one {TOML} in it", file=shown, found=names))
+
+
+def _instead(folder: Path) -> str:
+    """What to do about a folder without campaign.toml."""
+    names = sorted(path.name for path in folder.iterdir() if path.is_file())
+    near = next((n for n in names if n.casefold().startswith(TOML)), "") or nearest(TOML, names, 0.75)
+    if near:
+        return f"{TOML}; rename {near}?"
+    if not names:
+        return f"{TOML}, {TABLES[0]} and {RAW}/; tribo init writes them into a new folder"
+    return f"{TOML}, {TABLES[0]} and {RAW}/; for a folder of exports: tribo init NEW --from {folder.name}"
+
+
+def with_flat_sample(campaign: Campaign, wanted: str = "") -> Campaign:
+    """The campaign with the flat sample a user asked for; unchanged where none was asked for.
+
+    Raises
+    ------
+    CampaignError
+        ``wanted`` was not measured, or has cavities.
+    """
+    if not wanted or wanted == campaign.chosen_flat:
+        return campaign
+    if wanted not in campaign.flat_samples:
+        measured = {test.sample for test in campaign.tests}
+        what = "this sample has cavities" if wanted in measured else "no test of this campaign has this sample"
+        raise CampaignError(replace(_problem(campaign, what, wanted), file="--flat", column=None))
+    return replace(campaign, chosen_flat=wanted)
+
+
+def required_flat_sample(campaign: Campaign) -> str:
+    """Name of the flat sample.
+
+    Raises
+    ------
+    CampaignError
+        No flat sample was measured, or several were and none of them was chosen.
+    """
+    if campaign.flat_sample:
+        return campaign.flat_sample
+    found = ", ".join(campaign.flat_samples) or "no sample whose pattern has cavity = none"
+    raise CampaignError(_problem(campaign, "the model must be calibrated on one flat sample", found))
+
+
+def _problem(campaign: Campaign, what: str, found: str) -> Problem:
+    flat = campaign.flat_samples
+    allowed = f"--flat {' or --flat '.join(flat)}" if flat else "at least one sample whose pattern has cavity = none"
+    return Problem("no_flat_sample", what, file="tests.csv", column="sample", found=found, allowed=allowed)
+
+
+def with_zeros(campaign: Campaign, zero: str = "", load_zero: str = "") -> Campaign:
+    """The campaign with the zero of the force and of the load as given; unchanged where nothing is given.
+
+    Raises
+    ------
+    ValueError
+        A text that is no zero.
+    """
+    if not zero and not load_zero:
+        return campaign
+    force, load = zero_choice(zero), zero_choice(load_zero)
+
+    def own(test: Test) -> Test:
+        return replace(
+            test,
+            zero=_chosen(test.zero, campaign.zero, force),
+            load_zero=_chosen(test.load_zero, campaign.load_zero, load),
+        )
+
+    return replace(
+        campaign, tests=tuple(map(own, campaign.tests)), zero=_chosen(campaign.zero, campaign.zero, force),
+        load_zero=_chosen(campaign.load_zero, campaign.load_zero, load),
+    )  # fmt: skip
+
+
+def _chosen(own: ZeroChoice, of_campaign: ZeroChoice, given: ZeroChoice) -> ZeroChoice:
+    return given if given != DEFAULT and own == of_campaign else own

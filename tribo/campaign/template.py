@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tribo.campaign.load import RAW, TESTS, TOML
 from tribo.errors import CampaignError, Problem
-from tribo.file_contents import write_new
+from tribo.files import write_new
 
 _TOML_TEXT = """\
 # Description of a campaign: sample, counterface and patterns. Replace the example values by your own.

@@ -9,16 +9,12 @@ import click
 
 from tribo import __version__
 from tribo.cli.build_commands import build, schedule
-from tribo.cli.compare_reports_command import compare_reports
-from tribo.cli.console import Console, command_options
-from tribo.cli.discover_command import discover
-from tribo.cli.given_paths import GivenPath
-from tribo.cli.init_command import init
-from tribo.cli.reading_options import corrected, reading_options
+from tribo.cli.console import Console, GivenPath, command_options
+from tribo.cli.setup_commands import init
 from tribo.cli.simulate_command import simulate
-from tribo.cli.study_commands import compare, demo, diagnose, fit, ingest, predict, report
-from tribo.cli.study_options import CAMPAIGN
-from tribo.nearest import did_you_mean
+from tribo.cli.study_commands import compare, compare_reports, demo, diagnose, discover, fit, ingest, predict, report
+from tribo.cli.study_options import CAMPAIGN, corrected, reading_options
+from tribo.user_text import did_you_mean
 
 
 class Commands(click.Group):
@@ -87,9 +83,9 @@ def plan(console: Console, campaign: Path, law_file: Path | None, **_: Any) -> N
     from dataclasses import asdict
 
     from tribo.campaign import open_campaign
-    from tribo.diagnose import plan_design
-    from tribo.diagnose.discovery.law_file import read_law
-    from tribo.diagnose.discovery.planned_law import plan_law
+    from tribo.diagnostics import plan_design
+    from tribo.lawsearch.known_laws import plan_law
+    from tribo.lawsearch.law_file import read_law
     from tribo.report.words.verdict_text import plan_text
 
     law = read_law(law_file) if law_file is not None else None
@@ -134,15 +130,15 @@ def bench(console: Console, campaign: Path | None, large: bool, jobs: int, **_: 
 
     Times are compared with those of reference programs, measured alternately in the same run.
     """
-    from tribo.cli.reading_speed import against_pandas, in_words, timing_in_words
+    from tribo.cli.setup_commands import against_pandas, in_words_reading_speed, timing_in_words
     from tribo.published import data_dir
-    from tribo.simulate.engine_speed import simulator_benchmarks
+    from tribo.springblock.engine_speed import simulator_benchmarks
 
     with console.progress() as progress:
         ratios = against_pandas(campaign or data_dir() / "example", jobs)
         timings = simulator_benchmarks(lambda done, total: progress("timing the simulator", done, total), large=large)
     record = {"reading": [vars(r) for r in ratios], "simulator": [t.record() for t in timings]}
-    console.result(record, "\n".join([*map(in_words, ratios), *map(timing_in_words, timings)]))
+    console.result(record, "\n".join([*map(in_words_reading_speed, ratios), *map(timing_in_words, timings)]))
 
 
 @main.command()
@@ -152,7 +148,7 @@ def doctor(console: Console, **_: Any) -> int:
 
     Lists versions, processor cores and the optional packages found or missing.
     """
-    from tribo.cli.doctor import examine, in_words
+    from tribo.cli.setup_commands import examine, in_words
 
     found = examine()
     console.result(found, in_words(found))

@@ -1,4 +1,17 @@
-"""Shared by all commands: common options, progress, errors as text or JSON, exit statuses."""
+"""Paths that a user gives and that must exist; one that cannot be looked at is not called missing.
+
+Faults as lines of text: equal ones once, with their number, one example in full and the tests they concern.
+
+What happens beside a command: the system asks it to end, or a kept result turns out to be damaged.
+
+What a dry run found, in lines: the steps, then tests set aside, doubts and notes.
+
+Where a command writes: -o, --force and --wait, and the folder held as long as the command runs.
+
+What is recorded of a run: the command line, the time, the inputs and the options.
+
+Shared by all commands: common options, progress, errors as text or JSON, exit statuses.
+"""
 
 from __future__ import annotations
 
@@ -7,23 +20,305 @@ import json
 import logging
 import math
 import os
+import re
 import shutil
+import signal
+import stat
 import sys
 import textwrap
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass
-from typing import Any
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from tribo.cli.grouped_faults import doubts_text, faults_text, set_aside_text
-from tribo.cli.interruption import damage_said, ended_by_terminate
+from tribo.cache.kept_results import DamagedResultWarning
+from tribo.cache.own_folder import KEPT, Access, BusyError, check_folder, own_folder
 from tribo.errors import Problem, TriboError, failed_by_system, of_the_system, system_problem, unexpected
-from tribo.escaping import printable
 from tribo.records import Doubt, SetAside
-from tribo.store.lock import BusyError
+from tribo.user_text import nearest, printable
+
+if TYPE_CHECKING:
+    from tribo.dry_run import Checked
+    from tribo.records import Study
+    from tribo.report.provenance import Provenance
+    from tribo.stages import StudyOptions
+
+
+class GivenPath(click.Path):
+    """A path that exists. Errors of the system other than its absence are named as such, with exit status 1."""
+
+    def __init__(self, *, file_okay: bool = True, dir_okay: bool = True):
+        super().__init__(exists=True, file_okay=file_okay, dir_okay=dir_okay, path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        try:
+            is_folder = stat.S_ISDIR(os.stat(value).st_mode)
+        except (FileNotFoundError, NotADirectoryError):
+            if near := _beside(Path(value)):
+                self.fail(f"{value!r} does not exist; did you mean {near}?", param, ctx)
+            return super().convert(value, param, ctx)  # click says so
+        except OSError as why:
+            raise click.ClickException(f"{value}: {(why.strerror or str(why)).lower()}") from why
+        if self.dir_okay if is_folder else self.file_okay:
+            return Path(value)
+        return super().convert(value, param, ctx)
+
+
+def _beside(path: Path) -> Path | None:
+    """The file or folder beside ``path`` whose name is nearest to its name."""
+    try:
+        names = [p.name for p in path.parent.iterdir() if not p.name.startswith(".")]
+    except OSError:
+        return None
+    near = nearest(path.name, names)
+    return path.parent / near if near else None
+
+
+FEWEST_GROUPED = 3  # equal faults fewer than this are listed one by one
+LONGEST_LIST = 160  # characters of the tests listed below an example
+_SAME_BEGINNING = 24  # characters by which two sentences of one kind count as the same
+
+
+def faults_text(problems: Sequence[Problem], *, all_of_them: bool = False) -> str:
+    """The problems, equal ones grouped: an example in full, then the others by test or row."""
+    lines = []
+    for group in _groups(problems):
+        if all_of_them or len(group) < FEWEST_GROUPED:
+            lines += [f"  {_full(problem)}" for problem in group]
+        else:
+            lines += [f"  {len(group)} times, for example {_full(group[0])}", f"    also {_others(group[1:])}"]
+    return "\n".join(lines)
+
+
+def doubts_text(doubts: Sequence[Doubt]) -> str:
+    """Doubtful numbers, those that one slip explains together with it."""
+    by_slip: dict[str, list[Doubt]] = {}
+    for doubt in doubts:
+        by_slip.setdefault(doubt.slip, []).append(doubt)
+    lines = []
+    for slip, together in by_slip.items():
+        lines += [f"  {doubt.without_slip()}" for doubt in together]
+        lines += [f"    likely slip: {slip}"] if slip else []
+    return "\n".join(lines)
+
+
+def set_aside_text(tests: Sequence[SetAside], *, all_of_them: bool = False) -> str:
+    """Tests with their reasons; those with an equal fault once, with an example and the other tests."""
+    groups: dict[object, list[SetAside]] = {}
+    for test in tests:
+        key = tuple(map(_key, test.problems)) or test.reason
+        groups.setdefault(key, []).append(test)
+    lines = []
+    for group in groups.values():
+        if all_of_them or len(group) < FEWEST_GROUPED:
+            lines += [f"  {test.test_id}: {test.reason}" for test in group]
+        else:
+            others = _listed([test.test_id for test in group[1:]])
+            lines += [
+                f"  {len(group)} tests, for example {group[0].test_id}: {group[0].reason}", f"    also {others}"
+            ]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _groups(problems: Sequence[Problem]) -> list[list[Problem]]:
+    """Problems of one kind in one column together, in the order of their first."""
+    groups: dict[object, list[Problem]] = {}
+    for problem in problems:
+        groups.setdefault(_key(problem), []).append(problem)
+    return list(groups.values())
+
+
+def _key(problem: Problem) -> tuple[object, ...]:
+    what = re.sub(r"^sample [^:]*: ", "", problem.what)
+    return problem.kind, problem.column, re.sub(r"\d+", "#", what)[:_SAME_BEGINNING]
+
+
+def _full(problem: Problem) -> str:
+    return f"{problem.test_id + ': ' if problem.test_id else ''}{problem}"
+
+
+def _others(problems: Sequence[Problem]) -> str:
+    if all(p.test_id for p in problems):
+        return _listed([str(p.test_id) for p in problems])
+    if all(p.row is not None for p in problems):
+        return "in rows " + _listed([str(p.row) for p in problems])
+    return _listed([str(p.file or p.column or p.found or p.what.partition(":")[0]) for p in problems])
+
+
+def _listed(names: Sequence[str]) -> str:
+    """As many names as fit, then how many more there are."""
+    names = list(dict.fromkeys(names))
+    shown: list[str] = []
+    for name in names:
+        if shown and sum(len(n) + 2 for n in (*shown, name)) > LONGEST_LIST:
+            break
+        shown.append(name)
+    more = len(names) - len(shown)
+    return ", ".join(shown) + (f" and {more} more (-v lists all)" if more else "")
+
+
+@contextmanager
+def damage_said(say: Callable[[str], None]) -> Iterator[None]:
+    """Say it as a line where a kept result is damaged and made again; other warnings are shown as ever."""
+    with warnings.catch_warnings():
+        shown = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *more: Any, **named: Any) -> None:
+            if issubclass(category, DamagedResultWarning):
+                say(f"warning: {message}")
+            else:
+                shown(message, category, *more, **named)
+
+        warnings.showwarning = show
+        yield
+
+
+@contextmanager
+def ended_by_terminate() -> Iterator[None]:
+    """Let SIGTERM end the command as Ctrl-C does, so that nothing is left half written.
+
+    Further ones are ignored: a build and Snakemake both ask a step to end, and the second request must not interrupt
+    the removal of unfinished files.
+    """
+    process = os.getpid()
+
+    def interrupt(number: int, _: Any) -> None:
+        signal.signal(number, signal.SIG_IGN)
+        if os.getpid() != process:  # a forked worker tidies up and ends; the command speaks for all
+            raise SystemExit(128 + number)
+        raise KeyboardInterrupt
+
+    try:
+        before = signal.signal(signal.SIGTERM, interrupt)
+    except ValueError:  # not in the main thread, where signals arrive
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def dry_run_text(found: Checked, out: Path, *, all_of_them: bool) -> str:
+    """The result of a dry run but for the faults; equal ones are grouped unless ``all_of_them`` are asked for."""
+    parts = [f"would {step}" for step in found.steps]
+    if not found.faults:
+        parts.append(f"would write into {out}")
+    findings = findings_text(replace(found, faults=()), all_of_them=all_of_them)
+    parts += [findings] if findings else []
+    if not found.faults:
+        clean = not (found.set_aside or found.doubts or found.used_with_doubts)
+        parts.append(f"checked: {found.tests} tests can be used{'; nothing is doubtful' if clean else ''}")
+    return "\n".join(parts)
+
+
+def findings_text(found: Checked, *, all_of_them: bool) -> str:
+    """Faults, doubtful numbers, tests set aside or used with doubts, and notes; empty where there is nothing to say."""
+    parts = []
+    groups = (
+        ("fault", "", faults_text(found.faults, all_of_them=all_of_them), found.faults),
+        ("doubtful number", "", doubts_text(found.doubts), found.doubts),
+        ("test", "would be set aside", set_aside_text(found.set_aside, all_of_them=all_of_them), found.set_aside),
+        ("test", "would be used with doubts", set_aside_text(found.used_with_doubts, all_of_them=all_of_them),
+         found.used_with_doubts),
+        ("note", "", faults_text(found.notes, all_of_them=all_of_them), found.notes),
+    )  # fmt: skip
+    for noun, what, text, items in groups:
+        if items:
+            number = f"{len(items)} {noun}{'s' if len(items) != 1 else ''}"
+            parts.append(f"{number}{f' {what}' if what and noun == 'test' else ''}:\n{text}")
+    return "\n".join(parts)
+
+
+FOLDER = click.Path(file_okay=False, path_type=Path)
+FORCE = click.option(
+    "--force", is_flag=True,
+    help="Write even where there are files that tribo has not written; those of the same name are replaced.",
+)  # fmt: skip
+WAIT = click.option(
+    "--wait", "wait_s", default=0.0, show_default=True,
+    help="Seconds to wait if another process is writing there.",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Output:
+    """The output folder of a command, ``path``, and how it may be taken."""
+
+    path: Path
+    force: bool = False
+    wait_s: float = 0.0
+
+    @property
+    def kept(self) -> Path:
+        """Folder of finished simulations and the like, for the next start."""
+        return self.path / KEPT
+
+    def check(self, *inputs: Path) -> None:
+        """Refuse a folder that results of these inputs must not be written to."""
+        check_folder(self.path, inputs, self.force)
+
+    def taken(self, *inputs: Path, shared: bool = False) -> AbstractContextManager[Path]:
+        """The folder, held as its only writer; or ``shared`` with others that only add kept results."""
+        return own_folder(self.path, inputs, Access(self.force, self.wait_s, shared))
+
+
+def output_options(default: str | None = None) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add -o, --force and --wait to a command, which receives them as one :class:`Output`."""
+    out = click.option(
+        "-o", "--out", type=FOLDER, required=default is None, default=default, show_default=default is not None,
+        help="Output folder.",
+    )  # fmt: skip
+
+    def with_options(function: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(function)
+        def command(*arguments: Any, out: Path, force: bool, wait_s: float, **options: Any) -> Any:
+            return function(*arguments, out=Output(out, force, wait_s), **options)
+
+        return out(FORCE(WAIT(command)))
+
+    return with_options
+
+
+def provenance_of_run(study: Study, campaign: Path, chosen: StudyOptions) -> Provenance:
+    """Provenance of a study run by this command."""
+    from tribo.report import gather_provenance
+
+    options = {**chosen.as_words(), "flat": study.ingested.campaign.flat_sample}
+    if study.simulated is None:
+        del options["runs"]  # nothing was simulated
+    return gather_provenance(
+        study,
+        command=command_line(),
+        seed=chosen.seed,
+        started_at=now(),
+        options=options,
+        campaign=campaign,
+        overrides=chosen.overrides,
+    )
+
+
+def command_line() -> str:
+    import shlex
+    import sys
+
+    return shlex.join(["tribo", *sys.argv[1:]])
+
+
+def now() -> str:
+    """The time of this run, or that of SOURCE_DATE_EPOCH (reproducible-builds.org) where it is set."""
+    import os
+    from datetime import UTC, datetime
+
+    fixed = os.environ.get("SOURCE_DATE_EPOCH")
+    now = datetime.fromtimestamp(int(fixed), UTC) if fixed else datetime.now(UTC)
+    return now.isoformat(timespec="seconds")
+
 
 DONE, UNUSABLE, SOME_SET_ASIDE = 0, 1, 3
 INTERRUPTED = 130

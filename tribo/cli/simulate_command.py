@@ -9,17 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tribo.cli.console import Console, command_options
-from tribo.cli.given_paths import GivenPath
-from tribo.cli.output import FORCE, WAIT
+from tribo.cli.console import FORCE, WAIT, Console, GivenPath, command_options
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tribo.diagnose.discovery.written_law import WrittenLaw
+    from tribo.lawsearch.grammar import WrittenLaw
     from tribo.records import Run
-    from tribo.simulate import SimConfig
-    from tribo.simulate.resume import Work
+    from tribo.springblock import SimConfig
+    from tribo.springblock.ensemble import Work
+
 
 # options that describe the runs; a design file may replace them
 _RUNS = (
@@ -94,12 +93,12 @@ def simulate(
     ensemble; FILE.nc then holds one entry per run. If the same command is started again, it computes only the missing
     runs.
     """
+    from tribo.cache.own_folder import check_file, only_writer_of
     from tribo.mechanisms_in_model import columns_from, parse_given, parse_with
-    from tribo.simulate.design_file import asked_runs, described_by_options, read_design, together
-    from tribo.simulate.results_file import ENSEMBLE, ONE_RUN, kind_of
-    from tribo.simulate.resume import continues, run_stored
-    from tribo.simulate.run import simulate as run_model
-    from tribo.store.own_file import check_file, only_writer_of
+    from tribo.springblock.design_file import asked_runs, described_by_options, read_design, together
+    from tribo.springblock.ensemble import continues, run_stored
+    from tribo.springblock.results_file import ENSEMBLE, ONE_RUN, kind_of
+    from tribo.springblock.run import simulate as run_model
 
     scheduler, seed, jobs = (options.pop(name) for name in ("scheduler", "seed", "jobs"))
     force, wait_s = options.pop("force"), options.pop("wait_s")
@@ -157,7 +156,7 @@ def pulled(config: SimConfig, added: Added) -> Run:
 
 def _laws_in(text: str) -> tuple[tuple[tuple[WrittenLaw, tuple[float, ...]], ...], str]:
     """The laws whose files a text names, with their amplitudes, and the rest of the text."""
-    from tribo.diagnose.discovery.law_file import read_law
+    from tribo.lawsearch.law_file import read_law
 
     items = text.split(",")
     files = [Path(item.strip()) for item in items if item.strip().endswith(".toml")]
@@ -169,7 +168,7 @@ def _laws_in(text: str) -> tuple[tuple[tuple[WrittenLaw, tuple[float, ...]], ...
 
 
 def _one_run(console: Console, run: Run, out: Path) -> None:
-    from tribo.simulate import write_run
+    from tribo.springblock import write_run
 
     write_run(run, out)
     record = {
@@ -191,7 +190,7 @@ def _work(added: Added) -> Work:
     from functools import partial
 
     from tribo.display import exact_text
-    from tribo.simulate.resume import FRICTION, Work
+    from tribo.springblock.ensemble import FRICTION, Work
 
     if not added.acting and not added.laws:
         return FRICTION
@@ -203,7 +202,7 @@ def _work(added: Added) -> Work:
 def _say_ensemble(console: Console, table: pd.DataFrame, out: Path, table2: bool) -> None:
     """The ensemble in words and as a record: beside the published column, or means and laws."""
     from tribo.published import load_table2
-    from tribo.simulate.table2_column import beside, described, fitted, table2_text
+    from tribo.springblock.table2_column import beside, described, fitted, table2_text
 
     record: dict[str, Any] = {"out": str(out), "runs": len(table)}
     if table2:

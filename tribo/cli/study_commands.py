@@ -1,4 +1,9 @@
-"""Commands that run the stages of a study on one campaign and write their results: ingest to report."""
+"""Commands that run the stages of a study on one campaign and write their results: ingest to report.
+
+tribo discover: the missing law.
+
+tribo compare-reports: two reports side by side.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +13,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tribo.cli.console import UNUSABLE, Console, command_options, set_aside_record, status_of
-from tribo.cli.given_paths import GivenPath
-from tribo.cli.output import Output, output_options
-from tribo.cli.reading_options import reading_options, with_reading_options
-from tribo.cli.run_record import command_line, now, provenance_of_run
+from tribo.cli.console import (
+    UNUSABLE,
+    Console,
+    GivenPath,
+    Output,
+    command_line,
+    command_options,
+    now,
+    output_options,
+    provenance_of_run,
+    set_aside_record,
+    status_of,
+)
 from tribo.cli.study_options import (
     CAMPAIGN,
     DRY_RUN,
@@ -25,12 +38,14 @@ from tribo.cli.study_options import (
     ZEROS,
     fit_options,
     model_options,
+    reading_options,
+    with_reading_options,
 )
 
 if TYPE_CHECKING:
-    from tribo.diagnose import Diagnosis
-    from tribo.diagnose.diagnosis_record import Alone
-    from tribo.diagnose.verdict import Verdict
+    from tribo.diagnostics import Diagnosis
+    from tribo.diagnostics.diagnosis_record import Alone
+    from tribo.diagnostics.verdict import Verdict
     from tribo.dry_run import Until as DryUntil
     from tribo.records import Campaign, Study
     from tribo.report.card import Card
@@ -155,13 +170,12 @@ def diagnose(
     if campaign is None:
         return _diagnose_published(console, out, options["seed"])
     from tribo import stages
+    from tribo.cache.kept_results import Shelf
     from tribo.campaign import open_campaign
     from tribo.report import write_until
-    from tribo.report.card import card_of
+    from tribo.report.card import card_of, card_text
     from tribo.report.drawing_choices import Drawing
-    from tribo.report.words.card_text import card_text
     from tribo.report.words.verdict_text import verdict_text
-    from tribo.store.kept_results import Shelf
 
     chosen = stages.StudyOptions(kept=out.kept, **options)
     if dry_run:
@@ -183,11 +197,11 @@ def diagnose(
 
 def _diagnose_published(console: Console, out: Output, seed: int) -> int:
     """The verdict on Table 2 of Berardo et al. (2019), for every interpretation of what it leaves open."""
-    from tribo.diagnose.discovery.across_words import record_of, sentence
-    from tribo.diagnose.from_table.published_diagnosis import across_published, diagnose_published
+    from tribo.berardo2019.table_diagnosis import across_published, diagnose_published
+    from tribo.lawsearch.across_words import record_of, sentence
     from tribo.published import BERARDO2019, data_dir, load_table2, load_table2_simulated_anew
     from tribo.report.provenance import provenance_of_table
-    from tribo.report.table_report import write_published
+    from tribo.report.without_study import write_published
     from tribo.report.words.verdict_text import verdict_text
 
     folder, tables = data_dir() / BERARDO2019, ("table2.csv", "table2_tribo.csv")
@@ -234,10 +248,10 @@ def demo(console: Console, out: Output, **options: Any) -> int:
 def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool, columns: str, **options: Any) -> int:
     """Run the stages up to ``until`` on one campaign and write their results."""
     from tribo import stages
+    from tribo.cache.kept_results import Shelf
     from tribo.campaign import open_campaign
     from tribo.report import write_until
     from tribo.report.drawing_choices import Drawing
-    from tribo.store.kept_results import Shelf
 
     stated = options.pop("stated")
     chosen = stages.StudyOptions(kept=out.kept, **options)
@@ -293,7 +307,7 @@ def _conclude(
     from dataclasses import asdict
 
     from tribo.report import summary_text, table2_text
-    from tribo.report.result_tables import fits_table
+    from tribo.report.tables import fits_table
 
     set_aside = study.ingested.set_aside
     doubts = study.ingested.doubts()
@@ -327,7 +341,7 @@ def _conclude(
 def _card_words(card: Card | None) -> list[str]:
     if card is None:
         return []
-    from tribo.report.words.card_text import card_text
+    from tribo.report.card import card_text
 
     return [card_text(card)]
 
@@ -347,7 +361,7 @@ def _checked(
     """Print everything that a study of a campaign would meet, and the status it would end with."""
     from dataclasses import replace
 
-    from tribo.cli.dry_run_text import dry_run_text
+    from tribo.cli.console import dry_run_text
     from tribo.dry_run import check
     from tribo.errors import TriboError
 
@@ -360,3 +374,67 @@ def _checked(
     console.result(found.as_record(), dry_run_text(found, out.path, all_of_them=console.verbosity > 0))
     console.list_problems(found.faults)
     return UNUSABLE if found.faults else status_of(found.set_aside)
+
+
+@click.command()
+@click.argument("campaign", type=GivenPath())
+@output_options()
+@click.option(
+    "--with", "law_file", type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="LAW.TOML",
+    help="Test this law, found in another campaign, instead of searching.",
+)
+@click.option(
+    "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
+)
+@click.option("--flat", default="", metavar="SAMPLE", help="Flat sample for the calibration, as in tribo report.")
+@command_options
+def discover(
+    console: Console, campaign: Path, out: Output, law_file: Path | None, **options: Any
+) -> int:
+    """Search for the law of what no mechanism explains.
+
+    All laws of a small grammar are tried: a recorded column, the shape of its course, what it acts on, in which regime
+    and on which samples, and products of two columns. A law is written only if it is beyond what the best of all laws
+    reaches by chance. Writes law-1.toml and further laws, laws.csv and discovery.json.
+    """
+    from tribo import stages
+    from tribo.campaign import open_campaign
+    from tribo.lawsearch.discovery import discover_in, hold_law_against
+    from tribo.lawsearch.law_file import read_law
+    from tribo.report.without_study import write_discovery, write_held
+
+    law = read_law(law_file) if law_file is not None else None
+    with out.taken(campaign), open_campaign(campaign) as opened, console.progress() as progress:
+        chosen = stages.StudyOptions(kept=out.kept, **options)
+        study = stages.study(opened, chosen, until="ingest", progress=progress)
+        record = provenance_of_run(study, campaign, chosen)
+        with stages.naming_set_aside(study.ingested):
+            if law is not None:
+                written = write_held(hold_law_against(study.ingested, *law, seed=chosen.seed), out.path, record)
+            else:
+                found = discover_in(study.ingested, seed=chosen.seed, progress=progress)
+                written = write_discovery(found, study.ingested.campaign.title, out.path, record)
+    console.result(written.record, written.text)
+    return console.status_after(study.ingested.set_aside)
+
+
+@click.command("compare-reports")
+@click.argument("first", type=GivenPath(file_okay=False))
+@click.argument("second", type=GivenPath(file_okay=False))
+@output_options()
+@command_options
+def compare_reports(console: Console, first: Path, second: Path, out: Output, **_: Any) -> int:
+    """Compare two reports: FIRST and SECOND are output folders of tribo report.
+
+    Writes compare.html, with the findings and figures of both side by side, and compare.csv, with the difference of mu,
+    tau0 and T of every sample that both have and its 95 % interval.
+    """
+    from tribo.report.compare_reports import write_comparison
+    from tribo.report.provenance import provenance_of_comparison
+
+    with out.taken(first, second) as folder:
+        record = provenance_of_comparison((first, second), command_line(), now())
+        table, said = write_comparison((first, second), folder, record)
+    words = [*said, f"Written: {out.path / 'compare.html'}"]
+    console.result({"sentences": said, "differences": table.to_dict("records")}, "\n".join(words))
+    return 0

@@ -20,8 +20,8 @@ from typing import Any
 
 from tribo.cli.console import DONE, SOME_SET_ASIDE, UNUSABLE
 from tribo.errors import is_of_the_system
-from tribo.file_contents import found_below, text_of
-from tribo.pipeline.step_record import read_record
+from tribo.files import found_below, text_of
+from tribo.site.steps import read_record
 
 DONE_WORDS = {DONE: "done", SOME_SET_ASIDE: "some_set_aside", UNUSABLE: "unusable"}
 
@@ -54,7 +54,7 @@ def run_step(
         "seconds": round(time.time() - started, 1),
         "finished": finished,
     }
-    from tribo.store.whole_files import write_text
+    from tribo.files import write_text
 
     write_text(record, json.dumps(written, indent=1) + "\n")
     return 0

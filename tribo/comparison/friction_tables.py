@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 from tribo.comparison.study_lookup import sample_numbers
+from tribo.fitting.alternatives import force_N
 from tribo.fitting.dependence import LABELS, SPEED, measured_points, test_values, variables_of
-from tribo.fitting.law_choice import force_N
-from tribo.fitting.load_levels import meant_to_be_one
+from tribo.fitting.linear import meant_to_be_one
 from tribo.records import REGIMES, Study
 
 POINTS_COLUMNS = [

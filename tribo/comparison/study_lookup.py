@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from tribo.fitting.load_levels import levels_of
+from tribo.fitting.linear import levels_of
 from tribo.records import FloatArray, LawFit, Pattern, Study
 
 LOAD_TOLERANCE = 0.02  # loads closer than this (relative) are repeats of one load

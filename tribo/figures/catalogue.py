@@ -25,7 +25,7 @@ from tribo.figures import (
 from tribo.figures.record import FigureOf, StudyFigure
 
 if TYPE_CHECKING:
-    from tribo.diagnose.from_table.published_diagnosis import PublishedDiagnosis
+    from tribo.berardo2019.table_diagnosis import PublishedDiagnosis
     from tribo.figures.record import DiagnosisFigure
 
 FIGURES: dict[str, StudyFigure] = {

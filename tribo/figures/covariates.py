@@ -10,7 +10,7 @@ import numpy as np
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
-    from tribo.diagnose.statistics.model import Setup
+    from tribo.diagnostics.model import Setup
 
 BEND = "bend"  # the square of ln N: whether T(N) bends
 LABELS = {
@@ -58,7 +58,7 @@ class Covariate:
 
 def mechanism_label(name: str) -> str:
     """The plain name of a mechanism without its article; of one that follows any column, that column."""
-    from tribo.diagnose.terms import name_in_words
+    from tribo.diagnostics.terms import name_in_words
 
     column = name.partition(":")[2]
     plain = f"dependence on {LABELS.get(column, column)}" if column else name_in_words(name)
@@ -80,7 +80,7 @@ def covariates(s: Setup) -> list[Covariate]:
 
 def numeric(s: Setup) -> list[str]:
     """Names of the recorded numbers that vary and are complete."""
-    from tribo.diagnose.search.looks import numeric_covariates
+    from tribo.diagnostics.contrasts import numeric_covariates
 
     return list(numeric_covariates(s))
 

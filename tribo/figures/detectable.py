@@ -16,7 +16,7 @@ from tribo.figures import style
 from tribo.figures.covariates import mechanism_label
 
 if TYPE_CHECKING:
-    from tribo.diagnose import Diagnosis
+    from tribo.diagnostics import Diagnosis
 
 COLUMNS = ["mark", "name", "strength", "found_10_percent", "found_50_percent", "found_90_percent"]
 LEVEL = 0.01  # chance of a misfit where nothing is hidden, as the diagnosis takes it by default

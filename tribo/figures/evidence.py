@@ -15,7 +15,7 @@ from tribo.figures.covariates import mechanism_label
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
-    from tribo.diagnose import Diagnosis
+    from tribo.diagnostics import Diagnosis
 
 COLUMNS = ["mechanism", "choice", "status", "gain", "weight", "estimate", "reason"]
 STATUS = {
@@ -35,7 +35,7 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
 
     With two causes the gains are those of the first step. Empty where nothing had to be explained.
     """
-    from tribo.diagnose import weighing_table
+    from tribo.diagnostics import weighing_table
 
     if d.named is None or not d.named.weighed:
         return pd.DataFrame(columns=COLUMNS)

@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from tribo.comparison import study_lookup
-from tribo.diagnose.statistics.percent import percent, rms_percent
+from tribo.diagnostics.effect_sizes import percent, rms_percent
 from tribo.figures import style
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
-    from tribo.diagnose import Diagnosis
+    from tribo.diagnostics import Diagnosis
 
 COLUMNS = [
     "sample_number", "sample", "regime", "normal_load_N", "model", "residual_percent", "low_percent", "high_percent",

@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from tribo.diagnose.statistics.percent import percent
+from tribo.diagnostics.effect_sizes import percent
 from tribo.figures import style
 from tribo.figures.covariates import Covariate, covariate
 from tribo.figures.residuals import WEIGHTS, added_by_causes, summaries
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
-    from tribo.diagnose import Diagnosis
+    from tribo.diagnostics import Diagnosis
 
 COLUMNS = ["regime", "axis", "mark", "sample", "test_id", "x", "x_name", "y", "y_low", "y_high"]
 BY_SAMPLE = ("area_fraction", "rim_per_m", "elongation", "clip_N", "sample", "tau0")
@@ -33,7 +33,7 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     twice its standard error; band, two standard deviations of such a mean by the fitted noise; curve, what the named
     causes add. The column is that of the cause that acts most, else that of the first misfit, else the sample.
     """
-    from tribo.diagnose.statistics.fit import residual_on_flat
+    from tribo.diagnostics.fit import residual_on_flat
 
     o = d.baseline.setup.observations
     column = _column(d)

@@ -11,17 +11,17 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from tribo.diagnose.discovery.written_law import UNITS, WrittenLaw, column_values
-from tribo.diagnose.statistics.model import effect_of
-from tribo.diagnose.statistics.percent import percent
-from tribo.diagnose.terms import in_words
+from tribo.diagnostics.effect_sizes import percent
+from tribo.diagnostics.model import effect_of
+from tribo.diagnostics.terms import in_words
 from tribo.figures import style
+from tribo.lawsearch.grammar import UNITS, WrittenLaw, column_values
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
-    from tribo.diagnose import Diagnosis
-    from tribo.diagnose.discovery.search import Discovery
-    from tribo.diagnose.discovery.settling import FoundLaw
+    from tribo.diagnostics import Diagnosis
+    from tribo.lawsearch.model_choice import FoundLaw
+    from tribo.lawsearch.search import Discovery
 
 COLUMNS = [
     "law_number", "formula", "regime", "sample", "covariate", "x", "x_name", "partial_percent", "law_percent",

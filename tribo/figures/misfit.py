@@ -12,14 +12,14 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, TwoSlopeNorm, to_rgb
 from matplotlib.figure import Figure
 
-from tribo.diagnose.statistics.percent import bend_percent, change_percent, mean_percent, percent
+from tribo.diagnostics.effect_sizes import bend_percent, change_percent, mean_percent, percent
 from tribo.figures import style
 from tribo.figures.covariates import BEND, Covariate, covariates
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
-    from tribo.diagnose import Diagnosis
-    from tribo.diagnose.statistics.linearisation import ModelFit
+    from tribo.diagnostics import Diagnosis
+    from tribo.diagnostics.fit import ModelFit
 
 COLUMNS = ["observable", "row", "covariate", "label", "effect_percent", "strength", "p_adjusted", "mark"]
 ALL = "all samples"
@@ -51,7 +51,7 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     The observable "trace" has the change of the zero (of the median sliding force), of the slope of the rise and of the
     stick-slip amplitude, with the p value of a rank correlation, adjusted for the number of cells.
     """
-    from tribo.diagnose.statistics.fit import residual_on_flat
+    from tribo.diagnostics.fit import residual_on_flat
 
     columns = covariates(d.baseline.setup)
     residual = residual_on_flat(d.baseline)

@@ -17,8 +17,8 @@ from tribo.figures.covariates import mechanism_label
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
-    from tribo.diagnose.from_table.published_diagnosis import PublishedDiagnosis
-    from tribo.diagnose.from_table.table_outlook import Outlook
+    from tribo.berardo2019.table_diagnosis import PublishedDiagnosis
+    from tribo.berardo2019.table_model import Outlook
 
 RATIO_COLUMNS = [
     "sample", "regime", "pressure_kPa", "measured_over_model", "low", "high", "low_independent", "high_independent",
@@ -39,7 +39,7 @@ def ratio_numbers(d: PublishedDiagnosis) -> pd.DataFrame:
     ``recalibrated`` is the same model with its flat law fitted to the whole table, ``extended`` with the best
     mechanism on top.
     """
-    from tribo.diagnose.from_table.table_observations import friction_at
+    from tribo.berardo2019.table_model import friction_at
 
     main = d.main
     table, best = main.table, main.weighed[0].fit
@@ -115,7 +115,7 @@ def _ratio_panel(ax: Axes, part: pd.DataFrame) -> None:
 
 def reading_numbers(d: PublishedDiagnosis) -> pd.DataFrame:
     """One row per reading and mechanism: log likelihood gained, amplitude with its 90 % interval, the guess it is."""
-    from tribo.diagnose.from_table.table_outlook import estimate_of
+    from tribo.berardo2019.table_model import estimate_of
 
     rows = []
     for k, o in enumerate(d.outlooks):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from tribo.diagnose import Diagnosis
+    from tribo.diagnostics import Diagnosis
 
 Of = TypeVar("Of")
 

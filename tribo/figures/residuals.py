@@ -12,15 +12,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from tribo.diagnose.statistics.model import PATTERN
-from tribo.diagnose.statistics.percent import percent
+from tribo.diagnostics.effect_sizes import percent
+from tribo.diagnostics.model import PATTERN
 from tribo.figures import style
 from tribo.figures.covariates import LOGARITHMIC, Covariate, covariate
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
-    from tribo.diagnose import Diagnosis
-    from tribo.diagnose.search.looks import Look
+    from tribo.diagnostics import Diagnosis
+    from tribo.diagnostics.contrasts import Look
 
 COLUMNS = [
     "panel", "title", "detail", "axis", "y_axis", "mark", "sample_number", "sample", "test_id", "x", "x_name", "y",
@@ -54,7 +54,7 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     ``mark`` is test; mean and band, the mean of a bin and two standard deviations of such a mean by the fitted noise
     (repeats, specimens, the model's own error of a sample); curve, what the named model adds there.
     """
-    from tribo.diagnose.statistics.fit import residual_on_flat
+    from tribo.diagnostics.fit import residual_on_flat
 
     residual = residual_on_flat(d.baseline)
     frames = [_rows(d, k, panel, residual) for k, panel in enumerate(panels(d))]

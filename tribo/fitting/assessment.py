@@ -1,25 +1,209 @@
-"""What is reported beside the fits: other weights and laws, uncertainty budget, power and outlying pulls."""
+"""Outlying pulls and specimens, found by robust fits. They are reported and never removed.
+
+What is reported beside the fits: other weights and laws, uncertainty budget, power and outlying pulls.
+"""
 
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 
 from tribo.errors import FitError
+from tribo.fitting.alternatives import compared_laws, fit_three_term, mixed_model
 from tribo.fitting.budget import Budget, campaign_budgets
 from tribo.fitting.dependence import dependence
-from tribo.fitting.law_choice import compared_laws
-from tribo.fitting.mixed import mixed_model
-from tribo.fitting.outlying import outlying_pulls, outlying_specimens
-from tribo.fitting.paired import differences_table, paired_differences
-from tribo.fitting.power import power_of_campaign
+from tribo.fitting.differences import differences_table, paired_differences, power_of_campaign
+from tribo.fitting.linear import (
+    WEIGHTS,
+    RepeatScatter,
+    Rows,
+    expected_force_N,
+    least_squares,
+    repeat_scatter,
+    sample_rows,
+    weights_of,
+)
 from tribo.fitting.samples import fit_samples
-from tribo.fitting.three_term import fit_three_term
-from tribo.fitting.weighting import WEIGHTS
-from tribo.records import NO_AREA_M2, REGIMES, Ingested, LawFit
+from tribo.laws import LAWS
+from tribo.records import NO_AREA_M2, REGIMES, FloatArray, Ingested, LawFit, Regime
+
+LAW = LAWS["coulomb_adhesion"]
+FALSE_ALARMS = 0.05  # chance of flagging anything at all in a campaign without outliers, for Gaussian scatter
+_MEDIAN_TO_SD = 1.4826
+
+
+@dataclass(frozen=True)
+class Outlying:
+    """An outlying pull or specimen: deviation ``deviation_pct`` of T, ``score`` robust standard deviations.
+
+    ``name`` is the test_id of a pull or the specimen; ``limit`` the score that chance exceeds in 5 % of
+    campaigns, all comparisons counted.
+    """
+
+    kind: Literal["pull", "specimen"]
+    name: str
+    sample: str
+    regime: Regime
+    deviation_pct: float
+    score: float
+    limit: float
+
+    def text(self) -> str:
+        """One sentence."""
+        where = "above" if self.deviation_pct > 0 else "below"
+        siblings = "the line of its specimen" if self.kind == "pull" else "the other specimens of its sample"
+        return (
+            f"{self.kind} {self.name} ({self.sample}, {self.regime}): {abs(self.deviation_pct):.0f} % "
+            f"{where} {siblings}, {self.score:.1f} robust standard deviations (limit {self.limit:.1f})"
+        )
+
+
+def outlying_pulls(table: pd.DataFrame, regime: Regime, nominal_area_m2: float) -> tuple[Outlying, ...]:
+    """Pulls far from the robust line (Tukey's biweight) of their specimen, furthest first.
+
+    Deviations are judged against the scatter of repeats as a function of force (:mod:`tribo.fitting.linear`), the
+    same for all samples. Specimens with fewer than five pulls are skipped: they determine no line.
+    """
+    samples = [rows for rows in sample_rows(table, regime) if len(np.unique(rows.load_N)) > 1]
+    scatter = repeat_scatter(tuple(samples)) if samples else None
+    lines = [line for rows in samples for line in _robust_lines(rows, scatter, nominal_area_m2)]
+    if not lines:
+        return ()
+    bulk = np.concatenate([line.residual / np.sqrt(1 - line.leverage) for line in lines])
+    scale = _MEDIAN_TO_SD * float(np.median(np.abs(bulk)))
+    if scale == 0:
+        return ()
+    limit = _limit(len(bulk), float(sum((1 - line.leverage).sum() for line in lines)))
+    found = []
+    for line in lines:
+        # a far pull has next to no weight in its line: its residual is that of a pull left out, wider by 1/(1 - h)
+        score = np.abs(line.residual) * np.sqrt(1 - line.leverage) / scale
+        found += [
+            Outlying(
+                "pull", str(line.rows.test_id[k]), line.rows.sample, regime,
+                100 * float(line.rows.force_N[k] / line.force_N[k] - 1), float(score[k]), limit,
+            )
+            for k in np.flatnonzero(score > limit)
+        ]  # fmt: skip
+    return tuple(sorted(found, key=lambda o: -o.score))
+
+
+def outlying_specimens(table: pd.DataFrame, regime: Regime, nominal_area_m2: float) -> tuple[Outlying, ...]:
+    """Specimens whose force deviates from that of the other specimens of their sample, furthest first.
+
+    Judged at the lowest and the highest load of the campaign by a robust fit (Huber) of log T on the sample;
+    needs samples of three specimens or more. With three, one that differs is found only if the specimens of
+    the other samples agree well among themselves.
+    """
+    names, samples, forces = _specimen_forces(table, regime, nominal_area_m2)
+    if len(names) == 0:
+        return ()
+    found = [o for column in np.log(forces).T for o in _apart(names, samples, column, regime, forces.shape[1])]
+    worst: dict[str, Outlying] = {}
+    for o in sorted(found, key=lambda o: o.score):
+        worst[f"{o.sample}/{o.name}"] = o
+    return tuple(sorted(worst.values(), key=lambda o: -o.score))
+
+
+@dataclass(frozen=True)
+class _Line:
+    """Robust line of one specimen: its pulls, fitted force, weighted residual and leverage, arrays (n,)."""
+
+    rows: Rows
+    force_N: FloatArray
+    residual: FloatArray
+    leverage: FloatArray
+
+
+def _robust_lines(rows: Rows, scatter: RepeatScatter | None, area: float) -> list[_Line]:
+    expected = expected_force_N(rows, area)
+    weight = expected**-2.0 if scatter is None else 1 / scatter.variance(expected)
+    lines = []
+    for name in rows.specimens:
+        keep = rows.specimen == name
+        own = rows.take(keep)
+        if len(own) >= 5 and len(np.unique(own.load_N)) > 1:
+            lines.append(_robust_line(own, weight[keep], area))
+    return lines
+
+
+def _robust_line(rows: Rows, weight: FloatArray, area: float) -> _Line:
+    from statsmodels.robust.norms import TukeyBiweight
+    from statsmodels.robust.robust_linear_model import RLM
+
+    root = np.sqrt(weight)
+    design = LAW.design_matrix(rows.load_N, area)
+    plain = least_squares(design, rows.force_N, weight)
+    weighted = design * root[:, None]
+    leverage = np.einsum("ij,jk,ik->i", weighted, plain.unscaled, weighted)
+    values = plain.values
+    if plain.residuals @ plain.residuals > 1e-20 * (rows.force_N * root) @ (rows.force_N * root):
+        tau0_in_kPa = np.array([1.0, 1e3])  # columns of comparable length
+        fit = RLM(rows.force_N * root, weighted * tau0_in_kPa, M=TukeyBiweight()).fit()
+        values = np.asarray(fit.params) * tau0_in_kPa
+    force = design @ values
+    return _Line(rows, force, (rows.force_N - force) * root, leverage)
+
+
+def _specimen_forces(table: pd.DataFrame, regime: Regime, area: float) -> tuple[np.ndarray, np.ndarray, FloatArray]:
+    """Names (g,), samples (g,) and fitted forces (g, 2) at the lowest and highest load of the campaign."""
+    names, samples, lines = [], [], []
+    every = [rows for rows in sample_rows(table, regime) if len(np.unique(rows.load_N)) > 1]
+    for rows in every:
+        weight = weights_of(rows, area, "relative")
+        own = [s for s in rows.specimens if len(np.unique(rows.load_N[rows.specimen == s])) > 1]
+        for name in own if len(own) > 2 else []:
+            keep = rows.specimen == name
+            design = LAW.design_matrix(rows.load_N[keep], area)
+            lines.append(least_squares(design, rows.force_N[keep], weight[keep]).values)
+            names.append(name)
+            samples.append(rows.sample)
+    if not lines:
+        return np.array([]), np.array([]), np.zeros((0, 2))
+    loads = np.concatenate([rows.load_N for rows in every])
+    at = LAW.design_matrix(np.array([loads[loads > 0].min(), loads.max()]), area)
+    forces = np.array(lines) @ at.T
+    above = (forces > 0).all(axis=1)
+    return np.array(names)[above], np.array(samples)[above], forces[above]
+
+
+def _apart(names: np.ndarray, samples: np.ndarray, log_force: FloatArray, regime: Regime, looks: int) -> list[Outlying]:
+    from statsmodels.robust.norms import HuberT
+    from statsmodels.robust.robust_linear_model import RLM
+
+    kinds, index = np.unique(samples, return_inverse=True)
+    dof = len(names) - len(kinds)
+    design = np.eye(len(kinds))[index]
+    leverage = 1 / np.bincount(index)[index]
+    fit = RLM(log_force, design, M=HuberT()).fit()
+    residual = np.asarray(fit.resid)
+    scale = _MEDIAN_TO_SD * float(np.median(np.abs(residual) / np.sqrt(1 - leverage)))
+    if scale == 0:
+        return []
+    score = np.abs(residual) / (scale * np.sqrt(1 - leverage))
+    limit = _limit(looks * len(names), dof)
+    return [
+        Outlying(
+            "specimen", str(names[k]), str(samples[k]), regime,
+            100 * float(np.expm1(residual[k])), float(score[k]), limit,
+        )
+        for k in np.flatnonzero(score > limit)
+    ]  # fmt: skip
+
+
+def _limit(looks: int, dof: float) -> float:
+    """Score that the largest of ``looks`` passes with probability FALSE_ALARMS (Bonferroni, t with ``dof``).
+
+    The robust scale is worth about 0.37 of the degrees of freedom of a standard deviation (the efficiency of
+    the median absolute deviation under Gaussian scatter).
+    """
+    from scipy.stats import t
+
+    return float(t.ppf(1 - FALSE_ALARMS / (2 * looks), max(0.37 * dof, 1.0)))
 
 
 def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> dict[str, Any]:

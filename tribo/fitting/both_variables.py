@@ -12,11 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.errors import FitError, Problem
-from tribo.fitting.linear import least_squares
-from tribo.fitting.rows import Rows, sample_rows
+from tribo.fitting.linear import Rows, least_squares, sample_rows, weights_of
 from tribo.fitting.samples import combine, fit_samples
-from tribo.fitting.weighting import weights_of
-from tribo.laws.table import LAWS
+from tribo.laws import LAWS
 from tribo.records import FloatArray, LawFit, Regime
 
 if TYPE_CHECKING:

@@ -16,11 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.errors import FitError, Problem
-from tribo.fitting.linear import least_squares
+from tribo.fitting.linear import Rows, least_squares, sample_rows, weights_of
 from tribo.fitting.partial_pooling import at_least, partly_pooled
-from tribo.fitting.rows import Rows, sample_rows
-from tribo.fitting.weighting import weights_of
-from tribo.laws.table import LAWS
+from tribo.laws import LAWS
 from tribo.records import STANDARD_GRAVITY, CombinedFit, FloatArray, Ingested, LawFit
 
 if TYPE_CHECKING:

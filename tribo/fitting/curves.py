@@ -7,12 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tribo.errors import FitError, Problem
-from tribo.fitting.linear import LinearFit, least_squares
-from tribo.fitting.rows import Rows, sample_rows
+from tribo.fitting.linear import WEIGHTS, LinearFit, Rows, least_squares, sample_rows, weights_of
 from tribo.fitting.samples import ONE_SPECIMEN, combine
-from tribo.fitting.weighting import WEIGHTS, weights_of
-from tribo.laws.record import Law
-from tribo.laws.table import LAWS
+from tribo.laws import LAWS, Law
 from tribo.records import FloatArray, LawFit, Regime
 
 if TYPE_CHECKING:

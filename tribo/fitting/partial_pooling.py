@@ -15,8 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from tribo.fitting.linear import Rows
 from tribo.fitting.pooled_scatter import degrees_of_freedom
-from tribo.fitting.rows import Rows
 from tribo.fitting.samples import LAW, ONE_SPECIMEN
 from tribo.records import FloatArray, LawFit
 

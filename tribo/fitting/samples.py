@@ -1,4 +1,6 @@
-"""mu and tau0 of every sample: each specimen fitted first, then the specimens combined.
+"""Whether the loads of a sample span enough for a slope.
+
+mu and tau0 of every sample: each specimen fitted first, then the specimens combined.
 
 Pulls of one specimen are not independent of each other: they share the specimen. The scatter that counts for
 another specimen of the same pattern is therefore that of the specimens' own values. With G specimens the
@@ -9,21 +11,53 @@ Zap. Nauchn. Sem. POMI 328 (2005) 5; Ibragimov and Mueller, J. Bus. Econ. Stat. 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tribo.errors import FitError, Problem
-from tribo.fitting.linear import LinearFit, least_squares
-from tribo.fitting.resolution import loads_too_close
-from tribo.fitting.rows import Rows, sample_rows
-from tribo.fitting.weighting import WEIGHTS, weights_of
-from tribo.laws.table import LAWS
+from tribo.fitting.linear import WEIGHTS, LinearFit, Rows, least_squares, sample_rows, weights_of
+from tribo.laws import LAWS
 from tribo.records import REGIMES, FloatArray, LawFit, Regime
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+def loads_too_close(rows: Rows, mu_u: float) -> str:
+    """Why the tests of a sample determine no slope, as a note; empty where they do.
+
+    ``mu_u`` is the standard uncertainty of the slope from the scatter of tests or specimens, NaN where there is none.
+
+    A slope is not resolved where its standard uncertainty exceeds the friction coefficient T/N itself: the data then
+    exclude neither that the friction force is independent of the load nor that it rises twice as fast as the load. The
+    uncertainty is the larger of ``mu_u`` and of what the reading uncertainty of the forces alone gives for a line
+    through these loads.
+    """
+    load, force = float(rows.load_N.mean()), float(rows.force_N.mean())
+    coefficient = abs(force) / load if load > 0 else math.inf
+    uncertainty = max([u for u in (mu_u, _from_readings(rows)) if math.isfinite(u)], default=0.0)
+    if uncertainty <= coefficient:
+        return ""
+    low, high = rows.load_N.min(), rows.load_N.max()
+    return (
+        f"the loads span only {100 * (high / low - 1.0):.2g} % ({low:.5g} to {high:.5g} N), which does not determine a "
+        f"slope: the standard uncertainty of mu ({uncertainty:.2g}) exceeds the friction coefficient T/N "
+        f"({coefficient:.2g})"
+    )
+
+
+def _from_readings(rows: Rows) -> float:
+    """Standard uncertainty of the slope from the reading uncertainties of the forces; NaN where they are not known."""
+    known = np.isfinite(rows.u_N) & (rows.u_N > 0)
+    if np.count_nonzero(known) < 2:
+        return math.nan
+    weight, load = rows.u_N[known] ** -2.0, rows.load_N[known]
+    spread = float(weight @ (load - np.average(load, weights=weight)) ** 2)
+    return 1.0 / math.sqrt(spread) if spread > 0 else math.nan
+
 
 LAW = LAWS["coulomb_adhesion"]
 ONE_SPECIMEN = "only one specimen: the interval applies to this specimen, not to the pattern"
@@ -49,7 +83,7 @@ def fit_samples(
     nominal_area_m2 : float
         A, in m2.
     weights : "relative", "ratio" or "force"
-        Which scatter is constant over the loads; see :mod:`tribo.fitting.weighting`.
+        Which scatter is constant over the loads; see :mod:`tribo.fitting.linear`.
     by : "specimens" or "tests"
         "tests" pools all pulls as if they were independent; offered for comparison, its intervals are too
         narrow wherever specimens differ.

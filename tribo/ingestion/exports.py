@@ -1,9 +1,16 @@
-"""The exports of a campaign, read one by one or on several processes, each into traces and their pulls."""
+"""Exports under the wrong test: the numbers of one test given twice, or a header that names another test.
+
+The exports of a campaign, read one by one or on several processes, each into traces and their pulls.
+
+Every usable test of a campaign as a trace and a pull; what cannot be used is set aside with its reason.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -11,17 +18,68 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribo.campaign.choice import is_chosen, names_pulls, split_choice
-from tribo.campaign.stated import Columns, columns_of
-from tribo.errors import Problem, TraceError, TriboError, unexpected
+from tribo.campaign.rows import Columns, columns_of
+from tribo.campaign.table import is_chosen, names_pulls, split_choice
+from tribo.errors import CampaignError, Problem, TraceError, TriboError, unexpected
 from tribo.forked import each, may_fork
-from tribo.ingestion.evaluated import evaluated_pull
-from tribo.input_files import hashes_of_reads
-from tribo.limits import LARGEST_LOAD_N, SMALLEST_LOAD_N
-from tribo.records import Campaign, Correction, Pull, SetAside, Test, Trace
+from tribo.input_files import LARGEST_LOAD_N, SMALLEST_LOAD_N, hashes_of_reads
+from tribo.records import Campaign, Correction, Ingested, Pull, SetAside, Test, Trace
+from tribo.traces.evaluation import evaluated_pull
 
 if TYPE_CHECKING:
     from tribo.readers import Inspection
+
+
+_LABELLED = 0.9  # share of exports that name their own test from which on a header that names another one counts
+_FEWEST = 5
+_WORD = re.compile(r"[\w.+-]+")
+
+
+def under_the_wrong_test(traces: Mapping[str, Trace], test_ids: Collection[str]) -> dict[str, Problem]:
+    """The problem of each test whose trace belongs to another one; ``test_ids`` are all tests of the campaign.
+
+    ``other_test``: its header names another test, where the headers of a campaign name their own. ``same_numbers``: its
+    data are those of another test, and no header states to which test they belong; then none of them is used.
+    """
+    ids = frozenset(test_ids)
+    named = {test_id: ids.intersection(_words(trace)) for test_id, trace in traces.items()}
+    own = [test_id for test_id, words in named.items() if test_id in words]
+    labelled = len(own) >= max(_FEWEST, _LABELLED * len(traces))
+    found = {
+        test_id: _other_test(test_id, traces[test_id], words)
+        for test_id, words in named.items()
+        if labelled and words and test_id not in words
+    }
+    for group in _same_samples(traces):
+        doubtful = [test_id for test_id in group if test_id not in found]
+        if len(doubtful) > 1:
+            found |= {test_id: _same_numbers(test_id, traces[test_id], group) for test_id in doubtful}
+    return found
+
+
+def _words(trace: Trace) -> set[str]:
+    return {word for pair in trace.metadata.items() for text in pair for word in _WORD.findall(text)}
+
+
+def _same_samples(traces: Mapping[str, Trace]) -> list[list[str]]:
+    """Tests that share every sample of time and force, in groups of two or more."""
+    groups: dict[bytes, list[str]] = {}
+    for test_id, trace in traces.items():
+        samples = np.ascontiguousarray(np.concatenate((trace.time_s, trace.force_N)))
+        groups.setdefault(hashlib.blake2b(samples.tobytes(), digest_size=16).digest(), []).append(test_id)
+    return [group for group in groups.values() if len(group) > 1]
+
+
+def _other_test(test_id: str, trace: Trace, words: Collection[str]) -> Problem:
+    what = "the header of this export names a different test"
+    return Problem("other_test", what, trace.file, found=", ".join(sorted(words)), allowed=test_id, test_id=test_id)
+
+
+def _same_numbers(test_id: str, trace: Trace, group: Collection[str]) -> Problem:
+    others = ", ".join(other for other in group if other != test_id)
+    what = f"the data are identical to those of {others}; the correct test is not known, so none of them is used"
+    return Problem("same_numbers", what, trace.file, allowed="one measurement per test", test_id=test_id)
+
 
 FEWEST_FOR_PROCESSES = 100  # below, starting processes costs more than it gains
 CHUNK = 16
@@ -203,7 +261,7 @@ def _chosen_pulls(root: Path, columns: ColumnsFor, rule: str, test: Test) -> tup
     """Every pull that the choice of a test means, as a test of its own; all strokes of an export share one zero."""
     from tribo.readers import read_blocks
     from tribo.traces import orient_strokes, split_pulls
-    from tribo.traces.strokes import read_pieces
+    from tribo.traces.evaluation import read_pieces
 
     export, choice = split_choice(test.file)
     tables = read_blocks(
@@ -267,3 +325,43 @@ def read_all(campaign: Campaign, rule: str, jobs: int = 1) -> Iterator[RowRead]:
         return
     read(campaign.tests[0])  # what it imports is then in every process
     yield from each(read, campaign.tests, jobs, CHUNK)
+
+
+Progress = Callable[[str, int, int], None]
+
+
+def ingest_campaign(campaign: Campaign, rule: str, jobs: int, progress: Progress) -> Ingested:
+    """Read every usable test of a campaign on ``jobs`` processes where that pays; the result does not depend on them.
+
+    Raises
+    ------
+    CampaignError
+        No test could be read.
+    """
+
+    traces: dict[str, Trace] = {}
+    pulls: dict[str, Pull] = {}
+    set_aside = list(campaign.set_aside)
+    tests: list[Test] = []
+    inputs = dict(campaign.inputs)
+    for done, row in enumerate(read_all(campaign, rule, jobs), start=1):
+        inputs |= row.hashes
+        for test, outcome in row.outcomes:
+            tests.append(test)
+            if isinstance(outcome, SetAside):
+                set_aside.append(outcome)
+            else:
+                trace, pulls[test.test_id] = outcome
+                if trace is not None:
+                    traces[test.test_id] = trace
+        progress("reading exports", done, len(campaign.tests))
+    ids = {test.test_id for test in tests} | {fault.test_id for fault in set_aside}
+    for test_id, problem in under_the_wrong_test(traces, ids).items():
+        del traces[test_id], pulls[test_id]
+        set_aside.append(SetAside(test_id, str(problem), (problem,)))
+    if not pulls:
+        raise CampaignError(
+            [p for fault in set_aside for p in fault.problems]
+            or [Problem("no_usable_test", "no test of this campaign is usable", file=str(campaign.root))]
+        )
+    return Ingested(replace(campaign, tests=tuple(tests), inputs=inputs), traces, pulls, tuple(set_aside))

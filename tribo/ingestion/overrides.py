@@ -11,10 +11,10 @@ import numpy as np
 
 from tribo.campaign.table import Table, TestRow, read_table
 from tribo.errors import CampaignError, Problem, TraceError, system_problem, unexpected
+from tribo.files import LEADS_OUT, leads_out
 from tribo.input_files import hashes_of_reads
-from tribo.links import LEADS_OUT, leads_out
-from tribo.nearest import did_you_mean
 from tribo.records import ByHand, Ingested, Override, Pull, SetAside, Trace
+from tribo.user_text import did_you_mean
 
 TIMES = ("window_start_s", "window_end_s", "peak_s")
 COLUMNS = ("test_id", "action", "reason", *TIMES)

@@ -1,15 +1,25 @@
-"""What a mechanism is: its law, and everything that only it knows."""
+"""What a mechanism needs besides numbers: which specimen, which pattern, which column.
+
+Where a mechanism acts in the spring-block model, as data and functions of arrays.
+
+The module :mod:`tribo.mechanisms_in_model` carries the placement out; it needs nothing else of a mechanism.
+
+Evidence of a mechanism besides the friction forces: in the traces, by a measurement, by varying a condition.
+
+What a mechanism means for a published table of mu and tau0 that prints neither pulls nor conditions.
+
+What a mechanism is: its law, and everything that only it knows.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 
 from tribo.display import displayed
-from tribo.mechanisms.choosing import NO_CHOICE, Choosing, OnTest, no_choice
 from tribo.mechanisms.conditions import (
     REFERENCE_HOLD_S,
     REFERENCE_PRESSURE_PA,
@@ -20,10 +30,254 @@ from tribo.mechanisms.conditions import (
     StringArray,
     Values,
 )
-from tribo.mechanisms.direct_estimates import DirectMeasurement, TraceEvidence, Variation
-from tribo.mechanisms.in_table import WEIGHED, BenchTest, InTable, Readings
-from tribo.mechanisms.placement import BY_LAW, Contact, Placement
 from tribo.records import FloatArray
+
+
+@displayed()
+@dataclass(frozen=True)
+class OnTest:
+    """How a mechanism acts on one test: its values there, and the sample that takes the place of the labelled one."""
+
+    values: Values
+    other_sample: str = ""
+
+
+def no_choice(base: Base, conditions: Conditions) -> tuple[str, ...]:
+    """A mechanism without variants."""
+    return ("",)
+
+
+def same_on_every_test(values: Values, choice: str, conditions: Conditions, test: int) -> OnTest | None:
+    """The values of the campaign."""
+    return OnTest(values)
+
+
+def nothing_to_choose(conditions: Conditions) -> str:
+    """In one run there is no choice."""
+    return ""
+
+
+def unnamed(choice: str) -> str:
+    """A verdict calls the mechanism by its name alone."""
+    return ""
+
+
+def one_part(choice: str) -> tuple[str, ...]:
+    """A choice stands for itself."""
+    return (choice,)
+
+
+@displayed()
+@dataclass(frozen=True)
+class Choosing:
+    """What the choices of a mechanism mean.
+
+    Parameters
+    ----------
+    label
+        What a verdict appends to the name, as in ``covariate:operator``.
+    column
+        The recorded column that the mechanism follows; empty: the choice itself, or the columns it needs.
+    level
+        The one name of a column of several that a choice concerns; empty: the whole column.
+    on_test
+        How it acts on the test of an index; None where the choice does not concern that test.
+    in_one_run
+        The choice in a single run of the simulator.
+    held_out
+        What cross-validation leaves out. "samples": whole samples, or specimens where there are fewer than four
+        samples. "loads": whole loads, for a choice that cannot be learned from other samples or specimens.
+    parts
+        The choices whose changes of ln T, each on tests of its own, add up to that of a choice; the choice itself by
+        default.
+    all_or_nothing_sd
+        Standard deviation of the amplitude around its start value, where the effect is present as a whole or absent.
+    """
+
+    label: Callable[[str], str] = unnamed
+    column: str = ""
+    level: Callable[[str], str] = unnamed
+    on_test: Callable[[Values, str, Conditions, int], OnTest | None] = same_on_every_test
+    in_one_run: Callable[[Conditions], str] = nothing_to_choose
+    held_out: Literal["samples", "loads"] = "samples"
+    parts: Callable[[str], tuple[str, ...]] = one_part
+    all_or_nothing_sd: float | None = None
+
+
+NO_CHOICE = Choosing()
+
+
+@displayed()
+@dataclass(frozen=True)
+class Contact:
+    """The sample in the model: pressure and area fraction, and its own T/N so far, static and sliding."""
+
+    pressure_Pa: float
+    area_fraction: float
+    static: float = 0.0
+    sliding: float = 0.0
+
+
+Gains = Callable[[Values, Contact], tuple[float, float]]  # static and sliding
+Profile = Callable[[Values, float, FloatArray], tuple[FloatArray, FloatArray]]
+
+
+@displayed()
+@dataclass(frozen=True)
+class Placement:
+    """What a mechanism changes in the model; a field that is not given changes nothing. Gains are 1 at zero amplitude.
+
+    Parameters
+    ----------
+    by_law
+        Every contact block follows the law of the mechanism, with the pressure and the area of the contact.
+    thresholds, load
+        Gains of the thresholds, and of the normal force, of every block, (static, sliding).
+    springs
+        Gain of the elastic modulus.
+    floors
+        Share of the cavity floors that touch down.
+    rims
+        Static adhesion per rim length, N/m, and the share of it left while sliding; it acts on blocks beside a cavity.
+    along
+        Normal force and adhesion of every block over their mean, given T/N and the place of the block along the
+        pull, from -1/2 (trailing edge) to 1/2, both (n,).
+    chain
+        Fields of :class:`tribo.mechanisms_in_model.measuring_chain.MeasuringChain`, given the recorded conditions.
+        Where several mechanisms set the same field, their values add.
+    other_sample
+        The sample is another one, named in brackets behind the mechanism; the amplitude moves ln T towards it.
+    own_friction
+        ``load``, ``thresholds`` or ``along`` depend on the friction that they change: runs are repeated until the
+        friction stays the same.
+    """
+
+    by_law: bool = False
+    thresholds: Gains | None = None
+    load: Gains | None = None
+    springs: Callable[[Values, Conditions], float] | None = None
+    floors: Callable[[Values, Conditions], float] | None = None
+    rims: Callable[[Values], tuple[float, float]] | None = None
+    along: Profile | None = None
+    chain: Callable[[Values, Mapping[str, float]], Mapping[str, float]] | None = None
+    other_sample: bool = False
+    own_friction: bool = False
+
+    @property
+    def on_single_blocks(self) -> bool:
+        """Whether the position of a block matters."""
+        return any(part is not None for part in (self.floors, self.rims, self.along))
+
+
+BY_LAW = Placement(by_law=True)
+
+
+Quantity = Literal["zero", "zero drift", "rise"]
+
+
+@displayed()
+@dataclass(frozen=True)
+class TraceEvidence:
+    """A quantity of the traces that equals the amplitude of a mechanism.
+
+    Parameters
+    ----------
+    quantity
+        "zero": force before contact, N. "zero drift": its slope in time, N/h. "rise": relative change of the slope
+        of the rise per e-fold of the pull speed.
+    covariate
+        The recorded column that it follows, empty where it is constant.
+    source
+        Where the value was read, as a clause of a sentence.
+    absent
+        The sentence where the evidence is not certain, with ``{value}`` and ``{percent}``.
+    corrected
+        Whether the effect was subtracted from every force, so that it cannot explain the friction forces.
+    contains
+        Mechanisms whose evidence this one includes.
+    """
+
+    quantity: Quantity
+    covariate: str
+    source: str
+    absent: str = ""
+    corrected: bool = False
+    contains: tuple[str, ...] = ()
+
+
+@displayed()
+@dataclass(frozen=True)
+class DirectMeasurement:
+    """A measurement of the amplitude, with a standard uncertainty in the unit of the amplitude, and its duration."""
+
+    text: str
+    uncertainty: float
+    hours: float
+
+
+@displayed()
+@dataclass(frozen=True)
+class Variation:
+    """A condition to vary so that a mechanism could show: in words, its column in tests.csv, and values."""
+
+    text: str
+    column: str
+    values: tuple[float, ...]
+
+
+@displayed()
+@dataclass(frozen=True)
+class Readings:
+    """A mechanism over all readings of the table that are possible for a line fit.
+
+    ``gains`` are log likelihoods earned and ``sizes`` amplitudes, one a reading; ``limit()`` is the largest
+    amplitude within 95 % in the first reading, ``flat_traction_Pa`` the static traction of the flat sample at 10 kPa.
+    """
+
+    gains: tuple[float, ...]
+    sizes: tuple[float, ...]
+    limit: Callable[[], float]
+    flat_traction_Pa: float
+
+
+@displayed()
+@dataclass(frozen=True)
+class BenchTest:
+    """A test at the bench that would decide what the table leaves open, and the mechanisms it separates."""
+
+    text: str
+    separates: tuple[str, ...]
+    design: Mapping[str, Any] = field(default_factory=dict)
+
+
+@displayed()
+@dataclass(frozen=True)
+class InTable:
+    """A mechanism in the diagnosis of a published table.
+
+    Parameters
+    ----------
+    missing
+        What the table does not print and the mechanism needs; such a mechanism is not weighed.
+    barred
+        Why it is not weighed although its law could change the table.
+    guess
+        The explanation proposed by the authors that it stands for.
+    finding
+        What the table says about that explanation, in sentences.
+    next_test
+        The bench test to do next.
+    """
+
+    missing: str = ""
+    barred: str = ""
+    guess: str = ""
+    finding: Callable[[Readings], str] | None = None
+    next_test: BenchTest | None = None
+
+
+WEIGHED = InTable()
+
 
 Kind = Literal["interface", "pattern", "instrument", "bulk", "environment", "bookkeeping", "any"]
 Law = Callable[[Values, Base, Conditions, str], Forces]

@@ -1,7 +1,7 @@
 """Putting a mechanism into the spring-block model itself: ``tribo simulate --with suction:dp=3000``.
 
 Every mechanism of the library can be simulated. Its placement says whether it acts on the blocks
-(:mod:`tribo.mechanisms_in_model.on_blocks`), in the measuring chain (:mod:`tribo.virtual_tribometer.measuring_chain`)
+(:mod:`tribo.mechanisms_in_model.on_blocks`), in the measuring chain (:mod:`tribo.mechanisms_in_model.measuring_chain`)
 or replaces the sample by another one. At zero amplitude a run is that of the baseline to the bit.
 """
 
@@ -16,11 +16,11 @@ import numpy as np
 from tribo.errors import Problem, SimulationError
 from tribo.mechanisms.record import Base, Mechanism, Values
 from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms_in_model.measuring_chain import MeasuringChain, measured
 from tribo.mechanisms_in_model.on_blocks import RECORDED, Pulled, conditions_of_run, run_with
 from tribo.records import Run
-from tribo.simulate.config import SimConfig
-from tribo.simulate.masks import pattern_of
-from tribo.virtual_tribometer.measuring_chain import MeasuringChain, measured
+from tribo.springblock.config import SimConfig
+from tribo.springblock.lattice import pattern_of
 
 SIMULATED = tuple(MECHANISMS)
 SETTLED = 2e-3  # relative change of T/N below which a run agrees with the friction it was given

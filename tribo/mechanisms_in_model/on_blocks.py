@@ -1,30 +1,31 @@
 """What mechanisms do to the blocks of the spring-block model: coefficients, adhesion, load, contact, springs.
 
-Each mechanism states its placement (:class:`tribo.mechanisms.placement.Placement`). Most act on every block in contact
+Each mechanism states its placement (:class:`tribo.mechanisms.record.Placement`). Most act on every block in contact
 alike: the law of the mechanism, applied to the law of one contact block, gives the change of its coefficients, its
 adhesion and its normal force. Some depend on where a block lies (rims, floors, the trailing edge); these change the
 thresholds of single blocks.
+
+A law that was found in measurements, put into the spring-block model: every contact block follows it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from tribo.mechanisms.placement import Contact, Placement
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Values
+from tribo.errors import Problem, SimulationError
+from tribo.mechanisms.record import Base, Conditions, Contact, Forces, Mechanism, Placement, Values
 from tribo.mechanisms.table import MECHANISMS
+from tribo.mechanisms_in_model.measuring_chain import SLED_AREA_M2
 from tribo.records import FloatArray, Pattern, Run
-from tribo.simulate.config import SimConfig
-from tribo.simulate.engines.fast import Thresholds, lattice_of, run_fast, thresholds_of
-from tribo.simulate.engines.lattice import Lattice
-from tribo.simulate.engines.reference import run_reference
-from tribo.simulate.local_friction import LocalFriction
-from tribo.simulate.run import run_of, simulate
-from tribo.virtual_tribometer.measuring_chain import SLED_AREA_M2
+from tribo.springblock.config import LocalFriction, SimConfig
+from tribo.springblock.engines.fast import Thresholds, lattice_of, run_fast, thresholds_of
+from tribo.springblock.engines.reference import run_reference
+from tribo.springblock.lattice import Lattice
+from tribo.springblock.run import run_of, simulate
 
 RECORDED = {
     "hold_s": 10.0, "specimen_run": 1.0, "temperature_C": 23.0, "humidity_pct": 50.0, "speed_m_s": 2e-4,
@@ -264,3 +265,50 @@ def with_profile(
     load, grip = profile(place)
     load = load * carried.load
     return Carried(load * carried.load[lattice.contact].mean() / load[lattice.contact].mean(), grip * carried.grip)
+
+
+OF_THE_RUN = ("pressure_Pa", "contact_pressure_Pa")  # columns that a run has by itself
+
+
+def with_law(
+    config: SimConfig, law: tuple[Mechanism, Values], recorded: Mapping[str, float], columns: Mapping[str, str]
+) -> SimConfig:
+    """The configuration whose local friction follows a law, as if every contact block were a flat sample.
+
+    ``columns`` are values of recorded columns that the model does not know. A law on T or on a term of it is a gain of
+    coefficients and adhesion, so that it can act on every block; one that acts in static friction alone changes the
+    static thresholds and leaves the sliding ones. Where it changes nothing, the configuration is the same to the bit.
+    """
+    mechanism, values = law
+    conditions = conditions_under(config, recorded, columns)
+    changed, same = (by_law_under(config.friction, mechanism, v, conditions) for v in (values, mechanism.zero()))
+    return config if changed == same else config.with_(friction=changed)
+
+
+def conditions_under(config: SimConfig, recorded: Mapping[str, float], columns: Mapping[str, str]) -> Conditions:
+    """The run as one test with these values of further columns."""
+    conditions = conditions_of_run(config, recorded)
+    own = {name: np.array([text]) for name, text in columns.items() if name != "run_order"}
+    order = np.array([float(columns.get("run_order", 1.0))])
+    return replace(conditions, run_order=order, columns={**conditions.columns, **own})
+
+
+def columns_from(text: str, names: Collection[str]) -> tuple[str, dict[str, str]]:
+    """"film_um=3.2,hold_s=100" with the columns ``names`` of laws -> what is left for mechanisms, and their values.
+
+    Raises
+    ------
+    SimulationError
+        A column of a law has no value: every one that is missing.
+    """
+    items = [item.strip() for item in text.split(",") if item.strip()]
+    wanted = [name for name in names if name not in RECORDED and name not in OF_THE_RUN]
+    own = {key: value for key, _, value in (item.partition("=") for item in items) if key in wanted}
+    if missing := [name for name in wanted if name not in own]:
+        raise SimulationError(
+            Problem("missing_condition", "the law depends on a column that the model does not have", found=name,
+                    allowed=f"--given {name}=VALUE")
+            for name in missing
+        )  # fmt: skip
+    rest = [item for item in items if item.partition("=")[0] not in own]
+    return ",".join(rest), own

@@ -1,4 +1,3 @@
-from .core.export import read_blocks as read_blocks, read_export as read_export
-from .core.given import columns_from_text as columns_from_text
-from .core.inspect import Inspection as Inspection, inspect_export as inspect_export
-from .families import READERS as READERS
+from .columns import columns_from_text as columns_from_text
+from .inspection import Inspection as Inspection, inspect_export as inspect_export
+from .reading import READERS as READERS, read_blocks as read_blocks, read_export as read_export

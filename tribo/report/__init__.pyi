@@ -1,7 +1,7 @@
 from .campaign_nc import write_store as write_store
 from .drawings import write_figures as write_figures
 from .provenance import Provenance as Provenance, gather_provenance as gather_provenance
-from .result_tables import write_tables as write_tables
+from .tables import write_tables as write_tables
 from .verdict_file import write_verdict as write_verdict
 from .verify import Verification as Verification, verify as verify
 from .words.terminal_text import summary_text as summary_text, table2_text as table2_text

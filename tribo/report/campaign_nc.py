@@ -16,15 +16,15 @@ import numpy as np
 import pandas as pd
 
 from tribo.errors import failed_by_system
+from tribo.files import whole_hdf5
 from tribo.records import Study, Trace
-from tribo.report import result_tables
+from tribo.report import tables as result_tables
 from tribo.report.provenance import Provenance
-from tribo.store.hdf5_files import whole_hdf5
 
 if TYPE_CHECKING:
     import h5netcdf
 
-    from tribo.diagnose import Diagnosis
+    from tribo.diagnostics import Diagnosis
 
 Variable = tuple[str, np.ndarray, Mapping[str, Any]]  # dimension, values along it, attributes
 
@@ -178,7 +178,7 @@ def _read(place: h5netcdf.Group) -> Group:
 
 
 def _diagnosed(diagnosis: Diagnosis) -> dict[str, Group]:
-    from tribo.diagnose import residual_table
+    from tribo.diagnostics import residual_table
 
     residuals, runs = OF_DIAGNOSIS
     groups = {residuals: _table(residual_table(diagnosis), "residual_row")}

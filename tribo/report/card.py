@@ -1,26 +1,32 @@
 """The card on top of a report: the answer in one sentence, with what it rests on. Made once, then written everywhere.
 
 Page, PDF, index page, terminal and ``--json`` take their words from this record.
+
+What a campaign shows, in one plain sentence, and what else must be known before it is believed.
+
+The card as text for a terminal.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tribo.comparison import study_lookup
+from tribo.comparison import findings, study_lookup
+from tribo.diagnostics.sentences import meaning_in_words, sentence_case
+from tribo.diagnostics.terms import in_words, name_in_words
 from tribo.display import displayed
+from tribo.files import write_text
 from tribo.records import REGIMES, CombinedFit, LawFit, Study
-from tribo.report.result_tables import PA_PER_KPA, all_set_aside
-from tribo.report.words import card_sentences
-from tribo.report.words.numerals import counted, joined, loads_in_words, with_uncertainty
+from tribo.report.tables import PA_PER_KPA, all_set_aside
 from tribo.report.words.wording import specimens_of, uncertainty_kind
-from tribo.store.whole_files import write_text
+from tribo.wording.numerals import counted, joined, loads_in_words, significant, with_uncertainty
+from tribo.wording.verdict_headings import without_model
 
 NUMBERS = {"mu": "μ", "tau0_Pa": "τ₀"}
 
@@ -82,8 +88,8 @@ def card_of(study: Study, verdict: Mapping[str, Any] | None) -> Card:
     aside, specimens = len(all_set_aside(study)), len(specimens_of(campaign, tests))
     fits = [fit for s in study_lookup.sample_numbers(study) for r in REGIMES if (fit := _law(study, s, r)) is not None]
     return Card(
-        sentence=card_sentences.sentence(study, verdict),
-        meanings=card_sentences.meanings(verdict),
+        sentence=sentence(study, verdict),
+        meanings=meanings(verdict),
         used=len(tests),
         set_aside=aside,
         specimens=specimens,
@@ -91,7 +97,7 @@ def card_of(study: Study, verdict: Mapping[str, Any] | None) -> Card:
         intercept="τ₀ (kPa)" if campaign.has_area else "T₀ (N)",
         laws=tuple(card_law(fit) for fit in fits),
         uncertainty=uncertainty_kind(study),
-        to_know=tuple(card_sentences.to_know(study, verdict)),
+        to_know=tuple(to_know(study, verdict)),
         next_test=_next(verdict),
         doubts=tuple(map(str, study.doubts)),
     )
@@ -148,7 +154,7 @@ def _next(verdict: Mapping[str, Any] | None) -> NextStep | None:
     if not found:
         return None
     hours = (found.get("design") or {}).get("hours")
-    what, why = str(found["text"]), card_sentences.why_next(verdict or {})
+    what, why = str(found["text"]), why_next(verdict or {})
     return NextStep(what, why, hours, f"{what.rstrip('.')}{_duration(hours)}: {why}.")
 
 
@@ -157,3 +163,261 @@ def _duration(hours: float | None) -> str:
     if hours is None:
         return ""
     return f" (about {hours:.1f} h)" if hours >= 1 else f" (about {60 * hours:.0f} min)"
+
+
+BENT = "the load means deviate from a straight line"
+OBSERVABLES = {
+    "static": "static friction", "sliding": "sliding friction", "both": "static and sliding friction",
+    "drop": "the ratio of static to sliding friction", "rise": "the slope of the rise of the force",
+    "zero": "the force before contact",
+}  # fmt: skip
+MOST_SAMPLES = 3
+
+
+def sentence(study: Study, verdict: Mapping[str, Any] | None) -> str:
+    """What happens to friction, how much, with its interval, where, and what it is called."""
+    if verdict is None:
+        return _without_diagnosis(study)
+    if without_model(verdict):
+        return _alone(verdict)
+    outcome = str(verdict["verdict"])
+    if outcome == "no_misfit":
+        return _no_misfit(study, verdict)
+    layers = sorted(_layers(verdict, "cause"), key=lambda layer: -abs(layer["effect_percent"]))
+    if layers and outcome != "unknown":
+        return _caused(study, verdict, layers)
+    if _layers(verdict, "law"):
+        law = str(_layers(verdict, "law")[0]["text"]).rstrip(".")
+        return f"{law}; no mechanism of the library explains it." if outcome == "unknown" else f"{law}."
+    if verdict["causes"] and outcome != "unknown":
+        return _direct(verdict)
+    return _unknown(verdict)
+
+
+def _alone(verdict: Mapping[str, Any]) -> str:
+    """Without the model: what friction varies with beside the load; without anything, the first law."""
+    causes = [str(cause["text"]) for cause in verdict["causes"]]
+    laws = [str(layer["text"]) for layer in _layers(verdict, "baseline")]
+    found = causes or [*laws[:1], "Nothing beyond the law of each sample was found."]
+    return " ".join(found)
+
+
+def meanings(verdict: Mapping[str, Any] | None) -> tuple[tuple[str, str], ...]:
+    """The plain name and the meaning of every mechanism that the verdict names, each once."""
+    names = dict.fromkeys(str(c["mechanism"]) for c in (verdict or {}).get("causes") or ())
+    return tuple((sentence_case(name_in_words(name)), f"{sentence_case(meaning_in_words(name))}.") for name in names)
+
+
+def why_next(verdict: Mapping[str, Any]) -> str:
+    """Why the next test is the one to make."""
+    separates = [str(name) for name in verdict["next_test"].get("separates") or ()]
+    if not separates:
+        return "it is the most informative test"
+    if verdict["verdict"] == "unknown" and not _layers(verdict, "law"):
+        return f"to see whether friction follows {joined([in_words(s) for s in separates])} when nothing else changes"
+    for law in _layers(verdict, "law"):
+        if set(separates) <= {law["formula"], *law["tied_with"]}:
+            columns = joined([in_words(name) for name in str(law["name"]).split(" and ")])
+            return f"it distinguishes laws of {columns} that fit equally well"
+    names = [in_words(s) if without_model(verdict) else name_in_words(s) for s in separates]
+    if without_model(verdict) and len(names) > 1:
+        return f"it tells the effect of {names[0]} from that of {joined(names[1:])}"
+    if verdict["verdict"] == "no_misfit":
+        return f"this campaign could not test {joined(names)}"
+    if len(names) > 1:
+        return f"it distinguishes {names[0]} from {joined(names[1:])}"
+    return f"it tests {joined(names)}"
+
+
+def to_know(study: Study, verdict: Mapping[str, Any] | None) -> Iterator[str]:
+    """What changes how far the sentence can be trusted; nothing where nothing does."""
+    aside = dict(_reasons(study))
+    if aside:
+        reasons = sorted(aside.items(), key=lambda item: -item[1])[:MOST_SAMPLES]
+        yield f"Tests set aside: {'; '.join(f'{count} × {reason}' for reason, count in reasons)}."
+    yield from _flat(study)
+    yield from bent_laws(study)
+    yield from _limits(verdict)
+    moved = sum(1 for t in study.ingested.by_hand if t in study.ingested.pulls)
+    if moved:
+        yield f"The peak or the window of {counted(moved, 'pull')} was moved by hand."
+    yield from (note for note in study.notes if note.startswith("no diagnosis"))
+
+
+def bent_laws(study: Study) -> Iterator[str]:
+    """The samples whose friction is no straight line in the load, with the chi-squared ratio of each."""
+    bent = [fit for fit in study.fits if any(note.startswith(BENT) for note in fit.notes)]
+    if bent:
+        named = joined([f"{fit.sample} {fit.regime} (χ²/ν = {significant(fit.chi2_red, 2)})" for fit in bent])
+        yield (
+            f"T against N is not a straight line for {named}: μ and {_intercept(study)} there depend on the range of "
+            "loads."
+        )
+
+
+def _intercept(study: Study) -> str:
+    return "τ₀" if study.ingested.campaign.has_area else "T₀"
+
+
+def _flat(study: Study) -> Iterator[str]:
+    """That another sample than F calibrates the model."""
+    campaign = study.ingested.campaign
+    flat = campaign.flat_sample
+    if study.comparison is not None and flat != "F":
+        why = "as chosen" if campaign.chosen_flat else "the only flat sample; there is no sample F"
+        yield f"The model is calibrated on sample {flat} ({why})."
+
+
+def _limits(verdict: Mapping[str, Any] | None) -> Iterator[str]:
+    if verdict is None:
+        return
+    if ties := [names for names in verdict.get("equivalent") or () if len(names) > 1]:
+        tied = "; ".join(" or ".join(map(name_in_words, names)) for names in ties)
+        yield f"The data fit each of these equally well: {tied}."
+    if untested := [str(e["mechanism"]) for e in verdict.get("not_testable") or ()]:
+        yield f"This design cannot test {joined([name_in_words(n) for n in dict.fromkeys(untested)])}."
+
+
+def _reasons(study: Study) -> dict[str, int]:
+    """How many tests were set aside for each reason."""
+    from tribo.report.tables import all_set_aside
+
+    found: dict[str, int] = {}
+    for fault in all_set_aside(study).values():
+        reason = fault.problems[0].what if fault.problems else fault.reason
+        found[reason] = found.get(reason, 0) + 1
+    return found
+
+
+def _layers(verdict: Mapping[str, Any], kind: str) -> list[Mapping[str, Any]]:
+    return [layer for layer in verdict.get("layers") or () if layer["kind"] == kind]
+
+
+def size_in_words(effect: Mapping[str, Any]) -> str:
+    """ "-27 % (90 % interval -31 to -23 %)" of a layer or a misfit."""
+    value, low, high = effect["effect_percent"], effect.get("low"), effect.get("high")
+    interval = f" (90 % interval {signed(low)} to {signed(high)} %)" if low is not None and high is not None else ""
+    return f"{signed(value)} %{interval}"
+
+
+def signed(value: float | None) -> str:
+    """A percentage in whole numbers with its sign."""
+    return "–" if value is None else f"{value:+.0f}".replace("-", "−")
+
+
+def _where(study: Study, layer: Mapping[str, Any]) -> str:
+    """ "static and sliding friction of all samples"."""
+    regimes = " and ".join(layer["regimes"])
+    samples, measured = list(layer["samples"]), study_lookup.sample_numbers(study)
+    whose = "all samples" if set(samples) >= set(measured) and len(measured) > 1 else joined(samples)
+    return f"{regimes} friction of {whose}" if whose else f"{regimes} friction"
+
+
+def _caused(study: Study, verdict: Mapping[str, Any], layers: Sequence[Mapping[str, Any]]) -> str:
+    """The cause that acts most, with what is tied with it; then the others by name and size."""
+    first, *others = layers
+    most = f", most in {first['at']}" if first.get("at") else ""
+    said = f"{_named(verdict, first)} {_where(study, first)} by up to {size_in_words(first)}{most}"
+    also = [f"{_names(verdict, layer)} ({size_in_words(layer)})" for layer in others]
+    also += [f"a change with {in_words(law['name'])} ({size_in_words(law)})" for law in _layers(verdict, "law")]
+    said += f"; in addition, {joined(also)}" if also else ""
+    left = "; part of the difference from the model remains unexplained" if verdict["verdict"] == "partly" else ""
+    return f"{said}{left}."
+
+
+def _alternatives(verdict: Mapping[str, Any], layer: Mapping[str, Any]) -> list[str]:
+    rivals = [str(c["mechanism"]) for c in verdict["causes"]] if verdict["verdict"] == "undetermined" else []
+    return list(dict.fromkeys([layer["name"], *layer["tied_with"], *rivals]))
+
+
+def _names(verdict: Mapping[str, Any], layer: Mapping[str, Any]) -> str:
+    return " or ".join(name_in_words(name) for name in _alternatives(verdict, layer))
+
+
+def _named(verdict: Mapping[str, Any], layer: Mapping[str, Any]) -> str:
+    names = _alternatives(verdict, layer)
+    if len(names) == 1:
+        choice = f": {layer['choice']}" if layer.get("choice") else ""
+        return f"{sentence_case(meaning_in_words(names[0]))} ({name_in_words(names[0])}{choice}): this changes"
+    return f"{sentence_case(_names(verdict, layer))} (this campaign cannot tell which) changes"
+
+
+def _direct(verdict: Mapping[str, Any]) -> str:
+    """A cause without a layer, such as one that the traces show besides the forces, with the size of its parameter."""
+    cause = verdict["causes"][0]
+    sizes = [
+        f"{name.replace('_', ' ')} = {significant(_number(e['value']))} {e['unit']}".rstrip()
+        + f" (90 % interval {significant(_number(e['low']))} to {significant(_number(e['high']))})"
+        for name, e in cause["parameters"].items()
+    ]
+    ties: list[str] = next((names for names in verdict.get("equivalent") or () if cause["mechanism"] in names), [])
+    others = [name_in_words(name) for name in ties if name != cause["mechanism"]]
+    or_else = f"; {joined(others)} would explain the data equally well" if others else ""
+    size = f": {joined(sizes)}" if sizes else ""
+    name = str(cause["mechanism"])
+    return f"{sentence_case(meaning_in_words(name))} ({name_in_words(name)}){size}{or_else}."
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else float(value)
+
+
+def _unknown(verdict: Mapping[str, Any]) -> str:
+    misfits = verdict.get("misfits") or ()
+    if not misfits:
+        return (
+            "Friction differs from the model beyond chance, and neither a mechanism nor a recorded column explains it."
+        )
+    largest = misfits[0]
+    if largest["covariate"] == "sample":
+        apart = list(dict.fromkeys(m["sample"] for m in misfits if m["covariate"] == "sample"))
+        return (
+            f"The model predicts the wrong friction for {joined(apart)}: measured "
+            f"{OBSERVABLES[largest['observable']]} of {largest['sample']} differs most, by {size_in_words(largest)}; "
+            "no mechanism of the library explains it."
+        )
+    of = f" of {largest['sample']}" if largest["sample"] else " of all samples"
+    return (
+        f"{sentence_case(OBSERVABLES.get(largest['observable'], 'friction'))}{of} changes with "
+        f"{in_words(largest['covariate'])} by {size_in_words(largest)} relative to the model, and no mechanism of the "
+        "library explains it."
+    )
+
+
+def _no_misfit(study: Study, verdict: Mapping[str, Any]) -> str:
+    flat = study_lookup.flat_sample(study)
+    corrections = _layers(verdict, "pattern_correction")
+    said = f"The model calibrated on {flat} describes static and sliding friction of all samples within its own error"
+    if not corrections:
+        return f"{said}."
+    most = max(corrections, key=lambda layer: abs(layer["effect_percent"]))
+    return (
+        f"{said}: the largest mean difference, {most['regimes'][0]} friction of {most['name']}, is "
+        f"{size_in_words(most)}."
+    )
+
+
+def _without_diagnosis(study: Study) -> str:
+    """The measured friction, highest and lowest, where it was not compared with a model."""
+    from tribo.wording.friction_words import ratio_of_samples
+
+    if study.comparison is not None:
+        off = [a for a in findings.agreements(study) if not a.calibrated]
+        if off:
+            worst = max((load for a in off for load in a.loads), key=lambda load: abs(load.deviation))
+            a = next(a for a in off if worst in a.loads)
+            value, low, high = (100 * (x - 1) for x in (worst.ratio, worst.low, worst.high))
+            return (
+                f"Measured friction differs most from the model for {a.regime} friction of {a.sample} at "
+                f"{significant(worst.normal_load_N)} N, by {signed(value)} % (95 % interval {signed(low)} to "
+                f"{signed(high)} %); no diagnosis was made."
+            )
+    return ratio_of_samples(study)
+
+
+def card_text(card: Card) -> str:
+    """The sentence, what it means, the tests, what else to know and the next test; the laws have their own table."""
+    lines = [card.sentence, *(f"{name}: {meaning}" for name, meaning in card.meanings), card.counts, *card.to_know]
+    if card.next_test is not None:
+        lines.append(f"Next test: {card.next_test.line}")
+    return "\n".join(lines)

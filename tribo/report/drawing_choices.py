@@ -19,7 +19,7 @@ def make_anew(name: str, made_from: object, make: Callable[[], Any], rooms: Iter
 class Drawing:
     """How figures are drawn: where the progress is reported, and in how many processes they are drawn.
 
-    ``keep`` (:meth:`tribo.store.kept_results.Shelf.take`) avoids redrawing a figure whose numbers have not changed.
+    ``keep`` (:meth:`tribo.cache.kept_results.Shelf.take`) avoids redrawing a figure whose numbers have not changed.
     """
 
     progress: Progress | None = None

@@ -1,37 +1,147 @@
-"""Figures to files: SVG, PDF, PNG and the plotted numbers as CSV, the same bytes for the same study."""
+"""Positions of the points of a drawn figure, so that the page can show their values on hovering.
+
+Pages set by typst with the fonts it brings along, so that the same words give the same bytes everywhere.
+
+Figures to files: SVG, PDF, PNG and the plotted numbers as CSV, the same bytes for the same study.
+"""
 
 from __future__ import annotations
 
 import base64
 import logging
 import re
+import struct
 import textwrap
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
+import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tribo.errors import Problem, unexpected
-from tribo.escaping import printable
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES, FIGURES, FRICTION_FIGURES
 from tribo.figures.record import FigureOf
 from tribo.figures.style import as_svg, house_style
+from tribo.files import write_bytes, write_text
 from tribo.forked import each
-from tribo.records import Study
+from tribo.records import FloatArray, Study
 from tribo.report.drawing_choices import DRAWING, Drawing, Keep
-from tribo.report.html.hover import Series, series_of
-from tribo.report.paper.typeset import figure_files
-from tribo.report.result_tables import to_csv
-from tribo.store.whole_files import write_bytes
+from tribo.report.tables import to_csv
+from tribo.temporary import temporary_folder
+from tribo.user_text import printable
 
 if TYPE_CHECKING:
-    from tribo.diagnose import Diagnosis
+    from tribo.diagnostics import Diagnosis
+
+
+POINTS_PER_INCH = 72.0
+MOST_POINTS = 60  # of a line without marks: it is read off by eye, not point by point
+MARKS = frozenset("os^DvPX<>*hpd.")  # the caps of error bars are marks too, but no points
+
+
+@dataclass(frozen=True)
+class Series:
+    """Points of one kind in one panel: (n, 2) on the page in points from the top left, and (n, 2) in their units."""
+
+    name: str
+    x: str
+    y: str
+    place: FloatArray
+    value: FloatArray
+
+
+def series_of(figure: Figure) -> list[Series]:
+    """The points of every line and scatter of a settled figure."""
+    height = figure.get_size_inches()[1] * POINTS_PER_INCH
+    scale = POINTS_PER_INCH / figure.dpi
+    labels: dict[str, str] = {}
+    found = []
+    for ax in figure.axes:
+        x, y = ax.get_xlabel() or labels.get("x", "x"), ax.get_ylabel() or labels.get("y", "y")
+        labels |= {"x": x, "y": y}
+        for name, xy, transform in _points(ax):
+            finite = np.isfinite(xy).all(axis=1)
+            if finite.any():
+                place = transform.transform(xy[finite]) * scale
+                place[:, 1] = height - place[:, 1]
+                found.append(Series(_joined(ax, name), x, y, place, xy[finite]))
+    return found
+
+
+def _joined(ax: Axes, name: str) -> str:
+    parts = (ax.get_title(loc="left"), "" if name.startswith("_") else name)
+    return ", ".join(part for part in parts if part)
+
+
+def _points(ax: Axes) -> Iterator[tuple[str, FloatArray, Any]]:
+    for line in ax.lines:
+        xy = np.asarray(line.get_xydata(), float)
+        marked = str(line.get_marker()) in MARKS
+        if len(xy) and (marked or (line.get_linestyle() == "-" and len(xy) > 2)):
+            step = 1 if marked else max(1, len(xy) // MOST_POINTS)
+            yield str(line.get_label()), xy[::step], line.get_transform()
+    for scatter in ax.collections:
+        offsets: FloatArray = np.ma.filled(np.ma.asarray(scatter.get_offsets(), float), np.nan)
+        if len(offsets) > 1:
+            yield str(scatter.get_label()), offsets, scatter.get_offset_transform()
+
+
+PNG_DPI = 300.0
+FIGURE_PAGE = """#set page(width: auto, height: auto, margin: 0pt, fill: white)
+#set document(title: sys.inputs.title, description: sys.inputs.origin, date: none)
+#image("figure.svg")
+"""
+
+
+def figure_files(svg: bytes, title: str, origin: str) -> dict[str, bytes]:
+    """A figure given as SVG, as PDF (vectors, lettering as outlines) and as PNG of 300 dots per inch."""
+    import typst
+
+    with temporary_folder() as folder:
+        write_bytes(folder / "figure.svg", svg)
+        write_text(folder / "page.typ", FIGURE_PAGE)
+        compiler: Any = typst.Compiler(root=folder, ignore_system_fonts=True)
+        inputs = {"title": title, "origin": origin}
+        pdf = compiler.compile(folder / "page.typ", format="pdf", sys_inputs=inputs)
+        png = compiler.compile(folder / "page.typ", format="png", ppi=PNG_DPI, sys_inputs=inputs)
+    return {"pdf": bytes(pdf), "png": with_text(bytes(png), {"Title": title, "Description": origin})}
+
+
+def document(source: str, files: Mapping[str, bytes], made_at: datetime | None) -> bytes:
+    """A PDF of a typst source and the files it reads; ``made_at`` stands in it as its date of creation."""
+    import typst
+
+    with temporary_folder() as folder:
+        for name, content in files.items():
+            write_bytes(folder / name, content)
+        write_text(folder / "document.typ", source)
+        compiler: Any = typst.Compiler(root=folder, ignore_system_fonts=True)
+        return bytes(compiler.compile(folder / "document.typ", format="pdf", timestamp=made_at))
+
+
+def with_text(png: bytes, texts: Mapping[str, str]) -> bytes:
+    """A PNG with lines of text in it (iTXt, PNG specification 11.3.3.4), put before its picture data."""
+    at = png.index(b"IDAT") - 4
+    chunks = b"".join(
+        _chunk(b"iTXt", key.encode("latin-1") + b"\0\0\0\0\0" + text.encode("utf-8"))
+        for key, text in texts.items()
+        if text
+    )
+    return png[:at] + chunks + png[at:]
+
+
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+
 
 OF_STRAIGHT_LINES = ("fig4", "fig6", "fig7", "fig8")  # without the model, "forces" shows the law chosen by the data
 STAGE = "drawing figures"

@@ -14,11 +14,9 @@ from typing import Any
 
 from tribo.display import displayed
 from tribo.errors import naming
-from tribo.escaping import well_formed
-from tribo.file_contents import text_of
-from tribo.links import leads_out, paths_below
+from tribo.files import leads_out, paths_below, text_of, write_text
 from tribo.records import Study
-from tribo.store.whole_files import write_text
+from tribo.user_text import well_formed
 
 FILE = "provenance.json"
 PACKAGES = (

@@ -8,12 +8,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tribo.diagnose.sentences import sentence_case
-from tribo.diagnose.terms import name_in_words
+from tribo.diagnostics.sentences import sentence_case
+from tribo.diagnostics.terms import name_in_words
 from tribo.figures.covariates import LABELS
-from tribo.report.words.numerals import joined, significant
-from tribo.report.words.verdict_headings import OUTCOMES_WITHOUT_MODEL, headings, without_model
-from tribo.store.whole_files import write_text
+from tribo.files import write_text
+from tribo.wording.numerals import joined, significant
+from tribo.wording.verdict_headings import OUTCOMES_WITHOUT_MODEL, headings, without_model
 
 OBSERVABLES = {
     "static": "static friction", "sliding": "sliding friction", "both": "static and sliding friction",

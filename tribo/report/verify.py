@@ -9,14 +9,13 @@ from html import unescape
 from pathlib import Path
 from typing import Any, Literal
 
+from tribo.cache.own_folder import MARK
 from tribo.display import displayed
 from tribo.errors import CampaignError, Problem
-from tribo.escaping import well_formed
-from tribo.file_contents import bytes_of, found_below
-from tribo.links import leads_out
+from tribo.files import bytes_of, found_below, leads_out
+from tribo.input_files import opened_zip, pieces
 from tribo.report.provenance import DESCRIBED_IN, FILE, RAW, file_hash, input_names, read_record
-from tribo.store.own_folder import MARK
-from tribo.zips import opened_zip, pieces
+from tribo.user_text import well_formed
 
 ORIGIN = "inputs SHA-256 "  # begins what determines the numbers of a file, to the end of its origin
 BEAR_THEIR_ORIGIN = (".svg", ".nc")
@@ -71,7 +70,7 @@ def verify(out: Path, campaign: Path | None = None) -> Verification:
     ------
     CampaignError
         There is no provenance.json in ``out``, or it lists no outputs; or the .zip of the campaign is refused
-        (:func:`tribo.zips.opened_zip`).
+        (:func:`tribo.input_files.opened_zip`).
     """
     record = read_record(out)
     if record is None:

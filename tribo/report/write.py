@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tribo.cache.own_folder import own_folder
+from tribo.files import write_bytes, write_text
 from tribo.records import Study
 from tribo.report.campaign_nc import write_store
 from tribo.report.drawing_choices import DRAWING, Drawing, Progress
@@ -18,12 +20,10 @@ from tribo.report.provenance import (
     settle_outputs,
     write_provenance,
 )
-from tribo.report.result_tables import write_tables
-from tribo.store.own_folder import own_folder
-from tribo.store.whole_files import write_bytes, write_text
+from tribo.report.tables import write_tables
 
 if TYPE_CHECKING:
-    from tribo.diagnose.diagnosis_record import Alone, Diagnosis
+    from tribo.diagnostics.diagnosis_record import Alone, Diagnosis
     from tribo.report.card import Card
 
 
@@ -72,8 +72,8 @@ def write_until(
     if until == "report":
         from tribo.report.content import content
         from tribo.report.crate import write_crate
-        from tribo.report.html.page import pages_of
-        from tribo.report.paper.pdf import pdf_of
+        from tribo.report.page import pages_of
+        from tribo.report.pdf import pdf_of
 
         said = content(study, made_by, verdict, card)
         written += [write_text(out / name, page) for name, page in pages_of(said, drawn).items()]
@@ -85,15 +85,15 @@ def write_until(
 def _with_model(diagnosis: Diagnosis | Alone | None) -> Diagnosis | None:
     if diagnosis is None:
         return None
-    from tribo.diagnose.diagnosis_record import Diagnosis
+    from tribo.diagnostics.diagnosis_record import Diagnosis
 
     return diagnosis if isinstance(diagnosis, Diagnosis) else None
 
 
 def _write_diagnosed(diagnosis: Diagnosis, title: str, out: Path) -> list[Path]:
     """The tables of a diagnosis, and the laws that were found, if any."""
-    from tribo.report.diagnosis_csv import write_diagnosis_tables
-    from tribo.report.discovery_files import law_texts
+    from tribo.report.tables import write_diagnosis_tables
+    from tribo.report.without_study import law_texts
 
     laws = law_texts(diagnosis.laws, title) if diagnosis.laws is not None else {}
     return [*(write_text(out / name, text) for name, text in laws.items()), *write_diagnosis_tables(diagnosis, out)]

@@ -9,8 +9,7 @@ import numpy as np
 
 from tribo.errors import Problem, TraceError
 from tribo.records import FloatArray
-from tribo.traces.noise import line, running_mean, wander
-from tribo.traces.signal import Signal
+from tribo.traces.signal import Signal, line, running_mean, wander
 
 _LOW, _HIGH = 0.25, 0.75  # share of the first half-way level between which the slope of the rise is taken
 _DETECTABLE = 12.0  # a pull rises by at least this many times the sample noise

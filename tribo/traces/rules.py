@@ -10,7 +10,7 @@ import numpy as np
 
 from tribo.display import displayed
 from tribo.errors import Problem, TraceError
-from tribo.traces.apex import Apex, rounded_apex
+from tribo.traces.peak import Apex, rounded_apex
 from tribo.traces.sliding import Motion, Window, settled, slides_on_closed_track
 
 Parameters = Mapping[str, float]

@@ -9,9 +9,9 @@ import numpy as np
 
 from tribo.errors import Problem
 from tribo.records import CLOSED_TRACK_M, FloatArray
-from tribo.traces.apex import Apex
 from tribo.traces.loading import Climb, Rise, Zero
-from tribo.traces.noise import Steady, condense, line, steady, wander
+from tribo.traces.peak import Apex
+from tribo.traces.signal import Steady, condense, line, steady, wander
 
 Window = tuple[int, int]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tribo.records import FloatArray
-from tribo.traces.apex import Apex
+from tribo.traces.peak import Apex
 from tribo.traces.sliding import Motion
 
 DROP = 0.05  # share of the highest force so far by which the force falls in a first drop

@@ -9,9 +9,8 @@ import numpy as np
 
 from tribo.errors import Problem, TraceError
 from tribo.records import FloatArray, Trace
-from tribo.traces.course import Course, Range
-from tribo.traces.noise import wander
-from tribo.traces.signal import Signal
+from tribo.traces.phases import Course, Range
+from tribo.traces.signal import Signal, wander
 from tribo.traces.sliding import settled
 from tribo.zeroing import ZeroChoice
 

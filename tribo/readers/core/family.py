@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tribo.readers.core.given import Hint
-from tribo.readers.core.layout import Layout
-from tribo.readers.core.source import Source
+from tribo.readers.columns import Hint
+from tribo.readers.layout import Layout
+from tribo.readers.source import Source
 
 
 def no_hints(source: Source, layout: Layout) -> tuple[Hint, ...]:

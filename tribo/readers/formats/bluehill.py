@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 
 from tribo.readers.core.family import Family
-from tribo.readers.core.source import Source
+from tribo.readers.source import Source
 
 _KEYS = re.compile(r'^"?(specimen label|results table|sample description|test method|specimen)\b', re.I | re.M)
 _UNITS_ROW = re.compile(r'^"?\(s\)"?[,;\t]|[,;\t]"?\((?:mm|m?N|kN|s|m|gf|kgf)\)"?', re.M)

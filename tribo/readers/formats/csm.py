@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from tribo.readers.core.family import Family
-from tribo.readers.core.source import Source
+from tribo.readers.source import Source
 
 _NAMES = re.compile(r"\nTime *(?:\[s\])?[\t;] *Distance[^\t;]*[\t;] *laps\b", re.I)
 

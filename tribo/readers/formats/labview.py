@@ -8,11 +8,10 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+from tribo.readers.columns import Hint, match_column, split_unit
 from tribo.readers.core.family import Family
-from tribo.readers.core.given import Hint
-from tribo.readers.core.layout import Layout
-from tribo.readers.core.names import match_column, split_unit
-from tribo.readers.core.source import Source
+from tribo.readers.layout import Layout
+from tribo.readers.source import Source
 
 _HEADER_END = "***End_of_Header***"
 _NUMBER_OR_NOTHING = re.compile(r"\s*(?:[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?|NaN)?\s*")

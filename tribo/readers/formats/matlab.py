@@ -11,7 +11,7 @@ import numpy as np
 
 from tribo.errors import Problem, ReadError
 from tribo.readers.core.family import Family
-from tribo.readers.core.source import Source
+from tribo.readers.source import Source
 from tribo.records import FloatArray
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tribo.readers.core.family import Family
-from tribo.readers.core.source import Source
+from tribo.readers.source import Source
 
 
 def is_testsuite(source: Source) -> bool:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import re
 
+from tribo.readers.columns import Hint
 from tribo.readers.core.family import Family
-from tribo.readers.core.given import Hint
-from tribo.readers.core.layout import Layout
-from tribo.readers.core.source import Source
+from tribo.readers.layout import Layout
+from tribo.readers.source import Source
 
 _SETTINGS = re.compile(r"(?:-?\d+\.\d+\t){15}-?\d+\.\d+\s*")
 _ROW = re.compile(r"(?:-?\d+\.\d+;){6}-?\d+\.\d+\s*")

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import re
 
+from tribo.readers.columns import Hint
 from tribo.readers.core.family import Family
-from tribo.readers.core.given import Hint
-from tribo.readers.core.layout import Layout
-from tribo.readers.core.source import Source
+from tribo.readers.layout import Layout
+from tribo.readers.source import Source
 
 _STEP = re.compile(r"\n\W{0,3}(?:recipe )?step\W{0,3}\d+\b", re.I)
 _FORCES = re.compile(r"F[xz].*F[xz]|COF")

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from tribo.errors import Problem, ReadError
+from tribo.readers.columns import match_column, split_unit
 from tribo.readers.core.family import Family
-from tribo.readers.core.names import match_column, split_unit
-from tribo.readers.core.source import Source
+from tribo.readers.source import Source
 from tribo.records import FloatArray
 
 ENCODING = "tdms"

@@ -11,10 +11,10 @@ import re
 
 import numpy as np
 
+from tribo.readers.columns import Hint
 from tribo.readers.core.family import Family
-from tribo.readers.core.given import Hint
-from tribo.readers.core.layout import Layout, cut
-from tribo.readers.core.source import Source
+from tribo.readers.layout import Layout, cut
+from tribo.readers.source import Source
 
 _CLOCK = re.compile(r"(\d+):(\d\d):(\d\d)")
 _G = 9.81  # what the rig itself reckons with

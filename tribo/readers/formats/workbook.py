@@ -5,9 +5,8 @@ from __future__ import annotations
 import mmap
 from pathlib import Path
 
-from tribo.readers.core.packed import is_workbook_archive
-from tribo.readers.core.source import Source
-from tribo.sheets import OLD_EXCEL, ZIP, sheets_as_text
+from tribo.input_files import OLD_EXCEL, ZIP, sheets_as_text
+from tribo.readers.source import Source, is_workbook_archive
 
 
 def is_workbook(raw: bytes | mmap.mmap) -> bool:

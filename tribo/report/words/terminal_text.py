@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from tribo.comparison import findings, study_lookup
 from tribo.records import REGIMES, LawFit, Regime, Study
-from tribo.report.result_tables import PA_PER_KPA
+from tribo.report.tables import PA_PER_KPA
 from tribo.report.words import wording
-from tribo.report.words.numerals import with_uncertainty
+from tribo.wording.numerals import with_uncertainty
 
 HEAD = ("sample", "mu", "tau0 (kPa)", "T (N)", "mu", "tau0 (kPa)", "T (N)", "specimens", "tests")
 

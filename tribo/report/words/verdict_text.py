@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from tribo.diagnose.plan import Plan
-from tribo.diagnose.terms import name_in_words
-from tribo.diagnose.verdict import Verdict
+from tribo.diagnostics.planning import Plan
+from tribo.diagnostics.terms import name_in_words
+from tribo.diagnostics.verdict import Verdict
 from tribo.report.verdict_file import verdict_in_words
 
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from tribo.comparison import findings, study_lookup
 from tribo.comparison.findings import Agreement, DirectionRatio, Ranking, Verdict
+from tribo.comparison.oddness import OddPull
 from tribo.records import REGIMES, ByHand, Campaign, LawFit, Pull, Regime, Study, Test
-from tribo.report.oddness import OddPull
-from tribo.report.result_tables import PA_PER_KPA, all_set_aside
-from tribo.report.words.numerals import counted, joined, loads_in_words, percent, significant, span, with_uncertainty
+from tribo.report.tables import PA_PER_KPA, all_set_aside
+from tribo.wording.numerals import counted, joined, loads_in_words, percent, significant, span, with_uncertainty
 
 FLAGS = {
     "follows_load": "follows the normal load", "gap_at_peak": "gap in the data at the peak",

@@ -1,0 +1,272 @@
+"""Results of costly steps, kept beside the outputs with a hash of everything they were made from.
+
+A step asks for its result by name and gives everything the result is made from. If the file was made from exactly
+that, it is read; otherwise the result is computed and written. The hash covers the input values, the sources of the
+packages that compute and the versions of the libraries they use, so that no outdated result is returned after an edit
+or an upgrade. Each file bears a checksum; a damaged one is said and made again. The files are JSON: deleting one, or
+the folder, costs time and nothing else.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from functools import lru_cache
+from importlib import import_module, metadata
+from pathlib import Path
+from types import FunctionType
+from typing import Any, TypeVar, cast
+
+import numpy as np
+
+from tribo.files import bytes_of, found_below, found_in
+from tribo.published import PATTERN_SHARES, data_dir
+
+T = TypeVar("T")
+
+
+class DamagedResultWarning(RuntimeWarning):
+    """A kept result differs from its checksum, or cannot be read, and is made again."""
+
+
+LIBRARIES = ("numpy", "scipy", "pandas", "statsmodels", "numba", "odrpack")
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+@dataclass(frozen=True)
+class Shelf:
+    """A folder of kept results; without a folder nothing is kept and everything is made."""
+
+    folder: Path | None = None
+
+    def take(self, name: str, made_from: object, make: Callable[[], T], rooms: Iterable[str] = ()) -> T:
+        """The result kept as ``name`` if it was made from exactly this; else that of ``make``, which is then kept.
+
+        Parameters
+        ----------
+        name : file name without its ending
+        made_from : every value the result depends on (records, arrays, tables, plain values)
+        make : computes the result: records of tribo, arrays, tables and plain values, in any nesting
+        rooms : packages of tribo whose sources decide the result
+        """
+        if self.folder is None:
+            return make()
+        key = fingerprint(made_from, sources(*rooms))
+        path = self.folder / f"{name}.json"
+        kept = _read(path, key)
+        if kept is not None:
+            return cast(T, decoded(kept["result"]))
+        result = make()
+        try:
+            text = json.dumps(encoded(result))
+        except TypeError as why:  # a result in hand is worth more than keeping it
+            warnings.warn(f"{name} is not kept: {why}", RuntimeWarning, stacklevel=2)
+            return result
+        from tribo.files import write_bytes
+
+        body = b'"result": ' + text.encode() + b"}\n"
+        write_bytes(path, _head(key, body) + body)
+        return result
+
+
+def _head(key: str, body: bytes) -> bytes:
+    """The first line of a kept file: what the result is made from, and the checksum of this and the result."""
+    checksum = hashlib.sha256(key.encode() + body).hexdigest()
+    return f'{{"made_from": "{key}", "sha256": "{checksum}",\n'.encode()
+
+
+def _read(path: Path, key: str) -> dict[str, Any] | None:
+    """The contents of a kept file made from ``key``; else None, and a warning where it is damaged or unreadable."""
+    try:
+        content = bytes_of(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as why:
+        what = f"{path}: this kept result cannot be read ({why.strerror or why}); it is made again"
+        warnings.warn(what, DamagedResultWarning, stacklevel=3)
+        return None
+    head, newline, body = content.partition(b"\n")
+    made_from = re.match(rb'\{"made_from": "([0-9a-f]{64})"', head)
+    if made_from is None or _head(made_from[1].decode(), body) != head + newline:
+        what = f"{path}: this kept result is damaged or of an older version; it is made again"
+        warnings.warn(what, DamagedResultWarning, stacklevel=3)
+        return None
+    if made_from[1].decode() != key:
+        return None
+    kept: dict[str, Any] = json.loads(content)
+    return kept
+
+
+@lru_cache(maxsize=32)
+def sources(*rooms: str) -> str:
+    """SHA-256 over the sources of packages or modules of tribo and the versions of the libraries they compute with."""
+    digest = hashlib.sha256()
+    for room in sorted(rooms):
+        folder = _PACKAGE / room
+        for source in found_below(folder, "*.py") if folder.is_dir() else [folder.with_suffix(".py")]:
+            digest.update(f"{source.relative_to(_PACKAGE)}\0".encode() + bytes_of(source))
+    for library in LIBRARIES:
+        digest.update(f"{library} {metadata.version(library)}\0".encode())
+    return digest.hexdigest()
+
+
+@lru_cache(maxsize=1)
+def package_sources() -> str:
+    """SHA-256 over every file of the package, templates and style sheets included, the bundled table of pattern shares,
+    and the library versions."""
+    digest = hashlib.sha256(sources().encode())
+    for file in (p for p in found_below(_PACKAGE) if p.is_file() and "__pycache__" not in p.parts):
+        digest.update(f"{file.relative_to(_PACKAGE)}\0".encode() + bytes_of(file))
+    for file in found_in(data_dir() / PATTERN_SHARES, "*.csv"):
+        digest.update(f"{file.name}\0".encode() + bytes_of(file))
+    return digest.hexdigest()
+
+
+def fingerprint(*values: object) -> str:
+    """SHA-256 of values, records and arrays by content; of a path nothing, since results do not depend on places."""
+    digest = hashlib.sha256()
+    for value in values:
+        _feed(digest.update, value)
+    return digest.hexdigest()
+
+
+_PLAIN = {str, float, int, bool, type(None)}
+
+
+def _feed(update: Callable[[bytes], object], value: object) -> None:
+    update(f"<{type(value).__name__}".encode())
+    if type(value) in _PLAIN:  # most values: the cells of tables
+        update(repr(value).encode())
+    elif isinstance(value, FunctionType):
+        update(f"{value.__module__}:{value.__qualname__}".encode())
+    elif isinstance(value, np.ndarray) and value.dtype.kind != "O":
+        update(f"{value.dtype}{value.shape}".encode())
+        update(np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, Path):
+        pass
+    else:
+        parts = _parts(value)
+        if parts is None:
+            update(repr(value).encode())
+        else:
+            for part in parts:
+                _feed(update, part)
+    update(b">")
+
+
+def _parts(value: object) -> Iterable[object] | None:
+    """What a compound value consists of, in order; None for a plain one."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return [getattr(value, field.name) for field in fields(value)]
+    if isinstance(value, Mapping):
+        return [part for item in value.items() for part in item]
+    if isinstance(value, list | tuple | np.ndarray):
+        return list(value)
+    if hasattr(value, "columns") and hasattr(value, "to_numpy"):  # a table, without importing pandas to ask
+        table = cast(Any, value)
+        return [part for name in table.columns for part in (name, table[name].to_numpy())]
+    return None
+
+
+def encoded(value: Any) -> Any:
+    """A value as JSON can hold it, such that :func:`decoded` gives an equal one. A record or an array that is at
+    several places of the value is written once.
+
+    Raises
+    ------
+    TypeError
+        It holds something that is no record or function of tribo, array, table or plain value.
+    """
+    return _Encoder().encoded(value)
+
+
+class _Encoder:
+    def __init__(self) -> None:
+        self.places: dict[int, int] = {}  # number of a record or array, by its identity
+        self.alive: list[object] = []  # so that no identity is given twice
+
+    def encoded(self, value: Any) -> Any:
+        if value is None or isinstance(value, str | bool):
+            return value
+        if isinstance(value, int | float | np.generic):
+            return value.item() if isinstance(value, np.generic) else value
+        if id(value) in self.places:
+            return {"again": self.places[id(value)]}
+        if isinstance(value, np.ndarray) and value.dtype.kind != "O":
+            data = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode("ascii")
+            return self._numbered(value, {"array": data, "dtype": value.dtype.str, "shape": list(value.shape)})
+        if isinstance(value, list | np.ndarray):
+            return [self.encoded(part) for part in value]
+        if isinstance(value, tuple):
+            return {"tuple": [self.encoded(part) for part in value]}
+        if isinstance(value, Mapping):
+            return {"mapping": [[self.encoded(key), self.encoded(part)] for key, part in value.items()]}
+        if hasattr(value, "to_numpy") and hasattr(value, "columns"):
+            return {"table": [[str(name), self.encoded(value[name].to_numpy())] for name in value.columns]}
+        if is_dataclass(value) and type(value).__module__.startswith("tribo."):
+            parts = [[field.name, self.encoded(getattr(value, field.name))] for field in fields(value) if field.init]
+            place = f"{type(value).__module__}:{type(value).__qualname__}"
+            return self._numbered(value, {"record": place, "fields": parts})
+        if isinstance(value, FunctionType) and _named(place := f"{value.__module__}:{value.__qualname__}") is value:
+            return {"function": place}
+        raise TypeError(f"a {type(value).__qualname__} cannot be kept")
+
+    def _numbered(self, value: object, record: dict[str, Any]) -> dict[str, Any]:
+        """Numbers are given in the order in which :class:`_Decoder` completes its records and arrays."""
+        self.places[id(value)] = len(self.alive)
+        self.alive.append(value)
+        return record
+
+
+def decoded(value: Any) -> Any:
+    """The value that :func:`encoded` was given. Only records of tribo are ever constructed, and nothing is called."""
+    return _Decoder().decoded(value)
+
+
+class _Decoder:
+    def __init__(self) -> None:
+        self.done: list[Any] = []
+
+    def decoded(self, value: Any) -> Any:
+        if isinstance(value, list):
+            return [self.decoded(part) for part in value]
+        if not isinstance(value, dict):
+            return value
+        if "again" in value:
+            return self.done[value["again"]]
+        if "array" in value:
+            flat = np.frombuffer(base64.b64decode(value["array"]), np.dtype(value["dtype"]))
+            return self._numbered(flat.reshape(value["shape"]).copy())
+        if "tuple" in value:
+            return tuple(self.decoded(part) for part in value["tuple"])
+        if "mapping" in value:
+            return {self.decoded(key): self.decoded(part) for key, part in value["mapping"]}
+        if "table" in value:
+            import pandas as pd
+
+            return pd.DataFrame({name: self.decoded(column) for name, column in value["table"]})
+        if "function" in value:
+            function = _named(value["function"])
+            if not isinstance(function, FunctionType):
+                raise TypeError(f"{value['function']} is no function of tribo")
+            return function
+        record = _named(value["record"])
+        if not (isinstance(record, type) and is_dataclass(record)):
+            raise TypeError(f"{value['record']} is no record of tribo")
+        return self._numbered(record(**{name: self.decoded(part) for name, part in value["fields"]}))
+
+    def _numbered(self, value: Any) -> Any:
+        self.done.append(value)
+        return value
+
+
+def _named(place: str) -> object:
+    """What tribo itself defines at "module:name"; None where it defines nothing of that name there."""
+    module, _, name = place.partition(":")
+    found = getattr(import_module(module), name, None) if module.startswith("tribo.") else None
+    return found if getattr(found, "__module__", None) == module else None

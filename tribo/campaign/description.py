@@ -1,0 +1,329 @@
+"""campaign.toml: its allowed contents, and all errors at once with their rows."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+from urllib.parse import quote
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from tribo.errors import Problem, system_problem
+from tribo.input_files import (
+    DEEPEST_NESTING,
+    LARGEST_DESCRIPTION_BYTES,
+    LARGEST_NUMBER,
+    LONGEST_NAME,
+    SMALLEST_NUMBER,
+    nests_too_deeply,
+    read_input,
+)
+from tribo.units import QUANTITIES, quantity_named
+from tribo.user_text import did_you_mean, is_control
+from tribo.zeroing import zero_choice
+
+
+def _on_one_line(text: str) -> str:
+    if any(map(is_control, text)):
+        raise ValueError("must not contain control characters or line breaks")
+    return text
+
+
+def _measurable(value: float) -> float:
+    if 0 < value < SMALLEST_NUMBER:
+        raise ValueError(f"must be 0, or {SMALLEST_NUMBER:g} or more")
+    return value
+
+
+def _fit_for_a_file_name(name: str) -> str:
+    if len(quote(name, safe="")) > LONGEST_NAME:
+        raise ValueError(f"must not be longer than {LONGEST_NAME} bytes in the encoding of addresses")
+    return name
+
+
+Positive = Annotated[float, Field(gt=0, le=LARGEST_NUMBER, allow_inf_nan=False), AfterValidator(_measurable)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST_NUMBER, allow_inf_nan=False), AfterValidator(_measurable)]
+Line = Annotated[str, AfterValidator(_on_one_line)]
+Name = Annotated[Line, AfterValidator(_fit_for_a_file_name)]
+
+
+_QUOTED_NUMBER = re.compile(r"([-+]?\d+(?:[.,]\d+)?)\s*[^\d]{0,10}")
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+def _a_zero(given: str | float | list[float]) -> str | float | list[float]:
+    zero_choice(given)
+    return given
+
+
+Zero = Annotated[str | float | list[float], AfterValidator(_a_zero)]
+
+
+class CampaignTable(_Strict):
+    """[campaign]: properties of the whole campaign."""
+
+    title: Line
+    material: Line = ""
+    counterface: Line = ""
+    nominal_area_mm2: Positive | None = None
+    contact: Literal["", "sled", "pin_on_disc", "ball_on_disc", "ring_shear", "reciprocating", "rotary"] = ""
+    material_class: Literal["", "elastomer", "polymer", "metal", "ceramic", "lubricated", "granular"] = ""
+    slider_mass_g: NotNegative = 0.0
+    pull_speed_mm_s: Positive | None = None
+    sign: Literal[1, -1] | None = None
+    gain: Positive | None = None
+    lever_arm_mm: Positive | None = None
+    sampling_rate_Hz: Positive | None = None
+    zero: Zero = ""
+    load_zero: Zero = ""
+
+
+def _a_fraction(given: Any) -> Any:
+    if isinstance(given, int | float) and not isinstance(given, bool) and 1 < given <= 100:
+        raise ValueError(f"must not be more than 1; {given:g} looks like percent: divide by 100?")
+    return given
+
+
+class PatternTable(_Strict):
+    """[patterns.NAME]: geometry of one pattern, lengths in micrometre; one number is x and y alike."""
+
+    cavity: Literal["none", "circle", "square", "rectangle"]
+    diameter_um: Positive | None = None
+    size_um: Positive | list[Positive] | None = None
+    pitch_um: Positive | list[Positive] | None = None
+    staggered: bool = False
+    area_fraction: Annotated[float, BeforeValidator(_a_fraction), Field(gt=0, le=1)] | None = None
+
+    @property
+    def size(self) -> tuple[float, float] | None:
+        """(x, y) of a cavity in micrometre."""
+        return _pair(self.diameter_um if self.cavity == "circle" else self.size_um)
+
+    @property
+    def pitch(self) -> tuple[float, float] | None:
+        """(x, y) of the lattice in micrometre."""
+        return _pair(self.pitch_um)
+
+    @model_validator(mode="after")
+    def _keys_fit_the_cavity(self) -> PatternTable:
+        wanted = {"none": (), "circle": ("diameter_um", "pitch_um")}.get(self.cavity, ("size_um", "pitch_um"))
+        given = [key for key in ("diameter_um", "size_um", "pitch_um") if getattr(self, key) is not None]
+        missing = [key for key in wanted if key not in given]
+        unused = [key for key in given if key not in wanted]
+        if missing:
+            raise ValueError(f"cavity = {self.cavity} requires {' and '.join(missing)}")
+        if unused:
+            raise ValueError(f"cavity = {self.cavity} does not allow {' and '.join(unused)}")
+        return self
+
+    @model_validator(mode="after")
+    def _cavities_stand_apart(self) -> PatternTable:
+        if self.cavity == "none":
+            return self
+        if self.size is None or self.pitch is None:
+            raise ValueError("size_um and pitch_um must be one number or [x, y]")
+        if self.cavity == "square" and self.size[0] != self.size[1]:
+            raise ValueError("a square has one size_um; for two sizes use cavity = rectangle")
+        if self.size[0] >= self.pitch[0] or self.size[1] >= self.pitch[1]:
+            raise ValueError("the pitch must be larger than the cavity; otherwise cavities touch")
+        return self
+
+
+class InstrumentTable(_Strict):
+    """[instrument]: standard uncertainties (k = 1) and properties of the rig."""
+
+    load_cell_u_percent: NotNegative | None = None
+    load_cell_u_N: NotNegative | None = None
+    load_cell_range_N: Positive | None = None
+    mass_u_g: NotNegative | None = None
+    normal_load_u_percent: NotNegative | None = None
+    area_u_percent: NotNegative | None = None
+    wire_angle_deg: Annotated[float, Field(gt=-90, lt=90)] | None = None
+    wire_angle_u_deg: NotNegative | None = None
+    stiffness_N_per_m: Positive | None = None
+    sampling_rate_Hz: Positive | None = None
+
+
+def _low_and_high(given: list[float]) -> list[float]:
+    if len(given) != 2 or not given[0] < given[1]:
+        raise ValueError("must be [lowest, highest]")
+    return given
+
+
+Range = Annotated[list[float], AfterValidator(_low_and_high)]
+
+
+class PlausibleTable(_Strict):
+    """[plausible]: bounds outside which a number is doubtful, in place of those of the material class."""
+
+    mu: Range | None = None
+    friction_ratio: Range | None = None
+    tau0_kPa: Range | None = None
+    pressure_kPa: Range | None = None
+    speed_mm_s: Range | None = None
+    area_mm2: Range | None = None
+    mass_g: Range | None = None
+    temperature_C: Range | None = None
+    humidity_pct: Range | None = None
+
+
+def _value_and_uncertainty(given: list[float]) -> list[float]:
+    if len(given) != 2 or not given[1] > 0:
+        raise ValueError("must be [value, standard uncertainty], the uncertainty more than 0")
+    return given
+
+
+Measured = Annotated[
+    list[Annotated[float, Field(allow_inf_nan=False, ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]],
+    AfterValidator(_value_and_uncertainty),
+]
+Stated = dict[str, str | list[str] | dict[str, str | list[str]]]
+
+
+def _only_quantities(columns: Stated) -> Stated:
+    """[columns] holds quantities, "ignore" and "decimal", and tables of the same for a file or a glob of files."""
+    names = [*(name.replace(" ", "_") for name in QUANTITIES), "ignore", "decimal"]
+    for key, value in columns.items():
+        if isinstance(value, dict):
+            _only_quantities(dict(value))
+        elif key not in ("ignore", "decimal") and quantity_named(key) is None:
+            hint = did_you_mean(key, names) or f"known quantities: {', '.join(names)}"
+            raise ValueError(f"{key} is not a known quantity; {hint}")
+        elif key != "ignore" and not isinstance(value, str):
+            raise ValueError(f"{key} must be one column, not a list; only ignore takes a list")
+        elif key == "decimal" and value not in (".", ","):
+            raise ValueError("decimal must be a point or a comma")
+    return columns
+
+
+class CampaignFile(_Strict):
+    """The whole of campaign.toml."""
+
+    campaign: CampaignTable
+    patterns: Annotated[dict[Name, PatternTable], Field(min_length=1)]
+    columns: Annotated[Stated, AfterValidator(_only_quantities)] = {}
+    instrument: InstrumentTable = InstrumentTable()
+    plausible: PlausibleTable = PlausibleTable()
+    measured: dict[Name, Measured] = {}  # amplitudes of mechanisms that were measured directly
+
+
+def _pair(value: float | list[float] | None) -> tuple[float, float] | None:
+    if isinstance(value, list):
+        return (value[0], value[1]) if len(value) == 2 else None
+    return None if value is None else (value, value)
+
+
+def read_description(path: Path, file: str, problems: list[Problem]) -> CampaignFile | None:
+    """campaign.toml as checked tables; None where it cannot be used; every fault goes to ``problems``."""
+    deep = Problem("too_deep", "tables and arrays nested too deeply", file, allowed=f"at most {DEEPEST_NESTING} levels")
+    try:
+        text = read_input(path, LARGEST_DESCRIPTION_BYTES).decode("utf-8-sig")
+        table = tomllib.loads(text)
+        if not nests_too_deeply(table):
+            return CampaignFile.model_validate(table)
+        problems.append(deep)
+    except FileNotFoundError:
+        problems.append(Problem("missing_file", f"a campaign must contain {file}", file=file))
+    except OSError as why:
+        problems.append(system_problem(why, file))
+    except RecursionError:
+        problems.append(deep)
+    except UnicodeDecodeError as why:
+        row = why.object[: why.start].count(b"\n") + 1
+        problems.append(Problem("not_utf8", "TOML files must be encoded in UTF-8", file=file, row=row))
+    except tomllib.TOMLDecodeError as why:
+        row_said = re.search(r"line (\d+)", str(why))
+        row = int(row_said.group(1)) if row_said else text.count("\n") + 1
+        problems.append(_not_toml(str(why), text, file, row))
+    except ValidationError as why:
+        problems.extend(_problem(error, text, file) for error in why.errors(include_url=False))
+    except ValueError as why:  # a whole number of more digits than Python converts
+        problems.append(Problem("not_toml", f"not valid TOML: {why}", file=file))
+    return None
+
+
+def _not_toml(why: str, text: str, file: str, row: int) -> Problem:
+    """A line that is not TOML, with what it may mean: a decimal comma, a text or a unit without quotation marks."""
+    line = [*text.split("\n"), ""][row - 1].strip()
+    key, _, value = (part.strip() for part in line.partition("="))
+    number = re.match(r"([-+]?\d+)(?:,(\d+))?\s*(\S.*)?$", value)
+    meant = None
+    if number and number[2]:
+        meant = f"a decimal point: did you mean {key} = {number[1]}.{number[2]}?"
+    elif number and number[3]:
+        meant = f"a number without its unit: did you mean {key} = {number[1]}?"
+    elif key and re.match(r"[^\W\d]", value) and not value.startswith(("true", "false", "inf", "nan")):
+        meant = f'a text in quotation marks: did you mean {key} = "{value}"?'
+    return Problem("not_toml", f"not valid TOML: {why}", file, row, None, line[:80] or None, meant)
+
+
+def _problem(error: Any, text: str, file: str) -> Problem:
+    path = [str(part) for part in error["loc"] if not _is_branch(part)]
+    row = _row_of(path, text)
+    column = ".".join(path)
+    found = None if error["type"] == "missing" else _shown(error["input"])
+    if error["type"] == "extra_forbidden":
+        allowed = _allowed_keys(path)
+        hint = did_you_mean(path[-1], allowed, 0.5) or ", ".join(allowed)
+        return Problem("unknown_key", "unknown key", file, row, column, path[-1], hint)
+    if error["type"] == "missing":
+        return Problem("missing_key", "this required key is missing", file, row, column)
+    what = error["msg"].removeprefix("Value error, ")
+    return Problem("wrong_value", what[:1].lower() + what[1:], file, row, column, found, _meant_value(error))
+
+
+def _meant_value(error: Any) -> str | None:
+    """The allowed values where pydantic knows them, or the number that a quoted text may mean."""
+    given, expected = error["input"], error.get("ctx", {}).get("expected")
+    if error["type"] == "literal_error" and isinstance(given, str):
+        return did_you_mean(given, re.findall(r"'([^']+)'", expected)) or expected
+    found = _QUOTED_NUMBER.fullmatch(given.strip()) if isinstance(given, str) else None
+    if found and error["type"] in ("float_type", "float_parsing", "int_type"):
+        return f"a number without quotation marks and unit: did you mean {found[1].replace(',', '.')}?"
+    return None
+
+
+def _is_branch(part: object) -> bool:
+    """pydantic names the branch of a union in its path: "float", "list[float]"."""
+    return isinstance(part, str) and (part in {"float", "int", "str"} or "[" in part)
+
+
+def _shown(value: object) -> str | None:
+    return None if isinstance(value, dict) else str(value)[:200]
+
+
+def _allowed_keys(path: Sequence[str]) -> list[str]:
+    """Keys of the table that holds ``path``."""
+    tables: dict[str, type[BaseModel]] = {
+        "campaign": CampaignTable,
+        "patterns": PatternTable,
+        "instrument": InstrumentTable,
+        "plausible": PlausibleTable,
+    }
+    table = CampaignFile if len(path) == 1 else tables[path[0]]
+    return list(table.model_fields)
+
+
+def _row_of(path: Sequence[str], text: str) -> int | None:
+    """Line of the deepest part of ``path`` that stands in the file: the key in its table, else the table."""
+    lines = text.split("\n")
+    for depth in range(len(path), 0, -1):
+        dotted = r"\s*\.\s*".join(f'"?{re.escape(part)}"?' for part in path[:depth])
+        header = re.compile(rf"\s*\[\s*{dotted}\s*\]")
+        start = next((k for k, line in enumerate(lines) if header.match(line)), None)
+        if start is None:
+            continue
+        for k in range(start + 1, len(lines)):
+            if re.match(r"\s*\[", lines[k]):
+                break
+            if depth < len(path) and re.match(rf'\s*"?{re.escape(path[depth])}"?\s*=', lines[k]):
+                return k + 1
+        return start + 1
+    key = re.compile(rf'\s*"?{re.escape(path[0])}"?\s*=') if path else None
+    return next((k + 1 for k, line in enumerate(lines) if key and key.match(line)), None)

@@ -1,1 +1,0 @@
-"""The missing law: a complete search of a small grammar where a misfit follows a column and no mechanism."""

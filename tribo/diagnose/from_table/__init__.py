@@ -1,1 +1,0 @@
-"""The diagnosis of a published table of mu and tau0."""

@@ -1,1 +1,0 @@
-"""The search for causes: looks at the residuals, their screening, weighing and naming."""

@@ -1,1 +1,0 @@
-"""The statistical model of a campaign: observations, fit, chance, intervals and gain."""

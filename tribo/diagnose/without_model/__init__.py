@@ -1,1 +1,0 @@
-"""The diagnosis of a campaign without the spring-block model: what friction varies with beside the load."""

@@ -1,0 +1,442 @@
+"""The tests of one regime as columns: ln T, the law of every sample alone, and every other recorded column.
+
+Which recorded columns friction follows beside the law of every sample alone, against chance.
+
+ln T of a test is the law of its sample, the gain of its specimen, and scatter. Each column is tested by the F
+statistic of what it explains beyond the law. The strongest of all columns is compared with the strongest in campaigns
+made from the fitted law, whose specimens are drawn and whose scatter is resampled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as f_distribution, t as t_distribution
+
+from tribo.diagnostics.contrasts import share_beyond
+from tribo.mechanisms.record import StringArray
+from tribo.records import FloatArray, Ingested, Pull, Regime, Test
+
+FEWEST_TESTS = 12
+SAME_LOAD = 0.02  # relative distance of loads that were meant to be one
+MOST_NAMES = 12
+BINS = 4
+PRESENT = 0.75  # share of the tests that must have a value in a column
+LOGARITHMIC = ("speed_mm_s", "hold_s")
+NUMBERS = ("hold_s", "temperature_C", "humidity_pct", "run_order", "specimen_run", "repeat")
+_LOAD_BY_ANOTHER_NAME = ("nominal_load_N",)
+LEFT_OVER = 0.02  # share of a column's variance beyond the laws of the samples below which it cannot be told from load
+
+
+@dataclass(frozen=True)
+class Column:
+    """One way to follow a recorded column: ``columns`` (n, d) beside the law, and where its values run from and to.
+
+    ``kind`` is trend, course (groups of a number) or names. ``levels`` are the names of groups, the first being the
+    reference.
+    """
+
+    name: str
+    kind: str
+    columns: FloatArray
+    low: float = float("nan")
+    high: float = float("nan")
+    levels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Tested:
+    """The tests of one regime with a positive force: ln T, (n,), and ``law`` (n, p), the law of every sample alone.
+
+    The law of a sample is its mean at every load where loads are repeated, else a parabola of ln T in ln N as far as
+    the loads determine it.
+    """
+
+    regime: Regime
+    sample: StringArray
+    specimen: StringArray
+    load_N: FloatArray
+    log_force: FloatArray
+    law: FloatArray
+    columns: tuple[Column, ...]
+    untold: tuple[str, ...]
+
+    @property
+    def n(self) -> int:
+        return len(self.log_force)
+
+    @property
+    def enough(self) -> bool:
+        """Whether there are tests enough, and more than the laws take up."""
+        return self.n >= FEWEST_TESTS and self.n >= 2 * self.law.shape[1]
+
+
+def points_of(ingested: Ingested, regime: Regime) -> Tested:
+    """The tests of one regime; ``untold`` are columns that vary within samples, but only together with the load."""
+    pairs = [
+        (test, pull)
+        for test in ingested.campaign.tests
+        if (pull := ingested.pulls.get(test.test_id)) is not None
+        and getattr(pull, f"{regime}_N") > 0 and test.normal_load_N > 0
+    ]  # fmt: skip
+    tests, pulls = [t for t, _ in pairs], [p for _, p in pairs]
+    sample = np.array([t.sample for t in tests], str)
+    load = np.array([t.normal_load_N for t in tests], float)
+    law = _laws(sample, load)
+    found = [c for c in _columns(tests, pulls) if np.ptp(c.columns) > 0] if tests else []
+    told = [c for c in found if _beyond(law, c.columns) > LEFT_OVER]
+    samples = (sample[:, None] == np.unique(sample)[None]).astype(float)
+    names = {c.name for c in told} | {c.name for c in found if _beyond(samples, c.columns) <= LEFT_OVER}
+    return Tested(
+        regime, sample, np.array([t.specimen for t in tests], str), load,
+        np.log([getattr(p, f"{regime}_N") for p in pulls]), law, tuple(told),
+        tuple(dict.fromkeys(c.name for c in found if c.name not in names)),
+    )  # fmt: skip
+
+
+def _laws(sample: StringArray, load_N: FloatArray) -> FloatArray:
+    """Columns of the law of every sample, (n, p)."""
+    found = []
+    for name in np.unique(sample):
+        here = sample == name
+        level = load_levels(load_N[here])
+        count = len(np.unique(level))
+        if count > 1 and here.sum() >= 2 * count:
+            shapes = [(level == k).astype(float) for k in range(count)]
+        else:
+            x = np.log(load_N[here])
+            shapes = [(x - x.mean()) ** k for k in range(min(count, 3))]
+        for shape in shapes:
+            column = np.zeros(len(sample))
+            column[here] = shape
+            found.append(column)
+    return np.column_stack(found) if found else np.zeros((len(sample), 0))
+
+
+def load_levels(load_N: FloatArray) -> NDArray[np.int64]:
+    """The number of the level of each load, (n,): neighbours closer than two percent are one level."""
+    order = np.argsort(load_N)
+    steps = np.diff(np.log(load_N[order])) > SAME_LOAD
+    level = np.empty(len(load_N), int)
+    level[order] = np.concatenate([[0], np.cumsum(steps)])
+    return level
+
+
+def _beyond(law: FloatArray, columns: FloatArray) -> float:
+    """Share of the variance of columns that the laws do not take up."""
+    centred = columns - columns.mean(axis=0)
+    left = columns - law @ np.linalg.lstsq(law, columns, rcond=None)[0]
+    return float(np.sum(left**2) / max(float(np.sum(centred**2)), 1e-300))
+
+
+def _columns(tests: list[Test], pulls: list[Pull]) -> Iterator[Column]:
+    yield from _of_numbers("speed_mm_s", np.array([1e3 * t.speed_m_s if t.speed_m_s else np.nan for t in tests]))
+    for name in NUMBERS:
+        values = np.array([np.nan if (v := getattr(t, name)) is None else float(v) for t in tests])
+        yield from _of_numbers(name, values)
+    yield from _of_names("operator", [t.operator for t in tests])
+    yield from _of_names("direction", [_direction(t, p) for t, p in zip(tests, pulls, strict=True)])
+    yield from _of_names("date", [t.started_at[:10] for t in tests])
+    for name in sorted({c for t in tests for c in t.covariates} - set(_LOAD_BY_ANOTHER_NAME)):
+        cells = [str(t.covariates.get(name, "")) for t in tests]
+        numbers = np.array([_number(cell) for cell in cells])
+        if np.isfinite(numbers).any():
+            yield from _of_numbers(name, numbers)
+        else:
+            yield from _of_names(name, cells)
+
+
+def _direction(test: Test, pull: Pull) -> str:
+    return test.direction or next((way for way in ("forward", "backward") if way in pull.flags), "")
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell.replace(",", "."))
+    except ValueError:
+        return float("nan")
+
+
+def _of_numbers(name: str, values: FloatArray) -> Iterator[Column]:
+    """A trend, and the course over up to four groups; tests without a value lie at the mean."""
+    there = np.isfinite(values) & ((values > 0) | (name not in LOGARITHMIC))
+    if there.mean() < PRESENT or np.ptp(values[there]) <= 1e-9 * np.abs(values[there]).max():
+        return
+    low, high = float(values[there].min()), float(values[there].max())
+    filled = np.where(there, values, values[there].mean())
+    along = np.log(filled) if name in LOGARITHMIC else filled
+    yield Column(name, "trend", ((along - along.mean()) / np.ptp(along))[:, None], low, high)
+    distinct = np.unique(values[there])
+    edges = distinct[1:] if len(distinct) <= BINS else np.unique(np.quantile(values[there], np.arange(1, BINS) / BINS))
+    code = np.searchsorted(edges, filled, side="right")
+    groups = [k for k in range(1, len(edges) + 1) if (there & (code == k)).any()]
+    if len(groups) > 1:
+        parts = [values[there & (code == k)] for k in (0, *groups)]
+        levels = tuple(_span(part) for part in parts)
+        yield Column(name, "course", np.column_stack([code == k for k in groups]).astype(float), low, high, levels)
+
+
+def _span(values: FloatArray) -> str:
+    return f"{values.min():.3g} to {values.max():.3g}" if np.ptp(values) else f"{values.min():.3g}"
+
+
+def _of_names(name: str, cells: list[str]) -> Iterator[Column]:
+    names = sorted(set(cells) - {""})
+    if 1 < len(names) <= min(MOST_NAMES, len(cells) // 3) and sum(map(bool, cells)) >= PRESENT * len(cells):
+        column = np.array(cells, str)
+        levels = np.column_stack([column == n for n in names[1:]]).astype(float)
+        yield Column(name, "names", levels, levels=tuple(names))
+
+
+REPLICATES = 200
+MOST_FOUND = 6
+ALIKE = 0.9  # share of the effect of a column that another one reproduces, from which on they cannot be told apart
+TAIL = 8.0  # degrees of freedom of the scatter, whose outliers count less
+_VARIANCES = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # of specimen gains over that of repeats
+_ROUNDS = 4
+_NOTHING_LEFT = 1e-9
+
+
+@dataclass(frozen=True)
+class Follows:
+    """A column that friction follows: the change of T over its range with a 90 % interval, in percent.
+
+    ``where`` says between which values. ``alike`` are columns that this design cannot tell from it.
+    """
+
+    name: str
+    kind: str
+    regime: Regime
+    p: float
+    change_percent: float
+    low_percent: float
+    high_percent: float
+    where: tuple[str, str]
+    alike: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What was found in one regime; ``columns`` are all that were tested, ``untold`` those that only vary with load.
+
+    ``scatter_percent`` is the standard deviation of a repeat.
+    """
+
+    regime: Regime
+    follows: tuple[Follows, ...]
+    columns: tuple[str, ...]
+    untold: tuple[str, ...]
+    p_strongest: float
+    scatter_percent: float
+    n: int
+
+
+@dataclass(frozen=True)
+class _Weighed:
+    """The tests weighed for one spread of the specimens: what whitens them, and the law's orthonormal basis."""
+
+    share: FloatArray  # (specimens,) of a specimen's mean that is taken off
+    basis: FloatArray  # (n, p)
+    log_det: float
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """A law fitted by restricted likelihood: weights of outlying tests, basis, what is left, its variance."""
+
+    tested: Tested
+    root: FloatArray  # (n,) square roots of the weights
+    weighed: tuple[_Weighed, ...]
+    at: int
+    left: FloatArray  # (n,) whitened
+    variance: float
+    groups: FloatArray = field(repr=False)  # (n, specimens)
+
+    @property
+    def dof(self) -> int:
+        return self.tested.n - self.weighed[self.at].basis.shape[1]
+
+
+def searched(t: Tested, regimes: int, level: float, rng: np.random.Generator) -> Searched:
+    """The columns that friction follows beyond chance, the strongest first, each beside the others.
+
+    ``regimes`` is the number of regimes that are searched; p values are adjusted for it.
+    """
+    taken: list[Column] = []
+    p_first = 1.0
+    while len(taken) < MOST_FOUND:
+        fitted = _fit(t, taken)
+        others = [c for c in t.columns if c.name not in {k.name for k in taken}]
+        chances = _chances(fitted, others, rng)
+        if not chances:
+            break
+        best = min(chances, key=lambda k: chances[k])
+        p = min(chances[best] * regimes, 1.0)
+        p_first = p if not taken else p_first
+        if p >= level:
+            break
+        taken.append(others[best])
+    found = []
+    for column in taken:
+        beside = _fit(t, [c for c in taken if c is not column])
+        rivals = [c for c in t.columns if c.name not in {k.name for k in taken}]
+        p = min(_chances(beside, [column, *rivals], rng).get(0, 1.0) * regimes, 1.0)
+        if p < level:
+            found.append(_described(beside, _first_alike(beside, column), p))
+    names = tuple(dict.fromkeys(c.name for c in t.columns))
+    scatter = 100.0 * float(np.expm1(np.sqrt(_fit(t, taken).variance)))
+    return Searched(t.regime, tuple(found), names, t.untold, p_first, scatter, t.n)
+
+
+def _fit(t: Tested, taken: Sequence[Column]) -> _Fitted:
+    """The law with the columns taken, by restricted maximum likelihood in the spread of the specimens."""
+    design = np.column_stack([t.law, *(c.columns for c in taken)])
+    names = np.unique(t.specimen)
+    groups = (t.specimen[:, None] == names[None]).astype(float)
+    within = len(names) > len(np.unique(t.sample))
+    root = np.ones(t.n)
+    for _ in range(_ROUNDS):
+        scaled = groups * root[:, None]
+        weighed = [_weigh(design * root[:, None], scaled, v) for v in (_VARIANCES if within else _VARIANCES[:1])]
+        scores, lefts = zip(*(_restricted(w, _whiten(root * t.log_force, scaled, w.share), t.n) for w in weighed),
+                            strict=True)  # fmt: skip
+        at = int(np.argmax(scores))
+        left = lefts[at]
+        variance = float(left @ left) / max(t.n - weighed[at].basis.shape[1], 1)
+        standard = (left / root) ** 2 / max(variance, _NOTHING_LEFT**2)
+        root = np.sqrt((TAIL + 1.0) / (TAIL + standard))
+    return _Fitted(t, root, tuple(weighed), at, left, max(variance, _NOTHING_LEFT**2), scaled)
+
+
+def _weigh(design: FloatArray, groups: FloatArray, variance: float) -> _Weighed:
+    size = np.sum(groups**2, axis=0)
+    share = (1.0 - 1.0 / np.sqrt(1.0 + variance * size)) / size
+    white = _whiten(design, groups, share)
+    u, s, _ = np.linalg.svd(white, full_matrices=False)
+    kept = s > 1e-9 * s.max()
+    log_det = float(np.sum(np.log1p(variance * size)) + 2.0 * np.sum(np.log(s[kept])))
+    return _Weighed(share, u[:, kept], log_det)
+
+
+def _whiten(values: FloatArray, groups: FloatArray, share: FloatArray) -> FloatArray:
+    """Values (n, ...) with a share of the mean of each specimen taken off."""
+    if not share.any():
+        return values
+    means = groups.T @ values
+    return np.asarray(values - groups @ (means * (share if values.ndim == 1 else share[:, None])))
+
+
+def _restricted(w: _Weighed, values: FloatArray, n: int) -> tuple[float, FloatArray]:
+    """Restricted log likelihood, and what is left."""
+    left = values - w.basis @ (w.basis.T @ values)
+    dof = n - w.basis.shape[1]
+    return -0.5 * (dof * np.log(max(float(left @ left), 1e-300)) + w.log_det), left
+
+
+def _chances(f: _Fitted, columns: Sequence[Column], rng: np.random.Generator) -> dict[int, float]:
+    """By place in the list: the chance that one of all columns is as strong as this one with nothing hidden.
+
+    Columns that the law takes up are left out.
+    """
+    bases = {k: b for k, c in enumerate(columns) if (b := _base(f, c, f.at)).shape[1]}
+    if not bases or f.dof < 3:
+        return {}
+    strength = _strengths(f.left[:, None], list(bases.values()), f.dof)[0]
+    chance = _by_chance(f, [columns[k] for k in bases], rng)
+    # the strongest first: equal p values keep that order
+    found = {k: share_beyond(chance, float(s)) for k, s in zip(bases, strength, strict=True)}
+    return dict(sorted(found.items(), key=lambda item: -float(strength[list(bases).index(item[0])])))
+
+
+def _base(f: _Fitted, c: Column, at: int) -> FloatArray:
+    """Orthonormal basis of a column beyond the law, (n, d); columns that the law takes up have none."""
+    w = f.weighed[at]
+    white = _whiten(c.columns * f.root[:, None], f.groups, w.share)
+    left = white - w.basis @ (w.basis.T @ white)
+    u, s, _ = np.linalg.svd(left, full_matrices=False)
+    scale = float(np.sqrt(np.sum(white**2)))
+    return np.asarray(u[:, s > 1e-6 * max(scale, 1e-300)])
+
+
+def _strengths(left: FloatArray, bases: Sequence[FloatArray], dof: int) -> FloatArray:
+    """Minus the log of the p value of the F test of every column, (replicates, columns)."""
+    total = np.sum(left**2, axis=0)
+    found = []
+    for base in bases:
+        d = base.shape[1]
+        explained = np.sum((base.T @ left) ** 2, axis=0)
+        ratio = (explained / d) / np.maximum((total - explained) / max(dof - d, 1), 1e-300)
+        found.append(-f_distribution.logsf(ratio, d, max(dof - d, 1)))
+    return np.column_stack(found)
+
+
+def _by_chance(f: _Fitted, columns: Sequence[Column], rng: np.random.Generator) -> FloatArray:
+    """The strongest column in every campaign that the fitted law makes, (replicates,)."""
+    n = f.tested.n
+    drawn = f.left[rng.integers(0, n, (n, REPLICATES))] * np.sqrt(n / max(f.dof, 1))
+    spread = np.sqrt(_VARIANCES[f.at] * f.variance)
+    drawn = drawn + f.groups @ rng.normal(0.0, spread, (f.groups.shape[1], REPLICATES)) if spread else drawn
+    scores, lefts = [], []
+    for w in f.weighed:
+        white = _whiten(drawn, f.groups, w.share)
+        left = white - w.basis @ (w.basis.T @ white)
+        dof = n - w.basis.shape[1]
+        scores.append(-0.5 * (dof * np.log(np.maximum(np.sum(left**2, axis=0), 1e-300)) + w.log_det))
+        lefts.append(left)
+    chosen = np.argmax(scores, axis=0)
+    strongest = np.zeros(REPLICATES)
+    for at in np.unique(chosen):
+        bases = [b for c in columns if (b := _base(f, c, int(at))).shape[1]]
+        strongest[chosen == at] = _strengths(lefts[at][:, chosen == at], bases, f.dof).max(axis=1)
+    return strongest
+
+
+def _described(f: _Fitted, column: Column, p: float) -> Follows:
+    """The size of a column's effect with its interval, and what reproduces it."""
+    w = f.weighed[f.at]
+    white = _whiten(column.columns * f.root[:, None], f.groups, w.share)
+    white = white - w.basis @ (w.basis.T @ white)
+    inverse = np.linalg.pinv(white.T @ white)
+    size = inverse @ (white.T @ f.left)
+    dof = max(f.dof - len(size), 1)
+    variance = float(np.sum((f.left - white @ size) ** 2)) / dof
+    first, last, where = _ends(column, size)
+    contrast = last - first
+    value = float(contrast @ size)
+    half = float(t_distribution.ppf(0.95, dof) * np.sqrt(variance * contrast @ inverse @ contrast))
+    low, middle, high = (100.0 * float(np.expm1(value + k * half)) for k in (-1, 0, 1))
+    alike = _alike(f, column, white @ size)
+    return Follows(column.name, column.kind, f.tested.regime, p, middle, low, high, where, alike)
+
+
+def _first_alike(f: _Fitted, column: Column) -> Column:
+    """Of the columns that this design cannot tell apart, the first: the same one in both regimes."""
+    alike = {column.name, *_described(f, column, 1.0).alike}
+    first = next(c.name for c in f.tested.columns if c.name in alike)
+    same = [c for c in f.tested.columns if c.name == first and c.kind == column.kind]
+    return same[0] if same else column
+
+
+def _ends(column: Column, size: FloatArray) -> tuple[FloatArray, FloatArray, tuple[str, str]]:
+    """Between which levels the change is stated: the ends of a trend, else the lowest and the highest level."""
+    if column.kind == "trend":
+        return np.zeros(1), np.ones(1), (f"{column.low:.3g}", f"{column.high:.3g}")
+    levels = np.vstack([np.zeros(len(size)), np.eye(len(size))])
+    heights = levels @ size
+    first, last = int(np.argmin(heights)), int(np.argmax(heights))
+    return levels[first], levels[last], (column.levels[first], column.levels[last])
+
+
+def _alike(f: _Fitted, column: Column, effect: FloatArray) -> tuple[str, ...]:
+    """Other columns that reproduce the effect of this one."""
+    found = []
+    length = float(effect @ effect)
+    for other in f.tested.columns:
+        if other.name != column.name and length > 0:
+            base = _base(f, other, f.at)
+            if float(np.sum((base.T @ effect) ** 2)) > ALIKE * length:
+                found.append(other.name)
+    return tuple(dict.fromkeys(found))

@@ -1,0 +1,180 @@
+"""Direct evidence: mechanisms that the force before contact or the slope of the rise shows by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import erfc
+
+from tribo.diagnostics.observations import Observations
+from tribo.mechanisms.record import Quantity, TraceEvidence
+from tribo.mechanisms.table import MECHANISMS
+from tribo.records import FloatArray
+
+CERTAIN = 5.0  # standard errors
+NOISE_SHARE = 0.5  # an offset below half the noise of one reading does not matter to any result
+RISE_PER_FOLD = 0.02
+MOST_IN_PAIRS = 1500  # values whose slope is the median over all pairs, which a million of them fill
+LEAST_P = 1e-12  # no estimate has a tail that is known further out
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """An estimate with its standard error, and whether it is certain and large enough to matter.
+
+    ``looks`` is the number of estimates from which this one was chosen.
+    """
+
+    value: float
+    standard_error: float
+    certain: bool
+    unit: str
+    change: float = 0.0  # over the whole series, N or relative
+    looks: int = 1
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Ninety percent."""
+        half = 1.645 * self.standard_error
+        return self.value - half, self.value + half
+
+    def p_adjusted(self, looks: int) -> float:
+        """Two-sided p value of the estimate over its standard error (normal), Bonferroni over ``looks``."""
+        p = float(erfc(abs(self.value) / max(self.standard_error, 1e-300) / np.sqrt(2.0)))
+        return min(max(looks * p, LEAST_P), 1.0)
+
+
+@dataclass(frozen=True)
+class TraceFindings:
+    """All estimates from the traces by mechanism, and those that are certain, each with its adjusted p value."""
+
+    found: Mapping[str, Evidence]
+    certain: Mapping[str, tuple[Evidence, float]]
+
+
+def trace_findings(o: Observations) -> TraceFindings:
+    """What the traces show by themselves; p values are adjusted for every estimate that was made."""
+    found = direct_evidence(o)
+    looks = sum(e.looks for e in found.values())
+    return TraceFindings(found, {name: (e, e.p_adjusted(looks)) for name, e in certain_evidence(found).items()})
+
+
+def direct_evidence(o: Observations) -> dict[str, Evidence]:
+    """What the traces show of every mechanism that states an evidence in them, by name."""
+    found = {name: ESTIMATES[stated.quantity](o) for name, stated in stated_evidence().items()}
+    return {name: e for name, e in found.items() if e is not None}
+
+
+def stated_evidence() -> dict[str, TraceEvidence]:
+    """The evidence that mechanisms state, by name."""
+    return {name: m.evidence for name, m in MECHANISMS.items() if m.evidence is not None}
+
+
+def certain_evidence(evidence: Mapping[str, Evidence]) -> dict[str, Evidence]:
+    """What is certain, without evidence that another one includes (a drift includes the offset that it leaves)."""
+    certain = {name: e for name, e in evidence.items() if e.certain}
+    included = {other for name in certain for other in stated_evidence()[name].contains}
+    return {name: e for name, e in certain.items() if name not in included}
+
+
+def zero_offset(o: Observations) -> Evidence | None:
+    """The typical force before contact, N; None where no trace shows it."""
+    zero = o.zero_N[np.isfinite(o.zero_N)]
+    if len(zero) < 3:
+        return None
+    centre, error = _centre(zero)
+    return Evidence(centre, error, abs(centre) > CERTAIN * error and abs(centre) > _matters_N(o), "N", centre)
+
+
+def zero_drift(o: Observations) -> Evidence | None:
+    """Slope of the force before contact over the series, N/h; within the traces where the series has no clock."""
+    across, within = _drifts_across(o), _drift_within(o)
+    best = max(across, key=lambda e: abs(e.value) / e.standard_error, default=None)
+    found = [e for e in (best, within) if e is not None]
+    chosen = next((e for e in found if e.certain), found[0] if found else None)
+    return chosen and replace(chosen, looks=len(across) + (within is not None))
+
+
+def _drifts_across(o: Observations) -> list[Evidence]:
+    """Over the hours of the clock, and over those at the bench (nights left out)."""
+    clocks = (o.conditions.elapsed_s / 3600.0, _bench_hours(o.conditions.elapsed_s))
+    return [e for e in (_drift_along(o, hours) for hours in clocks) if e is not None]
+
+
+def _bench_hours(elapsed_s: FloatArray) -> FloatArray:
+    """Hours since the first pull, no pause counted for more than five times the usual one."""
+    order = np.argsort(elapsed_s)
+    gaps = np.diff(elapsed_s[order], prepend=elapsed_s[order[0]])
+    hours = np.empty_like(elapsed_s)
+    hours[order] = np.cumsum(np.minimum(gaps, 5.0 * np.median(gaps))) / 3600.0
+    return hours
+
+
+def _drift_along(o: Observations, hours: FloatArray) -> Evidence | None:
+    from scipy.stats import theilslopes
+
+    good = np.isfinite(o.zero_N) & np.isfinite(hours)
+    if good.sum() < 10 or np.ptp(hours[good]) <= 0:
+        return None
+    slope, _, low, high = theilslopes(*_in_stretches(o.zero_N[good], hours[good]), 0.90)
+    error = max((high - low) / 3.29, 1e-15)
+    change = float(slope * np.ptp(hours[good]))
+    certain = abs(slope) > CERTAIN * error and abs(change) > _matters_N(o)
+    return Evidence(float(slope), float(error), bool(certain), "N/h", change)
+
+
+def _in_stretches(values: FloatArray, hours: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Values and hours; of many tests the medians of MOST_IN_PAIRS stretches of the series, as every pair is taken."""
+    if len(values) <= MOST_IN_PAIRS:
+        return values, hours
+    stretches = np.array_split(np.argsort(hours, kind="stable"), MOST_IN_PAIRS)
+    found = np.array([(np.median(values[s]), np.median(hours[s])) for s in stretches])
+    return found[:, 0], found[:, 1]
+
+
+def _drift_within(o: Observations) -> Evidence | None:
+    slopes = o.zero_slope_N_per_s[np.isfinite(o.zero_slope_N_per_s)]
+    if len(slopes) < 10:
+        return None
+    centre, error = _centre(slopes)
+    change = centre * 20.0  # a pull lasts some twenty seconds
+    certain = abs(centre) > CERTAIN * error and abs(change) > _matters_N(o)
+    return Evidence(centre * 3600.0, error * 3600.0, bool(certain), "N/h", change)
+
+
+def rise_stiffening(o: Observations) -> Evidence | None:
+    """Relative stiffening of the rise per e-fold of speed; None at one speed."""
+    speed = np.log(o.conditions.speed_m_s)
+    good = np.isfinite(o.rise_N_per_m) & (o.rise_N_per_m > 0) & np.isfinite(speed)
+    if good.sum() < 10 or np.ptp(speed[good]) < 0.1:
+        return None
+    x, y = speed[good] - speed[good].mean(), np.log(o.rise_N_per_m[good])
+    slope = float(x @ (y - np.median(y)) / (x @ x))
+    left = y - np.median(y) - slope * x
+    error = float(1.4826 * np.median(np.abs(left)) / np.sqrt(x @ x))
+    certain = abs(slope) > CERTAIN * error and abs(slope) > RISE_PER_FOLD
+    return Evidence(slope, error, bool(certain), "", slope * float(np.ptp(x)))
+
+
+def _centre(values: FloatArray) -> tuple[float, float]:
+    """Median and its standard error."""
+    centre = float(np.median(values))
+    spread = 1.4826 * float(np.median(np.abs(values - centre)))
+    return centre, max(1.2533 * spread / np.sqrt(len(values)), 1e-15)
+
+
+def _matters_N(o: Observations) -> float:
+    """Half the noise of one reading; where the noise is unknown, half a percent of a weak pull."""
+    noise = o.noise_N[np.isfinite(o.noise_N)]
+    if len(noise):
+        return NOISE_SHARE * float(np.median(noise))
+    return 0.005 * float(np.exp(np.quantile(o.log_force, 0.05)))
+
+
+ESTIMATES: dict[Quantity, Callable[[Observations], Evidence | None]] = {
+    "zero": zero_offset,
+    "zero drift": zero_drift,
+    "rise": rise_stiffening,
+}

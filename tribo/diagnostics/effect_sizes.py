@@ -1,0 +1,121 @@
+"""Percentages of a diagnosis: all are 100 (measured / model - 1), with their sign, made here from ln(measured / model).
+
+A change is that of measured / model from one end of a column to the other, as a ratio less one.
+
+The size of what a look sees, as a signed percentage: 100 (measured / model - 1), or the change of that ratio.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tribo.diagnostics.contrasts import BENT, Look
+from tribo.diagnostics.fit import ModelFit
+from tribo.diagnostics.intervals import NORMAL_90
+from tribo.mechanisms.record import Conditions
+from tribo.records import FloatArray
+
+ENDS = (0.05, 0.95)  # quantiles of a column between which a change is stated
+
+
+def percent(log_ratio: FloatArray | float) -> FloatArray:
+    """100 (measured / model - 1) of ln(measured / model), any shape."""
+    return np.asarray(100.0 * np.expm1(log_ratio))
+
+
+def mean_percent(log_ratio: FloatArray) -> float:
+    """The mean over tests of 100 (measured / model - 1)."""
+    return float(percent(log_ratio).mean())
+
+
+def rms_percent(log_ratio: FloatArray) -> float:
+    """The root mean square over tests of 100 (measured / model - 1); those without a value are left out."""
+    return float(np.sqrt(np.nanmean(percent(log_ratio) ** 2)))
+
+
+def change_percent(score: FloatArray, log_ratio: FloatArray) -> float:
+    """Change of measured / model from the low to the high end of a column, by a straight line in ``score`` (n,)."""
+    slope = np.polyfit(score, log_ratio, 1)[0]
+    low, high = np.quantile(score, ENDS)
+    return float(percent(slope * (high - low)))
+
+
+def bend_percent(score: FloatArray, line: FloatArray, log_ratio: FloatArray) -> float:
+    """How far the ends of a column lie above its middle: the part of ``score`` (n,) beside a straight ``line`` (n,)."""
+    columns = np.column_stack([score, line, np.ones_like(score)])
+    slope = np.linalg.lstsq(columns, log_ratio, rcond=None)[0][0]
+    return float(percent(slope * np.ptp(score)))
+
+
+def contrast_percent(inside: FloatArray, outside: FloatArray) -> float:
+    """The geometric mean of measured / model ``inside`` over that ``outside``, less one; both as logarithms."""
+    return float(percent(inside.mean() - outside.mean()))
+
+
+def interval_percent(value: float, strength: float, factor: float) -> tuple[float, float]:
+    """Ends of the interval of a percentage that differs from zero by ``strength`` standard deviations in ln T."""
+    middle = np.log1p(value / 100.0)
+    half = factor * abs(middle) / max(strength, 1e-9)
+    low, high = percent(np.array([middle - half, middle + half]))
+    return float(low), float(high)
+
+
+SHARES = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (0.5, 0.5), "drop": (1.0, -1.0)}
+
+
+@dataclass(frozen=True)
+class Residual:
+    """ln(measured / model) of every test (n, 2), with the conditions of the tests."""
+
+    log_ratio: FloatArray
+    conditions: Conditions
+
+
+def residual_of(model: ModelFit) -> Residual:
+    """What a model leaves."""
+    return Residual(model.residual, model.setup.observations.conditions)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A signed percentage with its 90 % interval, and between what it is taken."""
+
+    percent: float
+    low: float
+    high: float
+    between: str
+
+
+def effect_of_look(look: Look, residual: Residual, coefficients: FloatArray, size: float, strength: float) -> Effect:
+    """What a look sees; ``size`` is its peak-to-peak effect in ln T, stated where a straight line does not give it.
+
+    That of a mechanism has the sign of its largest change; that of several columns has none.
+    """
+    value, between = _signed(look, residual)
+    if not np.isfinite(value):
+        change = (look.columns @ coefficients).ravel()
+        sign = float(np.sign(change[np.abs(change).argmax()])) if look.freedom == 1 else 1.0
+        value, between = float(percent(sign * min(size, 5.0))), "between its extremes"
+    return Effect(value, *interval_percent(value, strength, NORMAL_90), between)
+
+
+def _signed(look: Look, residual: Residual) -> tuple[float, str]:
+    weight = np.array(SHARES[look.observable])
+    y, x = residual.log_ratio @ weight, look.columns[:, int(weight[0] == 0.0), 0]
+    sample = residual.conditions.sample
+    here = sample == look.sample if look.kind == "sample" else np.ones(len(y), bool)
+    if look.kind == "sample" and look.covariate == "sample":
+        return mean_percent(y[here]), "mean"
+    if look.kind == "sample" and look.covariate.endswith(BENT):
+        line = np.log(residual.conditions.normal_load_N[here])
+        return bend_percent(x[here], line, y[here]), "the ends above the middle"
+    if look.kind in ("sample", "trend") and np.ptp(x[here]) > 0:
+        return change_percent(x[here], y[here]), "from the low to the high end"
+    if look.kind == "block" or (look.kind == "specimen" and not look.covariate.endswith(" by load")):
+        siblings = np.isin(sample, look.sample.split("/")) if look.kind == "specimen" else here
+        inside, outside = siblings & (x > 0), siblings & (x <= 0)
+        if inside.any() and outside.any():
+            return contrast_percent(y[inside], y[outside]), "ratio of geometric means"
+    return float("nan"), ""

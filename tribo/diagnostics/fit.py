@@ -1,0 +1,354 @@
+"""One campaign at given noise: whitening, normal equations, likelihood; and the fitted model, linear about its
+parameters, with what its own columns can absorb of others.
+
+Fitting a model: Gauss-Newton on law and mechanisms, robust weights, the noise estimated along with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tribo.diagnostics.model import N_LAW, Acting, RandomEffects, Setup, Target, in_batches, predict
+from tribo.diagnostics.normal_equations import (
+    Inverse,
+    ModelColumns,
+    Normal,
+    Sides,
+    Weighted,
+    model_columns,
+    normal_of,
+    weighted_columns,
+)
+from tribo.diagnostics.scatter import AtNoise, Noise, at_estimated_noise, at_noise, first_noise
+from tribo.display import displayed
+from tribo.records import FloatArray
+
+
+@displayed()
+@dataclass(frozen=True)
+class State:
+    """Where a fit has got to: parameters, random effects (q,), residual (n, 2) without them, and the noise."""
+
+    x: FloatArray
+    effects: FloatArray
+    residual: FloatArray
+    at: AtNoise
+
+
+@displayed()
+@dataclass(frozen=True)
+class System:
+    """The normal equations of one iteration solved: the inverse of their matrix and the step (p + q,).
+
+    ``weight`` (n,) is that of the tests, ``columns`` are those of the model.
+    """
+
+    inverse: Inverse
+    solution: FloatArray
+    weight: FloatArray
+    columns: ModelColumns
+
+
+def begin(s: Setup, x: FloatArray, residual: FloatArray, noise: Noise) -> State:
+    """The state of a fit before its first step, all random effects zero."""
+    return State(x, np.zeros(s.random_effects.count), residual, at_noise(s, noise))
+
+
+def weights(noise: Noise, factor: FloatArray, left: FloatArray) -> FloatArray:
+    """Weight of every test under the bivariate t, one on average for normal noise, shape (n,)."""
+    return (noise.tail + 2.0) / (noise.tail + distance(factor, left))
+
+
+def distance(factor: FloatArray, left: FloatArray) -> FloatArray:
+    """Squared length of what is left of every test, whitened, shape (n,)."""
+    static = factor[:, 0, 0] * left[:, 0]
+    return static**2 + (factor[:, 1, 0] * left[:, 0] + factor[:, 1, 1] * left[:, 1]) ** 2
+
+
+def whitened(factor: FloatArray, columns: FloatArray) -> FloatArray:
+    """Columns (n, 2, k) times the lower triangles ``factor`` (n, 2, 2), shape (2n, k), static rows first."""
+    n = len(columns)
+    white = np.empty((2 * n, columns.shape[2]))
+    np.multiply(columns[:, 0], factor[:, 0, :1], out=white[:n])
+    np.multiply(columns[:, 1], factor[:, 1, 1:], out=white[n:])
+    white[n:] += columns[:, 0] * factor[:, 1, :1]
+    return white
+
+
+def solved(s: Setup, state: State, jacobian: FloatArray, bounds: tuple[FloatArray, FloatArray]) -> System:
+    """One step under the weighted noise; a parameter at a bound that would leave it is held there."""
+    x, p = state.x, len(state.x)
+    weight = weights(state.at.noise, state.at.factor, _left(s, state))
+    columns = model_columns(jacobian, s.random_effects)
+    found = weighted_columns(columns, precision_of(state.at.factor, weight)[None])
+    normal = normal_of(found).with_prior(*prior_of(columns, state.at.precision))
+    right = found.with_residual(state.residual.T[None])
+    held = np.zeros(columns.border.shape[2], bool)
+    for _ in range(3):
+        inverse = normal.inverse_without(held)
+        solution = columns.vector(*inverse.solution(*right))[0]
+        outward = ((x <= bounds[0]) & (solution[:p] < 0)) | ((x >= bounds[1]) & (solution[:p] > 0))
+        if not (outward & ~held[:p]).any():
+            break
+        held[:p] |= outward
+    return System(inverse, solution, weight, columns)
+
+
+def precision_of(factor: FloatArray, weight: FloatArray) -> FloatArray:
+    """Precision of every test from the triangles (n, 2, 2) that whiten it: static, mixed, sliding entries, (3, n)."""
+    first, second, third = factor[:, 0, 0], factor[:, 1, 0], factor[:, 1, 1]
+    return np.stack([first**2 + second**2, second * third, third**2]) * weight
+
+
+def prior_of(columns: ModelColumns, precision: FloatArray) -> Sides:
+    """Precision of the coefficients of a model: next to none for law and mechanisms, (q,) of the random effects."""
+    return columns.sides(np.concatenate([np.full(columns.parameters, 1e-12), precision])[None])
+
+
+def _left(s: Setup, state: State) -> FloatArray:
+    """What is left of every test, (n, 2), random effects taken out."""
+    return np.asarray(state.residual - s.random_effects.on_tests(state.effects))
+
+
+def penalised(s: Setup, state: State) -> float:
+    """Log density of the tests given the effects, plus that of the effects, without constants of the noise."""
+    tail = state.at.noise.tail
+    tests = -0.5 * (tail + 2.0) * np.sum(np.log1p(distance(state.at.factor, _left(s, state)) / tail))
+    return float(tests - 0.5 * np.sum(state.effects**2 * state.at.precision))
+
+
+def with_noise_estimated(s: Setup, state: State, system: System) -> State:
+    """The same state, the noise estimated anew; the system says how uncertain each prediction is."""
+    left, columns = _left(s, state), system.columns
+    products = np.stack([left[:, 0] ** 2, left[:, 0] * left[:, 1], left[:, 1] ** 2])
+    squares = system.weight * (products + system.inverse.spread(columns)[0])
+    variance = columns.vector(*system.inverse.variances)[0, columns.parameters :]
+    return replace(state, at=at_estimated_noise(s, state.at, (state.effects, variance), squares))
+
+
+def scored(s: Setup, state: State) -> tuple[float, FloatArray]:
+    """Log marginal likelihood by Laplace's method, with the priors of the noise sizes; and the weights of the tests."""
+    weight = weights(state.at.noise, state.at.factor, _left(s, state))
+    columns = model_columns(np.zeros((len(weight), 2, 0)), s.random_effects)
+    normal = normal_of(weighted_columns(columns, precision_of(state.at.factor, weight)[None]))
+    curvature = float(normal.with_prior(*columns.sides(state.at.precision[None])).log_determinant()[0])
+    scale = float(np.sum(np.log(state.at.factor[:, 0, 0] * state.at.factor[:, 1, 1])))
+    prior = 0.5 * np.sum(np.log(state.at.precision)) + state.at.log_prior
+    return float(penalised(s, state) + scale + prior - 0.5 * curvature), weight
+
+
+@displayed()
+@dataclass(frozen=True)
+class Linear:
+    """A fitted model linear about its parameters, with the noise at which it was fitted.
+
+    ``jacobian`` (n, 2, p) is the derivative of ln T by law and mechanisms; the ``precision`` of the ``random_effects``
+    is (q,). ``residual`` (n, 2) is that of the fit; ``factor`` (n, 2, 2) whitens
+    a test without its robust ``weight`` (n,).
+    """
+
+    jacobian: FloatArray = field(repr=False)
+    random_effects: RandomEffects = field(repr=False)
+    residual: FloatArray = field(repr=False)
+    factor: FloatArray = field(repr=False)
+    precision: FloatArray = field(repr=False)
+    weight: FloatArray = field(repr=False)
+
+    @cached_property
+    def columns(self) -> ModelColumns:
+        """The columns of the model."""
+        return model_columns(self.jacobian, self.random_effects)
+
+    @cached_property
+    def weighted(self) -> Weighted:
+        """These columns times the precision of every test."""
+        return weighted_columns(self.columns, precision_of(self.factor, self.weight)[None])
+
+    @property
+    def normal(self) -> Normal:
+        """The normal matrix with the prior of the random effects."""
+        return normal_of(self.weighted).with_prior(*prior_of(self.columns, self.precision))
+
+    @property
+    def right(self) -> Sides:
+        """Products of the columns with the residual."""
+        return self.weighted.with_residual(self.residual.T[None])
+
+    @property
+    def inverse(self) -> Inverse:
+        """Of the normal matrix."""
+        return self.normal.inverse()
+
+    def cleared(self, stacked: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Columns (n, 2, k) and the residual, whitened, with law, mechanisms and random effects taken out.
+
+        Their inner products are scores and informations of the marginal model: taking out penalised columns is
+        an ordinary projection once the penalty is written as further rows.
+        """
+        columns, inverse = self.columns, self.inverse
+        others = np.concatenate([stacked, self.residual[:, :, None]], axis=2)
+        own, border = self.weighted.times(others)
+        each = [inverse.solution(own[..., k], border[..., k]) for k in range(others.shape[2])]
+        fitted = np.concatenate([columns.on_tests(*c) for c in each]).transpose(2, 1, 0)
+        rows = whitened(self.factor * np.sqrt(self.weight)[:, None, None], others - fitted)
+        root = np.sqrt(columns.vector(*prior_of(columns, self.precision)))
+        penalty = [-root * columns.vector(*c) for c in each]
+        left = np.concatenate([rows, np.concatenate(penalty).T])
+        return left[:, :-1], left[:, -1]
+
+    def beyond_law(self, columns: FloatArray) -> FloatArray:
+        """Columns (n, 2, k) less what the law and the mechanisms of the fit can absorb."""
+        flat = self.jacobian.reshape(-1, self.jacobian.shape[2])
+        q = np.linalg.qr(flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300))[0]
+        rows = columns.reshape(-1, columns.shape[2])
+        return np.asarray((rows - q @ (q.T @ rows)).reshape(columns.shape))
+
+
+    def size_beyond_law(self, columns: Iterable[FloatArray]) -> FloatArray:
+        """Peak-to-peak of each of many columns (n, 2) beyond what law and mechanisms absorb, (k,)."""
+        each = [np.ptp(self.beyond_law(batch), axis=(0, 1)) for batch in in_batches(columns)]
+        return np.concatenate([np.zeros(0), *each])
+
+
+@displayed()
+@dataclass(frozen=True)
+class ModelFit:
+    """A fitted model. ``residual`` (n, 2) is ln T measured minus the law without random effects.
+
+    ``score`` is the log of the marginal likelihood (Laplace), ``inverse`` that of the normal matrix, ``effects`` (q,)
+    the predicted random effects, ``linear`` the model linear about these parameters.
+    """
+
+    setup: Setup
+    acting: tuple[Acting, ...]
+    law: FloatArray
+    values: tuple[FloatArray, ...]
+    noise: Noise
+    effects: FloatArray
+    residual: FloatArray
+    score: float
+    inverse: Inverse = field(repr=False)
+    linear: Linear = field(repr=False)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Of the parameters of law and mechanisms, (p, p)."""
+        p = self.linear.columns.parameters
+        return self.inverse.border[0, :p, :p]
+
+    @property
+    def weight(self) -> FloatArray:
+        """How much each test counts, (n,)."""
+        return self.linear.weight
+
+    @property
+    def predicted(self) -> FloatArray:
+        return self.setup.observations.log_force - self.residual
+
+
+TRIAL_GAIN, END_GAIN = 0.5, 2e-3  # log likelihood that a step has to earn for another one to be made
+STILL = 0.02  # standard errors of a step below which derivatives are not taken anew
+LENGTHS = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a step that does not worsen the penalised likelihood: the first
+
+
+def fit(
+    s: Setup,
+    acting: Sequence[Acting] = (),
+    *,
+    start: ModelFit | None = None,
+    noise: Noise | None = None,
+    iterations: int = 30,
+    to_the_end: bool = True,
+) -> ModelFit:
+    """The fit from the best start of the mechanisms' further parameters; a trial from each finds out which.
+
+    ``noise`` given is kept; otherwise it is estimated along with everything else. A trial ends where a step no
+    longer earns much; without ``to_the_end`` the best trial is what is returned.
+    """
+    law = start.law if start is not None else s.first_law
+    first = noise or (start.noise if start is not None else first_noise())
+    starts, target, estimate = _starts(acting, start), Target(s, tuple(acting)), noise is None
+    if len(starts) > 1 or not to_the_end:
+        begins = [np.concatenate([law, *values]) for values in starts]
+        trials = [_fitted(target, x, first, estimate, (iterations, TRIAL_GAIN)) for x in begins]
+        best = max(trials, key=lambda f: f.score)
+        if not to_the_end:
+            return best
+        law, starts, first = best.law, [list(best.values)], best.noise if noise is None else noise
+    return _fitted(target, np.concatenate([law, *starts[0]]), first, estimate, (iterations, END_GAIN))
+
+
+def fit_without(f: ModelFit, out: NDArray[np.bool_]) -> ModelFit:
+    """The same model, noise and all, fitted to the tests that ``out`` (n,) does not mark."""
+    return fit(f.setup.take(~out), f.acting, start=f, iterations=12)
+
+
+def residual_on_flat(f: ModelFit) -> FloatArray:
+    """ln T measured over the model calibrated on the flat sample alone, shape (n, 2).
+
+    The paper calibrates like this. A fit to all samples, which the statistics rest on, spreads the misfit of a pattern
+    over the flat sample too. It stays what is shown where the flat sample was pulled at fewer than three loads.
+    """
+    c = f.setup.observations.conditions
+    other = c.sample != f.setup.observations.flat
+    if len(np.unique(np.round(c.normal_load_N[~other], 4))) < 3:
+        return f.residual
+    return f.setup.observations.log_force - predict(f.setup, fit_without(f, other).law, f.acting, f.values)
+
+
+def _starts(acting: Sequence[Acting], start: ModelFit | None) -> list[list[FloatArray]]:
+    """Start values: those of ``start`` for mechanisms it has, else a small amplitude and every try."""
+    each = []
+    known = {(a.mechanism.name, a.choice): v for a, v in zip(start.acting, start.values, strict=True)} if start else {}
+    for a in acting:
+        if (a.mechanism.name, a.choice) in known:
+            each.append([known[a.mechanism.name, a.choice]])
+            continue
+        size = a.mechanism.amplitude
+        tries = [(size.zero + 0.3 * (size.start - size.zero), *size.tries)]
+        tries += [(p.start, *p.tries) for p in a.mechanism.parameters[1:]]
+        each.append([np.array(values) for values in product(*tries)])
+    return [list(values) for values in product(*each)]
+
+
+def _fitted(target: Target, x: FloatArray, noise: Noise, estimate: bool, until: tuple[int, float]) -> ModelFit:
+    """Steps from ``x`` until one earns less than a gain, both in ``until``; with ``estimate`` the noise is estimated
+    along with them."""
+    s, log_force = target.setup, target.setup.observations.log_force
+    iterations, least_gain = until
+    x = np.clip(x, *target.bounds)
+    residual = target.residual(x)
+    jacobian = target.jacobian(x, log_force - residual)
+    state = begin(s, x, residual, noise)
+    score, weight = -np.inf, np.zeros(0)
+    for _ in range(iterations):
+        system = solved(s, state, jacobian, target.bounds)
+        before, p = state, len(state.x)
+        least = penalised(s, before) - 1e-9
+        for length in LENGTHS:
+            x = np.clip(before.x + length * system.solution[:p], *target.bounds)
+            effects = before.effects + length * (system.solution[p:] - before.effects)
+            trial = replace(before, x=x, effects=effects, residual=target.residual(x))
+            if penalised(s, trial) >= least:
+                state = trial
+                break
+        variance = np.diag(system.inverse.border[0])[:p]
+        moved = float(np.max(np.abs(state.x - before.x) / np.sqrt(variance + 1e-300)))
+        state = with_noise_estimated(s, state, system) if estimate else state
+        last, (score, weight) = score, scored(s, state)
+        if abs(score - last) < least_gain:
+            break
+        if moved > STILL:
+            jacobian = target.jacobian(state.x, log_force - state.residual)
+    jacobian = target.jacobian(state.x, log_force - state.residual)
+    return ModelFit(
+        s, target.acting, state.x[:N_LAW], target.values(state.x), state.at.noise, state.effects, state.residual, score,
+        system.inverse,
+        Linear(jacobian, s.random_effects, state.residual, state.at.factor, state.at.precision, weight),
+    )  # fmt: skip

@@ -1,0 +1,489 @@
+"""The random effects of a campaign: four of each specimen, which its tests alone show, and those that tests share.
+
+Columns along which ln T may change; where one specimen alone shows them, kept without the tests of the others.
+
+The model of a campaign: the flat law, the shares of each pattern, mechanisms on top, and the noise.
+
+ln T of test i in regime r = ln law + pattern error + specimen gain + specimen slope x ln p + repeat noise (bivariate
+t over the two regimes of one pull). All sizes are estimated from the campaign: gains and slopes of the specimens, one
+factor on the error that the predictor states for its patterns, and repeats that may differ by sample and by force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tribo.diagnostics.observations import Observations
+from tribo.diagnostics.predictor import Predictor
+from tribo.display import displayed
+from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism
+from tribo.mechanisms.table import MECHANISMS
+from tribo.records import FloatArray
+
+OF_A_SPECIMEN = 4  # gain and slope, alike in both regimes and apart
+
+
+@displayed()
+@dataclass(frozen=True)
+class RandomEffects:
+    """The design of the random effects, without the zeros of all specimens that a test was not made on.
+
+    ``specimen`` (n,) is the number of the specimen of every test, below ``specimens``, and ``own`` (n, 2, 4) are the
+    columns of its effects; ``shared`` (n, 2, c) are those that tests of several specimens show. A vector of all effects
+    (q,) holds those of the specimens one after the other, then the shared ones.
+    """
+
+    specimen: NDArray[np.int64]
+    specimens: int
+    own: FloatArray
+    shared: FloatArray
+
+    @property
+    def of_specimens(self) -> int:
+        """How many effects belong to specimens; the shared ones follow."""
+        return OF_A_SPECIMEN * self.specimens
+
+    @property
+    def count(self) -> int:
+        return self.of_specimens + int(self.shared.shape[2])
+
+    @cached_property
+    def tests_of(self) -> tuple[NDArray[np.int64], ...]:
+        """The tests of every specimen, as indices."""
+        order = np.argsort(self.specimen, kind="stable")
+        ends = np.cumsum(np.bincount(self.specimen, minlength=self.specimens))
+        return tuple(np.split(order, ends[:-1]))
+
+    @property
+    def dense(self) -> FloatArray:
+        """The whole design, (n, 2, q)."""
+        columns = np.zeros((*self.own.shape[:2], self.specimens, OF_A_SPECIMEN))
+        columns[np.arange(len(self.own)), :, self.specimen] = self.own
+        return np.concatenate([columns.reshape(*self.own.shape[:2], -1), self.shared], axis=2)
+
+    def parts(self, effects: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """A vector of effects (..., q) as those of the specimens (..., specimens, 4) and the shared ones (..., c)."""
+        own = effects[..., : self.of_specimens].reshape(*effects.shape[:-1], self.specimens, OF_A_SPECIMEN)
+        return own, effects[..., self.of_specimens :]
+
+    def on_tests(self, effects: FloatArray) -> FloatArray:
+        """What effects (..., q) add to ln T of every test, (..., n, 2)."""
+        own, shared = self.parts(effects)
+        n, regimes, c = self.shared.shape
+        of_shared = shared @ self.shared.reshape(n * regimes, c).T
+        of_own = np.einsum("nrk,...nk->...nr", self.own, own[..., self.specimen, :])
+        return np.asarray(of_own + of_shared.reshape(of_own.shape))
+
+    def summed(self, weight: FloatArray) -> FloatArray:
+        """The columns of all effects (q,), regimes added with ``weight`` (2,) and tests added up."""
+        own = np.zeros((self.specimens, OF_A_SPECIMEN))
+        np.add.at(own, self.specimen, np.einsum("nrk,r->nk", self.own, weight))
+        return np.concatenate([own.ravel(), np.einsum("nrk,r->k", self.shared, weight)])
+
+    def take(self, keep: np.ndarray) -> RandomEffects:
+        """The same for the tests picked by a mask or by indices."""
+        return replace(self, specimen=self.specimen[keep], own=self.own[keep], shared=self.shared[keep])
+
+    def with_shared(self, columns: FloatArray) -> RandomEffects:
+        """The same with further effects along ``columns`` (n, 2, d)."""
+        return replace(self, shared=np.concatenate([self.shared, columns], axis=2))
+
+
+EVERY = -1  # in place of a specimen: all tests
+AT_ONCE = 100  # courses that are written out at the same time
+MOST_PAIRS = 2000  # courses of two specimens that are written out at all
+
+
+@displayed()
+@dataclass(frozen=True)
+class Course:
+    """Columns of ln T, ``values`` (t, 2, d) on the ``tests`` (t,) of one ``specimen``, by its number, or of EVERY one;
+    zero on the others of ``n`` tests."""
+
+    n: int
+    specimen: int
+    tests: NDArray[np.int64]
+    values: FloatArray
+
+    @property
+    def columns(self) -> FloatArray:
+        """On all tests, (n, 2, d)."""
+        if self.specimen == EVERY:
+            return self.values
+        found = np.zeros((self.n, *self.values.shape[1:]))
+        found[self.tests] = self.values
+        return found
+
+    @property
+    def freedom(self) -> int:
+        return int(self.values.shape[2])
+
+    @property
+    def shows(self) -> bool:
+        """Whether it is finite, and a change for some test."""
+        values = self.values
+        return bool(values.size and np.isfinite(values).all() and (np.ptp(values) > 0 or len(values) < self.n))
+
+
+def course(columns: FloatArray, effects: RandomEffects) -> Course:
+    """The course of columns (n, 2, d)."""
+    changed = effects.specimen[np.any(columns != 0.0, axis=(1, 2))]
+    n = len(columns)
+    if len(changed) and (changed == changed[0]).all():
+        specimen = int(changed[0])
+        tests = effects.tests_of[specimen]
+        return Course(n, specimen, tests, columns[tests])
+    return Course(n, EVERY, np.arange(n), columns)
+
+
+def added(courses: Iterable[Course]) -> FloatArray:
+    """The columns (n, 2, d) that courses add up to."""
+    first, *others = courses
+    total = first.columns
+    for other in others:
+        total = total + other.columns
+    return total
+
+
+def in_batches(columns: Iterable[FloatArray]) -> Iterator[FloatArray]:
+    """Columns (n, 2) put together, (n, 2, k), AT_ONCE at a time."""
+    rest = iter(columns)
+    while batch := list(islice(rest, AT_ONCE)):
+        yield np.stack(batch, axis=2)
+
+
+N_LAW = 4  # mu static, tau0 static (kPa), mu sliding, tau0 sliding (kPa)
+FLOOR_N = 1e-6
+WITHIN_MEASURED = 3.0  # standard uncertainties: one measurement in 400 lies further off
+LAW_SCALE = np.array([1.0, 5.0, 1.0, 5.0])
+LAW_BOUNDS = (np.array([0.01, -200.0, 0.01, -200.0]), np.array([100.0, 1000.0, 100.0, 1000.0]))
+# Groups of random effects that share one size: gain and slope of the specimens, each in the mean of both regimes and
+# in their difference, which a specimen shares to an unknown degree; the patterns.
+GAIN, SLOPE, PATTERN = 0, 2, 4
+ALIKE_IN_BOTH, APART = np.array([1.0, 1.0]) / np.sqrt(2.0), np.array([1.0, -1.0]) / np.sqrt(2.0)
+FIXED = -1  # the group of effects whose size is not estimated
+
+
+@displayed()
+@dataclass(frozen=True)
+class Acting:
+    """A mechanism that takes part in a model, with its choice (which specimen, which column).
+
+    ``measured`` is its amplitude with its standard uncertainty, where that was measured directly.
+    """
+
+    mechanism: Mechanism
+    choice: str = ""
+    measured: tuple[float, float] | None = None
+
+    @property
+    def name(self) -> str:
+        """The name in a verdict: ``covariate:operator``."""
+        return self.mechanism.called(self.choice)
+
+    @property
+    def start(self) -> FloatArray:
+        """The parameters from which a fit starts, at the mechanism's full amplitude."""
+        return self.mechanism.start()
+
+    def measured_evidence(self, amplitude: float) -> float:
+        """Log likelihood by which a direct measurement favours this amplitude over none."""
+        if self.measured is None:
+            return 0.0
+        value, uncertainty = self.measured
+        zero = self.mechanism.amplitude.zero
+        return 0.5 * (((zero - value) / uncertainty) ** 2 - ((amplitude - value) / uncertainty) ** 2)
+
+
+@displayed()
+@dataclass(frozen=True)
+class Setup:
+    """What every model of one campaign shares: shares, random-effect design, groups.
+
+    There are q ``random_effects``. The standard deviation of effect j is ``unit[j]`` times the size of its ``group[j]``
+    (GAIN and SLOPE, plus one for the difference of the regimes; PATTERN), or ``unit[j]`` itself where the group is
+    FIXED. ``scatter`` (n, k) holds what the repeats may depend on: the sample, and the logarithm of the force.
+    ``first_law`` (4,) is a first guess of the flat law.
+    """
+
+    observations: Observations
+    predictor: Predictor
+    shares: FloatArray
+    random_effects: RandomEffects
+    unit: FloatArray
+    group: NDArray[np.int64]
+    log_pressure: FloatArray
+    scatter: FloatArray
+    first_law: FloatArray
+
+    @property
+    def random(self) -> FloatArray:
+        """The whole design of the random effects, (n, 2, q): large where there are many specimens."""
+        return self.random_effects.dense
+
+    def take(self, keep: NDArray[np.bool_]) -> Setup:
+        """The same for the tests that ``keep`` (n,) marks."""
+        return replace(
+            self, observations=self.observations.take(keep), shares=self.shares[keep],
+            random_effects=self.random_effects.take(keep), log_pressure=self.log_pressure[keep],
+            scatter=self.scatter[keep],
+        )  # fmt: skip
+
+    def base(self, law: FloatArray) -> Base:
+        """The baseline of every test for the flat law ``law`` = (mu, tau0 kPa) static, then sliding."""
+        area = self.observations.conditions.nominal_area_m2
+        flat = (law[0], law[1] * 1e3 * area, law[2], law[3] * 1e3 * area)
+        s = self.shares
+        by_sample = {
+            name: (v[0] * flat[0], v[1] * flat[1], v[2] * flat[2], v[3] * flat[3])
+            for name, v in self.predictor.shares.items()
+        }
+        return Base(
+            s[:, 0] * flat[0], s[:, 1] * flat[1], s[:, 2] * flat[2], s[:, 3] * flat[3],
+            by_sample=by_sample, flat=self.observations.flat,
+        )  # fmt: skip
+
+
+def setup(observations: Observations, predictor: Predictor) -> Setup:
+    """Random effects in both regimes: gain and slope of a specimen; offset, slope and curve of a pattern."""
+    o, c = observations, observations.conditions
+    log_p = np.log(c.pressure_Pa)
+    log_p = log_p - log_p.mean()
+    names, specimen = np.unique(c.specimen, return_inverse=True)
+    shapes = [(np.ones(o.n), GAIN), (log_p, SLOPE)]
+    kinds = [(shape[:, None] * r, group + k) for k, r in enumerate((ALIKE_IN_BOTH, APART)) for shape, group in shapes]
+    own = np.stack([column for column, _ in kinds], axis=2)
+    columns: list[FloatArray] = []
+    units, groups = [1.0] * (len(kinds) * len(names)), [group for _, group in kinds] * len(names)
+    for sample in np.unique(c.sample):
+        for regime in (0, 1):
+            known = (predictor.offset, predictor.slope, predictor.curve)
+            offset, slope, curve = (error[sample][regime] for error in known)
+            sized = ((offset, np.ones(o.n)), (slope, log_p), (curve, log_p**2 - np.mean(log_p**2)))
+            for size, shape in sized if offset > 0 else ():
+                columns.append(_column((c.sample == sample) * shape, regime))
+                units.append(size)
+                groups.append(PATTERN)
+    shared = np.stack(columns, axis=2) if columns else np.zeros((o.n, 2, 0))
+    effects = RandomEffects(specimen, len(names), own, shared)
+    bare = Setup(
+        o, predictor, predictor.table(c.sample), effects, np.array(units), np.array(groups), log_p,
+        np.zeros((o.n, 0)), np.zeros(N_LAW),
+    )  # fmt: skip
+    law = _first_law(bare)
+    return replace(bare, first_law=law, scatter=_scatter(bare, law))
+
+
+def _scatter(s: Setup, law: FloatArray) -> FloatArray:
+    """One column per sample, and the logarithm of the expected force about its mean."""
+    c = s.observations.conditions
+    log_force = predict(s, law, (), ()).mean(axis=1)
+    return np.column_stack([*((c.sample == name) * 1.0 for name in np.unique(c.sample)), log_force - log_force.mean()])
+
+
+def _first_law(s: Setup) -> FloatArray:
+    """A robust first guess of the flat law, one regime after the other."""
+    c, law = s.observations.conditions, []
+    for regime in (0, 1):
+        force = np.exp(s.observations.log_force[:, regime])
+        columns = [s.shares[:, 2 * regime] * c.normal_load_N, s.shares[:, 2 * regime + 1] * c.nominal_area_m2 * 1e3]
+        design = np.column_stack(columns) / force[:, None]
+        weight = np.ones(len(force))
+        for _ in range(8):
+            root = np.sqrt(weight)
+            found = np.linalg.lstsq(design * root[:, None], root, rcond=None)[0]
+            weight = 1.0 / (1.0 + ((design @ found - 1.0) / 0.15) ** 2)
+        law += [max(float(found[0]), 0.05), float(found[1])]
+    return np.array(law)
+
+
+def _column(values: FloatArray | NDArray[np.bool_], regime: int) -> FloatArray:
+    column = np.zeros((len(values), 2))
+    column[:, regime] = values
+    return column
+
+
+def log_forces(forces: Forces) -> FloatArray:
+    """ln T, shape (n, 2), of forces kept above a micronewton."""
+    both = np.column_stack([forces.static_N, forces.sliding_N])
+    return np.log(np.maximum(both, FLOOR_N))
+
+
+def predict(s: Setup, law: FloatArray, acting: Sequence[Acting], values: Sequence[FloatArray]) -> FloatArray:
+    """ln T of every test, shape (n, 2). Several mechanisms add their changes of ln T."""
+    conditions = s.observations.conditions
+    base = s.base(law)
+    before = log_forces(base.forces(conditions.normal_load_N))
+    total = before.copy()
+    for a, v in zip(acting, values, strict=True):
+        total += _change(a, v, base, conditions)
+    return total
+
+
+def effect_of(s: Setup, law: FloatArray, acting: Acting, values: FloatArray) -> FloatArray:
+    """Change of ln T by one mechanism on top of the flat law, (n, 2)."""
+    return _change(acting, values, s.base(law), s.observations.conditions)
+
+
+def _change(acting: Acting, values: FloatArray, base: Base, conditions: Conditions) -> FloatArray:
+    """Change of ln T by one mechanism, none for tests for which it was removed, (n, 2)."""
+    after = acting.mechanism.law(values, base, conditions, acting.choice)
+    change = log_forces(after) - log_forces(base.forces(conditions.normal_load_N))
+    return change * conditions.present(acting.mechanism.name)[:, None]
+
+
+def with_form_error(
+    s: Setup, law: FloatArray, acting: Sequence[Acting], values: Sequence[FloatArray], share: float
+) -> Setup:
+    """Further random effects that let each mechanism's effect be off by a ``share`` of itself, per sample and regime,
+    in size and slope."""
+    c = s.observations.conditions
+    columns, sizes = [], []
+    for a, v in zip(acting, values, strict=True):
+        change = effect_of(s, law, a, v)
+        for shape in (np.ones(s.observations.n), s.log_pressure):
+            for sample in np.unique(c.sample):
+                here = (c.sample == sample) * shape
+                for regime in (0, 1):
+                    column = np.zeros_like(change)
+                    column[:, regime] = change[:, regime] * here
+                    if np.abs(column).max() > 1e-6:
+                        columns.append(column)
+                        sizes.append(share)
+    if not columns:
+        return s
+    return replace(
+        s,
+        random_effects=s.random_effects.with_shared(np.stack(columns, axis=2)),
+        unit=np.concatenate([s.unit, np.array(sizes)]),
+        group=np.concatenate([s.group, np.full(len(sizes), FIXED)]),
+    )
+
+
+def with_free_columns(s: Setup, columns: FloatArray, coefficients: FloatArray) -> Setup:
+    """Further random effects along ``columns`` (n, 2, d), free to be about twice as large as ``coefficients`` (d,)."""
+    freedom = np.maximum(2.0 * np.abs(coefficients), 0.5 * np.abs(coefficients).max())
+    return replace(
+        s,
+        random_effects=s.random_effects.with_shared(columns),
+        unit=np.concatenate([s.unit, freedom]),
+        group=np.concatenate([s.group, np.full(len(freedom), FIXED)]),
+    )
+
+
+def candidates(s: Setup, law: FloatArray) -> list[Acting]:
+    """Every mechanism and choice that could show in the friction forces of this design."""
+    base, conditions = s.base(law), s.observations.conditions
+    found = []
+    for mechanism in MECHANISMS.values():
+        if not mechanism.changes_forces or not mechanism.applies(conditions):
+            continue
+        found += [_known(s, Acting(mechanism, str(choice))) for choice in mechanism.choices(base, conditions)]
+    return found
+
+
+def _known(s: Setup, a: Acting) -> Acting:
+    """A candidate with its amplitude as measured directly, where it was."""
+    every = s.observations.measured
+    measured = every.get(f"{a.mechanism.name}:{a.choice}", every.get(a.mechanism.name))
+    if measured is None:
+        return a
+    return replace(a, mechanism=as_measured_directly(a.mechanism, *measured), measured=measured)
+
+
+def as_measured_directly(mechanism: Mechanism, value: float, uncertainty: float) -> Mechanism:
+    """The mechanism with its amplitude kept within WITHIN_MEASURED standard uncertainties of a measured one."""
+    first, reach = mechanism.amplitude, WITHIN_MEASURED * uncertainty
+    low, high = np.clip([value - reach, value + reach], first.low, first.high)
+    amplitude = replace(first, low=float(low), high=float(high), tries=())
+    return replace(mechanism, parameters=(amplitude, *mechanism.parameters[1:]))
+
+
+@displayed()
+@dataclass(frozen=True)
+class StartChanges:
+    """What every candidate changes before it is fitted.
+
+    ``courses`` (k,) are the changes of ln T at the start values of ``acting`` (k,): one each, or two that add up, each
+    that of another candidate. ``every_start`` holds the changes at all sizes that a fit would start from,
+    (n, 2, sizes), of the mechanisms without a choice, by name. ``adhesion`` (n, 2) is the share of adhesion in T by the
+    law alone.
+    """
+
+    acting: tuple[Acting, ...]
+    courses: tuple[tuple[Course, ...], ...]
+    every_start: Mapping[str, FloatArray]
+    adhesion: FloatArray
+
+    @property
+    def columns(self) -> FloatArray:
+        """The changes of all candidates, (n, 2, k): large where there are many specimens."""
+        return np.concatenate([added(courses) for courses in self.courses], axis=2)
+
+
+def start_changes(s: Setup, law: FloatArray) -> StartChanges:
+    """The changes of all candidates on top of the flat law ``law``, mechanisms of a model left out."""
+    acting = candidates(s, law)
+    before = predict(s, law, (), ())
+    found: dict[tuple[str, str], Course] = {}
+    every = {}
+    for a in acting:
+        if len(a.mechanism.choosing.parts(a.choice)) > 1:
+            continue
+        column = effect_of(s, law, a, a.start)
+        found[a.mechanism.name, a.choice] = course(column[:, :, None], s.random_effects)
+        if not a.choice:
+            further = [np.array([size, *a.start[1:]]) for size in a.mechanism.amplitude.tries]
+            every[a.name] = np.stack([column, *(effect_of(s, law, a, v) for v in further)], axis=2)
+    adhesion = np.exp(log_forces(s.base(law).forces(np.zeros(s.observations.n))) - before)
+    names = [(a.mechanism.name, a.mechanism.choosing.parts(a.choice)) for a in acting]
+    courses = tuple(tuple(found[name, part] for part in parts) for name, parts in names)
+    return StartChanges(tuple(acting), courses, every, adhesion)
+
+
+@displayed()
+@dataclass(frozen=True)
+class Target:
+    """What is being fitted: a campaign, the mechanisms on top of the flat law, and their bounds."""
+
+    setup: Setup
+    acting: tuple[Acting, ...]
+
+    @cached_property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        lows = [LAW_BOUNDS[0], *(a.mechanism.bounds()[0] for a in self.acting)]
+        highs = [LAW_BOUNDS[1], *(a.mechanism.bounds()[1] for a in self.acting)]
+        return np.concatenate(lows), np.concatenate(highs)
+
+    @cached_property
+    def scales(self) -> FloatArray:
+        return np.concatenate([LAW_SCALE, *(np.abs(a.start) for a in self.acting)])
+
+    def values(self, x: FloatArray) -> tuple[FloatArray, ...]:
+        """The parameters of each mechanism, out of those of all."""
+        ends = N_LAW + np.cumsum([len(a.mechanism.parameters) for a in self.acting])
+        return tuple(np.split(x[N_LAW:], ends[:-1] - N_LAW)) if self.acting else ()
+
+    def predict(self, x: FloatArray) -> FloatArray:
+        """ln T of every test, (n, 2)."""
+        return predict(self.setup, x[:N_LAW], self.acting, self.values(x))
+
+    def residual(self, x: FloatArray) -> FloatArray:
+        return self.setup.observations.log_force - self.predict(x)
+
+    def jacobian(self, x: FloatArray, now: FloatArray) -> FloatArray:
+        """Forward differences, (n, 2, p); at an upper bound the step goes down."""
+        columns = []
+        for k, scale in enumerate(self.scales):
+            step = 1e-4 * max(scale, 1e-3 * abs(x[k]))
+            step = -step if x[k] + step > self.bounds[1][k] else step
+            moved = x.copy()
+            moved[k] += step
+            columns.append((self.predict(moved) - now) / step)
+        return np.stack(columns, axis=2)

@@ -1,0 +1,280 @@
+"""The extended model simulated for a campaign: runs with and without the named mechanisms, test by test.
+
+The diagnosis finds a mechanism by its law; here the mechanism acts on the blocks. Pairs of runs share local friction,
+angle and load, so that their ratio is the effect of the mechanism alone. The local friction is that of the flat law of
+the extended fit. Every sample is pulled at a low, a middle and a high load, under the conditions of the test at that
+load that the law changes most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tribo.diagnostics.diagnosis_record import Diagnosis, NotSimulated, SimulatedExtension
+from tribo.diagnostics.effect_sizes import rms_percent
+from tribo.diagnostics.fit import ModelFit
+from tribo.diagnostics.model import effect_of
+from tribo.diagnostics.predictor import flat_law
+from tribo.diagnostics.terms import name_in_words
+from tribo.diagnostics.verdict import CERTAIN_CAUSES
+from tribo.errors import SimulationError
+from tribo.mechanisms.record import Conditions, Values
+from tribo.mechanisms_in_model.extended_run import simulate_pair
+from tribo.records import FloatArray, Run
+from tribo.springblock.config import PAPER, LocalFriction, SimConfig
+from tribo.springblock.ensemble import angle_range_deg, run_seed
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+DT_S = 1e-7  # pairs of runs share their step, so that its error cancels
+LEAST_CHANGE = 0.01  # of ln T; the ratio of simulated to quick change would be noise below
+MOST_LOADS = 3  # the effect is smooth in the load: more are interpolated
+LONG_PEAKS = 2.2  # length of a run in peak times
+MOST_CHANGE = 1.2  # of ln T; beyond it hardly any force was there before, and a ratio says nothing
+Progress = Callable[[str, int, int], None]
+STAGE = "simulating the extended model"
+
+
+def simulate_extension(
+    model: ModelFit, *, seed: int = 0, jobs: int = 2, progress: Progress | None = None
+) -> SimulatedExtension | NotSimulated:
+    """The model of a campaign with its mechanisms in the simulator, or the reason why it was not simulated.
+
+    Parameters
+    ----------
+    model : the fit with the named mechanisms
+    seed : draws the local friction, equal in both runs of a pair
+    jobs : threads
+    """
+    names = tuple(a.name for a in model.acting)
+    each = zip(model.acting, model.values, strict=True)
+    quick = sum((effect_of(model.setup, model.law, a, v) for a, v in each), np.zeros_like(model.residual))
+    picked = representatives(model, quick)
+    if not picked:
+        bounds = f"{100 * np.expm1(LEAST_CHANGE):.0f} and {100 * np.expm1(MOST_CHANGE):.0f} %"
+        return NotSimulated(names, f"no test has a change of T between {bounds}")
+    pairs = [_pair(model, test, seed) for test in picked]
+    try:
+        runs = _run_pairs(pairs, jobs, progress)
+    except SimulationError as why:
+        return NotSimulated(names, "; ".join(str(problem) for problem in why.problems))
+    table = _table(model, picked, quick, runs)
+    change = interpolated(model, table, quick)
+    return SimulatedExtension(names, model.predicted - quick + change, change, quick, table, *_ratio(table))
+
+
+def representatives(model: ModelFit, quick: FloatArray) -> list[int]:
+    """Tests to simulate: the most moved of every sample at up to MOST_LOADS of its loads."""
+    c = model.setup.observations.conditions
+    loads = _loads(c.normal_load_N)
+    size = np.abs(quick[:, leading(quick)])
+    found = []
+    for sample in np.unique(c.sample):
+        usable = (c.sample == sample) & (np.abs(quick) < MOST_CHANGE).all(axis=1) & (size > LEAST_CHANGE)
+        for load in _spread(loads[usable]):
+            rows = np.flatnonzero(usable & (loads == load))
+            found.append(int(rows[np.argmax(size[rows])]))
+    return found
+
+
+def leading(quick: FloatArray) -> int:
+    """The regime that the effect moves more: 0 static, 1 sliding."""
+    return int(np.argmax(np.abs(quick).mean(axis=0)))
+
+
+def _loads(normal_load_N: FloatArray) -> FloatArray:
+    """The load level of each test: equal loads are one level."""
+    distinct = np.unique(np.round(normal_load_N, 6))
+    nearest = np.abs(np.log(normal_load_N[:, None] / distinct)).argmin(axis=1)
+    return np.asarray(distinct[nearest])
+
+
+def _spread(loads: FloatArray) -> FloatArray:
+    """A few of the loads, evenly over the logarithm of their range."""
+    distinct = np.unique(loads)
+    if len(distinct) <= MOST_LOADS:
+        return np.asarray(distinct)
+    wanted = np.geomspace(distinct[0], distinct[-1], MOST_LOADS)
+    return np.unique(distinct[np.abs(np.log(distinct[:, None] / wanted)).argmin(axis=0)])
+
+
+def _pair(model: ModelFit, test: int, seed: int) -> tuple[SimConfig, dict[str, Values], dict[str, float]]:
+    """The run of one test, the mechanisms as they act on it, and its recorded conditions."""
+    o = model.setup.observations
+    c = o.conditions
+    sample, pressure = str(c.sample[test]), float(c.pressure_Pa[test])
+    low, high = angle_range_deg(sample, o.patterns[sample])
+    own = run_seed(seed, sample, pressure, 0)
+    angle = float(np.random.default_rng(own).uniform(low, high)) if (low, high) == (0.0, 90.0) else (low + high) / 2
+    config = SimConfig(
+        sample=sample, pattern=o.patterns[sample], pressure_Pa=pressure, angle_deg=angle, seed=own,
+        friction=local_friction(model.law), dt_s=DT_S, duration_peaks=LONG_PEAKS,
+    )  # fmt: skip
+    return config, _acting_on(model, test), recorded_of(c, test)
+
+
+def local_friction(law: FloatArray) -> LocalFriction:
+    """Local friction whose flat sample follows the law (mu, tau0 in kPa, static and sliding): all scales are linear."""
+    mu_s, static, mu_d, sliding = np.asarray(law) / np.asarray(flat_law())
+    return LocalFriction(
+        PAPER.mu_s * mu_s, PAPER.mu_s_sd * mu_s, PAPER.mu_d * mu_d, PAPER.mu_d_sd * mu_d,
+        PAPER.static_adhesion_Pa * static, PAPER.sliding_adhesion_Pa * sliding,
+    )  # fmt: skip
+
+
+def _acting_on(model: ModelFit, test: int) -> dict[str, Values]:
+    """Values by mechanism for one test; a mechanism whose choice does not concern the test is left out."""
+    c = model.setup.observations.conditions
+    found: dict[str, Values] = {}
+    for acting, values in zip(model.acting, model.values, strict=True):
+        here = acting.mechanism.on_test(values, acting.choice, c, test)
+        if here is not None:
+            name = acting.mechanism.name
+            found[f"{name}({here.other_sample})" if here.other_sample else name] = here.values
+    return found
+
+
+def recorded_of(c: Conditions, test: int) -> dict[str, float]:
+    """The recorded conditions of one test, those that are there."""
+    known = {
+        "hold_s": c.hold_s, "specimen_run": c.specimen_run, "temperature_C": c.temperature_C,
+        "humidity_pct": c.humidity_pct, "speed_m_s": c.speed_m_s, "elapsed_s": c.elapsed_s,
+    }  # fmt: skip
+    found = {name: float(values[test]) for name, values in known.items() if np.isfinite(values[test])}
+    return found | {"nominal_area_m2": c.nominal_area_m2}
+
+
+def _run_pairs(
+    pairs: Sequence[tuple[SimConfig, Mapping[str, Values], Mapping[str, float]]], jobs: int, progress: Progress | None
+) -> list[tuple[Run, Run]]:
+    """Every pair as (without, with)."""
+
+    def run(pair: tuple[SimConfig, Mapping[str, Values], Mapping[str, float]]) -> tuple[Run, Run]:
+        return simulate_pair(*pair)
+
+    found = []
+    with ThreadPoolExecutor(max(1, jobs)) as pool:
+        for done, both in enumerate(pool.map(run, pairs), start=1):
+            found.append(both)
+            if progress is not None:
+                progress(STAGE, done, len(pairs))
+    return found
+
+
+def _table(
+    model: ModelFit, tests: Sequence[int], quick: FloatArray, runs: Sequence[tuple[Run, Run]]
+) -> pd.DataFrame:
+    """A row a pair: the test it stands for, T/N before and after, and the change of ln T, simulated and quick."""
+    import pandas as pd
+
+    o = model.setup.observations
+    rows = [
+        {
+            "test_id": o.test_ids[test], "sample": str(o.conditions.sample[test]),
+            "normal_load_N": float(o.conditions.normal_load_N[test]), "angle_deg": before.angle_deg,
+            "static_before": before.static_friction, "static_after": after.static_friction,
+            "sliding_before": before.sliding_friction, "sliding_after": after.sliding_friction,
+            "simulated_static": float(np.log(after.static_friction / before.static_friction)),
+            "simulated_sliding": float(np.log(after.sliding_friction / before.sliding_friction)),
+            "quick_static": float(quick[test, 0]), "quick_sliding": float(quick[test, 1]),
+        }
+        for test, (before, after) in zip(tests, runs, strict=True)
+    ]  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def interpolated(model: ModelFit, table: pd.DataFrame, quick: FloatArray) -> FloatArray:
+    """Change of ln T of every test, (n, 2): the quick one, corrected as the pairs of its sample were.
+
+    The correction of both regimes is in proportion to the quick change of the leading one (no effect, no correction).
+    Between loads the factor is linear in ln N.
+    """
+    c = model.setup.observations.conditions
+    places = _places(model, table)
+    lead = leading(quick)
+    off = table[["simulated_static", "simulated_sliding"]].to_numpy() - quick[places]
+    factor = off / quick[places, lead][:, None]
+    change = quick.copy()
+    for sample in np.unique(c.sample[places]):
+        rows = np.flatnonzero(c.sample == sample)
+        pairs = np.flatnonzero(c.sample[places] == sample)
+        pairs = pairs[np.argsort(c.normal_load_N[places[pairs]])]
+        known, wanted = np.log(c.normal_load_N[places[pairs]]), np.log(c.normal_load_N[rows])
+        for k in (0, 1):
+            change[rows, k] += quick[rows, lead] * np.interp(wanted, known, factor[pairs, k])
+    return change
+
+
+def _places(model: ModelFit, table: pd.DataFrame) -> np.ndarray:
+    """The row of the campaign that each pair stands for."""
+    place = {test: k for k, test in enumerate(model.setup.observations.test_ids.tolist())}
+    return np.array([place[test] for test in table["test_id"]])
+
+
+def _ratio(table: pd.DataFrame) -> tuple[float, float]:
+    """Least squares ratio of simulated to quick change over all pairs and regimes, and its standard error."""
+    x = table[["quick_static", "quick_sliding"]].to_numpy().ravel()
+    y = table[["simulated_static", "simulated_sliding"]].to_numpy().ravel()
+    whole = float(x @ x)
+    if whole < 1e-12:
+        return float("nan"), float("nan")
+    ratio = float(x @ y / whole)
+    left = y - ratio * x
+    return ratio, float(np.sqrt(left @ left / max(len(x) - 1, 1) / whole))
+
+
+def with_simulation(
+    d: Diagnosis, *, seed: int = 0, jobs: int = 2, progress: Progress | None = None
+) -> Diagnosis:
+    """The same diagnosis with its named mechanisms simulated.
+
+    The text and the ``model`` record of its verdict say where the predictions come from and what the simulation gave,
+    or why there is none.
+    """
+    model: dict[str, object] = {**d.verdict.model, "shares_from": d.baseline.setup.predictor.source}
+    words = [d.verdict.text, f"The predictions for the patterned samples are based on {model['shares_from']}."]
+    found = None
+    if d.named is not None and d.named.causes and d.verdict.verdict in CERTAIN_CAUSES:
+        found = simulate_extension(d.named.model, seed=seed, jobs=jobs, progress=progress)
+        key, record, sentence = _reported(d, found)
+        model[key] = record
+        words.append(sentence)
+    simulated = found if isinstance(found, SimulatedExtension) else None
+    return replace(d, simulated=simulated, verdict=replace(d.verdict, text=" ".join(words), model=model))
+
+
+def _reported(d: Diagnosis, found: SimulatedExtension | NotSimulated) -> tuple[str, dict[str, object], str]:
+    """The key and the record of a simulation in ``model`` of the verdict, and a sentence about it."""
+    names = " and ".join(name_in_words(name) for name in found.mechanisms)
+    if isinstance(found, NotSimulated):
+        record: dict[str, object] = {"mechanisms": list(found.mechanisms), "reason": found.reason}
+        return "not_simulated", record, f"The model with {names} was not simulated: {found.reason}."
+    before, quick, after = residual_percent(d, found)
+    record = {
+        "mechanisms": list(found.mechanisms), "pairs_of_runs": len(found.table), "effect_over_law": found.ratio,
+        "effect_over_law_u": found.ratio_u, "rms_percent_before": before, "rms_percent_law": quick,
+        "rms_percent_simulated": after,
+    }  # fmt: skip
+    sentence = (
+        f"With {names} in the simulator itself ({len(found.table)} pairs of runs), the effect is {found.ratio:.3f} +- "
+        f"{found.ratio_u:.3f} times that of its law. The root mean square of measured over modelled T, less one, is "
+        f"{before:.1f} % for the calibrated model, {after:.1f} % with the simulated effect and {quick:.1f} % with the "
+        "law."
+    )
+    return "simulated", record, sentence
+
+
+def residual_percent(d: Diagnosis, found: SimulatedExtension) -> tuple[float, float, float]:
+    """Root mean square of 100 (measured / modelled T - 1): calibrated, extended by law, and by the simulator."""
+    assert d.named is not None
+    measured = d.baseline.setup.observations.log_force
+    left = (d.baseline.residual, d.named.model.residual, measured - found.log_force)
+    before, quick, after = (rms_percent(part) for part in left)
+    return before, quick, after

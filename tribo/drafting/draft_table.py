@@ -1,0 +1,181 @@
+"""Which columns of a table of evaluated forces are the sample, the load, the speed and the friction, by their names.
+
+A campaign drafted from a table of forces that were evaluated elsewhere: one row a test, cycle or pull.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from tribo.campaign.table import KNOWN, Table, read_table
+from tribo.drafting.draft import Draft, as_column
+from tribo.errors import CampaignError, Problem
+from tribo.units import match_quantity
+
+_SAMPLE = ("sample", "material", "probe", "werkstoff", "matiere", "materiau", "echantillon", "muestra")
+_SETS = ("dataname", "data name", "data set", "dataset", "series")  # of one rig each: not to be pooled
+_COEFFICIENT = re.compile(
+    r"(?:cof|mu|friction coefficient|coefficient of friction|coefficient)(?: (?:mean|avg|average))?"
+)
+_FORCE = re.compile(r"(?:friction(?:al)?|sliding|tangential) force(?: (?:mean|avg|average))?")
+_LOAD = re.compile(r"(?:nominal |applied |mean )?(?:normal )?load|normal force|nominalload|normalload")
+_SPEED = re.compile(r"(?:max |mean |nominal )?(?:lin |linear |sliding )?(?:speed|velocity)|maxlinspeed")
+_UNIT_AT_END = re.compile(r"[\[(]\s*(m?k?N|gf?|kgf|um/s|mm/s|m/s|mm/min)\s*[\])]\s*$")
+_FIELDS = {
+    "N": "normal_load_N", "mN": "normal_load_mN", "kN": "normal_load_kN", "gf": "normal_load_gf", "g": "mass_g",
+    "kgf": "normal_load_kgf", "mm/s": "speed_mm_s", "um/s": "speed_um_s", "m/s": "speed_m_s", "mm/min": "speed_mm_min",
+}  # fmt: skip
+_LOOKED_AT = 200  # rows in which a label has to repeat the number with its unit
+
+
+def proposed_mapping(table: Table) -> dict[str, str]:
+    """Column of the table for each column of tests.csv, as far as names and units tell; {} without load and friction.
+
+    The unit of a number stands in brackets behind the name, or in a column of labels that repeats it: 10 beside
+    "10 mN". Without a unit a column is not taken. A table with a time or a displacement is a trace.
+    """
+    if any((match_quantity(name) or ("", 0))[0] in ("time", "displacement") for name in table.names):
+        return {}
+    found: dict[str, str] = {}
+    for name in table.names:
+        plain = _plain(name)
+        if plain in _SAMPLE:
+            found.setdefault("sample", name)
+        elif _COEFFICIENT.fullmatch(plain):
+            found.setdefault("coefficient", name)
+        elif _FORCE.fullmatch(plain) and _unit(table, name) == "N":
+            found.setdefault("sliding_N", name)
+        elif _LOAD.fullmatch(plain) or _SPEED.fullmatch(plain):
+            field = _FIELDS.get(_unit(table, name), "")
+            if field.startswith("speed") == bool(_SPEED.fullmatch(plain)) and field:
+                found.setdefault(field, name)
+    if (finer := _finer(table, found.get("sample", ""))) is not None:
+        found["sample"] = finer
+    loads = [field for field in found if field.startswith(("normal_load", "mass"))]
+    return found if loads and ("coefficient" in found or "sliding_N" in found) else {}
+
+
+def _finer(table: Table, sample: str) -> str | None:
+    """A column of data sets, each of one sample; None where there is none."""
+    for name in table.names:
+        pairs = {(row.cells.get(name, ""), row.cells.get(sample, "")) for row in table.rows}
+        if _plain(name) in _SETS and sample and len(pairs) == len({one for one, _ in pairs}) < len(table.rows) / 2:
+            return name
+    return None
+
+
+def _plain(name: str) -> str:
+    """A column name in lower case without its unit, marks as blanks: "CoF.mean" -> "cof mean"."""
+    return re.sub(r"[\W_]+", " ", _UNIT_AT_END.sub("", name)).strip().lower()
+
+
+def _unit(table: Table, name: str) -> str:
+    stated = _UNIT_AT_END.search(name)
+    return stated[1] if stated else next(_units_in_labels(table, name), "")
+
+
+def _units_in_labels(table: Table, name: str) -> Iterator[str]:
+    """The unit behind the number in another column, where that column repeats this one row by row."""
+    rows = table.rows[:_LOOKED_AT]
+    for other in table.names:
+        units = {_unit_behind(row.cells.get(name, ""), row.cells.get(other, "")) for row in rows} - {None}
+        alike = all(_unit_behind(row.cells.get(name, ""), row.cells.get(other, "")) is not None for row in rows)
+        if other != name and alike and len(units) == 1:
+            yield str(units.pop())
+
+
+def _unit_behind(number: str, label: str) -> str | None:
+    unit = label.strip().removeprefix(number.strip())
+    return unit.strip() if number.strip() and unit != label.strip() and unit.strip() in _FIELDS else None
+
+
+def repeated_or_derived(table: Table, taken: dict[str, str]) -> set[str]:
+    """Columns that say nothing of their own: copies of a mapped number in other units or words, and further figures of
+    the evaluation, whose names begin like that of the friction ("CoF.sd" beside "CoF.mean")."""
+    friction = [name for field, name in taken.items() if field in ("coefficient", "sliding_N", "static_N")]
+    stems = {_plain(name).split(" ")[0] for name in friction}
+    found = {name for name in table.names if _plain(name).split(" ")[0] in stems and name not in friction}
+    mapped = [name for name in taken.values() if name not in friction]
+    for name in table.names:
+        if any(name != other and _one_to_one(table, name, other) for other in mapped):
+            found.add(name)
+    return found
+
+
+def _one_to_one(table: Table, one: str, other: str) -> bool:
+    pairs = {(row.cells.get(one, ""), row.cells.get(other, "")) for row in table.rows}
+    return len(pairs) == len({a for a, _ in pairs}) == len({b for _, b in pairs})
+
+
+_FORCES = ("static_N", "sliding_N", "static_mu", "sliding_mu", "coefficient")
+_LOADS = ("normal_load_N", "mass_g", "normal_stress_Pa")
+
+
+def draft_from_table(path: Path, mapping: Mapping[str, str]) -> Draft:
+    """The rows of tests.csv from a table; ``mapping`` gives its column for each column of tests.csv.
+
+    A column of tests.csv may carry another unit of its quantity: ``normal_load_mN``. Without a mapping one is proposed
+    from the names of the columns. Columns not mapped are kept as covariates, unless every row has the same in them,
+    they repeat a mapped column, or they are further figures of the evaluation.
+
+    Raises
+    ------
+    CampaignError
+        The table has no rows, a column that is not there is mapped, or neither a force nor a load is.
+    """
+    table = read_table(path, path.name)
+    if table is None or not table.rows:
+        raise CampaignError(Problem("empty", "the table has no rows", file=path.name))
+    draft = Draft(of_exports=False)
+    if not mapping and (mapping := proposed_mapping(table)):
+        text = ",".join(f"{field}={name}" for field, name in mapping.items())
+        draft.found.append(f'columns "{text}" (proposed; give --table to read them otherwise)')
+    if problems := _faults(table, mapping, path.name):
+        raise CampaignError(problems)
+    left_out = set(mapping.values()) | repeated_or_derived(table, dict(mapping))
+    kept = [n for n in table.names if n and n not in left_out and n not in KNOWN and _varies(table, n)]
+    width = len(str(len(table.rows)))
+    for k, row in enumerate(table.rows, start=1):
+        stated = dict(as_column((field, _number(row.cells.get(name, "")))) for field, name in mapping.items())
+        others = {name: " ".join(row.cells.get(name, "").split()) for name in kept}
+        draft.rows.append({"test_id": f"T{k:0{width}d}", "sample": path.stem, **others, **stated})
+    draft.found.append(
+        f"{len(table.rows)} rows with {', '.join(mapping)}; kept as covariates: {', '.join(kept) or 'none'}"
+    )
+    return draft
+
+
+def is_table_of_forces(path: Path) -> bool:
+    """Whether the columns of a file name a load and a friction, both with units, and no time."""
+    try:
+        table = read_table(path, path.name)
+    except (CampaignError, OSError):
+        return False
+    return table is not None and bool(proposed_mapping(table))
+
+
+def _varies(table: Table, name: str) -> bool:
+    return len({row.cells.get(name, "") for row in table.rows}) > 1
+
+
+def _number(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _faults(table: Table, mapping: Mapping[str, str], file: str) -> list[Problem]:
+    problems = []
+    here = ", ".join(name for name in table.names if name)
+    for field, name in mapping.items():
+        if name not in table.names:
+            problems.append(
+                Problem("missing_column", f"no such column for {field}", file, table.header_row, name, None, here)
+            )
+    columns = {as_column((field, "1"))[0] for field in mapping}
+    for wanted in (_FORCES, _LOADS):
+        if not columns & set(wanted):
+            what = "the table needs a force or coefficient, and a load"
+            allowed = f"one of {', '.join(wanted)}; columns here: {here}"
+            problems.append(Problem("missing_column", what, file, table.header_row, None, None, allowed))
+    return problems

@@ -1,0 +1,208 @@
+"""The record of a friction law.
+
+The friction laws tribo fits. A new law: its two functions, a line in LAWS, an exact-value test.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tribo.display import displayed
+from tribo.records import FloatArray
+
+
+@displayed()
+@dataclass(frozen=True)
+class Variable:
+    """A condition under which a law is evaluated: its argument name and SI unit ("" where dimensionless)."""
+
+    name: str
+    unit: str
+
+
+@displayed()
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a law. ``low`` and ``high`` are the physical limits, not bounds of a fit."""
+
+    name: str
+    symbol: str
+    unit: str
+    text: str
+    low: float = -math.inf
+    high: float = math.inf
+
+
+@displayed()
+@dataclass(frozen=True)
+class Law:
+    """One friction law T(conditions; parameters), T in newton.
+
+    ``function(*conditions, *parameters)`` returns T; ``gradient`` takes the same arguments and returns
+    dT/dparameter, one array per parameter in their order. Both are pure and broadcast. ``linear`` says that
+    T is linear in all parameters, so that the gradient is the design matrix of a least-squares fit.
+    """
+
+    name: str
+    formula: str
+    function: Callable[..., Any]
+    gradient: Callable[..., tuple[Any, ...]]
+    conditions: tuple[Variable, ...]
+    parameters: tuple[Parameter, ...]
+    linear: bool
+    source: str
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        return tuple(p.name for p in self.parameters)
+
+    def force_N(self, conditions: tuple[Any, ...], values: FloatArray) -> FloatArray:
+        """T under ``conditions`` (arrays that broadcast) with parameter ``values``, shape (k,)."""
+        return np.asarray(self.function(*conditions, *values), float)
+
+    def design_matrix(self, *conditions: Any, at: FloatArray | None = None) -> FloatArray:
+        """dT/dparameter as columns, shape (n, k). A law that is not linear needs the values ``at``."""
+        values = np.zeros(len(self.parameters)) if at is None else np.asarray(at, float)
+        columns = np.broadcast_arrays(*conditions, *self.gradient(*conditions, *values))
+        return np.column_stack([np.asarray(c, float) for c in columns[len(conditions) :]])
+
+
+BERARDO = "Berardo et al., Materials & Design 181 (2019) 107930, doi:10.1016/j.matdes.2019.107930"
+
+
+def amontons(normal_load_N: Any, mu: Any) -> Any:
+    """T = mu N. N in newton, mu dimensionless; regular everywhere. Amontons (1699)."""
+    return mu * normal_load_N
+
+
+def amontons_gradient(normal_load_N: Any, mu: Any) -> tuple[Any]:
+    """dT/dmu = N, in newton."""
+    return (normal_load_N,)
+
+
+def coulomb_adhesion(normal_load_N: Any, nominal_area_m2: Any, mu: Any, tau0_Pa: Any) -> Any:
+    """T = mu N + tau0 A. N in newton, A nominal area in m2, mu dimensionless, tau0 in pascal.
+
+    Divided by N it is the paper's T/N = mu + tau0/p, p = N/A; that form is singular at N = 0, this is not.
+    Source: Berardo et al. 2019, text beside Fig. 4.
+    """
+    return mu * normal_load_N + tau0_Pa * nominal_area_m2
+
+
+def coulomb_adhesion_gradient(
+    normal_load_N: Any, nominal_area_m2: Any, mu: Any, tau0_Pa: Any
+) -> tuple[Any, Any]:
+    """(dT/dmu, dT/dtau0) = (N, A), in newton and m2."""
+    return normal_load_N, nominal_area_m2
+
+
+def three_term(
+    normal_load_N: Any, nominal_area_m2: Any, area_fraction: Any, mu: Any, a_Pa: Any, b_Pa: Any
+) -> Any:
+    """T = mu N + (a AF + b) A. N in newton, A in m2, AF contact area fraction, a and b in pascal.
+
+    With one area fraction only a AF + b can be determined, not a and b. Regular everywhere.
+    Source: Berardo et al. 2019, end of the discussion; Vernes et al., Faraday Discuss. 156 (2012) 173.
+    """
+    return mu * normal_load_N + (a_Pa * area_fraction + b_Pa) * nominal_area_m2
+
+
+def three_term_gradient(
+    normal_load_N: Any, nominal_area_m2: Any, area_fraction: Any, mu: Any, a_Pa: Any, b_Pa: Any
+) -> tuple[Any, Any, Any]:
+    """(dT/dmu, dT/da, dT/db) = (N, AF A, A), in newton and m2."""
+    return normal_load_N, area_fraction * nominal_area_m2, nominal_area_m2
+
+
+def pressure_power(
+    normal_load_N: Any, nominal_area_m2: Any, reference_pressure_Pa: Any, mu_ref: Any, n: Any
+) -> Any:
+    """T = mu_ref (p/p_ref)^-n N, p = N/A. N in newton, A in m2, p_ref in pascal, mu_ref and n dimensionless.
+
+    n = 0 is Amontons' law, n = 1/3 a single Hertzian contact (T as N^(2/3)), n = 1 a load-independent T.
+    Singular case: N = 0, where T = 0 for n < 1; the function returns 0 there. N must not be negative.
+    Source: Bowden and Tabor, The Friction and Lubrication of Solids (1950), elastic contacts.
+    """
+    load = np.asarray(normal_load_N, float)
+    ratio = np.where(load > 0, load, 1.0) / (nominal_area_m2 * reference_pressure_Pa)
+    return mu_ref * np.where(load > 0, load * ratio ** (-n), 0.0)
+
+
+def pressure_power_gradient(
+    normal_load_N: Any, nominal_area_m2: Any, reference_pressure_Pa: Any, mu_ref: Any, n: Any
+) -> tuple[Any, Any]:
+    """(dT/dmu_ref, dT/dn) = (T/mu_ref, -T ln(p/p_ref)), in newton; both 0 at N = 0, their limit for n < 1."""
+    load = np.asarray(normal_load_N, float)
+    ratio = np.where(load > 0, load, 1.0) / (nominal_area_m2 * reference_pressure_Pa)
+    unit_force = pressure_power(normal_load_N, nominal_area_m2, reference_pressure_Pa, 1.0, n)
+    return unit_force, -mu_ref * unit_force * np.log(ratio)
+
+
+def pressure_power_adhesion(
+    normal_load_N: Any, nominal_area_m2: Any, reference_pressure_Pa: Any, mu_ref: Any, n: Any, tau0_Pa: Any
+) -> Any:
+    """T = mu_ref (p/p_ref)^-n N + tau0 A: the power law with the adhesion term of Coulomb's.
+
+    Units as in :func:`pressure_power`, tau0 in pascal. Singular case: N = 0, where T = tau0 A for n < 1; at
+    n = 1 the two terms have the same form and only their sum can be determined.
+    """
+    pressed = pressure_power(normal_load_N, nominal_area_m2, reference_pressure_Pa, mu_ref, n)
+    return pressed + tau0_Pa * nominal_area_m2
+
+
+def pressure_power_adhesion_gradient(
+    normal_load_N: Any, nominal_area_m2: Any, reference_pressure_Pa: Any, mu_ref: Any, n: Any, tau0_Pa: Any
+) -> tuple[Any, Any, Any]:
+    """(dT/dmu_ref, dT/dn, dT/dtau0): those of the power law, and A."""
+    by_mu, by_n = pressure_power_gradient(normal_load_N, nominal_area_m2, reference_pressure_Pa, mu_ref, n)
+    return by_mu, by_n, nominal_area_m2
+
+
+_LOAD = Variable("normal_load_N", "N")
+_AREA = Variable("nominal_area_m2", "m^2")
+_AREA_FRACTION = Variable("area_fraction", "")
+_REFERENCE_PRESSURE = Variable("reference_pressure_Pa", "Pa")
+_MU = Parameter("mu", "μ", "", "friction coefficient: slope of T against N", low=0.0)
+_TAU0 = Parameter("tau0_Pa", "τ₀", "Pa", "adhesion per nominal area: T/A at no load, of either sign")
+_MU_REF = Parameter("mu_ref", "μ_ref", "", "T/N at the reference pressure", low=0.0)
+_EXPONENT = Parameter("n", "n", "", "exponent by which T/N falls with pressure", low=-1.0, high=1.0)
+
+LAWS: dict[str, Law] = {
+    law.name: law
+    for law in (
+        Law(
+            "amontons", "T = μ N", amontons, amontons_gradient,
+            (_LOAD,), (_MU,), True, "Amontons, Mémoires de l'Académie royale (1699)",
+        ),
+        Law(
+            "coulomb_adhesion", "T = μ N + τ₀ A", coulomb_adhesion, coulomb_adhesion_gradient,
+            (_LOAD, _AREA), (_MU, _TAU0), True, BERARDO,
+        ),
+        Law(
+            "three_term", "T = μ N + (a AF + b) A", three_term, three_term_gradient,
+            (_LOAD, _AREA, _AREA_FRACTION),
+            (
+                _MU,
+                Parameter("a_Pa", "a", "Pa", "adhesion per contact area"),
+                Parameter("b_Pa", "b", "Pa", "adhesion per nominal area, whatever the contact"),
+            ),
+            True, BERARDO,
+        ),
+        Law(
+            "pressure_power", "T = μ_ref (p/p_ref)^-n N", pressure_power, pressure_power_gradient,
+            (_LOAD, _AREA, _REFERENCE_PRESSURE), (_MU_REF, _EXPONENT), False,
+            "Bowden and Tabor, The Friction and Lubrication of Solids (1950)",
+        ),
+        Law(
+            "pressure_power_adhesion", "T = μ_ref (p/p_ref)^-n N + τ₀ A",
+            pressure_power_adhesion, pressure_power_adhesion_gradient,
+            (_LOAD, _AREA, _REFERENCE_PRESSURE), (_MU_REF, _EXPONENT, _TAU0), False,
+            "Bowden and Tabor (1950) with the adhesion term of " + BERARDO,
+        ),
+    )
+}  # fmt: skip

@@ -1,1 +1,0 @@
-"""Friction laws as records in one table: ``from tribo.laws.table import LAWS``."""

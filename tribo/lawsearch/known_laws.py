@@ -1,0 +1,254 @@
+"""Whether a law of one campaign holds in another one.
+
+Laws of earlier campaigns: read from a folder, tested on a campaign, and added to it where they hold.
+
+Before anything is measured: whether a design would show a law of an earlier campaign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from scipy.special import erfc
+
+from tribo.diagnostics.contrasts import FORM
+from tribo.diagnostics.fit import ModelFit, fit
+from tribo.diagnostics.gain import gain
+from tribo.diagnostics.intervals import NORMAL_90, estimates, recovered
+from tribo.diagnostics.model import Acting, effect_of
+from tribo.diagnostics.planning import PAPER_LAW, TYPICAL, expected_fit
+from tribo.diagnostics.verdict import Estimate, Layer
+from tribo.errors import CampaignError, Problem
+from tribo.files import found_below
+from tribo.lawsearch.grammar import UNITS, WrittenLaw
+from tribo.lawsearch.law_file import read_law, read_title
+from tribo.lawsearch.law_words import law_layer, size_sentence
+from tribo.lawsearch.model_choice import without_rivals
+from tribo.mechanisms.record import Conditions
+from tribo.records import Campaign
+
+Answer = Literal["held", "not held", "cannot be told"]
+SURE = 2.58  # standard errors: both decisions are at 1 %
+SHOWS = 4.0  # standard errors that the effect must have for its absence to be certain
+
+
+@dataclass(frozen=True)
+class Held:
+    """The ``answer`` on one campaign, the amplitude found there beside the earlier one, and a sentence."""
+
+    answer: Answer
+    found: Estimate | None
+    earlier: Estimate
+    text: str
+
+
+def holds(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimate], tried: int = 1) -> Held:
+    """Fit the amplitude of a law, its form as written, on a campaign that it was not made from.
+
+    It held if the amplitude is beyond chance (1 % over all laws ``tried``) and differs from the earlier one by less
+    than 2.58 standard errors of the difference; of a wave, both amplitudes. The form may be wrong by a share of the
+    effect, which adds to this error: another design shows another part of it. Causes of the columns of the law are left
+    out unless they explain the campaign clearly better than the law (:func:`without_rivals`). Nothing can be told where
+    a column is missing or does not vary, or the effect is below four standard errors in this design.
+    """
+    c, a0 = model.setup.observations.conditions, earlier["a"]
+    if (why := not_tested(c, law)) or not np.any(law.weight(c)):
+        return Held("cannot be told", None, a0, f"The law cannot be tested here: {why or 'no such sample'}.")
+    acting = Acting(law.mechanism())
+    names = [p.name for p in acting.mechanism.parameters]
+    before = [earlier[name] for name in names]
+    if np.abs(effect_of(model.setup, model.law, acting, np.array([e.value for e in before]))).max() < 1e-9:
+        return Held("cannot be told", None, a0, "The law changes nothing in this design.")
+    model, _ = without_rivals(model, law)
+    after = fit(model.setup, (*model.acting, acting), start=model)
+    found = [Estimate(*ends, a0.unit) for ends in recovered(after, len(after.acting) - 1)]
+    beyond = max(np.sign(e0.value) * e.value / _error(e) for e, e0 in zip(found, before, strict=True))
+    wrong_form = FORM * float(np.linalg.norm([e.value for e in before]))
+    alike = all(
+        abs(e.value - e0.value) < SURE * np.linalg.norm([_error(e), _error(e0), wrong_form])
+        for e, e0 in zip(found, before, strict=True)
+    )
+    said = "; ".join(_both(*each) for each in zip(names, found, before, strict=True))
+    if beyond > sure(tried) and alike:
+        return Held("held", found[0], a0, f"The law held: {said}.")
+    if max(abs(e0.value) / _error(e) for e, e0 in zip(found, before, strict=True)) < SHOWS:
+        return Held("cannot be told", found[0], a0, f"This campaign is too small to test the law: {said}.")
+    return Held("not held", found[0], a0, f"The law did not hold: {said}.")
+
+
+def sure(tried: int) -> float:
+    """Standard errors that one of so many laws exceeds by chance in 1 % of campaigns (Bonferroni)."""
+    from scipy.special import ndtri
+
+    return float(-ndtri(0.005 / tried))
+
+
+def _error(e: Estimate) -> float:
+    return max((e.high - e.low) / (2 * NORMAL_90), 1e-12)
+
+
+def _both(name: str, found: Estimate, earlier: Estimate) -> str:
+    return (
+        f"{name} = {found.value:.3g} ({found.low:.3g} to {found.high:.3g}) here, {earlier.value:.3g} "
+        f"({earlier.low:.3g} to {earlier.high:.3g}) before"
+    )
+
+
+def not_tested(c: Conditions, law: WrittenLaw) -> str:
+    """Why the columns of a law do not allow a test; empty where they do."""
+    for name in law.columns:
+        if name not in UNITS and name not in c.columns:
+            return f"the column {name} is not recorded"
+    course = law.course(c)[law.weight(c) != 0]
+    if not len(course) or np.ptp(course) < 1e-9:
+        return f"{' and '.join(law.columns)} does not vary"
+    return ""
+
+
+@dataclass(frozen=True)
+class KnownLaw:
+    """A law of an earlier campaign: the ``name`` of its file, the title of the campaign, and its parameters."""
+
+    name: str
+    found_in: str
+    law: WrittenLaw
+    parameters: Mapping[str, Estimate]
+
+
+@dataclass(frozen=True)
+class Tested:
+    """The answers of a campaign about known laws, the layers of those that held, and the model with these.
+
+    ``replaced`` are causes of the same columns that explain the campaign less well, each with the log likelihood by
+    which the law is better.
+    """
+
+    model: ModelFit
+    answers: tuple[tuple[KnownLaw, Held], ...]
+    layers: tuple[Layer, ...]
+    replaced: Mapping[str, float]
+
+    @property
+    def text(self) -> str:
+        """How many held, and what those say."""
+        if not self.answers:
+            return ""
+        n = sum(held.answer == "held" for _, held in self.answers)
+        return " ".join([f"{n} of {len(self.answers)} known laws held.", *(layer.text for layer in self.layers)])
+
+    @property
+    def columns(self) -> set[str]:
+        return {name for known, held in self.answers if held.answer == "held" for name in known.law.columns}
+
+
+def read_laws(folder: Path) -> tuple[KnownLaw, ...]:
+    """Every law in a folder and the folders in it, by the name of its file.
+
+    Raises
+    ------
+    CampaignError
+        A file is no law, or there is none: every fault of every file.
+    """
+    found: list[KnownLaw] = []
+    problems: list[Problem] = []
+    for path in found_below(folder, "law*.toml"):
+        try:
+            law, parameters = read_law(path)
+        except CampaignError as why:
+            problems += why.problems
+            continue
+        found.append(KnownLaw(str(path.relative_to(folder)), read_title(path), law, parameters))
+    if not found and not problems:
+        problems = [Problem("no_laws", "no law in this folder", file=str(folder), allowed="files such as law-1.toml")]
+    if problems:
+        raise CampaignError(problems)
+    return tuple(found)
+
+
+def try_laws(model: ModelFit, known: Sequence[KnownLaw], rng: np.random.Generator) -> Tested:
+    """Test every law on a fitted campaign; those that held are added, the surest first, while they hold beside the
+    others. A column has one law; a cause that explains the campaign as well stays in its place."""
+    answers = {k.name: holds(model, k.law, k.parameters, len(known)) for k in known}
+    layers: list[Layer] = []
+    replaced: dict[str, float] = {}
+    taken: set[str] = set()
+    for k in sorted(known, key=lambda k: -_strength(answers[k.name])):
+        if answers[k.name].answer != "held" or taken & set(k.law.columns):
+            continue
+        if layers and holds(model, k.law, k.parameters, len(known)).answer != "held":
+            continue
+        without, rivals = without_rivals(model, k.law)
+        if any(by <= 0.0 for by in rivals.values()):
+            continue
+        after = fit(without.setup, (*without.acting, Acting(k.law.mechanism())), start=without)
+        layers.append(_layer(k, without, after, rng))
+        taken |= set(k.law.columns)
+        replaced |= rivals
+        model = after
+    return Tested(model, tuple((k, answers[k.name]) for k in known), tuple(layers), replaced)
+
+
+def _strength(held: Held) -> float:
+    """How surely it held, in half widths of its interval."""
+    if held.found is None:
+        return 0.0
+    return abs(held.found.value) / max(held.found.high - held.found.low, 1e-12)
+
+
+def _layer(known: KnownLaw, model: ModelFit, after: ModelFit, rng: np.random.Generator) -> Layer:
+    parameters = estimates(after, len(after.acting) - 1)
+    effect = _percent(known.law, after.setup.observations.conditions, parameters)
+    said = size_sentence(known.law, {**known.parameters, **parameters}, effect)
+    text = f"The law of {known.found_in or known.name} held: {said}."
+    layer = law_layer(known.law, after, parameters, effect, text)
+    error = max(parameters["a"].high - parameters["a"].low, 1e-12) / (2.0 * NORMAL_90)
+    p = float(erfc(abs(parameters["a"].value) / error / np.sqrt(2.0)))
+    return replace(layer, gain=gain(model, after, rng), p_adjusted=p)
+
+
+def _percent(law: WrittenLaw, c: Conditions, parameters: Mapping[str, Estimate]) -> tuple[float, float, float]:
+    """Change of T (or of its term) from the least to the most of the course where the law acts fully."""
+    here, a = law.weight(c) != 0, parameters["a"]
+    if "b" in parameters:
+        size = 2.0 * float(np.hypot(a.value, parameters["b"].value))
+        half = a.high - a.low
+        ends = (size, size - half, size + half)
+    else:
+        reach = float(np.ptp(law.course(c)[here])) * float(np.abs(law.weight(c)).max())
+        ends = (a.value * reach, a.low * reach, a.high * reach)
+    value, low, high = (100.0 * float(np.expm1(x)) for x in ends)
+    return value, low, high
+
+
+@dataclass(frozen=True)
+class PlannedLaw:
+    """The ``strength`` of a law in a design, in standard errors of its amplitude, and how many tests would suffice."""
+
+    formula: str
+    strength: float
+    tests_needed: int
+    text: str
+
+
+def plan_law(campaign: Campaign, law: WrittenLaw, parameters: Mapping[str, Estimate]) -> PlannedLaw:
+    """Whether the planned tests of a campaign would show a law at the size that was found, at typical noise."""
+    f = expected_fit(campaign, TYPICAL, PAPER_LAW, None)
+    c, formula, n = f.setup.observations.conditions, law.formula(), len(campaign.tests)
+    if why := not_tested(c, law):
+        return PlannedLaw(formula, 0.0, 0, f"This design cannot test the law {formula}: {why}.")
+    acting = Acting(law.mechanism())
+    values = np.array([parameters[p.name].value for p in acting.mechanism.parameters])
+    left = f.linear.cleared(effect_of(f.setup, f.law, acting, values)[:, :, None])[0]
+    strength = float(np.sqrt(np.sum(left**2)))
+    needed = int(np.ceil(n * (SHOWS / max(strength, 1e-6)) ** 2))
+    shows = "would show" if strength >= SHOWS else "would not show"
+    more = "" if strength >= SHOWS else f"; about {needed} tests would" if needed < 100 * n else ""
+    text = (
+        f"This design {shows} the law {formula} at the size that was found: {strength:.1f} standard errors, "
+        f"{SHOWS:g} are needed to say that it is absent{more}."
+    )
+    return PlannedLaw(formula, strength, needed, text)

@@ -1,0 +1,132 @@
+"""law.toml: a law that was found, written down so that it can be tested on another campaign."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from tribo.diagnostics.verdict import Estimate
+from tribo.errors import CampaignError, Problem
+from tribo.files import text_of
+from tribo.lawsearch.grammar import ADHESION_TERM, BOTH, LOAD_TERM, Shape, T, WrittenLaw
+
+SCHEMA = "tribo.law/1"
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class ShapeTable(_Strict):
+    """[[shape]]: a function of one column."""
+
+    kind: Literal[
+        "linear", "log", "step", "soft step", "ramp", "optimum", "hump", "saturating", "window", "wave", "level"
+    ]
+    column: str
+    low: Finite = 0.0
+    high: Finite = 1.0
+    place: Finite | None = None
+    width: Finite | None = None
+    level: str = ""
+
+    def shape(self) -> Shape:
+        nan = float("nan")
+        place = nan if self.place is None else self.place
+        width = nan if self.width is None else self.width
+        return Shape(self.kind, self.column, self.low, self.high, place, width, self.level)
+
+
+class ParameterTable(_Strict):
+    """[parameters.a]: the value found, with its 90 % interval."""
+
+    value: Finite
+    low: Finite
+    high: Finite
+    unit: str = ""
+
+
+class LawTable(_Strict):
+    """The whole file."""
+
+    schema_name: Literal["tribo.law/1"] = Field(alias="schema")
+    acts_on: Literal["T", "load term", "adhesion term"]
+    regime: Literal["static", "sliding", "both"]
+    where: str
+    where_scale: Finite = 1.0
+    formula: str = ""
+    found_in: str = ""
+    shape: list[ShapeTable] = Field(min_length=1, max_length=2)
+    parameters: dict[str, ParameterTable]
+
+    @model_validator(mode="after")
+    def _has_amplitudes(self) -> LawTable:
+        wanted = ("a", "b") if self.shape[0].kind == "wave" else ("a",)
+        if missing := [name for name in wanted if name not in self.parameters]:
+            raise ValueError(f"[parameters.{missing[0]}] is missing")
+        return self
+
+
+assert {T, LOAD_TERM, ADHESION_TERM, BOTH} == {"T", "load term", "adhesion term", "both"}
+
+
+def law_text(law: WrittenLaw, parameters: Mapping[str, Estimate], found_in: str) -> str:
+    """law.toml of a law with its parameters, found in the campaign of this title."""
+    lines = [
+        f"schema = {_text(SCHEMA)}", f"formula = {_text(law.formula())}", f"found_in = {_text(found_in)}",
+        f"acts_on = {_text(law.acts_on)}", f"regime = {_text(law.regime)}", f"where = {_text(law.where)}",
+        f"where_scale = {law.where_scale!r}",
+    ]  # fmt: skip
+    for s in law.shapes:
+        lines += ["", "[[shape]]", f"kind = {_text(s.kind)}", f"column = {_text(s.column)}"]
+        lines += [f"low = {s.low!r}", f"high = {s.high!r}"]
+        lines += [f"{name} = {value!r}" for name, value in (("place", s.place), ("width", s.width)) if value == value]
+        lines += [f"level = {_text(s.level)}"] if s.level else []
+    for name, e in parameters.items():
+        lines += ["", f"[parameters.{name}]", f"value = {e.value!r}", f"low = {e.low!r}", f"high = {e.high!r}"]
+        lines += [f"unit = {_text(e.unit)}"]
+    return "\n".join(lines) + "\n"
+
+
+def _text(value: str) -> str:
+    """A TOML string: escapes of JSON are escapes of TOML."""
+    import json
+
+    return json.dumps(value, ensure_ascii=True)
+
+
+def read_law(path: Path) -> tuple[WrittenLaw, dict[str, Estimate]]:
+    """The law of a law.toml and its parameters.
+
+    Raises
+    ------
+    CampaignError
+        The file is no law, with every fault of it.
+    """
+    table = _table(path)
+    law = WrittenLaw(
+        tuple(s.shape() for s in table.shape), table.acts_on, table.regime, table.where, table.where_scale
+    )
+    parameters = {name: Estimate(p.value, p.low, p.high, p.unit) for name, p in table.parameters.items()}
+    return law, parameters
+
+
+def read_title(path: Path) -> str:
+    """The title of the campaign that a law was found in; raises as :func:`read_law`."""
+    return _table(path).found_in
+
+
+def _table(path: Path) -> LawTable:
+    try:
+        return LawTable.model_validate(tomllib.loads(text_of(path)))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as why:
+        raise CampaignError(Problem("bad_toml", f"not a TOML file: {why}", file=path.name)) from None
+    except ValidationError as why:
+        raise CampaignError(
+            Problem("bad_law", e["msg"], file=path.name, column=".".join(map(str, e["loc"]))) for e in why.errors()
+        ) from None

@@ -1,0 +1,431 @@
+"""Broad bounds of friction tests by material class, each with its source; campaign.toml may replace any of them.
+
+A bound is wide on purpose: published values lie well inside it, and slips of a unit (a factor of 10 to 1000) outside.
+
+Slips of a unit that would bring implausible numbers back into their bounds.
+
+Every number of a campaign that lies outside its broad physical bounds, as a doubt with the likely slip.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tribo.records import STANDARD_GRAVITY, Campaign, Doubt, Ingested, LawFit, Pattern
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The plausible range of one quantity, in the unit of its name, and where it is from."""
+
+    low: float
+    high: float
+    source: str
+
+
+OWN = "[plausible] of campaign.toml"
+_FRICTION = "static and kinetic coefficients of engineering tables"
+_BERARDO = "Berardo et al. 2019, Table 2: mu up to 4.8 and tau0 up to 0.1 MPa for PDMS"
+_PTFE = f"{_FRICTION}: the lowest of dry solids is PTFE with 0.04"
+MU: Mapping[str, Bound] = {
+    "": Bound(0.04, 20.0, _PTFE),
+    "elastomer": Bound(0.1, 20.0, _BERARDO),
+    "polymer": Bound(0.03, 3.0, _PTFE),
+    "metal": Bound(0.05, 5.0, f"{_FRICTION}: clean copper on copper 1.6"),
+    "ceramic": Bound(0.01, 3.0, "carbon coatings come near 0.01, below which friction is called superlubric"),
+    "lubricated": Bound(0.0005, 0.6, "full films 0.001 to 0.1, boundary lubrication up to 0.3"),
+    "granular": Bound(0.1, 2.0, "internal and boundary friction of sand 0.4 to 0.8"),
+}
+ADHESION = 5.0  # factor by which T/N at a low load may exceed mu, because tau0 A is added to mu N
+TAU0_KPA: Mapping[str, Bound] = {
+    "": Bound(-1e3, 1e3, "shear strength of elastomers in full contact is below 1 MPa, of sleds far less"),
+    "elastomer": Bound(-1e3, 1e3, "shear strength of elastomers in full contact is below 1 MPa"),
+    "polymer": Bound(-5e4, 5e4, "shear strength of polymers, about 50 MPa"),
+    "metal": Bound(-1e6, 1e6, "shear strength of metals, below 1 GPa"),
+    "ceramic": Bound(-1e6, 1e6, "shear strength of hard coatings, below 1 GPa"),
+    "lubricated": Bound(-1e5, 1e5, "limiting shear stress of lubricants, below 100 MPa"),
+    "granular": Bound(-1e3, 1e3, "cohesion of soils and rock powder, below 1 MPa"),
+}
+PRESSURE_KPA: Mapping[str, Bound] = {
+    "": Bound(1e-3, 1e5, "a sheet of paper on itself presses with 1 Pa; polymers yield at about 100 MPa"),
+    "elastomer": Bound(1e-3, 1e4, "modulus of elastomers, 1 to 10 MPa"),
+    "metal": Bound(1e-3, 1e7, "hardness of steels, up to 10 GPa"),
+    "ceramic": Bound(1e-3, 5e7, "hardness of diamond-like coatings, up to 50 GPa"),
+    "lubricated": Bound(1e-3, 1e7, "Hertzian pressure of bearings, up to 4 GPa"),
+}
+_SLED = "sleds of ASTM D1894 and ISO 8295 (200 g, 40 cm2, 1.7 to 2.5 mm/s) and the paper (55 mm2, 0.2 mm/s)"
+_RIGS = "force microscopes to brake rigs"
+SPEED_MM_S: Mapping[str, Bound] = {"": Bound(1e-9, 1e5, _RIGS), "sled": Bound(1e-5, 1e4, _SLED)}
+AREA_MM2: Mapping[str, Bound] = {"": Bound(1e-9, 1e7, _RIGS), "sled": Bound(1.0, 1e6, _SLED)}
+MASS_G: Mapping[str, Bound] = {"": Bound(1e-3, 1e6, _RIGS), "sled": Bound(0.5, 5e4, _SLED)}
+TEMPERATURE_C: Mapping[str, Bound] = {
+    "": Bound(-100.0, 250.0, "glass transition to decomposition of common polymers"),
+    "metal": Bound(-273.15, 1200.0, "melting of steels"),
+    "ceramic": Bound(-273.15, 1500.0, "hot hardness tests of ceramics"),
+    "lubricated": Bound(-80.0, 450.0, "pour point to decomposition of oils"),
+}
+HUMIDITY_PCT: Mapping[str, Bound] = {"": Bound(0.0, 100.0, "definition of relative humidity")}
+SMALLEST_CAVITY_UM = 0.5  # about what contact lithography resolves
+FEWEST_CAVITIES_ACROSS = 2.0  # a sample with fewer is no pattern
+MOST_OFF_AREA_FRACTION = 0.2  # by which a measured contact area fraction may differ from that of the geometry
+ONE_LOAD = 1.05  # largest over smallest load up to which loads were meant to be one, as in the fits
+SMALLEST_LOAD_SPAN = 1.1  # largest over smallest load; at 1 % scatter of T a slope over 10 % is uncertain by about 20 %
+
+TABLES: Mapping[str, Mapping[str, Bound]] = {
+    "mu": MU, "tau0_kPa": TAU0_KPA, "pressure_kPa": PRESSURE_KPA, "speed_mm_s": SPEED_MM_S, "area_mm2": AREA_MM2,
+    "mass_g": MASS_G, "temperature_C": TEMPERATURE_C, "humidity_pct": HUMIDITY_PCT,
+}  # fmt: skip
+_WORDS = {
+    "lubricated": r"oils?|greased?|lubricat\w*|lubricants?|in water|glycerol",
+    "granular": r"sand|quartz sand|granular|powder|gouge|soil",
+    "elastomer": r"pdms|sylgard|rubbers?|elastomers?|silicones?|epdm|nbr|fkm|sbr|polyurethane|tpu|ecoflex",
+    "polymer": r"ptfe|teflon|uhmwpe|polyethylene|polypropylene|nylon|polyamide|pa66?|pom|peek|pmma|petg?|pla|abs"
+    r"|polycarbonate|films?|paper|wood|textile|leather",
+    "ceramic": r"ceramics?|alumina|zirconia|si3n4|sic|glass|diamond|dlc|graphite|mos2",
+    "metal": r"steels?|iron|metals?|aluminium|aluminum|copper|bronze|brass|titanium|alloys?|100cr6|nickel|42crmo4",
+}
+
+
+def material_class(campaign: Campaign) -> str:
+    """The class stated in campaign.toml, else one that the words of material and counterface name, else empty.
+
+    The softer or lubricated partner decides, as it does about friction: oil before sand, before rubber, before plastic.
+    Where neither body is described, the names of the samples stand for them.
+    """
+    if campaign.material_class:
+        return campaign.material_class
+    words = f"{campaign.material} {campaign.counterface}".strip() or " ".join(campaign.samples).replace("_", " ")
+    words = words.lower()
+    return next((name for name, pattern in _WORDS.items() if re.search(rf"\b(?:{pattern})\b", words)), "")
+
+
+def bound_of(quantity: str, campaign: Campaign) -> Bound:
+    """The plausible range of a quantity for a campaign: its own, else that of its material class or kind of contact."""
+    if quantity in campaign.plausible:
+        low, high = campaign.plausible[quantity]
+        return Bound(low, high, OWN)
+    if quantity == "friction_ratio":
+        mu = bound_of("mu", campaign)
+        return Bound(mu.low, ADHESION * mu.high, mu.source)
+    table = TABLES[quantity]
+    return table.get(material_class(campaign)) or table.get(campaign.contact or "sled") or table[""]
+
+
+_GRAM, _KPA = 1e-3, 1e-3
+Numbers = Mapping[str, dict[str, float]]  # quantity -> what it is of -> its value
+MOST_NAMED = 2
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A wrong unit: its question, and the factors by which loads, their differences, forces, masses and area change.
+
+    A load N becomes ``difference`` (N - ``offset_N``): the mass of the slider may be right where the others are wrong.
+    """
+
+    question: str
+    load: float = 1.0
+    difference: float = 1.0
+    offset_N: float = 0.0
+    force: float = 1.0
+    mass: float = 1.0
+    area: float = 1.0
+
+    def corrected(self, numbers: Numbers, area_m2: float) -> Numbers:
+        """The numbers as they would be without the slip."""
+        factors = {
+            "mu": self.force / self.difference,
+            "friction_ratio": self.force / self.load,
+            "tau0_kPa": self.force / self.area,
+            "pressure_kPa": self.load / self.area,
+            "area_mm2": self.area,
+            "mass_g": self.mass,
+        }
+        found = {q: {of: value * factors[q] for of, value in by.items()} for q, by in numbers.items()}
+        for of, mu in numbers.get("mu", {}).items():  # the intercept moves where loads move by more than a factor
+            if of in found.get("tau0_kPa", {}):
+                found["tau0_kPa"][of] += factors["tau0_kPa"] * mu * self.offset_N / area_m2 * _KPA
+        return found
+
+
+def likely_slips(campaign: Campaign, numbers: Numbers) -> str:
+    """The slips that bring every number into its bounds, as a question; empty where none does, or nothing is outside.
+
+    ``numbers`` holds mu, friction_ratio, tau0_kPa, pressure_kPa, area_mm2 and mass_g by what they are of.
+    """
+    if _all_inside(campaign, numbers):
+        return ""
+    area_m2 = campaign.nominal_area_m2
+    found = [s.question for s in _candidates(campaign) if _all_inside(campaign, s.corrected(numbers, area_m2))]
+    return "? Or ".join(found[:MOST_NAMED]) + "?" if found else ""
+
+
+def _all_inside(campaign: Campaign, numbers: Numbers) -> bool:
+    bounds = {quantity: bound_of(quantity, campaign) for quantity in numbers}
+    return all(bounds[q].low <= value <= bounds[q].high for q, by in numbers.items() for value in by.values())
+
+
+def _candidates(campaign: Campaign) -> Iterator[Slip]:
+    """Slips in the order of how often they are made: a load typed by hand, the area, then the unit of an export."""
+    stated = {test.load_from for test in campaign.tests}
+    for column, ways in _LOADS.items():
+        if stated == {column}:
+            for words, change in ways:
+                yield _of_loads(campaign, f"{column} looks like {words}", change)
+    if "mass_g" in stated and campaign.slider_mass_kg > 0:
+        slider = campaign.slider_mass_kg * STANDARD_GRAVITY
+        loads = _loads(campaign)
+        question = "slider_mass_g in campaign.toml looks like kilograms: multiply by 1000"
+        yield Slip(question, load=float(np.median((loads + 999 * slider) / loads)))
+    if campaign.has_area:
+        for words, factor in _AREAS:
+            yield Slip(f"nominal_area_mm2 looks like {words}", area=factor)
+    if any(test.evaluated is None for test in campaign.tests):
+        for words, factor in _FORCES:
+            yield Slip(f"the friction force of the exports looks like {words}", force=factor)
+
+
+def _of_loads(campaign: Campaign, question: str, change: Callable[[np.ndarray, float], np.ndarray]) -> Slip:
+    loads = _loads(campaign)
+    slider = campaign.slider_mass_kg * STANDARD_GRAVITY
+    other = change(loads, slider)
+    usual = float(np.median(other / loads))
+    span = float(np.ptp(loads))
+    steeper = float(np.ptp(other)) / span if span > 0 else usual
+    return Slip(question, usual, steeper, float(np.median(loads - other / steeper)), mass=steeper)
+
+
+def _loads(campaign: Campaign) -> np.ndarray:
+    loads = np.array([test.normal_load_N for test in campaign.tests])
+    return loads[np.isfinite(loads) & (loads > 0)]
+
+
+def _times(factor: float) -> Callable[[np.ndarray, float], np.ndarray]:
+    return lambda loads, slider: factor * loads
+
+
+def _mass_times(factor: float) -> Callable[[np.ndarray, float], np.ndarray]:
+    """Loads whose mass, without that of the slider, was too small by ``factor``."""
+    return lambda loads, slider: factor * (loads - slider) + slider
+
+
+_NEWTON_PER_GRAM = _GRAM * STANDARD_GRAVITY
+_LOADS: Mapping[str, tuple[tuple[str, Callable[[np.ndarray, float], np.ndarray]], ...]] = {
+    "mass_g": (
+        ("kilograms: multiply by 1000", _mass_times(1e3)),
+        ("newtons: move it to a column normal_load_N", _mass_times(1 / _NEWTON_PER_GRAM)),
+        ("milligrams: divide by 1000", _mass_times(1e-3)),
+    ),
+    "normal_load_N": (
+        ("grams: move it to a column mass_g", _times(_NEWTON_PER_GRAM)),
+        ("kilonewtons: multiply by 1000", _times(1e3)),
+        ("millinewtons: divide by 1000", _times(1e-3)),
+        ("kilograms: multiply by 9.81", _times(STANDARD_GRAVITY)),
+    ),
+    "normal_stress_Pa": (
+        ("kilopascals: multiply by 1000", _times(1e3)),
+        ("megapascals: multiply by 1000000", _times(1e6)),
+    ),
+    "": (
+        ("kilonewtons in the exports: state the unit in [columns]", _times(1e3)),
+        ("millinewtons in the exports: state the unit in [columns]", _times(1e-3)),
+        ("gram-force in the exports: state the unit in [columns]", _times(_NEWTON_PER_GRAM)),
+    ),
+}  # fmt: skip
+_AREAS = (
+    ("cm2: multiply by 100", 1e2), ("m2: multiply by 1000000", 1e6), ("um2: divide by 1000000", 1e-6),
+)  # fmt: skip
+_FORCES = (
+    ("millinewtons: state the unit in [columns]", 1e-3),
+    ("kilonewtons: state the unit in [columns]", 1e3),
+    ("gram-force: state the unit in [columns]", _NEWTON_PER_GRAM),
+)
+
+
+_MM2, _KPA_DOUBTS, _MM, _UM, _KELVIN = 1e6, 1e-3, 1e3, 1e6, 273.15
+_TABLE, _TOML = "tests.csv", "campaign.toml"
+_COVERAGE = 2.0  # standard uncertainties by which a fitted number must lie outside
+_MOST_SHOWN = 3
+
+
+def doubts_of(
+    campaign: Campaign, ingested: Ingested | None = None, fits: Sequence[LawFit] = ()
+) -> tuple[Doubt, ...]:
+    """Doubts about the numbers of a campaign: those stated, and the measured and fitted ones where they are given."""
+    if ingested is not None:
+        campaign = ingested.campaign
+    numbers = _measured(campaign, ingested, fits)
+    slip = likely_slips(campaign, numbers)
+    found = [
+        doubt for q, by in numbers.items() if (doubt := _outside(campaign, q, by, _PLACES[q], slip)) is not None
+    ]
+    if not slip:  # one that explains the loads or the area explains these as well
+        found += [*_wide_pitches(campaign), *_load_span(campaign)]
+    return (*found, *_stated(campaign), *_geometry(campaign))
+
+
+def _measured(campaign: Campaign, ingested: Ingested | None, fits: Sequence[LawFit]) -> Numbers:
+    """Numbers that hang together: a wrong load, force or area moves several of them."""
+    masses = {f"test {t.test_id}": t.mass_kg * 1e3 for t in campaign.tests if t.mass_kg and t.load_from == "mass_g"}
+    found: dict[str, dict[str, float]] = {
+        "mu": {}, "friction_ratio": {}, "tau0_kPa": {}, "pressure_kPa": {}, "area_mm2": {}, "mass_g": masses,
+    }  # fmt: skip
+    for fit in fits:
+        of = f"{fit.sample}, {fit.regime}"
+        found["mu"] |= _if_resolved(fit, "mu", of, bound_of("mu", campaign), 1.0)
+        if fit.has_area:
+            found["tau0_kPa"] |= _if_resolved(fit, "tau0_Pa", of, bound_of("tau0_kPa", campaign), _KPA_DOUBTS)
+    if ingested is not None:
+        found["friction_ratio"] = _ratios(ingested)
+    if campaign.has_area:
+        found["area_mm2"] = {"the sample": campaign.nominal_area_m2 * _MM2}
+        loads = [t.normal_load_N for t in campaign.tests if t.normal_load_N > 0]
+        if loads and campaign.contact in ("", "sled"):
+            found["pressure_kPa"] = {
+                name: campaign.nominal_pressure_Pa(load) * _KPA_DOUBTS
+                for name, load in (("the smallest load", min(loads)), ("the largest load", max(loads)))
+            }
+    return {q: by for q, by in found.items() if by}
+
+
+def _if_resolved(fit: LawFit, parameter: str, of: str, bound: Bound, unit: float) -> dict[str, float]:
+    """A fitted number; the bound itself where its uncertainty reaches back to it."""
+    if parameter not in fit.parameters or not math.isfinite(fit.value(parameter)):
+        return {}
+    value, u = fit.value(parameter) * unit, fit.standard_uncertainty(parameter) * unit
+    nearest = min(max(value, bound.low), bound.high)
+    reach = _COVERAGE * u if math.isfinite(u) else 0.0
+    return {of: nearest if abs(value - nearest) <= reach else value}
+
+
+def _ratios(ingested: Ingested) -> dict[str, float]:
+    """The median of T/N of every sample: while sliding, or static where nothing slid."""
+    by_sample: dict[str, list[float]] = {}
+    for test in ingested.campaign.tests:
+        pull = ingested.pulls.get(test.test_id)
+        force = math.nan if pull is None else next(filter(math.isfinite, (pull.sliding_N, pull.static_N)), math.nan)
+        if math.isfinite(force) and test.normal_load_N > 0:
+            by_sample.setdefault(test.sample, []).append(abs(force) / test.normal_load_N)
+    return {sample: float(np.median(values)) for sample, values in sorted(by_sample.items())}
+
+
+def _outside(campaign: Campaign, quantity: str, by: Mapping[str, float], place: str, slip: str) -> Doubt | None:
+    """A doubt about the values outside their bound, one for all of them; None where all are inside."""
+    bound = bound_of(quantity, campaign)
+    wrong = {of: value for of, value in by.items() if not bound.low <= value <= bound.high}
+    if not wrong:
+        return None
+    kind = material_class(campaign)
+    found = _listed([f"{value:.3g} ({of})" for of, value in wrong.items()])
+    allowed = f"{bound.low:g} to {bound.high:g}"
+    return Doubt(quantity, _NAMES[quantity], found, allowed, place, slip, bound.source, kind)
+
+
+def _listed(values: Sequence[str]) -> str:
+    more = f" and {len(values) - _MOST_SHOWN} more" if len(values) > _MOST_SHOWN else ""
+    return ", ".join(values[:_MOST_SHOWN]) + more
+
+
+def _stated(campaign: Campaign) -> Iterator[Doubt]:
+    """Speeds, temperatures and humidities as typed."""
+    speeds = {f"test {t.test_id}": t.speed_m_s * _MM for t in campaign.tests if t.speed_m_s}
+    warmth = {f"test {t.test_id}": t.temperature_C for t in campaign.tests if t.temperature_C is not None}
+    damp = {f"test {t.test_id}": t.humidity_pct for t in campaign.tests if t.humidity_pct is not None}
+    rules = (
+        ("speed_mm_s", speeds, lambda v: _SPEEDS[0] if v < 1.0 else _SPEEDS[1]),
+        ("temperature_C", warmth, lambda v: "it looks like kelvin: subtract 273.15" if 200 < v < 500 else ""),
+        ("humidity_pct", damp, lambda v: ""),
+    )
+    for quantity, by, slip in rules:
+        question = next((slip(v) for v in by.values() if not _plausible(campaign, quantity, v)), "")
+        if doubt := _outside(campaign, quantity, by, _PLACES[quantity], f"{question}?" if question else ""):
+            yield doubt
+    if damp and 0 < max(damp.values()) <= 1:
+        found = f"at most {max(damp.values()):g}"
+        fraction = "humidity_pct looks like a fraction: multiply by 100?"
+        yield Doubt("humidity_pct", _NAMES["humidity_pct"], found, "1 to 100", _PLACES["humidity_pct"], fraction)
+
+
+def _plausible(campaign: Campaign, quantity: str, value: float) -> bool:
+    bound = bound_of(quantity, campaign)
+    return bound.low <= value <= bound.high
+
+
+def _wide_pitches(campaign: Campaign) -> Iterator[Doubt]:
+    """Patterns of which the sample would hold hardly one cavity."""
+    if not campaign.has_area:
+        return
+    side_um = math.sqrt(campaign.nominal_area_m2) * _UM
+    most_um = side_um / FEWEST_CAVITIES_ACROSS
+    pitches = {p.name: max(p.pitch_m) * _UM for p in campaign.samples.values() if p.pitch_m is not None}
+    wide = [f"{pitch:.4g} um ({name})" for name, pitch in pitches.items() if pitch > most_um]
+    if wide:
+        slip = "pitch_um looks like nanometres: divide by 1000? Or nominal_area_mm2 like cm2: multiply by 100?"
+        allowed = f"at most {most_um:.3g} um on a sample {side_um:.3g} um wide"
+        yield Doubt("pitch_um", "pitch", _listed(wide), allowed, f"{_TOML}, pitch_um and nominal_area_mm2", slip)
+
+
+def _geometry(campaign: Campaign) -> Iterator[Doubt]:
+    """Cavities smaller than can be made, area fractions off the geometry."""
+    for name, pattern in {p.name: p for p in campaign.samples.values()}.items():
+        if pattern.size_m is None:
+            continue
+        place, size = f"{_TOML}, patterns.{name}", min(pattern.size_m) * _UM
+        if size < SMALLEST_CAVITY_UM:
+            allowed = f"{SMALLEST_CAVITY_UM:g} um or more"
+            slip = "the lengths look like millimetres: multiply by 1000?"
+            yield Doubt("size_um", f"cavity of pattern {name}", f"{size:.4g} um", allowed, place, slip)
+        yield from _area_fraction(pattern, place)
+
+
+def _area_fraction(pattern: Pattern, place: str) -> Iterator[Doubt]:
+    measured = pattern.measured_area_fraction
+    if measured is None:
+        return
+    nominal = replace(pattern, measured_area_fraction=None).area_fraction
+    if abs(measured - nominal) <= MOST_OFF_AREA_FRACTION:
+        return
+    cavities = abs(1 - measured - nominal) <= MOST_OFF_AREA_FRACTION
+    slip = f"it looks like the fraction of the cavities: 1 - {measured:g} = {1 - measured:.3g}?" if cavities else ""
+    name, found = f"area_fraction of pattern {pattern.name}", f"{measured:g}"
+    yield Doubt("area_fraction", name, found, f"about {nominal:.2g}, from its size and pitch", place, slip)
+
+
+def _load_span(campaign: Campaign) -> Iterator[Doubt]:
+    """Samples whose loads are too close together for a slope; of flat samples, loads meant to be one are none."""
+    patterned = any(not pattern.is_flat for pattern in campaign.samples.values())
+    one_load = 1.0 if patterned else ONE_LOAD
+    by_sample: dict[str, list[float]] = {}
+    for test in campaign.tests:
+        if test.normal_load_N > 0:
+            by_sample.setdefault(test.sample, []).append(test.normal_load_N)
+    close = {
+        s: 100 * (max(loads) / min(loads) - 1)
+        for s, loads in sorted(by_sample.items())
+        if one_load < max(loads) / min(loads) < SMALLEST_LOAD_SPAN
+    }
+    if not close:
+        return
+    found = _listed([f"{span:.2g} % ({s})" for s, span in close.items()])
+    low = 100 * (SMALLEST_LOAD_SPAN - 1)
+    slip = "loads this close determine neither mu nor tau0: measure at loads that differ by a factor of two or more"
+    yield Doubt("load_span", "range of the loads of a sample", found, f"{low:.0f} % or more", _TABLE, slip)
+
+
+_SPEEDS = ("the speed looks like m/s: multiply by 1000", "the speed looks like um/s: divide by 1000")
+_NAMES = {
+    "mu": "mu", "friction_ratio": "T/N", "tau0_kPa": "tau0 in kPa", "pressure_kPa": "nominal pressure in kPa",
+    "area_mm2": "nominal area in mm2", "mass_g": "mass in g", "speed_mm_s": "speed in mm/s",
+    "temperature_C": "temperature in °C", "humidity_pct": "relative humidity in %",
+}  # fmt: skip
+_PLACES = {
+    "mu": f"{_TABLE}, loads", "friction_ratio": f"{_TABLE}, loads", "tau0_kPa": f"{_TOML}, nominal_area_mm2",
+    "pressure_kPa": f"{_TOML}, nominal_area_mm2, and {_TABLE}, loads", "area_mm2": f"{_TOML}, nominal_area_mm2",
+    "mass_g": f"{_TABLE}, column mass_g", "speed_mm_s": f"{_TABLE}, column speed_mm_s, or {_TOML}, pull_speed_mm_s",
+    "temperature_C": f"{_TABLE}, column temperature_C", "humidity_pct": f"{_TABLE}, column humidity_pct",
+}  # fmt: skip

@@ -1,0 +1,232 @@
+"""Damage that shows in a column of numbers: time that decreases, gaps, values off by a factor of ten.
+
+What follows from the columns and from what was stated: time, force from a torque, sign and gain.
+
+The one place where a recorded force is changed; everything after it sees the corrected one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tribo.errors import Problem
+from tribo.input_files import LARGEST_NUMBER, SMALLEST_NUMBER
+from tribo.readers.columns import Assignment, Column
+from tribo.records import Correction, FloatArray
+
+GAP_STEPS = 5.0  # a time step this many median steps long is a gap
+_WORTH_A_LOOK = 1.5  # mean steps: where no step is this long, none is a gap
+_TEN_TIMES = (9.0, 11.0)  # a decimal mark slipped by one place, noise allowed for
+_LEAST_SHARE = 0.3  # of the range: smaller jumps are noise or stick-slip
+_MOST_STEPS = 40  # large steps, above which they are what the signal does
+_MOST_TRIED = 10  # large steps that may begin a scaled rest of the record
+_FEWEST_ROWS, _ROWS_BESIDE = 10, 100  # looked at on either side of a jump
+_LEVEL_ROWS = (1, 10, 100)  # rows beside a jump by which the levels are compared; all are tried, as the force may swing
+_TIMES_IN_WORDS = {1: "ten", 2: "a hundred", 3: "a thousand"}
+
+RowOf = Callable[[int], int]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A doubt: the flag it sets on the trace, and the problem with its place; ``fatal`` sets the trace aside."""
+
+    flag: str
+    problem: Problem
+    fatal: bool = False
+
+
+def beyond_measurement(
+    arrays: Mapping[str, FloatArray], file: str, labels: Mapping[str, str], row_of: RowOf
+) -> list[Problem]:
+    """Columns (SI units) with numbers that no instrument gives: too large for any, or a force or time too small."""
+    problems = []
+    for quantity, values in arrays.items():
+        largest = float(max(values.max(), -values.min())) if values.size else 0.0
+        column = labels.get(quantity, quantity)
+        if largest > LARGEST_NUMBER:
+            k = int(np.argmax(np.abs(values) > LARGEST_NUMBER))
+            place = (file, row_of(k), column, f"{values[k]:.6g}", f"at most {LARGEST_NUMBER:g} in SI units")
+            problems.append(Problem("impossible_number", "not a possible value", *place))
+        elif quantity in ("time", "friction force") and 0 < largest < SMALLEST_NUMBER:
+            found, allowed = f"at most {largest:.3g}", f"values of at least {SMALLEST_NUMBER:g} in SI units"
+            what = "no value of this column is large enough to have been measured"
+            problems.append(Problem("impossible_number", what, file, None, column, found, allowed))
+    return problems
+
+
+def check_time(time: FloatArray, file: str, column: str, row_of: RowOf) -> list[Finding]:
+    """Faults of a time base: decreasing (fatal), repeated or missing times. ``row_of(k)`` is the line of sample k."""
+    if time.size < 2:
+        return []
+    step = np.diff(time)
+    least, largest = float(step.min()), float(step.max())
+    found = []
+    if least < 0:
+        k = int(np.argmax(step < 0)) + 1
+        what = f"the time decreases from {time[k - 1]:.6g} s"
+        place = (file, row_of(k), column, f"{time[k]:.6g} s", "a time that never decreases")
+        found.append(Finding("time_goes_back", Problem("time_goes_back", what, *place), fatal=True))
+    elif least == 0:
+        k = int(np.argmax(step == 0)) + 1
+        what = f"{int((step == 0).sum())} times occur twice; this is the first"
+        found.append(Finding("time_repeats", Problem("time_repeats", what, file, row_of(k), column)))
+    if largest > _WORTH_A_LOOK * float(time[-1] - time[0]) / step.size:
+        median = float(np.median(step))
+        if median > 0 and largest > GAP_STEPS * median:
+            k = int(np.argmax(step)) + 1
+            what = f"{int((step > GAP_STEPS * median).sum())} gaps in time; the longest ends here"
+            place = (file, row_of(k), column, f"{largest:.4g} s", f"steps of about {median:.4g} s")
+            found.append(Finding("time_gap", Problem("time_gap", what, *place)))
+    return found
+
+
+def check_scale(values: FloatArray, file: str, column: str, row_of: RowOf) -> list[Finding]:
+    """Rows ten times larger or smaller than what is beside them: a slipped decimal mark, or another unit.
+
+    Two rows or more between neighbours that agree; or all rows from one to the end (ten, a hundred or a thousand
+    times), if what changes from row to row is off by as much as the values are: a force that falls does not do that.
+    """
+    if values.size < 4:
+        return []
+    step = np.diff(values)
+    least = _LEAST_SHARE * float(values.max() - values.min())
+    if step.max() <= least and step.min() >= -least:
+        return []
+    large = np.flatnonzero(np.abs(step) > least)
+    found = _there_and_back(values, large) if large.size <= _MOST_STEPS else None
+    found = found or _to_the_end(values, step, large[:_MOST_TRIED])
+    if found is None:
+        return []
+    first, n, times = found
+    beside = "the rows before" if first + n == values.size else "their neighbours"
+    way = "above" if times > 1 else "below"
+    what = f"{n} rows {_TIMES_IN_WORDS[round(abs(math.log10(times)))]} times {way} {beside}; this is the first"
+    place = (file, row_of(first), column, f"{values[first]:.6g}", f"about {values[first - 1]:.6g}")
+    return [Finding("scale_jump", Problem("scale_jump", what, *place), fatal=True)]
+
+
+def _there_and_back(values: FloatArray, large: NDArray[np.int64]) -> tuple[int, int, float] | None:
+    """(first row, rows, factor) of a stretch ten times off, between two of the large steps, or None."""
+    if large.size < 2:
+        return None
+    before, after = values[large], values[large + 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = after / before
+    up = (ratio > _TEN_TIMES[0]) & (ratio < _TEN_TIMES[1])
+    down = (ratio > 1 / _TEN_TIMES[1]) & (ratio < 1 / _TEN_TIMES[0])
+    for i in range(large.size - 1):
+        n = int(large[i + 1] - large[i])
+        there_and_back = (up[i] and down[i + 1]) or (down[i] and up[i + 1])
+        if n > 1 and there_and_back and not (_is_impulse(values, large[i]) or _is_impulse(values, large[i + 1] + 1)):
+            return int(large[i]) + 1, n, 10.0 if up[i] else 0.1
+    return None
+
+
+def _is_impulse(values: FloatArray, k: int) -> bool:
+    """Whether the values on both sides of one are alike, and it is not: then it is no level to compare with."""
+    beside = values[[max(k - 1, 0), min(k + 1, values.size - 1)]]
+    return bool(np.ptp(beside) < 0.5 * np.abs(values[k] - beside).min())
+
+
+def _to_the_end(values: FloatArray, step: FloatArray, large: NDArray[np.int64]) -> tuple[int, int, float] | None:
+    """(first row, rows, factor) of rows off by a power of ten from one on, or None."""
+    for k in (int(at) for at in large):
+        if min(k, step.size - k - 1) < _FEWEST_ROWS:
+            continue
+        change = _typical(np.abs(step[max(k - _ROWS_BESIDE, 0) : k])), _typical(np.abs(step[k + 1 :][:_ROWS_BESIDE]))
+        for rows in _LEVEL_ROWS:
+            before, after = _typical(values[max(k + 1 - rows, 0) : k + 1]), _typical(values[k + 1 :][:rows])
+            times = _power_of_ten(after / before) if before else None
+            if times and _scaled_as(times, *change):
+                return k + 1, values.size - k - 1, times
+    return None
+
+
+def _typical(values: FloatArray) -> float:
+    return float(np.median(values))
+
+
+def _power_of_ten(ratio: float) -> float | None:
+    """10, 100, 1000 or one part in so many where a ratio is about that, else None."""
+    power = round(math.log10(ratio)) if ratio > 0 else 0
+    near = 1 <= abs(power) <= 3 and _TEN_TIMES[0] / 10 < ratio / 10.0**power < _TEN_TIMES[1] / 10
+    return 10.0**power if near else None
+
+
+def _scaled_as(times: float, before: float, after: float) -> bool:
+    """Whether changes from row to row scaled rather as the values did than not at all; shrinking may leave nothing."""
+    if not before:
+        return False
+    if not after:
+        return times < 1
+    return abs(math.log10(after / before / times)) < abs(math.log10(times)) / 2
+
+
+NO_TIME = "no_time"
+_PATH_FOR_TIME_M_S = 1e-3  # 1 mm of path counts as 1 s where neither time nor speed is known
+
+Arrays = dict[str, FloatArray]
+
+
+def complete(
+    arrays: Arrays, assignment: Assignment, correction: Correction, file: str
+) -> tuple[Arrays, Assignment, tuple[Finding, ...]]:
+    """Arrays that hold time and friction force, the columns they came from, and a doubt where time is missing."""
+    columns = list(assignment.columns)
+    findings: list[Finding] = []
+    if "friction force" not in arrays:
+        column = next(c for c in columns if c.quantity == "torque")
+        arrays = {**arrays, "friction force": arrays["torque"] / (correction.lever_arm_m or 1.0)}
+        reason = f"torque over the lever arm of {(correction.lever_arm_m or 0.0) * 1e3:g} mm, as given"
+        columns.append(Column("friction force", -1, column.label, 1.0, 0.0, reason))
+    if "rotation speed" in arrays and "speed" not in arrays and correction.lever_arm_m is not None:
+        arrays = {**arrays, "speed": 2.0 * np.pi * correction.lever_arm_m * arrays["rotation speed"]}
+        columns.append(_speed_of_turns(columns, correction.lever_arm_m))
+    factor = correction.sign * correction.gain
+    if factor != 1.0:
+        arrays = {**arrays, "friction force": arrays["friction force"] * factor}
+        columns = [_scaled(c, correction) if c.quantity == "friction force" else c for c in columns]
+    if "time" not in arrays:
+        time, column = _time(arrays, correction)
+        arrays = {**arrays, "time": time}
+        columns.append(column)
+        if correction.sampling_rate_Hz is None and correction.speed_m_s is None:
+            findings.append(Finding(NO_TIME, _no_time(file)))
+    return arrays, replace(assignment, columns=tuple(columns)), tuple(findings)
+
+
+def _speed_of_turns(columns: Sequence[Column], lever_arm_m: float) -> Column:
+    turns = next(c for c in columns if c.quantity == "rotation speed")
+    reason = f"rotation speed times 2 pi times the lever arm of {lever_arm_m * 1e3:g} mm, as given"
+    return Column("speed", -1, turns.label, 1.0, 0.0, reason)
+
+
+def _scaled(column: Column, correction: Correction) -> Column:
+    said = [f"gain {correction.gain:g}"] if correction.gain != 1.0 else []
+    said += ["sign reversed"] if correction.sign < 0 else []
+    return replace(column, reason=f"{column.reason}; {', '.join(said)}, as given")
+
+
+def _time(arrays: Arrays, correction: Correction) -> tuple[FloatArray, Column]:
+    if correction.sampling_rate_Hz is not None:
+        n = arrays["friction force"].size
+        reason = f"row number over the sampling rate of {correction.sampling_rate_Hz:g} Hz, as given"
+        return np.arange(n) / correction.sampling_rate_Hz, Column("time", -1, "sampling rate", 1.0, 0.0, reason)
+    path = np.abs(np.diff(arrays["displacement"], prepend=arrays["displacement"][:1])).cumsum()
+    speed = correction.speed_m_s or _PATH_FOR_TIME_M_S
+    reason = f"path over the speed of {speed * 1e3:g} mm/s" + (", as given" if correction.speed_m_s else "")
+    return path / speed, Column("time", -1, "path", 1.0, 0.0, reason)
+
+
+def _no_time(file: str) -> Problem:
+    what = (
+        "neither time nor speed is known: the path stands for the time, 1 mm for 1 s; forces and their dependence on "
+        "the path hold, while durations, rates, periods and drift per second are not determined"
+    )
+    return Problem(NO_TIME, what, file, allowed="speed_mm_s, sampling_rate_Hz, or a column of the time")

@@ -1,0 +1,383 @@
+"""Names of columns: the unit in them, and the quantity they stand for.
+
+What a user states about an export beside its contents: columns, columns left out, decimal mark, corrections.
+
+Quantity and unit of each column. Nothing is guessed: doubtful cases are errors.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+from tribo.errors import Problem, ReadError
+from tribo.records import UNCORRECTED, Correction
+from tribo.units import QUANTITIES, match_quantity, narrow, quantity_named, unit_factor
+from tribo.user_text import did_you_mean
+
+_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^\[\]()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
+_AFTER_MARK = re.compile(r"^(.*\S)\s*(?:\s?/|\sin\s|,\s|_)\s*((?:[^\W\d_]|[°%])[\w/°%^·²-]*)$")
+
+
+def bare_unit(unit: str) -> str:
+    """ "(mm)" and "[mm]" -> "mm"."""
+    found = _BRACKETS.fullmatch(narrow(unit.strip()))
+    return found.group(1).strip() if found else unit.strip()
+
+
+def match_column(name: str) -> tuple[str, int] | None:
+    """(quantity, rank) of a column name with or without its unit in it."""
+    return match_quantity(name) or match_quantity(split_unit(name)[0])
+
+
+@lru_cache(maxsize=1024)
+def split_unit(name: str) -> tuple[str, str | None]:
+    """("Kraft", "kN") of "Kraft [kN]", "Kraft (kN)", "Kraft / kN", "Kraft/kN", "Kraft in kN", "Kraft_kN"."""
+    name = narrow(name)
+    found = _BRACKETS.search(name)
+    if found:
+        return name[: found.start()].strip(), found.group(1).strip()
+    found = _AFTER_MARK.match(name)
+    hit = match_quantity(found.group(1)) if found and match_quantity(name) is None else None
+    if found and hit and is_unit(found.group(2), hit[0]):
+        return found.group(1).strip(), found.group(2)
+    return name, None
+
+
+def is_unit(text: str, quantity: str) -> bool:
+    """Whether a text is a unit of a quantity."""
+    try:
+        unit_factor(text, quantity)
+    except ReadError:
+        return False
+    return True
+
+
+ASKED = "asked for"
+NONE, IGNORE, DECIMAL = "none", "ignore", "decimal"
+Columns = Mapping[str, str | Sequence[str]]
+
+
+@dataclass(frozen=True)
+class Hint:
+    """A column for a quantity, by name and unit ("Fx [gf]") or position ("#3 [N]"), and its source.
+
+    A name with ``*`` or ``?`` means every column it fits: one record each.
+    """
+
+    quantity: str
+    wanted: str
+    reason: str = ASKED
+
+    @property
+    def is_pattern(self) -> bool:
+        """Whether the hint may mean several columns."""
+        return any(mark in split_unit(self.wanted)[0] for mark in "*?")
+
+
+@dataclass(frozen=True)
+class Given:
+    """Everything stated for one export.
+
+    ``without`` are quantities that are not read although a column has their name, ``ignored`` columns that are not
+    looked at, by name or position; ``decimal`` is the decimal mark, "" where the file settles it.
+    """
+
+    hints: tuple[Hint, ...] = ()
+    without: frozenset[str] = frozenset()
+    ignored: tuple[str, ...] = ()
+    decimal: str = ""
+    correction: Correction = UNCORRECTED
+
+    def names(self, name: str) -> bool:
+        """Whether a hint names this column."""
+        return any(name in (hint.wanted, split_unit(hint.wanted)[0]) for hint in self.hints)
+
+    def with_hints(self, hints: Sequence[Hint]) -> Given:
+        """The same with hints of the format added; those of the user come first."""
+        return replace(self, hints=(*self.hints, *(h for h in hints if h.quantity not in self.without)))
+
+    def ignores(self, index: int, name: str) -> bool:
+        """Whether the column at a position (from 0) is not to be looked at."""
+        return any(wanted in (f"#{index + 1}", name, split_unit(name)[0]) for wanted in self.ignored)
+
+
+NOTHING_GIVEN = Given()
+
+
+def parse_columns(columns: Columns | None, correction: Correction | None = None) -> Given:
+    """``{quantity: "name [unit]"}`` as hints; "none" for a quantity to leave out; ``ignore`` and ``decimal``.
+
+    Raises
+    ------
+    ReadError
+        unknown_quantity for every key that names none, unknown_decimal for a mark that is no decimal mark.
+    """
+    columns = columns or {}
+    problems = [problem for key, value in columns.items() for problem in column_faults(key, value)]
+    if problems:
+        raise ReadError(problems)
+    return _given(columns, correction or UNCORRECTED)
+
+
+def column_faults(key: str, value: object) -> Iterator[Problem]:
+    """Why one entry of columns cannot be used."""
+    if key == IGNORE:
+        return
+    if key == DECIMAL:
+        if value not in (".", ","):
+            yield Problem("unknown_decimal", "not a decimal mark", found=str(value), allowed='"." or ","')
+    elif quantity_named(key) is None:
+        names = [name.replace(" ", "_") for name in QUANTITIES]
+        meant = did_you_mean(key, [*names, IGNORE, DECIMAL])
+        allowed = f"{', '.join(names)}; {IGNORE}, {DECIMAL}{f' ({meant})' if meant else ''}"
+        yield Problem("unknown_quantity", "not a known quantity", found=key, allowed=allowed)
+
+
+def _given(columns: Columns, correction: Correction) -> Given:
+    """Columns whose keys are known."""
+    hints, without = [], set()
+    for key, value in columns.items():
+        quantity = quantity_named(key)
+        if quantity is None:
+            continue
+        if str(value).strip().lower() == NONE:
+            without.add(quantity)
+        else:
+            hints.append(Hint(quantity, str(value).strip()))
+    ignored = columns.get(IGNORE, ())
+    listed = re.split(r"\s*;\s*", ignored) if isinstance(ignored, str) else ignored
+    return Given(
+        tuple(hints),
+        frozenset(without),
+        tuple(name.strip() for name in listed if name.strip()),
+        str(columns.get(DECIMAL, "")),
+        correction,
+    )
+
+
+def what_is_known(columns: Columns | None, correction: Correction | None = None) -> Given:
+    """Columns as :func:`parse_columns` gives them, without those that name no quantity."""
+    kept = {key: value for key, value in (columns or {}).items() if not list(column_faults(key, value))}
+    return _given(kept, correction or UNCORRECTED)
+
+
+def columns_from_text(text: str) -> dict[str, str]:
+    """Columns as given on a command line: "time=Clock [s], friction_force=#3 [gf], displacement=none".
+
+    Raises
+    ------
+    ReadError
+        bad_columns, for a part that is not QUANTITY=COLUMN.
+    """
+    found = {}
+    for part in re.split(r",(?=\s*\w[\w ]*=)", text):
+        key, equals, value = part.partition("=")
+        if not equals or not key.strip() or not value.strip():
+            allowed = "time=NAME [unit], friction_force=#3 [unit]"
+            raise ReadError(Problem("bad_columns", "not QUANTITY=COLUMN", found=part.strip(), allowed=allowed))
+        found[key.strip()] = value.strip()
+    return found
+
+
+NEEDED = ("time", "friction force")
+_SIMILAR = 0.7  # difflib ratio from which a name that was asked for is taken for a misspelt one of the file
+_MEANS_NORMAL_BESIDE_FRICTION = {
+    "load", "last", "applied load", "charge", "carga", "obciążenie", "нагрузка", "载荷", "负荷", "荷重", "하중",
+}  # fmt: skip
+_ACCELERATION = re.compile(r"m\s*/\s*s(?:ec)?\s*(?:\^?2|²)|m/s/s|m·?s(?:\^?-2|⁻²)")
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column taken for a quantity: SI value = factor * value + offset. ``index`` counts from 0.
+
+    ``index`` is -1 for a quantity that follows from others, or from what was stated.
+    """
+
+    quantity: str
+    index: int
+    label: str
+    factor: float
+    offset: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """The column of each quantity, time and friction force first, and doubts: columns left out, hints not used."""
+
+    columns: tuple[Column, ...]
+    doubts: tuple[Problem, ...] = ()
+
+
+@lru_cache(maxsize=512)
+def assign(
+    names: tuple[str, ...], units: tuple[str, ...], filled: tuple[bool, ...], given: Given = NOTHING_GIVEN
+) -> Assignment:
+    """The column of each quantity. Where a quantity that a trace can do without has no unit, it is left out.
+
+    A column that was asked for and is not here is a doubt where the names of the file are sufficient without it.
+
+    Raises
+    ------
+    ReadError
+        missing_column, missing_unit, ambiguous_unit or unknown_unit; all of them at once.
+    """
+    filled = tuple(there and not given.ignores(k, names[k]) for k, there in enumerate(filled))
+    chosen, absent, problems = _asked_for(given.hints, names)
+    taken = {index for index, _, _ in chosen.values()}
+    for quantity, index, reason in _matches(names, filled, taken):
+        if quantity not in given.without:
+            chosen.setdefault(quantity, (index, None, reason))
+    columns, doubts, faults = _columns(chosen, names, units, given.correction)
+    unreadable = {problem.column for problem in faults}
+    there = {c.quantity for c in columns} | {q for q, (k, *_) in chosen.items() if _called(names, k) in unreadable}
+    missing = [q for q in NEEDED if q not in there and not _follows(q, there, given.correction)]
+    refused = {h.quantity for h in given.hints} - set(chosen)
+    if absent and (missing or faults or problems):
+        problems += absent
+    elif absent:
+        doubts += [_not_here(problem) for problem in absent]
+    problems += [_missing(q, names, there) for q in missing if q not in refused]
+    if problems or faults:
+        raise ReadError([*problems, *faults])
+    return Assignment(tuple(columns), tuple(doubts))
+
+
+Chosen = dict[str, tuple[int, str | None, str]]
+
+
+def _asked_for(hints: Sequence[Hint], names: Sequence[str]) -> tuple[Chosen, list[Problem], list[Problem]]:
+    """(column, unit, reason) of each quantity with a hint; hints for columns not in the file; hints misspelt."""
+    chosen: Chosen = {}
+    absent: list[Problem] = []
+    problems: list[Problem] = []
+    for hint in hints:
+        try:
+            chosen.setdefault(hint.quantity, _wanted_column(hint, names))
+        except ReadError as why:
+            bare = split_unit(hint.wanted)[0]
+            similar = difflib.get_close_matches(bare, [split_unit(n)[0] for n in names if n], 1, _SIMILAR)
+            strict = bool(similar) or hint.wanted.startswith("#") or hint.reason != ASKED
+            (problems if strict else absent).extend(why.problems)
+    return chosen, absent, problems
+
+
+def _columns(
+    chosen: Chosen, names: Sequence[str], units: Sequence[str], correction: Correction
+) -> tuple[list[Column], list[Problem], list[Problem]]:
+    """Columns with their units; doubts about columns left out; faults of columns that are needed."""
+    columns: list[Column] = []
+    doubts: list[Problem] = []
+    faults: list[Problem] = []
+    for quantity in sorted(chosen, key=list(QUANTITIES).index):
+        index, unit, reason = chosen[quantity]
+        try:
+            columns.append(_column(quantity, index, unit, reason, (names, units)))
+        except ReadError as why:
+            found = [_placed(p, quantity, _called(names, index)) for p in why.problems]
+            replaced = quantity == "time" and correction.sampling_rate_Hz is not None
+            optional = quantity not in NEEDED or replaced
+            left_out = optional and all(p.kind in ("missing_unit", "ambiguous_unit") for p in found)
+            (doubts if left_out else faults).extend(found)
+    return columns, doubts, faults
+
+
+def _called(names: Sequence[str], index: int) -> str:
+    return names[index] or f"#{index + 1}"
+
+
+def _follows(quantity: str, there: set[str], correction: Correction) -> bool:
+    """Whether a missing quantity follows from others: time from rate or path, friction force from a torque."""
+    if quantity == "time":
+        return correction.sampling_rate_Hz is not None or "displacement" in there
+    return "torque" in there and correction.lever_arm_m is not None
+
+
+def _matches(names: Sequence[str], filled: Sequence[bool], taken: set[int]) -> list[tuple[str, int, str]]:
+    """(quantity, index, reason) of the best-named column of each quantity; the first of equal ones."""
+    best: dict[str, tuple[int, int]] = {}
+    hits = {
+        index: hit
+        for index, name in enumerate(names)
+        if name and index not in taken and filled[index] and (hit := match_column(name))
+    }
+    for index, (quantity, rank) in hits.items():
+        if quantity not in best or rank < best[quantity][0]:
+            best[quantity] = (rank, index)
+    friction = best.get("friction force")
+    for index, (quantity, _) in hits.items():
+        plain = split_unit(names[index])[0].strip().lower()
+        beside = quantity == "friction force" and friction and index != friction[1]
+        if beside and plain in _MEANS_NORMAL_BESIDE_FRICTION and "normal force" not in best:
+            best["normal force"] = (0, index)
+    return [(q, index, f'named "{names[index]}"') for q, (_, index) in best.items()]
+
+
+def _wanted_column(hint: Hint, names: Sequence[str]) -> tuple[int, str | None, str]:
+    wanted = hint.wanted
+    name, unit = (wanted, None) if wanted in names else split_unit(wanted)
+    if re.fullmatch(r"#\d+", name) and 1 <= int(name[1:]) <= len(names):
+        return int(name[1:]) - 1, unit, f"{hint.reason} by position" if hint.reason == ASKED else hint.reason
+    bare = [split_unit(n)[0] for n in names]
+    for have in (list(names), bare):
+        if name in have:
+            return have.index(name), unit, f"{hint.reason} by name" if hint.reason == ASKED else hint.reason
+    meant = did_you_mean(name, [n for n in names if n])
+    allowed = f"{_listed(names)}{f' ({meant})' if meant else ''}"
+    what = f"no column has the name or position given for the {hint.quantity}"
+    raise ReadError(Problem("missing_column", what, found=wanted, allowed=allowed))
+
+
+def _column(
+    quantity: str, index: int, unit: str | None, reason: str, header: tuple[Sequence[str], Sequence[str]]
+) -> Column:
+    names, units = header
+    if unit is None:
+        unit = bare_unit(units[index]) or split_unit(names[index])[1] or ""
+        if unit == "g" and "force" in quantity and any(map(_ACCELERATION.search, (*names, *units))):
+            what = "the unit g may be gram-force or acceleration of gravity, as another column is in m/s2"
+            raise ReadError(Problem("ambiguous_unit", what, found=unit))
+    factor, offset = unit_factor(unit, quantity)
+    label = split_unit(names[index])[0] or f"#{index + 1}"
+    label = f"{label} [{unit}]" if unit else label
+    return Column(quantity, index, label, factor, offset, reason)
+
+
+def _placed(problem: Problem, quantity: str, name: str) -> Problem:
+    """A fault of a unit with its column, and how to give the unit."""
+    si = "gf or N" if problem.kind == "ambiguous_unit" else QUANTITIES[quantity].si_unit
+    way = f'{_key(quantity)} = "{split_unit(name)[0]} [unit]" in columns, the unit such as {si}'
+    return replace(problem, column=name, allowed=way)
+
+
+def _key(quantity: str) -> str:
+    return quantity.replace(" ", "_")
+
+
+def _not_here(problem: Problem) -> Problem:
+    what = "this column, given in columns, is not in this table, which was read by its own names"
+    return Problem("column_not_here", what, found=problem.found, allowed=problem.allowed)
+
+
+def _missing(quantity: str, names: Sequence[str], there: set[str]) -> Problem:
+    here = f"columns here: {_listed(names)}" if any(names) else f"{len(names)} columns without names"
+    example = '"NAME [unit]"' if any(names) else '"#2 [unit]"'
+    what = f"no column was recognised as the {quantity}"
+    ways = [f"{_key(quantity)} = {example} in columns"]
+    if quantity == "time":
+        ways += ["a counter takes the sampling interval as its unit, [0.01 s]", "or sampling_rate_Hz = 100"]
+    elif "torque" in there:
+        what = "the friction is recorded as a torque, without a friction force"
+        ways = ["lever_arm_mm = 2.5, the distance of the contact from the axis"]
+    elif "friction coefficient" in there:
+        ways += ['for friction over load, the load is the unit, friction_force = "NAME [3 N]"']
+    return Problem("missing_column", what, allowed="; ".join([*ways, here]))
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(n or f"#{k + 1}" for k, n in enumerate(names))

@@ -1,0 +1,349 @@
+"""Description of an export before it is used."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tribo.display import displayed
+from tribo.errors import Problem, ReadError
+from tribo.input_files import MAPPED_BYTES
+from tribo.readers.columns import NEEDED, Column, Columns, Given, assign, match_column, parse_columns, what_is_known
+from tribo.readers.core.family import Family
+from tribo.readers.layout import Layout
+from tribo.readers.reading import (
+    Contents,
+    Reading,
+    family_of,
+    layout_of,
+    open_sources,
+    read_contents,
+    split_at_restarts,
+)
+from tribo.readers.source import Source
+from tribo.records import Correction, FloatArray
+
+_BASELINE_SHARE = 0.05  # of the largest force: a pull that starts above it has no zero phase
+_FLAT_TOP = 5  # equal samples at an extreme in a row
+_UNEVEN = 0.2  # spread of the time steps over their median
+_MARKS = {"\t": "tab", " ": "blanks", "": "nothing", ",": "comma", ";": "semicolon", "|": "bar"}
+
+
+@dataclass(frozen=True)
+class ColumnSeen:
+    """A column as the file has it, and the quantity it was taken for ("" if none) and why."""
+
+    position: int
+    name: str
+    unit: str
+    quantity: str = ""
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class TableSeen:
+    """A table that is a trace: its position, its time base in seconds, its forces in newton."""
+
+    label: str
+    first_row: int
+    rows: int
+    start_s: float
+    end_s: float
+    step_s: float
+    shortest_step_s: float
+    longest_step_s: float
+    lowest_force_N: float
+    highest_force_N: float
+    normal_load_N: float | None
+
+
+@displayed()
+@dataclass(frozen=True)
+class Inspection:
+    """Description of an export.
+
+    ``problems`` state why it cannot be read, ``advice`` what to give so that it can, ``doubts`` what to check.
+    ``pulls`` lists the pulls within its tables, if there are several, by the text that selects them in tests.csv.
+    """
+
+    file: str
+    family: str = ""
+    family_text: str = ""
+    encoding: str = ""
+    delimiter: str = ""
+    decimal: str = ""
+    header_rows: int = 0
+    columns: tuple[ColumnSeen, ...] = ()
+    tables: tuple[TableSeen, ...] = ()
+    other_tables: tuple[str, ...] = ()
+    pulls: tuple[str, ...] = ()
+    metadata: Mapping[str, str] | None = None
+    signs: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
+    doubts: tuple[Problem, ...] = ()
+    problems: tuple[Problem, ...] = ()
+    advice: str = ""
+
+    @property
+    def refused(self) -> bool:
+        """Whether the export cannot be read."""
+        return bool(self.problems)
+
+    def record(self) -> dict[str, Any]:
+        """All of it for JSON."""
+        return {"refused": self.refused, **asdict(self)}
+
+    def in_words(self) -> str:
+        """All of it as text."""
+        lines = [self.file]
+        if self.family:
+            marks = f"{_MARKS.get(self.delimiter, self.delimiter)!s} between cells, decimal {_mark(self.decimal)}"
+            lines.append(f"  format    {self.family_text} ({self.family})")
+            lines.append(f"  encoding  {self.encoding}, {marks}, {self.header_rows} header rows")
+        lines += [f"  column    {_column_in_words(c)}" for c in self.columns]
+        lines += [f"  table     {_table_in_words(t)}" for t in self.tables[:12]]
+        if len(self.tables) > 12:
+            lines.append(f"  table     and {len(self.tables) - 12} more")
+        lines += [f"  pull      {text}" for text in self.pulls[:12]]
+        if len(self.pulls) > 12:
+            lines.append(f"  pull      and {len(self.pulls) - 12} more")
+        if self.other_tables:
+            lines.append(f"  no trace  {', '.join(self.other_tables[:12])}")
+        lines += [f"  signs     {text}" for text in self.signs]
+        lines += [f"  missing   {text}" for text in self.missing]
+        lines += [f"  doubt     {problem}" for problem in self.doubts]
+        lines += [f"  refused   {problem}" for problem in self.problems]
+        if self.advice:
+            lines.append(f"  advice    {self.advice}")
+        return "\n".join(lines)
+
+
+def inspect_export(
+    path: Path | str, *, columns: Columns | None = None, correction: Correction | None = None
+) -> Inspection:
+    """Description of an export: family, encoding, columns and why, units, tables, time base, doubts.
+
+    Never raises because of the contents of the file: for an export that cannot be read, ``problems`` states why.
+    Only the beginning of a large file is checked; a doubt then says so. ``columns`` and ``correction``
+    as in :func:`tribo.readers.read_export`.
+    """
+    path = Path(path)
+    file = str(path)
+    try:
+        contents = read_contents(path, parse_columns(columns, correction), file, beginning_only=True)
+    except ReadError as why:
+        return _refused(path, file, why.problems, what_is_known(columns, correction))
+    seen = _read(file, contents)
+    return replace(seen, doubts=(*_unseen(path, file), *seen.doubts))
+
+
+def _unseen(path: Path, file: str) -> tuple[Problem, ...]:
+    """The doubt about a large file of which only the beginning was checked; with its last line."""
+    source = open_sources(path, file)[0] if path.stat().st_size > MAPPED_BYTES else None
+    if source is None or not source.is_large:
+        return ()
+    seen, everything = len(source.beginning_only().data), len(source.data)
+    what = f"only the first {seen / 1e6:.0f} of {everything / 1e6:.0f} MB were checked; found: the last line"
+    return (Problem("only_beginning", what, file, found=source.last_line()[:60]),)
+
+
+def _refused(path: Path, file: str, problems: tuple[Problem, ...], given: Given) -> Inspection:
+    """What is known about an export that cannot be read."""
+    try:
+        source = open_sources(path, file)[0]
+    except ReadError:
+        return Inspection(file, problems=problems)
+    family = family_of(source)
+    seen = Inspection(file, family.name, family.text, source.encoding, problems=problems)
+    try:
+        layout = layout_of(source, given)
+    except ReadError:
+        return seen
+    return replace(
+        seen,
+        delimiter=layout.delimiter,
+        decimal=layout.decimal,
+        header_rows=layout.header_rows,
+        columns=_columns(layout, _taken(source, family, layout, given)),
+        metadata=layout.metadata,
+        advice=_advice(problems, family, layout),
+    )
+
+
+def _taken(source: Source, family: Family, layout: Layout, given: Given) -> tuple[Column, ...]:
+    try:
+        return assign(layout.names, layout.units, layout.filled, given.with_hints(family.hints(source, layout))).columns
+    except ReadError:
+        return ()
+
+
+def _advice(problems: tuple[Problem, ...], family: Family, layout: Layout) -> str:
+    """What to give so that the export can be read, where that is a matter of names and units."""
+    if not all(p.kind in ("missing_column", "missing_unit", "unknown_unit") for p in problems):
+        return ""
+    if family.advice:
+        return family.advice
+    name = "NAME [unit]" if any(layout.names) else "#1 [unit]"
+    other = "NAME [unit]" if any(layout.names) else "#2 [unit]"
+    return f'in columns: time = "{name}", friction_force = "{other}"'
+
+
+def _read(file: str, contents: Contents) -> Inspection:
+    first = contents.readings[0]
+    layout = first.block.layout
+    parts = [part for reading in contents.readings for part in split_at_restarts(reading)]
+    findings = [finding for part in parts for finding in part.findings]
+    doubts = [f.problem for f in findings if not f.fatal]
+    doubts += [doubt for part in parts[:1] for doubt in _doubts(part, file)]
+    if len(parts) > 1:
+        what, allowed = f"this export contains {len(parts)} traces", f"{file}#1 to {file}#{len(parts)}"
+        doubts.append(Problem("several_tables", what, file=file, allowed=allowed))
+    if contents.footer:
+        what = f"{len(contents.footer)} lines without data at the end of the file"
+        doubts.append(Problem("footer", what, file=file, found=contents.footer[0]))
+    return Inspection(
+        file=file,
+        family=first.family.name,
+        family_text=first.family.text,
+        encoding=first.source.encoding,
+        delimiter=layout.delimiter,
+        decimal=layout.decimal,
+        header_rows=layout.header_rows,
+        columns=_columns(layout, first.assignment.columns),
+        tables=tuple(_table(part) for part in parts),
+        other_tables=contents.others,
+        metadata=layout.metadata,
+        signs=_signs(parts),
+        missing=_missing(first),
+        doubts=tuple(doubts),
+        problems=tuple(f.problem for f in findings if f.fatal),
+    )
+
+
+def _columns(layout: Layout, columns: tuple[Column, ...]) -> tuple[ColumnSeen, ...]:
+    taken = {c.index: c for c in columns}
+    seen = []
+    for k in range(layout.n_cells):
+        column = taken.get(k)
+        if column is None:
+            seen.append(ColumnSeen(k + 1, layout.names[k], layout.units[k]))
+        else:
+            unit = column.label.rpartition("[")[2].rstrip("]") if "[" in column.label else ""
+            seen.append(ColumnSeen(k + 1, layout.names[k], unit, column.quantity, column.reason))
+    return tuple(seen)
+
+
+def _table(reading: Reading) -> TableSeen:
+    time, force = reading.arrays["time"], reading.arrays["friction force"]
+    step = np.diff(time) if time.size > 1 else np.zeros(1)
+    normal = reading.arrays.get("normal force")
+    return TableSeen(
+        label=reading.block.label,
+        first_row=reading.block.layout.header_rows + 1 + reading.skipped,
+        rows=int(time.size),
+        start_s=float(time[0]),
+        end_s=float(time[-1]),
+        step_s=float(np.median(step)),
+        shortest_step_s=float(step.min()),
+        longest_step_s=float(step.max()),
+        lowest_force_N=float(force.min()),
+        highest_force_N=float(force.max()),
+        normal_load_N=None if normal is None else float(np.median(np.abs(normal))),
+    )
+
+
+def _signs(parts: list[Reading]) -> tuple[str, ...]:
+    found = []
+    normal = parts[0].arrays.get("normal force")
+    if normal is not None and np.median(normal) < 0:
+        found.append("the normal force is negative under load")
+    means = [float(np.mean(part.arrays["friction force"][part.arrays["time"].size // 2 :])) for part in parts]
+    if max(means) > 0 > min(means):
+        found.append("the friction force changes sign between tables: strokes in opposite directions")
+    elif max(means) < 0:
+        found.append("the friction force is negative")
+    return tuple(found)
+
+
+def _missing(reading: Reading) -> tuple[str, ...]:
+    found = []
+    if "normal force" not in reading.arrays:
+        found.append("no normal load in the file: give it in tests.csv")
+    if "displacement" not in reading.arrays:
+        found.append("no displacement")
+    return tuple(found)
+
+
+def _doubts(reading: Reading, file: str) -> list[Problem]:
+    label = {c.quantity: c.label for c in reading.assignment.columns}
+    time, force = reading.arrays["time"], reading.arrays["friction force"]
+    doubts = _other_candidates(reading)
+    step = np.diff(time)
+    if step.size and np.percentile(step, 95) - np.percentile(step, 5) > _UNEVEN * max(np.median(step), 1e-12):
+        found = f"{step.min():.4g} to {step.max():.4g} s"
+        doubts.append(Problem("uneven_time", "the time steps are not equal", file, None, label["time"], found))
+    start = float(np.median(force[:5]))
+    if abs(start) > _BASELINE_SHARE * float(np.abs(force).max()):
+        what = "the force does not start near zero, so the zero cannot be determined"
+        place = (file, reading.row_of(0), label["friction force"], f"{start:.4g} N")
+        doubts.append(Problem("no_zero_phase", what, *place))
+    top = _flat_top(force)
+    if top is not None:
+        what = f"{top[1]} equal data points at the largest force: possibly clipped"
+        place = (file, reading.row_of(top[0]), label["friction force"], f"{force[top[0]]:.5g} N")
+        doubts.append(Problem("flat_top", what, *place))
+    for quantity, values in reading.arrays.items():
+        if quantity not in NEEDED and values.size > 1 and not np.ptp(values) and not values[0]:
+            doubts.append(Problem("all_zero", f"the {quantity} is always zero", file, None, label[quantity]))
+    return doubts
+
+
+def _other_candidates(reading: Reading) -> list[Problem]:
+    """Columns that could stand for a needed quantity as well as the one that was taken."""
+    layout = reading.block.layout
+    taken = {c.index for c in reading.assignment.columns}
+    doubts = []
+    for column in (c for c in reading.assignment.columns if c.quantity in NEEDED):
+        others = [
+            layout.names[k]
+            for k in range(layout.n_cells)
+            if k not in taken
+            and layout.filled[k]
+            and (hit := match_column(layout.names[k]))
+            and hit[0] == column.quantity
+        ]
+        if others:
+            what = f"the {column.quantity} could also be {' or '.join(others)}"
+            place = (reading.source.file, layout.names_row, column.label)
+            doubts.append(Problem("other_candidate", what, *place))
+    return doubts
+
+
+def _flat_top(force: FloatArray) -> tuple[int, int] | None:
+    """(first sample, length) of the longest run of equal samples at the largest force, or None if it is short."""
+    at_top = np.flatnonzero(force == force.max())
+    runs = np.split(at_top, np.flatnonzero(np.diff(at_top) > 1) + 1)
+    longest = max(runs, key=len)
+    return (int(longest[0]), len(longest)) if len(longest) >= _FLAT_TOP and np.ptp(force) else None
+
+
+def _mark(decimal: str) -> str:
+    return "comma" if decimal == "," else "point"
+
+
+def _column_in_words(column: ColumnSeen) -> str:
+    name = f'{column.position} "{column.name}"{f" [{column.unit}]" if column.unit else ""}'
+    return f"{name} -> {column.quantity} ({column.reason})" if column.quantity else name
+
+
+def _table_in_words(table: TableSeen) -> str:
+    label = f"{table.label}: " if table.label else ""
+    load = "" if table.normal_load_N is None else f", normal load {table.normal_load_N:.4g} N"
+    return (
+        f"{label}{table.rows} rows from row {table.first_row}, {table.start_s:.6g} to {table.end_s:.6g} s in steps of "
+        f"{table.step_s:.4g} s, force {table.lowest_force_N:.4g} to {table.highest_force_N:.4g} N{load}"
+    )

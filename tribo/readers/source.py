@@ -1,0 +1,382 @@
+"""From a file to bytes with one line ending, and to the text of any stretch of it.
+
+Exports inside a .zip or .gz: one entry is read as the file itself, one of several by PATH.zip/ENTRY.
+"""
+
+from __future__ import annotations
+
+import codecs
+import gzip
+import io
+import mmap
+import re
+import zipfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import IO, Protocol
+
+from tribo.errors import Problem, ReadError, unexpected
+from tribo.input_files import (
+    LARGEST_EXPORT_BYTES as LARGEST_FILE_BYTES,
+    LAST_BYTES,
+    MAPPED_BYTES,
+    MOST_UNPACKED_EXPORT_BYTES,
+    NotRegularError,
+    TooLargeError,
+    last_record,
+    read_or_map,
+)
+from tribo.records import FloatArray
+from tribo.units import match_quantity
+
+HEAD_BYTES = 2_500
+LARGEST_HEAD_BYTES = 400_000
+CHUNK_BYTES = 16 << 20
+_WIDE_BOMS = {
+    codecs.BOM_UTF32_LE: "utf-32",
+    codecs.BOM_UTF32_BE: "utf-32",
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
+_CELL = re.compile(r"[^\t;,|\n\"]+")
+# Code pages of Central Europe, China, Japan, Korea, Taiwan and Russia: recognised by names of columns in them.
+_BY_NAMES = ("cp1250", "gb18030", "cp932", "cp949", "big5", "cp1251", "iso8859-2")
+_MULTIBYTE = ("gb18030", "cp932", "cp949", "big5")
+_ASCII = bytes(range(128))
+# Letters and signs that western machines write; anything else makes cp1252 an unlikely reading.
+_PLAUSIBLE = frozenset("äöüÄÖÜßéèêëàâçîïôùûÉÈÀÇñÑåÅøØæÆáíóúìòãõµ°²³±·×«»‘’“”–—…€ \xa0")
+
+
+@dataclass(frozen=True)
+class Source:
+    """An export as bytes without BOM, wide encodings made UTF-8, lines ending in ``\\n``.
+
+    A mapped source (a large file) keeps its bytes as they are on disk. ``arrays`` holds the columns where the
+    file is no text but named arrays (MATLAB), ``names`` their names; ``part`` the sheet of a workbook.
+    """
+
+    path: Path
+    file: str
+    data: bytes | mmap.mmap
+    encoding: str
+    start: int = 0
+    part: str = ""
+    names: tuple[str, ...] = ()
+    arrays: tuple[FloatArray, ...] = ()
+
+    def lines(self, start: int, size: int) -> tuple[tuple[str, ...], bool]:
+        """Whole lines of the ``size`` bytes from ``start``, and whether the file goes on after them."""
+        piece = self.data[start : start + size]
+        more = start + size < len(self.data)
+        if more:
+            piece = piece[: piece.rfind(b"\n") + 1] or piece
+        text = self.text(piece)
+        if isinstance(self.data, mmap.mmap):
+            text = text.replace("\r\n", "\n")
+        return tuple(text.split("\n")), more
+
+    @cached_property
+    def beginning(self) -> tuple[tuple[str, ...], bool]:
+        """The first lines, and whether the file goes on after them."""
+        return self.lines(self.start, HEAD_BYTES)
+
+    @property
+    def head(self) -> tuple[str, ...]:
+        """The first lines, enough to recognise a family by."""
+        return self.beginning[0]
+
+    @cached_property
+    def head_text(self) -> str:
+        """The first lines as one text, a line end before each."""
+        return "\n" + "\n".join(self.head)
+
+    @property
+    def codec(self) -> str:
+        """The encoding of ``data``."""
+        return "utf-8" if self.encoding.startswith("utf") or self.encoding in _MULTIBYTE else self.encoding
+
+    def text(self, piece: bytes) -> str:
+        """Bytes of this file as text; bytes that the encoding does not know become U+FFFD."""
+        return piece.decode(self.codec, errors="replace")
+
+    def offset(self, start: int, lines: int) -> int:
+        """Where the line stands that is ``lines`` lines below the one at ``start``."""
+        for _ in range(lines):
+            start = self.data.find(b"\n", start) + 1
+            if start == 0:
+                return len(self.data)
+        return start
+
+    @property
+    def is_large(self) -> bool:
+        """Whether the file is mapped and read in pieces."""
+        return isinstance(self.data, mmap.mmap)
+
+    def beginning_only(self) -> Source:
+        """The first lines of a large file as a source of their own, enough to tell what it is; any other as it is."""
+        if not self.is_large:
+            return self
+        piece = bytes(self.data[: max(LARGEST_HEAD_BYTES, CHUNK_BYTES // 4)])
+        return _with_one_line_ending(self, piece[: piece.rfind(b"\n") + 1] or piece)
+
+    def last_line(self) -> str:
+        """The last line of the file that is not blank."""
+        lines = self.text(bytes(self.data[-HEAD_BYTES:])).split("\n")
+        return next((line.strip() for line in reversed(lines) if line.strip()), "")
+
+    def line_ends(self, start: int, end: int) -> int:
+        """Line ends from ``start`` to ``end``, counted piece by piece."""
+        return sum(chunk.count(b"\n") for chunk in self.chunks(start, end))
+
+    def chunks(self, start: int, end: int) -> Iterator[bytes]:
+        """Whole lines from ``start`` to ``end`` in pieces of bounded size."""
+        while start < end:
+            stop = end
+            if end - start > CHUNK_BYTES:
+                stop = self.data.rfind(b"\n", start, start + CHUNK_BYTES) + 1
+                stop = stop if stop > start else start + CHUNK_BYTES
+            yield bytes(self.data[start:stop])
+            start = stop
+
+
+def open_text(path: Path, file: str, raw: bytes | mmap.mmap) -> Source:
+    """A text export, read as bytes, with its encoding settled.
+
+    Raises
+    ------
+    ReadError
+        empty, bom_only, binary or too_large.
+    """
+    bom = next((b for b in (*_WIDE_BOMS, codecs.BOM_UTF8) if raw[:4].startswith(b)), b"")
+    if not raw[len(bom) : HEAD_BYTES].strip() and not raw[len(bom) : LARGEST_HEAD_BYTES].strip():
+        kind, what = ("bom_only", "the file contains only a byte order mark") if bom else ("empty", "the file is empty")
+        raise ReadError(Problem(kind, what, file=file, allowed="an export with data rows"))
+    if bom in _WIDE_BOMS:
+        if isinstance(raw, mmap.mmap):
+            raise _too_large(len(raw), MAPPED_BYTES, file)
+        encoding = _WIDE_BOMS[bom]
+        data: bytes | mmap.mmap = raw.decode(encoding, errors="replace").encode("utf-8")
+    elif b"\0" in raw[:HEAD_BYTES]:
+        encoding = _wide_without_bom(raw[:HEAD_BYTES])
+        if not encoding or isinstance(raw, mmap.mmap):
+            raise ReadError(Problem("binary", "this is not a text file", file=file, allowed="a text export"))
+        data = raw.decode(encoding, errors="replace").encode("utf-8")
+    else:
+        encoding, data = ("utf-8-sig" if bom else _narrow_encoding(raw)), raw
+        if encoding in _MULTIBYTE:  # their second bytes may look like delimiters
+            data = raw[:].decode(encoding, errors="replace").encode("utf-8")
+    source = Source(path, file, data, encoding, start=len(bom) if bom == codecs.BOM_UTF8 else 0)
+    return source if isinstance(data, mmap.mmap) else _with_one_line_ending(source, data)
+
+
+def _wide_without_bom(head: bytes) -> str:
+    """UTF-16 tells itself in a western text: every other byte is zero."""
+    for encoding, zeros, letters in (("utf-16-le", head[1::2], head[::2]), ("utf-16-be", head[::2], head[1::2])):
+        if len(zeros) > 8 and not any(zeros) and all(letters):
+            return encoding
+    return ""
+
+
+def _with_one_line_ending(source: Source, data: bytes) -> Source:
+    if source.start:
+        data = data[source.start :]
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n")
+        data = data.replace(b"\r", b"\n") if b"\r" in data else data
+    return replace(source, data=data, start=0)
+
+
+def read_bytes(path: Path, file: str) -> bytes | mmap.mmap:
+    """A file's bytes, mapped where they are many.
+
+    Raises
+    ------
+    ReadError
+        missing, unreadable or too_large.
+    """
+    try:
+        return read_or_map(path, LARGEST_FILE_BYTES, MAPPED_BYTES)
+    except FileNotFoundError as why:
+        raise ReadError(Problem("missing", "this file does not exist", file=file)) from why
+    except TooLargeError as why:
+        raise _too_large(why.size, LARGEST_FILE_BYTES, file) from why
+    except NotRegularError as why:
+        raise ReadError(Problem("not_a_file", "not a regular file", file=file)) from why
+    except OSError as why:
+        raise ReadError(replace(unexpected(why, "cannot be opened"), file=file)) from why
+
+
+def _too_large(size: int, limit: int, file: str) -> ReadError:
+    found, allowed = f"{size} bytes", f"at most {limit} bytes of this encoding"
+    return ReadError(Problem("too_large", "the file is too large", file=file, found=found, allowed=allowed))
+
+
+def _encoding_of_names(head: bytes) -> str:
+    """The code page in which more cells of the beginning are names of quantities than in cp1252, or ""."""
+    best, most = "", _names_in(head, "cp1252")
+    for encoding in _BY_NAMES:
+        if (found := _names_in(head, encoding)) > most:
+            best, most = encoding, found
+    return best
+
+
+def _names_in(head: bytes, encoding: str) -> int:
+    text = head.decode(encoding, errors="replace")
+    return sum(match_quantity(cell.strip()) is not None for cell in _CELL.findall(text) if not cell.isascii())
+
+
+def _narrow_encoding(raw: bytes | mmap.mmap) -> str:
+    looked_at = raw if isinstance(raw, bytes) else raw[:CHUNK_BYTES]
+    if looked_at.isascii():
+        return "ascii"
+    try:
+        looked_at[: looked_at.rfind(b"\n") + 1 or None].decode("utf-8")
+        return "utf-8"
+    except UnicodeDecodeError:
+        pass
+    if by_names := _encoding_of_names(looked_at[:HEAD_BYTES]):
+        return by_names
+    strange = looked_at.translate(None, delete=_ASCII)
+    try:
+        if set(strange.decode("cp1252")) <= _PLAUSIBLE:
+            return "cp1252"
+    except UnicodeDecodeError:
+        pass
+    from charset_normalizer import from_bytes
+
+    best = from_bytes(looked_at[:HEAD_BYTES]).best()
+    return best.encoding if best is not None else "cp1252"
+
+
+_CHUNK = 1 << 20
+_MOST_LISTED = 12
+_GZIP, _ZIP = b"\x1f\x8b", b"PK\x03\x04"
+_WORKBOOK_ENTRIES = {"[Content_Types].xml", "META-INF/manifest.xml"}
+_DAMAGED = (
+    zipfile.BadZipFile, gzip.BadGzipFile, NotImplementedError, EOFError, OSError, RuntimeError, ValueError, zlib.error,
+)  # fmt: skip
+
+
+class _Readable(Protocol):
+    def read(self, size: int, /) -> bytes: ...
+
+
+def export_bytes(path: Path, file: str) -> bytes | mmap.mmap:
+    """The bytes of an export, unpacked where it is in a .zip or .gz; PATH may go on into a .zip: ``a.zip/b.csv``.
+
+    Raises
+    ------
+    ReadError
+        missing, unreadable, too_large, bad_archive, encrypted, several_entries or unknown_entry.
+    """
+    archive, entry = split_entry(path)
+    raw = read_bytes(archive, file)
+    if raw[:4] == _ZIP and not is_workbook_archive(raw):
+        raw = _from_zip(raw, entry, file)
+    elif entry:
+        raise ReadError(Problem("missing", "this file does not exist", file=file))
+    if raw[:2] == _GZIP:
+        raw = _from_gzip(raw, file)
+    return raw
+
+
+def split_entry(path: Path) -> tuple[Path, str]:
+    """(archive, entry) where a parent of the path is a file; the path itself and "" otherwise."""
+    if not path.exists():
+        for parent in path.parents:
+            if parent.is_file():
+                return parent, path.relative_to(parent).as_posix()
+    return path, ""
+
+
+def entries_of(path: Path) -> tuple[str, ...]:
+    """Names of the files in a .zip of exports; nothing for any other file."""
+    try:
+        with path.open("rb") as stream:
+            if stream.read(4) != _ZIP:
+                return ()
+        with zipfile.ZipFile(path) as opened:
+            return () if _holds_workbook(opened) else tuple(e.filename for e in _files(opened))
+    except _DAMAGED:
+        return ()
+
+
+def is_workbook_archive(raw: bytes | mmap.mmap) -> bool:
+    """Whether a .zip is an .xlsx, .xlsb or .ods; one that cannot be listed counts as none."""
+    try:
+        with zipfile.ZipFile(_stream(raw)) as opened:
+            return _holds_workbook(opened)
+    except _DAMAGED:
+        return False
+
+
+def _holds_workbook(opened: zipfile.ZipFile) -> bool:
+    return bool(_WORKBOOK_ENTRIES & set(opened.namelist()))
+
+
+def _stream(raw: bytes | mmap.mmap) -> IO[bytes]:
+    if isinstance(raw, mmap.mmap):
+        raw.seek(0)
+        return raw  # type: ignore[return-value]
+    return io.BytesIO(raw)
+
+
+def _files(opened: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
+    """The entries that are files, those of the system that made the .zip left out."""
+    entries = [e for e in opened.infolist() if not e.is_dir() and not e.filename.startswith("__MACOSX/")]
+    return [e for e in entries if not e.filename.rpartition("/")[2].startswith(".")]
+
+
+def _from_zip(raw: bytes | mmap.mmap, wanted: str, file: str) -> bytes:
+    try:
+        last_record(raw[-LAST_BYTES:])
+        with zipfile.ZipFile(_stream(raw)) as opened:
+            entry = _chosen(_files(opened), wanted, file)
+            if entry.flag_bits & 1:
+                what, allowed = "this .zip is encrypted", "a .zip without a password, or the file unpacked"
+                raise ReadError(Problem("encrypted", what, file=file, found=entry.filename, allowed=allowed))
+            with opened.open(entry) as packed:
+                return _bounded(packed, file)
+    except _DAMAGED as why:
+        raise _bad(why, "zip", file) from why
+
+
+def _chosen(entries: list[zipfile.ZipInfo], wanted: str, file: str) -> zipfile.ZipInfo:
+    found = [e for e in entries if wanted in ("", e.filename)]
+    if len(found) == 1:
+        return found[0]
+    names = [e.filename for e in entries]
+    listed = ", ".join(names[:_MOST_LISTED]) + (", ..." if len(names) > _MOST_LISTED else "")
+    if not names:
+        raise ReadError(Problem("empty", "this .zip contains no files", file=file))
+    if wanted:
+        raise ReadError(Problem("unknown_entry", "this .zip has no such entry", file=file, allowed=f"one of {listed}"))
+    what = f"this .zip contains {len(names)} files"
+    allowed = f"one of them, given after the name of the .zip: {Path(file).name}/{names[0]}; here: {listed}"
+    raise ReadError(Problem("several_entries", what, file=file, allowed=allowed))
+
+
+def _from_gzip(raw: bytes | mmap.mmap, file: str) -> bytes:
+    try:
+        with gzip.GzipFile(fileobj=_stream(raw)) as packed:
+            return _bounded(packed, file)
+    except _DAMAGED as why:
+        raise _bad(why, "gz", file) from why
+
+
+def _bounded(packed: _Readable, file: str) -> bytes:
+    """Everything a stream holds, up to the limit: what an archive says of its own size is not relied on."""
+    found = bytearray()
+    while chunk := packed.read(_CHUNK):
+        found += chunk
+        if len(found) > MOST_UNPACKED_EXPORT_BYTES:
+            allowed = f"at most {MOST_UNPACKED_EXPORT_BYTES} bytes unpacked"
+            raise ReadError(Problem("too_large", "the file is too large", file=file, allowed=allowed))
+    return bytes(found)
+
+
+def _bad(why: Exception, kind: str, file: str) -> ReadError:
+    return ReadError(Problem("bad_archive", f"not a readable .{kind} ({why})", file=file))

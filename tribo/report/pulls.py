@@ -1,0 +1,233 @@
+"""Every pull of a campaign as a card of the page: a small picture of its trace and its results.
+
+Data for the script of the page: thinned traces with their results, and the points of the figures.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from tribo.comparison import study_lookup
+from tribo.comparison.oddness import ODD_SCORE, OddPull, oddness, standings
+from tribo.figures.thinning import thin_trace
+from tribo.records import ByHand, FloatArray, Pull, Study, Test, Trace
+from tribo.report.drawings import Series
+from tribo.report.shell import script_json
+from tribo.report.words.wording import by_hand_sentence, flags_in_words, odd_sentence
+from tribo.wording.numerals import significant, with_uncertainty
+
+WIDTH, HEIGHT = 180, 56
+PICTURE_BYTES = 1_200_000  # all pictures together, so that the page stays easy to send
+PULLS_A_PAGE = 2000  # more of them on one page are slow to open
+BY_HAND = ("peak_by_hand", "window_by_hand")
+
+
+@dataclass(frozen=True)
+class PullCard:
+    """One pull as shown on the page. ``state`` is used, moved or excluded; cards are sorted by ``oddness``."""
+
+    test_id: str
+    sample: str
+    specimen: str
+    load: str
+    state: str
+    static: str
+    sliding: str
+    zero: str
+    window: str
+    flags: tuple[str, ...]
+    odd: str
+    by_hand: str
+    oddness: float
+    order: int
+    picture: Markup
+
+    @property
+    def flags_in_words(self) -> str:
+        return flags_in_words(self.flags)
+
+
+def pull_cards(study: Study) -> list[PullCard]:
+    """Every pull that was read, highest outlier score first, including those excluded by hand."""
+    ingested = study.ingested
+    standing = standings(study)
+    levels = load_labels(study)
+    read = [t for t in ingested.campaign.tests if t.test_id in ingested.pulls or t.test_id in ingested.by_hand]
+    points = int(np.clip(PICTURE_BYTES / (9 * min(max(len(read), 1), PULLS_A_PAGE)), 24, 160))
+    read = [t for t in read if t.test_id in study.ingested.traces or t.test_id in study.ingested.by_hand]
+    cards = [_card(study, t, levels[t.test_id], standing.get(t.test_id), points) for t in read]
+    return sorted(cards, key=lambda card: (-card.oddness, card.test_id))
+
+
+def on_pages(cards: list[PullCard]) -> list[list[PullCard]]:
+    """The cards of each page. Where there are several pages, pulls with a decision by hand come first, so that the
+    first page holds all decisions."""
+    if len(cards) <= PULLS_A_PAGE:
+        return [cards]
+    ordered = sorted(cards, key=lambda card: card.state == "used")
+    return [ordered[k : k + PULLS_A_PAGE] for k in range(0, len(ordered), PULLS_A_PAGE)]
+
+
+def doubted_s(trace: Trace, pull: Pull) -> dict[float, tuple[str, ...]]:
+    """Times (s) of doubtful data points, each with the doubts."""
+    found: dict[float, tuple[str, ...]] = {}
+    for problem in dict.fromkeys((*trace.problems, *pull.problems)):
+        sample = -1 if problem.row is None else problem.row - trace.first_row
+        if 0 <= sample < len(trace.time_s) and math.isfinite(trace.time_s[sample]):
+            time = float(trace.time_s[sample])
+            found[time] = (*found.get(time, ()), problem.what)
+    return dict(sorted(found.items()))
+
+
+def load_labels(study: Study) -> dict[str, str]:
+    """The load level of every test in newton, as it is filtered by."""
+    tests = study.ingested.campaign.tests
+    levels = study_lookup.load_levels(np.array([t.normal_load_N for t in tests], float)) if tests else np.empty(0)
+    return {t.test_id: significant(float(level)) for t, level in zip(tests, levels, strict=True)}
+
+
+def reading(study: Study, test_id: str) -> tuple[Pull, Trace, ByHand | None]:
+    """The pull of a test (also if it is excluded), its trace and the decision made by hand."""
+    ingested = study.ingested
+    decided = ingested.by_hand.get(test_id)
+    if test_id in ingested.pulls:
+        return ingested.pulls[test_id], ingested.traces[test_id], decided
+    assert decided is not None
+    return decided.automatic, decided.trace, decided
+
+
+def _card(study: Study, test: Test, load: str, standing: OddPull | None, points: int) -> PullCard:
+    pull, trace, decided = reading(study, test.test_id)
+    used = test.test_id in study.ingested.pulls
+    start, end = pull.window_s
+    flags = tuple(flag for flag in pull.flags if flag not in BY_HAND)
+    return PullCard(
+        test.test_id,
+        test.sample,
+        test.specimen,
+        load,
+        "excluded" if not used else "moved" if decided else "used",
+        with_uncertainty(pull.static_N, pull.static_u_N),
+        with_uncertainty(pull.sliding_N, pull.sliding_u_N),
+        significant(pull.zero_N, 2),
+        f"{significant(start)} to {significant(end)}",
+        flags,
+        odd_sentence(standing) if standing is not None and abs(standing.score) > ODD_SCORE else "",
+        by_hand_sentence(decided, pull if used else None) if decided is not None else "",
+        round(oddness(standing, flags), 2),
+        test.run_order or 0,
+        trace_picture(trace, pull, points),
+    )
+
+
+def trace_picture(trace: Trace, pull: Pull, points: int = 120) -> Markup:
+    """A small SVG of a trace, its zero subtracted: a line at zero, a shaded window with its mean, a dot at the peak.
+
+    Notches from above point at samples with a doubt.
+    """
+    time, force = thin_trace(trace.time_s, trace.force_N - pull.zero_N, points)
+    time, force = time[np.isfinite(force)], force[np.isfinite(force)]
+    if len(force) < 2 or time[-1] <= time[0]:
+        return Markup("")
+    low, high = min(0.0, float(force.min())), float(np.nanmax([*force, pull.static_N, 1e-12]))
+
+    def x(t: float | np.ndarray) -> np.ndarray:
+        return np.asarray((t - time[0]) / (time[-1] - time[0]) * WIDTH)
+
+    def y(f: float | np.ndarray) -> np.ndarray:
+        return np.asarray(3 + (high - f) / (high - low) * (HEIGHT - 6))
+
+    marks = f'<path class="z" d="M0 {y(0.0):.1f}H{WIDTH}"/>'
+    if all(map(math.isfinite, (*pull.window_s, pull.sliding_N))):
+        start, end = x(pull.window_s[0]), x(pull.window_s[1])
+        marks += f'<path class="b" d="M{start:.0f} 0H{end:.0f}V{HEIGHT}H{start:.0f}z"/>'
+    marks += '<path d="M' + "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(x(time), y(force), strict=True)) + '"/>'
+    if all(map(math.isfinite, (*pull.window_s, pull.sliding_N))):
+        marks += f'<path class="w" d="M{start:.0f} {y(pull.sliding_N):.1f}H{end:.0f}"/>'
+    if math.isfinite(pull.peak_s) and math.isfinite(pull.static_N):
+        marks += f'<circle class="k" cx="{x(pull.peak_s):.0f}" cy="{y(pull.static_N):.1f}" r="2.6"/>'
+    doubts = "".join(f"M{x(t):.0f} 0v7" for t in doubted_s(trace, pull))
+    marks += f'<path class="d" d="{doubts}"/>' if doubts else ""
+    view = f'viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}"'
+    return Markup(f'<svg class="trace" aria-hidden="true" {view}>{marks}</svg>')
+
+
+TRACE_BYTES = 2_000_000  # all traces together
+FULL_SCALE = 65535
+
+
+def trace_data(study: Study, test_ids: Iterable[str]) -> Markup:
+    """JSON by test id of the thinned traces and the readings, for a script element of its own."""
+    wanted = list(test_ids)
+    points = int(np.clip(TRACE_BYTES / (5.4 * max(len(wanted), 1)), 100, 1000))
+    return script_json({test_id: _pull_record(study, test_id, points) for test_id in wanted})
+
+
+def _pull_record(study: Study, test_id: str, points: int) -> dict[str, Any]:
+    pull, trace, decided = reading(study, test_id)
+    record = _trace_record(trace, pull, points) | _marks(pull)
+    doubts = doubted_s(trace, pull)
+    if doubts:
+        record["doubts"] = [[_short(time), "; ".join(what)] for time, what in doubts.items()]
+    if decided is not None:
+        override = decided.override
+        record["automatic"] = _marks(decided.automatic)
+        record["decided"] = {
+            "action": override.action, "reason": override.reason, "peak": override.peak_s, "window": override.window_s,
+        }  # fmt: skip
+    return record
+
+
+def _trace_record(trace: Trace, pull: Pull, points: int) -> dict[str, Any]:
+    """Times and forces (zero subtracted) as 16-bit shares of their ranges: finer than any screen."""
+    time, force = thin_trace(trace.time_s, trace.force_N - pull.zero_N, points)
+    good = np.isfinite(force) & np.isfinite(time)
+    time, force = (time[good], force[good]) if good.any() else (np.zeros(1), np.zeros(1))
+    t, f = _packed(time), _packed(force)
+    return {"t": t, "f": f, "whole": bool(len(time) == len(trace.time_s))}
+
+
+def _packed(values: FloatArray) -> dict[str, Any]:
+    low, high = float(values.min()), float(values.max())
+    share = (values - low) / (high - low) if high > low else np.zeros_like(values)
+    data = np.round(share * FULL_SCALE).astype("<u2").tobytes()
+    return {"low": _short(low), "high": _short(high), "data": base64.b64encode(data).decode("ascii")}
+
+
+def _marks(pull: Pull) -> dict[str, Any]:
+    return {
+        "peak": [_short(pull.peak_s), _short(pull.static_N)],
+        "window": [_short(t) for t in pull.window_s],
+        "sliding": _short(pull.sliding_N),
+        "zero": _short(pull.zero_N),
+    }
+
+
+def _short(value: float) -> float | None:
+    return float(f"{value:.6g}") if math.isfinite(value) else None
+
+
+def figure_data(series: Mapping[str, Iterable[Series]]) -> Markup:
+    """JSON by figure name of the points someone may hover over: place on the page in points, and values."""
+    return script_json(
+        {
+            name: [
+                {
+                    "name": s.name,
+                    "x": s.x,
+                    "y": s.y,
+                    "place": [float(f"{v:.1f}") for v in s.place.ravel()],
+                    "value": [float(f"{v:.4g}") for v in s.value.ravel()],
+                }
+                for s in found
+            ]
+            for name, found in series.items()
+        }
+    )

@@ -1,0 +1,325 @@
+"""The tables of a study as data frames and CSV files. Units end the column names; NaN is an empty cell.
+
+The numbers of a diagnosis as CSV: every test beside the models, and every layer and misfit with its percentages.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from tribo.comparison.agreement import ratios
+from tribo.files import write_text
+from tribo.records import CombinedFit, LawFit, Pull, SetAside, Study, Test
+from tribo.user_text import for_spreadsheet
+
+if TYPE_CHECKING:
+    from tribo.diagnostics import Diagnosis
+
+
+FLOAT_FORMAT = "%.8g"
+PA_PER_KPA = 1e3
+_PER_AREA = (
+    "tau0_kPa", "tau0_u_kPa", "cov", "tau0_low_kPa", "tau0_high_kPa", "tau0_u_combined_kPa", "cov_combined",
+    "tau0_combined_low_kPa", "tau0_combined_high_kPa",
+)  # fmt: skip
+TESTS_COLUMNS = [
+    "test_id", "static_N", "static_u_N", "sliding_N", "sliding_u_N", "rule", "window", "zero_N", "flags",
+    "set_aside", "sample", "specimen", "normal_load_N", "peak_s", "onset_s", "window_start_s", "window_end_s",
+    "zero_u_N", "rise_N_per_s", "rise_stiffness_N_per_m", "stick_slip_amplitude_N", "stick_slip_period_s", "noise_N",
+    "drift_N_per_s", "direction", "speed_m_s", "hold_s", "repeat", "run_order", "specimen_run", "started_at",
+    "temperature_C", "humidity_pct", "operator", "file", "doubts", "zero_rule", "first_maximum_N", "highest_N",
+    "first_drop_N", "recorded_load_N", "recorded_load_u_N", "regime", "cycles", "stick_peak_N", "stick_peak_u_N",
+    "stick_trough_N", "stick_trough_u_N", "stick_drop_N", "stick_drop_u_N", "stick_period_s", "stick_period_u_s",
+    "loading_N_per_s", "loading_u_N_per_s", "stuck_share", "stuck_share_u", "restarts", "restart_N", "restart_u_N",
+    "restart_hold_s",
+]  # fmt: skip
+RESTARTS_COLUMNS = [
+    "test_id", "sample", "specimen", "normal_load_N", "restart", "hold_s", "stop_s", "peak_s", "static_N", "static_u_N",
+    "sliding_N", "sliding_u_N",
+]  # fmt: skip
+FITS_COLUMNS = [
+    "sample", "regime", "mu", "mu_u", "tau0_kPa", "tau0_u_kPa", "cov", "n_specimens", "n_tests", "method",
+    "chi2_red", "law", "dof", "mu_low", "mu_high", "tau0_low_kPa", "tau0_high_kPa", "notes", "T0_N", "T0_u_N",
+    "mu_u_combined", "tau0_u_combined_kPa", "cov_combined", "mu_combined_low", "mu_combined_high",
+    "tau0_combined_low_kPa", "tau0_combined_high_kPa", "T0_u_combined_N", "largest_mu", "largest_tau0",
+]  # fmt: skip
+COMPARISON_COLUMNS = [
+    "sample", "regime", "normal_load_N", "measured_N", "measured_u_N", "simulated_N", "simulated_u_N",
+    "ratio", "ratio_low", "ratio_high",
+]  # fmt: skip
+_READINGS = [
+    "static_N", "static_u_N", "sliding_N", "sliding_u_N", "rule", "zero_N", "peak_s", "onset_s", "zero_u_N",
+    "rise_N_per_s", "rise_stiffness_N_per_m", "stick_slip_amplitude_N", "stick_slip_period_s", "noise_N",
+    "drift_N_per_s", "zero_rule", "first_maximum_N", "highest_N", "first_drop_N", "recorded_load_N",
+    "recorded_load_u_N",
+]  # fmt: skip
+_CONDITIONS = [
+    "sample", "specimen", "normal_load_N", "direction", "speed_m_s", "hold_s", "repeat", "run_order",
+    "specimen_run", "started_at", "temperature_C", "humidity_pct", "operator", "file",
+]  # fmt: skip
+
+
+def all_set_aside(study: Study) -> dict[str, SetAside]:
+    """Every test that takes no part, by its id: faulty rows of tests.csv and exports that fail."""
+    ingested = study.ingested
+    return {fault.test_id: fault for fault in (*ingested.campaign.set_aside, *ingested.set_aside)}
+
+
+def tests_table(study: Study) -> pd.DataFrame:
+    """One row per test in the order of the campaign, used or set aside; its own covariates come last."""
+    ingested = study.ingested
+    aside = all_set_aside(study)
+    doubts = {doubted.test_id: doubted.reason for doubted in ingested.doubts()}
+    placed = [
+        (
+            t.row,
+            _test_row(t, ingested.pulls.get(t.test_id), aside.pop(t.test_id, None))
+            | {"doubts": doubts.get(t.test_id, "")},
+        )
+        for t in ingested.campaign.tests
+    ]
+    placed += [(_faulty_row(fault), {"test_id": fault.test_id, "set_aside": fault.reason}) for fault in aside.values()]
+    rows = [row for _, row in sorted(placed, key=lambda item: math.inf if item[0] is None else item[0])]
+    return pd.DataFrame(rows, columns=[*TESTS_COLUMNS, *covariates(study)])
+
+
+def covariates(study: Study) -> list[str]:
+    """Columns of tests.csv that tribo does not know and keeps as they are."""
+    found = dict.fromkeys(name for t in study.ingested.campaign.tests for name in t.covariates)
+    return [name for name in found if name not in TESTS_COLUMNS]
+
+
+def _faulty_row(fault: SetAside) -> int | None:
+    """The row of tests.csv that a test set aside before its export was read stands in, where it is known."""
+    return next((p.row for p in fault.problems if p.row is not None), None)
+
+
+def _test_row(test: Test, pull: Pull | None, fault: SetAside | None) -> dict[str, object]:
+    row: dict[str, object] = {**test.covariates, "test_id": test.test_id}
+    row |= {name: getattr(test, name) for name in _CONDITIONS}
+    row["set_aside"] = fault.reason if fault is not None else ""
+    if pull is not None:
+        start, end = pull.window_s
+        row |= {name: getattr(pull, name) for name in _READINGS}
+        row |= {"window": f"{start:.6g}:{end:.6g}", "window_start_s": start, "window_end_s": end}
+        row["flags"] = ";".join(pull.flags)
+        row |= _oscillation_cells(pull) | _restart_cells(pull)
+    return row
+
+
+def _oscillation_cells(pull: Pull) -> dict[str, object]:
+    """How the force varies while sliding; a steady or irregular one has no cycles to report."""
+    found = pull.oscillation
+    if found is None:
+        return {}
+    named = {name: getattr(found, name) for name in ("regime", "cycles", "loading_N_per_s", "loading_u_N_per_s")}
+    named |= {"stuck_share": found.stuck_share, "stuck_share_u": found.stuck_share_u}
+    for name in ("peak", "trough", "drop"):
+        named |= {f"stick_{name}_N": getattr(found, f"{name}_N"), f"stick_{name}_u_N": getattr(found, f"{name}_u_N")}
+    return named | {"stick_period_s": found.period_s, "stick_period_u_s": found.period_u_s}
+
+
+def _restart_cells(pull: Pull) -> dict[str, object]:
+    """The number of restarts, and the first of them; all are in restarts.csv."""
+    if not pull.restarts:
+        return {}
+    first = pull.restarts[0]
+    found = {"restart_N": first.static_N, "restart_u_N": first.static_u_N, "restart_hold_s": first.hold_s}
+    return {"restarts": len(pull.restarts), **found}
+
+
+def restarts_table(study: Study) -> pd.DataFrame:
+    """One row per restart after a stop of the drive, with the time it stood still."""
+    pulls = study.ingested.pulls
+    rows = [
+        {name: getattr(test, name) for name in RESTARTS_COLUMNS[:4]} | {"restart": number} | vars(restart)
+        for test in study.ingested.campaign.tests
+        if test.test_id in pulls
+        for number, restart in enumerate(pulls[test.test_id].restarts, start=1)
+    ]
+    return pd.DataFrame(rows, columns=RESTARTS_COLUMNS)
+
+
+def fits_table(fits: Iterable[LawFit], combined: Iterable[CombinedFit] = ()) -> pd.DataFrame:
+    """mu and tau0 (kPa) of every fit; ``cov`` is cov(mu, tau0) in kPa, ``*_low`` to ``*_high`` 95 %.
+
+    ``*_u``, ``*_low`` and ``*_high`` are of specimens and repeats alone; those of ``combined`` include the instrument.
+    """
+    by = {(fit.sample, fit.regime): fit for fit in combined}
+    laws = [fit for fit in fits if "tau0_Pa" in fit.parameters]
+    rows = [_fit_row(fit) | _without_area(_combined_cells(by.get((fit.sample, fit.regime))), fit) for fit in laws]
+    return pd.DataFrame(rows, columns=FITS_COLUMNS)
+
+
+def _combined_cells(fit: CombinedFit | None) -> dict[str, object]:
+    if fit is None:
+        return {}
+    low, high = (v / PA_PER_KPA for v in fit.interval("tau0_Pa"))
+    mu_low, mu_high = fit.interval("mu")
+    tau0_u = fit.standard_uncertainty("tau0_Pa")
+    return {
+        "mu_u_combined": fit.standard_uncertainty("mu"), "tau0_u_combined_kPa": tau0_u / PA_PER_KPA,
+        "cov_combined": float(fit.covariance[0, 1]) / PA_PER_KPA, "mu_combined_low": mu_low,
+        "mu_combined_high": mu_high, "tau0_combined_low_kPa": low, "tau0_combined_high_kPa": high,
+        "T0_u_combined_N": tau0_u * fit.nominal_area_m2, "largest_mu": fit.largest["mu"][0],
+        "largest_tau0": fit.largest["tau0_Pa"][0],
+    }  # fmt: skip
+
+
+def _without_area(cells: dict[str, object], fit: LawFit) -> dict[str, object]:
+    return cells if fit.has_area else cells | dict.fromkeys(_PER_AREA, float("nan"))
+
+
+def _fit_row(fit: LawFit) -> dict[str, object]:
+    mu, tau0 = fit.parameters.index("mu"), fit.parameters.index("tau0_Pa")
+    mu_low, mu_high = fit.interval("mu")
+    tau0_low, tau0_high = fit.interval("tau0_Pa")
+    area = fit.nominal_area_m2
+    row = {
+        "sample": fit.sample,
+        "regime": fit.regime,
+        "mu": fit.value("mu"),
+        "mu_u": fit.standard_uncertainty("mu"),
+        "tau0_kPa": fit.value("tau0_Pa") / PA_PER_KPA,
+        "tau0_u_kPa": fit.standard_uncertainty("tau0_Pa") / PA_PER_KPA,
+        "cov": float(fit.covariance[mu, tau0]) / PA_PER_KPA,
+        "n_specimens": fit.n_specimens,
+        "n_tests": fit.n_tests,
+        "method": fit.method,
+        "chi2_red": fit.chi2_red,
+        "law": fit.law,
+        "dof": fit.dof,
+        "mu_low": mu_low,
+        "mu_high": mu_high,
+        "tau0_low_kPa": tau0_low / PA_PER_KPA,
+        "tau0_high_kPa": tau0_high / PA_PER_KPA,
+        "notes": "; ".join(fit.notes),
+        "T0_N": fit.value("tau0_Pa") * area,
+        "T0_u_N": fit.standard_uncertainty("tau0_Pa") * area,
+    }
+    return _without_area(row, fit)
+
+
+def other_fits_table(study: Study) -> pd.DataFrame:
+    """The data under other weights or laws, and the model's own fits: one row per parameter, SI units."""
+    simulated = study.comparison.simulated if study.comparison is not None else ()
+    labelled = [("measured", f) for f in study.other_fits] + [("simulated", f) for f in simulated]
+    rows = [
+        (
+            source,
+            f.sample,
+            f.regime,
+            f.law,
+            f.method,
+            name,
+            f.value(name),
+            f.standard_uncertainty(name),
+            *f.interval(name),
+            f.dof,
+            f.n_specimens,
+            f.n_tests,
+            f.chi2_red,
+        )
+        for source, f in labelled
+        for name in f.parameters
+    ]
+    columns = ["source", "sample", "regime", "law", "method", "parameter", "value", "u", "low", "high"]
+    return pd.DataFrame(rows, columns=[*columns, "dof", "n_specimens", "n_tests", "chi2_red"])
+
+
+def comparison_table(study: Study) -> pd.DataFrame:
+    """Measured and simulated force at each load; ``ratio`` is measured over simulated, with 95 %."""
+    if study.comparison is None:
+        return pd.DataFrame(columns=COMPARISON_COLUMNS)
+    rows = pd.DataFrame([vars(row) for row in study.comparison.rows], columns=COMPARISON_COLUMNS[:7])
+    beside = ratios(study).drop(columns="sample_number")
+    return rows.merge(beside, on=["sample", "regime", "normal_load_N"], how="left", validate="1:1")
+
+
+def to_csv(table: pd.DataFrame) -> str:
+    """CSV text, the same for the same table on every machine; texts that a spreadsheet would take for formulas escaped.
+
+    See :func:`tribo.user_text.for_spreadsheet`.
+    """
+    table = table.rename(columns=lambda name: for_spreadsheet(str(name)))
+    for name in table.select_dtypes(exclude="number"):
+        table[name] = [for_spreadsheet(cell) if isinstance(cell, str) else cell for cell in table[name]]
+    for name in table.select_dtypes("float"):
+        table[name] = table[name].replace(-0.0, 0.0).where(np.isfinite(table[name]) | table[name].isna(), np.nan)
+    return str(table.to_csv(index=False, float_format=FLOAT_FORMAT, lineterminator="\n"))
+
+
+def write_tables(study: Study, out: Path) -> list[Path]:
+    """tests.csv, and fits, other_fits, budget, differences and comparison as far as the study went."""
+    tables = {"tests.csv": tests_table(study)}
+    if not (restarts := restarts_table(study)).empty:
+        tables["restarts.csv"] = restarts
+    if study.fits:
+        tables["fits.csv"] = fits_table(study.fits, study.combined)
+        tables["other_fits.csv"] = other_fits_table(study)
+    if study.laws is not None and not study.laws.empty:
+        tables["laws.csv"] = study.laws
+    if study.dependence is not None and not study.dependence.empty:
+        tables["dependence.csv"] = study.dependence
+    if study.budget is not None:
+        tables["budget.csv"] = study.budget
+    if study.differences is not None:
+        tables["differences.csv"] = study.differences
+    if study.comparison is not None:
+        tables["comparison.csv"] = comparison_table(study)
+    return [write_text(out / name, to_csv(table)) for name, table in tables.items()]
+
+
+LAYERS_COLUMNS = [
+    "kind", "name", "samples", "regimes", "effect_percent", "low", "high", "p_adjusted", "at", "tied_with", "formula",
+    "log_score_gain", "log_score_gain_se", "rmse_percent_before", "rmse_percent_after",
+]  # fmt: skip
+
+
+def write_diagnosis_tables(diagnosis: Diagnosis, out: Path) -> list[Path]:
+    """OUT/diagnosis.csv, one row per test and regime, and OUT/layers.csv, one row per layer and misfit."""
+    from tribo.diagnostics import residual_table
+
+    tables = {"diagnosis.csv": residual_table(diagnosis), "layers.csv": layers_table(diagnosis.verdict.as_dict())}
+    return [write_text(out / name, to_csv(table)) for name, table in tables.items()]
+
+
+def layers_table(verdict: Mapping[str, Any]) -> pd.DataFrame:
+    """Pattern corrections, causes, laws, remainders, misfits and the gain of the verdict, with their percentages."""
+    import pandas as pd
+
+    rows = [_of_layer(layer) for layer in verdict["layers"]] + [_of_misfit(m) for m in verdict["misfits"]]
+    if verdict["gain"]:
+        rows.append({"kind": "gain", "name": verdict["gain"]["held_out"], **_gain(verdict["gain"])})
+    simulated = (verdict.get("model") or {}).get("simulated") or {}
+    if "rms_percent_before" in simulated:
+        rows += [
+            {"kind": "rms", "name": name, "effect_percent": simulated[f"rms_percent_{name}"]}
+            for name in ("before", "law", "simulated")
+        ]
+    return pd.DataFrame(rows, columns=LAYERS_COLUMNS)
+
+
+def _of_layer(layer: Mapping[str, Any]) -> dict[str, Any]:
+    own = {name: layer[name] for name in ("kind", "name", "effect_percent", "low", "high", "p_adjusted", "formula")}
+    lists = {name: ";".join(layer[name]) for name in ("samples", "regimes", "tied_with")}
+    return own | lists | {"at": layer.get("at", "")} | _gain(layer.get("gain"))
+
+
+def _of_misfit(misfit: Mapping[str, Any]) -> dict[str, Any]:
+    own = {name: misfit.get(name) for name in ("effect_percent", "low", "high", "p_adjusted")}
+    where = {"name": misfit["covariate"], "samples": misfit["sample"], "regimes": misfit["observable"]}
+    return {"kind": "misfit"} | where | own
+
+
+def _gain(gain: Mapping[str, Any] | None) -> dict[str, Any]:
+    if not gain:
+        return {}
+    rmse = {name: gain[name] for name in ("rmse_percent_before", "rmse_percent_after")}
+    return {"log_score_gain": gain["difference"], "log_score_gain_se": gain["se"]} | rmse

@@ -1,1 +1,0 @@
-"""The engines of the spring-block model: fast, dense and reference, and the compiled loops they run."""

@@ -1,0 +1,335 @@
+"""`tribo build`: from a folder of campaigns to a site of reports, by the Snakemake workflow in pipelines/.
+
+A site holds ``current`` (the outputs of each campaign and the index page), ``builds`` (dated copies), ``latest`` (a
+link to the newest) and ``.tribo`` (records of steps, logs, the lock).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from tribo.cache.kept_results import package_sources
+from tribo.cache.own_folder import STATE, WAIT, check_site, is_leftover, only_writer
+from tribo.dry_run import Checked, check
+from tribo.errors import Problem, TriboError
+from tribo.files import found_below, found_in, text_of, write_text
+from tribo.site.history import collect_laws
+from tribo.site.scan import CURRENT, Dropped, clear_unfinished, date_build, difference, scan
+from tribo.site.steps import OF_A_REPORT, inputs_of, read_record
+from tribo.site.workflow import Progress, run_workflow
+from tribo.stages import StudyOptions, Weights
+from tribo.temporary import PREFIX, clear_abandoned, place_of_temporary_files
+from tribo.traces.evaluation import named_rule
+from tribo.user_text import well_formed
+
+GONE = "report.html has been deleted"
+PROFILES = ("local", "slurm")
+_BLOCKS = re.compile(r"(?m)^(?=\[|\s*$)")  # Snakemake says one thing after a blank line or a date in brackets
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+class BuildError(TriboError):
+    """The workflow itself could not run, or a step failed in a way that is no fault of the input."""
+
+
+@dataclass(frozen=True)
+class BuildOptions:
+    """What a build may choose: ``settle_s`` is how long a file must rest, ``keep`` how many dated copies stay."""
+
+    rule: str = "seed"
+    weights: Weights = "relative"
+    flat: str = ""  # as --flat of the commands
+    runs: int = 4
+    seed: int = 0
+    scheduler: str | None = None
+    jobs: int = 2
+    profile: str = "local"
+    settle_s: float = 60.0
+    keep: int = 10
+    wait_s: float = 0.0
+    force: bool = False  # also into a folder that holds files of others
+
+    def of_commands(self) -> dict[str, str]:
+        """Options of the commands of the workflow, and all of them in words for what a step is made from."""
+        fit = ["--rule", self.rule, "--weights", self.weights, "--seed", str(self.seed)]
+        flat = ["--flat", self.flat] if self.flat else []
+        model = [*fit, *flat, "--runs", str(self.runs)]
+        where = ["--scheduler", self.scheduler] if self.scheduler else []
+        diagnosis = ["--rule", self.rule, "--seed", str(self.seed), *flat]
+        parts = {"fit": fit, "model": [*model, *where], "diagnose": diagnosis, "words": model}
+        return {name: shlex.join(words) for name, words in parts.items()}
+
+    def of_study(self, overrides: Path | None) -> StudyOptions:
+        """The same as options of a study of one campaign."""
+        return StudyOptions(
+            rule=self.rule, weights=self.weights, flat=self.flat, runs=self.runs, seed=self.seed, jobs=self.jobs,
+            overrides=overrides,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Watch:
+    """What is told of a build while it works: ``steps`` how far it is, ``checks`` the exports read by a dry run."""
+
+    steps: Callable[[Progress], None] = lambda progress: None
+    checks: Callable[[str, int, int], None] = lambda stage, done, total: None
+
+
+UNWATCHED = Watch()
+
+
+@dataclass(frozen=True)
+class Built:
+    """How a build ended: campaigns by name with what was due and why, those left waiting, and the dated copy."""
+
+    site: Path
+    due: Mapping[str, str]
+    waiting: Mapping[str, tuple[str, ...]]
+    status: Mapping[str, str] = field(default_factory=dict)
+    steps: tuple[str, ...] = ()
+    dated: Path | None = None
+    checked: Mapping[str, Checked] = field(default_factory=dict)  # of a dry run: what each campaign would meet
+    refused: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # why a campaign cannot be built as it is
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same as plain types."""
+        return {
+            "site": str(self.site), "due": dict(self.due), "waiting": {k: list(v) for k, v in self.waiting.items()},
+            "status": dict(self.status), "steps": list(self.steps), "dated": str(self.dated) if self.dated else None,
+            "checked": {name: found.as_record() for name, found in self.checked.items()},
+            "refused": {name: list(why) for name, why in self.refused.items()},
+        }  # fmt: skip
+
+
+def workflow_dir() -> Path:
+    """Folder of the Snakefile: ``tribo/_pipelines`` of an installed wheel, ``pipelines`` of a source checkout."""
+    for folder in (_PACKAGE / "_pipelines", _PACKAGE.parent / "pipelines"):
+        if (folder / "Snakefile").is_file():
+            return folder
+    raise BuildError(Problem("missing_workflow", "this installation lacks pipelines/Snakefile; install tribo again"))
+
+
+def build_site(
+    drop: Path, site: Path, options: BuildOptions, *, dry_run: bool = False, watch: Watch = UNWATCHED
+) -> Built:
+    """Bring the site up to date with a folder of campaigns; with ``dry_run`` only check what would be built.
+
+    A dry run lists the steps with their reasons, and opens every export of the campaigns that are due.
+
+    Raises
+    ------
+    BusyError
+        Another build of this site is running.
+    CampaignError
+        The drop folder cannot be used; the site is, holds or lies in it, or holds files that tribo has not written.
+    TraceError
+        The rule is not known.
+    BuildError
+        Snakemake is missing, or a step failed other than by unusable input; everything else is built.
+    """
+    if find_spec("snakemake") is None:
+        what, allowed = "tribo build requires snakemake", "pip install 'tribo[pipelines]'"
+        raise BuildError(Problem("missing_package", what, allowed=allowed))
+    named_rule(options.rule, None)
+    check_site(site, drop, options.force)
+    state = site.resolve() / STATE
+    if dry_run:
+        return _planned(drop, state, options, watch)
+    busy = Problem("busy", f"another build of this site is running; {WAIT}", file=str(site))
+    with only_writer(state / "lock", options.wait_s, lasting=True, busy=busy) as descriptor:
+        _clear_leftovers(state)
+        return _built(drop, state, options, watch, descriptor)
+
+
+def _clear_leftovers(state: Path) -> None:
+    """Remove what a killed build has left; the folders of reports are cleared by the steps that write into them."""
+    site = state.parent
+    for path in (*found_below(state, ".*"), *found_in(site, ".*"), *found_in(site / CURRENT, ".*")):
+        if is_leftover(path.name) and path.is_file():
+            path.unlink()
+    clear_unfinished(site)
+    clear_abandoned(place_of_temporary_files(), PREFIX)
+
+
+def _planned(drop: Path, state: Path, options: BuildOptions, watch: Watch) -> Built:
+    """What a build would do, and what it would meet in the campaigns that are due."""
+    found, ready, due = _due(drop, state / "dry-run", options)
+    config = _configuration(found, ready, state / "dry-run.json", options)
+    said = _snakemake(state, config, options, ("--dry-run", *_forced(due, state)), None, UNWATCHED)
+    if said.returncode:
+        raise BuildError(_failures(state, said.stdout))
+    checked = {c.name: _checked(c, options, watch) for c in found if c.name in due}
+    status = {c.name: "unusable" if c.refused else _status(c.name, state) for c in found if c.name not in due}
+    status |= {name: "unusable" if look.faults else "to be built" for name, look in checked.items()}
+    return Built(
+        state.parent, due, _waiting(found), status, tuple(planned_steps(said.stdout)), checked=checked,
+        refused=_refused(found),
+    )  # fmt: skip
+
+
+def _checked(campaign: Dropped, options: BuildOptions, watch: Watch) -> Checked:
+    def progress(stage: str, done: int, total: int) -> None:
+        watch.checks(f"{campaign.name}: {stage}", done, total)
+
+    return check(campaign.path, options.of_study(campaign.overrides), "report", progress=progress)
+
+
+def _due(
+    drop: Path, inputs: Path, options: BuildOptions
+) -> tuple[tuple[Dropped, ...], dict[str, Any], dict[str, str]]:
+    """The campaigns of a drop folder, what the workflow needs to know of each, and which are to be built and why."""
+    found, ready = inputs_of(scan(drop.resolve(), options.settle_s), inputs)
+    return found, ready, {c.name: why for c in found if c.is_ready and (why := _why_due(c, inputs.parent, options))}
+
+
+def _waiting(found: Sequence[Dropped]) -> dict[str, tuple[str, ...]]:
+    return {c.name: c.waiting for c in found if c.waiting}
+
+
+def _refused(found: Sequence[Dropped]) -> dict[str, tuple[str, ...]]:
+    return {c.name: c.refused for c in found if c.refused}
+
+
+def _built(drop: Path, state: Path, options: BuildOptions, watch: Watch, descriptor: int | None) -> Built:
+    found, ready, due = _due(drop, state / "inputs", options)
+    config = _configuration(found, ready, state / "build.json", options)
+    said = _snakemake(state, config, options, _forced(due, state), descriptor, watch)
+    write_text(state / "log" / "snakemake.log", said.stdout)
+    collect_laws(state.parent / CURRENT, state)
+    dated = date_build(state.parent, options.keep)
+    if said.returncode:
+        raise BuildError(_failures(state, said.stdout))
+    status = {c.name: "unusable" if c.refused else _status(c.name, state) for c in found}
+    return Built(
+        state.parent, due, _waiting(found), status, tuple(planned_steps(said.stdout)), dated, refused=_refused(found)
+    )
+
+
+def _why_due(campaign: Dropped, state: Path, options: BuildOptions) -> str:
+    """Why a campaign is to be built, in words; empty where its report is of exactly these files and options."""
+    record = read_record(state / "steps" / campaign.name / "report.json", *OF_A_REPORT, "files")
+    if record is None:
+        started = (state / "steps" / campaign.name).is_dir()
+        return "not finished in an earlier build" if started else "new"
+    changed = difference(record["files"], campaign.files)
+    if changed:
+        return changed
+    if _report_is_gone(campaign.name, record, state):
+        return GONE
+    same = record["digest"] == step_digest(campaign.digest, options)
+    return "" if same else "options or code of tribo changed"
+
+
+def _forced(due: Mapping[str, str], state: Path) -> tuple[str, ...]:
+    """Reports that Snakemake would not miss: gone ones, and records lost behind an index that is there."""
+    if not (state / "index.json").is_file():
+        return ()
+    records = {name: f"steps/{name}/report.json" for name in due}
+    lost = [r for name, r in records.items() if due[name] == GONE or not (state / r).is_file()]
+    return ("--forcerun", *lost) if lost else ()
+
+
+def _report_is_gone(name: str, record: Mapping[str, Any], state: Path) -> bool:
+    return record["status"] != "unusable" and not (state.parent / CURRENT / name / "report.html").is_file()
+
+
+def step_digest(digest: str, options: BuildOptions) -> str:
+    """What every step of a campaign is made from, as one text: contents, sources of tribo, options."""
+    return f"{digest} {package_sources()} {options.of_commands()['words']}"
+
+
+def _configuration(found: Sequence[Dropped], ready: Mapping[str, Any], file: Path, options: BuildOptions) -> Path:
+    """Write what the workflow needs to know; returns the file."""
+    campaigns = {
+        c.name: {"path": well_formed(str(c.path)), "waiting": list(c.waiting), "refused": list(c.refused)}
+        for c in found
+    }
+    listing = json.dumps([campaigns, {n: r["digest"] for n, r in ready.items()}, step_digest("", options)])
+    config = {
+        "ready": ready,
+        "campaigns": campaigns,
+        "digest": hashlib.sha256(listing.encode()).hexdigest(),
+        "options": options.of_commands(),
+        "sources": package_sources(),
+        "python": sys.executable,
+        "threads": options.jobs,
+    }
+    return write_text(file, json.dumps(config, indent=1) + "\n")
+
+
+def _snakemake(
+    state: Path, config: Path, options: BuildOptions, more: Sequence[str], descriptor: int | None, watch: Watch
+) -> subprocess.CompletedProcess[str]:
+    """Run the workflow; the lock of the site is what keeps two apart, so that Snakemake needs none of its own.
+
+    Neither Python nor Snakemake takes modules or settings from the folder that the build happens to start in.
+    """
+    folder = workflow_dir()
+    profile = folder / "profiles" / options.profile if options.profile in PROFILES else Path(options.profile)
+    command = [
+        sys.executable, "-P", "-m", "snakemake", "--snakefile", str(folder / "Snakefile"), "--directory", str(state),
+        "--configfile", str(config), "--profile", str(profile.resolve()), "--workflow-profile", "none",
+        "--cores", str(options.jobs), "--nolock", "--nocolor", *more,
+    ]  # fmt: skip
+    return run_workflow(command, state, descriptor, watch.steps)
+
+
+def planned_steps(said: str) -> list[str]:
+    """Each job that Snakemake names in what it says, with its reason: "fit (a): Params have changed ..."."""
+    jobs = []
+    for block in _BLOCKS.split(said):
+        named = re.search(r"^\s*(?:local)?rule (\w+):", block, re.M)
+        if not named or named.group(1) == "all":
+            continue
+        of = re.search(r"^\s*wildcards: (.+)$", block, re.M)
+        why = re.search(r"^\s*reason: (.+)$", block, re.M)
+        words = re.sub(r"\w+=", "", of.group(1)) if of else ""
+        reason = _plain_reason(why.group(1)) if why else ""
+        jobs.append(f"{named.group(1)}{f' ({words})' if words else ''}: {reason}")
+    return list(dict.fromkeys(jobs))
+
+
+def _plain_reason(reason: str) -> str:
+    """Snakemake's reason in fewer words."""
+    if reason.startswith("Params have changed"):
+        return "contents of its inputs or its options changed"
+    if reason.startswith("Forced execution"):
+        return "its report is missing"
+    if reason.startswith("Missing output files"):
+        return "not finished before"
+    if reason.startswith("Input files updated by another job"):
+        return "an earlier step runs again"
+    return reason
+
+
+def _status(name: str, state: Path) -> str:
+    record = read_record(state / "steps" / name / "report.json", *OF_A_REPORT)
+    return str(record["status"]) if record else "not built yet"
+
+
+def _failures(state: Path, said: str) -> list[Problem]:
+    """The steps that failed, each with the end of its log; what Snakemake said last where it was no step."""
+    errors = "\n".join(block for block in _BLOCKS.split(said) if "Error in rule" in block)
+    logs = sorted({state / "log" / log for log in re.findall(r"log: log/(.+?\.log)", errors)})
+    what = "a step failed; all other steps are complete, and the next build will try this one again"
+    if not logs:
+        return [Problem("workflow_failed", "the workflow could not be run", found=_last_lines(said))]
+    return [Problem("step_failed", what, file=str(log), found=_tail(log)) for log in logs]
+
+
+def _tail(path: Path) -> str:
+    return _last_lines(text_of(path, errors="replace")) if path.is_file() else "no log"
+
+
+def _last_lines(text: str, most: int = 8) -> str:
+    return "\n".join(text.strip().splitlines()[-most:])

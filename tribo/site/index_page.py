@@ -1,0 +1,395 @@
+"""What the index page needs to compare any two campaigns of a site in the browser, without a server.
+
+mu and tau0 of each sample from campaign to campaign, and where they changed.
+
+A change point splits the campaigns of a series, in the order in which they were measured, in two runs of different
+mean. Each split is judged by the two-sample t test. The smallest p over all splits and all series accounts for the
+number of comparisons. It is compared with the smallest p under random orders of the campaigns (the same order for
+all series, since a campaign moves all of them at once): the single-step method of Westfall and Young (1993) with
+permutations, which needs neither normal scatter nor independent series. Each part found this way is searched for
+further changes.
+
+index.html of a site: every campaign with its verdict and state, and mu and tau0 of each sample over time.
+
+``python -m tribo.site.index_page SITE MARKER`` writes it, and MARKER for the workflow (``-`` for none).
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import math
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+import numpy as np
+
+from tribo import __version__
+from tribo.errors import unexpected
+from tribo.files import bytes_of
+from tribo.records import FloatArray
+from tribo.site.history import CampaignRow, Law, answers_of, history, laws_csv, laws_in_words
+from tribo.user_text import for_spreadsheet
+
+if TYPE_CHECKING:
+    from tribo.report.compare_reports import Fitted, Reported
+
+
+def comparable(current: Path, names: Iterable[str]) -> dict[str, Any]:
+    """The campaigns whose reports can be compared, by name, and the titles of their figures; empty for fewer than two.
+
+    ``current`` is the folder of the index page; links and figures are relative to it.
+    """
+    from tribo.errors import CampaignError
+    from tribo.figures.catalogue import TITLES
+    from tribo.report.compare_reports import SHOWN, read_reported
+
+    found = {}
+    for name in names:
+        try:
+            found[name] = _told(read_reported(current / name))
+        except CampaignError:  # the table of the page says what is wrong with it
+            continue
+    return {"campaigns": found, "titles": {name: TITLES[name] for name in SHOWN}} if len(found) > 1 else {}
+
+
+def _told(report: Reported) -> dict[str, Any]:
+    from tribo.report.compare_reports import fitted
+
+    folder = quote(report.folder.name)
+    return {
+        "title": report.title,
+        "link": f"{folder}/report.html",
+        "sentence": report.sentence(),
+        "counts": report.counts(),
+        "next_test": report.next_test(),
+        "loads": _numbers(report.loads_N),
+        "newton_per_kPa": _numbers([1e3 * report.area_m2])[0],
+        "fits": [_fit(fitted(row)) for row in report.fits.to_dict("records")],
+        "figures": {name: f"{folder}/figures/{name}.svg" for name in report.pictures()},
+    }
+
+
+def _fit(fit: Fitted) -> dict[str, Any]:
+    return {
+        "sample": fit.sample,
+        "regime": fit.regime,
+        "mu": _numbers([fit.mu, fit.mu_half]),
+        "tau0": _numbers([fit.tau0_kPa, fit.tau0_half_kPa]),
+        "variances": _numbers(fit.variances),
+        "widening": _numbers([fit.widening])[0],
+    }
+
+
+def _numbers(values: Iterable[float]) -> list[float | None]:
+    """More digits than any page shows; None where there is no number."""
+    return [float(f"{value:.9g}") if math.isfinite(value) else None for value in values]
+
+
+FEWEST = 8  # campaigns in a series; with fewer, no order of them is rare enough to speak of a change
+SHORTEST = 3  # campaigns on either side of a change, so that one odd campaign makes none
+LEVEL = 0.05
+PERMUTATIONS = 2000
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of one series before its campaign ``at`` (an index into the series' campaigns)."""
+
+    series: str
+    at: int
+    before: float
+    after: float
+    p: float
+
+
+def change_points(
+    series: Mapping[str, Sequence[float]], *, level: float = LEVEL, seed: int = 0, permutations: int = PERMUTATIONS
+) -> tuple[Change, ...]:
+    """Changes in any of several series over the same campaigns, in order.
+
+    Parameters
+    ----------
+    series : name -> one value per campaign, NaN where the campaign has none
+    level : chance of a false alarm in the first round, over all series together
+
+    Returns
+    -------
+    tuple of Change
+        By series and place. ``p`` is adjusted for all splits and series examined.
+    """
+    values = {name: np.asarray(v, float) for name, v in series.items()}
+    if not values:
+        return ()
+    rng = np.random.default_rng(seed)
+    keys = rng.random((permutations, len(next(iter(values.values())))))
+    found: list[Change] = []
+    spans = [(name, np.flatnonzero(np.isfinite(v))) for name, v in values.items()]
+    while spans := [(name, places) for name, places in spans if places.size >= FEWEST]:
+        next_spans = []
+        for (name, places), (cut, p) in zip(spans, _adjusted(values, spans, keys), strict=True):
+            if p <= level:
+                y = values[name]
+                left, right = places[:cut], places[cut:]
+                found.append(Change(name, int(right[0]), float(y[left].mean()), float(y[right].mean()), p))
+                next_spans += [(name, left), (name, right)]
+        spans = next_spans
+    order = list(values)
+    return tuple(sorted(found, key=lambda c: (order.index(c.series), c.at)))
+
+
+def _adjusted(
+    values: Mapping[str, FloatArray], spans: Sequence[tuple[str, np.ndarray]], keys: FloatArray
+) -> list[tuple[int, float]]:
+    """For each span its best split and the adjusted p of that split."""
+    smallest = np.ones(len(keys))
+    best = []
+    for name, places in spans:
+        y = values[name][places]
+        p = split_p(y[None, :])[0]
+        best.append((int(np.argmin(p)) + SHORTEST, float(p.min())))
+        shuffled = y[np.argsort(keys[:, places], axis=1)]
+        smallest = np.minimum(smallest, split_p(shuffled).min(axis=1))
+    return [(cut, float((1 + np.sum(smallest <= p * (1 + 1e-9))) / (1 + len(keys)))) for cut, p in best]
+
+
+def split_p(y: FloatArray) -> FloatArray:
+    """p of the two-sample t test (common variance) of each split of each row, shape (rows, n - 2 SHORTEST + 1)."""
+    from scipy.special import stdtr
+
+    n = y.shape[1]
+    y = y - y.mean(axis=1, keepdims=True)
+    left_n = np.arange(SHORTEST, n - SHORTEST + 1)
+    sums, squares = np.cumsum(y, axis=1), np.cumsum(y**2, axis=1)
+    left, total = sums[:, left_n - 1], squares[:, -1:]
+    between = left**2 / left_n + left**2 / (n - left_n)  # the two sums are opposite, since the mean is out
+    within = np.maximum(total - between, 1e-12 * total)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = np.sqrt(between * (n - 2) / within)
+    t = np.where(total > 0, t, 0.0)
+    return np.asarray(2 * stdtr(n - 2, -t))
+
+
+STATES = {
+    "done": "done", "some set aside": "done, some tests set aside", "unusable": "input not usable",
+    "failed": "failed", "waiting": "postponed to the next build", "gone": "no longer in the folder",
+}  # fmt: skip
+VERDICTS = {
+    "no_misfit": "no misfit", "named": "cause identified", "undetermined": "several possible causes",
+    "partly": "cause identified, misfit left", "unknown": "misfit of unknown cause", "": "–",
+}  # fmt: skip
+SYMBOLS = {"mu": ("μ", ""), "tau0": ("τ₀", "kPa")}
+WIDE = 6.0  # times the median arm of the intervals: a wider one is cut off, so that the others stay readable
+WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 300.0, 136.0, 44.0, 8.0, 16.0, 18.0
+
+Key = tuple[str, str, str]  # sample, regime, parameter
+
+
+@dataclass(frozen=True)
+class Point:
+    """One campaign in a panel, in its coordinates; ``text`` is what hovering says."""
+
+    x: float
+    y: float
+    y_low: float
+    y_high: float
+    text: str
+    link: str
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One parameter of one sample over the campaigns: tick labels are (y, text), changes (x, text)."""
+
+    title: str
+    label: str
+    points: tuple[Point, ...]
+    ticks: tuple[tuple[float, str], ...]
+    dates: tuple[str, str]
+    changes: tuple[tuple[float, str], ...]
+
+
+def write_index(site: Path) -> str:
+    """Write SITE/current/index.html, trend.csv and laws.csv where they differ from what is there; their SHA-256."""
+    from tribo.files import write_text
+
+    rows = history(site)
+    changes = change_points({series_name(key): values for key, values in series(rows).items()})
+    digest = hashlib.sha256()
+    current = site / "current"
+    answers = answers_of(current)
+    compared = comparable(current, [row.name for row in reversed(rows) if row.has_report])
+    texts = {"index.html": page(rows, changes, laws_in_words(answers), compared), "trend.csv": trend_csv(rows)}
+    if answers:
+        texts["laws.csv"] = laws_csv(answers)
+    for name, text in texts.items():
+        path = current / name
+        if not path.is_file() or bytes_of(path) != text.encode("utf-8"):
+            write_text(path, text)
+        digest.update(text.encode())
+    return digest.hexdigest()
+
+
+def series(rows: Sequence[CampaignRow]) -> dict[Key, list[float]]:
+    """Values of each parameter of each sample, one a campaign, NaN where it has none."""
+    laws = [{(law.sample, law.regime, law.parameter): law.value for law in row.laws} for row in rows]
+    keys = sorted({key for found in laws for key in found}, key=lambda k: (k[0], k[1] != "static", k[2]))
+    return {key: [found.get(key, math.nan) for found in laws] for key in keys}
+
+
+def trend_csv(rows: Sequence[CampaignRow]) -> str:
+    """The plotted numbers: one row per campaign, sample, regime and parameter."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["campaign", "measured", "sample", "regime", "parameter", "value", "low", "high"])
+    for row in rows:
+        for law in row.laws:
+            numbers = ["" if math.isnan(v) else f"{v:.8g}" for v in (law.value, law.low, law.high)]
+            words = map(for_spreadsheet, (row.name, row.measured, law.sample, law.regime, law.parameter))
+            writer.writerow([*words, *numbers])
+    return text.getvalue()
+
+
+def series_name(key: Key) -> str:
+    """Sample, regime and parameter as one text; :func:`key_of` gives them back, whatever the sample is called."""
+    return json.dumps(key)
+
+
+def key_of(name: str) -> Key:
+    """The key of a :func:`series_name`."""
+    sample, regime, parameter = json.loads(name)
+    return sample, regime, parameter
+
+
+def page(
+    rows: Sequence[CampaignRow],
+    changes: Sequence[Change],
+    laws: Sequence[str] = (),
+    compared: Mapping[str, Any] = MappingProxyType({}),
+) -> str:
+    """The page as text: the same bytes for the same campaigns. ``compared`` is that of :func:`comparable`."""
+    from tribo.report.shell import STYLE, WORKING, environment, script_json, style_and_script
+
+    templates = environment("tribo.site")
+    by_sample: dict[str, list[Panel]] = {}
+    for key in series(rows):
+        by_sample.setdefault(key[0], []).append(panel(key, rows, [c for c in changes if key_of(c.series) == key]))
+    longest = max((sum(map(math.isfinite, v)) for v in series(rows).values()), default=0)
+    return templates.get_template("index.html").render(
+        rows=list(reversed(rows)), states=STATES, verdicts=VERDICTS, link=report_link, panels=by_sample,
+        sentences=[change_sentence(c, rows) for c in changes], looked=longest >= FEWEST, fewest=FEWEST,
+        shortest=SHORTEST, level=LEVEL, width=WIDTH, height=HEIGHT, left=LEFT, right=RIGHT, top=TOP, bottom=BOTTOM,
+        version=__version__, laws=laws, comparable=set(compared.get("campaigns", ())),
+        compared=script_json(dict(compared)),
+        **style_and_script(templates, [STYLE, "index.css"], [*WORKING, "index.js"]),
+    )  # fmt: skip
+
+
+def report_link(name: str) -> str:
+    """Where the report of a campaign lies, from the index page."""
+    return f"{quote(name)}/report.html"
+
+
+def panel(key: Key, rows: Sequence[CampaignRow], changes: Sequence[Change]) -> Panel:
+    """One parameter of one sample, laid out in WIDTH by HEIGHT."""
+    sample, regime, parameter = key
+    symbol, unit = SYMBOLS[parameter]
+    fitted = [k for k, row in enumerate(rows) if row.laws]
+    place = {k: at for at, k in enumerate(fitted)}  # campaigns without a fit take no room
+    placed = [(k, row, law) for k, row in enumerate(rows) for law in row.laws if _key(law) == key]
+    low, high = _range([law for _, _, law in placed])
+    step = (WIDTH - LEFT - RIGHT) / len(fitted)
+
+    def x(k: int, aside: float = 0.0) -> float:
+        return round(LEFT + step * (place[k] + 0.5 + aside), 1)
+
+    def y(value: float) -> float:
+        share = min(max((value - low) / (high - low), 0.0), 1.0)
+        return round(HEIGHT - BOTTOM - share * (HEIGHT - TOP - BOTTOM), 1)
+
+    def end(value: float, law: Law) -> float:
+        return y(value if math.isfinite(value) else law.value)
+
+    points = tuple(
+        Point(x(k), y(law.value), end(law.low, law), end(law.high, law), _hover(row, law),
+              report_link(row.name) if row.has_report else "")
+        for k, row, law in placed
+    )  # fmt: skip
+    return Panel(
+        title=f"{regime} {symbol}{f' in {unit}' if unit else ''}",
+        label=f"{regime} {symbol} of {sample} in {len(points)} campaigns: " + "; ".join(p.text for p in points),
+        points=points,
+        ticks=tuple((y(v), text) for v, text in ticks(low, high)),
+        dates=(rows[fitted[0]].measured, rows[fitted[-1]].measured) if len(fitted) > 1 else ("", ""),
+        changes=tuple((x(c.at, -0.5), f"{_short(c.before)} to {_short(c.after)}") for c in changes),
+    )
+
+
+def _key(law: Law) -> Key:
+    return law.sample, law.regime, law.parameter
+
+
+def _range(laws: Sequence[Law]) -> tuple[float, float]:
+    """Lowest and highest number shown: all values, and every interval but those far wider than most."""
+    values = [law.value for law in laws]
+    arms = [abs(e - law.value) for law in laws for e in (law.low, law.high) if math.isfinite(e)]
+    widest = WIDE * median(arms) if arms else 0.0
+    ends = [e for law in laws for e in (law.low, law.high) if math.isfinite(e) and abs(e - law.value) <= widest]
+    low, high = min(values + ends), max(values + ends)
+    return (low, high) if high > low else (low - 1.0, high + 1.0)
+
+
+def ticks(low: float, high: float) -> tuple[tuple[float, str], ...]:
+    """Values and labels at the foot, the middle and the head of an axis, with as many decimals as part them."""
+    decimals = max(0, 1 - math.floor(math.log10((high - low) / 2)))
+    return tuple((v, f"{v:.{decimals}f}".replace("-", "−")) for v in (low, (low + high) / 2, high))
+
+
+def _hover(row: CampaignRow, law: Law) -> str:
+    unit = f" {SYMBOLS[law.parameter][1]}".rstrip()
+    interval = f" ({_short(law.low)} to {_short(law.high)})" if math.isfinite(law.low) else ""
+    return f"{row.name}: {_short(law.value)}{interval}{unit}"
+
+
+def _short(value: float) -> str:
+    return f"{value:.3g}".replace("-", "−")
+
+
+def change_sentence(change: Change, rows: Sequence[CampaignRow]) -> str:
+    """A change in words."""
+    sample, regime, parameter = key_of(change.series)
+    symbol, unit = SYMBOLS[parameter]
+    verb = "rises" if change.after > change.before else "falls"
+    p = "below 0.001" if change.p < 0.001 else f"{change.p:.3f}"
+    return (
+        f"{regime.capitalize()} {symbol} of {sample} {verb} from {_short(change.before)} to {_short(change.after)}"
+        f"{f' {unit}' if unit else ''} at {rows[change.at].name} (adjusted p {p})."
+    )
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Write the index of a site, and the marker of the workflow."""
+    from tribo.files import write_text
+
+    site, marker = arguments
+    try:
+        digest = write_index(Path(site))
+        if marker != "-":
+            record: Mapping[str, str] = {"index": digest}
+            write_text(Path(marker), json.dumps(record) + "\n")
+    except OSError as why:
+        print(unexpected(why, "the index of the site cannot be written"), file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,18 @@
+from .calibration import CalibrationRuns as CalibrationRuns, calibrate as calibrate
+from .config import (
+    PAPER as PAPER,
+    FrictionTerms as FrictionTerms,
+    LocalFriction as LocalFriction,
+    SimConfig as SimConfig,
+)
+from .ensemble import (
+    angle_range_deg as angle_range_deg,
+    read_stored as read_stored,
+    run_ensemble as run_ensemble,
+    run_stored as run_stored,
+    stratified_design as stratified_design,
+)
+from .lattice import PAPER_PATTERNS as PAPER_PATTERNS, contact_mask as contact_mask
+from .results_file import write_ensemble as write_ensemble, write_run as write_run
+from .run import simulate as simulate
+from .table2_column import table2 as table2, table2_design as table2_design

@@ -1,0 +1,478 @@
+"""The lists of strips in each state, the neighbours that moving strips reach, and the queue of those asleep.
+
+Which strips of the lattice are worked on: only those where blocks move, and those their springs reach.
+
+A strip is asleep (nothing in its reach moves; it waits in a queue for the step in which its first contact block will
+fail), listening (blocks in its reach move, so its forces are looked at in every step), gliding (cavity blocks move) or
+sliding (contact blocks too). A strip asleep fails at a time that is known beforehand: in the coordinates of
+:mod:`tribo.springblock.engines.state` its forces are G + R t until something in its reach moves.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tribo.records import FloatArray
+from tribo.springblock.engines.jit import compiled, copied_into_callers, inner
+from tribo.springblock.engines.state import (
+    ACTIVE_STEPS,
+    ALONG,
+    CODE,
+    FRICTION_WORK,
+    N_FAILED,
+    RUNNING,
+    STEP,
+    VISCOUS_WORK,
+    Numerics,
+    Samples,
+    State,
+    observe,
+    static_threshold,
+)
+from tribo.springblock.engines.strips import CAVITY, CONTACT, LANES, Layout, Planes, Sums, forces, glides, slides, wrap
+from tribo.springblock.engines.team import (
+    END,
+    FORCES,
+    MOTION,
+    Team,
+    done,
+    give,
+    next_order,
+    shares_of,
+    team_of,
+    wait_for_all,
+)
+
+LISTENING, GLIDING, SLIDING, ASLEEP = range(4)  # states of a strip
+PENDING = -1  # row of Lists.strips and .members: strips that fell asleep and are not in the queue yet
+# columns of Lists.links: state, number of moving strips that reach it, which neighbours it reaches itself (a bit each)
+# and would with its cavities alone, place in its list, share of the lattice, bucket of the queue, the strips before and
+# after it there, and the eight neighbours, -1 where there is none
+STATUS, TOUCHED, REACH, OWN_REACH, PLACE, SHARE, BUCKET, BEFORE, AFTER, NEAR = range(10)
+LINKS = NEAR + 8
+AROUND = ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))  # a bit of REACH each
+WEST, MIDDLE, EAST = 0b00000111, 0b00011000, 0b11100000
+RING = 1 << 15  # steps the queue looks ahead
+
+
+class Lists(NamedTuple):
+    """Every strip is in the list of its state and share or, asleep, in the queue.
+
+    The list of a state and a share is row ``shares * state + share`` of ``strips``; the last row is for PENDING.
+    """
+
+    links: NDArray[np.int64]  # (strips, LINKS)
+    strips: NDArray[np.int64]  # (rows, 2 strips)
+    members: NDArray[np.int64]  # (rows,) how many are in each list
+    shares: int
+    head: NDArray[np.int64]  # the queue: first strip of each bucket, one bucket per step, used as a ring
+
+
+def lists_of(cavity: NDArray[np.bool_], c: Numerics, shares: int) -> Lists:
+    """All strips asleep, in so many shares. ``cavity`` (strips, lanes) tells the cavity blocks."""
+    n, lanes = cavity.shape
+    across = -(-c.nx // lanes)
+    y, x = np.divmod(np.arange(n), across)
+    last = np.where(x < across - 1, lanes - 1, (c.nx - 1) % lanes)
+    reach = np.where(cavity[:, 0], WEST, 0) | np.where(cavity[np.arange(n), last], EAST, 0)
+    links = np.full((n, LINKS), -1, np.int64)
+    links[:, TOUCHED] = links[:, REACH] = 0
+    links[:, STATUS] = ASLEEP
+    links[:, OWN_REACH] = np.where(cavity.any(axis=1), MIDDLE | reach, 0)
+    for bit, (dx, dy) in enumerate(AROUND):
+        to_x, to_y = x + dx, y + dy
+        if c.periodic:
+            to_x, to_y = to_x % across, to_y % c.ny
+        inside = (to_x >= 0) & (to_x < across) & (to_y >= 0) & (to_y < c.ny)
+        links[inside, NEAR + bit] = (to_y * across + to_x)[inside]
+    links[:, SHARE] = shares * np.arange(n) // n
+    rows = shares * ASLEEP + 1
+    strips, members = np.zeros((rows, 2 * n), np.int64), np.zeros(rows, np.int64)
+    return Lists(links, strips, members, shares, np.full(RING, -1, np.int64))
+
+
+@inner
+def listed(status: int, lists: Lists) -> int:
+    """Number of strips of this state and those after it, without those asleep."""
+    found = 0
+    for row in range(lists.shares * status, lists.shares * ASLEEP):
+        found += lists.members[row]
+    return found
+
+
+@inner
+def join(strip: int, status: int, lists: Lists) -> None:
+    """Put a strip into the list of a state."""
+    row = lists.shares * status + lists.links[strip, SHARE]
+    lists.links[strip, STATUS] = status
+    lists.links[strip, PLACE] = lists.members[row]
+    lists.strips[row, lists.members[row]] = strip
+    lists.members[row] += 1
+
+
+@inner
+def leave(strip: int, lists: Lists) -> None:
+    """Take a strip out of the list of its state, or out of the queue; the last of the list takes its place."""
+    links = lists.links
+    status = links[strip, STATUS]
+    if status != ASLEEP:
+        row = lists.shares * status + links[strip, SHARE]
+        lists.members[row] -= 1
+        last = lists.strips[row, lists.members[row]]
+        lists.strips[row, links[strip, PLACE]] = last
+        links[last, PLACE] = links[strip, PLACE]
+        return
+    bucket = links[strip, BUCKET]
+    if bucket < 0:
+        return
+    before, after = links[strip, BEFORE], links[strip, AFTER]
+    if before >= 0:
+        links[before, AFTER] = after
+    else:
+        lists.head[bucket] = after
+    if after >= 0:
+        links[after, BEFORE] = before
+    links[strip, BUCKET] = -1
+
+
+@inner
+def rest(strip: int, lists: Lists) -> None:
+    """A strip within which nothing moves listens if something in its reach does; else its failure is to be found."""
+    if lists.links[strip, TOUCHED] > 0:
+        join(strip, LISTENING, lists)
+    else:
+        lists.links[strip, STATUS] = ASLEEP
+        lists.strips[PENDING, lists.members[PENDING]] = strip
+        lists.members[PENDING] += 1
+
+
+@inner
+def set_reach(strip: int, reach: int, lists: Lists) -> None:
+    """The blocks that move in a strip reach these neighbours from now on, and no others."""
+    links = lists.links
+    changed = reach ^ links[strip, REACH]
+    links[strip, REACH] = reach
+    for bit in range(8):
+        other = links[strip, NEAR + bit]
+        if (changed >> bit) & 1 == 0 or other < 0:
+            continue
+        if (reach >> bit) & 1:
+            links[other, TOUCHED] += 1
+            if links[other, STATUS] == ASLEEP:
+                leave(other, lists)
+                join(other, LISTENING, lists)
+        else:
+            links[other, TOUCHED] -= 1
+            if links[other, TOUCHED] == 0 and links[other, STATUS] == LISTENING:
+                leave(other, lists)
+                rest(other, lists)
+
+
+@inner
+def enqueue(strip: int, now: int, due: float, lists: Lists) -> None:
+    """Put a strip into the bucket of a step; steps beyond the ring wait in its last bucket and are looked at again."""
+    links = lists.links
+    if links[strip, BUCKET] >= 0:
+        return
+    ring = len(lists.head)
+    bucket = (now + int(min(max(due - now, 0.0), ring - 1.0))) % ring
+    first = lists.head[bucket]
+    links[strip, AFTER] = first
+    links[strip, BEFORE] = -1
+    if first >= 0:
+        links[first, BEFORE] = strip
+    lists.head[bucket] = strip
+    links[strip, BUCKET] = bucket
+
+
+@inner
+def steps_to_next_failure(now: int, limit: int, head: NDArray[np.int64]) -> int:
+    """Steps from now to the next bucket that holds a strip, at most ``limit``."""
+    ring = len(head)
+    for wait in range(min(limit, ring)):
+        if head[(now + wait) % ring] >= 0:
+            return wait
+    return min(limit, ring - 1)
+
+
+MANY = 64  # strips; an order costs about as much as the forces of 20 strips in the cache
+
+
+class Active(NamedTuple):
+    """The blocks of a run, their strips, and what the loops say of each strip."""
+
+    planes: Planes
+    sums: Sums  # a row each share
+    layout: Layout
+    lists: Lists
+    starts: NDArray[np.bool_]  # (strips,) a block at rest gives way
+    calm: NDArray[np.bool_]  # (strips,) all cavity blocks may rest
+    moving: NDArray[np.int64]  # (strips,) contact blocks that move
+    team: Team
+
+
+def active_of(planes: Planes, layout: Layout, numerics: Numerics, threads: int = 1) -> Active:
+    """Lists of a lattice whose blocks move where ``planes.pace`` says so; a large one has up to ``threads`` threads."""
+    n = len(planes.place)
+    shares = shares_of(numerics.nx * numerics.ny)
+    lanes = planes.place[:, None] + np.arange(LANES)
+    lists = lists_of(planes.kind[lanes] == CAVITY, numerics, shares)
+    for strip in np.flatnonzero((planes.pace[lanes] != 0.0).any(axis=1)):
+        here = lanes[strip]
+        planes.hold[here[planes.kind[here] == CAVITY]] = np.inf
+        leave(int(strip), lists)
+        join(int(strip), SLIDING, lists)
+        set_reach(int(strip), WEST | MIDDLE | EAST, lists)
+    lists.strips[PENDING, :n] = np.arange(n)
+    lists.members[PENDING] = n
+    starts, calm = np.zeros((2, n), np.bool_)
+    team, sums = team_of(threads, shares), Sums(*np.zeros((3, shares, LANES)))
+    return Active(planes, sums, layout, lists, starts, calm, np.zeros(n, np.int64), team)
+
+
+@inner
+def hold_cavities(strip: int, hold: float, p: Planes) -> None:
+    """The cavity blocks of a strip rest up to a force, which is infinite while they move."""
+    copied_into_callers()
+    first = p.place[strip]
+    for i in range(first, first + LANES):
+        if p.kind[i] == CAVITY:
+            p.hold[i] = hold
+            if hold < np.inf:
+                p.p_x[i] = 0.0
+                p.p_y[i] = 0.0
+
+
+@inner
+def slipping(strip: int, s: State, p: Planes, layout: Layout, c: Numerics) -> int:
+    """Reach of the contact blocks of a strip whose force exceeds what they hold, 0 without any; they are counted."""
+    copied_into_callers()
+    first = p.place[strip]
+    t = c.start + s.counts[STEP] * c.dt
+    reach = 0
+    for i in range(first, first + LANES):
+        hold = static_threshold(p.hold[i], t - p.since[i], c.law)
+        if p.kind[i] != CONTACT or p.f_x[i] * p.f_x[i] + p.f_y[i] * p.f_y[i] <= hold * hold:
+            continue
+        y, x = divmod(i - layout.first, layout.width)
+        reach |= MIDDLE | (WEST if i == first else 0) | (EAST if i == first + LANES - 1 or x == c.nx - 1 else 0)
+        n = s.counts[N_FAILED]
+        if n < s.failed.shape[1]:
+            s.failed[0, n] = y * c.nx + x
+            s.failed[1, n] = s.counts[STEP]
+            s.counts[N_FAILED] += 1
+    return reach
+
+
+@inner
+def threads_for(strips: int, team: Team) -> int:
+    """The whole team where many strips are worked on, else the leader alone."""
+    return team.threads if strips >= MANY else 1
+
+
+@inner
+def find_forces(thread: int, threads: int, s: State, a: Active, c: Numerics) -> None:
+    """Forces of the strips that listen, glide or slide, in the shares of one of so many threads."""
+    copied_into_callers()
+    lists = a.lists
+    t = c.start + s.counts[STEP] * c.dt
+    for row in range(lists.shares * ASLEEP):
+        if row % threads == thread:
+            forces(a.planes, lists.strips[row, : lists.members[row]], a.starts, c, t)
+
+
+@inner
+def move(thread: int, threads: int, s: State, a: Active, c: Numerics) -> None:
+    """Move the strips that glide or slide, in the shares of one of so many threads."""
+    copied_into_callers()
+    lists = a.lists
+    for share in range(thread, lists.shares, threads):
+        row = lists.shares * GLIDING + share
+        sums = Sums(a.sums.along[share], a.sums.squares[share], a.sums.work[share])
+        glides(a.planes, lists.strips[row, : lists.members[row]], a.calm, c, sums)
+        row = lists.shares * SLIDING + share
+        slides(a.planes, lists.strips[row, : lists.members[row]], a.moving, c, s.counts[STEP], sums)
+
+
+@compiled
+def assist(a: Active, s: State, c: Numerics, thread: int) -> None:
+    """What another thread of the team than the leader does, until the leader has no more orders."""
+    kind = next_order(thread, a.team)
+    while kind != END:
+        if kind == FORCES:
+            find_forces(thread, a.team.threads, s, a, c)
+        else:
+            move(thread, a.team.threads, s, a, c)
+        done(thread, a.team)
+        kind = next_order(thread, a.team)
+
+
+@inner
+def start_all(s: State, a: Active, c: Numerics) -> None:
+    """Find forces of the strips that listen, glide or slide, and start those of their blocks that give way."""
+    copied_into_callers()
+    lists = a.lists
+    threads = threads_for(listed(LISTENING, lists), a.team)
+    if threads > 1:
+        give(FORCES, a.team)
+    find_forces(0, threads, s, a, c)
+    if threads > 1:
+        wait_for_all(a.team)
+    for row in range(lists.shares * ASLEEP):  # strips that begin to listen now join a list that has been seen
+        status = row // lists.shares
+        m = lists.members[row] - 1
+        while m >= 0:  # from the end: one that leaves is replaced by one that has been seen or has just joined
+            strip = lists.strips[row, m]
+            m -= 1
+            if not a.starts[strip]:
+                continue
+            a.starts[strip] = False
+            reach = slipping(strip, s, a.planes, a.layout, c)
+            to = SLIDING if reach != 0 or status == SLIDING else GLIDING
+            if to != status:
+                leave(strip, lists)
+                join(strip, to, lists)
+                hold_cavities(strip, np.inf, a.planes)
+            set_reach(strip, reach | lists.links[strip, REACH] | lists.links[strip, OWN_REACH], lists)
+
+
+@inner
+def rest_all(a: Active, c: Numerics) -> None:
+    """Gliding strips rest once they are calm; sliding ones in which all contact blocks stopped glide on, or rest."""
+    copied_into_callers()
+    lists = a.lists
+    for row in range(lists.shares * GLIDING, lists.shares * SLIDING):
+        m = lists.members[row] - 1
+        while m >= 0:
+            strip = lists.strips[row, m]
+            m -= 1
+            if a.calm[strip]:
+                hold_cavities(strip, 2.0 * c.rest_force, a.planes)
+                leave(strip, lists)
+                rest(strip, lists)
+                set_reach(strip, 0, lists)
+    for row in range(lists.shares * SLIDING, lists.shares * ASLEEP):
+        m = lists.members[row] - 1
+        while m >= 0:
+            strip = lists.strips[row, m]
+            m -= 1
+            if a.moving[strip] == 0:
+                leave(strip, lists)
+                if lists.links[strip, OWN_REACH] != 0:
+                    join(strip, GLIDING, lists)
+                else:
+                    rest(strip, lists)
+                set_reach(strip, lists.links[strip, OWN_REACH], lists)
+
+
+@inner
+def queue_pending(s: State, a: Active, c: Numerics) -> None:
+    """Put strips that fell asleep into the queue for the step in which one of their blocks will fail."""
+    copied_into_callers()
+    lists = a.lists
+    n = 0
+    for m in range(lists.members[PENDING]):
+        strip = lists.strips[PENDING, m]
+        if lists.links[strip, STATUS] == LISTENING and lists.links[strip, TOUCHED] == 0:  # was due, and did not fail
+            leave(strip, lists)
+            lists.links[strip, STATUS] = ASLEEP
+        if lists.links[strip, STATUS] == ASLEEP and lists.links[strip, BUCKET] < 0:
+            lists.strips[PENDING, n] = strip
+            n += 1
+    lists.members[PENDING] = 0
+    forces(a.planes, lists.strips[PENDING, :n], a.starts, c, 0.0)
+    for m in range(n):
+        a.starts[lists.strips[PENDING, m]] = False  # the comparison with the force at t = 0 means nothing
+        t_fail = first_failure(lists.strips[PENDING, m], s, a.planes, c)
+        if t_fail < np.inf:
+            enqueue(lists.strips[PENDING, m], s.counts[STEP], math.ceil((t_fail - c.start) / c.dt), lists)
+
+
+@inner
+def first_failure(strip: int, s: State, p: Planes, c: Numerics) -> float:
+    """Time at which the first contact block of a strip fails, its forces at t = 0 being known.
+
+    |G + R t| = F_s is a quadratic in t.
+    """
+    copied_into_callers()
+    t_now = c.start + s.counts[STEP] * c.dt
+    earliest = np.inf
+    first = p.place[strip]
+    for i in range(first, first + LANES):
+        if p.kind[i] != CONTACT:
+            continue
+        limit = static_threshold(p.hold[i], t_now - p.since[i], c.law)
+        a = p.pull_x[i] * p.pull_x[i] + p.pull_y[i] * p.pull_y[i]
+        b = p.f_x[i] * p.pull_x[i] + p.f_y[i] * p.pull_y[i]
+        excess = p.f_x[i] * p.f_x[i] + p.f_y[i] * p.f_y[i] - limit * limit
+        if a > 0.0:
+            root = b * b - a * excess
+            earliest = min(earliest, (math.sqrt(root) - b) / a if root > 0.0 else t_now)
+    return earliest
+
+
+@inner
+def admit_due(step: int, lists: Lists) -> None:
+    """The strips whose first failure is due in this step listen in it."""
+    due = step % len(lists.head)
+    while lists.head[due] >= 0:
+        strip = lists.head[due]
+        leave(strip, lists)
+        join(strip, LISTENING, lists)
+        lists.strips[PENDING, lists.members[PENDING]] = strip
+        lists.members[PENDING] += 1
+
+
+@inner
+def total(values: FloatArray) -> float:
+    """The sum over all shares and lanes."""
+    found = 0.0
+    for share in range(values.shape[0]):
+        for lane in range(LANES):
+            found += values[share, lane]
+    return found
+
+
+@compiled
+def advance(a: Active, s: State, out: Samples, c: Numerics, until_step: int) -> None:
+    """Integrate to ``until_step``, or until ``counts[CODE]`` says finished or not finite."""
+    lists = a.lists
+    way = c.dt * c.dt / c.mass
+    along = s.totals[ALONG] - way * total(a.sums.along)
+    friction = s.totals[FRICTION_WORK] - way * total(a.sums.work)
+    viscous = s.totals[VISCOUS_WORK] - way * c.damping * c.dt * total(a.sums.squares)
+    while s.counts[STEP] < until_step and s.counts[CODE] == RUNNING:
+        if lists.members[PENDING] > 0:
+            queue_pending(s, a, c)
+        if listed(GLIDING, lists) == 0:
+            wait = steps_to_next_failure(s.counts[STEP], until_step - s.counts[STEP], lists.head)
+            if wait > 0:
+                observe(wait, 0, s, out, c)
+                continue
+        admit_due(s.counts[STEP], lists)
+        start_all(s, a, c)
+        active = listed(GLIDING, lists)
+        s.counts[ACTIVE_STEPS] += LANES * active
+        threads = threads_for(active, a.team)
+        if threads > 1:
+            give(MOTION, a.team)
+        move(0, threads, s, a, c)
+        if threads > 1:
+            wait_for_all(a.team)
+        if c.periodic:
+            for plane in (a.planes.q_x, a.planes.q_y, a.planes.q_sum, a.planes.q_gap):
+                wrap(plane, a.layout, c.nx, c.ny)
+        moving = 0
+        if (s.counts[STEP] + 1) % c.stride == 0:
+            for row in range(lists.shares * SLIDING, lists.shares * ASLEEP):
+                for strip in lists.strips[row, : lists.members[row]]:
+                    moving += a.moving[strip]
+        rest_all(a, c)
+        s.totals[ALONG] = along + way * total(a.sums.along)
+        observe(1, moving, s, out, c)
+    s.totals[FRICTION_WORK] = friction + way * total(a.sums.work)
+    s.totals[VISCOUS_WORK] = viscous + way * c.damping * c.dt * total(a.sums.squares)

@@ -1,0 +1,344 @@
+"""The model as printed by Berardo et al. (2019), on all blocks at every step: the reference for the other engines.
+
+Springs of the full r_ij (or linearised, for comparison), fourth-order Runge-Kutta, 1e-8 s in the paper. Where
+the text gives no details, these choices were made:
+
+- The shear force is K_s (v t + r0 - r); the paper prints it without K_s.
+- Stick or slip is decided at the start of a step and holds for its four stages. A block at rest starts to slide
+  when its driving force exceeds its static threshold; else it stays where it is.
+- Friction opposes the velocity a block has at the start of a step (its driving force where that is zero), and
+  keeps that direction for the four stages. Taken anew at each stage it flips within the last step of a slip,
+  averages out, and blocks hover instead of stopping; the energy balance then fails by a factor.
+- A sliding block comes to rest when a step turns its velocity by more than a right angle. Its position stays
+  that of the step; its velocity becomes zero. Other rules (``sticking``) replace this one on request.
+- Cavity blocks feel no friction and never stick.
+- A run starts at a given share of the first failure, the contact blocks unmoved and the cavities at their
+  quasi-static displacement and velocity; what finite rotation adds to that dies out within microseconds.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tribo.errors import Problem, SimulationError
+from tribo.records import FloatArray
+from tribo.springblock.config import SimConfig
+from tribo.springblock.engines.fast import Thresholds, Trajectory, drive_of, first_failure_s, once
+from tribo.springblock.engines.jit import compiled
+from tribo.springblock.lattice import OFFSETS, Lattice
+
+START_SHARE = 0.98  # of the first failure
+
+
+class Model(NamedTuple):
+    """Constants of a run in SI units; arrays over the n blocks."""
+
+    neighbours: NDArray[np.int64]  # (n + 1, 8), n where there is none
+    rest: FloatArray  # (8, 3): rest vector to each neighbour and its length
+    springs: FloatArray  # (8,): k_ij
+    static: FloatArray  # (n,)
+    sliding: FloatArray
+    contact: NDArray[np.bool_]
+    shear_stiffness: float
+    mass: float
+    damping: float
+    velocity: FloatArray  # (2,) of the slider
+    finite: bool
+    again: FloatArray  # (n,): static threshold of a block that has slipped
+    rule: int  # when a sliding block comes to rest: TURNED, SLOW or NEVER
+    slow: float  # m/s, for SLOW
+    test_every: int  # steps between two tests for rest
+
+
+RULES = ("turned", "slow", "never")
+TURNED, SLOW, NEVER = range(len(RULES))
+
+
+class State(NamedTuple):
+    """Every block now: displacement and velocity (n, 2), and whether it rests (n,). Steps change it in place."""
+
+    u: FloatArray
+    v: FloatArray
+    resting: NDArray[np.bool_]
+
+
+class Steps(NamedTuple):
+    """How many steps are taken: from ``start``, each ``dt`` long, a sample every ``stride``.
+
+    The run ends early once the time exceeds ``stop_at_peaks`` peak times.
+    """
+
+    start: float
+    dt: float
+    number: int
+    stride: int
+    stop_at_peaks: float
+
+
+class Record(NamedTuple):
+    """Samples every ``stride`` steps, and running sums that are exact to the order of the trapezoid."""
+
+    time: FloatArray
+    force: FloatArray
+    impulse: FloatArray
+    moving: NDArray[np.int64]
+    failed: NDArray[np.int64]
+    sums: FloatArray  # see the names below
+
+
+FORCE, IMPULSE, PEAK, PEAK_TIME, FRICTION_WORK, VISCOUS_WORK, N_FAILED, N_SUMS = range(8)
+
+
+@compiled
+def driving_force(u: FloatArray, t: float, m: Model, out: FloatArray) -> None:
+    """F_mot = F_int + F_s of every block, from displacements ``u`` (n, 2) at time ``t``."""
+    for i in range(len(u)):
+        fx = m.shear_stiffness * (m.velocity[0] * t - u[i, 0])
+        fy = m.shear_stiffness * (m.velocity[1] * t - u[i, 1])
+        for k in range(8):
+            j = m.neighbours[i, k]
+            if j == len(u):
+                continue
+            dx = u[j, 0] - u[i, 0]
+            dy = u[j, 1] - u[i, 1]
+            if m.finite:
+                rx = m.rest[k, 0] + dx
+                ry = m.rest[k, 1] + dy
+                r = math.sqrt(rx * rx + ry * ry)
+                pull = m.springs[k] * (r - m.rest[k, 2]) / r
+                fx += pull * rx
+                fy += pull * ry
+            else:
+                nx = m.rest[k, 0] / m.rest[k, 2]
+                ny = m.rest[k, 1] / m.rest[k, 2]
+                pull = m.springs[k] * (nx * dx + ny * dy)
+                fx += pull * nx
+                fy += pull * ny
+        out[i, 0] = fx
+        out[i, 1] = fy
+
+
+@compiled
+def oppose(v: FloatArray, driving: FloatArray, m: Model, friction: FloatArray) -> None:
+    """Sliding friction of every block against its velocity, or against its driving force where it has none."""
+    for i in range(len(v)):
+        along = v[i] if v[i, 0] != 0.0 or v[i, 1] != 0.0 else driving[i]
+        amount = math.sqrt(along[0] * along[0] + along[1] * along[1])
+        for d in range(2):
+            friction[i, d] = -m.sliding[i] * (along[d] / amount if amount > 0.0 else 0.0)
+
+
+@compiled
+def acceleration(
+    u: FloatArray, v: FloatArray, t: float, resting: NDArray[np.bool_], friction: FloatArray, m: Model, a: FloatArray
+) -> None:
+    """m a = F_mot + F_d + F_fr of every block; none for blocks at rest."""
+    driving_force(u, t, m, a)
+    if m.rule == NEVER:
+        oppose(v, a, m, friction)
+    for i in range(len(u)):
+        for d in range(2):
+            a[i, d] = 0.0 if resting[i] else (a[i, d] + friction[i, d]) / m.mass - m.damping * v[i, d]
+
+
+@compiled
+def decide_friction(
+    u: FloatArray, v: FloatArray, t: float, m: Model, resting: NDArray[np.bool_], friction: FloatArray, rec: Record
+) -> None:
+    """Release blocks beyond their static threshold, and set the friction force of this step on those that slide."""
+    driving_force(u, t, m, friction)
+    for i in range(len(u)):
+        driving = math.sqrt(friction[i, 0] * friction[i, 0] + friction[i, 1] * friction[i, 1])
+        if resting[i] and driving > m.static[i]:
+            resting[i] = False
+            m.static[i] = m.again[i]
+            n = int(rec.sums[N_FAILED])
+            if n < len(rec.failed):
+                rec.failed[n] = i
+                rec.sums[N_FAILED] += 1.0
+        speed = math.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
+        for d in range(2):
+            direction = v[i, d] / speed if speed > 0.0 else (friction[i, d] / driving if driving > 0.0 else 0.0)
+            friction[i, d] = -m.sliding[i] * direction
+
+
+@compiled
+def shifted(base: FloatArray, slope: FloatArray, h: float, out: FloatArray) -> None:
+    for i in range(len(base)):
+        out[i, 0] = base[i, 0] + h * slope[i, 0]
+        out[i, 1] = base[i, 1] + h * slope[i, 1]
+
+
+@compiled
+def runge_kutta(
+    u: FloatArray, v: FloatArray, t: float, dt: float, resting: NDArray[np.bool_], m: Model, w: FloatArray
+) -> None:
+    """One classical fourth-order step of u' = v, v' = a.
+
+    ``w`` is work space (10, n, 2): ``w[9]`` holds the friction of the step, ``w[8]`` receives the new velocity.
+    """
+    a1, a2, a3, a4, v2, v3, v4, p, new_v = w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7], w[8]
+    acceleration(u, v, t, resting, w[9], m, a1)
+    shifted(v, a1, 0.5 * dt, v2)
+    shifted(u, v, 0.5 * dt, p)
+    acceleration(p, v2, t + 0.5 * dt, resting, w[9], m, a2)
+    shifted(v, a2, 0.5 * dt, v3)
+    shifted(u, v2, 0.5 * dt, p)
+    acceleration(p, v3, t + 0.5 * dt, resting, w[9], m, a3)
+    shifted(v, a3, dt, v4)
+    shifted(u, v3, dt, p)
+    acceleration(p, v4, t + dt, resting, w[9], m, a4)
+    for i in range(len(u)):
+        for d in range(2):
+            new_v[i, d] = v[i, d] + dt / 6.0 * (a1[i, d] + 2.0 * a2[i, d] + 2.0 * a3[i, d] + a4[i, d])
+            u[i, d] += dt / 6.0 * (v[i, d] + 2.0 * v2[i, d] + 2.0 * v3[i, d] + v4[i, d])
+
+
+@compiled
+def comes_to_rest(v: FloatArray, new_v: FloatArray, m: Model) -> bool:
+    """Whether a block of velocity v before and new_v after a step stops, by the rule of the run."""
+    if m.rule == NEVER:
+        return False
+    if m.rule == SLOW:
+        return new_v[0] * new_v[0] + new_v[1] * new_v[1] < m.slow * m.slow
+    return v[0] * new_v[0] + v[1] * new_v[1] < 0.0
+
+
+@compiled
+def finish_step(state: State, t: float, dt: float, m: Model, new_v: FloatArray, rec: Record, tested: bool) -> None:
+    """Stop blocks where ``tested``, and add up force, friction work and viscous work of the step."""
+    u, v, resting = state.u, state.v, state.resting
+    force_x = 0.0
+    force_y = 0.0
+    for i in range(len(u)):
+        if not resting[i]:
+            before = math.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
+            if tested and m.contact[i] and comes_to_rest(v[i], new_v[i], m):
+                resting[i] = True
+                new_v[i, 0] = 0.0
+                new_v[i, 1] = 0.0
+            after = math.sqrt(new_v[i, 0] * new_v[i, 0] + new_v[i, 1] * new_v[i, 1])
+            rec.sums[FRICTION_WORK] += 0.5 * dt * m.sliding[i] * (before + after)
+            rec.sums[VISCOUS_WORK] += 0.5 * dt * m.mass * m.damping * (before * before + after * after)
+            v[i, 0] = new_v[i, 0]
+            v[i, 1] = new_v[i, 1]
+        force_x += m.shear_stiffness * (m.velocity[0] * (t + dt) - u[i, 0])
+        force_y += m.shear_stiffness * (m.velocity[1] * (t + dt) - u[i, 1])
+    speed = math.sqrt(m.velocity[0] * m.velocity[0] + m.velocity[1] * m.velocity[1])
+    force = (force_x * m.velocity[0] + force_y * m.velocity[1]) / speed
+    rec.sums[IMPULSE] += 0.5 * dt * (rec.sums[FORCE] + force)
+    rec.sums[FORCE] = force
+    if force > rec.sums[PEAK]:
+        rec.sums[PEAK] = force
+        rec.sums[PEAK_TIME] = t + dt
+
+
+@compiled
+def integrate_all(state: State, steps: Steps, m: Model, w: FloatArray, rec: Record) -> int:
+    """Take the steps, or fewer where the run ends early; returns the number of samples taken."""
+    samples = 0
+    dt = steps.dt
+    for step in range(steps.number):
+        t = steps.start + step * dt
+        decide_friction(state.u, state.v, t, m, state.resting, w[9], rec)
+        runge_kutta(state.u, state.v, t, dt, state.resting, m, w)
+        finish_step(state, t, dt, m, w[8], rec, (step + 1) % m.test_every == 0)
+        if (step + 1) % steps.stride == 0:
+            rec.time[samples] = t + dt
+            rec.force[samples] = rec.sums[FORCE]
+            rec.impulse[samples] = rec.sums[IMPULSE]
+            rec.moving[samples] = np.sum(m.contact & ~state.resting)
+            samples += 1
+            if not math.isfinite(rec.sums[FORCE]) or t > steps.stop_at_peaks * rec.sums[PEAK_TIME]:
+                break
+    return samples
+
+
+def reference_model(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Model:
+    """The constants of a configuration as the reference engine takes them."""
+    offsets = np.array(OFFSETS, float)
+    lengths = np.hypot(*offsets.T)
+    drive = drive_of(config, lattice)
+    return Model(
+        neighbours=lattice.neighbours,
+        rest=config.spacing_m * np.column_stack([offsets, lengths]),
+        springs=config.stiffness_N_m * np.where(lengths > 1.0, 0.5, 1.0),
+        static=thresholds.static_N.copy(),
+        sliding=thresholds.sliding_N,
+        contact=lattice.contact,
+        shear_stiffness=config.shear_stiffness_N_m,
+        mass=config.mass_kg,
+        damping=config.damping_per_s,
+        velocity=drive.velocity,
+        finite=config.rotation == "finite",
+        again=thresholds.static_N if thresholds.again_N is None else thresholds.again_N,
+        rule=RULES.index(config.sticking),
+        slow=config.stick_speed_m_s,
+        test_every=max(1, round((config.stick_interval_s or 0.0) / config.dt_s)),
+    )
+
+
+def run_reference(
+    config: SimConfig, lattice: Lattice, thresholds: Thresholds, start_share: float = START_SHARE
+) -> Trajectory:
+    """One run on the reference engine, from ``start_share`` of the first failure on.
+
+    Raises
+    ------
+    SimulationError
+        A force became non-finite; the message names the block and the time.
+    """
+    model = reference_model(config, lattice, thresholds)
+    drive = drive_of(config, lattice)
+    failure = first_failure_s(lattice, thresholds, drive, config.stiffness_N_m)
+    start = start_share * failure
+    u, v = drive.follow * start + drive.lag, drive.follow.copy()
+    resting = lattice.contact.copy()
+    end = config.duration_s or 2.0 * config.duration_peaks * float(thresholds.static_N.sum()) / drive.force_rate
+    steps = max(1, int(np.ceil((end - start) / config.dt_s)))
+    stride = min(max(1, round(config.sample_interval_s / config.dt_s)), steps)
+    room = steps // stride
+    sums = np.zeros(N_SUMS)
+    sums[FORCE] = drive.force_rate * start
+    sums[IMPULSE] = 0.5 * sums[FORCE] * start
+    record = Record(
+        np.zeros(room), np.zeros(room), np.zeros(room), np.zeros(room, np.int64), np.full(64, -1, np.int64), sums
+    )
+    stop = np.inf if config.duration_s else config.duration_peaks
+    asked = Steps(start, config.dt_s, steps, stride, stop)
+    kept = integrate_all(State(u, v, resting), asked, model, np.zeros((10, *u.shape)), record)
+    if not np.isfinite(sums[FORCE]):
+        _refuse(u, lattice, float(record.time[kept - 1]))
+    return Trajectory(
+        time_s=np.concatenate([(0.0, start), record.time[:kept]]),
+        force_N=np.concatenate([(0.0, drive.force_rate * start), record.force[:kept]]),
+        impulse_Ns=np.concatenate([(0.0, 0.5 * drive.force_rate * start**2), record.impulse[:kept]]),
+        moving=np.concatenate([np.zeros(2, np.int64), record.moving[:kept]]),
+        peak_N=float(sums[PEAK]),
+        peak_s=float(sums[PEAK_TIME]),
+        first_peak_N=float(sums[PEAK]),
+        first_peak_s=float(sums[PEAK_TIME]),
+        first_failure_s=failure,
+        failed=once(record.failed[: int(sums[N_FAILED])]),
+        end_s=float(record.time[kept - 1]),
+        end_impulse_Ns=float(sums[IMPULSE]),
+        displacement_m=u,
+        velocity_m_s=v,
+        friction_work_J=float(sums[FRICTION_WORK]),
+        viscous_work_J=float(sums[VISCOUS_WORK]),
+    )
+
+
+def _refuse(u: FloatArray, lattice: Lattice, t: float) -> None:
+    bad = np.flatnonzero(~np.isfinite(u).all(axis=1))
+    y, x = divmod(int(bad[0]), lattice.nx) if bad.size else (-1, -1)
+    raise SimulationError(
+        Problem(
+            "not_finite", f"the force is no longer finite at t = {t:.9g} s",
+            found=f"{bad.size} blocks, the first at x = {x}, y = {y}", allowed="a smaller dt_s",
+        )
+    )

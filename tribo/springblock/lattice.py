@@ -1,0 +1,217 @@
+"""Which blocks of the lattice touch the counterface.
+
+The elastic lattice: neighbours, own stiffness, and what cavities do while everything around them sticks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tribo.records import FloatArray, Pattern
+
+BoolArray = NDArray[np.bool_]
+UM = 1e-6
+
+PAPER_PATTERNS: dict[str, Pattern] = {
+    "F": Pattern("F"),
+    "A": Pattern("A", "circle", (5 * UM, 5 * UM), (20 * UM, 20 * UM)),
+    "B": Pattern("B", "circle", (10 * UM, 10 * UM), (15 * UM, 15 * UM)),
+    "C": Pattern("C", "circle", (15 * UM, 15 * UM), (20 * UM, 20 * UM)),
+    "S": Pattern("S", "rectangle", (200 * UM, 40 * UM), (220 * UM, 120 * UM), staggered=True),
+}
+"""The patterns of Berardo et al. 2019, Table 1 (S with the pitch of the table, not of the text)."""
+
+# (size, pitch) in blocks -> first cavity, where the reference lattice does not centre the pattern
+_REFERENCE_FIRST = {((40.0, 8.0), (44.0, 24.0)): (4, 11)}
+
+
+def pattern_of(sample: str) -> Pattern | None:
+    """The paper's pattern of a sample name: "Sx" and "Sy" are S; None where the paper has no such sample."""
+    return PAPER_PATTERNS.get(sample) or PAPER_PATTERNS.get(sample[:-1] if sample[-1:] in "xy" else sample)
+
+
+def contact_mask(
+    pattern: Pattern,
+    blocks: tuple[int, int],
+    spacing_m: float,
+    first: tuple[int, int] | None = None,
+    shape: str = "square",
+) -> BoolArray:
+    """True where a block touches the counterface.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        Cavity geometry. With ``shape="square"`` circles become squares of the same width (Berardo 2019);
+        ``"round"`` keeps them round, which needs a spacing well below the diameter.
+    blocks : (int, int)
+        Blocks along x and y.
+    first : (int, int), optional
+        Index of the first block of the first cavity in x and y. By default the pattern is centred over as many
+        whole cavities as fit; sample S keeps the reference position (4, 11).
+
+    Returns
+    -------
+    array of bool, shape (ny, nx)
+    """
+    nx, ny = blocks
+    if pattern.cavity == "none" or pattern.size_m is None or pattern.pitch_m is None:
+        return np.ones((ny, nx), bool)
+    size = _in_blocks(pattern.size_m, spacing_m)
+    pitch = _in_blocks(pattern.pitch_m, spacing_m)
+    x0, y0 = first if first is not None else first_cavity(blocks, size, pitch)
+    # Half a block off the corner is the centre; the small shift keeps whole numbers clear of rounding.
+    y = np.arange(ny) - y0 + 1e-6
+    row = np.floor(y / pitch[1])
+    shift = np.where(row % 2 == 1, pitch[0] / 2, 0.0) if pattern.staggered else np.zeros(ny)
+    x = np.arange(nx)[None, :] - x0 + 1e-6 - np.floor(shift)[:, None]
+    in_x, in_y = x % pitch[0], np.broadcast_to((y % pitch[1])[:, None], (ny, nx))
+    if shape == "round" and pattern.cavity == "circle":
+        a, b = size[0] / 2, size[1] / 2
+        return np.asarray(((in_x + 0.5 - a) / a) ** 2 + ((in_y + 0.5 - b) / b) ** 2 > 1.0)
+    return np.asarray(~((in_x < size[0]) & (in_y < size[1])))
+
+
+def first_cavity(
+    blocks: tuple[int, int], size: tuple[float, float], pitch: tuple[float, float]
+) -> tuple[int, int]:
+    """First block of the first cavity, such that as many whole ones as fit lie centred."""
+    reference = _REFERENCE_FIRST.get((size, pitch))
+    if reference is not None:
+        return reference
+    starts = []
+    for n, s, p in zip(blocks, size, pitch, strict=True):
+        repeats = max(np.floor((n - 2 - s) / p), 0.0)
+        starts.append(int(np.floor((n - repeats * p - s) / 2)))
+    return starts[0], starts[1]
+
+
+def _in_blocks(lengths_m: tuple[float, float], spacing_m: float) -> tuple[float, float]:
+    x, y = (round(length / spacing_m, 6) for length in lengths_m)
+    return x, y
+
+
+OFFSETS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (-1, 1), (1, -1))  # E W N S NE SW NW SE
+# K_int n nT of each of the eight springs, in units of K_int: (xx, yy, xy); diagonals have half the stiffness
+SPRINGS = ((1, 0, 0), (1, 0, 0), (0, 1, 0), (0, 1, 0)) + ((0.25, 0.25, 0.25),) * 2 + ((0.25, 0.25, -0.25),) * 2
+INNER = (3.0, 3.0, 0.0)  # their sum
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Geometry of a lattice with unit K_int; block i = y nx + x. ``neighbours`` is n where a spring is missing.
+
+    ``own`` holds the stiffness (xx, yy, xy) of each block against the fixed rest, shear spring included;
+    ``follow[i]`` the 2 x 2 matrix that turns the velocity of the slider into that of a cavity block while all
+    contact blocks stick; ``lag[i]`` turns it into the displacement by which unit drag per velocity holds it back.
+    """
+
+    nx: int
+    ny: int
+    periodic: bool
+    shear: float
+    contact: NDArray[np.bool_]  # (n,)
+    neighbours: NDArray[np.int64]  # (n + 1, 8)
+    own: FloatArray  # (n + 1, 3)
+    follow: FloatArray  # (n + 1, 2, 2)
+    lag: FloatArray  # (n + 1, 2, 2)
+
+    @property
+    def area_fraction(self) -> float:
+        return float(self.contact.mean())
+
+    def spring_forces(self, displacement: FloatArray) -> FloatArray:
+        """Elastic force on every block per unit K_int, springs to neighbours and own stiffness; (n, 2)."""
+        q = np.concatenate([displacement, np.zeros((1, 2))])
+        force = np.zeros_like(q)
+        for k, (xx, yy, xy) in enumerate(SPRINGS):
+            near = q[self.neighbours[:, k]]
+            force[:, 0] += xx * near[:, 0] + xy * near[:, 1]
+            force[:, 1] += xy * near[:, 0] + yy * near[:, 1]
+        own_xx, own_yy, own_xy = self.own.T
+        force[:, 0] -= own_xx * q[:, 0] + own_xy * q[:, 1]
+        force[:, 1] -= own_xy * q[:, 0] + own_yy * q[:, 1]
+        return np.asarray(force[:-1])
+
+
+def make_lattice(mask: BoolArray, shear: float, periodic: bool) -> Lattice:
+    """Lattice of a contact mask (ny, nx); ``shear`` is K_s / K_int. One factorisation a mask, kept for later."""
+    packed = np.packbits(mask).tobytes()
+    return _make_lattice(packed, mask.shape, shear, periodic)
+
+
+@lru_cache(maxsize=16)
+def _make_lattice(packed: bytes, shape: tuple[int, int], shear: float, periodic: bool) -> Lattice:
+    ny, nx = shape
+    n = nx * ny
+    contact = np.unpackbits(np.frombuffer(packed, np.uint8), count=n).astype(bool)
+    neighbours = _neighbours(nx, ny, periodic)
+    own = np.zeros((n + 1, 3))
+    for k, spring in enumerate(SPRINGS):
+        own[:n] += np.where(neighbours[:n, k, None] < n, spring, 0.0)
+    own[:n, :2] += shear
+    follow, lag = _condense(contact, neighbours, own, shear)
+    return Lattice(nx, ny, periodic, shear, contact, neighbours, own, follow, lag)
+
+
+def _neighbours(nx: int, ny: int, periodic: bool) -> NDArray[np.int64]:
+    y, x = np.divmod(np.arange(nx * ny), nx)
+    table = np.full((nx * ny + 1, 8), nx * ny, np.int64)
+    for k, (dx, dy) in enumerate(OFFSETS):
+        near_x, near_y = x + dx, y + dy
+        if periodic:
+            near_x, near_y = near_x % nx, near_y % ny
+        inside = (near_x >= 0) & (near_x < nx) & (near_y >= 0) & (near_y < ny)
+        table[:-1, k][inside] = (near_y * nx + near_x)[inside]
+    return table
+
+
+def _condense(
+    contact: NDArray[np.bool_], neighbours: NDArray[np.int64], own: FloatArray, shear: float
+) -> tuple[FloatArray, FloatArray]:
+    """K_cc w = K_s V and K_cc z = w: cavity velocities, and their lag per drag, for unit V along x and y."""
+    n = len(contact)
+    follow, lag = np.zeros((n + 1, 2, 2)), np.zeros((n + 1, 2, 2))
+    cavity = np.flatnonzero(~contact)
+    if cavity.size == 0:
+        return follow, lag
+    solve = _factorise(cavity, neighbours, own)
+    m = cavity.size
+    drive = np.zeros((2 * m, 2))
+    drive[:m, 0] = drive[m:, 1] = shear
+    w = solve(drive)
+    z = solve(w)
+    for axis in range(2):
+        rows = slice(axis * m, (axis + 1) * m)
+        follow[cavity, axis], lag[cavity, axis] = w[rows], z[rows]
+    return follow, lag
+
+
+def _factorise(cavity: NDArray[np.intp], neighbours: NDArray[np.int64], own: FloatArray) -> Any:
+    """Solver of the cavity block of the stiffness matrix, x components first."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.linalg import splu
+
+    m = cavity.size
+    number = np.full(len(own), -1)
+    number[cavity] = np.arange(m)
+    rows, columns, values = [], [], []
+
+    def add(row: Any, column: Any, xx: Any, yy: Any, xy: Any) -> None:
+        for a, b, value in ((0, 0, xx), (1, 1, yy), (0, 1, xy), (1, 0, xy)):
+            rows.append(row + a * m)
+            columns.append(column + b * m)
+            values.append(np.broadcast_to(value, np.shape(row)))
+
+    add(np.arange(m), np.arange(m), *own[cavity].T)
+    for k, (xx, yy, xy) in enumerate(SPRINGS):
+        near = number[neighbours[cavity, k]]
+        linked = near >= 0
+        add(np.flatnonzero(linked), near[linked], -xx, -yy, -xy)
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return splu(coo_array(entries, shape=(2 * m, 2 * m)).tocsc()).solve

@@ -1,1 +1,0 @@
-"""Results kept between starts, files written as a whole, and locks."""

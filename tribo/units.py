@@ -1,0 +1,628 @@
+"""The names that quantities have in the exports of machines, in the languages of their programs.
+
+Names are plain: without case, accents, units or punctuation (:func:`tribo.units.plain_name`). Where several
+columns of an export fit a quantity, the name that stands first here is preferred.
+
+Physical quantities: name, symbol, SI unit, and their names in exports.
+
+All unit conversions are done here (pint). Everything inside tribo is in SI units.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from tribo.errors import Problem, ReadError
+
+ALIASES = {
+    "time": """
+        time
+        test time
+        step time
+        elapsed time
+        timestamp
+        time stamp
+        total time
+        run time
+        running time
+        zeit
+        prufzeit
+        laufzeit
+        versuchszeit
+        temps
+        temps d essai
+        duree
+        t
+        test zeit
+        temps ecoule
+        tiempo
+        tempo
+        tijd
+        total elapsed time
+        cycle elapsed time
+        czas
+        czas testu
+        aika
+        tid
+        cas
+        ido
+        zaman
+        sure
+        timp
+        время
+        час
+        χρονος
+        时间
+        试验时间
+        時間
+        試験時間
+        経過時間
+        시간
+    """,
+    "friction force": """
+        friction force
+        friction
+        tangential force
+        traction force
+        frictionforce
+        lateral force
+        reibkraft
+        reibungskraft
+        force de frottement
+        load
+        force
+        standard force
+        standardkraft
+        prufkraft
+        kraft
+        force standard
+        fx
+        ff
+        ft
+        f
+        load cell
+        axial force
+        traction force 1
+        effort
+        last
+        tangential load
+        tangentialkraft
+        force tangentielle
+        horizontal force
+        pull force
+        pulling force
+        tensile force
+        sled force
+        fuerza de friccion
+        forza di attrito
+        fuerza
+        forza
+        forca
+        kracht
+        carga
+        force x
+        fx force
+        daq fx
+        tensile load
+        zugkraft
+        charge
+        sila tarcia
+        sila
+        sila styczna
+        kitkavoima
+        voima
+        friktionskraft
+        friktion
+        wrijvingskracht
+        treci sila
+        sila treni
+        surtunme kuvveti
+        kuvvet
+        forta de frecare
+        forta
+        forca de atrito
+        forca de friccao
+        tangencialni sila
+        сила трения
+        сила
+        усилие
+        τριβη
+        摩擦力
+        obciazenie
+        нагрузка
+        力
+        负荷
+        切向力
+        载荷
+        試験力
+        摩擦荷重
+        荷重
+        마찰력
+        하중
+        힘
+    """,
+    "displacement": """
+        extension
+        displacement
+        stroke
+        crosshead
+        crosshead position
+        position
+        standard travel
+        standardweg
+        course standard
+        weg
+        hub
+        course
+        deplacement
+        axial displacement
+        traverse
+        course traverse
+        traverse abs
+        traverse absolue
+        maschine
+        maschinenweg
+        machine displacement
+        linear position
+        sliding distance
+        distance
+        x position
+        x
+        dx
+        tensile extension
+        tensile displacement
+        crosshead displacement
+        crosshead travel
+        axial extension
+        grip to grip separation
+        absolute crosshead travel
+        crosshead absolute
+        actuator displacement
+        sled displacement
+        travel
+        desplazamiento
+        spostamento
+        deslocamento
+        verplaatsing
+        extension en traction
+        disp
+        displ
+        xyz x position
+        droga
+        przemieszczenie
+        wydluzenie
+        droga tarcia
+        siirtyma
+        matka
+        forskjutning
+        forflyttning
+        stracka
+        weglange
+        draha
+        posun
+        posuv
+        elmozdulas
+        yer degistirme
+        deplasare
+        recorrido
+        corsa
+        percorso
+        curso
+        перемещение
+        путь
+        ход
+        位移
+        行程
+        変位
+        ストローク
+        移動距離
+        변위
+    """,
+    "normal force": """
+        normal force
+        normal load
+        vertical force
+        normal force fz
+        ball load
+        contact force
+        normalkraft
+        force normale
+        fz
+        fn
+        fz force
+        daq fz
+        nominal load
+        force z
+        carga normal
+        forza normale
+        fuerza normal
+        sila normalna
+        obciazenie normalne
+        sila nacisku
+        normaalivoima
+        normaalkracht
+        normalova sila
+        pritlacna sila
+        normal kuvvet
+        forta normala
+        forca normal
+        нормальная сила
+        нормальная нагрузка
+        法向力
+        正压力
+        法向载荷
+        垂直力
+        垂直荷重
+        法線力
+        押付力
+        수직하중
+        수직력
+    """,
+    "friction coefficient": """
+        cof
+        friction coefficient
+        coefficient of friction
+        traction coeff
+        daq cof
+        mu
+        reibwert
+        coefficient de frottement
+        reibungskoeffizient
+        reibzahl
+        reibungszahl
+        coefficiente di attrito
+        coeficiente de friccion
+        cof mu
+        wspolczynnik tarcia
+        kitkakerroin
+        friktionskoefficient
+        wrijvingscoefficient
+        koeficient treni
+        surtunme katsayisi
+        coeficient de frecare
+        coeficiente de atrito
+        coeficiente de rozamiento
+        coefficient de friction
+        коэффициент трения
+        摩擦系数
+        摩擦係数
+        마찰계수
+    """,
+    "torque": """
+        friction torque
+        torque
+        frictional torque
+        friction moment
+        reibmoment
+        drehmoment
+        moment
+        couple
+        couple de frottement
+        moment de frottement
+        coppia
+        momento
+        par
+        koppel
+        moment tarcia
+        moment sily
+        момент
+        момент трения
+        扭矩
+        摩擦力矩
+        トルク
+        摩擦トルク
+        토크
+    """,
+    "temperature": """
+        temperature
+        temp
+        temperatur
+        ambient temperature
+        room temperature
+        raumtemperatur
+        temperature c
+        temperatura
+        temperature ambiante
+        lampotila
+        teplota
+        sicaklik
+        температура
+        温度
+        온도
+    """,
+    "humidity": """
+        humidity
+        relative humidity
+        rh
+        feuchte
+        luftfeuchte
+        humidite
+        luftfeuchtigkeit
+        relative luftfeuchte
+        wilgotnosc
+        humedad
+        umidita
+        humidade
+        vochtigheid
+        kosteus
+        luftfuktighet
+        vlhkost
+        nem
+        влажность
+        湿度
+        습도
+    """,
+    "speed": """
+        sliding velocity
+        sliding speed
+        speed
+        velocity
+        geschwindigkeit
+        gleitgeschwindigkeit
+        vitesse
+        vitesse de glissement
+        gleitgeschw
+        predkosc
+        predkosc poslizgu
+        velocidad
+        velocita
+        velocidade
+        snelheid
+        nopeus
+        hastighet
+        rychlost
+        hiz
+        viteza
+        скорость
+        скорость скольжения
+        速度
+        滑动速度
+        すべり速度
+        속도
+    """,
+    "rotation speed": """
+        rotation speed
+        rotational speed
+        rotary speed
+        spindle speed
+        rotational velocity
+        rotation rate
+        revolution speed
+        rpm
+        drehzahl
+        vitesse de rotation
+        velocidad de giro
+        velocita di rotazione
+        toerental
+        转速
+        回転数
+        회전수
+    """,
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A physical quantity; ``column`` is its SI column name, ``aliases`` plain names it goes by."""
+
+    name: str
+    symbol: str
+    si_unit: str
+    column: str
+    aliases: tuple[str, ...]
+
+
+def _quantity(name: str, symbol: str, si_unit: str, column: str) -> Quantity:
+    aliases = tuple(line.strip() for line in ALIASES[name].strip().splitlines())
+    return Quantity(name, symbol, si_unit, column, aliases)
+
+
+QUANTITIES: dict[str, Quantity] = {
+    q.name: q
+    for q in (
+        _quantity("time", "t", "s", "time_s"),
+        _quantity("friction force", "T", "N", "force_N"),
+        _quantity("displacement", "x", "m", "displacement_m"),
+        _quantity("normal force", "N", "N", "normal_force_N"),
+        _quantity("friction coefficient", "mu", "", "friction_coefficient"),
+        _quantity("torque", "M", "N m", "torque_Nm"),
+        _quantity("temperature", "theta", "degC", "temperature_C"),
+        _quantity("humidity", "RH", "percent", "humidity_pct"),
+        _quantity("speed", "v", "m/s", "speed_m_s"),
+        _quantity("rotation speed", "n", "revolution/s", "rotation_rev_per_s"),
+    )
+}
+
+# Spellings that pint does not know, or knows as something else.
+_SPELLINGS = {
+    "sec": "s",
+    "secs": "s",
+    "seconds": "s",
+    "msec": "ms",
+    "min": "minute",
+    "h": "hour",
+    "µs": "microsecond",
+    "μs": "microsecond",
+    "us": "microsecond",
+    "n": "newton",
+    "newtons": "newton",
+    "millinewtons": "millinewton",
+    "micron": "micrometer",
+    "microns": "micrometer",
+    "kn": "kilonewton",
+    "mn": "millinewton",
+    "cn": "centinewton",
+    "un": "micronewton",
+    "µn": "micronewton",
+    "μn": "micronewton",
+    "gf": "gram_force",
+    "kgf": "kilogram_force",
+    "kp": "kilogram_force",
+    "lbf": "pound_force",
+    "lb": "pound_force",
+    "µm": "micrometer",
+    "μm": "micrometer",
+    "um": "micrometer",
+    "in": "inch",
+    '"': "inch",
+    "%": "percent",
+    "°c": "degC",
+    "degc": "degC",
+    "c": "degC",
+    "°f": "degF",
+    "℃": "degC",
+    "sek": "s",
+    "sek.": "s",
+    "seg": "s",
+    "с": "s",
+    "сек": "s",
+    "秒": "s",
+    "초": "s",
+    "mm/sec": "mm/s",
+    "мс": "ms",
+    "毫秒": "ms",
+    "мин": "minute",
+    "н": "newton",
+    "кн": "kilonewton",
+    "мн": "millinewton",
+    "牛": "newton",
+    "牛顿": "newton",
+    "千牛": "kilonewton",
+    "毫牛": "millinewton",
+    "мм": "millimeter",
+    "мкм": "micrometer",
+    "м": "meter",
+    "毫米": "millimeter",
+    "微米": "micrometer",
+    "米": "meter",
+}
+_CASE_MATTERS = {
+    "mN": "millinewton",
+    "MN": "meganewton",
+    "Mm": "megameter",
+    "МН": "meganewton",
+    "Мм": "megameter",
+    "Nm": "newton * meter",
+    "mNm": "millinewton * meter",
+    "Ncm": "newton * centimeter",
+    "Nmm": "newton * millimeter",
+}
+_TURNS = {
+    "rps": "revolution/s", "rev/s": "revolution/s", "r/s": "revolution/s", "1/s": "revolution/s", "hz": "revolution/s",
+    "rpm": "revolution/minute", "rev/min": "revolution/minute", "r/min": "revolution/minute",
+    "1/min": "revolution/minute", "min-1": "revolution/minute", "u/min": "revolution/minute",
+}  # fmt: skip
+_MASSES_AS_FORCES = {"g": "gram_force", "kg": "kilogram_force"}
+_NO_UNIT = {"", "-", "1"}
+_LONGEST_UNIT = 40
+# A product of words and numbers with powers of one digit: nothing that could take long to work out.
+_FACTOR = r"\(?[\d.]*\s*[^\W\d_]+[²³]?(?:\^-?\d)?\)?"
+_UNIT_EXPRESSION = re.compile(rf"{_FACTOR}(?:\s*[/*· ]\s*{_FACTOR})*")
+_NUMBER_BELOW = re.compile(r"/\s*([\d.]+\s*[^\W\d_]+)")
+
+
+_LONGEST_NAME = 80  # characters; longer cells are no column names
+_WIDE = str.maketrans("（）［］【】：／，　", "()[][]:/, ")
+_BARRED = str.maketrans({"ł": "l", "ø": "o", "đ": "d", "ß": "ss", "æ": "ae", "œ": "oe", "ı": "i"})
+_CHANNEL = re.compile(r"^\s*(?:c|ch|channel|kanal)[ _]?\d+[ _]", re.I)
+
+
+def narrow(text: str) -> str:
+    """Brackets, blanks and marks of full width, as Chinese and Japanese programs write them, as ordinary ones."""
+    return text if text.isascii() else text.translate(_WIDE)
+
+
+def plain_name(text: str) -> str:
+    """A column name without case, accents, units in brackets or punctuation: "Prüfzeit [s]" -> "prufzeit"."""
+    text = re.sub(r"[\[(].*?[\])]", " ", narrow(text))
+    text = _CHANNEL.sub("", text)
+    text = unicodedata.normalize("NFKD", text).replace("μ", "mu ")
+    text = "".join(c for c in text if not unicodedata.combining(c)).lower().translate(_BARRED)
+    return re.sub(r"[^\w%]+|_+", " ", text).strip()
+
+
+_RANKS: dict[str, tuple[str, int]] = {
+    plain_name(alias): (q.name, rank) for q in QUANTITIES.values() for rank, alias in enumerate(q.aliases)
+}
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None)
+
+
+@lru_cache(maxsize=256)
+def unit_factor(unit: str, quantity: str) -> tuple[float, float]:
+    """(factor, offset) with SI value = factor * value + offset.
+
+    A unit may be a product and carry a number: "30.7 gf", "N m / 2.5 mm".
+
+    Raises
+    ------
+    ReadError
+        The unit is unknown, empty, or not a unit of this quantity. Units are never guessed.
+    """
+    target = QUANTITIES[quantity].si_unit or "dimensionless"
+    text = unit.strip()
+    if not text and target != "dimensionless":
+        raise ReadError(Problem("missing_unit", f"the {quantity} has no unit", allowed=f"a unit such as {target}"))
+    _registry()  # an installation without a working pint is no fault of the unit
+    try:
+        zero, one = _in_unit(0.0, text, quantity, target), _in_unit(1.0, text, quantity, target)
+    except Exception as why:  # pint raises many kinds, tokenizer errors among them
+        raise ReadError(
+            Problem("unknown_unit", f"not a unit of {quantity}", found=unit, allowed=f"a unit such as {target}")
+        ) from why
+    return one - zero, zero
+
+
+def _in_unit(value: float, text: str, quantity: str, target: str) -> float:
+    """``value`` times the unit ``text``, in ``target``."""
+    if target == "dimensionless" and text in _NO_UNIT:
+        return value
+    if quantity == "rotation speed":
+        text = _TURNS.get(text.lower(), text)
+    ureg = _registry()
+    name = _spelled_out(text, quantity)
+    if re.fullmatch(r"\w+", name):
+        return float(ureg.Quantity(value, name).to(target).magnitude)
+    if len(text) > _LONGEST_UNIT or not _UNIT_EXPRESSION.fullmatch(text):
+        raise ValueError(text)
+    text = _NUMBER_BELOW.sub(r"/(\1)", text)
+    expression = re.sub(r"[^\W\d_]+", lambda word: f"({_spelled_out(word[0], quantity)})", text)
+    return float((value * ureg.parse_expression(expression)).to(target).magnitude)
+
+
+def _spelled_out(word: str, quantity: str) -> str:
+    """A unit in pint's spelling; g and kg are forces where a force is meant."""
+    if "force" in quantity and word.lower() in _MASSES_AS_FORCES:
+        return _MASSES_AS_FORCES[word.lower()]
+    return _CASE_MATTERS.get(word) or _SPELLINGS.get(word.lower()) or word
+
+
+@lru_cache(maxsize=1024)
+def match_quantity(name: str) -> tuple[str, int] | None:
+    """(quantity, rank of the alias) for a column name, or None where nothing fits."""
+    if len(name) > _LONGEST_NAME:
+        return None
+    return _RANKS.get(plain_name(name))
+
+
+_SHORT_NAMES = {"force": "friction force", "friction": "friction force", "load": "normal force"}
+
+
+def quantity_named(key: str) -> str | None:
+    """The quantity meant by a key such as "force", "normal_force", "time_s"; None where there is none."""
+    plain = key.strip().replace("_", " ").lower()
+    if plain in _SHORT_NAMES:
+        return _SHORT_NAMES[plain]
+    for q in QUANTITIES.values():
+        if plain == q.name or key.strip() == q.column:
+            return q.name
+    return None

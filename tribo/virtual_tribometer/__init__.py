@@ -1,1 +1,0 @@
-"""A simulated tribometer: pulls with known friction, in the export formats of real machines."""
