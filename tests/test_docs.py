@@ -15,7 +15,7 @@ import tribo
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 PACKAGES = sorted(file.parent.name for file in Path(tribo.__file__).parent.glob("*/__init__.py"))
 REFERENCE = sorted((DOCS / "reference").glob("*.md"))
-RECORDS = ("records", "trace_records", "law_records", "errors")
+RECORDS = ("records", "errors")
 DIRECTIVE = re.compile(r"^\.\. auto(function|class|data|module|exception):: (\S+)", re.MULTILINE)
 LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)(?:#[^)]*)?\)")
 

@@ -145,8 +145,8 @@ def _chunk(kind: bytes, content: bytes) -> bytes:
 
 OF_STRAIGHT_LINES = ("fig4", "fig6", "fig7", "fig8")  # without the model, "forces" shows the law chosen by the data
 STAGE = "drawing figures"
-DRAWN_BY = ("figures", "report/drawings", "report/html/hover")
-SET_BY = ("report/drawings", "report/paper/typeset")
+DRAWN_BY = ("figures", "report/drawings")
+SET_BY = ("report/drawings",)
 THEME = {
     "#ffffff": "var(--paper)",
     "#000000": "currentColor",
