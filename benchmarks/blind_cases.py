@@ -31,7 +31,7 @@ from blind.patterns import ErrorSize
 from blind.tribometer import EFFECTS, LARGEST, Design, hide, write
 
 if TYPE_CHECKING:
-    from tribo.diagnostics.diagnosis import Diagnosis
+    from tribo.diagnostics import Diagnosis
     from tribo.diagnostics.model import Setup
     from tribo.records import Ingested
 

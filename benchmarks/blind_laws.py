@@ -28,10 +28,9 @@ from tribo.diagnostics.diagnosis import examine
 from tribo.diagnostics.fit import fit
 from tribo.diagnostics.model import Acting, Setup, predict, setup
 from tribo.diagnostics.observations import observe
-from tribo.lawsearch.diagnosis_with_laws import uncontested
-from tribo.lawsearch.discovery import searched_laws
+from tribo.lawsearch.diagnosis_with_laws import searched_laws, uncontested
 from tribo.lawsearch.grammar import LOAD_TERM
-from tribo.lawsearch.known_laws import holds
+from tribo.lawsearch.known_laws import validate_law
 from tribo.lawsearch.model_choice import CauseForms, FoundLaw, centred
 from tribo.lawsearch.scoring import terms_of
 from tribo.lawsearch.search import Discovery
@@ -184,7 +183,7 @@ def _pair(piece: Piece) -> dict[str, Any]:
     later = hide_law(seed, piece.second, piece.seed if same else None)
     kept = later.bench.column("repeat") <= KEPT
     d = examine(as_ingested(later.bench, seed, kept), seed=seed)
-    held = holds(uncontested(d).model, found.laws[0].law, found.laws[0].parameters)
+    held = validate_law(uncontested(d).model, found.laws[0].law, found.laws[0].parameters)
     return {
         "answer": held.answer, "second": piece.second, "text": held.text, "verdict": d.verdict.verdict,
         "strength": round(later.strength, 2),

@@ -293,10 +293,10 @@ def diagnosis_without_model(study: Study, *, seed: int = 0, kept: Path | None = 
     was not run.
     """
     from tribo.diagnostics.diagnosis_record import Alone
-    from tribo.diagnostics.without_model import diagnose_alone
+    from tribo.diagnostics.without_model import diagnose_without_model
 
     made_from = (study.ingested, study.laws, seed)
-    return Shelf(kept).take("alone", made_from, lambda: Alone(diagnose_alone(study, seed=seed)), DIAGNOSED_BY)
+    return Shelf(kept).take("alone", made_from, lambda: Alone(diagnose_without_model(study, seed=seed)), DIAGNOSED_BY)
 
 
 def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:

@@ -12,8 +12,17 @@ from blind.tribometer import Design, hide
 
 from tribo.berardo2019.table_diagnosis import readings, table_deviations
 from tribo.berardo2019.table_model import read_table
-from tribo.lawsearch.across_patterns import Deviations, Term, across_patterns, grammar, left_out_errors, predicted
-from tribo.lawsearch.across_words import deviations_of, formula, geometry_of, sentence, table_of
+from tribo.lawsearch.across_patterns import (
+    Deviations,
+    Term,
+    across_patterns,
+    deviations_of,
+    geometry_of,
+    grammar,
+    left_out_errors,
+    predicted,
+)
+from tribo.lawsearch.across_words import formula, sentence, table_of
 from tribo.published import load_table2
 
 from .known import baseline

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -20,11 +19,10 @@ from tribo.diagnostics.verdict import Cause, Estimate
 from tribo.display import exact_text
 from tribo.errors import CampaignError
 from tribo.figures import law as law_figure
-from tribo.lawsearch import diagnosis_with_laws as in_verdict, discovery as on_campaign
-from tribo.lawsearch.diagnosis_with_laws import parting_test, with_laws, with_misfits
-from tribo.lawsearch.discovery import searched_laws
+from tribo.lawsearch import diagnosis_with_laws
+from tribo.lawsearch.diagnosis_with_laws import searched_laws, separating_test, with_laws, with_misfits
 from tribo.lawsearch.grammar import ADHESION_TERM, LOAD_TERM, UNITS, Shape, WrittenLaw, groups_of, shapes_of
-from tribo.lawsearch.known_laws import holds
+from tribo.lawsearch.known_laws import validate_law
 from tribo.lawsearch.law_file import law_text, read_law
 from tribo.lawsearch.law_words import discovery_text, law_layers, law_sentence, size_sentence
 from tribo.lawsearch.scoring import Projection
@@ -81,7 +79,7 @@ def test_laws_of_the_two_pressures_are_told_apart_at_equal_contact_pressures() -
         for name in ("pressure_Pa", "contact_pressure_Pa")
     )
     conditions = baseline(made(nothing, seed=1)).setup.observations.conditions
-    assert "at equal contact pressures" in parting_test(one, other, conditions).text
+    assert "at equal contact pressures" in separating_test(one, other, conditions).text
 
 
 def nothing(s: Setup) -> np.ndarray:
@@ -156,9 +154,9 @@ def test_a_law_beside_a_cause_leaves_it_a_part_of_the_answer(found: Discovery, q
     assert "A misfit remains beyond chance" in v.text
 
 
-@pytest.mark.parametrize(("room", "step"), [(in_verdict, with_laws), (on_campaign, searched_laws)])
+@pytest.mark.parametrize("step", [with_laws, searched_laws])
 def test_a_law_has_to_be_beyond_chance_at_three_tenths_of_the_level_of_a_misfit(
-    quiet: Diagnosis, monkeypatch: pytest.MonkeyPatch, room: ModuleType, step: Callable[..., object]
+    quiet: Diagnosis, monkeypatch: pytest.MonkeyPatch, step: Callable[..., object]
 ) -> None:
     levels = []
 
@@ -166,7 +164,7 @@ def test_a_law_has_to_be_beyond_chance_at_three_tenths_of_the_level_of_a_misfit(
         levels.append(level)
         return Discovery((), (), 0)
 
-    monkeypatch.setattr(room, "discover_laws", nothing_found)
+    monkeypatch.setattr(diagnosis_with_laws, "discover_laws", nothing_found)
     step(quiet, level=0.05)
     assert levels == [pytest.approx(0.015)]
 
@@ -244,16 +242,16 @@ def test_faults_of_a_law_are_named_all_at_once(tmp_path: Path) -> None:
 def test_a_law_holds_where_it_is_at_work_and_not_where_it_is_absent_or_of_other_size(found: Discovery) -> None:
     law = found.laws[0]
     same = baseline(made(warm_is_best, seed=21))
-    assert holds(same, law.law, law.parameters).answer == "held"
-    assert holds(baseline(made(nothing, seed=22)), law.law, law.parameters).answer == "not held"
+    assert validate_law(same, law.law, law.parameters).answer == "held"
+    assert validate_law(baseline(made(nothing, seed=22)), law.law, law.parameters).answer == "not held"
     turned = {**law.parameters, "a": Estimate(*(-x for x in _ends(law.parameters["a"])), "")}
-    assert holds(same, law.law, turned).answer == "not held"
+    assert validate_law(same, law.law, turned).answer == "not held"
 
 
 def test_a_law_whose_column_is_not_recorded_cannot_be_told(found: Discovery) -> None:
     law = found.laws[0]
     elsewhere = replace(law.law, shapes=(replace(law.law.shapes[0], column="lot"),))
-    answer = holds(baseline(made(nothing, seed=22)), elsewhere, law.parameters)
+    answer = validate_law(baseline(made(nothing, seed=22)), elsewhere, law.parameters)
     assert answer.answer == "cannot be told"
     assert "lot is not recorded" in answer.text
 
@@ -313,7 +311,7 @@ def test_what_a_cause_of_slightly_wrong_form_leaves_is_no_law() -> None:
 def test_a_day_is_not_to_be_varied_but_what_it_had_in_particular() -> None:
     shape = Shape("level", "date", level="2026-03-04")
     one, other = (WrittenLaw((shape,), acts_on=term) for term in (LOAD_TERM, ADHESION_TERM))
-    test = parting_test(one, other, baseline(made(nothing, seed=1)).setup.observations.conditions)
+    test = separating_test(one, other, baseline(made(nothing, seed=1)).setup.observations.conditions)
     assert test.text.startswith("Find out what differed on 2026-03-04, and pull with it and without it at ")
 
 

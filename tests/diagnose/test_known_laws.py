@@ -17,7 +17,7 @@ from tribo.errors import CampaignError, SimulationError
 from tribo.lawsearch import model_choice as contested
 from tribo.lawsearch.diagnosis_with_laws import with_laws, without_causes
 from tribo.lawsearch.grammar import Shape, WrittenLaw
-from tribo.lawsearch.known_laws import KnownLaw, holds, plan_law, read_laws, try_laws
+from tribo.lawsearch.known_laws import KnownLaw, plan_law, read_laws, validate_law, validate_laws
 from tribo.lawsearch.law_file import law_text
 from tribo.lawsearch.model_choice import without_wrong_forms
 from tribo.mechanisms.table import MECHANISMS
@@ -55,7 +55,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_known_law_that_holds_is_added_and_one_that_cannot_be_tested_says_why(folder: Path) -> None:
-    tested = try_laws(baseline(made(warming, seed=31)), read_laws(folder), np.random.default_rng(0))
+    tested = validate_laws(baseline(made(warming, seed=31)), read_laws(folder), np.random.default_rng(0))
     assert [held.answer for _, held in tested.answers] == ["held", "cannot be told"]
     assert [layer.name for layer in tested.layers] == ["temperature_C"]
     assert "The law of first held" in tested.text
@@ -83,7 +83,7 @@ def test_a_known_law_replaces_a_cause_of_its_column_unless_that_explains_more(
 ) -> None:
     model = refitted(baseline(made(at_work, seed=31)), [Acting(MECHANISMS["temperature"])])
     known = KnownLaw("law-1.toml", "first", STEP, {"a": Estimate(a, a - 0.04, a + 0.04, "")})
-    tested = try_laws(model, [known], np.random.default_rng(0))
+    tested = validate_laws(model, [known], np.random.default_rng(0))
     assert tested.answers[0][1].answer == answer
     left = {a.name for a in tested.model.acting}
     assert ("temperature" in left) == (answer == "not held")
@@ -93,7 +93,7 @@ def test_a_known_law_replaces_a_cause_of_its_column_unless_that_explains_more(
 def test_the_form_of_a_known_law_may_be_wrong_by_some_of_its_effect() -> None:
     model = baseline(made(stepped, seed=31))
     sizes = (0.3, 0.39, 0.5)
-    answers = [holds(model, STEP, {"a": Estimate(a, a - 1e-6, a + 1e-6, "")}).answer for a in sizes]
+    answers = [validate_law(model, STEP, {"a": Estimate(a, a - 1e-6, a + 1e-6, "")}).answer for a in sizes]
     assert answers == ["held", "held", "not held"]
 
 

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnostics import examine, look_table, misfit_map, plan_design, residual_table, weighing_table
-from tribo.diagnostics.diagnosis import Diagnosis
+from tribo.diagnostics import Diagnosis, examine, look_table, misfit_map, plan_design, residual_table, weighing_table
 from tribo.diagnostics.planning import Finding, Plan
 
 from .synthetic import Design, hidden

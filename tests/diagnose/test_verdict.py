@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from tribo.diagnostics import examine
-from tribo.diagnostics.diagnosis import Diagnosis
+from tribo.diagnostics import Diagnosis, examine
 from tribo.diagnostics.planning import bits
 from tribo.diagnostics.verdict import Misfit, Verdict
 from tribo.errors import FitError

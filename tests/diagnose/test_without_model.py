@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from tribo import stages
 from tribo.campaign import load_campaign
 from tribo.cli import main
-from tribo.diagnostics.column_search import load_levels, points_of
+from tribo.diagnostics.column_search import load_levels, regime_tests
 from tribo.diagnostics.verdict import Verdict
 from tribo.diagnostics.within_records import running_in
 from tribo.fitting.alternatives import compared_laws
@@ -182,8 +182,8 @@ def test_diagnose_writes_a_verdict_without_the_model(tmp_path: Path) -> None:
 
 def test_a_column_named_by_another_name_of_the_load_is_no_column(tmp_path: Path) -> None:
     folder = made(tmp_path / "c", lambda row: 0.0, columns=lambda row: {"nominal_load_N": row["normal_load_N"]})
-    points = points_of(stages.ingest(load_campaign(folder)), "sliding")
-    assert "nominal_load_N" not in [*points.untold, *(c.name for c in points.columns)]
+    points = regime_tests(stages.ingest(load_campaign(folder)), "sliding")
+    assert "nominal_load_N" not in [*points.only_with_load, *(c.name for c in points.columns)]
 
 
 @pytest.mark.parametrize(("spread", "doubted"), [(1.003, False), (1.08, True)])

@@ -13,8 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from figures.test_figures import collisions
-from tribo.diagnostics import examine
-from tribo.diagnostics.diagnosis import Diagnosis
+from tribo.diagnostics import Diagnosis, examine
 from tribo.diagnostics.fit import fit, residual_on_flat
 from tribo.diagnostics.model import PATTERN
 from tribo.figures import detectable, extended, misfit, residuals

@@ -37,8 +37,7 @@ from tribo.berardo2019.table_model import (
 )
 from tribo.berardo2019.table_sentences import verdict_of
 from tribo.diagnostics.verdict import Gain, Verdict
-from tribo.lawsearch.across_patterns import AcrossPatterns, Deviations, across_patterns
-from tribo.lawsearch.across_words import geometry_of
+from tribo.lawsearch.across_patterns import AcrossPatterns, Deviations, across_patterns, geometry_of
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import REGIMES, FloatArray
 

@@ -399,9 +399,9 @@ def discover(
     """
     from tribo import stages
     from tribo.campaign import open_campaign
-    from tribo.lawsearch.discovery import discover_in, hold_law_against
+    from tribo.lawsearch.diagnosis_with_laws import discover_on_campaign, validate_on_campaign
     from tribo.lawsearch.law_file import read_law
-    from tribo.report.without_study import write_discovery, write_held
+    from tribo.report.without_study import write_discovery, write_validation
 
     law = read_law(law_file) if law_file is not None else None
     with out.taken(campaign), open_campaign(campaign) as opened, console.progress() as progress:
@@ -410,9 +410,10 @@ def discover(
         record = provenance_of_run(study, campaign, chosen)
         with stages.naming_set_aside(study.ingested):
             if law is not None:
-                written = write_held(hold_law_against(study.ingested, *law, seed=chosen.seed), out.path, record)
+                held = validate_on_campaign(study.ingested, *law, seed=chosen.seed)
+                written = write_validation(held, out.path, record)
             else:
-                found = discover_in(study.ingested, seed=chosen.seed, progress=progress)
+                found = discover_on_campaign(study.ingested, seed=chosen.seed, progress=progress)
                 written = write_discovery(found, study.ingested.campaign.title, out.path, record)
     console.result(written.record, written.text)
     return console.status_after(study.ingested.set_aside)

@@ -1,4 +1,4 @@
-from .diagnosis import diagnose as diagnose, examine as examine
+from .diagnosis import examine as examine
 from .diagnosis_record import (
     Diagnosis as Diagnosis,
     look_table as look_table,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tribo.diagnostics.column_search import Follows, Searched
+from tribo.diagnostics.column_search import ColumnEffect, SearchedColumns
 from tribo.diagnostics.sentences import p_text, sentence_case
 from tribo.diagnostics.terms import in_words, name_in_words
 from tribo.diagnostics.verdict import Cause, Excluded, Layer, NextTest
-from tribo.diagnostics.within_records import Apart, RunningIn
+from tribo.diagnostics.within_records import RunningIn, StrokeOffset
 from tribo.mechanisms.record import ALONG_RECORDS, STROKES_APART
 from tribo.mechanisms.table import MECHANISMS
 
@@ -25,7 +25,7 @@ def name_of_column(column: str) -> str:
     return MECHANISMS_OF_COLUMNS.get(column, f"{ANY_COLUMN}:{column}")
 
 
-def of_column(f: Follows) -> str:
+def of_column(f: ColumnEffect) -> str:
     """How friction follows a column, with the size of the change."""
     unit = UNITS.get(f.name, "")
     first, last = f.where
@@ -54,7 +54,7 @@ def of_records(records: Sequence[RunningIn]) -> str:
     )
 
 
-def of_strokes(a: Apart) -> str:
+def of_strokes(a: StrokeOffset) -> str:
     """The offset between strokes in both directions."""
     return (
         f"The force recorded in {a.strokes[0]} forward and {a.strokes[1]} backward strokes is offset by "
@@ -87,7 +87,7 @@ def load_test(columns: Sequence[str]) -> NextTest:
     return NextTest(text, (*columns, "normal_load_N"), design, float("nan"))
 
 
-def parting_test(f: Follows) -> NextTest:
+def parting_test(f: ColumnEffect) -> NextTest:
     """For columns with the same effect in this design."""
     names = (f.name, *f.alike)
     varied = next((name for name in names if name not in SERIES), "")
@@ -100,7 +100,7 @@ def parting_test(f: Follows) -> NextTest:
 
 
 def summary(
-    layers: Sequence[Layer], causes: Sequence[Cause], inseparable: Sequence[Excluded], found: Sequence[Searched],
+    layers: Sequence[Layer], causes: Sequence[Cause], inseparable: Sequence[Excluded], found: Sequence[SearchedColumns],
     too_few: str,
 ) -> str:
     """The verdict in a few sentences: the laws, what friction varies with, what cannot be told."""

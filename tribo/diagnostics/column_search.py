@@ -48,7 +48,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Tested:
+class RegimeTests:
     """The tests of one regime with a positive force: ln T, (n,), and ``law`` (n, p), the law of every sample alone.
 
     The law of a sample is its mean at every load where loads are repeated, else a parabola of ln T in ln N as far as
@@ -62,7 +62,7 @@ class Tested:
     log_force: FloatArray
     law: FloatArray
     columns: tuple[Column, ...]
-    untold: tuple[str, ...]
+    only_with_load: tuple[str, ...]
 
     @property
     def n(self) -> int:
@@ -74,8 +74,8 @@ class Tested:
         return self.n >= FEWEST_TESTS and self.n >= 2 * self.law.shape[1]
 
 
-def points_of(ingested: Ingested, regime: Regime) -> Tested:
-    """The tests of one regime; ``untold`` are columns that vary within samples, but only together with the load."""
+def regime_tests(ingested: Ingested, regime: Regime) -> RegimeTests:
+    """The tests of one regime, and the columns that vary within samples ``only_with_load``."""
     pairs = [
         (test, pull)
         for test in ingested.campaign.tests
@@ -90,7 +90,7 @@ def points_of(ingested: Ingested, regime: Regime) -> Tested:
     told = [c for c in found if _beyond(law, c.columns) > LEFT_OVER]
     samples = (sample[:, None] == np.unique(sample)[None]).astype(float)
     names = {c.name for c in told} | {c.name for c in found if _beyond(samples, c.columns) <= LEFT_OVER}
-    return Tested(
+    return RegimeTests(
         regime, sample, np.array([t.specimen for t in tests], str), load,
         np.log([getattr(p, f"{regime}_N") for p in pulls]), law, tuple(told),
         tuple(dict.fromkeys(c.name for c in found if c.name not in names)),
@@ -201,7 +201,7 @@ _NOTHING_LEFT = 1e-9
 
 
 @dataclass(frozen=True)
-class Follows:
+class ColumnEffect:
     """A column that friction follows: the change of T over its range with a 90 % interval, in percent.
 
     ``where`` says between which values. ``alike`` are columns that this design cannot tell from it.
@@ -219,16 +219,16 @@ class Follows:
 
 
 @dataclass(frozen=True)
-class Searched:
-    """What was found in one regime; ``columns`` are all that were tested, ``untold`` those that only vary with load.
+class SearchedColumns:
+    """What was found in one regime; ``columns`` are all that were tested, the others vary ``only_with_load``.
 
     ``scatter_percent`` is the standard deviation of a repeat.
     """
 
     regime: Regime
-    follows: tuple[Follows, ...]
+    follows: tuple[ColumnEffect, ...]
     columns: tuple[str, ...]
-    untold: tuple[str, ...]
+    only_with_load: tuple[str, ...]
     p_strongest: float
     scatter_percent: float
     n: int
@@ -247,7 +247,7 @@ class _Weighed:
 class _Fitted:
     """A law fitted by restricted likelihood: weights of outlying tests, basis, what is left, its variance."""
 
-    tested: Tested
+    tested: RegimeTests
     root: FloatArray  # (n,) square roots of the weights
     weighed: tuple[_Weighed, ...]
     at: int
@@ -260,7 +260,7 @@ class _Fitted:
         return self.tested.n - self.weighed[self.at].basis.shape[1]
 
 
-def searched(t: Tested, regimes: int, level: float, rng: np.random.Generator) -> Searched:
+def search_columns(t: RegimeTests, regimes: int, level: float, rng: np.random.Generator) -> SearchedColumns:
     """The columns that friction follows beyond chance, the strongest first, each beside the others.
 
     ``regimes`` is the number of regimes that are searched; p values are adjusted for it.
@@ -288,10 +288,10 @@ def searched(t: Tested, regimes: int, level: float, rng: np.random.Generator) ->
             found.append(_described(beside, _first_alike(beside, column), p))
     names = tuple(dict.fromkeys(c.name for c in t.columns))
     scatter = 100.0 * float(np.expm1(np.sqrt(_fit(t, taken).variance)))
-    return Searched(t.regime, tuple(found), names, t.untold, p_first, scatter, t.n)
+    return SearchedColumns(t.regime, tuple(found), names, t.only_with_load, p_first, scatter, t.n)
 
 
-def _fit(t: Tested, taken: Sequence[Column]) -> _Fitted:
+def _fit(t: RegimeTests, taken: Sequence[Column]) -> _Fitted:
     """The law with the columns taken, by restricted maximum likelihood in the spread of the specimens."""
     design = np.column_stack([t.law, *(c.columns for c in taken)])
     names = np.unique(t.specimen)
@@ -394,7 +394,7 @@ def _by_chance(f: _Fitted, columns: Sequence[Column], rng: np.random.Generator) 
     return strongest
 
 
-def _described(f: _Fitted, column: Column, p: float) -> Follows:
+def _described(f: _Fitted, column: Column, p: float) -> ColumnEffect:
     """The size of a column's effect with its interval, and what reproduces it."""
     w = f.weighed[f.at]
     white = _whiten(column.columns * f.root[:, None], f.groups, w.share)
@@ -409,7 +409,7 @@ def _described(f: _Fitted, column: Column, p: float) -> Follows:
     half = float(t_distribution.ppf(0.95, dof) * np.sqrt(variance * contrast @ inverse @ contrast))
     low, middle, high = (100.0 * float(np.expm1(value + k * half)) for k in (-1, 0, 1))
     alike = _alike(f, column, white @ size)
-    return Follows(column.name, column.kind, f.tested.regime, p, middle, low, high, where, alike)
+    return ColumnEffect(column.name, column.kind, f.tested.regime, p, middle, low, high, where, alike)
 
 
 def _first_alike(f: _Fitted, column: Column) -> Column:

@@ -15,23 +15,24 @@ from tribo.diagnostics.observations import enough, observe
 from tribo.diagnostics.predictor import Predictor, tabled_predictor
 from tribo.diagnostics.score_statistics import start_effects
 from tribo.diagnostics.sentences import exclusions
-from tribo.diagnostics.verdict import Misfit, Verdict
-from tribo.lawsearch.diagnosis_with_laws import with_law_across, with_laws
 from tribo.records import Ingested
 
 REPLICATES = 120
 REPLICATES_LEFT = 60
 
 
-def diagnose(
+def examine(
     ingested: Ingested,
     *,
     seed: int = 0,
     level: float = 0.01,
     predictor: Predictor | None = None,
     progress: Progress | None = None,
-) -> Verdict:
-    """Find out whether the calibrated model fails on a campaign beyond chance, and which mechanism or law explains it.
+    replicates: tuple[int, int] = (REPLICATES, REPLICATES_LEFT),
+) -> Diagnosis:
+    """Find out whether the calibrated model fails on a campaign beyond chance, and which mechanism explains it.
+
+    Laws of what no mechanism explains are searched afterwards (:mod:`tribo.lawsearch`).
 
     Parameters
     ----------
@@ -45,26 +46,19 @@ def diagnose(
         Shares of the flat law per sample; those tabulated from simulations by default.
     progress : callable, optional
         Called with a stage, the steps done and the steps there are.
+    replicates : (int, int)
+        Simulated campaigns at most: for the first look, and for what a cause leaves.
 
     Returns
     -------
-    Verdict
-        The record behind verdict.json.
+    Diagnosis
+        The verdict with the fitted models and screens that it rests on.
+
+    Raises
+    ------
+    FitError
+        Fewer than twelve usable tests.
     """
-    examined = examine(ingested, seed=seed, level=level, predictor=predictor, progress=progress)
-    return with_law_across(with_laws(examined, seed=seed, level=level, progress=progress), seed=seed).verdict
-
-
-def examine(
-    ingested: Ingested,
-    *,
-    seed: int = 0,
-    level: float = 0.01,
-    predictor: Predictor | None = None,
-    progress: Progress | None = None,
-    replicates: tuple[int, int] = (REPLICATES, REPLICATES_LEFT),
-) -> Diagnosis:
-    """:func:`diagnose` without laws, with the fitted models and screens kept. Raises FitError below twelve tests."""
     rng = np.random.default_rng(seed)
     observations = enough(observe(ingested))
     s = setup(observations, predictor or tabled_predictor(observations.patterns))
@@ -80,6 +74,3 @@ def examine(
         named = name_causes(effects, screened, rules)
     verdict = conclude(Findings(effects, screened, evidence, barred, named, level), rng)
     return Diagnosis(verdict, baseline, screened, named)
-
-
-__all__ = ["Diagnosis", "Misfit", "diagnose", "examine"]

@@ -91,7 +91,7 @@ _FEWEST = 3
 
 
 @dataclass(frozen=True)
-class Apart:
+class StrokeOffset:
     """The ``offset`` of the force in N with its 90 % interval: half of what parts the two directions.
 
     ``percent`` is that of the mean sliding force. ``strokes`` counts those forward and those backward.
@@ -106,7 +106,7 @@ class Apart:
     strokes: tuple[int, int]
 
 
-def strokes_apart(ingested: Ingested) -> Apart | None:
+def stroke_offset(ingested: Ingested) -> StrokeOffset | None:
     """The offset over all pairs of strokes; None without strokes in both directions, or with fewer than three pairs."""
     pulls = list(ingested.pulls.values())
     forward = [p for p in pulls if "forward" in p.flags]
@@ -119,7 +119,7 @@ def strokes_apart(ingested: Ingested) -> Apart | None:
     force = float(np.mean([p.sliding_N for p in (*forward, *backward)]))
     p = float(2.0 * t_distribution.sf(abs(mean) / se, len(zeros) - 1))
     low, high = mean - half, mean + half
-    return Apart(
+    return StrokeOffset(
         Estimate(mean, low, high, "N"), 100 * mean / force, 100 * low / force, 100 * high / force, p,
         abs(mean) > CERTAIN * se, (len(forward), len(backward)),
     )  # fmt: skip

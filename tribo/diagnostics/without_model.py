@@ -13,9 +13,16 @@ import numpy as np
 from scipy.stats import t as t_distribution
 
 from tribo.diagnostics import alone_words as words
-from tribo.diagnostics.column_search import FEWEST_TESTS, Follows, Searched, Tested, points_of, searched
+from tribo.diagnostics.column_search import (
+    FEWEST_TESTS,
+    ColumnEffect,
+    RegimeTests,
+    SearchedColumns,
+    regime_tests,
+    search_columns,
+)
 from tribo.diagnostics.verdict import Cause, Estimate, Excluded, Layer, Misfit, NextTest, Outcome, Verdict
-from tribo.diagnostics.within_records import Apart, RunningIn, running_in, strokes_apart
+from tribo.diagnostics.within_records import RunningIn, StrokeOffset, running_in, stroke_offset
 from tribo.fitting.dependence import LABELS
 from tribo.mechanisms.record import ALONG_RECORDS, STROKES_APART
 from tribo.records import REGIMES, Study
@@ -120,7 +127,7 @@ BASELINE = "the law of each sample alone"
 RUNNING_IN, OFFSET = words.SHOWN_BY[ALONG_RECORDS], words.SHOWN_BY[STROKES_APART]
 
 
-def diagnose_alone(study: Study, *, seed: int = 0, level: float = 0.01) -> Verdict:
+def diagnose_without_model(study: Study, *, seed: int = 0, level: float = 0.01) -> Verdict:
     """What friction varies with beyond the law of each sample over load, and what this design cannot tell.
 
     Parameters
@@ -133,11 +140,11 @@ def diagnose_alone(study: Study, *, seed: int = 0, level: float = 0.01) -> Verdi
         Chance of naming anything where nothing is there.
     """
     rng = np.random.default_rng(seed)
-    points = [t for regime in REGIMES if (t := points_of(study.ingested, regime)).n]
+    points = [t for regime in REGIMES if (t := regime_tests(study.ingested, regime)).n]
     enough = [t for t in points if t.enough]
-    found = [searched(t, len(enough), level, rng) for t in enough]
+    found = [search_columns(t, len(enough), level, rng) for t in enough]
     records = [r for r in running_in(study.ingested) if r.p < level]
-    apart = strokes_apart(study.ingested)
+    apart = stroke_offset(study.ingested)
     layers = [*law_layers(study), *_column_layers(found), *_record_layers(records), *_offset_layers(apart)]
     causes = [*_column_causes(found), *_record_causes(records), *_offset_causes(apart)]
     inseparable = _inseparable(study, found)
@@ -159,10 +166,10 @@ def diagnose_alone(study: Study, *, seed: int = 0, level: float = 0.01) -> Verdi
     )
 
 
-def _too_few(points: list[Tested], found: list[Searched]) -> str:
+def _too_few(points: list[RegimeTests], found: list[SearchedColumns]) -> str:
     if found or not points:
         return ""
-    if not any(t.columns or t.untold for t in points):
+    if not any(t.columns or t.only_with_load for t in points):
         return "No recorded column varies beside the load."
     needed = max(FEWEST_TESTS, 2 * points[-1].law.shape[1])
     return (
@@ -171,7 +178,7 @@ def _too_few(points: list[Tested], found: list[Searched]) -> str:
     )
 
 
-def _column_layers(found: list[Searched]) -> list[Layer]:
+def _column_layers(found: list[SearchedColumns]) -> list[Layer]:
     return [
         Layer(
             kind="cause", name=words.name_of_column(f.name), samples=(), regimes=(f.regime,), p_adjusted=f.p,
@@ -182,9 +189,9 @@ def _column_layers(found: list[Searched]) -> list[Layer]:
     ]  # fmt: skip
 
 
-def _column_causes(found: list[Searched]) -> list[Cause]:
+def _column_causes(found: list[SearchedColumns]) -> list[Cause]:
     """One cause per column, with its size in every regime in which it is beyond chance."""
-    each: dict[str, list[Follows]] = {}
+    each: dict[str, list[ColumnEffect]] = {}
     for s in found:
         for f in s.follows:
             each.setdefault(f.name, []).append(f)
@@ -197,11 +204,11 @@ def _column_causes(found: list[Searched]) -> list[Cause]:
     ]  # fmt: skip
 
 
-def _size(f: Follows) -> Estimate:
+def _size(f: ColumnEffect) -> Estimate:
     return Estimate(f.change_percent, f.low_percent, f.high_percent, "%")
 
 
-def _misfits(found: list[Searched], records: list[RunningIn]) -> list[Misfit]:
+def _misfits(found: list[SearchedColumns], records: list[RunningIn]) -> list[Misfit]:
     all_found = [f for s in found for f in s.follows]
     misfits = [Misfit(f.regime, "", f.name, f.change_percent, f.p, words.of_column(f)) for f in all_found]
     for sample in dict.fromkeys(r.sample for r in records):
@@ -234,7 +241,7 @@ def _record_causes(records: list[RunningIn]) -> list[Cause]:
     return [Cause(RUNNING_IN, 1.0, {"first twentieth over second half": size}, words.of_records(records))]
 
 
-def _offset_layers(apart: Apart | None) -> list[Layer]:
+def _offset_layers(apart: StrokeOffset | None) -> list[Layer]:
     if apart is None or not apart.certain:
         return []
     return [Layer(kind="cause", name=OFFSET, samples=(), regimes=(), p_adjusted=apart.p,
@@ -242,13 +249,13 @@ def _offset_layers(apart: Apart | None) -> list[Layer]:
                   parameters={"F0": apart.offset}, text=words.of_strokes(apart))]  # fmt: skip
 
 
-def _offset_causes(apart: Apart | None) -> list[Cause]:
+def _offset_causes(apart: StrokeOffset | None) -> list[Cause]:
     if apart is None or not apart.certain:
         return []
     return [Cause(OFFSET, 1.0, {"F0": apart.offset}, words.of_strokes(apart))]
 
 
-def _inseparable(study: Study, found: list[Searched]) -> list[Excluded]:
+def _inseparable(study: Study, found: list[SearchedColumns]) -> list[Excluded]:
     """Columns that vary only together with the load, and pairs of columns that vary together."""
     pairs: dict[tuple[str, str], list[str]] = {}
     table = study.dependence
@@ -265,13 +272,13 @@ def _inseparable(study: Study, found: list[Searched]) -> list[Excluded]:
     return [*said, *(Excluded(names, reason) for names, reason in together)]
 
 
-def _only_with_load(found: list[Searched]) -> list[str]:
-    return sorted({name for s in found for name in s.untold})
+def _only_with_load(found: list[SearchedColumns]) -> list[str]:
+    return sorted({name for s in found for name in s.only_with_load})
 
 
-def _not_testable(found: list[Searched]) -> list[Excluded]:
+def _not_testable(found: list[SearchedColumns]) -> list[Excluded]:
     """Mechanisms whose column does not vary, or was not recorded."""
-    there = {name for s in found for name in (*s.columns, *s.untold)}
+    there = {name for s in found for name in (*s.columns, *s.only_with_load)}
     return [
         Excluded(mechanism, words.not_varied_column(column))
         for column, mechanism in words.MECHANISMS_OF_COLUMNS.items()
@@ -279,7 +286,7 @@ def _not_testable(found: list[Searched]) -> list[Excluded]:
     ]
 
 
-def _next_test(found: list[Searched]) -> NextTest | None:
+def _next_test(found: list[SearchedColumns]) -> NextTest | None:
     if columns := _only_with_load(found):
         return words.load_test(columns)
     tied = next((f for s in found for f in s.follows if f.alike), None)

@@ -19,9 +19,13 @@ from itertools import combinations, permutations
 
 import numpy as np
 
+from tribo.diagnostics.fit import ModelFit
+from tribo.lawsearch.grammar import ADHESION_TERM, LOAD_TERM, T
 from tribo.records import REGIMES, FloatArray
 
-T, LOAD_TERM, ADHESION_TERM, BENT = "T", "load term", "adhesion term", "T, in proportion to ln p"
+BENT = "T, in proportion to ln p"
+LOADS = 3  # groups of tests by load
+CERTAIN = 0.01
 FEWEST = 4  # patterns
 MOST_PERMUTATIONS = 119  # of five patterns all but one; of more a random choice
 LISTED = 200  # laws of each number of terms that are kept for the table
@@ -51,6 +55,43 @@ class Deviations:
         return Deviations(names, geometry, self.pressure_Pa, self.log_ratio[k], self.adhesion_share[k])
 
 
+def geometry_of(
+    area_fraction: FloatArray, rim_per_m: FloatArray, cavity_width_m: FloatArray, elongation: FloatArray
+) -> dict[str, FloatArray]:
+    """The quantities of patterns (n,) that a law may use, by name; ``elongation`` as in ``Conditions``."""
+    return {
+        "1 - AF": 1.0 - area_fraction, "(1 - AF)/AF": (1.0 - area_fraction) / area_fraction,
+        "-ln AF": -np.log(area_fraction), "rim length per area (1/um)": 1e-6 * rim_per_m,
+        "cavity width (um)": 1e6 * cavity_width_m, "elongation along the pull": elongation,
+        "1": np.ones_like(area_fraction),
+    }  # fmt: skip
+
+
+def deviations_of(f: ModelFit) -> Deviations:
+    """Mean of ln(measured / model) of every patterned sample and regime, in three groups of tests by load."""
+    c, base = f.setup.observations.conditions, f.setup.base(f.law)
+    forces = base.forces(c.normal_load_N)
+    share = np.column_stack([base.static_adhesion_N / forces.static_N, base.sliding_adhesion_N / forces.sliding_N])
+    names = tuple(str(s) for s in np.unique(c.sample[c.area_fraction < 1.0]))
+    groups = {s: _by_load(c.normal_load_N, c.sample == s) for s in names}
+    first = [int(np.flatnonzero(c.sample == s)[0]) for s in names]
+    means = {
+        key: np.array([[values[rows].mean(axis=0) for rows in groups[s]] for s in names]).reshape(len(names), LOADS, 2)
+        for key, values in (("left", f.residual), ("share", share))
+    }
+    pressure = np.array([[c.normal_load_N[rows].mean() for rows in groups[s]] for s in names]) / c.nominal_area_m2
+    geometry = geometry_of(c.area_fraction[first], c.rim_per_m[first], c.cavity_width_m[first], c.elongation[first])
+    middle = np.exp(np.log(pressure).mean(axis=0)) if len(names) else np.ones(LOADS)
+    return Deviations(
+        names, geometry, middle, np.swapaxes(means["left"], 1, 2), np.swapaxes(means["share"], 1, 2)
+    )
+
+
+def _by_load(load_N: FloatArray, here: np.ndarray) -> list[np.ndarray]:
+    rows = np.flatnonzero(here)
+    return list(np.array_split(rows[np.argsort(load_N[rows], kind="stable")], LOADS))
+
+
 @dataclass(frozen=True)
 class Term:
     """One term of a law: a quantity of the pattern, what it acts on, and the regime ("both" or one)."""
@@ -78,7 +119,7 @@ class LawAcross:
 
 
 @dataclass(frozen=True)
-class Search:
+class LawsAcross:
     """All laws of one number of terms: the best ones, and what chance and nesting make of the best.
 
     ``p`` is the share of reassignments of the deviations whose best law errs no more, ``nested`` the rms error of ln T
@@ -104,7 +145,7 @@ class AcrossPatterns:
 
     deviations: Deviations
     without: float
-    searches: tuple[Search, ...]
+    searches: tuple[LawsAcross, ...]
 
 
 def grammar(d: Deviations) -> tuple[Term, ...]:
@@ -136,7 +177,7 @@ def _orders(n: int, rng: np.random.Generator) -> list[tuple[int, ...]]:
     return [order for order in drawn if order != tuple(range(n))]
 
 
-def _searched(d: Deviations, terms: Sequence[Term], k: int, orders: Sequence[tuple[int, ...]]) -> Search:
+def _searched(d: Deviations, terms: Sequence[Term], k: int, orders: Sequence[tuple[int, ...]]) -> LawsAcross:
     columns = np.array([term.column(d) for term in terms])
     laws = np.array(list(combinations(range(len(terms)), k)))
     errors = left_out_errors(columns, d.log_ratio, laws)
@@ -144,7 +185,7 @@ def _searched(d: Deviations, terms: Sequence[Term], k: int, orders: Sequence[tup
     by_chance = left_out_errors(columns, d.log_ratio, laws, orders).min(axis=1)
     best = tuple(_law(d, terms, laws[i], float(errors[i])) for i in ranked[:LISTED])
     chosen = tuple(_nested(d, terms, laws, columns))
-    return Search(
+    return LawsAcross(
         k, len(laws), best, float((1 + np.sum(by_chance <= SAME * errors[ranked[0]])) / (1 + len(by_chance))),
         float(np.median(by_chance)), float(np.sqrt(np.mean([law.error**2 for law in chosen]))), chosen,
     )  # fmt: skip

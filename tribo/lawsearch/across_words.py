@@ -1,4 +1,4 @@
-"""Laws across patterns: from a fitted model to its deviations, and the outcome in words and as a table."""
+"""Laws across patterns in words and as a table."""
 
 from __future__ import annotations
 
@@ -7,54 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.sentences import p_text
-from tribo.lawsearch.across_patterns import BENT, AcrossPatterns, Deviations, LawAcross, Search, T, Term
-from tribo.records import FloatArray
+from tribo.lawsearch.across_patterns import BENT, CERTAIN, AcrossPatterns, LawAcross, LawsAcross, Term
+from tribo.lawsearch.grammar import T
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-LOADS = 3  # groups of tests by load
-CERTAIN = 0.01
-
-
-def geometry_of(
-    area_fraction: FloatArray, rim_per_m: FloatArray, cavity_width_m: FloatArray, elongation: FloatArray
-) -> dict[str, FloatArray]:
-    """The quantities of patterns (n,) that a law may use, by name; ``elongation`` as in ``Conditions``."""
-    return {
-        "1 - AF": 1.0 - area_fraction, "(1 - AF)/AF": (1.0 - area_fraction) / area_fraction,
-        "-ln AF": -np.log(area_fraction), "rim length per area (1/um)": 1e-6 * rim_per_m,
-        "cavity width (um)": 1e6 * cavity_width_m, "elongation along the pull": elongation,
-        "1": np.ones_like(area_fraction),
-    }  # fmt: skip
-
-
-def deviations_of(f: ModelFit) -> Deviations:
-    """Mean of ln(measured / model) of every patterned sample and regime, in three groups of tests by load."""
-    c, base = f.setup.observations.conditions, f.setup.base(f.law)
-    forces = base.forces(c.normal_load_N)
-    share = np.column_stack([base.static_adhesion_N / forces.static_N, base.sliding_adhesion_N / forces.sliding_N])
-    names = tuple(str(s) for s in np.unique(c.sample[c.area_fraction < 1.0]))
-    groups = {s: _by_load(c.normal_load_N, c.sample == s) for s in names}
-    first = [int(np.flatnonzero(c.sample == s)[0]) for s in names]
-    means = {
-        key: np.array([[values[rows].mean(axis=0) for rows in groups[s]] for s in names]).reshape(len(names), LOADS, 2)
-        for key, values in (("left", f.residual), ("share", share))
-    }
-    pressure = np.array([[c.normal_load_N[rows].mean() for rows in groups[s]] for s in names]) / c.nominal_area_m2
-    geometry = geometry_of(c.area_fraction[first], c.rim_per_m[first], c.cavity_width_m[first], c.elongation[first])
-    middle = np.exp(np.log(pressure).mean(axis=0)) if len(names) else np.ones(LOADS)
-    return Deviations(
-        names, geometry, middle, np.swapaxes(means["left"], 1, 2), np.swapaxes(means["share"], 1, 2)
-    )
-
-
-def _by_load(load_N: FloatArray, here: np.ndarray) -> list[np.ndarray]:
-    rows = np.flatnonzero(here)
-    return list(np.array_split(rows[np.argsort(load_N[rows], kind="stable")], LOADS))
 
 
 def formula(law: LawAcross) -> str:
@@ -89,7 +47,7 @@ def sentence(found: AcrossPatterns) -> str:
     )
 
 
-def _tried(s: Search) -> str:
+def _tried(s: LawsAcross) -> str:
     return f"{s.tried} laws of {s.terms} term{'s' if s.terms > 1 else ''} were tried."
 
 

@@ -1,9 +1,4 @@
-"""Laws as a step of a diagnosis: laws of what its causes leave are searched and added.
-
-A law across patterns as part of a verdict: where the model is wrong about several patterns, does one law say how?
-
-The test that tells apart two laws that the design cannot.
-"""
+"""A diagnosis with the laws of what its causes leave, and the test that separates two laws that the design cannot."""
 
 from __future__ import annotations
 
@@ -15,21 +10,22 @@ import numpy as np
 
 from tribo.diagnostics.conclusion import pattern_layers
 from tribo.diagnostics.contrasts import Screen, screen_left
+from tribo.diagnostics.diagnosis import examine
 from tribo.diagnostics.diagnosis_record import Diagnosis
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.planning import HOURS_PER_PULL, PULLS, first_test_of
 from tribo.diagnostics.sentences import summary
 from tribo.diagnostics.terms import in_words
-from tribo.diagnostics.verdict import CERTAIN_CAUSES, Excluded, Layer, NextTest, Outcome, Verdict
-from tribo.lawsearch.across_patterns import AcrossPatterns, across_patterns
-from tribo.lawsearch.across_words import CERTAIN, deviations_of, sentence
+from tribo.diagnostics.verdict import CERTAIN_CAUSES, Estimate, Excluded, Layer, NextTest, Outcome, Verdict
+from tribo.lawsearch.across_patterns import CERTAIN, AcrossPatterns, across_patterns, deviations_of
+from tribo.lawsearch.across_words import sentence
 from tribo.lawsearch.grammar import BOTH, PRESSURES, UNITS, WrittenLaw, column_values
-from tribo.lawsearch.known_laws import KnownLaw, Tested, try_laws
+from tribo.lawsearch.known_laws import KnownLaw, ValidatedLaws, Validation, validate_law, validate_laws
 from tribo.lawsearch.law_words import law_layers, law_misfit, laws_text, tied_text
 from tribo.lawsearch.model_choice import CauseForms, Contested, without_wrong_forms
 from tribo.lawsearch.search import Discovery, Progress, discover_laws
 from tribo.mechanisms.record import Conditions
-from tribo.records import FloatArray
+from tribo.records import FloatArray, Ingested
 
 REPLICATES_LEFT = 60
 # Of the level of a misfit: a law says more, and it is searched for in the very data that showed the misfit. At the full
@@ -55,7 +51,7 @@ def with_laws(
     rng = np.random.default_rng(seed)
     contested = uncontested(d)
     d = replace(d, verdict=with_forms_of_causes(d.verdict, contested.forms, contested.model))
-    tested = try_laws(contested.model, known, rng)
+    tested = validate_laws(contested.model, known, rng)
     strict = LEVEL_OF_LAWS * level
     found = discover_laws(tested.model, level=strict, rng=rng, progress=progress, without=tested.columns)
     found = replace(found, of_causes=contested.forms)
@@ -69,7 +65,32 @@ def with_laws(
     return replace(d, laws=found, verdict=_extended(verdict, (tested, found), model, (left, level)))
 
 
-def with_tested(v: Verdict, tested: Tested) -> Verdict:
+def discover_on_campaign(
+    ingested: Ingested, *, seed: int = 0, level: float = 0.01, progress: Progress | None = None
+) -> Discovery:
+    """Search for the laws of what the causes of a campaign leave unexplained."""
+    d = examine(ingested, seed=seed, level=level, progress=progress)
+    return searched_laws(d, seed=seed, level=level, progress=progress)
+
+
+def searched_laws(d: Diagnosis, *, seed: int = 0, level: float = 0.01, progress: Progress | None = None) -> Discovery:
+    """The laws of what the causes of a diagnosis leave unexplained.
+
+    ``level`` is that of a misfit; a law has to be beyond chance at LEVEL_OF_LAWS times it.
+    """
+    strict, contested = LEVEL_OF_LAWS * level, uncontested(d)
+    found = discover_laws(contested.model, level=strict, rng=np.random.default_rng(seed), progress=progress)
+    return replace(found, of_causes=contested.forms)
+
+
+def validate_on_campaign(
+    ingested: Ingested, law: WrittenLaw, parameters: Mapping[str, Estimate], *, seed: int = 0, level: float = 0.01
+) -> Validation:
+    """Whether a law of another campaign holds in this one, its own causes taken into account."""
+    return validate_law(uncontested(examine(ingested, seed=seed, level=level)).model, law, parameters)
+
+
+def with_tested(v: Verdict, tested: ValidatedLaws) -> Verdict:
     """The verdict with the answers about known laws in its ``model`` record."""
     if not tested.answers:
         return v
@@ -107,7 +128,7 @@ def with_forms_of_causes(v: Verdict, forms: Sequence[CauseForms], model: ModelFi
         for layer in v.layers
     )  # fmt: skip
     first = next(iter(tied.values()))
-    next_test = v.next_test or parting_test(first.law, first.ties[0], model.setup.observations.conditions)
+    next_test = v.next_test or separating_test(first.law, first.ties[0], model.setup.observations.conditions)
     return replace(v, layers=layers, next_test=next_test)
 
 
@@ -154,7 +175,7 @@ def _alternatives(v: Verdict, lost: Mapping[str, float]) -> set[str]:
 
 
 def _extended(
-    v: Verdict, laws: tuple[Tested, Discovery], model: ModelFit, left: tuple[Screen, float]
+    v: Verdict, laws: tuple[ValidatedLaws, Discovery], model: ModelFit, left: tuple[Screen, float]
 ) -> Verdict:
     """The verdict with corrections of the patterns beside the laws, the laws, and what is left after them."""
     (screened, level), (tested, found) = left, laws
@@ -166,7 +187,7 @@ def _extended(
     ties = [(law.law, law.ties[0]) for law in found.laws if law.ties]
     next_test = v.next_test
     if ties and not v.equivalent:
-        next_test = parting_test(*ties[0], model.setup.observations.conditions)
+        next_test = separating_test(*ties[0], model.setup.observations.conditions)
     layers = (*pattern_layers(model), *kept, *tested.layers, *law_layers(found), *remainders)
     said = [v.text, laws_text(found, v.text), rest] if v.verdict != "no_misfit" else [v.text]
     return replace(v, layers=layers, next_test=next_test, text=" ".join(filter(None, said)))
@@ -203,7 +224,7 @@ PARTS_PRESSURES = (
 )
 
 
-def parting_test(law: WrittenLaw, other: WrittenLaw, c: Conditions) -> NextTest:
+def separating_test(law: WrittenLaw, other: WrittenLaw, c: Conditions) -> NextTest:
     """Where two tied laws differ: in their columns, samples, terms, regimes or, at last, in their courses."""
     text, design = _how(law, other, c)
     design |= {"pulls": PULLS, "hours": PULLS * HOURS_PER_PULL}

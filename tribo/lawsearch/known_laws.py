@@ -37,7 +37,7 @@ SHOWS = 4.0  # standard errors that the effect must have for its absence to be c
 
 
 @dataclass(frozen=True)
-class Held:
+class Validation:
     """The ``answer`` on one campaign, the amplitude found there beside the earlier one, and a sentence."""
 
     answer: Answer
@@ -46,7 +46,7 @@ class Held:
     text: str
 
 
-def holds(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimate], tried: int = 1) -> Held:
+def validate_law(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimate], tried: int = 1) -> Validation:
     """Fit the amplitude of a law, its form as written, on a campaign that it was not made from.
 
     It held if the amplitude is beyond chance (1 % over all laws ``tried``) and differs from the earlier one by less
@@ -56,13 +56,13 @@ def holds(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimate], tri
     a column is missing or does not vary, or the effect is below four standard errors in this design.
     """
     c, a0 = model.setup.observations.conditions, earlier["a"]
-    if (why := not_tested(c, law)) or not np.any(law.weight(c)):
-        return Held("cannot be told", None, a0, f"The law cannot be tested here: {why or 'no such sample'}.")
+    if (why := why_not_testable(c, law)) or not np.any(law.weight(c)):
+        return Validation("cannot be told", None, a0, f"The law cannot be tested here: {why or 'no such sample'}.")
     acting = Acting(law.mechanism())
     names = [p.name for p in acting.mechanism.parameters]
     before = [earlier[name] for name in names]
     if np.abs(effect_of(model.setup, model.law, acting, np.array([e.value for e in before]))).max() < 1e-9:
-        return Held("cannot be told", None, a0, "The law changes nothing in this design.")
+        return Validation("cannot be told", None, a0, "The law changes nothing in this design.")
     model, _ = without_rivals(model, law)
     after = fit(model.setup, (*model.acting, acting), start=model)
     found = [Estimate(*ends, a0.unit) for ends in recovered(after, len(after.acting) - 1)]
@@ -74,10 +74,10 @@ def holds(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimate], tri
     )
     said = "; ".join(_both(*each) for each in zip(names, found, before, strict=True))
     if beyond > sure(tried) and alike:
-        return Held("held", found[0], a0, f"The law held: {said}.")
+        return Validation("held", found[0], a0, f"The law held: {said}.")
     if max(abs(e0.value) / _error(e) for e, e0 in zip(found, before, strict=True)) < SHOWS:
-        return Held("cannot be told", found[0], a0, f"This campaign is too small to test the law: {said}.")
-    return Held("not held", found[0], a0, f"The law did not hold: {said}.")
+        return Validation("cannot be told", found[0], a0, f"This campaign is too small to test the law: {said}.")
+    return Validation("not held", found[0], a0, f"The law did not hold: {said}.")
 
 
 def sure(tried: int) -> float:
@@ -98,7 +98,7 @@ def _both(name: str, found: Estimate, earlier: Estimate) -> str:
     )
 
 
-def not_tested(c: Conditions, law: WrittenLaw) -> str:
+def why_not_testable(c: Conditions, law: WrittenLaw) -> str:
     """Why the columns of a law do not allow a test; empty where they do."""
     for name in law.columns:
         if name not in UNITS and name not in c.columns:
@@ -120,7 +120,7 @@ class KnownLaw:
 
 
 @dataclass(frozen=True)
-class Tested:
+class ValidatedLaws:
     """The answers of a campaign about known laws, the layers of those that held, and the model with these.
 
     ``replaced`` are causes of the same columns that explain the campaign less well, each with the log likelihood by
@@ -128,7 +128,7 @@ class Tested:
     """
 
     model: ModelFit
-    answers: tuple[tuple[KnownLaw, Held], ...]
+    answers: tuple[tuple[KnownLaw, Validation], ...]
     layers: tuple[Layer, ...]
     replaced: Mapping[str, float]
 
@@ -169,17 +169,17 @@ def read_laws(folder: Path) -> tuple[KnownLaw, ...]:
     return tuple(found)
 
 
-def try_laws(model: ModelFit, known: Sequence[KnownLaw], rng: np.random.Generator) -> Tested:
+def validate_laws(model: ModelFit, known: Sequence[KnownLaw], rng: np.random.Generator) -> ValidatedLaws:
     """Test every law on a fitted campaign; those that held are added, the surest first, while they hold beside the
     others. A column has one law; a cause that explains the campaign as well stays in its place."""
-    answers = {k.name: holds(model, k.law, k.parameters, len(known)) for k in known}
+    answers = {k.name: validate_law(model, k.law, k.parameters, len(known)) for k in known}
     layers: list[Layer] = []
     replaced: dict[str, float] = {}
     taken: set[str] = set()
     for k in sorted(known, key=lambda k: -_strength(answers[k.name])):
         if answers[k.name].answer != "held" or taken & set(k.law.columns):
             continue
-        if layers and holds(model, k.law, k.parameters, len(known)).answer != "held":
+        if layers and validate_law(model, k.law, k.parameters, len(known)).answer != "held":
             continue
         without, rivals = without_rivals(model, k.law)
         if any(by <= 0.0 for by in rivals.values()):
@@ -189,10 +189,10 @@ def try_laws(model: ModelFit, known: Sequence[KnownLaw], rng: np.random.Generato
         taken |= set(k.law.columns)
         replaced |= rivals
         model = after
-    return Tested(model, tuple((k, answers[k.name]) for k in known), tuple(layers), replaced)
+    return ValidatedLaws(model, tuple((k, answers[k.name]) for k in known), tuple(layers), replaced)
 
 
-def _strength(held: Held) -> float:
+def _strength(held: Validation) -> float:
     """How surely it held, in half widths of its interval."""
     if held.found is None:
         return 0.0
@@ -238,7 +238,7 @@ def plan_law(campaign: Campaign, law: WrittenLaw, parameters: Mapping[str, Estim
     """Whether the planned tests of a campaign would show a law at the size that was found, at typical noise."""
     f = expected_fit(campaign, TYPICAL, PAPER_LAW, None)
     c, formula, n = f.setup.observations.conditions, law.formula(), len(campaign.tests)
-    if why := not_tested(c, law):
+    if why := why_not_testable(c, law):
         return PlannedLaw(formula, 0.0, 0, f"This design cannot test the law {formula}: {why}.")
     acting = Acting(law.mechanism())
     values = np.array([parameters[p.name].value for p in acting.mechanism.parameters])

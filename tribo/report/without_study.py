@@ -23,7 +23,7 @@ from tribo.report.verdict_file import write_verdict
 if TYPE_CHECKING:
     from tribo.berardo2019.table_diagnosis import PublishedDiagnosis
     from tribo.lawsearch.across_patterns import AcrossPatterns
-    from tribo.lawsearch.known_laws import Held
+    from tribo.lawsearch.known_laws import Validation
     from tribo.lawsearch.search import Discovery
 
 
@@ -70,7 +70,7 @@ def law_texts(d: Discovery, title: str) -> dict[str, str]:
     return {f"law-{k}.toml": law_text(found.law, found.parameters, title) for k, found in enumerate(d.laws, start=1)}
 
 
-def write_held(held: Held, out: Path, provenance: Provenance) -> Written:
+def write_validation(held: Validation, out: Path, provenance: Provenance) -> Written:
     """discovery.json of the test of one law, and provenance.json."""
     record: dict[str, Any] = {"schema": SCHEMA, **asdict(held)}
     _write({RECORD: _json(record)}, out, provenance)
