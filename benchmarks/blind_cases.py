@@ -294,7 +294,7 @@ class Staircase:
 
 def is_seen(case: Case) -> bool:
     """Whether anything is seen at all: the first part of a diagnosis, without naming."""
-    from tribo.diagnostics.contrasts import all_looks, screen
+    from tribo.diagnostics.contrasts import all_contrasts, screen
     from tribo.diagnostics.direct_evidence import rise_stiffening, zero_drift, zero_offset
     from tribo.diagnostics.fit import fit
     from tribo.diagnostics.model import setup, start_changes
@@ -306,4 +306,4 @@ def is_seen(case: Case) -> bool:
         return True
     f = fit(setup(o, tabled_predictor(o.patterns)))
     rng = np.random.default_rng(case.seed)
-    return screen(f, all_looks(f.setup, start_changes(f.setup, f.law)), replicates=120, rng=rng).p_adjusted() < 0.01
+    return screen(f, all_contrasts(f.setup, start_changes(f.setup, f.law)), replicates=120, rng=rng).p_adjusted() < 0.01

@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pattern_error
 
 from tribo.cache.kept_results import sources
-from tribo.diagnostics import pattern_error
 from tribo.diagnostics.predictor import flat_law, simulated_patterns
 from tribo.springblock import run_stored
 from tribo.springblock.pattern_laws import KEPT, origin, pattern_laws, write_table

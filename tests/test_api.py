@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -27,6 +28,13 @@ def test_a_public_name_stays_what_it_is_after_its_package_was_imported() -> None
     code += "print([n for n in tribo.__all__ if isinstance(getattr(tribo, n), types.ModuleType)])"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip()
     assert found == str(sorted(MODULES))
+
+
+def test_diagnosis_is_the_old_name_of_diagnose(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tribo.stages.diagnose", lambda ingested, **options: (ingested, options))
+    ingested: Any = object()
+    with pytest.warns(FutureWarning, match="tribo.diagnose"):
+        assert tribo.diagnosis(ingested, seed=3) == (ingested, {"seed": 3})
 
 
 def test_importing_tribo_imports_none_of_the_heavy_libraries() -> None:

@@ -7,7 +7,7 @@ passes through SimConfig -> Run -> LawFit. Each stage takes and returns the froz
 
     campaign = tribo.load_campaign("my-campaign")
     study = tribo.study(campaign)              # ingest, fit, compare
-    found = tribo.diagnosis(study.ingested)    # where the model fails, and why
+    found = tribo.diagnose(study.ingested)     # where the model fails, and why
     tribo.write_report(study, "out", diagnosis=found)
 
 The stub beside this file lists the public names; each is imported on first use.

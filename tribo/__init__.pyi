@@ -31,6 +31,7 @@ from .stages import (
     StudyOptions as StudyOptions,
     assess as assess,
     compare as compare,
+    diagnose as diagnose,
     diagnosis as diagnosis,
     fit as fit,
     ingest as ingest,

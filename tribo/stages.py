@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from tribo.cache.kept_results import Shelf
 from tribo.campaign.load import required_flat_sample, with_flat_sample, with_zeros
@@ -22,7 +23,7 @@ from tribo.records import (
 if TYPE_CHECKING:
     from tribo.comparison.prediction import Cell, ModelRuns
     from tribo.diagnostics import Diagnosis
-    from tribo.diagnostics.diagnosis_record import Alone
+    from tribo.diagnostics.diagnosis_record import DiagnosisWithoutModel
     from tribo.diagnostics.predictor import Predictor
 
 Progress = Callable[[str, int, int], None]
@@ -248,7 +249,7 @@ def with_fits(read: Study, weights: Weights = "relative") -> Study:
     return replace(read, fits=fits, combined=tuple(b.combined() for b in budgets))
 
 
-def diagnosis(
+def diagnose(
     ingested: Ingested,
     *,
     seed: int = 0,
@@ -257,17 +258,42 @@ def diagnosis(
     laws: Path | None = None,
     progress: Progress = _silent,
 ) -> Diagnosis:
-    """Where the calibrated model fails and why, with the evidence; taken from ``kept`` if it is there.
-
-    Laws of other campaigns in the folder ``laws`` are tested. What no mechanism explains is searched for its law.
+    """Where the calibrated model fails on a campaign and why, with the evidence.
 
     The model's prediction for each pattern comes from the simulations of the campaign if ``kept`` holds them, else from
-    tabulated ones. A mechanism that is named is then simulated as part of the spring-block model.
+    tabulated ones. What no mechanism explains is searched for its law. A mechanism that is named is then simulated as
+    part of the spring-block model.
+
+    Parameters
+    ----------
+    ingested : Ingested
+        A campaign with its exports read.
+    seed : int
+        Of the simulated campaigns that stand for chance, and of the simulated pulls.
+    jobs : int
+        How many simulations run at once.
+    kept : Path, optional
+        Folder of finished results; a diagnosis made of the same inputs is taken from it.
+    laws : Path, optional
+        Folder with laws of other campaigns (``law-*.toml``), which are tested on this one.
+    progress : callable, optional
+        Called with a stage, the steps done and the steps there are.
+
+    Returns
+    -------
+    Diagnosis
+        ``verdict`` is the record behind verdict.json; ``baseline``, ``screened`` and ``named`` are what it rests on.
 
     Raises
     ------
     FitError
-        Fewer than twelve usable tests.
+        Fewer than twelve usable tests, fewer than two loads, or the name of a mechanism that there is not.
+
+    Examples
+    --------
+    >>> found = tribo.diagnose(tribo.ingest(tribo.load_campaign("data/example")))
+    >>> found.verdict.verdict in ("no_misfit", "named", "undetermined", "partly", "unknown")
+    True
     """
     from tribo.diagnostics import examine, predictor as pattern_table, with_simulation
     from tribo.lawsearch.diagnosis_with_laws import with_law_across, with_laws
@@ -286,17 +312,27 @@ def diagnosis(
     return Shelf(kept).take("diagnosis", made_from, found, DIAGNOSED_BY)
 
 
-def diagnosis_without_model(study: Study, *, seed: int = 0, kept: Path | None = None) -> Alone:
+def diagnosis(ingested: Ingested, **options: Any) -> Diagnosis:
+    """The old name of :func:`tribo.diagnose`."""
+    warnings.warn("tribo.diagnosis is called tribo.diagnose now", FutureWarning, stacklevel=2)
+    return diagnose(ingested, **options)
+
+
+def diagnosis_without_model(study: Study, *, seed: int = 0, kept: Path | None = None) -> DiagnosisWithoutModel:
     """What friction varies with beyond the law of each sample over load; taken from ``kept`` if it is there.
 
     ``study`` holds the laws of its samples (:func:`assess`), as that of :func:`study` does where the spring-block model
     was not run.
     """
-    from tribo.diagnostics.diagnosis_record import Alone
+    from tribo.diagnostics.diagnosis_record import DiagnosisWithoutModel
     from tribo.diagnostics.without_model import diagnose_without_model
 
     made_from = (study.ingested, study.laws, seed)
-    return Shelf(kept).take("alone", made_from, lambda: Alone(diagnose_without_model(study, seed=seed)), DIAGNOSED_BY)
+
+    def without() -> DiagnosisWithoutModel:
+        return DiagnosisWithoutModel(diagnose_without_model(study, seed=seed))
+
+    return Shelf(kept).take("alone", made_from, without, DIAGNOSED_BY)
 
 
 def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:

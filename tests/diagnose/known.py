@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from blind.tribometer import Design, hide
 
-from tribo.diagnostics.contrasts import Look, all_looks
+from tribo.diagnostics.contrasts import Contrast, all_contrasts
 from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.model import Acting, Setup, predict, setup, start_changes
 from tribo.diagnostics.observations import observe
@@ -47,6 +47,6 @@ def setup_of(campaign: Ingested) -> Setup:
     return setup(o, tabled_predictor(o.patterns))
 
 
-def looks_at(f: ModelFit) -> list[Look]:
-    """Every look at a fitted model."""
-    return all_looks(f.setup, start_changes(f.setup, f.law))
+def contrasts_of(f: ModelFit) -> list[Contrast]:
+    """Every contrast of a fitted model."""
+    return all_contrasts(f.setup, start_changes(f.setup, f.law))

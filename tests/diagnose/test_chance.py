@@ -15,31 +15,32 @@ from tribo.diagnostics.predictor import tabled_predictor
 from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit, refit_sizes, standardised
 from tribo.diagnostics.score_statistics import columns_in, scores
 
-from .known import looks_at
+from .known import contrasts_of
 from .synthetic import SMALL, hidden
 from .test_screen import baseline
 
 
-def test_a_batch_of_replicates_looks_like_each_fitted_by_itself() -> None:
-    """The strongest look of a replicate is within 5 % of that of the full fit of the same campaign."""
+def test_a_batch_of_replicates_contrasts_like_each_fitted_by_itself() -> None:
+    """The strongest contrast of a replicate is within 5 % of that of the full fit of the same campaign."""
     f = baseline()
-    looks = looks_at(f)
-    ends = np.cumsum([look.freedom for look in looks])
-    spans = [slice(int(e - look.freedom), int(e)) for e, look in zip(ends, looks, strict=True)]
-    ready = columns_in(np.concatenate([look.columns for look in looks], axis=2), spans)
+    contrasts = contrasts_of(f)
+    ends = np.cumsum([contrast.freedom for contrast in contrasts])
+    spans = [slice(int(e - contrast.freedom), int(e)) for e, contrast in zip(ends, contrasts, strict=True)]
+    ready = columns_in(np.concatenate([contrast.columns for contrast in contrasts], axis=2), spans)
     drawn = drawn_residuals(f, np.random.default_rng(5), 6)
-    alone = np.array([look.freedom == 1 for look in looks])
+    alone = np.array([contrast.freedom == 1 for contrast in contrasts])
     batch = np.sqrt(scores(refit(f, drawn), ready)[0][:, alone].max(axis=1))
     for k, log_force in enumerate(f.predicted + drawn.transpose(0, 2, 1)):
         again = replace(f.setup, observations=replace(f.setup.observations, log_force=log_force))
-        single = screen(fit(again, start=replace(f, setup=again)), looks, replicates=0, rng=np.random.default_rng(0))
+        refitted, rng = fit(again, start=replace(f, setup=again)), np.random.default_rng(0)
+        single = screen(refitted, contrasts, replicates=0, rng=rng)
         assert batch[k] == pytest.approx(single.strength[alone].max(), rel=0.05)
 
 
 def test_the_null_is_simulated_from_the_fitted_model() -> None:
     """Scores of a trend are close to standard normal, robust weights making them a little smaller."""
     f = baseline()
-    trend = next(look for look in looks_at(f) if look.covariate == "run_order" and look.kind == "trend")
+    trend = next(c for c in contrasts_of(f) if c.covariate == "run_order" and c.kind == "trend")
     ready = columns_in(trend.columns, [slice(0, 1)])
     chi2 = scores(refit(f, drawn_residuals(f, np.random.default_rng(1), 300)), ready)[0][:, 0]
     assert 0.8 < np.sqrt(np.mean(chi2)) < 1.2

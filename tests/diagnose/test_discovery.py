@@ -137,7 +137,7 @@ def test_a_campaign_without_misfit_is_searched_and_none_is_found(quiet: Diagnosi
     assert all(layer.kind == "pattern_correction" for layer in quiet.verdict.layers)
 
 
-def test_a_law_that_no_look_had_shown_is_a_misfit(found: Discovery, quiet: Diagnosis) -> None:
+def test_a_law_that_no_contrast_had_shown_is_a_misfit(found: Discovery, quiet: Diagnosis) -> None:
     v = with_misfits(quiet.verdict, found)
     assert v.verdict == "unknown"
     assert [(m.observable, m.covariate) for m in v.misfits] == [("sliding", "temperature_C")]

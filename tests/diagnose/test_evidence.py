@@ -90,7 +90,7 @@ def test_a_drift_that_rests_overnight_is_still_a_drift() -> None:
     assert drift.change == pytest.approx(0.15 * 0.12, rel=0.2)
 
 
-def test_the_p_value_of_an_estimate_is_two_sided_normal_times_the_looks() -> None:
+def test_the_p_value_of_an_estimate_is_two_sided_normal_times_the_contrasts() -> None:
     """1.96 standard errors have p = 0.05 (any table of the normal distribution)."""
     e = Evidence(value=-1.959964, standard_error=1.0, certain=False, unit="N")
     assert e.p_adjusted(1) == pytest.approx(0.05, rel=1e-5)
@@ -103,8 +103,8 @@ def test_every_estimate_that_was_made_is_counted() -> None:
     o = observe(hidden(("load_cell_drift", 1.0)))
     rng = np.random.default_rng(1)
     evidence = direct_evidence(replace(o, zero_slope_N_per_s=rng.normal(0.0, 0.0005, o.n)))
-    assert evidence["load_cell_offset"].looks == 1
-    assert evidence["load_cell_drift"].looks == 3
+    assert evidence["load_cell_offset"].contrasts == 1
+    assert evidence["load_cell_drift"].contrasts == 3
 
 
 def test_a_drift_includes_the_offset_that_it_leaves() -> None:
@@ -183,7 +183,7 @@ def test_a_drift_by_the_clock_and_one_by_the_hours_at_the_bench_are_told_apart()
         assert found.value == pytest.approx(0.02, rel=0.02)
         assert found.change == pytest.approx(0.02 * np.ptp(hours), rel=0.02)
         assert found.certain
-        assert found.looks == 2
+        assert found.contrasts == 2
 
 
 def test_a_drift_needs_ten_zeros_and_a_clock() -> None:

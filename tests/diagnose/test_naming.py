@@ -163,7 +163,7 @@ def test_far_beyond_the_replicates_chance_falls_as_a_gumbel_tail_of_their_mean_a
     scale = np.std(few) * np.sqrt(6) / np.pi
     mode = np.mean(few) - np.euler_gamma * scale
     assert screened(few, []).p_adjusted(8.0) == pytest.approx(-np.expm1(-np.exp(-(8.0 - mode) / scale)), rel=1e-9)
-    assert screened(few, []).p_adjusted() == screened(few, []).p_adjusted(5.0)  # of the strongest look
+    assert screened(few, []).p_adjusted() == screened(few, []).p_adjusted(5.0)  # of the strongest contrast
     assert screened([2.0] * 50, []).p_adjusted(50.0) == 1e-12
     assert screened(few, []).p_adjusted(max(few) + 0.01) <= 1 / 51
 
@@ -178,7 +178,7 @@ def test_replicates_end_once_ten_are_as_strong_or_the_campaign_is_ten_deviations
     assert not decided(ramp[:-1], 1.0)  # never on fewer
 
 
-def test_the_strongest_of_a_replicate_is_taken_over_all_looks_and_over_the_mechanisms() -> None:
+def test_the_strongest_of_a_replicate_is_taken_over_all_contrasts_and_over_the_mechanisms() -> None:
     strengths = np.array([[1.0, 5.0, 2.0], [4.0, 3.0, 0.0]])
     assert strongest(strengths, np.array([True, False, True])).tolist() == [[5.0, 2.0], [4.0, 4.0]]
     assert strongest(strengths, np.zeros(3, bool)).tolist() == [[5.0, -np.inf], [4.0, -np.inf]]
@@ -244,8 +244,8 @@ def test_of_several_causes_the_newest_is_left_out_where_its_own_column_is_still_
 
 def chosen_of(monkeypatch: pytest.MonkeyPatch, best: Candidate | None, strength: float | None) -> str:
     """Which layer is added where a mechanism and a free course of a column, of this strength, are beyond chance."""
-    look: Any = SimpleNamespace(columns=np.ones((4, 2)))
-    other = None if strength is None else naming.Remainder(look, strength, np.zeros(1), 0.1, 0.001)
+    contrast: Any = SimpleNamespace(columns=np.ones((4, 2)))
+    other = None if strength is None else naming.Remainder(contrast, strength, np.zeros(1), 0.1, 0.001)
     monkeypatch.setattr(naming, "best_beyond_chance", lambda *_: best)
     monkeypatch.setattr(naming, "strongest_beside_mechanisms", lambda *_: other)
     monkeypatch.setattr(naming, "sort_rivals", lambda model, best, ranked: ((best,), ()))
@@ -273,20 +273,22 @@ def test_a_free_course_of_a_column_goes_first_only_where_it_explains_more_by_wha
     assert chosen_of(monkeypatch, None, None) == "neither"
 
 
-def look_of(kind: str, taken_up: bool = False) -> Any:
+def contrast_of(kind: str, taken_up: bool = False) -> Any:
     return SimpleNamespace(kind=kind, is_taken_up=lambda flat: taken_up and flat == "F")
 
 
-def test_what_is_left_beside_mechanisms_is_the_strongest_look_beyond_chance_that_no_law_takes_up() -> None:
-    looks = (look_of("column"), look_of("mechanism"), look_of("bend", taken_up=True), look_of("column"))
+def test_what_is_left_beside_mechanisms_is_the_strongest_contrast_beyond_chance_that_no_law_takes_up() -> None:
+    bend = contrast_of("bend", taken_up=True)
+    contrasts = (contrast_of("column"), contrast_of("mechanism"), bend, contrast_of("column"))
     strength, p = np.array([3.0, 6.0, 5.0, 4.0]), np.array([0.004, 0.001, 0.002, 0.003])
-    seen: Any = SimpleNamespace(looks=looks, strength=strength, p=p, size=strength / 10, coefficients=list("abcd"))
+    known = {"strength": strength, "p": p, "size": strength / 10, "coefficients": list("abcd")}
+    seen: Any = SimpleNamespace(contrasts=contrasts, **known)
     found = naming.strongest_beside_mechanisms(seen, 0.01, "F")
     assert found is not None
-    assert (found.look, found.strength, found.p, found.size) == (looks[3], 4.0, 0.003, 0.4)
+    assert (found.contrast, found.strength, found.p, found.size) == (contrasts[3], 4.0, 0.003, 0.4)
     other = naming.strongest_beside_mechanisms(seen, 0.01, "B")
     assert other is not None
-    assert other.look is looks[2]
+    assert other.contrast is contrasts[2]
     assert naming.strongest_beside_mechanisms(seen, 0.003, "F") is None  # at the level itself: within chance
 
 

@@ -53,7 +53,7 @@ TOY = Mechanism(
     silenced_by=("pull each specimen once",),
     needs=("specimen_run",),
     plain="alternating static friction",
-    measurement=DirectMeasurement("Look at every other pull.", 0.01, 0.1),
+    measurement=DirectMeasurement("Contrast at every other pull.", 0.01, 0.1),
 )
 
 
@@ -93,7 +93,7 @@ def test_the_verdict_names_it_and_words_it_by_what_its_record_says(examined: Dia
     assert v.causes[0].text.startswith("Alternating static friction: a = 0.")
     assert "static friction alternates from pull to pull" in v.causes[0].text
     assert v.next_test is not None
-    assert v.next_test.text == "Look at every other pull."
+    assert v.next_test.text == "Contrast at every other pull."
 
 
 def test_a_plan_says_from_which_size_on_it_is_found(toy: Mechanism) -> None:

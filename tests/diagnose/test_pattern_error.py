@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tribo.diagnostics import pattern_error as e
 from tribo.diagnostics.predictor import error_sizes, simulated_patterns
 from tribo.published import data_dir
 from tribo.records import Pattern
@@ -19,6 +18,8 @@ ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "docs" / "data"
 FLAT = np.array([5.0, 20e3])
 sys.path.append(str(ROOT / "benchmarks"))
+
+import pattern_error as e  # noqa: E402
 
 
 def fits(scale: float = 1.0, of_b: float = 1.0) -> list[tuple[str, float, float]]:

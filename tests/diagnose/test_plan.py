@@ -7,7 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tribo.diagnostics import Diagnosis, examine, look_table, misfit_map, plan_design, residual_table, weighing_table
+from tribo.diagnostics import (
+    Diagnosis,
+    contrast_table,
+    examine,
+    misfit_map,
+    plan_design,
+    residual_table,
+    weighing_table,
+)
 from tribo.diagnostics.planning import Finding, Plan
 
 from .synthetic import Design, hidden
@@ -67,8 +75,8 @@ def test_the_tables_hold_every_test_and_shrink_under_the_named_cause(examined: D
     assert misfit_map(examined)["n_tests"].sum() == len(rows)
 
 
-def test_looks_and_weights_are_ranked(examined: Diagnosis) -> None:
-    assert look_table(examined)["strength"].is_monotonic_decreasing
+def test_contrasts_and_weights_are_ranked(examined: Diagnosis) -> None:
+    assert contrast_table(examined)["strength"].is_monotonic_decreasing
     weighed = weighing_table(examined)
     assert weighed.iloc[0]["mechanism"] == "run_in"
     assert weighed["weight"].sum() == pytest.approx(1.0)

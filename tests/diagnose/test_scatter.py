@@ -17,7 +17,7 @@ from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
 from tribo.diagnostics.replicates import drawn_residuals, refit_sizes
 
-from .known import looks_at
+from .known import contrasts_of
 from .synthetic import PATTERNS, SMALL, hidden
 
 LARGE = Design(samples=("F", "A", "B", "C"), specimens=6)
@@ -49,10 +49,10 @@ def test_specimens_with_slopes_of_5_percent_are_no_misfit(seed: int) -> None:
 
 
 def test_the_slope_of_a_specimen_is_judged_against_those_of_the_others() -> None:
-    """Slopes of 10 % per e-fold: no look at one specimen by load is beyond four standard deviations."""
+    """Slopes of 10 % per e-fold: no contrast of one specimen by load is beyond four standard deviations."""
     f = baseline(5, replace(LARGE, specimen_slope=0.10))
-    looks = [look for look in looks_at(f) if look.covariate.endswith(" by load")]
-    assert screen(f, looks, replicates=0, rng=np.random.default_rng(0)).strength.max() < 4.0
+    contrasts = [contrast for contrast in contrasts_of(f) if contrast.covariate.endswith(" by load")]
+    assert screen(f, contrasts, replicates=0, rng=np.random.default_rng(0)).strength.max() < 4.0
 
 
 def test_the_scale_of_the_pattern_error_is_recovered_within_a_third() -> None:

@@ -1,4 +1,4 @@
-"""Scores of looks at several sizes of the random effects, against dense matrices written out from their definition."""
+"""Scores of contrasts at several sizes of the random effects, against dense matrices from their definition."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ def at_step(s: Setup, noise: Noise, flat: np.ndarray, step: np.ndarray) -> tuple
     """Information (4, 4) and score (4,) of the columns beyond the law, and the log likelihood without them, the law
     integrated out, of a campaign whose random sizes are ``step`` e-folds larger."""
     stepped = noise.with_sizes(noise.sizes * np.exp(step))
-    whole, look, r = dense(s, stepped)[0], columns(s).reshape(-1, 4), residual_of(s).ravel()
+    whole, contrast, r = dense(s, stepped)[0], columns(s).reshape(-1, 4), residual_of(s).ravel()
     inverse = np.linalg.inv(whole)
     of_law = flat.T @ inverse @ flat
     rest = inverse - inverse @ flat @ np.linalg.solve(of_law, flat.T @ inverse)
     likelihood = -0.5 * (np.linalg.slogdet(whole)[1] + np.linalg.slogdet(of_law)[1] + r @ rest @ r)
     prior = sum(float(log_size_prior(k, size)) for k, size in enumerate(stepped.sizes))
-    return look.T @ rest @ look, look.T @ rest @ r, likelihood + prior
+    return contrast.T @ rest @ contrast, contrast.T @ rest @ r, likelihood + prior
 
 
-def test_a_look_scores_at_the_sizes_that_favour_it_and_pays_for_what_the_model_alone_loses_there() -> None:
+def test_a_contrast_scores_at_the_sizes_that_favour_it_and_pays_for_what_the_model_alone_loses_there() -> None:
     s = campaign()
     noise = noise_of(s)
     replicate, flat = one_replicate(s, noise)
@@ -63,7 +63,7 @@ def test_a_look_scores_at_the_sizes_that_favour_it_and_pays_for_what_the_model_a
     assert at_first == pytest.approx(expected[0] - 2.0 * (steps[0][2] - best), rel=1e-3)
 
 
-def test_a_look_that_is_there_as_a_whole_or_not_at_all_is_tested_at_a_coefficient_of_one() -> None:
+def test_a_contrast_that_is_there_as_a_whole_or_not_at_all_is_tested_at_a_coefficient_of_one() -> None:
     """Twice the largest log likelihood ratio of a coefficient c, known to 0.2 about one, against none."""
     s = campaign()
     noise = noise_of(s)
@@ -80,7 +80,7 @@ def test_a_look_that_is_there_as_a_whole_or_not_at_all_is_tested_at_a_coefficien
     assert found[0, 1:] == pytest.approx(free[0, 1:])
 
 
-def test_a_column_that_the_law_explains_but_for_a_thousandth_is_not_seen_as_a_look() -> None:
+def test_a_column_that_the_law_explains_but_for_a_thousandth_is_not_seen_as_a_contrast() -> None:
     s = campaign()
     noise = noise_of(s)
     replicate, flat = one_replicate(s, noise)
@@ -131,18 +131,19 @@ def test_a_course_of_one_specimen_is_kept_on_its_tests_and_gives_its_columns_bac
     assert not course(np.full((s.observations.n, 2, 1), np.nan), s.random_effects).shows
 
 
-def test_looks_at_one_specimen_and_at_two_score_as_the_same_columns_written_out() -> None:
-    """Beside a look at all tests, at free sizes and at sizes known to be one."""
+def test_contrasts_at_one_specimen_and_at_two_score_as_the_same_columns_written_out() -> None:
+    """Beside a contrast of all tests, at free sizes and at sizes known to be one."""
     s = campaign()
     replicate, _ = one_replicate(s, noise_of(s))
     alone = local_courses(s)
     wide = course(columns(s)[:, :, :2], s.random_effects)
-    looks = [(alone[2],), (wide,), (alone[0],), (alone[0], alone[2]), (alone[1],), (alone[3],), (alone[1], alone[3])]
-    stacked = np.concatenate([added(look) for look in looks], axis=2)
-    ends = np.cumsum([look[0].freedom for look in looks])
-    spans = [slice(int(e) - look[0].freedom, int(e)) for e, look in zip(ends, looks, strict=True)]
-    for whole in (np.zeros(len(looks)), np.where(np.arange(len(looks)) == 1, 0.0, 25.0)):
-        found, coefficients = scores(replicate, columns_of(looks, whole, s.observations.n))
+    both = [(alone[0], alone[2]), (alone[1], alone[3])]
+    contrasts = [(alone[2],), (wide,), (alone[0],), both[0], (alone[1],), (alone[3],), both[1]]
+    stacked = np.concatenate([added(contrast) for contrast in contrasts], axis=2)
+    ends = np.cumsum([contrast[0].freedom for contrast in contrasts])
+    spans = [slice(int(e) - contrast[0].freedom, int(e)) for e, contrast in zip(ends, contrasts, strict=True)]
+    for whole in (np.zeros(len(contrasts)), np.where(np.arange(len(contrasts)) == 1, 0.0, 25.0)):
+        found, coefficients = scores(replicate, columns_of(contrasts, whole, s.observations.n))
         expected, written_out = scores(replicate, columns_in(stacked, spans, whole))
         assert found == pytest.approx(expected, rel=1e-6, abs=1e-9)
         for a, b in zip(coefficients, written_out, strict=True):
@@ -155,11 +156,11 @@ def test_the_information_and_the_score_of_candidates_are_those_of_the_marginal_m
     replicate, flat = one_replicate(s, noise)
     alone = local_courses(s)
     wide = course(columns(s)[:, :, :1], s.random_effects)
-    looks = [(alone[2],), (wide,), (alone[0],), (alone[0], alone[2]), (alone[0], alone[3])]
-    left, pull = informations(replicate, columns_of(looks, np.zeros(5), s.observations.n))
+    contrasts = [(alone[2],), (wide,), (alone[0],), (alone[0], alone[2]), (alone[0], alone[3])]
+    left, pull = informations(replicate, columns_of(contrasts, np.zeros(5), s.observations.n))
     inverse = np.linalg.inv(dense(s, noise)[0])
     rest = inverse - inverse @ flat @ np.linalg.solve(flat.T @ inverse @ flat, flat.T @ inverse)
-    for k, look in enumerate(looks):
-        column = added(look).ravel()
+    for k, contrast in enumerate(contrasts):
+        column = added(contrast).ravel()
         assert left[0, k] == pytest.approx(column @ rest @ column, rel=1e-4)
         assert pull[0, k] == pytest.approx(column @ rest @ residual_of(s).ravel(), rel=1e-3, abs=1e-4)

@@ -1,4 +1,4 @@
-"""Looks, their strength, and what chance gives."""
+"""Contrasts, their strength, and what chance gives."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tribo.diagnostics.predictor import tabled_predictor
 from tribo.diagnostics.replicates import as_measured
 from tribo.diagnostics.score_statistics import AS_FITTED, columns_in, scores
 
-from .known import looks_at
+from .known import contrasts_of
 from .synthetic import hidden
 
 
@@ -39,21 +39,22 @@ def test_columns_of_the_law_itself_are_cleared_away() -> None:
 
 def test_the_quick_score_is_that_of_the_cleared_columns() -> None:
     f = baseline()
-    looks = [look for look in looks_at(f) if look.freedom == 1][:60]
-    left, target = f.linear.cleared(np.concatenate([look.columns for look in looks], axis=2))
+    contrasts = [contrast for contrast in contrasts_of(f) if contrast.freedom == 1][:60]
+    left, target = f.linear.cleared(np.concatenate([contrast.columns for contrast in contrasts], axis=2))
     size = np.sqrt(np.sum(left**2, axis=0))
     seen = size > 1e-3
-    ends = [slice(k, k + 1) for k in range(len(looks))]
-    ready = columns_in(np.concatenate([look.columns for look in looks], axis=2), ends)
+    ends = [slice(k, k + 1) for k in range(len(contrasts))]
+    ready = columns_in(np.concatenate([contrast.columns for contrast in contrasts], axis=2), ends)
     quick = np.sqrt(scores(as_measured(f), ready, steps=AS_FITTED)[0][0])
     assert quick[seen] == pytest.approx(np.abs(left.T @ target / size)[seen], rel=1e-4, abs=1e-5)
 
 
-def test_a_look_that_is_whole_or_absent_is_tested_at_a_size_about_one() -> None:
+def test_a_contrast_that_is_whole_or_absent_is_tested_at_a_size_about_one() -> None:
     f = baseline(("mislabelled_specimen", 1.0))
-    looks = [look for look in looks_at(f) if look.acting is not None and look.acting.name == "mislabelled_specimen"]
-    stacked, about_one = np.concatenate([look.columns for look in looks], axis=2), np.full(len(looks), 0.15**-2)
-    spans = [slice(k, k + 1) for k in range(len(looks))]
+    contrasts = [c for c in contrasts_of(f) if c.acting is not None and c.acting.name == "mislabelled_specimen"]
+    stacked = np.concatenate([c.columns for c in contrasts], axis=2)
+    about_one = np.full(len(contrasts), 0.15**-2)
+    spans = [slice(k, k + 1) for k in range(len(contrasts))]
     found = scores(as_measured(f), columns_in(stacked, spans, about_one), steps=AS_FITTED)[0][0]
     left, target = f.linear.cleared(stacked)
     sizes = np.linspace(-1.0, 3.0, 40001)[:, None]
@@ -63,28 +64,28 @@ def test_a_look_that_is_whole_or_absent_is_tested_at_a_size_about_one() -> None:
 
 
 def test_every_wrong_label_is_looked_for_as_a_whole_and_nothing_else_is() -> None:
-    looks = looks_at(baseline())
-    whole = {look.acting.name for look in looks if look.wholeness > 0 and look.acting is not None}
+    contrasts = contrasts_of(baseline())
+    whole = {contrast.acting.name for contrast in contrasts if contrast.wholeness > 0 and contrast.acting is not None}
     assert whole == {"mislabelled_specimen"}
-    assert all(look.wholeness == 0 for look in looks if look.acting is None)
+    assert all(contrast.wholeness == 0 for contrast in contrasts if contrast.acting is None)
 
 
-def test_an_effect_is_the_strongest_look_at_its_own_column() -> None:
+def test_an_effect_is_the_strongest_contrast_at_its_own_column() -> None:
     f = baseline(("run_in", 2.5))
-    looks = looks_at(f)
-    found = screen(f, looks, replicates=0, rng=np.random.default_rng(0))
-    strongest = looks[int(found.strength.argmax())]
+    contrasts = contrasts_of(f)
+    found = screen(f, contrasts, replicates=0, rng=np.random.default_rng(0))
+    strongest = contrasts[int(found.strength.argmax())]
     assert strongest.covariate in ("specimen_run", "run_in")
-    run_in = next(k for k, look in enumerate(looks) if look.acting is not None and look.acting.name == "run_in")
+    run_in = next(k for k, c in enumerate(contrasts) if c.acting is not None and c.acting.name == "run_in")
     assert found.strength[run_in] > 0.98 * found.strength.max()
 
 
 def test_no_more_replicates_are_made_than_the_decision_needs() -> None:
     plain = baseline()
-    looks = [look for look in looks_at(plain) if look.kind == "trend"]
-    within = screen(plain, looks[1:2], replicates=200, rng=np.random.default_rng(2))
+    contrasts = [contrast for contrast in contrasts_of(plain) if contrast.kind == "trend"]
+    within = screen(plain, contrasts[1:2], replicates=200, rng=np.random.default_rng(2))
     f = baseline(("run_in", 2.5))
-    beyond = screen(f, looks_at(f), replicates=200, rng=np.random.default_rng(2))
+    beyond = screen(f, contrasts_of(f), replicates=200, rng=np.random.default_rng(2))
     assert len(within.chance) < 200
     assert np.sum(within.chance >= within.strength.max()) >= 10
     assert len(beyond.chance) < 200
@@ -93,16 +94,16 @@ def test_no_more_replicates_are_made_than_the_decision_needs() -> None:
 
 def test_a_p_value_beyond_all_replicates_is_small_and_finite() -> None:
     f = baseline(("run_in", 2.5))
-    looks = [look for look in looks_at(f) if look.kind == "trend"]
-    found = screen(f, looks, replicates=30, rng=np.random.default_rng(2))
+    contrasts = [contrast for contrast in contrasts_of(f) if contrast.kind == "trend"]
+    found = screen(f, contrasts, replicates=30, rng=np.random.default_rng(2))
     assert 0.0 < found.p_adjusted() < 1e-3
     assert found.p_adjusted(0.0) == 1.0
 
 
 def test_a_stretch_of_the_series_that_differs_is_found_as_such() -> None:
-    """Another counterface for a third of the series: the strongest look is one at a stretch of the run order."""
+    """Another counterface for a third of the series: the strongest contrast is one of a stretch of the run order."""
     f = baseline(("outside:counterface", 2.0))
-    looks = looks_at(f)
-    strongest = looks[int(screen(f, looks, replicates=0, rng=np.random.default_rng(0)).strength.argmax())]
+    contrasts = contrasts_of(f)
+    strongest = contrasts[int(screen(f, contrasts, replicates=0, rng=np.random.default_rng(0)).strength.argmax())]
     assert strongest.kind == "block"
     assert strongest.covariate.startswith("run_order, from")

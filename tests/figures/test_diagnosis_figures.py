@@ -71,7 +71,7 @@ def mean_cells(d: Diagnosis) -> pd.Series:
     return cells[(cells["covariate"] == "mean") & (cells["observable"] == "static")].set_index("row")["effect_percent"]
 
 
-def test_the_strongest_look_comes_first_with_the_curve_of_the_named_mechanism(temperature: Diagnosis) -> None:
+def test_the_strongest_contrast_comes_first_with_the_curve_of_the_named_mechanism(temperature: Diagnosis) -> None:
     rows = residuals.numbers(temperature)
     first = rows[rows["panel"] == 0]
     assert first["axis"].iloc[0].startswith("Temperature")

@@ -59,7 +59,7 @@ def test_reading_holds_the_numbers_once_and_little_beside(tmp_path: Path) -> Non
 
 
 @pytest.mark.usefixtures("small_pieces")
-def test_an_inspection_looks_at_the_beginning_and_says_so(tmp_path: Path) -> None:
+def test_an_inspection_contrasts_of_the_beginning_and_says_so(tmp_path: Path) -> None:
     assert bytes_per_row(inspect_export, tmp_path) < 0.5
     seen = inspect_export(tmp_path / f"{ROWS}.csv")
     assert not seen.refused

@@ -44,7 +44,7 @@ from tribo.cli.study_options import (
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
-    from tribo.diagnostics.diagnosis_record import Alone
+    from tribo.diagnostics.diagnosis_record import DiagnosisWithoutModel
     from tribo.diagnostics.verdict import Verdict
     from tribo.dry_run import Until as DryUntil
     from tribo.records import Campaign, Study
@@ -266,13 +266,15 @@ def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool
     return _conclude(console, study, out.path, found.verdict if found else None, card)
 
 
-def _card(study: Study, found: Diagnosis | Alone | None) -> Card:
+def _card(study: Study, found: Diagnosis | DiagnosisWithoutModel | None) -> Card:
     from tribo.report.card import card_of
 
     return card_of(study, found.verdict.as_dict() if found is not None else None)
 
 
-def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[Study, Diagnosis | Alone | None]:
+def _diagnosed(
+    study: Study, chosen: StudyOptions, progress: Progress
+) -> tuple[Study, Diagnosis | DiagnosisWithoutModel | None]:
     """The diagnosis of a study; a note instead where there is too little to diagnose."""
     from dataclasses import replace
 
@@ -289,13 +291,13 @@ def _diagnosed(study: Study, chosen: StudyOptions, progress: Progress) -> tuple[
         return replace(study, notes=(*study.notes, f"no diagnosis: {problem}")), None
 
 
-def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis | Alone:
+def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis | DiagnosisWithoutModel:
     """With the spring-block model, or, where a study was made without it, without."""
-    from tribo.stages import diagnosis, diagnosis_without_model, without_model
+    from tribo.stages import diagnose as diagnosis_with_model, diagnosis_without_model, without_model
 
     if without_model(study.ingested.campaign, chosen):
         return diagnosis_without_model(study, seed=chosen.seed, kept=chosen.kept)
-    return diagnosis(
+    return diagnosis_with_model(
         study.ingested, seed=chosen.seed, jobs=chosen.jobs, kept=chosen.kept, laws=chosen.laws, progress=progress
     )
 

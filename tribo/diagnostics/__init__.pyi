@@ -1,12 +1,11 @@
 from .diagnosis import examine as examine
 from .diagnosis_record import (
     Diagnosis as Diagnosis,
-    look_table as look_table,
+    contrast_table as contrast_table,
     misfit_map as misfit_map,
     residual_table as residual_table,
     weighing_table as weighing_table,
 )
-from .in_simulator import parse_given as parse_given, parse_with as parse_with, simulate_with as simulate_with
 from .planning import Plan as Plan, plan_design as plan_design
 from .predictor import (
     simulated_predictor as simulated_predictor,

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tribo.diagnostics.contrasts import Look, Progress, Screen, screen_left
+from tribo.diagnostics.contrasts import Contrast, Progress, Screen, screen_left
 from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.model import Acting, Setup, Target, with_free_columns
 from tribo.diagnostics.score_statistics import StartEffects, start_effects
@@ -180,10 +180,10 @@ MAX_LAYERS = 8
 @displayed()
 @dataclass(frozen=True)
 class Remainder:
-    """A look that no mechanism explains: its ``strength`` as a normal deviate, its peak-to-peak ``size`` in ln T and
-    its adjusted p value."""
+    """A contrast that no mechanism explains: its ``strength`` as a normal deviate, its peak-to-peak ``size`` in ln T
+    and its adjusted p value."""
 
-    look: Look
+    contrast: Contrast
     strength: float
     coefficients: np.ndarray
     size: float
@@ -274,13 +274,13 @@ def best_beyond_chance(ranked: Sequence[Candidate], seen: Screen, level: float) 
 
 
 def strongest_beside_mechanisms(seen: Screen, level: float, flat: str) -> Remainder | None:
-    """The strongest look beyond chance that is no mechanism."""
+    """The strongest contrast beyond chance that is no mechanism."""
     for k in np.argsort(-seen.strength):
-        look, p = seen.looks[k], float(seen.p[k])
+        contrast, p = seen.contrasts[k], float(seen.p[k])
         if p >= level:
             return None
-        if look.kind != "mechanism" and not look.is_taken_up(flat):
-            return Remainder(look, float(seen.strength[k]), seen.coefficients[k], float(seen.size[k]), p)
+        if contrast.kind != "mechanism" and not contrast.is_taken_up(flat):
+            return Remainder(contrast, float(seen.strength[k]), seen.coefficients[k], float(seen.size[k]), p)
     return None
 
 
@@ -293,7 +293,7 @@ def _grown(layers: Layers, ranked: Sequence[Candidate], seen: Screen, level: flo
         return replace(layers, model=best.fit, causes=(*layers.causes, alike), rivals=rivals)
     if other is None:
         return None
-    wider = with_free_columns(layers.model.setup, other.look.columns, other.coefficients)
+    wider = with_free_columns(layers.model.setup, other.contrast.columns, other.coefficients)
     model = fit(wider, layers.model.acting, start=layers.model)
     return replace(layers, model=model, remainders=(*layers.remainders, other))
 
@@ -307,8 +307,8 @@ def _misfit_in_own_column(cause: Candidate, left: Screen, level: float) -> bool:
     if cause.acting.mechanism.any_column and choice != column:
         return False
     return any(
-        p < level and look.kind in ("trend", "shape", "level", "period") and look.covariate.split(",")[0] == column
-        for look, p in zip(left.looks, left.p, strict=True)
+        p < level and c.kind in ("trend", "shape", "level", "period") and c.covariate.split(",")[0] == column
+        for c, p in zip(left.contrasts, left.p, strict=True)
     )
 
 

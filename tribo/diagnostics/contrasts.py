@@ -1,6 +1,6 @@
-"""Every way the diagnosis looks at the residuals: by mechanism, covariate, shape, sample, specimen and period.
+"""Contrasts of the residuals: by mechanism, covariate, shape, sample, specimen and period.
 
-How strongly each look is followed, and how strongly by chance: the maximum over all looks, simulated.
+How strongly each contrast is followed, and how strongly by chance: the maximum over all contrasts, simulated.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ from tribo.records import FloatArray
 OBSERVABLES = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (1.0, 1.0), "drop": (1.0, -1.0)}
 BINS = 6
 TENTHS = 10
-BENT = ", bend"  # what a look at the curve of a sample adds to its column
+BENT = ", bend"  # what a contrast of the curve of a sample adds to its column
 MOST_LEVELS = 200  # names of a text column: the work grows with their cube
 CYCLES = 24  # periods down to a twenty-fourth of the series
 
 
 @displayed()
 @dataclass(frozen=True)
-class Look:
-    """One look: which observable against which covariate, and the columns it would follow: those of one course, or of
+class Contrast:
+    """One contrast: an observable against a covariate, and the columns it would follow: those of one course, or of
     two that add up, on different specimens."""
 
     kind: str  # mechanism, trend, shape, level, sample, specimen, period, block
@@ -71,17 +71,17 @@ class Look:
         return self.courses[0].freedom
 
 
-def all_looks(s: Setup, changes: StartChanges) -> list[Look]:
-    """Every look that this design allows, ``changes`` being those of the candidates."""
+def all_contrasts(s: Setup, changes: StartChanges) -> list[Contrast]:
+    """Every contrast that this design allows, ``changes`` being those of the candidates."""
     recorded = [*_covariates(s), *_levels(s), *_samples(s), *_specimens(s), *_periods(s), *_blocks(s)]
-    looks = [*_mechanisms(s, changes), *recorded]
-    return [look for look in looks if all(c.shows for c in look.courses)]
+    contrasts = [*_mechanisms(s, changes), *recorded]
+    return [contrast for contrast in contrasts if all(c.shows for c in contrast.courses)]
 
 
-def _mechanisms(s: Setup, changes: StartChanges) -> Iterator[Look]:
+def _mechanisms(s: Setup, changes: StartChanges) -> Iterator[Contrast]:
     for acting, courses in zip(changes.acting, changes.courses, strict=True):
-        yield Look("mechanism", "both", acting.name, "", courses, acting)
-    yield Look("trend", "both", "tau0", "", _course(s, changes.adhesion[:, :, None]))
+        yield Contrast("mechanism", "both", acting.name, "", courses, acting)
+    yield Contrast("trend", "both", "tau0", "", _course(s, changes.adhesion[:, :, None]))
 
 
 def _course(s: Setup, columns: FloatArray) -> tuple[Course]:
@@ -122,14 +122,14 @@ def _spread(values: FloatArray, observable: str) -> FloatArray:
     return values[:, None, :] * np.array(OBSERVABLES[observable])[None, :, None]
 
 
-def _covariates(s: Setup) -> Iterator[Look]:
+def _covariates(s: Setup) -> Iterator[Contrast]:
     for name, values in numeric_covariates(s).items():
         for observable in OBSERVABLES:
-            yield Look("trend", observable, name, "", _course(s, _spread(values[:, None], observable)))
+            yield Contrast("trend", observable, name, "", _course(s, _spread(values[:, None], observable)))
         bins = _bins(values)
         if bins.shape[1] > 1:
             for observable in ("static", "sliding", "both"):
-                yield Look("shape", observable, name, "", _course(s, _spread(bins, observable)))
+                yield Contrast("shape", observable, name, "", _course(s, _spread(bins, observable)))
 
 
 def _bins(values: FloatArray) -> FloatArray:
@@ -140,17 +140,17 @@ def _bins(values: FloatArray) -> FloatArray:
     return np.column_stack([code == k for k in range(1, len(edges) + 1)]).astype(float)
 
 
-def _levels(s: Setup) -> Iterator[Look]:
+def _levels(s: Setup) -> Iterator[Contrast]:
     """Text columns: one gain per name."""
     for name, column in s.observations.conditions.columns.items():
         names = np.unique(column)
         if 1 < len(names) <= min(s.observations.n // 8, MOST_LEVELS):
             levels = np.column_stack([column == level for level in names[1:]]).astype(float)
             for observable in ("static", "sliding", "both"):
-                yield Look("level", observable, name, "", _course(s, _spread(levels, observable)))
+                yield Contrast("level", observable, name, "", _course(s, _spread(levels, observable)))
 
 
-def _samples(s: Setup) -> Iterator[Look]:
+def _samples(s: Setup) -> Iterator[Contrast]:
     """Each sample's offset, its slope and its curve against ln p."""
     c, p = s.observations.conditions, s.log_pressure
     shapes = {"offset": np.ones_like(p), "slope": p, "curve": p**2 - np.mean(p**2)}
@@ -160,10 +160,10 @@ def _samples(s: Setup) -> Iterator[Look]:
             for name, shape in shapes.items():
                 covariate = {"offset": "sample", "slope": "normal_load_N"}.get(name, f"normal_load_N{BENT}")
                 columns = _spread((here * shape)[:, None], observable)
-                yield Look("sample", observable, covariate, str(sample), _course(s, columns))
+                yield Contrast("sample", observable, covariate, str(sample), _course(s, columns))
 
 
-def _specimens(s: Setup) -> Iterator[Look]:
+def _specimens(s: Setup) -> Iterator[Contrast]:
     """Each specimen's offset against its siblings, and its slope against ln p."""
     c = s.observations.conditions
     for number, tests in enumerate(s.random_effects.tests_of):
@@ -172,24 +172,24 @@ def _specimens(s: Setup) -> Iterator[Look]:
         seen = [(observable, name, ones) for observable in ("static", "sliding", "both")]
         for observable, covariate, shape in (*seen, ("both", f"{name} by load", load)):
             along = Course(s.observations.n, number, tests, _spread(shape, observable))
-            yield Look("specimen", observable, covariate, where, (along,))
+            yield Contrast("specimen", observable, covariate, where, (along,))
 
 
-def _periods(s: Setup) -> Iterator[Look]:
+def _periods(s: Setup) -> Iterator[Contrast]:
     """Harmonics of the run order, and of the day."""
     c = s.observations.conditions
     if np.isfinite(c.run_order).all() and len(np.unique(c.run_order)) > 3 * BINS:
         rank = np.argsort(np.argsort(c.run_order)) / s.observations.n
         for k in range(1, min(CYCLES, s.observations.n // 4) + 1):
             period = f"run_order, period {s.observations.n / k:.3g}"
-            yield Look("period", "both", period, "", _course(s, _spread(_wave(k * rank), "both")))
+            yield Contrast("period", "both", period, "", _course(s, _spread(_wave(k * rank), "both")))
     hours = s.observations.clock_h
     if np.isfinite(hours).all() and np.ptp(hours) > 2:
         for k in (1, 2, 3):
-            yield Look("period", "both", "time of day", "", _course(s, _spread(_wave(k * hours / 24.0), "both")))
+            yield Contrast("period", "both", "time of day", "", _course(s, _spread(_wave(k * hours / 24.0), "both")))
 
 
-def _blocks(s: Setup) -> Iterator[Look]:
+def _blocks(s: Setup) -> Iterator[Contrast]:
     """Stretches of the series in which something else may have been mounted: runs of successive tenths, up to half."""
     order = s.observations.conditions.run_order
     if not np.isfinite(order).all() or s.observations.n < 3 * TENTHS:
@@ -200,7 +200,7 @@ def _blocks(s: Setup) -> Iterator[Look]:
         for last in range(first + 1, min(first + TENTHS // 2, TENTHS)):
             inside = ((tenth >= first) & (tenth <= last)).astype(float)
             where = f"run_order, from {order[inside > 0].min():.0f} to {order[inside > 0].max():.0f}"
-            yield Look("block", "both", where, "", _course(s, _spread(inside[:, None], "both")))
+            yield Contrast("block", "both", where, "", _course(s, _spread(inside[:, None], "both")))
 
 
 def _wave(turns: FloatArray) -> FloatArray:
@@ -208,7 +208,7 @@ def _wave(turns: FloatArray) -> FloatArray:
 
 
 Progress = Callable[[str, int, int], None]
-AT_ONCE = 20  # replicates, between two looks at whether they suffice
+AT_ONCE = 20  # replicates, after which it is asked whether they suffice
 FEWEST = 40
 FORM = 0.12  # by how much of its own effect a law may be wrong in form, sample by sample
 
@@ -216,14 +216,15 @@ FORM = 0.12  # by how much of its own effect a law may be wrong in form, sample 
 @displayed()
 @dataclass(frozen=True)
 class Screen:
-    """Strength of every look as a standard normal deviate, and what chance gives.
+    """Strength of every contrast as a standard normal deviate, and what chance gives.
 
-    ``p`` (looks,) is the adjusted p value of each. ``chance`` (replicates,) is the strongest look in each simulated
-    campaign of the fitted model, ``chance_library`` the strongest of the mechanisms alone. ``size`` (looks,) is the
-    peak-to-peak effect in ln T that the calibration does not absorb, ``coefficients`` those of each look's columns.
+    ``p`` (contrasts,) is the adjusted p value of each. ``chance`` (replicates,) is the strongest contrast in each
+    simulated campaign of the fitted model, ``chance_library`` the strongest of the mechanisms alone. ``size``
+    (contrasts,) is the peak-to-peak effect in ln T that the calibration does not absorb, ``coefficients`` those of
+    each contrast's columns.
     """
 
-    looks: tuple[Look, ...]
+    contrasts: tuple[Contrast, ...]
     strength: FloatArray
     size: FloatArray
     coefficients: tuple[FloatArray, ...]
@@ -232,11 +233,11 @@ class Screen:
     p: FloatArray
 
     def without_columns(self) -> Screen:
-        """The same without the columns of the looks, which are large."""
-        return replace(self, looks=tuple(replace(look, courses=()) for look in self.looks))
+        """The same without the columns of the contrasts, which are large."""
+        return replace(self, contrasts=tuple(replace(contrast, courses=()) for contrast in self.contrasts))
 
     def p_adjusted(self, strength: float | None = None) -> float:
-        """Chance that some look is at least this strong (default: the strongest) with nothing hidden."""
+        """Chance that some contrast is at least this strong (default: the strongest) with nothing hidden."""
         value = float(self.strength.max()) if strength is None else strength
         return share_beyond(self.chance, value)
 
@@ -260,21 +261,21 @@ def share_beyond(chance: FloatArray, value: float) -> float:
 
 def screen(
     f: ModelFit,
-    looks: Sequence[Look],
+    contrasts: Sequence[Contrast],
     *,
     replicates: int,
     rng: np.random.Generator,
     progress: Progress | None = None,
 ) -> Screen:
-    """Look at a fitted model in every way, then do the same with up to ``replicates`` campaigns it makes itself.
+    """Test every contrast on a fitted model, then do the same with up to ``replicates`` campaigns it makes itself.
 
-    Replicates end once the strongest look is clearly within chance, or clearly beyond it.
+    Replicates end once the strongest contrast is clearly within chance, or clearly beyond it.
     """
-    whole = np.array([look.wholeness for look in looks])
-    ready = columns_of([look.courses for look in looks], whole, f.setup.observations.n)
+    whole = np.array([contrast.wholeness for contrast in contrasts])
+    ready = columns_of([contrast.courses for contrast in contrasts], whole, f.setup.observations.n)
     strengths, found = strengths_of(as_measured(f), ready)
     strength, coefficients = strengths[0], [c[0] for c in found]
-    library = np.array([look.kind == "mechanism" for look in looks])
+    library = np.array([contrast.kind == "mechanism" for contrast in contrasts])
     chance = np.zeros((0, 2))
     while len(chance) < replicates:
         drawn = drawn_residuals(f, rng, min(AT_ONCE, replicates - len(chance)))
@@ -285,22 +286,22 @@ def screen(
             progress("diagnose", len(chance), replicates)
         if decided(chance[:, 0], float(strength.max())):
             break
-    shown = _shown(looks, strength)
-    looks, strength, coefficients = [looks[k] for k in shown], strength[shown], [coefficients[k] for k in shown]
+    shown = _shown(contrasts, strength)
+    contrasts, strength, coefficients = [contrasts[k] for k in shown], strength[shown], [coefficients[k] for k in shown]
     size = f.linear.size_beyond_law(
-        added(look.courses) @ c for look, c in zip(looks, coefficients, strict=True)
+        added(contrast.courses) @ c for contrast, c in zip(contrasts, coefficients, strict=True)
     )
     p = np.array([share_beyond(chance[:, 0], float(value)) for value in strength])
-    return Screen(tuple(looks), strength, size, tuple(coefficients), chance[:, 0], chance[:, 1], p)
+    return Screen(tuple(contrasts), strength, size, tuple(coefficients), chance[:, 0], chance[:, 1], p)
 
 
-def _shown(looks: Sequence[Look], strength: FloatArray) -> list[int]:
-    """Which looks are shown: of those at two specimens the MOST_PAIRS strongest, and all others. Chance counts all."""
-    pairs = [k for k, look in enumerate(looks) if len(look.courses) > 1]
+def _shown(contrasts: Sequence[Contrast], strength: FloatArray) -> list[int]:
+    """Which contrasts are shown: of those of two specimens the MOST_PAIRS strongest, and all others."""
+    pairs = [k for k, contrast in enumerate(contrasts) if len(contrast.courses) > 1]
     if len(pairs) <= MOST_PAIRS:
-        return list(range(len(looks)))
+        return list(range(len(contrasts)))
     weaker = set(sorted(pairs, key=lambda k: -strength[k])[MOST_PAIRS:])
-    return [k for k in range(len(looks)) if k not in weaker]
+    return [k for k in range(len(contrasts)) if k not in weaker]
 
 
 def allowed_wrong_form(model: ModelFit, allowed: int = 0) -> ModelFit:
@@ -316,12 +317,12 @@ def screen_left(
 ) -> Screen:
     """What is left after a model, its laws allowed to be wrong in form (:func:`allowed_wrong_form`)."""
     widened = allowed_wrong_form(model, allowed)
-    looks = all_looks(widened.setup, start_changes(widened.setup, widened.law))
-    return screen(widened, looks, replicates=replicates, rng=rng, progress=progress)
+    contrasts = all_contrasts(widened.setup, start_changes(widened.setup, widened.law))
+    return screen(widened, contrasts, replicates=replicates, rng=rng, progress=progress)
 
 
 def _strongest(strengths: FloatArray, library: NDArray[np.bool_]) -> FloatArray:
-    """The strongest look of every replicate, and the strongest of the library's alone, (r, 2)."""
+    """The strongest contrast of every replicate, and the strongest of the library's alone, (r, 2)."""
     alone = strengths[:, library].max(axis=1) if library.any() else np.full(len(strengths), -np.inf)
     return np.column_stack([strengths.max(axis=1), alone])
 
@@ -338,10 +339,10 @@ def decided(chance: FloatArray, strongest: float, fewest: int = FEWEST) -> bool:
     return bool(np.sum(chance >= strongest) >= 10 or beyond)
 
 
-def strengths_of(fitted: Replicates, looks: Columns) -> tuple[FloatArray, list[FloatArray]]:
-    """Strength of every look as a standard normal deviate, (r, looks), and the coefficients of each, (r, d)."""
-    chi2, coefficients = scores(fitted, looks)
-    return deviate(chi2, looks.freedom), coefficients
+def strengths_of(fitted: Replicates, contrasts: Columns) -> tuple[FloatArray, list[FloatArray]]:
+    """Strength of every contrast as a standard normal deviate, (r, contrasts), and the coefficients of each, (r, d)."""
+    chi2, coefficients = scores(fitted, contrasts)
+    return deviate(chi2, contrasts.freedom), coefficients
 
 
 def deviate(chi2: FloatArray, freedom: FloatArray | NDArray[np.int64]) -> FloatArray:

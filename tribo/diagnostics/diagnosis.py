@@ -6,7 +6,7 @@ import numpy as np
 
 from tribo.diagnostics.candidates import Rules, name_causes
 from tribo.diagnostics.conclusion import Findings, conclude
-from tribo.diagnostics.contrasts import Progress, all_looks, screen
+from tribo.diagnostics.contrasts import Progress, all_contrasts, screen
 from tribo.diagnostics.diagnosis_record import Diagnosis
 from tribo.diagnostics.direct_evidence import trace_findings
 from tribo.diagnostics.fit import fit
@@ -64,8 +64,8 @@ def examine(
     s = setup(observations, predictor or tabled_predictor(observations.patterns))
     baseline = fit(s)
     effects = start_effects(baseline)
-    looks = all_looks(s, effects.changes)
-    screened = screen(baseline, looks, replicates=replicates[0], rng=rng, progress=progress)
+    contrasts = all_contrasts(s, effects.changes)
+    screened = screen(baseline, contrasts, replicates=replicates[0], rng=rng, progress=progress)
     evidence = trace_findings(observations)
     barred = exclusions(observations.conditions, evidence.found, effects.absorbed)
     named = None

@@ -61,7 +61,7 @@ class NotSimulated:
 
 @displayed()
 @dataclass(frozen=True)
-class Alone:
+class DiagnosisWithoutModel:
     """A verdict without the spring-block model: what friction varies with beside the law of each sample."""
 
     verdict: Verdict
@@ -84,7 +84,7 @@ class Diagnosis:
     laws: Discovery | None = None
 
     def without_columns(self) -> Diagnosis:
-        """The same without the columns of the looks, which nothing needs once the verdict stands."""
+        """The same without the columns of the contrasts, which nothing needs once the verdict stands."""
         named = self.named and replace(self.named, left=self.named.left.without_columns())
         return replace(self, screened=self.screened.without_columns(), named=named)
 
@@ -145,18 +145,18 @@ def misfit_map(d: Diagnosis) -> pd.DataFrame:
     return pd.DataFrame(found)
 
 
-def look_table(d: Diagnosis) -> pd.DataFrame:
-    """Every look at the baseline: its strength in standard deviations, adjusted p and peak-to-peak size."""
+def contrast_table(d: Diagnosis) -> pd.DataFrame:
+    """Every contrast at the baseline: its strength in standard deviations, adjusted p and peak-to-peak size."""
     import pandas as pd
 
     s = d.screened
     rows = [
         {
-            "kind": look.kind, "observable": look.observable, "covariate": look.covariate, "sample": look.sample,
-            "choice": look.acting.choice if look.acting else "", "strength": strength,
+            "kind": c.kind, "observable": c.observable, "covariate": c.covariate, "sample": c.sample,
+            "choice": c.acting.choice if c.acting else "", "strength": strength,
             "p_adjusted": s.p_adjusted(float(strength)), "peak_to_peak_percent": float(percent(min(size, 5.0))),
         }
-        for look, strength, size in zip(s.looks, s.strength, s.size, strict=True)
+        for c, strength, size in zip(s.contrasts, s.strength, s.size, strict=True)
     ]  # fmt: skip
     return pd.DataFrame(rows).sort_values("strength", ascending=False, ignore_index=True)
 

@@ -2,7 +2,7 @@
 
 A change is that of measured / model from one end of a column to the other, as a ratio less one.
 
-The size of what a look sees, as a signed percentage: 100 (measured / model - 1), or the change of that ratio.
+The size of a contrast, as a signed percentage: 100 (measured / model - 1), or the change of that ratio.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribo.diagnostics.contrasts import BENT, Look
+from tribo.diagnostics.contrasts import BENT, Contrast
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.intervals import NORMAL_90
 from tribo.mechanisms.record import Conditions
@@ -88,33 +88,35 @@ class Effect:
     between: str
 
 
-def effect_of_look(look: Look, residual: Residual, coefficients: FloatArray, size: float, strength: float) -> Effect:
-    """What a look sees; ``size`` is its peak-to-peak effect in ln T, stated where a straight line does not give it.
+def effect_of_contrast(
+    contrast: Contrast, residual: Residual, coefficients: FloatArray, size: float, strength: float
+) -> Effect:
+    """The size of a contrast; ``size`` is its peak-to-peak effect in ln T, stated where no straight line gives it.
 
     That of a mechanism has the sign of its largest change; that of several columns has none.
     """
-    value, between = _signed(look, residual)
+    value, between = _signed(contrast, residual)
     if not np.isfinite(value):
-        change = (look.columns @ coefficients).ravel()
-        sign = float(np.sign(change[np.abs(change).argmax()])) if look.freedom == 1 else 1.0
+        change = (contrast.columns @ coefficients).ravel()
+        sign = float(np.sign(change[np.abs(change).argmax()])) if contrast.freedom == 1 else 1.0
         value, between = float(percent(sign * min(size, 5.0))), "between its extremes"
     return Effect(value, *interval_percent(value, strength, NORMAL_90), between)
 
 
-def _signed(look: Look, residual: Residual) -> tuple[float, str]:
-    weight = np.array(SHARES[look.observable])
-    y, x = residual.log_ratio @ weight, look.columns[:, int(weight[0] == 0.0), 0]
+def _signed(contrast: Contrast, residual: Residual) -> tuple[float, str]:
+    weight = np.array(SHARES[contrast.observable])
+    y, x = residual.log_ratio @ weight, contrast.columns[:, int(weight[0] == 0.0), 0]
     sample = residual.conditions.sample
-    here = sample == look.sample if look.kind == "sample" else np.ones(len(y), bool)
-    if look.kind == "sample" and look.covariate == "sample":
+    here = sample == contrast.sample if contrast.kind == "sample" else np.ones(len(y), bool)
+    if contrast.kind == "sample" and contrast.covariate == "sample":
         return mean_percent(y[here]), "mean"
-    if look.kind == "sample" and look.covariate.endswith(BENT):
+    if contrast.kind == "sample" and contrast.covariate.endswith(BENT):
         line = np.log(residual.conditions.normal_load_N[here])
         return bend_percent(x[here], line, y[here]), "the ends above the middle"
-    if look.kind in ("sample", "trend") and np.ptp(x[here]) > 0:
+    if contrast.kind in ("sample", "trend") and np.ptp(x[here]) > 0:
         return change_percent(x[here], y[here]), "from the low to the high end"
-    if look.kind == "block" or (look.kind == "specimen" and not look.covariate.endswith(" by load")):
-        siblings = np.isin(sample, look.sample.split("/")) if look.kind == "specimen" else here
+    if contrast.kind == "block" or (contrast.kind == "specimen" and not contrast.covariate.endswith(" by load")):
+        siblings = np.isin(sample, contrast.sample.split("/")) if contrast.kind == "specimen" else here
         inside, outside = siblings & (x > 0), siblings & (x <= 0)
         if inside.any() and outside.any():
             return contrast_percent(y[inside], y[outside]), "ratio of geometric means"

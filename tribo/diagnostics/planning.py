@@ -28,7 +28,7 @@ from tribo.records import Campaign, FloatArray
 
 PAPER_LAW = np.array([4.78, 23.44, 2.879, 11.89])  # mu and tau0 in kPa of the flat sample, Berardo 2019, Table 2
 TYPICAL = Noise(repeat=np.diag([0.09**2, 0.07**2]), specimen=np.array([0.05, 0.05]))
-FOUND = 3.6  # strength that chance reaches in one campaign of a hundred, over all looks
+FOUND = 3.6  # strength that chance reaches in one campaign of a hundred, over all contrasts
 NINE_IN_TEN = FOUND + 1.28
 
 

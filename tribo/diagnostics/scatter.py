@@ -32,7 +32,7 @@ SIZE_PRIORS = np.array([SPECIMEN_PRIOR, SPECIMEN_PRIOR, SLOPE_PRIOR, SLOPE_PRIOR
 REPEAT_PRIOR = (0.08, 4.0)
 SCATTER_SD = 0.5  # of ln of the ratio of repeats between samples, and of the power of the force they follow
 SMALLEST_SD = 0.003  # of ln T: no reading repeats better
-# Of the logarithms of the sizes (GAIN, SLOPE: two each; PATTERN): what a look explains of the patterns makes their
+# Of the logarithms of the sizes (GAIN, SLOPE: two each; PATTERN): what a contrast explains of the patterns makes their
 # error smaller, and what it explains of a specimen makes the spread of the specimens smaller.
 SIZE_STEPS = np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, -0.7], [-0.7, -0.7, -0.7, -0.7, 0.0]])
 

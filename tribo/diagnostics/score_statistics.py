@@ -30,10 +30,11 @@ Index = NDArray[np.int64]
 @displayed()
 @dataclass(frozen=True)
 class Wide:
-    """Columns (n, 2, k) of several specimens, each look at one of ``spans``, and the products its information needs.
+    """Columns (n, 2, k) of several specimens, each contrast at one of ``spans``, and the products its information
+    needs.
 
-    ``products`` (3, n, m) are the static, mixed and sliding products of the pairs of columns of one look that some test
-    shows both of; those of each look are at ``pairs`` of the m, and fill its matrix at ``places``.
+    ``products`` (3, n, m) are the static, mixed and sliding products of the pairs of columns of one contrast that some
+    test shows both of; those of each contrast are at ``pairs`` of the m, and fill its matrix at ``places``.
     """
 
     columns: FloatArray
@@ -57,9 +58,9 @@ class Local:
 @displayed()
 @dataclass(frozen=True)
 class Columns:
-    """All looks, made ready for many replicates: those at ``wide_at`` of several specimens, those at ``local_at`` of
-    one, and those at ``pair_at``, each the sum of two local ones, ``pair_of`` (pairs, 2). ``whole`` (looks,) is the
-    precision with which the coefficient of a look is known to be one: zero where its size is free.
+    """All contrasts, made ready for many replicates: those at ``wide_at`` of several specimens, those at ``local_at``
+    of one, and those at ``pair_at``, each the sum of two local ones, ``pair_of`` (pairs, 2). ``whole`` (contrasts,) is
+    the precision with which the coefficient of a contrast is known to be one: zero where its size is free.
     """
 
     wide: Wide
@@ -72,37 +73,37 @@ class Columns:
 
     @property
     def freedom(self) -> Index:
-        """Of every look, (looks,)."""
+        """Of every contrast, (contrasts,)."""
         found = np.ones(len(self.whole), np.int64)
         found[self.wide_at] = [span.stop - span.start for span in self.wide.spans]
         return found
 
 
 def columns_in(stacked: FloatArray, spans: Sequence[slice], whole: FloatArray | None = None) -> Columns:
-    """Columns (n, 2, k) made ready, those of each look at one of ``spans``; ``whole`` (looks,) as in :class:`Columns`,
-    free by default."""
+    """Columns (n, 2, k) made ready, those of each contrast at one of ``spans``; ``whole`` (contrasts,) as in
+    :class:`Columns`, free by default."""
     whole = np.zeros(len(spans)) if whole is None else whole
     none = np.zeros(0, np.int64)
     return Columns(_wide(stacked, spans), np.arange(len(spans)), (), none, np.zeros((0, 2), np.int64), none, whole)
 
 
-def columns_of(looks: Sequence[tuple[Course, ...]], whole: FloatArray, n: int) -> Columns:
-    """The courses of all looks at ``n`` tests, made ready: one course each, or two that add up.
+def columns_of(contrasts: Sequence[tuple[Course, ...]], whole: FloatArray, n: int) -> Columns:
+    """The courses of all contrasts at ``n`` tests, made ready: one course each, or two that add up.
 
-    Two courses of one specimen each, both of them looks of their own, are not written out.
+    Two courses of one specimen each, both of them contrasts of their own, are not written out.
     """
-    alone = [k for k, courses in enumerate(looks) if len(courses) == 1 and _is_local(courses[0])]
-    alone.sort(key=lambda k: looks[k][0].specimen)
-    place = {id(looks[k][0]): i for i, k in enumerate(alone)}
-    pairs = [k for k, courses in enumerate(looks) if len(courses) == 2 and all(id(c) in place for c in courses)]
-    of = [[place[id(c)] for c in looks[k]] for k in pairs]
+    alone = [k for k, courses in enumerate(contrasts) if len(courses) == 1 and _is_local(courses[0])]
+    alone.sort(key=lambda k: contrasts[k][0].specimen)
+    place = {id(contrasts[k][0]): i for i, k in enumerate(alone)}
+    pairs = [k for k, courses in enumerate(contrasts) if len(courses) == 2 and all(id(c) in place for c in courses)]
+    of = [[place[id(c)] for c in contrasts[k]] for k in pairs]
     rest = {*alone, *pairs}
-    wide = [k for k in range(len(looks)) if k not in rest]
-    ends = np.cumsum([looks[k][0].freedom for k in wide], dtype=np.int64)
-    spans = [slice(int(e) - looks[k][0].freedom, int(e)) for e, k in zip(ends, wide, strict=True)]
-    stacked = np.concatenate([np.zeros((n, 2, 0)), *(added(looks[k]) for k in wide)], axis=2)
+    wide = [k for k in range(len(contrasts)) if k not in rest]
+    ends = np.cumsum([contrasts[k][0].freedom for k in wide], dtype=np.int64)
+    spans = [slice(int(e) - contrasts[k][0].freedom, int(e)) for e, k in zip(ends, wide, strict=True)]
+    stacked = np.concatenate([np.zeros((n, 2, 0)), *(added(contrasts[k]) for k in wide)], axis=2)
     return Columns(
-        _wide(stacked, spans), np.array(wide, np.int64), _locals([looks[k][0] for k in alone]),
+        _wide(stacked, spans), np.array(wide, np.int64), _locals([contrasts[k][0] for k in alone]),
         np.array(alone, np.int64), np.array(of, np.int64).reshape(-1, 2), np.array(pairs, np.int64), whole,
     )  # fmt: skip
 
@@ -153,7 +154,7 @@ def _products(columns: FloatArray, first: Index, second: Index) -> FloatArray:
 @displayed()
 @dataclass(frozen=True)
 class Crossed:
-    """Products of the looks with specimens and border, whatever the random sizes are: ``crossed`` with wide columns
+    """Products of the contrasts with specimens and border, whatever the random sizes are: ``crossed`` with wide columns
     (r, S, 4, k) and (r, m, k), or with local ones, each with its own specimen, (r, 4, k) and (r, m, k); with the
     residual, ``pull`` (r, k); with each other, ``whole`` (r, m)."""
 
@@ -197,42 +198,42 @@ def cleared(normal: Normal, right: Sides) -> Cleared:
     return Cleared(own, border, across, (own_right, border_right), log_root)
 
 
-def scores(fitted: Replicates, looks: Columns, steps: int = len(SIZE_STEPS)) -> tuple[FloatArray, list[FloatArray]]:
-    """Score test of every look beyond the model's own columns.
+def scores(fitted: Replicates, contrasts: Columns, steps: int = len(SIZE_STEPS)) -> tuple[FloatArray, list[FloatArray]]:
+    """Score test of every contrast beyond the model's own columns.
 
-    A look that is present as a whole or absent is tested at its known size: its chi-squared value is twice the log
+    A contrast that is present as a whole or absent is tested at its known size: its chi-squared value is twice the log
     likelihood ratio of a coefficient about one against zero.
 
     The scores are taken at several sizes of the random effects, the first ``steps`` of SIZE_STEPS from the fitted
-    ones; each pays what it loses of the likelihood of the model without the look. Returns the largest
-    chi-squared values (r, looks) and the coefficients of each look, (r, d) each, at the first sizes.
+    ones; each pays what it loses of the likelihood of the model without the contrast. Returns the largest
+    chi-squared values (r, contrasts) and the coefficients of each contrast, (r, d) each, at the first sizes.
     """
-    wide, local, right = _wide_products(fitted, looks.wide), _local_products(fitted, looks), _right(fitted)
+    wide, local, right = _wide_products(fitted, contrasts.wide), _local_products(fitted, contrasts), _right(fitted)
     best: FloatArray = np.zeros(0)
     first: list[FloatArray] = []
     evidence = []
     for k in range(steps):
         at, likelihood = _at_step(fitted, right, k)
-        singles = _singles(looks, local, at)
-        chi2, coefficients = _scores_at(looks, wide, singles, at)
+        singles = _singles(contrasts, local, at)
+        chi2, coefficients = _scores_at(contrasts, wide, singles, at)
         evidence.append(likelihood)
         chi2 = chi2 + 2.0 * likelihood[:, None]
         best, first = (chi2, coefficients) if k == 0 else (np.maximum(best, chi2), first)
     return np.maximum(best - 2.0 * np.max(evidence, axis=0)[:, None], 0.0), first
 
 
-def informations(fitted: Replicates, looks: Columns) -> tuple[FloatArray, FloatArray]:
-    """Information (r, looks) and score (r, looks) of looks of one column beyond the model, at the fitted sizes; both
-    zero where the model takes the column up."""
+def informations(fitted: Replicates, contrasts: Columns) -> tuple[FloatArray, FloatArray]:
+    """Information (r, contrasts) and score (r, contrasts) of contrasts of one column beyond the model, at the fitted
+    sizes; both zero where the model takes the column up."""
     at, _ = _at_step(fitted, _right(fitted), 0)
-    wide, local = _wide_products(fitted, looks.wide), _local_products(fitted, looks)
+    wide, local = _wide_products(fitted, contrasts.wide), _local_products(fitted, contrasts)
     crossed, pull = _wide_cleared(wide, at)
-    left, score, whole = (np.zeros((len(pull), len(looks.whole))) for _ in range(3))
-    shown = np.array([pair.stop > pair.start for pair in looks.wide.pairs], bool)  # a column of zeros has no products
-    whole[:, looks.wide_at[shown]] = wide.whole
-    left[:, looks.wide_at] = whole[:, looks.wide_at] - np.sum(crossed**2, axis=1)
-    score[:, looks.wide_at] = pull
-    for positions, single in _singles(looks, local, at):
+    left, score, whole = (np.zeros((len(pull), len(contrasts.whole))) for _ in range(3))
+    shown = np.array([pair.stop > pair.start for pair in contrasts.wide.pairs], bool)  # zeros have no products
+    whole[:, contrasts.wide_at[shown]] = wide.whole
+    left[:, contrasts.wide_at] = whole[:, contrasts.wide_at] - np.sum(crossed**2, axis=1)
+    score[:, contrasts.wide_at] = pull
+    for positions, single in _singles(contrasts, local, at):
         left[:, positions], score[:, positions], whole[:, positions] = single.left, single.pull, single.whole
     seen = left > TAKEN_UP * whole
     return np.where(seen, left, 0.0), np.where(seen, score, 0.0)
@@ -243,7 +244,7 @@ def _right(fitted: Replicates) -> Sides:
 
 
 def _at_step(fitted: Replicates, right: Sides, index: int) -> tuple[Cleared, FloatArray]:
-    """The normal matrix at one of SIZE_STEPS, and the log likelihood (r,) of the model without looks."""
+    """The normal matrix at one of SIZE_STEPS, and the log likelihood (r,) of the model without contrasts."""
     columns = fitted.weighted.columns
     precision = fitted.sizes.precision * np.exp(-2.0 * np.append(SIZE_STEPS[index], 0.0))[fitted.group]
     prior = np.concatenate([np.full((len(precision), columns.parameters), 1e-12), precision], axis=1)
@@ -260,10 +261,10 @@ def _wide_products(fitted: Replicates, wide: Wide) -> Crossed:
     return Crossed(fitted.weighted.times(wide.columns), pull, whole)
 
 
-def _local_products(fitted: Replicates, looks: Columns) -> list[Crossed]:
+def _local_products(fitted: Replicates, contrasts: Columns) -> list[Crossed]:
     """Specimen by specimen."""
     residual, found = _weighted_residual(fitted), []
-    for here in looks.local:
+    for here in contrasts.local:
         r, t, k = len(residual), len(here.tests), here.columns.shape[2]
         own = fitted.weighted.own_times(here.tests, here.columns)
         border = fitted.weighted.border_times(here.tests, here.columns)
@@ -283,7 +284,7 @@ def _weighted_residual(fitted: Replicates) -> FloatArray:
 @displayed()
 @dataclass(frozen=True)
 class Single:
-    """Scores of looks of one column each, (r, k): the score beyond the model, and the information left and whole."""
+    """Scores of contrasts of one column each, (r, k): the score beyond the model, the information left and whole."""
 
     pull: FloatArray
     left: FloatArray
@@ -297,12 +298,12 @@ class Single:
         return np.where(seen, alone * toward_one - about_one, 0.0), alone
 
 
-def _singles(looks: Columns, local: Sequence[Crossed], at: Cleared) -> list[tuple[Index, Single]]:
-    """Local looks and their pairs, each with the positions of its looks."""
+def _singles(contrasts: Columns, local: Sequence[Crossed], at: Cleared) -> list[tuple[Index, Single]]:
+    """Local contrasts and their pairs, each with the positions of its contrasts."""
     if not local:
         return []
     each, borders = [], []
-    for here, found in zip(looks.local, local, strict=True):
+    for here, found in zip(contrasts.local, local, strict=True):
         own = at.own[:, here.specimen] @ found.crossed[0]
         border = at.border_of(found.crossed[1], at.across[:, here.specimen].transpose(0, 2, 1) @ own)
         taken = np.einsum("rak,ra->rk", own, at.right[0][:, here.specimen])
@@ -311,12 +312,12 @@ def _singles(looks: Columns, local: Sequence[Crossed], at: Cleared) -> list[tupl
         each.append((pull, left, found.whole))
         borders.append(border)
     pull, left, whole = (np.concatenate(parts, axis=1) for parts in zip(*each, strict=True))
-    singles = [(looks.local_at, Single(pull, left, whole))]
-    if len(looks.pair_of):
-        i, j = looks.pair_of.T
+    singles = [(contrasts.local_at, Single(pull, left, whole))]
+    if len(contrasts.pair_of):
+        i, j = contrasts.pair_of.T
         shared = _in_common(np.concatenate(borders, axis=2), i, j)
         both = Single(pull[:, i] + pull[:, j], left[:, i] + left[:, j] - 2.0 * shared, whole[:, i] + whole[:, j])
-        singles.append((looks.pair_at, both))
+        singles.append((contrasts.pair_at, both))
     return singles
 
 
@@ -342,22 +343,22 @@ def _wide_cleared(wide: Crossed, at: Cleared) -> tuple[FloatArray, FloatArray]:
 
 
 def _scores_at(
-    looks: Columns, wide: Crossed, singles: Sequence[tuple[Index, Single]], at: Cleared
+    contrasts: Columns, wide: Crossed, singles: Sequence[tuple[Index, Single]], at: Cleared
 ) -> tuple[FloatArray, list[FloatArray]]:
-    """Chi-squared values and coefficients of all looks."""
+    """Chi-squared values and coefficients of all contrasts."""
     crossed, pull = _wide_cleared(wide, at)
-    r, count = len(pull), len(looks.whole)
+    r, count = len(pull), len(contrasts.whole)
     chi2 = np.zeros((r, count))
     coefficients: list[FloatArray] = [np.zeros((r, 1))] * count
-    first = [span.start for span in looks.wide.spans]
-    whole = wide.whole[:, [pair.start for pair in looks.wide.pairs]]
+    first = [span.start for span in contrasts.wide.spans]
+    whole = wide.whole[:, [pair.start for pair in contrasts.wide.pairs]]
     alone = Single(pull[:, first], whole - np.sum(crossed[:, :, first] ** 2, axis=1), whole)
-    for positions, single in ((looks.wide_at, alone), *singles):
-        chi2[:, positions], found = single.solved(looks.whole[positions])
+    for positions, single in ((contrasts.wide_at, alone), *singles):
+        chi2[:, positions], found = single.solved(contrasts.whole[positions])
         for position, column in zip(positions, found.T[:, :, None], strict=True):
             coefficients[position] = column
     for position, span, pair, place in zip(
-        looks.wide_at, looks.wide.spans, looks.wide.pairs, looks.wide.places, strict=True
+        contrasts.wide_at, contrasts.wide.spans, contrasts.wide.pairs, contrasts.wide.places, strict=True
     ):
         if span.stop > span.start + 1:
             own = _filled(wide.whole[:, pair], place, span.stop - span.start)
@@ -374,8 +375,8 @@ def _filled(values: FloatArray, place: tuple[Index, Index], d: int) -> FloatArra
 
 
 def _solution(pull: FloatArray, whole: FloatArray, crossed: FloatArray) -> FloatArray:
-    """Coefficients of one look (r, d) from its scores (r, d), its raw information (r, d, d) and its share (r, p, d) of
-    the model's columns."""
+    """Coefficients of one contrast (r, d) from its scores (r, d), its raw information (r, d, d) and its share (r, p, d)
+    of the model's columns."""
     floor = ROUNDING * (np.diagonal(whole, axis1=1, axis2=2) + 1e-12)
     information = whole - crossed.transpose(0, 2, 1) @ crossed + floor[:, :, None] * np.eye(pull.shape[1])
     return np.asarray(np.linalg.solve(information, pull[:, :, None])[:, :, 0])

@@ -7,9 +7,9 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from tribo.diagnostics.candidates import Candidate, Remainder
-from tribo.diagnostics.contrasts import Look, Screen
+from tribo.diagnostics.contrasts import Contrast, Screen
 from tribo.diagnostics.direct_evidence import Evidence, stated_evidence
-from tribo.diagnostics.effect_sizes import Effect, Residual, effect_of_look, percent
+from tribo.diagnostics.effect_sizes import Effect, Residual, effect_of_contrast, percent
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.intervals import WITHIN, PatternExcess
 from tribo.diagnostics.model import Acting
@@ -28,7 +28,7 @@ NOT_TESTABLE = "cannot be tested with this design"
 
 
 def misfits_of(screened: Screen, level: float, residual: Residual, flat: str = "") -> list[Misfit]:
-    """The looks that chance does not explain, the strongest first. Mechanisms are reported as causes instead.
+    """The contrasts that chance does not explain, the strongest first. Mechanisms are reported as causes instead.
 
     ``residual`` is that of the model that was looked at; the size of each misfit is read off it.
 
@@ -39,12 +39,12 @@ def misfits_of(screened: Screen, level: float, residual: Residual, flat: str = "
     order = np.argsort(-screened.strength)
     seen: set[tuple[str, str]] = set()
     for k in order:
-        look = screened.looks[k]
+        contrast = screened.contrasts[k]
         p = float(screened.p[k])
-        key = (_covariate(look), look.sample)
+        key = (_covariate(contrast), contrast.sample)
         if p >= level or len(found) >= SHOWN:
             break
-        if look.kind != "mechanism" and not look.is_taken_up(flat) and key not in seen:
+        if contrast.kind != "mechanism" and not contrast.is_taken_up(flat) and key not in seen:
             seen.add(key)
             found.append(_misfit_at(screened, int(k), residual))
     if not found and len(order) and screened.p[order[0]] < level:
@@ -53,9 +53,9 @@ def misfits_of(screened: Screen, level: float, residual: Residual, flat: str = "
 
 
 def _misfit_at(screened: Screen, k: int, residual: Residual) -> Misfit:
-    look, coefficients = screened.looks[k], screened.coefficients[k]
-    effect = effect_of_look(look, residual, coefficients, float(screened.size[k]), float(screened.strength[k]))
-    return misfit_of(look, effect, coefficients, float(screened.p[k]))
+    contrast, coefficients = screened.contrasts[k], screened.coefficients[k]
+    effect = effect_of_contrast(contrast, residual, coefficients, float(screened.size[k]), float(screened.strength[k]))
+    return misfit_of(contrast, effect, coefficients, float(screened.p[k]))
 
 
 def misfits_remaining(remainders: Sequence[Remainder], residual: Residual) -> list[Misfit]:
@@ -65,8 +65,8 @@ def misfits_remaining(remainders: Sequence[Remainder], residual: Residual) -> li
 
 def misfit_remaining(r: Remainder, residual: Residual) -> Misfit:
     """What follows a recorded column and no mechanism."""
-    effect = effect_of_look(r.look, residual, r.coefficients, r.size, r.strength)
-    return misfit_of(r.look, effect, r.coefficients, r.p)
+    effect = effect_of_contrast(r.contrast, residual, r.coefficients, r.size, r.strength)
+    return misfit_of(r.contrast, effect, r.coefficients, r.p)
 
 
 def each_once(misfits: Sequence[Misfit]) -> tuple[Misfit, ...]:
@@ -75,20 +75,20 @@ def each_once(misfits: Sequence[Misfit]) -> tuple[Misfit, ...]:
     return tuple(m for m in misfits if first[m.observable, m.sample, m.covariate] is m)
 
 
-def _covariate(look: Look) -> str:
-    """The column that a look follows; for a mechanism the columns it needs."""
-    if look.acting is None:
-        return look.covariate.split(",")[0]
-    return look.acting.mechanism.column(look.acting.choice)
+def _covariate(contrast: Contrast) -> str:
+    """The column that a contrast follows; for a mechanism the columns it needs."""
+    if contrast.acting is None:
+        return contrast.covariate.split(",")[0]
+    return contrast.acting.mechanism.column(contrast.acting.choice)
 
 
-def misfit_of(look: Look, effect: Effect, coefficients: np.ndarray, p: float) -> Misfit:
-    """A look as a misfit; ``coefficients`` tell the course of one with several columns."""
-    of = f" of {look.sample}" if look.sample and look.kind != "specimen" else ""
-    text = f"{sentence_case(WHAT[look.observable])}{of} {_predicate(look, effect.percent > 0, coefficients)}"
+def misfit_of(contrast: Contrast, effect: Effect, coefficients: np.ndarray, p: float) -> Misfit:
+    """A contrast as a misfit; ``coefficients`` tell the course of one with several columns."""
+    of = f" of {contrast.sample}" if contrast.sample and contrast.kind != "specimen" else ""
+    text = f"{sentence_case(WHAT[contrast.observable])}{of} {_predicate(contrast, effect.percent > 0, coefficients)}"
     text += f": {effect_in_words(effect)}, {effect.between} (adjusted p {p_text(p)})."
     return Misfit(
-        look.observable, look.sample, _covariate(look), effect.percent, p, text, effect.low, effect.high
+        contrast.observable, contrast.sample, _covariate(contrast), effect.percent, p, text, effect.low, effect.high
     )  # fmt: skip
 
 
@@ -97,23 +97,23 @@ def effect_in_words(effect: Effect) -> str:
     return f"{effect.percent:+.0f} % (90 % interval {effect.low:+.0f} to {effect.high:+.0f} %)"
 
 
-def _predicate(look: Look, up: bool, coefficients: np.ndarray) -> str:
+def _predicate(contrast: Contrast, up: bool, coefficients: np.ndarray) -> str:
     """What the observable does relative to the model, in words."""
-    column, _, detail = look.covariate.partition(", ")
+    column, _, detail = contrast.covariate.partition(", ")
     words = in_words(column)
-    if look.acting is not None:
-        return f"varies as expected from {acting_in_words(look.acting)}"
-    if look.kind == "sample":
+    if contrast.acting is not None:
+        return f"varies as expected from {acting_in_words(contrast.acting)}"
+    if contrast.kind == "sample":
         return _of_sample(column, detail, up)
-    if look.kind == "specimen":
-        return _of_specimen(column, look.sample, up)
-    if look.kind == "trend":
+    if contrast.kind == "specimen":
+        return _of_specimen(column, contrast.sample, up)
+    if contrast.kind == "trend":
         return f"{_goes(up)} with {words} relative to the model"
-    if look.kind == "period":
+    if contrast.kind == "period":
         return f"varies periodically with {words}" + (f" ({detail} pulls)" if detail else "")
-    if look.kind == "block":
+    if contrast.kind == "block":
         return f"{_lies(up)} for {words} {detail} than in the rest of the series"
-    if look.kind == "level":
+    if contrast.kind == "level":
         return f"differs between values of {words}"
     return f"follows {words}, {_course(coefficients)}"
 

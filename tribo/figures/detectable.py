@@ -34,10 +34,10 @@ def numbers(d: Diagnosis, level: float = LEVEL) -> pd.DataFrame:
     chance = [("chance", "", float(z), *[float("nan")] * 3) for z in d.screened.chance]
     best = int(np.argmax(d.screened.strength))
     need = float(np.quantile(d.screened.chance, 1 - level)) if len(chance) else 3.7
-    look = d.screened.looks[best]
+    contrast = d.screened.contrasts[best]
     seen, nothing = float(d.screened.strength[best]), [float("nan")] * 3
     rows = [*chance, ("need", f"level {level:g}", need, *nothing)]
-    rows.append(("observed", f"{look.observable}, {look.covariate}", seen, *nothing))
+    rows.append(("observed", f"{contrast.observable}, {contrast.covariate}", seen, *nothing))
     for name, percent in sorted(d.verdict.smallest_effects.items(), key=lambda item: item[1])[:SHOWN]:
         low, high = (percent * (need + s * TENTH) / need for s in (-1, 1))
         rows.append(("mechanism", name, float("nan"), low, percent, high))

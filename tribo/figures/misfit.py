@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 COLUMNS = ["observable", "row", "covariate", "label", "effect_percent", "strength", "p_adjusted", "mark"]
 ALL = "all samples"
 REGIMES = {"both": (0.5, 0.5), "static": (1.0, 0.0), "sliding": (0.0, 1.0), "drop": (1.0, -1.0)}
-PATTERNS = {**REGIMES, "both": (1.0, 1.0)}  # what a look would follow in the two regimes
+PATTERNS = {**REGIMES, "both": (1.0, 1.0)}  # what a contrast would follow in the two regimes
 TITLES = {
     "both": "Static and sliding friction together", "static": "Static friction", "sliding": "Sliding friction",
     "drop": "Drop from static to sliding", "trace": "Other features of the traces",
@@ -47,7 +47,7 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     The model is the one calibrated on the flat sample alone. The column "mean" is the mean over a sample of
     100 (measured / model - 1); the flat sample has neither a mean nor a change with load, since the calibration absorbs
     both. ``strength`` is the signed score in standard deviations once the flat law, the model's own error of a sample
-    and the specimens are taken out; ``p_adjusted`` sets it against the strongest of all looks at simulated campaigns.
+    and the specimens are taken out; ``p_adjusted`` sets it against the strongest contrast of simulated campaigns.
     The observable "trace" has the change of the zero (of the median sliding force), of the slope of the rise and of the
     stick-slip amplitude, with the p value of a rank correlation, adjusted for the number of cells.
     """
@@ -107,7 +107,7 @@ def _end_to_end(column: Covariate, residual: FloatArray, here: np.ndarray) -> fl
 
 
 def _strengths(f: ModelFit, shapes: FloatArray, observable: str) -> FloatArray:
-    """Signed score of every shape (n, k) in one observable, as the diagnosis itself judges its looks."""
+    """Signed score of every shape (n, k) in one observable, as the diagnosis itself judges its contrasts."""
     stacked = shapes[:, None, :] * np.array(PATTERNS[observable])[None, :, None]
     left, target = f.linear.cleared(stacked)
     length = np.sqrt(np.sum(left**2, axis=0))

@@ -20,7 +20,7 @@ from tribo.records import FloatArray
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
-    from tribo.diagnostics.contrasts import Look
+    from tribo.diagnostics.contrasts import Contrast
 
 COLUMNS = [
     "panel", "title", "detail", "axis", "y_axis", "mark", "sample_number", "sample", "test_id", "x", "x_name", "y",
@@ -38,16 +38,16 @@ NAMES = {
 
 @dataclass(frozen=True)
 class Panel:
-    """One look as a panel: the tests it is about, and their covariate."""
+    """One contrast as a panel: the tests it is about, and their covariate."""
 
-    look: Look
+    contrast: Contrast
     covariate: Covariate
     here: np.ndarray
     p: float
 
 
 def numbers(d: Diagnosis) -> pd.DataFrame:
-    """Residuals, 100 (measured / model - 1), of the strongest looks, one panel each.
+    """Residuals, 100 (measured / model - 1), of the strongest contrasts, one panel each.
 
     The model is the one calibrated on the flat sample alone.
 
@@ -62,39 +62,40 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
 
 
 def panels(d: Diagnosis) -> list[Panel]:
-    """The strongest look at each covariate and sample, the strongest first."""
+    """The strongest contrast with each covariate and sample, the strongest first."""
     s = d.screened
     found: dict[tuple[str, str], Panel] = {}
     for k in np.argsort(-s.strength):
-        look = s.looks[k]
-        panel = _panel(d, look, s.p_adjusted(float(s.strength[k])))
-        if panel is not None and not look.is_taken_up(d.baseline.setup.observations.flat):
-            found.setdefault((panel.covariate.name, look.sample if look.kind == "sample" else ""), panel)
+        contrast = s.contrasts[k]
+        panel = _panel(d, contrast, s.p_adjusted(float(s.strength[k])))
+        if panel is not None and not contrast.is_taken_up(d.baseline.setup.observations.flat):
+            found.setdefault((panel.covariate.name, contrast.sample if contrast.kind == "sample" else ""), panel)
         if len(found) == MOST_PANELS:
             break
     certain = [p for p in found.values() if p.p < 0.05]
     return certain or list(found.values())[:3]
 
 
-def _panel(d: Diagnosis, look: Look, p: float) -> Panel | None:
+def _panel(d: Diagnosis, contrast: Contrast, p: float) -> Panel | None:
     c = d.baseline.setup.observations.conditions
     here = np.ones(len(c.sample), bool)
-    name = look.covariate
-    if look.acting is not None:
-        needs = look.acting.mechanism.needs
-        name = _column_of(look.acting.choice) or {"speed_m_s": "speed_mm_s", "elapsed_s": "started_at"}.get(
+    name = contrast.covariate
+    if contrast.acting is not None:
+        needs = contrast.acting.mechanism.needs
+        name = _column_of(contrast.acting.choice) or {"speed_m_s": "speed_mm_s", "elapsed_s": "started_at"}.get(
             needs[0] if needs else "", needs[0] if needs else "normal_load_N"
         )
-    if look.kind in ("sample", "specimen") or name in ("area_fraction", "rim_per_m", "elongation", "tau0", "clip_N"):
+    of_pattern = ("area_fraction", "rim_per_m", "elongation", "tau0", "clip_N")
+    if contrast.kind in ("sample", "specimen") or name in of_pattern:
         name = "normal_load_N"
-    if look.kind == "sample":
-        here = c.sample == look.sample
-    if look.kind == "specimen":
-        here = c.specimen == look.covariate.split()[1]
-    if look.kind == "period":
-        name = look.covariate.split(",")[0]
+    if contrast.kind == "sample":
+        here = c.sample == contrast.sample
+    if contrast.kind == "specimen":
+        here = c.specimen == contrast.covariate.split()[1]
+    if contrast.kind == "period":
+        name = contrast.covariate.split(",")[0]
     try:
-        return Panel(look, covariate(d.baseline.setup, name), here, p)
+        return Panel(contrast, covariate(d.baseline.setup, name), here, p)
     except KeyError:
         return None
 
@@ -107,16 +108,16 @@ def _column_of(choice: str) -> str:
 
 
 def _rows(d: Diagnosis, k: int, panel: Panel, residual: FloatArray) -> list[dict[str, Any]]:
-    look, here = panel.look, panel.here
+    contrast, here = panel.contrast, panel.here
     o = d.baseline.setup.observations
-    observable = _observable(look)
+    observable = _observable(contrast)
     weight = np.array(WEIGHTS[observable])
     samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
     places = {s: i for i, s in enumerate(samples)}
     x, y = panel.covariate.values, percent(residual @ weight)
     added = added_by_causes(d, residual, weight)
     common = {
-        "panel": k, "title": _title(look), "detail": f"p {_p(panel.p)}", "axis": panel.covariate.axis,
+        "panel": k, "title": _title(contrast), "detail": f"p {_p(panel.p)}", "axis": panel.covariate.axis,
         "y_axis": f"{NAMES[observable]}:\nmeasured / model − 1 (%)",
     }  # fmt: skip
     tests = [
@@ -190,17 +191,17 @@ def _name(column: Covariate, value: float) -> str:
     return column.names[round(value)] if column.names else ""
 
 
-def _observable(look: Look) -> str:
-    """What a look is about; a mechanism that acts in one regime is shown there."""
-    if look.acting is not None and len(look.acting.mechanism.regimes) == 1:
-        return look.acting.mechanism.regimes[0]
-    return look.observable
+def _observable(contrast: Contrast) -> str:
+    """What a contrast is about; a mechanism that acts in one regime is shown there."""
+    if contrast.acting is not None and len(contrast.acting.mechanism.regimes) == 1:
+        return contrast.acting.mechanism.regimes[0]
+    return contrast.observable
 
 
-def _title(look: Look) -> str:
-    if look.kind == "specimen":
-        return f"{look.covariate} ({look.sample})"
-    return f"Sample {look.sample}" if look.sample else "All samples"
+def _title(contrast: Contrast) -> str:
+    if contrast.kind == "specimen":
+        return f"{contrast.covariate} ({contrast.sample})"
+    return f"Sample {contrast.sample}" if contrast.sample else "All samples"
 
 
 def _p(p: float) -> str:

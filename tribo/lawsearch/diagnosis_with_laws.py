@@ -196,9 +196,9 @@ def _extended(
 def _still_left(layers: Sequence[Layer], columns: set[str], screened: Screen, level: float) -> list[Layer]:
     """Remainders of other columns that are still beyond chance beside the laws."""
     follows = {
-        look.covariate.split(",")[0]
-        for look, p in zip(screened.looks, screened.p, strict=True)
-        if p < level and look.kind != "mechanism"
+        contrast.covariate.split(",")[0]
+        for contrast, p in zip(screened.contrasts, screened.p, strict=True)
+        if p < level and contrast.kind != "mechanism"
     }
     return [layer for layer in layers if layer.name in follows and layer.name not in columns]
 

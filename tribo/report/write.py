@@ -23,7 +23,7 @@ from tribo.report.provenance import (
 from tribo.report.tables import write_tables
 
 if TYPE_CHECKING:
-    from tribo.diagnostics.diagnosis_record import Alone, Diagnosis
+    from tribo.diagnostics.diagnosis_record import Diagnosis, DiagnosisWithoutModel
     from tribo.report.card import Card
 
 
@@ -33,7 +33,7 @@ def write_until(
     until: str = "report",
     drawing: Drawing = DRAWING,
     provenance: Provenance | None = None,
-    diagnosis: Diagnosis | Alone | None = None,
+    diagnosis: Diagnosis | DiagnosisWithoutModel | None = None,
     card: Card | None = None,
 ) -> None:
     """Write the results of all stages up to ``until`` (ingest, fit, compare or report).
@@ -82,7 +82,7 @@ def write_until(
     write_provenance(made_by, out, settle_outputs(out, before, made_by, written, complete=until == "report"))
 
 
-def _with_model(diagnosis: Diagnosis | Alone | None) -> Diagnosis | None:
+def _with_model(diagnosis: Diagnosis | DiagnosisWithoutModel | None) -> Diagnosis | None:
     if diagnosis is None:
         return None
     from tribo.diagnostics.diagnosis_record import Diagnosis
@@ -109,7 +109,7 @@ def write_report(
     out: Path | str,
     progress: Progress | None = None,
     provenance: Provenance | None = None,
-    diagnosis: Diagnosis | Alone | None = None,
+    diagnosis: Diagnosis | DiagnosisWithoutModel | None = None,
     jobs: int = 1,
 ) -> None:
     """All of OUT: tables, campaign.nc, figures, verdict.json where there is a diagnosis, page, PDF and crate.

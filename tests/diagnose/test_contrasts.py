@@ -1,4 +1,4 @@
-"""Every look of the diagnosis: its columns, written out by hand for a series of forty-eight tests."""
+"""Every contrast of the diagnosis: its columns, written out by hand for a series of forty-eight tests."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tribo.diagnostics.contrasts import BENT, Look, all_looks, numeric_covariates
+from tribo.diagnostics.contrasts import BENT, Contrast, all_contrasts, numeric_covariates
 from tribo.diagnostics.model import Acting, Setup, setup, start_changes
 from tribo.diagnostics.observations import Observations, observe
 from tribo.diagnostics.predictor import tabled_predictor
@@ -34,27 +34,25 @@ def setup_of(o: Observations) -> Setup:
     return setup(o, tabled_predictor(o.patterns))
 
 
-def looks(o: Observations) -> list[Look]:
+def contrasts(o: Observations) -> list[Contrast]:
     s = setup_of(o)
-    return all_looks(s, start_changes(s, s.first_law))
+    return all_contrasts(s, start_changes(s, s.first_law))
 
 
 @cache
-def seen() -> tuple[Look, ...]:
-    return tuple(looks(observed()))
+def seen() -> tuple[Contrast, ...]:
+    return tuple(contrasts(observed()))
 
 
-def one(kind: str, observable: str, covariate: str, sample: str = "") -> Look:
+def one(kind: str, observable: str, covariate: str, sample: str = "") -> Contrast:
     (found,) = [
-        look
-        for look in seen()
-        if (look.kind, look.observable, look.covariate, look.sample) == (kind, observable, covariate, sample)
+        c for c in seen() if (c.kind, c.observable, c.covariate, c.sample) == (kind, observable, covariate, sample)
     ]
     return found
 
 
-def of_kind(kind: str) -> list[Look]:
-    return [look for look in seen() if look.kind == kind]
+def of_kind(kind: str) -> list[Contrast]:
+    return [contrast for contrast in seen() if contrast.kind == kind]
 
 
 @pytest.mark.parametrize("observable", OBSERVABLES)
@@ -93,7 +91,7 @@ def test_a_shape_has_six_groups_of_alike_size_less_one_and_of_few_values_one_eac
     assert not columns[:, 1].any()
     runs = observed().conditions.specimen_run
     few = replace(observed(), conditions=replace(observed().conditions, specimen_run=np.minimum(runs, 4.0)))
-    (shape,) = [x for x in looks(few) if (x.kind, x.observable, x.covariate) == ("shape", "both", "specimen_run")]
+    (shape,) = [x for x in contrasts(few) if (x.kind, x.observable, x.covariate) == ("shape", "both", "specimen_run")]
     for k in range(3):
         assert shape.columns[:, 0, k].tolist() == (np.minimum(runs, 4.0) == k + 2).astype(float).tolist()
     assert shape.freedom == 3
@@ -101,7 +99,7 @@ def test_a_shape_has_six_groups_of_alike_size_less_one_and_of_few_values_one_eac
 
 def test_two_values_are_a_trend_and_have_no_shape() -> None:
     two = replace(observed().conditions, temperature_C=np.where(np.arange(48) % 2, 20.0, 25.0))
-    kinds = {x.kind for x in looks(replace(observed(), conditions=two)) if x.covariate == "temperature_C"}
+    kinds = {x.kind for x in contrasts(replace(observed(), conditions=two)) if x.covariate == "temperature_C"}
     assert kinds == {"trend"}
 
 
@@ -113,16 +111,16 @@ def test_the_levels_of_a_text_column_are_its_names_less_one() -> None:
         for k, name in enumerate("bc"):
             wanted = (observed().conditions.columns["batch"] == name).astype(float)
             assert columns[:, regime, k].tolist() == wanted.tolist()
-    assert {look.covariate for look in of_kind("level")} == {"batch"}  # at most one name for eight tests
+    assert {contrast.covariate for contrast in of_kind("level")} == {"batch"}  # at most one name for eight tests
 
 
 def test_up_to_one_name_for_eight_tests_makes_levels() -> None:
     for names, there in ((6, True), (7, False)):
         column = np.array([f"x{k % names}" for k in range(48)])
         c = replace(observed().conditions, columns={"who": column})
-        found = [look for look in looks(replace(observed(), conditions=c)) if look.kind == "level"]
+        found = [contrast for contrast in contrasts(replace(observed(), conditions=c)) if contrast.kind == "level"]
         assert bool(found) == there
-        assert all(look.freedom == names - 1 for look in found)
+        assert all(contrast.freedom == names - 1 for contrast in found)
 
 
 def test_a_sample_has_an_offset_a_slope_and_a_curve_against_the_logarithm_of_pressure() -> None:
@@ -161,36 +159,36 @@ def test_a_specimen_has_an_offset_in_each_regime_and_one_slope() -> None:
 
 def test_a_specimen_pulled_as_two_samples_names_both() -> None:
     both = np.where(observed().conditions.specimen == "B1", "F1", observed().conditions.specimen)
-    found = looks(replace(observed(), conditions=replace(observed().conditions, specimen=both)))
-    assert {look.sample for look in found if look.covariate == "specimen F1"} == {"B/F"}
+    found = contrasts(replace(observed(), conditions=replace(observed().conditions, specimen=both)))
+    assert {contrast.sample for contrast in found if contrast.covariate == "specimen F1"} == {"B/F"}
 
 
 def test_periods_are_harmonics_of_the_series_down_to_four_tests_and_three_of_the_day() -> None:
     o = observed()
     rank = (o.conditions.run_order - 1) / 48
-    series = [look for look in of_kind("period") if look.covariate.startswith("run_order")]
-    assert [look.covariate for look in series] == [f"run_order, period {48 / k:.3g}" for k in range(1, 13)]
-    for k, look in enumerate(series, start=1):
+    series = [contrast for contrast in of_kind("period") if contrast.covariate.startswith("run_order")]
+    assert [contrast.covariate for contrast in series] == [f"run_order, period {48 / k:.3g}" for k in range(1, 13)]
+    for k, contrast in enumerate(series, start=1):
         wave = np.column_stack([np.sin(2 * np.pi * k * rank), np.cos(2 * np.pi * k * rank)])
-        assert look.columns[:, 0] == pytest.approx(wave)
-        assert look.columns[:, 1] == pytest.approx(wave)
-    daily = [look for look in of_kind("period") if look.covariate == "time of day"]
+        assert contrast.columns[:, 0] == pytest.approx(wave)
+        assert contrast.columns[:, 1] == pytest.approx(wave)
+    daily = [contrast for contrast in of_kind("period") if contrast.covariate == "time of day"]
     assert len(daily) == 3
-    for k, look in enumerate(daily, start=1):
+    for k, contrast in enumerate(daily, start=1):
         turns = 2 * np.pi * k * o.clock_h / 24
-        assert look.columns[:, 0] == pytest.approx(np.column_stack([np.sin(turns), np.cos(turns)]))
+        assert contrast.columns[:, 0] == pytest.approx(np.column_stack([np.sin(turns), np.cos(turns)]))
 
 
 def test_no_period_of_the_day_is_sought_in_two_hours_or_without_a_clock() -> None:
     for clock in (9.0 + 2.0 * np.arange(48) / 47, np.full(48, np.nan)):
-        found = looks(replace(observed(), clock_h=clock))
+        found = contrasts(replace(observed(), clock_h=clock))
         assert not [x for x in found if x.kind == "period" and x.covariate == "time of day"]
 
 
 def test_no_period_of_the_series_is_sought_where_fewer_than_nineteen_orders_are_recorded() -> None:
     for orders, there in ((18, False), (19, True)):
         few = np.minimum(observed().conditions.run_order, float(orders))
-        found = looks(replace(observed(), conditions=replace(observed().conditions, run_order=few)))
+        found = contrasts(replace(observed(), conditions=replace(observed().conditions, run_order=few)))
         assert any(x.kind == "period" and x.covariate.startswith("run_order") for x in found) == there
 
 
@@ -200,25 +198,25 @@ def test_stretches_are_runs_of_two_to_five_successive_tenths_of_the_series() -> 
     wanted = [(a, b) for a in range(10) for b in range(a + 1, min(a + 5, 10))]
     found = of_kind("block")
     assert len(found) == len(wanted) == 30
-    for (first, last), look in zip(wanted, found, strict=True):
+    for (first, last), contrast in zip(wanted, found, strict=True):
         inside = (tenth >= first) & (tenth <= last)
-        assert look.columns[:, 0, 0].tolist() == look.columns[:, 1, 0].tolist() == inside.astype(float).tolist()
-        assert look.covariate == f"run_order, from {order[inside].min():.0f} to {order[inside].max():.0f}"
+        assert contrast.columns[:, 0, 0].tolist() == contrast.columns[:, 1, 0].tolist() == inside.astype(float).tolist()
+        assert contrast.covariate == f"run_order, from {order[inside].min():.0f} to {order[inside].max():.0f}"
 
 
 @pytest.mark.parametrize(("tests", "there"), [(29, False), (30, True)])
 def test_stretches_are_sought_in_thirty_tests_or_more(tests: int, there: bool) -> None:
-    found = looks(observed().take(np.arange(48) < tests))
-    assert any(look.kind == "block" for look in found) == there
+    found = contrasts(observed().take(np.arange(48) < tests))
+    assert any(contrast.kind == "block" for contrast in found) == there
 
 
 def test_an_order_that_is_not_recorded_gives_no_stretch_and_no_period() -> None:
     unknown = np.full(48, np.nan)
-    found = looks(replace(observed(), conditions=replace(observed().conditions, run_order=unknown)))
+    found = contrasts(replace(observed(), conditions=replace(observed().conditions, run_order=unknown)))
     assert not any(x.kind == "block" or x.covariate.startswith("run_order") for x in found)
 
 
-def test_every_candidate_is_a_look_at_what_it_changes_and_adhesion_one_at_its_share() -> None:
+def test_every_candidate_is_a_contrast_at_what_it_changes_and_adhesion_one_at_its_share() -> None:
     s = setup_of(observed())
     changes = start_changes(s, s.first_law)
     mechanisms = {(x.acting.mechanism.name, x.acting.choice): x for x in of_kind("mechanism") if x.acting is not None}
@@ -227,11 +225,11 @@ def test_every_candidate_is_a_look_at_what_it_changes_and_adhesion_one_at_its_sh
         if np.ptp(column) > 0:
             assert mechanisms[acting.mechanism.name, acting.choice].columns[:, :, 0] == pytest.approx(column)
     assert one("trend", "both", "tau0").columns[:, :, 0] == pytest.approx(changes.adhesion)
-    assert all(look.freedom == 1 for look in of_kind("mechanism"))
+    assert all(contrast.freedom == 1 for contrast in of_kind("mechanism"))
 
 
 def test_a_mechanism_that_is_present_as_a_whole_is_known_by_its_own_spread() -> None:
-    (label,) = [look for look in of_kind("mechanism") if look.covariate == "mislabelled_specimen"][:1]
+    (label,) = [contrast for contrast in of_kind("mechanism") if contrast.covariate == "mislabelled_specimen"][:1]
     sd = MECHANISMS["mislabelled_specimen"].choosing.all_or_nothing_sd
     assert sd is not None
     assert label.wholeness == pytest.approx(1 / sd**2)
@@ -239,8 +237,8 @@ def test_a_mechanism_that_is_present_as_a_whole_is_known_by_its_own_spread() -> 
     assert one("trend", "both", "tau0").wholeness == 0.0
 
 
-def test_a_look_that_is_not_finite_or_does_not_vary_is_none() -> None:
-    assert all(np.isfinite(look.columns).all() and np.ptp(look.columns) > 0 for look in seen())
+def test_a_contrast_that_is_not_finite_or_does_not_vary_is_none() -> None:
+    assert all(np.isfinite(contrast.columns).all() and np.ptp(contrast.columns) > 0 for contrast in seen())
 
 
 def test_a_sample_has_an_offset_a_slope_and_a_bend_of_its_own_tests() -> None:
