@@ -46,7 +46,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("lawsearch", GROUND | {"fitting", "springblock", "mechanisms", "mechanisms_in_model", "diagnostics"}),
     ("berardo2019", GROUND | {"fitting", "springblock", "mechanisms", "diagnostics", "lawsearch"}),
     ("wording", GROUND | {"mechanisms", "comparison", "diagnostics", "lawsearch", "berardo2019"}),
-    ("figures", GROUND | {"comparison", "diagnostics", "lawsearch", "berardo2019", "wording"}),
+    ("figures", GROUND | {"fitting", "comparison", "diagnostics", "lawsearch", "berardo2019", "wording"}),
     ("plot", GROUND | {"diagnostics", "berardo2019", "figures"}),
     ("report", GROUND | {"cache", "comparison", "diagnostics", "lawsearch", "berardo2019", "wording", "figures"}),
 )

@@ -21,7 +21,7 @@ from tribo.display import displayed, exact_text, in_short
 MOST_LINES, MOST_LETTERS = 40, 120
 FACES = (
     "tribo", "tribo.records", "tribo.errors", "tribo.springblock", "tribo.diagnostics", "tribo.report", "tribo.fitting",
-    "tribo.traces", "tribo.readers", "tribo.mechanisms.record", "tribo.laws", "tribo.figures.record",
+    "tribo.traces", "tribo.readers", "tribo.mechanisms.record", "tribo.laws", "tribo.figures.style",
 )  # fmt: skip
 
 

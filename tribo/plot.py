@@ -155,15 +155,15 @@ def pull(ingested: Ingested, test_id: str) -> Figure:
     TriboError
         The campaign has no such pull, or no trace of it.
     """
-    from tribo.figures import one_pull
+    from tribo.figures.one_pull import draw_pull, pull_numbers
 
     if test_id not in ingested.pulls or test_id not in ingested.traces:
         raise TriboError(Problem("unknown_test", "no pull with a trace has this id", found=test_id))
-    return one_pull.draw(one_pull.numbers(ingested.traces[test_id], ingested.pulls[test_id]))
+    return draw_pull(pull_numbers(ingested.traces[test_id], ingested.pulls[test_id]))
 
 
 def run(run: Run) -> Figure:
     """One run of the spring-block model: T/N against time (ms), with its peak and sliding window."""
-    from tribo.figures import simulated_runs
+    from tribo.figures.simulated import draw_runs, run_numbers
 
-    return simulated_runs.draw(simulated_runs.of_one_run(run))
+    return draw_runs(run_numbers(run))

@@ -18,7 +18,7 @@ from tribo.diagnostics.replicates import drawn_residuals, refit
 from tribo.diagnostics.verdict import Cause, Estimate
 from tribo.display import exact_text
 from tribo.errors import CampaignError
-from tribo.figures import law as law_figure
+from tribo.figures.extended_model import draw_law, law_numbers, law_numbers_of
 from tribo.lawsearch import diagnosis_with_laws
 from tribo.lawsearch.diagnosis_with_laws import searched_laws, separating_test, with_laws, with_misfits
 from tribo.lawsearch.grammar import ADHESION_TERM, LOAD_TERM, UNITS, Shape, WrittenLaw, groups_of, shapes_of
@@ -170,18 +170,18 @@ def test_a_law_has_to_be_beyond_chance_at_three_tenths_of_the_level_of_a_misfit(
 
 
 def test_the_figure_shows_the_law_over_its_column(diagnosed: Diagnosis) -> None:
-    shown = law_figure.numbers(diagnosed)
+    shown = law_numbers(diagnosed)
     assert set(shown["regime"]) == {"sliding"}
     assert len(shown) == diagnosed.baseline.setup.observations.n
     peak = shown.loc[shown["law_percent"].idxmax(), "x"]
     assert abs(peak - 23.0) < 0.4
     assert (shown["low_percent"] <= shown["high_percent"]).all()
     assert np.corrcoef(shown["partial_percent"], shown["law_percent"])[0, 1] > 0.5
-    assert len(law_figure.draw(shown).axes) == 1
+    assert len(draw_law(shown).axes) == 1
 
 
 def test_a_campaign_without_laws_has_no_figure_of_them() -> None:
-    assert law_figure.numbers_of(Discovery((), (), 0)).empty
+    assert law_numbers_of(Discovery((), (), 0)).empty
 
 
 def test_a_diagnosis_with_a_law_can_be_kept(diagnosed: Diagnosis) -> None:

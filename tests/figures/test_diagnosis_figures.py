@@ -16,7 +16,7 @@ from figures.test_figures import collisions
 from tribo.diagnostics import Diagnosis, examine
 from tribo.diagnostics.fit import fit, residual_on_flat
 from tribo.diagnostics.model import PATTERN
-from tribo.figures import detectable, extended, misfit, residuals
+from tribo.figures import evidence, extended_model, misfit, residuals
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
 from tribo.figures.style import house_style
 
@@ -41,7 +41,7 @@ def shown_points(figure: Figure) -> set[tuple[float, float]]:
 
 
 def test_the_heat_map_marks_the_column_that_was_hidden_and_its_sign(temperature: Diagnosis) -> None:
-    cells = misfit.numbers(temperature)
+    cells = misfit.misfit_numbers(temperature)
     hit = cells.query("row == @misfit.ALL and observable == 'both' and covariate == 'temperature_C'")
     assert hit["mark"].item() == "**"
     assert hit["effect_percent"].item() < -10
@@ -49,7 +49,7 @@ def test_the_heat_map_marks_the_column_that_was_hidden_and_its_sign(temperature:
 
 
 def test_the_heat_map_of_a_campaign_without_effect_marks_nothing(nothing: Diagnosis) -> None:
-    cells = misfit.numbers(nothing)
+    cells = misfit.misfit_numbers(nothing)
     assert (cells["mark"] == "").all()
     assert set(cells["observable"]) >= {"both", "static", "sliding", "drop"}
 
@@ -67,12 +67,12 @@ def test_the_mean_of_a_pattern_that_rubs_more_is_that_much_higher_and_no_other_i
 
 
 def mean_cells(d: Diagnosis) -> pd.Series:
-    cells = misfit.numbers(d)
+    cells = misfit.misfit_numbers(d)
     return cells[(cells["covariate"] == "mean") & (cells["observable"] == "static")].set_index("row")["effect_percent"]
 
 
 def test_the_strongest_contrast_comes_first_with_the_curve_of_the_named_mechanism(temperature: Diagnosis) -> None:
-    rows = residuals.numbers(temperature)
+    rows = residuals.residual_numbers(temperature)
     first = rows[rows["panel"] == 0]
     assert first["axis"].iloc[0].startswith("Temperature")
     curve = first[first["mark"] == "curve"].sort_values("x")
@@ -81,7 +81,7 @@ def test_the_strongest_contrast_comes_first_with_the_curve_of_the_named_mechanis
 
 
 def test_the_grey_band_is_that_of_the_means_beside_it(nothing: Diagnosis) -> None:
-    rows = residuals.numbers(nothing).reset_index()
+    rows = residuals.residual_numbers(nothing).reset_index()
     means = rows[rows["mark"] == "mean"].merge(rows[rows["mark"] == "band"], on=["panel", "x"], suffixes=("", "_band"))
     inside = ((means["y"] > means["y_low_band"]) & (means["y"] < means["y_high_band"])).mean()
     assert inside > 0.9
@@ -105,7 +105,7 @@ def test_what_is_expected_of_a_right_model_does_not_grow_with_how_wrong_the_camp
 
 
 def test_a_point_of_a_residual_is_measured_over_model_less_one(temperature: Diagnosis) -> None:
-    rows = residuals.numbers(temperature)
+    rows = residuals.residual_numbers(temperature)
     static = rows[(rows["mark"] == "test") & rows["y_axis"].str.startswith("Static friction")]
     both = rows[(rows["mark"] == "test") & rows["y_axis"].str.startswith("Static and sliding")]
     shown = static if len(static) else both
@@ -120,18 +120,18 @@ def test_the_caption_names_columns_that_the_heat_map_has(nothing: Diagnosis) -> 
     caption = DIAGNOSIS_FIGURES["misfit"].caption
     named = re.findall(r"[Cc]olumn “([^”]*)”", caption)
     assert len(named) == 2
-    assert set(named) <= set(misfit.numbers(nothing)["label"])
+    assert set(named) <= set(misfit.misfit_numbers(nothing)["label"])
 
 
 def test_the_extended_model_has_the_smaller_residuals(temperature: Diagnosis, nothing: Diagnosis) -> None:
-    rows = extended.numbers(temperature)
+    rows = extended_model.extended_numbers(temperature)
     rms = rows.groupby("model")["rms_percent"].mean()
     assert rms["after"] < rms["before"]
-    assert extended.numbers(nothing).empty
+    assert extended_model.extended_numbers(nothing).empty
 
 
 def test_power_grows_with_the_effect_around_half(nothing: Diagnosis) -> None:
-    rows = detectable.numbers(nothing)
+    rows = evidence.power_numbers(nothing)
     sizes = rows[rows["mark"] == "mechanism"]
     assert (sizes["found_10_percent"] < sizes["found_50_percent"]).all()
     assert (sizes["found_50_percent"] < sizes["found_90_percent"]).all()
@@ -182,11 +182,11 @@ def test_no_label_lies_outside_the_figure_or_on_another(name: str, temperature: 
 
 @pytest.mark.parametrize("n", [2, 5, 8, 12])
 def test_before_and_after_of_any_number_of_samples_have_no_label_on_another(temperature: Diagnosis, n: int) -> None:
-    rows = extended.numbers(temperature)
+    rows = extended_model.extended_numbers(temperature)
     one = rows[rows["sample"] == rows["sample"].iloc[0]]
     names = ("F", "A", "Sx", "S 20/40 dry", "K5", "Kx", "Ky", "holes 7", "B", "C", "D", "E")[:n]
     many = pd.concat([one.assign(sample=name, sample_number=k) for k, name in enumerate(names)], ignore_index=True)
-    figure = extended.draw(many)
+    figure = extended_model.draw_extended(many)
     assert collisions(figure) == []
     assert len(figure.axes) == 2 * n
 

@@ -17,7 +17,7 @@ from matplotlib.textpath import TextPath
 from report.synthetic import AREA_M2, make_study
 
 from tribo.comparison import study_lookup
-from tribo.figures import friction_panels
+from tribo.figures import measured_friction
 from tribo.figures.catalogue import FIGURES
 from tribo.figures.style import (
     SAMPLE_COLOURS,
@@ -154,7 +154,7 @@ def test_the_laws_of_samples_that_rub_alike_are_told_apart() -> None:
                       "T_N": 0.5 * loads})
         for k in range(4) for mark in ("measured", "T = μ N")
     ]  # fmt: skip
-    figure = friction_panels.draw_forces(pd.concat(frames, ignore_index=True))
+    figure = measured_friction.draw_forces(pd.concat(frames, ignore_index=True))
     assert len(figure.axes[0].texts) == 4
     assert collisions(figure) == []
 

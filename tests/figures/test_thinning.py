@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribo.figures.thinning import thin_trace
+from tribo.figures.one_pull import thin_trace
 
 
 def test_a_thinned_trace_keeps_its_spikes_its_ends_and_its_order() -> None:

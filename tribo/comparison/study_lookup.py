@@ -47,3 +47,8 @@ def stated_fit(study: Study, sample: str, regime: str) -> LawFit | None:
 def load_levels(normal_load_N: FloatArray, tolerance: float = LOAD_TOLERANCE) -> FloatArray:
     """The mean load of the level each load belongs to: loads within ``tolerance`` are one level."""
     return levels_of(np.asarray(normal_load_N, float), tolerance)
+
+
+def shown(study: Study) -> bool:
+    """Whether the study was made without the spring-block model, whose report shows other figures."""
+    return study.comparison is None and bool(study.ingested.pulls)

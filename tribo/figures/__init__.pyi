@@ -4,5 +4,4 @@ from .catalogue import (
     FRICTION_FIGURES as FRICTION_FIGURES,
     PUBLISHED_FIGURES as PUBLISHED_FIGURES,
 )
-from .record import FigureOf as FigureOf
-from .style import house_style as house_style
+from .style import FigureOf as FigureOf, house_style as house_style

@@ -1,4 +1,4 @@
-"""Evidence for each mechanism: increase in log likelihood over the calibrated model, or why it was ruled out."""
+"""Evidence for each mechanism, and the effects that the campaign could have detected."""
 
 from __future__ import annotations
 
@@ -8,16 +8,19 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from tribo.figures import style
-from tribo.figures.covariates import mechanism_label
+from tribo.figures.misfit import mechanism_label
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
 
-COLUMNS = ["mechanism", "choice", "status", "gain", "weight", "estimate", "reason"]
+
+EVIDENCE_COLUMNS = ["mechanism", "choice", "status", "gain", "weight", "estimate", "reason"]
 STATUS = {
     "cause": ("named", style.VERMILLION),
     "tied": ("not distinguishable from the best by this design", style.ORANGE),
@@ -25,12 +28,13 @@ STATUS = {
     "lost": ("explains less", "0.7"),
     "out": ("not weighed", "0.5"),
 }
-ROW_MM, FRAME_MM = 4.4, 24.0
+ROW_MM = 4.4
+EVIDENCE_FRAME_MM = 24.0
 LEAST_SHOWN = -2.0
 LETTERS_ACROSS = 100  # of the words beside the bars, over the width of the axis
 
 
-def numbers(d: Diagnosis) -> pd.DataFrame:
+def evidence_numbers(d: Diagnosis) -> pd.DataFrame:
     """Every mechanism: log likelihood gained net of its freedom, share of the evidence, amplitude, or why it is out.
 
     With two causes the gains are those of the first step. Empty where nothing had to be explained.
@@ -38,7 +42,7 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     from tribo.diagnostics import weighing_table
 
     if d.named is None or not d.named.weighed:
-        return pd.DataFrame(columns=COLUMNS)
+        return pd.DataFrame(columns=EVIDENCE_COLUMNS)
     status = _status(d)
     rows = []
     for row in weighing_table(d).to_dict("records"):
@@ -48,7 +52,7 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
     weighed = {row[0] for row in rows}
     out = [e for e in (*d.verdict.excluded, *d.verdict.not_testable) if e.mechanism not in weighed]
     rows += [(e.mechanism, "", "out", float("nan"), float("nan"), "", e.reason) for e in out]
-    return pd.DataFrame(rows, columns=COLUMNS)
+    return pd.DataFrame(rows, columns=EVIDENCE_COLUMNS)
 
 
 def _status(d: Diagnosis) -> dict[str, str]:
@@ -62,9 +66,9 @@ def _status(d: Diagnosis) -> dict[str, str]:
 
 
 @style.in_house_style
-def draw(numbers: pd.DataFrame) -> Figure:
+def draw_evidence(numbers: pd.DataFrame) -> Figure:
     """Bars for what was weighed, the best first; below, in words, what could not be."""
-    height_mm = ROW_MM * len(numbers) + FRAME_MM
+    height_mm = ROW_MM * len(numbers) + EVIDENCE_FRAME_MM
     figure = style.page_figure(height_mm)
     ax = figure.subplots()
     rows = numbers.reset_index(drop=True)
@@ -118,3 +122,104 @@ def _short(reason: str, most: int = 96) -> str:
     """The reason up to its first semicolon, in one line."""
     text = reason.split(";")[0].split(", and each")[0].replace(" +- ", " ± ")
     return text if len(text) <= most else f"{text[: most - 1]}…"
+
+
+POWER_COLUMNS = ["mark", "name", "strength", "found_10_percent", "found_50_percent", "found_90_percent"]
+LEVEL = 0.01  # chance of a misfit where nothing is hidden, as the diagnosis takes it by default
+TENTH = 1.2816  # standard normal deviate exceeded one time in ten
+SHOWN = 16
+POWER_FRAME_MM = 26.0
+
+
+def power_numbers(d: Diagnosis, level: float = LEVEL) -> pd.DataFrame:
+    """Chance: the strongest deviation in each simulated campaign without effect. Observed: the strongest in this one.
+
+    Then one row per mechanism: the effect on T, in percent over the range of the variable, that is detected with 10, 50
+    and 90 % probability. The strength of a deviation is proportional to the effect and has a standard deviation of 1.
+    """
+    chance = [("chance", "", float(z), *[float("nan")] * 3) for z in d.screened.chance]
+    best = int(np.argmax(d.screened.strength))
+    need = float(np.quantile(d.screened.chance, 1 - level)) if len(chance) else 3.7
+    contrast = d.screened.contrasts[best]
+    seen, nothing = float(d.screened.strength[best]), [float("nan")] * 3
+    rows = [*chance, ("need", f"level {level:g}", need, *nothing)]
+    rows.append(("observed", f"{contrast.observable}, {contrast.covariate}", seen, *nothing))
+    for name, percent in sorted(d.verdict.smallest_effects.items(), key=lambda item: item[1])[:SHOWN]:
+        low, high = (percent * (need + s * TENTH) / need for s in (-1, 1))
+        rows.append(("mechanism", name, float("nan"), low, percent, high))
+    return pd.DataFrame(rows, columns=POWER_COLUMNS)
+
+
+@style.in_house_style
+def draw_power(numbers: pd.DataFrame) -> Figure:
+    """Left the size of what was seen, right the power for what may be hidden."""
+    rows = numbers[numbers["mark"] == "mechanism"].reset_index(drop=True)
+    height_mm = max(ROW_MM * len(rows), 34.0) + POWER_FRAME_MM
+    figure = style.page_figure(height_mm)
+    left, right = figure.subplots(1, 2, width_ratios=(1, 1.5))
+    _chance(left, numbers)
+    _sizes(right, rows)
+    style.legend_below(
+        figure,
+        [
+            Patch(color="0.75", label="simulated campaigns without any effect"),
+            Line2D([], [], color="black", ls="--", lw=0.9, label="threshold of a misfit"),
+            Line2D([], [], color=style.VERMILLION, lw=1.6, label="this campaign"),
+            Line2D([], [], color=style.BLUE, lw=3, alpha=0.45, marker="o", ms=4, label="detected in 10, 50, 90 %"),
+        ],
+    )
+    return figure
+
+
+def _chance(ax: Axes, numbers: pd.DataFrame) -> None:
+    chance = numbers.loc[numbers["mark"] == "chance", "strength"].to_numpy(float)
+    observed = float(numbers.loc[numbers["mark"] == "observed", "strength"].iloc[0])
+    need = float(numbers.loc[numbers["mark"] == "need", "strength"].iloc[0])
+    if len(chance):
+        edges = np.arange(np.floor(4 * chance.min()) / 4, chance.max() + 0.25, 0.25)
+        ax.hist(chance, bins=edges.tolist(), color="0.75")
+    ax.axvline(need, color="black", ls="--", lw=0.9)
+    ax.axvline(observed, color=style.VERMILLION, lw=1.6)
+    style.panel_title(ax, "Is there a misfit?", "yes" if observed > need else "no")
+    ax.set_xlabel("Strongest deviation (standard deviations)")
+    ax.set_ylabel("Campaigns")
+
+
+def _sizes(ax: Axes, rows: pd.DataFrame) -> None:
+    places = np.arange(len(rows))
+    ax.hlines(places, rows["found_10_percent"], rows["found_90_percent"], color=style.BLUE, lw=3, alpha=0.45)
+    ax.plot(rows["found_50_percent"], places, "o", color=style.BLUE, ms=4)
+    ax.set_yticks(places, [mechanism_label(str(name)) for name in rows["name"]])
+    ax.set_ylim(len(rows) - 0.4, -0.6)
+    ax.tick_params(axis="y", length=0)
+    if rows.empty:
+        style.panel_title(ax, "Detectable effects", "none that this design can test")
+        return
+    ax.set_xscale("log")
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    style.panel_title(ax, "Detectable effects")
+    ax.set_xlabel("Change of T over the range of the variable (%)")
+
+
+EVIDENCE = style.FigureOf(
+    "evidence",
+    "Evidence for each mechanism",
+    "Increase in log likelihood over the calibrated model, minus a penalty for the free parameters of each "
+    "mechanism, with its fitted size. Mechanisms that the design cannot distinguish from the best one are "
+    "marked. Italics: reason why a mechanism was not evaluated. If two causes were found, the values are those "
+    "of the first step.",
+    evidence_numbers,
+    draw_evidence,
+)
+POWER = style.FigureOf(
+    "power",
+    "Effects this campaign could have detected",
+    "Left: the strongest deviation in this campaign, and in simulated campaigns of the calibrated model "
+    "with the same design and noise. Right: change of T over the whole range of a variable, after the part "
+    "that calibration on the flat sample absorbs, that would be detected in 10 %, 50 % and 90 % of such "
+    "campaigns (bar: 10 to 90 %, dot: 50 %).",
+    power_numbers,
+    draw_power,
+)

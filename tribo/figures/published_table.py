@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from tribo.figures import style
-from tribo.figures.covariates import mechanism_label
+from tribo.figures.misfit import mechanism_label
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
@@ -169,3 +169,26 @@ def _readings_axes(ax: Axes, readings: pd.DataFrame, mechanisms: list[str], n_gu
     ax.grid(visible=False)
     ax.tick_params(length=0)
     ax.spines[:].set_visible(False)
+
+
+PUBLISHED = style.FigureOf(
+    "published",
+    "Published table compared with the model of the paper",
+    "Ratio of measured to simulated friction force against pressure, from mu and tau0 in Table 2 of Berardo "
+    "et al. (2019). Band: 90 % interval of the measurement, with the correlation of mu and tau0 that results "
+    "from loads spread evenly over 3 to 25 kPa. Dotted: the same interval for independent mu and tau0. Dashed: "
+    "the same model with the law of the flat sample fitted to the whole table. Red: this model extended by the "
+    "best mechanism.",
+    ratio_numbers,
+    draw_ratio,
+)
+PUBLISHED_READINGS = style.FigureOf(
+    "published-readings",
+    "Evidence for each mechanism under each interpretation of the table",
+    "Increase in log likelihood over the calibrated model for each mechanism. Left of the line: the three "
+    "explanations suggested by the authors. Each row is one interpretation of the table: the simulation used "
+    "as the model, the correlation of mu and tau0, whether the printed standard deviations are those of a "
+    "mean or of three specimens, and the outcome.",
+    reading_numbers,
+    draw_readings,
+)

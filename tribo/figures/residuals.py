@@ -1,4 +1,4 @@
-"""The strongest deviations: residual against covariate, the expected scatter and the curve of the named mechanism."""
+"""Residuals of the calibrated model against recorded columns: the strongest deviations, and the picture of the card."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from matplotlib.patches import Patch
 from tribo.diagnostics.effect_sizes import percent
 from tribo.diagnostics.model import PATTERN
 from tribo.figures import style
-from tribo.figures.covariates import LOGARITHMIC, Covariate, covariate
-from tribo.records import FloatArray
+from tribo.figures.misfit import LOGARITHMIC, Covariate, covariate
+from tribo.records import REGIMES, FloatArray
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
     from tribo.diagnostics.contrasts import Contrast
 
-COLUMNS = [
+
+RESIDUAL_COLUMNS = [
     "panel", "title", "detail", "axis", "y_axis", "mark", "sample_number", "sample", "test_id", "x", "x_name", "y",
     "y_low", "y_high",
 ]  # fmt: skip
@@ -46,7 +47,7 @@ class Panel:
     p: float
 
 
-def numbers(d: Diagnosis) -> pd.DataFrame:
+def residual_numbers(d: Diagnosis) -> pd.DataFrame:
     """Residuals, 100 (measured / model - 1), of the strongest contrasts, one panel each.
 
     The model is the one calibrated on the flat sample alone.
@@ -58,7 +59,7 @@ def numbers(d: Diagnosis) -> pd.DataFrame:
 
     residual = residual_on_flat(d.baseline)
     frames = [_rows(d, k, panel, residual) for k, panel in enumerate(panels(d))]
-    return pd.DataFrame([row for rows in frames for row in rows], columns=COLUMNS)
+    return pd.DataFrame([row for rows in frames for row in rows], columns=RESIDUAL_COLUMNS)
 
 
 def panels(d: Diagnosis) -> list[Panel]:
@@ -209,17 +210,17 @@ def _p(p: float) -> str:
 
 
 @style.in_house_style
-def draw(numbers: pd.DataFrame) -> Figure:
+def draw_residuals(numbers: pd.DataFrame) -> Figure:
     """Grey band: 95 % of the means if nothing were hidden. Bars: mean of a bin with twice its standard error."""
     groups = [part for _, part in numbers.groupby("panel")]
     figure, axes = style.panel_grid(len(groups), 56, columns=min(len(groups), 3))
     for ax, part in zip(axes, groups, strict=True):
-        _draw_panel(ax, part)
-    style.legend_below(figure, _legend(numbers), columns=12)
+        _residual_panel(ax, part)
+    style.legend_below(figure, _residual_legend(numbers), columns=12)
     return figure
 
 
-def _draw_panel(ax: Axes, part: pd.DataFrame) -> None:
+def _residual_panel(ax: Axes, part: pd.DataFrame) -> None:
     tests = part[part["mark"] == "test"]
     band = part[part["mark"] == "band"].sort_values("x")
     names = tests.drop_duplicates("x")[["x", "x_name"]].sort_values("x") if tests["x_name"].any() else None
@@ -236,10 +237,10 @@ def _draw_panel(ax: Axes, part: pd.DataFrame) -> None:
     step: dict[str, Any] = {"drawstyle": "steps-mid"} if names is not None else {}
     ax.plot(curve["x"], curve["y"], "-", color=style.VERMILLION, lw=1.6, zorder=6, **step)
     ax.axhline(0, color="0.4", lw=0.8)
-    _axis(ax, part, names)
+    _residual_axis(ax, part, names)
 
 
-def _axis(ax: Axes, part: pd.DataFrame, names: pd.DataFrame | None) -> None:
+def _residual_axis(ax: Axes, part: pd.DataFrame, names: pd.DataFrame | None) -> None:
     first = part.iloc[0]
     tests = part[part["mark"] == "test"]
     style.panel_title(ax, str(first["title"]), str(first["detail"]))
@@ -263,7 +264,7 @@ def _jitter(n: int) -> FloatArray:
     return np.asarray(2.0 * np.mod(np.arange(n) * 0.618034, 1.0) - 1.0)
 
 
-def _legend(numbers: pd.DataFrame) -> list[Any]:
+def _residual_legend(numbers: pd.DataFrame) -> list[Any]:
     tests = numbers[numbers["mark"] == "test"]
     shown = tests.drop_duplicates("sample_number").sort_values("sample_number")
     marks = [(str(row["sample"]), style.sample_mark(int(row["sample_number"]))) for row in shown.to_dict("records")]
@@ -275,3 +276,150 @@ def _legend(numbers: pd.DataFrame) -> list[Any]:
     if (numbers["mark"] == "curve").any():
         handles.append(Line2D([], [], color=style.VERMILLION, lw=1.6, label="contribution of the named mechanism"))
     return handles
+
+
+FINDING_COLUMNS = ["regime", "axis", "mark", "sample", "test_id", "x", "x_name", "y", "y_low", "y_high"]
+BY_SAMPLE = ("area_fraction", "rim_per_m", "elongation", "clip_N", "sample", "tau0")
+RECORDED = {"speed_m_s": "speed_mm_s", "elapsed_s": "started_at"}
+WIDTH_MM, HEIGHT_MM = 130.0, 66.0
+
+
+def finding_numbers(d: Diagnosis) -> pd.DataFrame:
+    """100 (measured / model - 1) of every test, against the column that the finding follows.
+
+    The model is the one calibrated on the flat sample alone. ``mark`` is test; mean, of a value of the column, with
+    twice its standard error; band, two standard deviations of such a mean by the fitted noise; curve, what the named
+    causes add. The column is that of the cause that acts most, else that of the first misfit, else the sample.
+    """
+    from tribo.diagnostics.fit import residual_on_flat
+
+    o = d.baseline.setup.observations
+    column = _column(d)
+    here = np.isfinite(column.values)
+    residual = residual_on_flat(d.baseline)
+    rows: list[dict[str, Any]] = []
+    for regime in REGIMES:
+        weight = np.array(WEIGHTS[regime])
+        y = percent(residual @ weight)
+        common = {"regime": regime, "axis": _axis_name(column)}
+        rows += [
+            common
+            | {"mark": "test", "sample": o.conditions.sample[i], "test_id": o.test_ids[i], "x": column.values[i],
+               "x_name": column.names[round(column.values[i])] if column.names else "", "y": y[i]}
+            for i in np.flatnonzero(here)
+        ]  # fmt: skip
+        rows += [common | row for row in summaries(d, column, here, y, weight, added_by_causes(d, residual, weight))]
+    return pd.DataFrame(rows, columns=FINDING_COLUMNS)
+
+
+def _column(d: Diagnosis) -> Covariate:
+    for name in _names(d):
+        try:
+            return covariate(d.baseline.setup, name)
+        except KeyError:
+            continue
+    return covariate(d.baseline.setup, "sample")
+
+
+def _names(d: Diagnosis) -> list[str]:
+    """Columns that the finding may follow, the best first."""
+    if d.named is not None and d.named.causes and d.verdict.verdict != "unknown":
+        layers = [layer for layer in d.verdict.layers if layer.kind == "cause"]
+        sizes = {layer.name: abs(layer.effect_percent) for layer in layers}
+        acting = max((alike[0] for alike in d.named.causes), key=lambda c: sizes.get(c.name, 0.0)).acting
+        followed = acting.mechanism.column(acting.choice).split(", ")
+    else:
+        followed = [m.covariate for m in d.verdict.misfits[:1]]
+    if any(name in BY_SAMPLE for name in followed):
+        return ["sample"]
+    return [RECORDED.get(name, name) for name in followed]
+
+
+def _axis_name(column: Covariate) -> str:
+    return {"sample": "Sample", "specimen": "Specimen"}.get(column.name, column.axis)
+
+
+@style.in_house_style
+def draw_finding(numbers: pd.DataFrame) -> Figure:
+    """Static at the left, sliding at the right, one scale; on the line at zero the model is right."""
+    regimes = [r for r in REGIMES if (numbers["regime"] == r).any()]
+    size = (WIDTH_MM / style.MM_PER_INCH, HEIGHT_MM / style.MM_PER_INCH)
+    figure = Figure(figsize=size, layout="constrained")
+    axes = np.atleast_1d(figure.subplots(1, len(regimes), sharey=True))
+    for ax, regime in zip(axes, regimes, strict=True):
+        _finding_panel(ax, numbers[numbers["regime"] == regime])
+        style.panel_title(ax, f"{regime.capitalize()} friction")
+    axes[0].set_ylabel("measured / model − 1 (%)")
+    ends = numbers[["y", "y_low", "y_high"]].to_numpy(float)[(numbers["mark"] != "test").to_numpy()]
+    tests = numbers.loc[numbers["mark"] == "test", "y"]
+    low, high = min(np.nanmin(ends), tests.quantile(0.01), 0.0), max(np.nanmax(ends), tests.quantile(0.99), 0.0)
+    room = 0.06 * (high - low)
+    axes[0].set_ylim(low - room, high + room)
+    style.legend_below(figure, _finding_legend(numbers), columns=4)
+    return figure
+
+
+def _finding_panel(ax: Axes, part: pd.DataFrame) -> None:
+    tests, mean = part[part["mark"] == "test"], part[part["mark"] == "mean"]
+    named = bool(tests["x_name"].any())
+    band, curve = (part[part["mark"] == mark].sort_values("x").astype({"x": float}) for mark in ("band", "curve"))
+    if named:
+        ax.bar(band["x"], band["y_high"] - band["y_low"], 0.8, band["y_low"], color="0.75", alpha=0.45, lw=0)
+        ax.hlines(curve["y"], curve["x"] - 0.4, curve["x"] + 0.4, color=style.VERMILLION, lw=1.8, zorder=4)
+    else:
+        ax.fill_between(band["x"], band["y_low"], band["y_high"], color="0.75", alpha=0.45, lw=0)
+        ax.plot(curve["x"], curve["y"], "-", color=style.VERMILLION, lw=1.8, zorder=4)
+        ax.plot(tests["x"], tests["y"], "o", color="0.5", ms=1.6, alpha=0.5, mew=0)
+    bars = np.abs(mean[["y_low", "y_high"]].to_numpy(float) - mean[["y"]].to_numpy(float)).T
+    ax.errorbar(mean["x"], mean["y"], bars, fmt="o", ms=3.6, color="black", elinewidth=1.0, zorder=5)
+    ax.axhline(0, color="0.4", lw=0.8)
+    _finding_axis(ax, part, named)
+
+
+def _finding_axis(ax: Axes, part: pd.DataFrame, named: bool) -> None:
+    axis = str(part["axis"].iloc[0])
+    ax.set_xlabel(axis)
+    tests = part[part["mark"] == "test"]
+    if named:
+        names = tests.drop_duplicates("x").sort_values("x")
+        ax.set_xticks(names["x"], names["x_name"])
+        if names["x_name"].str.len().sum() > 20:
+            for label in ax.get_xticklabels():
+                label.set(rotation=90, fontsize=6)
+        ax.set_xlim(-0.6, float(names["x"].max()) + 0.6)
+    elif axis.split(" (")[0] in ("Normal load N", "Speed", "Hold"):
+        ax.set_xscale("log")
+        style.plain_log_axis(ax.xaxis, tests["x"])
+        ax.tick_params(axis="x", labelsize=6.5)
+
+
+def _finding_legend(numbers: pd.DataFrame) -> list[Any]:
+    handles: list[Any] = [
+        Line2D([], [], color="black", marker="o", lw=1.0, ms=3.6, label="mean ± 2 SE"),
+        Patch(color="0.75", alpha=0.6, lw=0, label="expected if the model is right"),
+    ]
+    if (numbers["mark"] == "curve").any():
+        handles.append(Line2D([], [], color=style.VERMILLION, lw=1.8, label="named cause"))
+    return handles
+
+
+FINDING = style.FigureOf(
+    "finding",
+    "What was found",
+    "100 (measured / model − 1) against what it follows, for the model calibrated on the flat sample. Points "
+    "with bars: means with twice their standard error. Band: range of 95 % of such means if the model were "
+    "right. Thick line, if a cause is named: what it adds. Small points, if shown: tests.",
+    finding_numbers,
+    draw_finding,
+)
+RESIDUALS = style.FigureOf(
+    "residuals",
+    "The strongest deviations",
+    "100 (measured / model − 1) against the recorded variable with which it varies most strongly; if no "
+    "deviation is significant, against the three variables that come closest. Small points: tests; points with "
+    "bars: means with twice their standard error. Band: range of 95 % of such means if the model were right, "
+    "given the scatter of repeats and specimens and the error of the model. Thick line: contribution of the "
+    "identified mechanism.",
+    residual_numbers,
+    draw_residuals,
+)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
 from importlib.resources import as_file, files
-from typing import Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -21,6 +21,13 @@ from matplotlib.figure import Figure
 from matplotlib.textpath import TextPath
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 from matplotlib.transforms import ScaledTranslation, Transform
+
+from tribo.display import displayed
+from tribo.records import Study
+
+if TYPE_CHECKING:
+    pass
+
 
 COLUMN_WIDTH_MM = 190.0
 MM_PER_INCH = 25.4
@@ -207,3 +214,26 @@ def _columns_that_fit(labels: list[str], most: int, width_points: float) -> int:
         if sum(max(part) for part in np.array_split(widths, columns)) < width_points:
             return columns
     return 1
+
+
+Of = TypeVar("Of")
+
+
+@displayed()
+@dataclass(frozen=True)
+class FigureOf(Generic[Of]):
+    """One figure of a record of type ``Of``.
+
+    ``numbers(record)`` gives exactly what is plotted, one row per point, units in the column names; an empty
+    frame where the record lacks what the figure needs. ``draw(numbers)`` has no other input, so a table
+    written from the numbers holds exactly what the figure shows.
+    """
+
+    name: str
+    title: str
+    caption: str
+    numbers: Callable[[Of], pd.DataFrame]
+    draw: Callable[[pd.DataFrame], Figure]
+
+
+StudyFigure = FigureOf[Study]

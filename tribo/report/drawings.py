@@ -29,8 +29,7 @@ from matplotlib.figure import Figure
 
 from tribo.errors import Problem, unexpected
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES, FIGURES, FRICTION_FIGURES
-from tribo.figures.record import FigureOf
-from tribo.figures.style import as_svg, house_style
+from tribo.figures.style import FigureOf, as_svg, house_style
 from tribo.files import write_bytes, write_text
 from tribo.forked import each
 from tribo.records import FloatArray, Study

@@ -16,7 +16,7 @@ from markupsafe import Markup
 
 from tribo.comparison import study_lookup
 from tribo.comparison.oddness import ODD_SCORE, OddPull, oddness, standings
-from tribo.figures.thinning import thin_trace
+from tribo.figures.one_pull import thin_trace
 from tribo.records import ByHand, FloatArray, Pull, Study, Test, Trace
 from tribo.report.drawings import Series
 from tribo.report.shell import script_json

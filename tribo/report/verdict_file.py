@@ -10,7 +10,7 @@ from typing import Any
 
 from tribo.diagnostics.sentences import sentence_case
 from tribo.diagnostics.terms import name_in_words
-from tribo.figures.covariates import LABELS
+from tribo.figures.misfit import LABELS
 from tribo.files import write_text
 from tribo.wording.numerals import joined, significant
 from tribo.wording.verdict_headings import OUTCOMES_WITHOUT_MODEL, headings, without_model

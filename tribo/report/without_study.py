@@ -43,7 +43,7 @@ def write_discovery(d: Discovery, title: str, out: Path, provenance: Provenance)
     discovery.json and provenance.json."""
     import pandas as pd
 
-    from tribo.figures import law as law_figure
+    from tribo.figures.extended_model import draw_law, law_numbers_of
     from tribo.figures.style import as_svg
 
     text = discovery_text(d)
@@ -59,8 +59,8 @@ def write_discovery(d: Discovery, title: str, out: Path, provenance: Provenance)
         "schema": SCHEMA, "text": text, "laws_tried": d.searched,
         "layers": [asdict(layer) for layer in law_layers(d)], "ties": [f.n_ties for f in d.laws],
     }  # fmt: skip
-    numbers = law_figure.numbers_of(d)
-    figure = {} if numbers.empty else {"law.svg": as_svg(law_figure.draw(numbers)), "law.csv": to_csv(numbers)}
+    numbers = law_numbers_of(d)
+    figure = {} if numbers.empty else {"law.svg": as_svg(draw_law(numbers)), "law.csv": to_csv(numbers)}
     _write({**laws, **figure, "laws.csv": to_csv(pd.DataFrame(rows)), RECORD: _json(record)}, out, provenance)
     return Written(record, text)
 

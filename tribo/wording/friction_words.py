@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tribo.comparison.friction_tables import shown
-from tribo.comparison.study_lookup import load_levels, sample_numbers
+from tribo.comparison.study_lookup import load_levels, sample_numbers, shown
 from tribo.records import REGIMES, Study
 from tribo.wording.numerals import counted, joined, loads_in_words, percent, significant, with_uncertainty
 
