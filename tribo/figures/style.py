@@ -44,6 +44,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
+@displayed()
 @dataclass(frozen=True)
 class SampleMark:
     """How one sample is drawn in every figure."""
