@@ -125,12 +125,11 @@ def _steps_in_order(
         for step, words in _steps(name, campaign, described["options"]):
             given = _arguments(state, name, step, words, described)
             if given and not _logged(state, f"{name}/{step}.log", partial(_step, steps, given)):
-                said = f"\nError in rule {step}:\n    log: log/{name}/{step}.log (check log file(s))\n"
                 _index(state, "-")
-                return subprocess.CompletedProcess([], 1, said)
+                return subprocess.CompletedProcess([], 1, "a step failed")
     if _index(state, "index.json"):
         return subprocess.CompletedProcess([], 0, "")
-    return subprocess.CompletedProcess([], 1, "\nError in rule index:\n    log: log/index.log (check log file(s))\n")
+    return subprocess.CompletedProcess([], 1, "the index failed")
 
 
 def _steps(name: str, campaign: dict[str, Any], options: dict[str, str]) -> list[tuple[str, str]]:

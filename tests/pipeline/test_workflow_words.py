@@ -114,7 +114,9 @@ def test_a_step_is_not_run_where_an_earlier_one_could_not_use_the_campaign(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tribo.cli.workflow_step._run", lambda command: pytest.fail("the step was run"))
-    fit, diagnose, problems = tmp_path / "fit.json", tmp_path / "diagnose.json", [{"what": "no such sample"}]
+    steps = tmp_path / "steps" / "a"
+    steps.mkdir(parents=True)
+    fit, diagnose, problems = steps / "fit.json", steps / "diagnose.json", [{"what": "no such sample"}]
     fit.write_text(json.dumps({"status": "unusable", "problems": problems}))
     assert workflow_step.main([str(diagnose), "--digest", "d", "--after", str(fit), "--", "diagnose", "a"]) == 0
     written = json.loads(diagnose.read_text())

@@ -21,7 +21,7 @@ from typing import Any
 from tribo.cli.console import DONE, SOME_SET_ASIDE, UNUSABLE
 from tribo.errors import is_of_the_system
 from tribo.files import found_below, text_of
-from tribo.site.steps import read_record
+from tribo.site.steps import Step, note, read_record
 
 DONE_WORDS = {DONE: "done", SOME_SET_ASIDE: "some_set_aside", UNUSABLE: "unusable"}
 
@@ -29,7 +29,18 @@ DONE_WORDS = {DONE: "done", SOME_SET_ASIDE: "some_set_aside", UNUSABLE: "unusabl
 def run_step(
     record: Path, command: Sequence[str], digest: str, after: Sequence[Path] = (), files: Path | None = None
 ) -> int:
-    """Run a tribo command as a step and write its record; returns the exit status for the workflow."""
+    """Run a tribo command as a step, write its record and note both in the journal; returns the exit status."""
+    step, state = Step.of_record(record), record.parents[2]
+    note(state, step, "begun")
+    status = 1
+    try:
+        status = _recorded(record, command, digest, after, files)
+    finally:
+        note(state, step, "ended", status)
+    return status
+
+
+def _recorded(record: Path, command: Sequence[str], digest: str, after: Sequence[Path], files: Path | None) -> int:
     records = (read_record(path, "status", "problems") for path in after)
     before = next((r for r in records if r and r["status"] == "unusable"), None)
     started = time.time()

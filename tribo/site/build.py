@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 import shlex
 import subprocess
 import sys
@@ -25,7 +24,7 @@ from tribo.errors import Problem, TriboError
 from tribo.files import found_below, found_in, text_of, write_text
 from tribo.site.history import collect_laws
 from tribo.site.scan import CURRENT, Dropped, clear_unfinished, date_build, difference, scan
-from tribo.site.steps import OF_A_REPORT, inputs_of, read_record
+from tribo.site.steps import INDEX, JOURNAL, OF_A_REPORT, Step, due_steps, inputs_of, journal, read_record
 from tribo.site.workflow import Progress, run_workflow
 from tribo.stages import StudyOptions, Weights
 from tribo.temporary import PREFIX, clear_abandoned, place_of_temporary_files
@@ -34,7 +33,6 @@ from tribo.user_text import well_formed
 
 GONE = "report.html has been deleted"
 PROFILES = ("local", "slurm")
-_BLOCKS = re.compile(r"(?m)^(?=\[|\s*$)")  # Snakemake says one thing after a blank line or a date in brackets
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -165,15 +163,15 @@ def _planned(drop: Path, state: Path, options: BuildOptions, watch: Watch) -> Bu
     """What a build would do, and what it would meet in the campaigns that are due."""
     found, ready, due = _due(drop, state / "dry-run", options)
     config = _configuration(found, ready, state / "dry-run.json", options)
-    said = _snakemake(state, config, options, ("--dry-run", *_forced(due, state)), None, UNWATCHED)
+    steps = _steps(state, ready, due, config, options)
+    said = _snakemake(state, config, options, ("--dry-run", *_forced(due, state)), steps, None, UNWATCHED)
     if said.returncode:
         raise BuildError(_failures(state, said.stdout))
     checked = {c.name: _checked(c, options, watch) for c in found if c.name in due}
     status = {c.name: "unusable" if c.refused else _status(c.name, state) for c in found if c.name not in due}
     status |= {name: "unusable" if look.faults else "to be built" for name, look in checked.items()}
     return Built(
-        state.parent, due, _waiting(found), status, tuple(planned_steps(said.stdout)), checked=checked,
-        refused=_refused(found),
+        state.parent, due, _waiting(found), status, tuple(map(str, steps)), checked=checked, refused=_refused(found)
     )  # fmt: skip
 
 
@@ -203,16 +201,53 @@ def _refused(found: Sequence[Dropped]) -> dict[str, tuple[str, ...]]:
 def _built(drop: Path, state: Path, options: BuildOptions, watch: Watch, descriptor: int | None) -> Built:
     found, ready, due = _due(drop, state / "inputs", options)
     config = _configuration(found, ready, state / "build.json", options)
-    said = _snakemake(state, config, options, _forced(due, state), descriptor, watch)
+    steps = _steps(state, ready, due, config, options)
+    (state / JOURNAL).unlink(missing_ok=True)
+    said = _snakemake(state, config, options, _forced(due, state), steps, descriptor, watch)
     write_text(state / "log" / "snakemake.log", said.stdout)
     collect_laws(state.parent / CURRENT, state)
     dated = date_build(state.parent, options.keep)
     if said.returncode:
         raise BuildError(_failures(state, said.stdout))
     status = {c.name: "unusable" if c.refused else _status(c.name, state) for c in found}
-    return Built(
-        state.parent, due, _waiting(found), status, tuple(planned_steps(said.stdout)), dated, refused=_refused(found)
-    )
+    ran = _ran(state, steps)
+    return Built(state.parent, due, _waiting(found), status, tuple(map(str, ran)), dated, refused=_refused(found))
+
+
+def _ran(state: Path, due: Sequence[Step]) -> list[Step]:
+    """The steps that a build ran, each with why."""
+    why = {(step.name, step.campaign): step.why for step in due}
+    begun = [step for step, event, _ in journal(state) if event == "begun"]
+    return [step._replace(why=why.get((step.name, step.campaign), "an earlier step ran again")) for step in begun]
+
+
+def _steps(
+    state: Path, ready: Mapping[str, Any], due: Mapping[str, str], config: Path, options: BuildOptions
+) -> list[Step]:
+    """The steps of this build with their reasons; the index page is the last of them."""
+    digests = {name: step_digest(inputs["digest"], options) for name, inputs in ready.items()}
+    steps = due_steps(state, ready, digests, _by_cell(options.profile))
+    runs = {(step.name, step.campaign) for step in steps}
+    steps += [Step("report", n, "its report is missing") for n in due if due[n] == GONE and ("report", n) not in runs]
+    index = read_record(state / f"{INDEX}.json", "digest")
+    listed = read_record(config, "digest")
+    if steps or index is None or listed is None or index["digest"] != listed["digest"]:
+        steps.append(Step(INDEX, why="not finished before" if index is None else "an earlier step runs again"))
+    return steps
+
+
+def _by_cell(profile: str) -> bool:
+    """Whether the steps of a profile run the simulations cell by cell."""
+    import yaml
+
+    file = _profile_folder(profile) / "config.yaml"
+    described = yaml.safe_load(text_of(file)) if file.is_file() else None
+    config = described.get("config") if isinstance(described, dict) else None
+    return "simulate_by=cell" in config if isinstance(config, list) else False
+
+
+def _profile_folder(profile: str) -> Path:
+    return (workflow_dir() / "profiles" / profile if profile in PROFILES else Path(profile)).resolve()
 
 
 def _why_due(campaign: Dropped, state: Path, options: BuildOptions) -> str:
@@ -268,48 +303,20 @@ def _configuration(found: Sequence[Dropped], ready: Mapping[str, Any], file: Pat
 
 
 def _snakemake(
-    state: Path, config: Path, options: BuildOptions, more: Sequence[str], descriptor: int | None, watch: Watch
+    state: Path, config: Path, options: BuildOptions, more: Sequence[str], steps: Sequence[Step],
+    descriptor: int | None, watch: Watch,
 ) -> subprocess.CompletedProcess[str]:
     """Run the workflow; the lock of the site is what keeps two apart, so that Snakemake needs none of its own.
 
     Neither Python nor Snakemake takes modules or settings from the folder that the build happens to start in.
     """
     folder = workflow_dir()
-    profile = folder / "profiles" / options.profile if options.profile in PROFILES else Path(options.profile)
     command = [
         sys.executable, "-P", "-m", "snakemake", "--snakefile", str(folder / "Snakefile"), "--directory", str(state),
-        "--configfile", str(config), "--profile", str(profile.resolve()), "--workflow-profile", "none",
+        "--configfile", str(config), "--profile", str(_profile_folder(options.profile)), "--workflow-profile", "none",
         "--cores", str(options.jobs), "--nolock", "--nocolor", *more,
     ]  # fmt: skip
-    return run_workflow(command, state, descriptor, watch.steps)
-
-
-def planned_steps(said: str) -> list[str]:
-    """Each job that Snakemake names in what it says, with its reason: "fit (a): Params have changed ..."."""
-    jobs = []
-    for block in _BLOCKS.split(said):
-        named = re.search(r"^\s*(?:local)?rule (\w+):", block, re.M)
-        if not named or named.group(1) == "all":
-            continue
-        of = re.search(r"^\s*wildcards: (.+)$", block, re.M)
-        why = re.search(r"^\s*reason: (.+)$", block, re.M)
-        words = re.sub(r"\w+=", "", of.group(1)) if of else ""
-        reason = _plain_reason(why.group(1)) if why else ""
-        jobs.append(f"{named.group(1)}{f' ({words})' if words else ''}: {reason}")
-    return list(dict.fromkeys(jobs))
-
-
-def _plain_reason(reason: str) -> str:
-    """Snakemake's reason in fewer words."""
-    if reason.startswith("Params have changed"):
-        return "contents of its inputs or its options changed"
-    if reason.startswith("Forced execution"):
-        return "its report is missing"
-    if reason.startswith("Missing output files"):
-        return "not finished before"
-    if reason.startswith("Input files updated by another job"):
-        return "an earlier step runs again"
-    return reason
+    return run_workflow(command, state, steps, descriptor, watch.steps)
 
 
 def _status(name: str, state: Path) -> str:
@@ -319,12 +326,12 @@ def _status(name: str, state: Path) -> str:
 
 def _failures(state: Path, said: str) -> list[Problem]:
     """The steps that failed, each with the end of its log; what Snakemake said last where it was no step."""
-    errors = "\n".join(block for block in _BLOCKS.split(said) if "Error in rule" in block)
-    logs = sorted({state / "log" / log for log in re.findall(r"log: log/(.+?\.log)", errors)})
+    last = {step: (event, status) for step, event, status in journal(state)}
+    logs = [state / step.log for step, how in last.items() if how != ("ended", 0)]
     what = "a step failed; all other steps are complete, and the next build will try this one again"
     if not logs:
         return [Problem("workflow_failed", "the workflow could not be run", found=_last_lines(said))]
-    return [Problem("step_failed", what, file=str(log), found=_tail(log)) for log in logs]
+    return [Problem("step_failed", what, file=str(log), found=_tail(log)) for log in sorted(logs)]
 
 
 def _tail(path: Path) -> str:

@@ -37,6 +37,7 @@ from tribo.errors import unexpected
 from tribo.files import bytes_of
 from tribo.records import FloatArray
 from tribo.site.history import CampaignRow, Law, answers_of, history, laws_csv, laws_in_words
+from tribo.site.steps import INDEX, Step, note, read_record
 from tribo.user_text import for_spreadsheet
 
 if TYPE_CHECKING:
@@ -376,19 +377,26 @@ def change_sentence(change: Change, rows: Sequence[CampaignRow]) -> str:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Write the index of a site, and the marker of the workflow."""
+    """Write the index of a site, and the record of this step of the workflow unless it is "-"."""
     from tribo.files import write_text
 
     site, marker = arguments
+    step, state = Step(INDEX), Path(marker).parent
+    status = 1
+    if marker != "-":
+        note(state, step, "begun")
     try:
         digest = write_index(Path(site))
         if marker != "-":
-            record: Mapping[str, str] = {"index": digest}
-            write_text(Path(marker), json.dumps(record) + "\n")
+            listed = read_record(state / "build.json", "digest") or {}
+            write_text(Path(marker), json.dumps({"index": digest, "digest": listed.get("digest", "")}) + "\n")
+        status = 0
     except OSError as why:
         print(unexpected(why, "the index of the site cannot be written"), file=sys.stderr)
-        return 1
-    return 0
+    finally:
+        if marker != "-":
+            note(state, step, "ended", status)
+    return status
 
 
 if __name__ == "__main__":

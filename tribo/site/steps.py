@@ -1,21 +1,25 @@
-"""The record that a finished step of the workflow leaves.
+"""The steps of a build: what each is told of its campaign, which are due and why, and what they leave.
 
-What the steps of a build are told of each campaign: place, digest, samples and cells, and its files by content.
+A step that is finished leaves a record, steps/CAMPAIGN/STEP.json. Every step writes two lines into a journal, when it
+begins and when it ends. What a build shows and reports is taken from these two, not from what the workflow prints.
 """
 
 from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from tribo.errors import CampaignError, is_of_the_system, unexpected
 from tribo.files import text_of, write_text
 from tribo.site.scan import Dropped
 
+JOURNAL = Path("log") / "steps.jsonl"  # in the state of a site
+INDEX = "index"
 OF_A_REPORT = ("status", "digest", "problems", "finished")
 _TYPES: dict[str, type | tuple[type, ...]] = {
     "status": str, "digest": str, "finished": str, "files": dict, "problems": list, "samples": list, "cells": list,
@@ -36,6 +40,81 @@ def read_record(path: Path, *keys: str) -> dict[str, Any] | None:
         return None
     whole = isinstance(record, dict) and all(isinstance(record.get(key), _TYPES[key]) for key in keys)
     return record if whole else None
+
+
+class Step(NamedTuple):
+    """A step of a build: ``name`` as in the workflow, its campaign (empty for the index), and why it runs."""
+
+    name: str
+    campaign: str = ""
+    why: str = ""
+
+    @classmethod
+    def of_record(cls, record: Path) -> Step:
+        """The step that leaves this record."""
+        return cls(INDEX) if record.name == f"{INDEX}.json" else cls(record.stem, record.parent.name)
+
+    @property
+    def kind(self) -> str:
+        """Its name without the cell that it simulates."""
+        return self.name.partition("-")[0]
+
+    @property
+    def log(self) -> Path:
+        """Where it prints to, in the state of a site."""
+        return Path("log") / self.campaign / f"{self.name}.log"
+
+    def __str__(self) -> str:
+        of = ", ".join(filter(None, (self.campaign, self.name.partition("-")[2])))
+        return f"{self.kind}{f' ({of})' if of else ''}: {self.why}"
+
+
+def note(state: Path, step: Step, event: str, status: int = 0) -> None:
+    """Add a line to the journal: the step has "begun", or has "ended" with an exit status."""
+    line = json.dumps({"step": step.name, "campaign": step.campaign, "event": event, "status": status})
+    with suppress(OSError):  # no step fails for want of its progress
+        (state / JOURNAL).parent.mkdir(parents=True, exist_ok=True)
+        with (state / JOURNAL).open("a", encoding="utf-8") as file:
+            file.write(f"{line}\n")  # one write: steps that run at once share the file
+
+
+def journal(state: Path) -> Iterator[tuple[Step, str, int]]:
+    """The lines of the journal: step, event and exit status. Lines that are not whole yet are left out."""
+    path = state / JOURNAL
+    for line in text_of(path).splitlines() if path.is_file() else ():
+        try:
+            said = json.loads(line)
+        except ValueError:
+            continue
+        yield Step(said["step"], said["campaign"]), said["event"], said["status"]
+
+
+def steps_of(cells: Iterable[str], by_cell: bool) -> list[str]:
+    """The steps of one campaign in their order, as pipelines/Snakefile has them."""
+    if not by_cell:
+        return ["predict", "report"]
+    return ["fit", "calibrate", *(f"simulate-{cell}" for cell in cells), "diagnose", "report"]
+
+
+def due_steps(state: Path, ready: Mapping[str, Any], digests: Mapping[str, str], by_cell: bool) -> list[Step]:
+    """The steps whose records are missing or are of other contents, options or sources, and those after them."""
+    due = []
+    for campaign, inputs in ready.items():
+        runs: list[str] = []
+        for name in steps_of(inputs["cells"], by_cell):
+            record = read_record(state / "steps" / campaign / f"{name}.json", "digest")
+            needed = [r for r in runs if not (name.startswith("simulate-") and r.startswith("simulate-"))]
+            if record is None:
+                why = "not finished before"
+            elif record["digest"] != digests[campaign]:
+                why = "contents of its inputs or its options changed"
+            elif needed:
+                why = "an earlier step runs again"
+            else:
+                continue
+            runs.append(name)
+            due.append(Step(name, campaign, why))
+    return due
 
 
 def inputs_of(found: Iterable[Dropped], folder: Path) -> tuple[tuple[Dropped, ...], dict[str, dict[str, Any]]]:

@@ -1,14 +1,10 @@
-"""How far a build is: the steps that run and those that are done, from what Snakemake says while it works.
-
-Snakemake as a process of a build: started, followed line by line, and ended with all of its steps.
-"""
+"""Snakemake as a process of a build: started, followed by the journal of its steps, and ended with all of them."""
 
 from __future__ import annotations
 
 import os
-import re
 import subprocess
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +13,7 @@ from threading import Thread
 from typing import IO
 
 from tribo.files import found_below
-from tribo.site.steps import read_record
+from tribo.site.steps import Step, journal, read_record
 from tribo.temporary import temporary_folder_of_child
 
 WORDS = {
@@ -25,19 +21,13 @@ WORDS = {
     "calibrate": "calibrating the model", "simulate": "simulating", "diagnose": "diagnosing",
     "report": "writing the report", "index": "writing the index page",
 }  # fmt: skip
-_TOTAL = re.compile(r"^total\s+(\d+)\s*$")
-_COUNTED = re.compile(r"^(\w+)\s+(\d+)\s*$")
-_RULE = re.compile(r"^(?:local)?rule (\w+):")
-_FAILED = re.compile(r"^Error in rule (\w+):")
-_JOB = re.compile(r"^\s+jobid: (\d+)")
-_WILDCARDS = re.compile(r"^\s+wildcards: (.+)$")
-_FINISHED = re.compile(r"^Finished job(?:id:)? (\d+)")
-_DONE = re.compile(r"^(\d+) of (\d+) steps")
+END_S = 60.0  # how long the steps of an interrupted build may take to end
+TICK_S = 1.0  # how often the progress is told where nothing changes
 
 
 @dataclass(frozen=True)
 class Progress:
-    """``done`` of ``total`` steps, those that run by campaign, and the share of the work that is done (0 to 1)."""
+    """``done`` of ``total`` steps, those that run in words, and the share of the work that is done (0 to 1)."""
 
     done: int
     total: int
@@ -45,74 +35,30 @@ class Progress:
     share: float
 
 
-class Follower:
-    """Takes what Snakemake says line by line. ``typical_s`` is how long a step of each kind took in earlier builds."""
+def progress_of(state: Path, due: Sequence[Step], typical_s: Mapping[str, float]) -> Progress:
+    """How far a build is, by its journal.
 
-    def __init__(self, typical_s: Mapping[str, float]):
-        known = list(typical_s.values())
-        self._weights = typical_s
-        self._usual = sum(known) / len(known) if known else 1.0
-        self._planned: dict[str, int] = {}
-        self._running: dict[str, tuple[str, str]] = {}  # job -> rule, and the step in words
-        self._finished: list[str] = []
-        self._rule = self._job = ""
-        self._failed = False
-        self._counting = False
-        self._total = 0
+    ``due`` are its steps, ``typical_s`` is how long a step of each kind took in earlier builds; a kind that is not
+    known takes as long as the others on average.
+    """
+    events = {step: event for step, event, _ in journal(state)}
+    done = [step for step, event in events.items() if event == "ended"]
+    running = [step for step, event in events.items() if event == "begun"]
+    usual = sum(typical_s.values()) / len(typical_s) if typical_s else 1.0
 
-    def take(self, line: str) -> bool:
-        """Note one line; whether it changed what runs or is done."""
-        if found := _RULE.match(line) or _FAILED.match(line):
-            self._rule, self._job, self._failed = found[1], "", line.startswith("Error")
-        elif found := _JOB.match(line):
-            return self._take_job(found[1])
-        elif (found := _WILDCARDS.match(line)) and self._job in self._running:
-            self._running[self._job] = self._rule, _in_words(self._rule, found[1])
-            return True
-        elif found := _FINISHED.match(line):
-            rule, _ = self._running.pop(found[1], ("", ""))
-            self._finished += [rule] if rule else []
-            return True
-        else:
-            self._count(line)
-        return False
+    def work(steps: Iterable[Step]) -> float:
+        return sum(typical_s.get(step.kind, usual) for step in steps)
 
-    def _take_job(self, job: str) -> bool:
-        self._job = job
-        if self._failed:
-            self._running.pop(job, None)
-        elif self._rule != "all":
-            self._running[job] = self._rule, _in_words(self._rule, "")
-        return self._failed  # a step that begins is told with the line that names its campaign
-
-    def _count(self, line: str) -> None:
-        """Lines of the table of planned jobs, which begins with "Job stats" and ends with the total."""
-        if line.startswith("Job stats"):
-            self._counting = True
-        elif found := _TOTAL.match(line):
-            self._counting, self._total = False, int(found[1])
-        elif self._counting and (found := _COUNTED.match(line)):
-            self._planned[found[1]] = int(found[2])
-        elif found := _DONE.match(line):
-            self._total = int(found[2])
-
-    @property
-    def progress(self) -> Progress:
-        """How far the build is now."""
-        work = sum(n * self._weight(rule) for rule, n in self._planned.items())
-        done = sum(map(self._weight, self._finished))
-        share = min(1.0, done / work) if work > 0 else 0.0
-        return Progress(len(self._finished), self._total, tuple(words for _, words in self._running.values()), share)
-
-    def _weight(self, rule: str) -> float:
-        return 0.0 if rule == "all" else self._weights.get(rule, self._usual)
+    everything = {(step.name, step.campaign): step for step in (*due, *events)}.values()
+    share = work(done) / work(everything) if everything else 0.0
+    return Progress(len(done), len(everything), tuple(map(_in_words, running)), share)
 
 
-def _in_words(rule: str, wildcards: str) -> str:
-    """"a: simulating B" of the rule simulate and "name=a, cell=B"."""
-    values = dict(part.strip().partition("=")[::2] for part in wildcards.split(",") if "=" in part)
-    words = " ".join(filter(None, (WORDS.get(rule, rule), values.get("cell", ""))))
-    return f"{values['name']}: {words}" if "name" in values else words
+def _in_words(step: Step) -> str:
+    """"a: simulating B@5000Pa" of the step simulate-B@5000Pa of a."""
+    kind, _, cell = step.name.partition("-")
+    words = " ".join(filter(None, (WORDS.get(kind, kind), cell)))
+    return f"{step.campaign}: {words}" if step.campaign else words
 
 
 def typical_seconds(steps: Path) -> dict[str, float]:
@@ -126,20 +72,16 @@ def typical_seconds(steps: Path) -> dict[str, float]:
     return {rule: sum(values) / len(values) for rule, values in found.items()}
 
 
-END_S = 60.0  # how long the steps of an interrupted build may take to end
-TICK_S = 1.0  # how often the progress is told where nothing changes
-
-
 def run_workflow(
-    command: Sequence[str], state: Path, descriptor: int | None, tell: Callable[[Progress], None]
+    command: Sequence[str], state: Path, due: Sequence[Step], descriptor: int | None, tell: Callable[[Progress], None]
 ) -> subprocess.CompletedProcess[str]:
-    """Run a Snakemake command to its end, and ``tell`` how far it is at every change and every second.
+    """Run a Snakemake command to its end, and ``tell`` how far its steps are at every line and every second.
 
     The lock of the site, ``descriptor``, is passed on, so that it is held as long as Snakemake runs. Temporary files
     of Snakemake are in a folder of tribo: what it leaves when it is killed goes at the next start.
     """
     (state / "log").mkdir(parents=True, exist_ok=True)
-    follower = Follower(typical_seconds(state / "steps"))
+    typical_s, before = typical_seconds(state / "steps"), None
     said: list[str] = []
     with temporary_folder_of_child() as (temporary, in_use), subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
@@ -150,8 +92,10 @@ def run_workflow(
         try:
             for line in _lines(process.stdout):
                 said.append(line)
-                if not line or follower.take(line):
-                    tell(follower.progress)
+                now = progress_of(state, due, typical_s)
+                if not line or now != before:
+                    tell(now)
+                before = now
             process.wait()
         except BaseException:
             _end(process)
