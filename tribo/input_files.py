@@ -1,12 +1,12 @@
-"""Limits on everything that is read, in one place; each is checked before the work that it bounds.
+"""Files of the user, none of which is trusted: the limits on all that is read, files read whole, archives, workbooks.
 
-The reasons are in docs/reference/limits.md. Numbers are limits of a computer unless a source is named.
+Each limit is checked before the work that it bounds; the reasons are in docs/reference/limits.md. Numbers are limits of
+a computer unless a source is named.
 
-Files of the user, read whole: only regular files of bounded size, each with the hash of the bytes that were read.
-
-Zip archives that are not trusted: everything is checked by the list of entries, before any of them is unpacked.
-
-Workbooks (.xlsx, .xls, .xlsb, .ods): each sheet as the tab-separated text it could have been saved from.
+The standard library unpacks zips, and refuses entries that are damaged or longer than they say. What it does not refuse
+is checked here, by the list of entries and before any of them is unpacked: a list that is too long to be read, or that
+other programs read otherwise; sizes of a bomb; links and devices; names that lead out of the folder, cannot be shown,
+or overwrite each other on some system.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ import struct
 import unicodedata
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from tribo.errors import CampaignError, Problem, ReadError, naming
 
@@ -76,6 +76,16 @@ FIRST_YEAR, LAST_YEAR = 1900, 2199  # of a measurement
 
 
 MAPPED_BYTES = 64 << 20  # larger files are mapped and read in pieces, so that memory holds the numbers only
+
+OLD_EXCEL = b"\xd0\xcf\x11\xe0"
+ZIP = b"PK\x03\x04"
+_MOST_CELLS = 20_000_000  # of the rectangle that a sheet spans, filled or not: its reader keeps all of them
+_CELL = re.compile(rb'<c [^>]*?r="([A-Z]{1,3})(\d{1,7})"')
+_MOST_NAMED = 5
+_CHUNK = 1 << 20
+_NOT_A_ZIP = (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, RuntimeError, ValueError, zlib.error)
+_END, _END_64, _END_64_PLACE = b"PK\5\6", b"PK\6\6", b"PK\6\7"  # APPNOTE.TXT 6.3.10, 4.3.14 to 4.3.16
+LAST_BYTES = (1 << 16) + 22 + 20 + 56  # the longest comment, and the records before it
 
 _HASHES: ContextVar[dict[str, str] | None] = ContextVar("hashes of the files that were read", default=None)
 
@@ -154,32 +164,9 @@ def nests_too_deeply(parsed: Any) -> bool:
     return True
 
 
-MOST_NAMED = 5
-_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-_CHUNK = 1 << 20
-_NOT_OF_THE_CAMPAIGN = "__MACOSX"
-_NOT_A_ZIP = (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, RuntimeError, ValueError, zlib.error)
-_END, _END_64, _END_64_PLACE = b"PK\5\6", b"PK\6\6", b"PK\6\7"  # APPNOTE.TXT 6.3.10, 4.3.14 to 4.3.16
-LAST_BYTES = (1 << 16) + 22 + 20 + 56  # the longest comment, and the records before it
-
-Fault = tuple[str, str, str]  # kind, sentence, what is allowed
-
-
-@dataclass(frozen=True)
-class Entry:
-    """An entry of a zip: its path inside with "/" between its parts, and what the zip says about it."""
-
-    name: str
-    info: zipfile.ZipInfo
-
-    @property
-    def is_folder(self) -> bool:
-        return self.info.filename.endswith(("/", "\\"))
-
-
 @contextmanager
-def opened_zip(archive: Path) -> Iterator[tuple[zipfile.ZipFile, tuple[Entry, ...]]]:
-    """A zip and its entries, once all of them are found to be harmless.
+def opened_zip(archive: Path) -> Iterator[tuple[zipfile.ZipFile, dict[str, zipfile.ZipInfo]]]:
+    """A zip and its entries by their path inside, "/" between its parts and behind a folder; all of them harmless.
 
     Raises
     ------
@@ -188,22 +175,9 @@ def opened_zip(archive: Path) -> Iterator[tuple[zipfile.ZipFile, tuple[Entry, ..
         link, a device, encrypted, compressed by an unusual method, leads out of the folder, has an unusable name, or
         would overwrite another one on this or another system.
     """
-    opened, infos = _listing(archive)
-    with opened:
-        problems = size_problems(infos, archive.stat().st_size, archive.name, MOST_UNPACKED_BYTES)
-        if problems:
-            raise CampaignError(problems)
-        entries = [e for info in infos if (e := _entry(info)).name.split("/")[0] != _NOT_OF_THE_CAMPAIGN]
-        problems = _entry_problems(entries, archive.name)
-        if problems:
-            raise CampaignError(problems)
-        yield opened, tuple(entry for entry in entries if entry.name)
-
-
-def _listing(archive: Path) -> tuple[zipfile.ZipFile, list[zipfile.ZipInfo]]:
     file = archive.name
     try:
-        _check_listing(archive)
+        _refuse_long_listing(archive)
         opened = zipfile.ZipFile(archive)
     except UnicodeDecodeError as why:
         name = bytes(why.object).decode("utf-8", errors="backslashreplace")
@@ -211,7 +185,17 @@ def _listing(archive: Path) -> tuple[zipfile.ZipFile, list[zipfile.ZipInfo]]:
         raise CampaignError(Problem("bad_entry_name", what, file=file, found=name)) from None
     except _NOT_A_ZIP as why:
         raise CampaignError(Problem("bad_zip", f"not a readable .zip ({why})", file=file)) from why
-    return opened, opened.infolist()
+    with opened:
+        infos = opened.infolist()
+        problems = size_problems(infos, archive.stat().st_size, file, MOST_UNPACKED_BYTES)
+        if problems:
+            raise CampaignError(problems)
+        entries = [(_path_of(info), info) for info in infos]
+        entries = [(path, info) for path, info in entries if path.split("/")[0] != "__MACOSX"]
+        problems = _entry_problems(entries, file)
+        if problems:
+            raise CampaignError(problems)
+        yield opened, {path: info for path, info in entries if path != "/"}
 
 
 def unpack(archive: Path, folder: Path) -> None:
@@ -220,18 +204,18 @@ def unpack(archive: Path, folder: Path) -> None:
     Raises
     ------
     CampaignError
-        As :func:`opened_zip`; or an entry is longer than it says.
+        As :func:`opened_zip`; or an entry is damaged, or longer than it says.
     """
     with opened_zip(archive) as (opened, entries):
-        for parent in {_parent(entry) for entry in entries}:
+        for parent in {path.rpartition("/")[0] for path in entries}:
             (folder / parent).mkdir(parents=True, exist_ok=True)
-        for entry in entries:
-            if not entry.is_folder:
-                with naming(folder / entry.name), (folder / entry.name).open("wb") as out:
-                    out.writelines(pieces(opened, entry, archive.name))
+        for path, info in entries.items():
+            if not path.endswith("/"):
+                with naming(folder / path), (folder / path).open("wb") as out:
+                    out.writelines(pieces(opened, info, archive.name))
 
 
-def pieces(opened: zipfile.ZipFile, entry: Entry, file: str) -> Iterator[bytes]:
+def pieces(opened: zipfile.ZipFile, info: zipfile.ZipInfo, file: str) -> Iterator[bytes]:
     """The contents of an entry in pieces of bounded size.
 
     Raises
@@ -239,38 +223,17 @@ def pieces(opened: zipfile.ZipFile, entry: Entry, file: str) -> Iterator[bytes]:
     CampaignError
         It is longer than it says, or damaged.
     """
-    left = entry.info.file_size
-    packed = _opened_entry(opened, entry, file)
-    with packed:
-        while piece := _read(packed, entry, file):
-            left -= len(piece)
-            if left < 0:
-                what = "an entry is longer than its declared size"
-                raise CampaignError(Problem("zip_bomb", what, file=file, found=entry.name))
-            yield piece
-
-
-def _opened_entry(opened: zipfile.ZipFile, entry: Entry, file: str) -> IO[bytes]:
     try:
-        return opened.open(entry.info)
+        with opened.open(info) as packed:
+            while piece := packed.read(_CHUNK):
+                yield piece
     except _NOT_A_ZIP as why:
-        raise _damaged(why, entry, file) from why
+        raise CampaignError(
+            Problem("bad_zip", f"not a readable .zip ({why})", file=file, found=_path_of(info))
+        ) from why
 
 
-def _read(packed: IO[bytes], entry: Entry, file: str) -> bytes:
-    try:
-        return packed.read(_CHUNK)
-    except _NOT_A_ZIP as why:
-        raise _damaged(why, entry, file) from why
-
-
-def _damaged(why: Exception, entry: Entry, file: str) -> CampaignError:
-    return CampaignError(Problem("bad_zip", f"not a readable .zip ({why})", file=file, found=entry.name))
-
-
-def size_problems(
-    infos: Sequence[zipfile.ZipInfo], archive_bytes: int, file: str, most_bytes: int
-) -> list[Problem]:
+def size_problems(infos: Sequence[zipfile.ZipInfo], archive_bytes: int, file: str, most_bytes: int) -> list[Problem]:
     """Why a zip must not be unpacked, by the number and the sizes of its entries."""
     problems = []
     total = sum(info.file_size for info in infos)
@@ -291,87 +254,72 @@ def _expands(size: int, packed: int) -> bool:
     return size > SMALL_ENTRY_BYTES and size > MOST_EXPANSION * max(packed, 1)
 
 
-def _parent(entry: Entry) -> str:
-    return entry.name if entry.is_folder else entry.name.rpartition("/")[0]
+def _path_of(info: zipfile.ZipInfo) -> str:
+    """Backslashes, doubled slashes and single dots mean what they mean as a path; a folder ends in a slash."""
+    path = "/".join(part for part in re.split(r"[/\\]", info.filename) if part not in ("", "."))
+    return f"{path}/" if info.filename.endswith(("/", "\\")) else path
 
 
-def _entry(info: zipfile.ZipInfo) -> Entry:
-    """Backslashes, doubled slashes and single dots mean what they mean as a path."""
-    parts = info.filename.replace("\\", "/").split("/")
-    return Entry("/".join(part for part in parts if part not in ("", ".")), info)
-
-
-def _entry_problems(entries: Sequence[Entry], file: str) -> list[Problem]:
+def _entry_problems(entries: Sequence[tuple[str, zipfile.ZipInfo]], file: str) -> list[Problem]:
     """One problem for each kind of fault, with the entries it was found in."""
-    found: dict[Fault, list[str]] = {}
-    for entry in entries:
-        fault = _name_fault(entry) or _kind_fault(entry.info)
-        if fault:
-            found.setdefault(fault, []).append(entry.info.orig_filename)
-    if not found:
-        twice = list(_colliding(entries))
-        if twice:
-            what = "entries that overwrite each other, on this system or on one that takes their names for the same"
-            allowed = "names that differ in more than case, slashes or the coding of letters"
-            found["duplicate_entry", what, allowed] = twice
+    found: dict[tuple[str, str, str], list[str]] = {}
+    for path, info in entries:
+        if fault := _name_fault(path, info.orig_filename) or _kind_fault(info):
+            found.setdefault(fault, []).append(info.orig_filename)
+    if not found and (twice := list(_colliding(entries))):
+        what = "entries that overwrite each other, on this system or on one that takes their names for the same"
+        found["duplicate_entry", what, "names that differ in more than case, slashes or the coding of letters"] = twice
     return [
         Problem(kind, what, file=file, found=_listed(names), allowed=allowed or None)
         for (kind, what, allowed), names in found.items()
     ]
 
 
-def _listed(names: Iterable[str]) -> str:
-    names = list(names)
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return ", ".join(name[:LONGEST_PATH_PART_BYTES] for name in names[:MOST_NAMED]) + more
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    return ", ".join(name[:LONGEST_PATH_PART_BYTES] for name in names[:_MOST_NAMED]) + more
 
 
-def _name_fault(entry: Entry) -> Fault | None:
-    given = entry.info.orig_filename
-    parts = entry.name.split("/")
+def _name_fault(path: str, given: str) -> tuple[str, str, str] | None:
+    """(kind, sentence, what is allowed) for an entry that cannot be unpacked under its name."""
+    parts = path.removesuffix("/").split("/")
     if not given.isprintable() and any(unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in given):
         return "bad_entry_name", "the name of an entry contains a control character", ""
     if given.startswith(("/", "\\")) or ".." in parts or re.match(r"[A-Za-z]:", given):
         return "entry_outside", "the path of an entry leads outside the folder", ""
     if len(parts) > DEEPEST_PATH or len(given.encode()) > LONGEST_ENTRY_NAME_BYTES:
-        return "bad_entry_name", "the path of an entry is too long", (
-            f"at most {DEEPEST_PATH} levels, {LONGEST_ENTRY_NAME_BYTES} bytes"
-        )
+        allowed = f"at most {DEEPEST_PATH} levels, {LONGEST_ENTRY_NAME_BYTES} bytes"
+        return "bad_entry_name", "the path of an entry is too long", allowed
     if any(len(part.encode()) > LONGEST_PATH_PART_BYTES for part in parts):
         return "bad_entry_name", "the name of an entry is too long", f"at most {LONGEST_PATH_PART_BYTES} bytes"
-    if not entry.name and not entry.is_folder:
-        return "bad_entry_name", "an entry has no name", ""
-    return None
+    return None if path else ("bad_entry_name", "an entry has no name", "")
 
 
-def _kind_fault(info: zipfile.ZipInfo) -> Fault | None:
+def _kind_fault(info: zipfile.ZipInfo) -> tuple[str, str, str] | None:
     if stat.S_IFMT(info.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR):
         return "link", "an entry is a link or a device", ""
     if info.flag_bits & 1:
         return "encrypted", "an entry is encrypted", ""
-    if info.compress_type not in _METHODS:
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         return "unusual_compression", "an entry is compressed by a method that is not supported", "Deflate"
     return None
 
 
-def _colliding(entries: Sequence[Entry]) -> Iterator[str]:
+def _colliding(entries: Sequence[tuple[str, zipfile.ZipInfo]]) -> Iterator[str]:
     """Entries whose place is taken by another one, and folders spelled in two ways."""
     files: dict[str, str] = {}
     folders: dict[str, str] = {}
-    for entry in entries:
-        for folder in _folders_of(entry):
-            if folders.setdefault(_alike(folder), folder) != folder:
-                yield entry.name
-        if not entry.is_folder:
-            if _alike(entry.name) in files:
-                yield entry.info.filename
-            files[_alike(entry.name)] = entry.name
-    yield from (name for key, name in files.items() if key in folders)
-
-
-def _folders_of(entry: Entry) -> Iterator[str]:
-    parts = _parent(entry).split("/")
-    return ("/".join(parts[: k + 1]) for k in range(len(parts)) if parts[k])
+    for path, info in entries:
+        above = path.rpartition("/")[0]
+        for end in [found.start() for found in re.finditer("/", above)] + [len(above)]:
+            folder = above[:end]
+            if folder and folders.setdefault(_alike(folder), folder) != folder:
+                yield path.removesuffix("/")
+        if not path.endswith("/"):
+            if _alike(path) in files:
+                yield info.filename
+            files[_alike(path)] = path
+    yield from (path for key, path in files.items() if key in folders)
 
 
 def _alike(name: str) -> str:
@@ -381,7 +329,7 @@ def _alike(name: str) -> str:
     return unicodedata.normalize("NFD", folded)
 
 
-def _check_listing(archive: Path) -> None:
+def _refuse_long_listing(archive: Path) -> None:
     """Refuse a zip whose list of entries is too long to be read, by the record at its end."""
     size = archive.stat().st_size
     with archive.open("rb") as stream:
@@ -418,12 +366,6 @@ def last_record(tail: bytes) -> int:
     return complete[-1]
 
 
-OLD_EXCEL = b"\xd0\xcf\x11\xe0"
-ZIP = b"PK\x03\x04"
-_MOST_CELLS = 20_000_000  # of the rectangle that a sheet spans, filled or not: its reader keeps all of them
-_CELL = re.compile(rb'<c [^>]*?r="([A-Z]{1,3})(\d{1,7})"')
-
-
 def sheets_as_text(data: bytes, file: str) -> dict[str, str]:
     """The sheets that hold anything, by name: one line per row, cells separated by tabs.
 
@@ -457,26 +399,16 @@ def _refuse_large(data: bytes, file: str) -> None:
             if entry.filename.startswith("xl/worksheets/") and entry.filename.endswith(".xml"):
                 cells = _spanned(packed.read(entry))
                 if cells > _MOST_CELLS:
-                    raise _too_large(f"{cells} cells in {entry.filename}", f"at most {_MOST_CELLS}", file)
-
-
-def _too_large(found: str, allowed: str, file: str) -> ReadError:
-    return ReadError(Problem("too_large", "the file is too large", file=file, found=found, allowed=allowed))
+                    found, allowed = f"{cells} cells in {entry.filename}", f"at most {_MOST_CELLS}"
+                    raise ReadError(Problem("too_large", "the file is too large", file, found=found, allowed=allowed))
 
 
 def _spanned(sheet: bytes) -> int:
     """Cells of the rectangle from the first to the last cell of a sheet."""
     found = {(letters, int(row)) for letters, row in _CELL.findall(sheet)}
     rows = {row for _, row in found}
-    columns = {_column(letters) for letters, _ in found}
+    columns = {sum((letter - 64) * 26**k for k, letter in enumerate(reversed(letters))) for letters, _ in found}
     return (max(rows) - min(rows) + 1) * (max(columns) - min(columns) + 1) if found else 0
-
-
-def _column(letters: bytes) -> int:
-    number = 0
-    for letter in letters:
-        number = 26 * number + letter - 64
-    return number
 
 
 def _sheets(data: bytes) -> dict[str, str]:
@@ -484,13 +416,10 @@ def _sheets(data: bytes) -> dict[str, str]:
 
     book = CalamineWorkbook.from_filelike(io.BytesIO(data))
     try:
-        return {name: _text(book.get_sheet_by_name(name).to_python(skip_empty_area=False)) for name in book.sheet_names}
+        sheets = {name: book.get_sheet_by_name(name).to_python(skip_empty_area=False) for name in book.sheet_names}
     finally:
         book.close()
-
-
-def _text(rows: Iterable[Iterable[object]]) -> str:
-    return "\n".join("\t".join(map(_cell, row)) for row in rows) + "\n"
+    return {name: "\n".join("\t".join(map(_cell, row)) for row in rows) + "\n" for name, rows in sheets.items()}
 
 
 def _cell(value: object) -> str:

@@ -130,7 +130,7 @@ def test_an_export_that_the_machine_cannot_open_is_no_fault_of_the_export(
 
     monkeypatch.setattr(source, "read_or_map", failing)
     with pytest.raises(ReadError, match=r"^raw/T1\.csv: cannot be opened: input/output error$") as raised:
-        source.read_bytes(tmp_path / "T1.csv", "raw/T1.csv")
+        source.export_bytes(tmp_path / "T1.csv", "raw/T1.csv")
     assert is_of_the_system(raised.value.problems[0].kind)
 
 

@@ -1,4 +1,4 @@
-"""Readers of raw exports, one module per format family; ``read_export`` chooses one of ``READERS`` by content.
+"""Readers of raw exports; ``read_export`` chooses one of ``READERS``, the machines known, by content.
 
 The stub beside this file lists the public names; each is imported on first use.
 """

@@ -1,24 +1,25 @@
-"""Damage that shows in a column of numbers: time that decreases, gaps, values off by a factor of ten.
+"""What follows from the columns of a table and from what was stated, and damage that shows in their numbers.
 
-What follows from the columns and from what was stated: time, force from a torque, sign and gain.
-
-The one place where a recorded force is changed; everything after it sees the corrected one.
+The one place where a recorded force is changed: force from a torque, sign and gain. Everything after it sees the
+corrected one. Damage is a time that decreases or has gaps, and values off by a factor of ten.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tribo.errors import Problem
 from tribo.input_files import LARGEST_NUMBER, SMALLEST_NUMBER
-from tribo.readers.columns import Assignment, Column
+from tribo.readers.columns import Column
 from tribo.records import Correction, FloatArray
 
+NO_TIME = "no_time"
+_PATH_FOR_TIME_M_S = 1e-3  # 1 mm of path counts as 1 s where neither time nor speed is known
 GAP_STEPS = 5.0  # a time step this many median steps long is a gap
 _WORTH_A_LOOK = 1.5  # mean steps: where no step is this long, none is a gap
 _TEN_TIMES = (9.0, 11.0)  # a decimal mark slipped by one place, noise allowed for
@@ -29,16 +30,56 @@ _FEWEST_ROWS, _ROWS_BESIDE = 10, 100  # looked at on either side of a jump
 _LEVEL_ROWS = (1, 10, 100)  # rows beside a jump by which the levels are compared; all are tried, as the force may swing
 _TIMES_IN_WORDS = {1: "ten", 2: "a hundred", 3: "a thousand"}
 
-RowOf = Callable[[int], int]
+Arrays = dict[str, FloatArray]  # by quantity, SI units
+RowOf = Callable[[int], int]  # line of the file of a sample
 
 
-@dataclass(frozen=True)
-class Finding:
-    """A doubt: the flag it sets on the trace, and the problem with its place; ``fatal`` sets the trace aside."""
+def complete(
+    arrays: Arrays, columns: Sequence[Column], correction: Correction, file: str
+) -> tuple[Arrays, tuple[Column, ...], list[Problem]]:
+    """Arrays that hold time and friction force, the columns they came from, and a doubt where time is missing."""
+    columns, doubts = list(columns), []
+    lever = correction.lever_arm_m
+    if "friction force" not in arrays:
+        torque = next(c for c in columns if c.quantity == "torque")
+        arrays = {**arrays, "friction force": arrays["torque"] / (lever or 1.0)}
+        reason = f"torque over the lever arm of {(lever or 0.0) * 1e3:g} mm, as given"
+        columns.append(Column("friction force", -1, torque.label, 1.0, 0.0, reason))
+    if "rotation speed" in arrays and "speed" not in arrays and lever is not None:
+        turns = next(c for c in columns if c.quantity == "rotation speed")
+        arrays = {**arrays, "speed": 2.0 * np.pi * lever * arrays["rotation speed"]}
+        reason = f"rotation speed times 2 pi times the lever arm of {lever * 1e3:g} mm, as given"
+        columns.append(Column("speed", -1, turns.label, 1.0, 0.0, reason))
+    factor = correction.sign * correction.gain
+    if factor != 1.0:
+        said = [f"gain {correction.gain:g}"] if correction.gain != 1.0 else []
+        said += ["sign reversed"] if correction.sign < 0 else []
+        arrays = {**arrays, "friction force": arrays["friction force"] * factor}
+        given = f"; {', '.join(said)}, as given"
+        columns = [replace(c, reason=c.reason + given) if c.quantity == "friction force" else c for c in columns]
+    if "time" not in arrays:
+        time, label, reason = _time(arrays, correction)
+        arrays = {**arrays, "time": time}
+        columns.append(Column("time", -1, label, 1.0, 0.0, reason))
+        if correction.sampling_rate_Hz is None and correction.speed_m_s is None:
+            what = (
+                "neither time nor speed is known: the path stands for the time, 1 mm for 1 s; forces and their "
+                "dependence on the path hold, while durations, rates, periods and drift per second are not determined"
+            )
+            doubts.append(Problem(NO_TIME, what, file, allowed="speed_mm_s, sampling_rate_Hz, or a column of the time"))
+    return arrays, tuple(columns), doubts
 
-    flag: str
-    problem: Problem
-    fatal: bool = False
+
+def _time(arrays: Arrays, correction: Correction) -> tuple[FloatArray, str, str]:
+    """The time of each sample from the sampling rate or the path, what it stands on, and why."""
+    if correction.sampling_rate_Hz is not None:
+        n = arrays["friction force"].size
+        reason = f"row number over the sampling rate of {correction.sampling_rate_Hz:g} Hz, as given"
+        return np.arange(n) / correction.sampling_rate_Hz, "sampling rate", reason
+    path = np.abs(np.diff(arrays["displacement"], prepend=arrays["displacement"][:1])).cumsum()
+    speed = correction.speed_m_s or _PATH_FOR_TIME_M_S
+    reason = f"path over the speed of {speed * 1e3:g} mm/s" + (", as given" if correction.speed_m_s else "")
+    return path / speed, "path", reason
 
 
 def beyond_measurement(
@@ -60,8 +101,8 @@ def beyond_measurement(
     return problems
 
 
-def check_time(time: FloatArray, file: str, column: str, row_of: RowOf) -> list[Finding]:
-    """Faults of a time base: decreasing (fatal), repeated or missing times. ``row_of(k)`` is the line of sample k."""
+def check_time(time: FloatArray, file: str, column: str, row_of: RowOf) -> list[Problem]:
+    """Faults of a time base: decreasing, repeated or missing times. ``row_of(k)`` is the line of sample k."""
     if time.size < 2:
         return []
     step = np.diff(time)
@@ -71,22 +112,22 @@ def check_time(time: FloatArray, file: str, column: str, row_of: RowOf) -> list[
         k = int(np.argmax(step < 0)) + 1
         what = f"the time decreases from {time[k - 1]:.6g} s"
         place = (file, row_of(k), column, f"{time[k]:.6g} s", "a time that never decreases")
-        found.append(Finding("time_goes_back", Problem("time_goes_back", what, *place), fatal=True))
+        found.append(Problem("time_goes_back", what, *place))
     elif least == 0:
         k = int(np.argmax(step == 0)) + 1
         what = f"{int((step == 0).sum())} times occur twice; this is the first"
-        found.append(Finding("time_repeats", Problem("time_repeats", what, file, row_of(k), column)))
+        found.append(Problem("time_repeats", what, file, row_of(k), column))
     if largest > _WORTH_A_LOOK * float(time[-1] - time[0]) / step.size:
         median = float(np.median(step))
         if median > 0 and largest > GAP_STEPS * median:
             k = int(np.argmax(step)) + 1
             what = f"{int((step > GAP_STEPS * median).sum())} gaps in time; the longest ends here"
             place = (file, row_of(k), column, f"{largest:.4g} s", f"steps of about {median:.4g} s")
-            found.append(Finding("time_gap", Problem("time_gap", what, *place)))
+            found.append(Problem("time_gap", what, *place))
     return found
 
 
-def check_scale(values: FloatArray, file: str, column: str, row_of: RowOf) -> list[Finding]:
+def check_scale(values: FloatArray, file: str, column: str, row_of: RowOf) -> list[Problem]:
     """Rows ten times larger or smaller than what is beside them: a slipped decimal mark, or another unit.
 
     Two rows or more between neighbours that agree; or all rows from one to the end (ten, a hundred or a thousand
@@ -108,7 +149,7 @@ def check_scale(values: FloatArray, file: str, column: str, row_of: RowOf) -> li
     way = "above" if times > 1 else "below"
     what = f"{n} rows {_TIMES_IN_WORDS[round(abs(math.log10(times)))]} times {way} {beside}; this is the first"
     place = (file, row_of(first), column, f"{values[first]:.6g}", f"about {values[first - 1]:.6g}")
-    return [Finding("scale_jump", Problem("scale_jump", what, *place), fatal=True)]
+    return [Problem("scale_jump", what, *place)]
 
 
 def _there_and_back(values: FloatArray, large: NDArray[np.int64]) -> tuple[int, int, float] | None:
@@ -166,67 +207,3 @@ def _scaled_as(times: float, before: float, after: float) -> bool:
     if not after:
         return times < 1
     return abs(math.log10(after / before / times)) < abs(math.log10(times)) / 2
-
-
-NO_TIME = "no_time"
-_PATH_FOR_TIME_M_S = 1e-3  # 1 mm of path counts as 1 s where neither time nor speed is known
-
-Arrays = dict[str, FloatArray]
-
-
-def complete(
-    arrays: Arrays, assignment: Assignment, correction: Correction, file: str
-) -> tuple[Arrays, Assignment, tuple[Finding, ...]]:
-    """Arrays that hold time and friction force, the columns they came from, and a doubt where time is missing."""
-    columns = list(assignment.columns)
-    findings: list[Finding] = []
-    if "friction force" not in arrays:
-        column = next(c for c in columns if c.quantity == "torque")
-        arrays = {**arrays, "friction force": arrays["torque"] / (correction.lever_arm_m or 1.0)}
-        reason = f"torque over the lever arm of {(correction.lever_arm_m or 0.0) * 1e3:g} mm, as given"
-        columns.append(Column("friction force", -1, column.label, 1.0, 0.0, reason))
-    if "rotation speed" in arrays and "speed" not in arrays and correction.lever_arm_m is not None:
-        arrays = {**arrays, "speed": 2.0 * np.pi * correction.lever_arm_m * arrays["rotation speed"]}
-        columns.append(_speed_of_turns(columns, correction.lever_arm_m))
-    factor = correction.sign * correction.gain
-    if factor != 1.0:
-        arrays = {**arrays, "friction force": arrays["friction force"] * factor}
-        columns = [_scaled(c, correction) if c.quantity == "friction force" else c for c in columns]
-    if "time" not in arrays:
-        time, column = _time(arrays, correction)
-        arrays = {**arrays, "time": time}
-        columns.append(column)
-        if correction.sampling_rate_Hz is None and correction.speed_m_s is None:
-            findings.append(Finding(NO_TIME, _no_time(file)))
-    return arrays, replace(assignment, columns=tuple(columns)), tuple(findings)
-
-
-def _speed_of_turns(columns: Sequence[Column], lever_arm_m: float) -> Column:
-    turns = next(c for c in columns if c.quantity == "rotation speed")
-    reason = f"rotation speed times 2 pi times the lever arm of {lever_arm_m * 1e3:g} mm, as given"
-    return Column("speed", -1, turns.label, 1.0, 0.0, reason)
-
-
-def _scaled(column: Column, correction: Correction) -> Column:
-    said = [f"gain {correction.gain:g}"] if correction.gain != 1.0 else []
-    said += ["sign reversed"] if correction.sign < 0 else []
-    return replace(column, reason=f"{column.reason}; {', '.join(said)}, as given")
-
-
-def _time(arrays: Arrays, correction: Correction) -> tuple[FloatArray, Column]:
-    if correction.sampling_rate_Hz is not None:
-        n = arrays["friction force"].size
-        reason = f"row number over the sampling rate of {correction.sampling_rate_Hz:g} Hz, as given"
-        return np.arange(n) / correction.sampling_rate_Hz, Column("time", -1, "sampling rate", 1.0, 0.0, reason)
-    path = np.abs(np.diff(arrays["displacement"], prepend=arrays["displacement"][:1])).cumsum()
-    speed = correction.speed_m_s or _PATH_FOR_TIME_M_S
-    reason = f"path over the speed of {speed * 1e3:g} mm/s" + (", as given" if correction.speed_m_s else "")
-    return path / speed, Column("time", -1, "path", 1.0, 0.0, reason)
-
-
-def _no_time(file: str) -> Problem:
-    what = (
-        "neither time nor speed is known: the path stands for the time, 1 mm for 1 s; forces and their dependence on "
-        "the path hold, while durations, rates, periods and drift per second are not determined"
-    )
-    return Problem(NO_TIME, what, file, allowed="speed_mm_s, sampling_rate_Hz, or a column of the time")

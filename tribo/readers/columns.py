@@ -1,8 +1,6 @@
-"""Names of columns: the unit in them, and the quantity they stand for.
+"""The columns of an export: what their names say, what the user states, and the quantity and unit each is read as.
 
-What a user states about an export beside its contents: columns, columns left out, decimal mark, corrections.
-
-Quantity and unit of each column. Nothing is guessed: doubtful cases are errors.
+Nothing is guessed: doubtful cases are errors.
 """
 
 from __future__ import annotations
@@ -18,8 +16,19 @@ from tribo.records import UNCORRECTED, Correction
 from tribo.units import QUANTITIES, match_quantity, narrow, quantity_named, unit_factor
 from tribo.user_text import did_you_mean
 
+ASKED = "asked for"
+NONE, IGNORE, DECIMAL = "none", "ignore", "decimal"
+NEEDED = ("time", "friction force")
+_SIMILAR = 0.7  # difflib ratio from which a name that was asked for is taken for a misspelt one of the file
+_MEANS_NORMAL_BESIDE_FRICTION = {
+    "load", "last", "applied load", "charge", "carga", "obciążenie", "нагрузка", "载荷", "负荷", "荷重", "하중",
+}  # fmt: skip
+_ACCELERATION = re.compile(r"m\s*/\s*s(?:ec)?\s*(?:\^?2|²)|m/s/s|m·?s(?:\^?-2|⁻²)")
 _BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^\[\]()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
 _AFTER_MARK = re.compile(r"^(.*\S)\s*(?:\s?/|\sin\s|,\s|_)\s*((?:[^\W\d_]|[°%])[\w/°%^·²-]*)$")
+
+Columns = Mapping[str, str | Sequence[str]]  # the column of each quantity, as a user states it
+Chosen = dict[str, tuple[int, str | None, str]]  # position, unit if given, and reason of the column of each quantity
 
 
 def bare_unit(unit: str) -> str:
@@ -54,11 +63,6 @@ def is_unit(text: str, quantity: str) -> bool:
     except ReadError:
         return False
     return True
-
-
-ASKED = "asked for"
-NONE, IGNORE, DECIMAL = "none", "ignore", "decimal"
-Columns = Mapping[str, str | Sequence[str]]
 
 
 @dataclass(frozen=True)
@@ -105,25 +109,33 @@ class Given:
         return any(wanted in (f"#{index + 1}", name, split_unit(name)[0]) for wanted in self.ignored)
 
 
-NOTHING_GIVEN = Given()
-
-
-def parse_columns(columns: Columns | None, correction: Correction | None = None) -> Given:
+def parse_columns(columns: Columns | None, correction: Correction | None = None, *, strict: bool = True) -> Given:
     """``{quantity: "name [unit]"}`` as hints; "none" for a quantity to leave out; ``ignore`` and ``decimal``.
+
+    Without ``strict``, entries that cannot be used are left out.
 
     Raises
     ------
     ReadError
         unknown_quantity for every key that names none, unknown_decimal for a mark that is no decimal mark.
     """
-    columns = columns or {}
-    problems = [problem for key, value in columns.items() for problem in column_faults(key, value)]
-    if problems:
-        raise ReadError(problems)
-    return _given(columns, correction or UNCORRECTED)
+    faults = {key: list(_entry_faults(key, value)) for key, value in (columns or {}).items()}
+    if strict and any(faults.values()):
+        raise ReadError(problem for found in faults.values() for problem in found)
+    stated = {key: value for key, value in (columns or {}).items() if not faults[key]}
+    wanted = [(quantity, str(value).strip()) for key, value in stated.items() if (quantity := quantity_named(key))]
+    ignored = stated.get(IGNORE, ())
+    listed = re.split(r"\s*;\s*", ignored) if isinstance(ignored, str) else ignored
+    return Given(
+        tuple(Hint(quantity, name) for quantity, name in wanted if name.lower() != NONE),
+        frozenset(quantity for quantity, name in wanted if name.lower() == NONE),
+        tuple(name.strip() for name in listed if name.strip()),
+        str(stated.get(DECIMAL, "")),
+        correction or UNCORRECTED,
+    )
 
 
-def column_faults(key: str, value: object) -> Iterator[Problem]:
+def _entry_faults(key: str, value: object) -> Iterator[Problem]:
     """Why one entry of columns cannot be used."""
     if key == IGNORE:
         return
@@ -135,34 +147,6 @@ def column_faults(key: str, value: object) -> Iterator[Problem]:
         meant = did_you_mean(key, [*names, IGNORE, DECIMAL])
         allowed = f"{', '.join(names)}; {IGNORE}, {DECIMAL}{f' ({meant})' if meant else ''}"
         yield Problem("unknown_quantity", "not a known quantity", found=key, allowed=allowed)
-
-
-def _given(columns: Columns, correction: Correction) -> Given:
-    """Columns whose keys are known."""
-    hints, without = [], set()
-    for key, value in columns.items():
-        quantity = quantity_named(key)
-        if quantity is None:
-            continue
-        if str(value).strip().lower() == NONE:
-            without.add(quantity)
-        else:
-            hints.append(Hint(quantity, str(value).strip()))
-    ignored = columns.get(IGNORE, ())
-    listed = re.split(r"\s*;\s*", ignored) if isinstance(ignored, str) else ignored
-    return Given(
-        tuple(hints),
-        frozenset(without),
-        tuple(name.strip() for name in listed if name.strip()),
-        str(columns.get(DECIMAL, "")),
-        correction,
-    )
-
-
-def what_is_known(columns: Columns | None, correction: Correction | None = None) -> Given:
-    """Columns as :func:`parse_columns` gives them, without those that name no quantity."""
-    kept = {key: value for key, value in (columns or {}).items() if not list(column_faults(key, value))}
-    return _given(kept, correction or UNCORRECTED)
 
 
 def columns_from_text(text: str) -> dict[str, str]:
@@ -183,14 +167,6 @@ def columns_from_text(text: str) -> dict[str, str]:
     return found
 
 
-NEEDED = ("time", "friction force")
-_SIMILAR = 0.7  # difflib ratio from which a name that was asked for is taken for a misspelt one of the file
-_MEANS_NORMAL_BESIDE_FRICTION = {
-    "load", "last", "applied load", "charge", "carga", "obciążenie", "нагрузка", "载荷", "负荷", "荷重", "하중",
-}  # fmt: skip
-_ACCELERATION = re.compile(r"m\s*/\s*s(?:ec)?\s*(?:\^?2|²)|m/s/s|m·?s(?:\^?-2|⁻²)")
-
-
 @dataclass(frozen=True)
 class Column:
     """One column taken for a quantity: SI value = factor * value + offset. ``index`` counts from 0.
@@ -206,21 +182,14 @@ class Column:
     reason: str
 
 
-@dataclass(frozen=True)
-class Assignment:
-    """The column of each quantity, time and friction force first, and doubts: columns left out, hints not used."""
-
-    columns: tuple[Column, ...]
-    doubts: tuple[Problem, ...] = ()
-
-
 @lru_cache(maxsize=512)
 def assign(
-    names: tuple[str, ...], units: tuple[str, ...], filled: tuple[bool, ...], given: Given = NOTHING_GIVEN
-) -> Assignment:
-    """The column of each quantity. Where a quantity that a trace can do without has no unit, it is left out.
+    names: tuple[str, ...], units: tuple[str, ...], filled: tuple[bool, ...], given: Given
+) -> tuple[tuple[Column, ...], tuple[Problem, ...]]:
+    """The column of each quantity, time and friction force first, and doubts.
 
-    A column that was asked for and is not here is a doubt where the names of the file are sufficient without it.
+    Where a quantity that a trace can do without has no unit, it is left out. A column that was asked for and is not
+    here is a doubt where the names of the file are sufficient without it.
 
     Raises
     ------
@@ -236,19 +205,21 @@ def assign(
     columns, doubts, faults = _columns(chosen, names, units, given.correction)
     unreadable = {problem.column for problem in faults}
     there = {c.quantity for c in columns} | {q for q, (k, *_) in chosen.items() if _called(names, k) in unreadable}
-    missing = [q for q in NEEDED if q not in there and not _follows(q, there, given.correction)]
+    follows = {  # time from rate or path, friction force from a torque
+        "time": given.correction.sampling_rate_Hz is not None or "displacement" in there,
+        "friction force": "torque" in there and given.correction.lever_arm_m is not None,
+    }
+    missing = [q for q in NEEDED if q not in there and not follows[q]]
     refused = {h.quantity for h in given.hints} - set(chosen)
     if absent and (missing or faults or problems):
         problems += absent
     elif absent:
-        doubts += [_not_here(problem) for problem in absent]
+        what = "this column, given in columns, is not in this table, which was read by its own names"
+        doubts += [Problem("column_not_here", what, found=p.found, allowed=p.allowed) for p in absent]
     problems += [_missing(q, names, there) for q in missing if q not in refused]
     if problems or faults:
         raise ReadError([*problems, *faults])
-    return Assignment(tuple(columns), tuple(doubts))
-
-
-Chosen = dict[str, tuple[int, str | None, str]]
+    return tuple(columns), tuple(doubts)
 
 
 def _asked_for(hints: Sequence[Hint], names: Sequence[str]) -> tuple[Chosen, list[Problem], list[Problem]]:
@@ -289,13 +260,6 @@ def _columns(
 
 def _called(names: Sequence[str], index: int) -> str:
     return names[index] or f"#{index + 1}"
-
-
-def _follows(quantity: str, there: set[str], correction: Correction) -> bool:
-    """Whether a missing quantity follows from others: time from rate or path, friction force from a torque."""
-    if quantity == "time":
-        return correction.sampling_rate_Hz is not None or "displacement" in there
-    return "torque" in there and correction.lever_arm_m is not None
 
 
 def _matches(names: Sequence[str], filled: Sequence[bool], taken: set[int]) -> list[tuple[str, int, str]]:
@@ -357,11 +321,6 @@ def _placed(problem: Problem, quantity: str, name: str) -> Problem:
 
 def _key(quantity: str) -> str:
     return quantity.replace(" ", "_")
-
-
-def _not_here(problem: Problem) -> Problem:
-    what = "this column, given in columns, is not in this table, which was read by its own names"
-    return Problem("column_not_here", what, found=problem.found, allowed=problem.allowed)
 
 
 def _missing(quantity: str, names: Sequence[str], there: set[str]) -> Problem:

@@ -12,19 +12,10 @@ import numpy as np
 from tribo.display import displayed
 from tribo.errors import Problem, ReadError
 from tribo.input_files import MAPPED_BYTES
-from tribo.readers.columns import NEEDED, Column, Columns, Given, assign, match_column, parse_columns, what_is_known
-from tribo.readers.core.family import Family
-from tribo.readers.layout import Layout
-from tribo.readers.reading import (
-    Contents,
-    Reading,
-    family_of,
-    layout_of,
-    open_sources,
-    read_contents,
-    split_at_restarts,
-)
-from tribo.readers.source import Source
+from tribo.readers.columns import NEEDED, Column, Columns, Given, assign, match_column, parse_columns
+from tribo.readers.layout import Layout, first_table
+from tribo.readers.reading import FATAL, Reading, machine_of, open_sources, read_tables, split_at_restarts
+from tribo.readers.text_machines import Machine
 from tribo.records import Correction, FloatArray
 
 _BASELINE_SHARE = 0.05  # of the largest force: a pull that starts above it has no zero phase
@@ -134,10 +125,10 @@ def inspect_export(
     path = Path(path)
     file = str(path)
     try:
-        contents = read_contents(path, parse_columns(columns, correction), file, beginning_only=True)
+        readings, others, footer = read_tables(path, parse_columns(columns, correction), file, beginning_only=True)
     except ReadError as why:
-        return _refused(path, file, why.problems, what_is_known(columns, correction))
-    seen = _read(file, contents)
+        return _refused(path, file, why.problems, parse_columns(columns, correction, strict=False))
+    seen = _read(file, readings, others, footer)
     return replace(seen, doubts=(*_unseen(path, file), *seen.doubts))
 
 
@@ -157,70 +148,67 @@ def _refused(path: Path, file: str, problems: tuple[Problem, ...], given: Given)
         source = open_sources(path, file)[0]
     except ReadError:
         return Inspection(file, problems=problems)
-    family = family_of(source)
-    seen = Inspection(file, family.name, family.text, source.encoding, problems=problems)
+    machine = machine_of(source)
+    seen = Inspection(file, machine.name, machine.text, source.encoding, problems=problems)
     try:
-        layout = layout_of(source, given)
+        layout = first_table(source, given)
     except ReadError:
         return seen
+    try:
+        with_hints = given.with_hints(machine.hints(source, layout))
+        taken, _ = assign(layout.names, layout.units, layout.filled, with_hints)
+    except ReadError:
+        taken = ()
     return replace(
         seen,
         delimiter=layout.delimiter,
         decimal=layout.decimal,
         header_rows=layout.header_rows,
-        columns=_columns(layout, _taken(source, family, layout, given)),
+        columns=_columns(layout, taken),
         metadata=layout.metadata,
-        advice=_advice(problems, family, layout),
+        advice=_advice(problems, machine, layout),
     )
 
 
-def _taken(source: Source, family: Family, layout: Layout, given: Given) -> tuple[Column, ...]:
-    try:
-        return assign(layout.names, layout.units, layout.filled, given.with_hints(family.hints(source, layout))).columns
-    except ReadError:
-        return ()
-
-
-def _advice(problems: tuple[Problem, ...], family: Family, layout: Layout) -> str:
+def _advice(problems: tuple[Problem, ...], machine: Machine, layout: Layout) -> str:
     """What to give so that the export can be read, where that is a matter of names and units."""
     if not all(p.kind in ("missing_column", "missing_unit", "unknown_unit") for p in problems):
         return ""
-    if family.advice:
-        return family.advice
+    if machine.advice:
+        return machine.advice
     name = "NAME [unit]" if any(layout.names) else "#1 [unit]"
     other = "NAME [unit]" if any(layout.names) else "#2 [unit]"
     return f'in columns: time = "{name}", friction_force = "{other}"'
 
 
-def _read(file: str, contents: Contents) -> Inspection:
-    first = contents.readings[0]
-    layout = first.block.layout
-    parts = [part for reading in contents.readings for part in split_at_restarts(reading)]
-    findings = [finding for part in parts for finding in part.findings]
-    doubts = [f.problem for f in findings if not f.fatal]
+def _read(file: str, readings: list[Reading], others: list[str], footer: list[str]) -> Inspection:
+    first, layout = readings[0], readings[0].layout
+    parts = [part for reading in readings for part in split_at_restarts(reading)]
+    findings = [problem for part in parts for problem in part.findings]
+    doubts = [problem for problem in findings if problem.kind not in FATAL]
     doubts += [doubt for part in parts[:1] for doubt in _doubts(part, file)]
     if len(parts) > 1:
         what, allowed = f"this export contains {len(parts)} traces", f"{file}#1 to {file}#{len(parts)}"
         doubts.append(Problem("several_tables", what, file=file, allowed=allowed))
-    if contents.footer:
-        what = f"{len(contents.footer)} lines without data at the end of the file"
-        doubts.append(Problem("footer", what, file=file, found=contents.footer[0]))
+    if footer:
+        what = f"{len(footer)} lines without data at the end of the file"
+        doubts.append(Problem("footer", what, file=file, found=footer[0]))
     return Inspection(
         file=file,
-        family=first.family.name,
-        family_text=first.family.text,
+        family=first.machine.name,
+        family_text=first.machine.text,
         encoding=first.source.encoding,
         delimiter=layout.delimiter,
         decimal=layout.decimal,
         header_rows=layout.header_rows,
-        columns=_columns(layout, first.assignment.columns),
+        columns=_columns(layout, first.columns),
         tables=tuple(_table(part) for part in parts),
-        other_tables=contents.others,
+        other_tables=tuple(others),
         metadata=layout.metadata,
         signs=_signs(parts),
         missing=_missing(first),
         doubts=tuple(doubts),
-        problems=tuple(f.problem for f in findings if f.fatal),
+        problems=tuple(problem for problem in findings if problem.kind in FATAL),
     )
 
 
@@ -242,8 +230,8 @@ def _table(reading: Reading) -> TableSeen:
     step = np.diff(time) if time.size > 1 else np.zeros(1)
     normal = reading.arrays.get("normal force")
     return TableSeen(
-        label=reading.block.label,
-        first_row=reading.block.layout.header_rows + 1 + reading.skipped,
+        label=reading.layout.label,
+        first_row=reading.layout.header_rows + 1 + reading.skipped,
         rows=int(time.size),
         start_s=float(time[0]),
         end_s=float(time[-1]),
@@ -279,7 +267,7 @@ def _missing(reading: Reading) -> tuple[str, ...]:
 
 
 def _doubts(reading: Reading, file: str) -> list[Problem]:
-    label = {c.quantity: c.label for c in reading.assignment.columns}
+    label = {c.quantity: c.label for c in reading.columns}
     time, force = reading.arrays["time"], reading.arrays["friction force"]
     doubts = _other_candidates(reading)
     step = np.diff(time)
@@ -304,10 +292,10 @@ def _doubts(reading: Reading, file: str) -> list[Problem]:
 
 def _other_candidates(reading: Reading) -> list[Problem]:
     """Columns that could stand for a needed quantity as well as the one that was taken."""
-    layout = reading.block.layout
-    taken = {c.index for c in reading.assignment.columns}
+    layout = reading.layout
+    taken = {c.index for c in reading.columns}
     doubts = []
-    for column in (c for c in reading.assignment.columns if c.quantity in NEEDED):
+    for column in (c for c in reading.columns if c.quantity in NEEDED):
         others = [
             layout.names[k]
             for k in range(layout.n_cells)

@@ -1,9 +1,4 @@
-"""Where a header ends and how rows are cut: delimiter, decimal mark, names, units.
-
-Tables in a file, one below the other: steps, segments, specimens.
-
-Names of columns in a file beside a nameless export: NAME.toml, NAME.json or a text of one name a line.
-"""
+"""The tables of a file: where a header ends and the next one begins, how rows are cut, what the columns are called."""
 
 from __future__ import annotations
 
@@ -12,10 +7,9 @@ import json
 import re
 import tomllib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from tribo.errors import Problem, ReadError
 from tribo.input_files import read_input
@@ -32,7 +26,11 @@ _HEADER_LINES_LOOKED_AT = 200
 _MEASURED = ("time", "friction force", "displacement", "temperature", "speed", "torque")
 _COMMENTS = {"comment", "comments", "kommentar", "commentaire"}
 _COMMENT_MARKS = ("#", "%", "//", ";")
-_BLANK = ' \t;,"|'
+BLANK = ' \t;,"|'
+_TEXT_LINE = re.compile(rb'^[ \t;,"]*[A-Za-z#*<\[({=_\x80-\xff][^\n]*', re.M)
+_LABEL = re.compile(r"\b(step|segment|specimen|probe|cycle|interval|data acquisition|run|schritt|zyklus)\b", re.I)
+_SIDECARS = (".toml", ".json", ".hdr", ".header", ".names", ".columns", ".meta", ".info", ".ini")
+_LARGEST_SIDECAR_BYTES = 100_000
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,7 @@ class Layout:
 
     ``header_rows`` counts the lines of the file above the first data row; ``names_row`` and ``units_row`` count
     from 1. ``filled`` is False for a column that is empty in the first rows; ``misfit`` states that the
-    names of the file cannot be matched to columns and are ignored.
+    names of the file cannot be matched to columns and are ignored. The rows are the bytes from ``start`` to ``end``.
     """
 
     delimiter: str
@@ -55,6 +53,9 @@ class Layout:
     units_row: int | None = None
     metadata: dict[str, str] = field(default_factory=dict)
     misfit: str = ""
+    start: int = 0
+    end: int = 0
+    label: str = ""
 
     def name(self, index: int) -> str:
         """What a column is called, or its position where it has no name."""
@@ -77,7 +78,65 @@ def cut(line: str, delimiter: str) -> list[str]:
         return [cell.strip(' "') for cell in line.split(delimiter)]
 
 
-def sniff(source: Source, given: Given, start: int = 0, rows_above: int = 0) -> Layout:
+def first_table(source: Source, given: Given) -> Layout:
+    """The layout of the first table, as if all below its header were its rows; names from a sidecar where it has none.
+
+    Raises
+    ------
+    ReadError
+        There is no table.
+    """
+    if source.arrays:
+        n = len(source.names)
+        return Layout("", ".", 0, n, source.names, ("",) * n, (True,) * n)
+    layout = _table_below(source, given, source.start)
+    if not any(layout.names) and not source.part:
+        for names, sidecar in _names_beside(source.path):
+            if len(names) == layout.n_cells:
+                return replace(layout, names=names, metadata={**layout.metadata, "names of columns from": sidecar})
+    return layout
+
+
+def tables_one_below_the_other(
+    source: Source, first: Layout, given: Given
+) -> tuple[tuple[Layout, ...], tuple[str, ...]]:
+    """The tables of a file that begins with ``first``, and the closing lines that hold no data.
+
+    A line of text inside a table begins a new header only if a table with known column names follows, and the
+    closing lines only if no number follows and they have not the shape of a row; else it is damage, left in place.
+    """
+    tables, footer = [], []
+    current, searched = first, first.start
+    while (found := _TEXT_LINE.search(source.data, searched)) is not None:
+        start = found.start()
+        cells = cut(source.text(found.group()), current.delimiter)
+        if len(cells) == current.n_cells > 1 and any(map(_NUMBER_START.match, cells)):
+            searched = found.end()
+            continue
+        rows_above = current.header_rows + source.data[current.start : start].count(b"\n")
+        try:
+            following = _table_below(source, given, start, rows_above)
+        except ReadError:
+            footer = [text for text in source.text(bytes(source.data[start:])).split("\n") if text.strip()][:20]
+            current = replace(current, end=start)
+            break
+        if following.names != first.names and not any(_known(name, given) for name in following.names):
+            searched = max(following.start, found.end())
+            continue
+        tables.append(replace(current, end=start))
+        current, searched = following, following.start
+    tables.append(current)
+    return tuple(replace(t, label=_label(t) or f"table {k}") for k, t in enumerate(tables, start=1)), tuple(footer)
+
+
+def _label(table: Layout) -> str:
+    for key, value in reversed(table.metadata.items()):
+        if _LABEL.search(key) and not key.lower().startswith(("step type", "number of")):
+            return f"{key} {value}".strip()
+    return ""
+
+
+def _table_below(source: Source, given: Given, start: int, rows_above: int = 0) -> Layout:
     """The layout of the first table below the line at offset ``start``, which has ``rows_above`` lines above it.
 
     Raises
@@ -97,27 +156,24 @@ def sniff(source: Source, given: Given, start: int = 0, rows_above: int = 0) -> 
         if not more or size > LARGEST_HEAD_BYTES:
             raise ReadError(_no_numbers(lines, given, source.file, rows_above))
         size *= 4
-    rows = [line for line in lines[first : first + _ROWS_LOOKED_AT] if line.strip(_BLANK)]
+    rows = [line for line in lines[first : first + _ROWS_LOOKED_AT] if line.strip(BLANK)]
     delimiter = _delimiter(rows, source.file)
     cells = [cut(row, delimiter) for row in rows]
     n_cells = Counter(map(len, cells)).most_common(1)[0][0]
     if len(cells[0]) == 1 < n_cells:
         first += 1  # a line of settings in another delimiter belongs to the header
     first = _step_back_over_damage(lines, first, delimiter, n_cells)
-    layout = Layout(delimiter, given.decimal or _decimal(cells), first, n_cells, filled=_filled(cells, n_cells))
+    filled = tuple(any(k < len(row) and row[k] for row in cells[:3]) for k in range(n_cells))
+    layout = Layout(delimiter, given.decimal or _decimal(cells), first, n_cells, filled=filled)
     _refuse_decimal_comma_as_delimiter(lines, layout, source.file, rows_above)
-    return _below(_with_header(lines, layout, given), rows_above)
-
-
-def _below(layout: Layout, rows_above: int) -> Layout:
-    def shifted(row: int | None) -> int | None:
-        return None if row is None else row + rows_above
-
+    layout = _with_header(lines, layout, given)
     return replace(
         layout,
-        header_rows=layout.header_rows + rows_above,
-        names_row=shifted(layout.names_row),
-        units_row=shifted(layout.units_row),
+        header_rows=first + rows_above,
+        names_row=None if layout.names_row is None else layout.names_row + rows_above,
+        units_row=None if layout.units_row is None else layout.units_row + rows_above,
+        start=source.offset(start, first),
+        end=len(source.data),
     )
 
 
@@ -126,16 +182,22 @@ def _first_row_of_numbers(lines: Sequence[str]) -> int | None:
     for k, line in enumerate(lines):
         if not _ROW_OF_NUMBERS.fullmatch(line):
             continue
-        following = next((other for other in lines[k + 1 :] if other.strip(_BLANK)), None)
+        following = next((other for other in lines[k + 1 :] if other.strip(BLANK)), None)
         if following is None or _ROW_OF_NUMBERS.fullmatch(following) or _mostly_numbers(line, following):
             return k
     return None
 
 
+def _mostly_numbers(line: str, following: str) -> bool:
+    """A whole row of numbers followed by a damaged one is still the first row of a table."""
+    starts = [bool(_NUMBER_START.match(cell.strip(' "'))) for cell in re.split(r"[\t;,|]", following)]
+    return len(starts) > 1 and starts[0] and 2 * sum(starts) >= len(starts) and line[:1] == following[:1]
+
+
 def _first_row_with_words(lines: Sequence[str]) -> int | None:
     """First of two neighbouring lines with numbers in the same cells, two at least, and words in others."""
     for k, line in enumerate(lines[:-1]):
-        following = next((other for other in lines[k + 1 :] if other.strip(_BLANK)), "")
+        following = next((other for other in lines[k + 1 :] if other.strip(BLANK)), "")
         for delimiter in "\t;,|":
             here, below = (_where_numbers_are(other, delimiter) for other in (line, following))
             if here == below and len(here) > 2 and sum(here) > 1:
@@ -146,12 +208,6 @@ def _first_row_with_words(lines: Sequence[str]) -> int | None:
 def _where_numbers_are(line: str, delimiter: str) -> tuple[bool, ...]:
     cells = cut(line, delimiter) if delimiter in line else []
     return tuple(bool(_DOT_NUMBER.fullmatch(c) or _COMMA_NUMBER.fullmatch(c) or c.isdigit()) for c in cells)
-
-
-def _mostly_numbers(line: str, following: str) -> bool:
-    """A whole row of numbers followed by a damaged one is still the first row of a table."""
-    starts = [bool(_NUMBER_START.match(cell.strip(' "'))) for cell in re.split(r"[\t;,|]", following)]
-    return len(starts) > 1 and starts[0] and 2 * sum(starts) >= len(starts) and line[:1] == following[:1]
 
 
 def _no_numbers(lines: Sequence[str], given: Given, file: str, rows_above: int) -> Problem:
@@ -194,10 +250,6 @@ def _last_mark(cell: str) -> str:
     return found["decimal"] if found else ""
 
 
-def _filled(rows: Sequence[Sequence[str]], n_cells: int) -> tuple[bool, ...]:
-    return tuple(any(k < len(row) and row[k] for row in rows[:3]) for k in range(n_cells))
-
-
 def _step_back_over_damage(lines: Sequence[str], first: int, delimiter: str, n_cells: int) -> int:
     """A damaged row above the first whole one belongs to the data, not to the header."""
     while first > 0:
@@ -211,26 +263,29 @@ def _step_back_over_damage(lines: Sequence[str], first: int, delimiter: str, n_c
 
 def _with_header(lines: Sequence[str], layout: Layout, given: Given) -> Layout:
     """Names and units are the two lines nearest above the data; the rest of the header is metadata."""
-    above = [k for k in range(layout.header_rows) if lines[k].strip(_BLANK)]
+
+    def nameless(rows: Iterable[int]) -> Layout:
+        nothing = ("",) * layout.n_cells
+        return replace(layout, names=nothing, units=nothing, metadata=_metadata(lines, rows, layout.delimiter))
+
+    above = [k for k in range(layout.header_rows) if lines[k].strip(BLANK)]
     cells = {k: _header_cells(lines[k], layout) for k in above[-2:]}
     if not above or len(cells[above[-1]]) == 1 < layout.n_cells:
-        return replace(layout, **_nameless(lines, above, layout))
+        return nameless(above)
     hits = {k: sum(_known(cell, given) for cell in row) for k, row in cells.items()}
     names_row, units_row = above[-1], None
     if len(above) > 1 and (hits[above[-2]] > hits[above[-1]] or _are_units(cells[above[-1]], cells[above[-2]])):
         names_row, units_row = above[-2], above[-1]
-    header = _nameless(lines, [k for k in above if k < names_row], layout)
+    layout = nameless(k for k in above if k < names_row)
     if units_row is not None:
-        header["units"] = _fit(cells[units_row], layout.n_cells)
-        header["units_row"] = units_row + 1
-    if _stands_over(cells[names_row], layout):
-        header["names"] = _fit(cells[names_row], layout.n_cells)
-        header["names_row"] = names_row + 1
-    else:
-        named = sum(bool(cell) for cell in cells[names_row])
-        header["misfit"] = f"{named} column names for {layout.n_cells} columns: they cannot be matched"
-        header["names_row"] = names_row + 1
-    return replace(layout, **header)
+        layout = replace(layout, units=_fit(cells[units_row], layout.n_cells), units_row=units_row + 1)
+    names = cells[names_row]
+    too_many = [name for name in names[layout.n_cells :] if name and name.lower() not in _COMMENTS]
+    if not too_many and not any(layout.filled[len(names) :]):
+        return replace(layout, names=_fit(names, layout.n_cells), names_row=names_row + 1)
+    named = sum(bool(cell) for cell in names)
+    misfit = f"{named} column names for {layout.n_cells} columns: they cannot be matched"
+    return replace(layout, misfit=misfit, names_row=names_row + 1)
 
 
 def _are_units(cells: Sequence[str], names: Sequence[str]) -> bool:
@@ -253,19 +308,8 @@ def _header_cells(line: str, layout: Layout) -> list[str]:
     return wider if len(wider) == layout.n_cells else cells
 
 
-def _stands_over(names: Sequence[str], layout: Layout) -> bool:
-    """Whether each name has its column: none without a name but empty ones, none too many but a comment."""
-    extra = [name for name in names[layout.n_cells :] if name and name.lower() not in _COMMENTS]
-    return not extra and not any(layout.filled[len(names) :])
-
-
-def _nameless(lines: Sequence[str], above: Sequence[int], layout: Layout) -> dict[str, Any]:
-    """Columns without names or units, and the lines above as metadata."""
-    nothing = ("",) * layout.n_cells
-    return {"names": nothing, "units": nothing, "metadata": metadata(lines, above, layout.delimiter)}
-
-
 def _fit(cells: Sequence[str], n: int) -> tuple[str, ...]:
+    """The first ``n`` cells, empty ones added where there are fewer."""
     return tuple(cells[:n]) + ("",) * (n - len(cells))
 
 
@@ -273,7 +317,7 @@ def _refuse_decimal_comma_as_delimiter(lines: Sequence[str], layout: Layout, fil
     row = lines[layout.header_rows]
     if layout.delimiter != "," or '"' in row or "." in row:
         return
-    above = [line for line in lines[: layout.header_rows] if line.strip(_BLANK)]
+    above = [line for line in lines[: layout.header_rows] if line.strip(BLANK)]
     given = max((sum(bool(c) for c in cut(line, ",")) for line in above[-2:]), default=0)
     if 1 < given < layout.n_cells - 1:
         what = "the comma is both delimiter and decimal mark, so the columns cannot be separated"
@@ -281,7 +325,7 @@ def _refuse_decimal_comma_as_delimiter(lines: Sequence[str], layout: Layout, fil
         raise ReadError(Problem("decimal_is_delimiter", what, *place, found=row[:60]))
 
 
-def metadata(lines: Sequence[str], rows: Sequence[int], delimiter: str) -> dict[str, str]:
+def _metadata(lines: Sequence[str], rows: Iterable[int], delimiter: str) -> dict[str, str]:
     """Header lines as the file has them: first cell, then the rest as it stands ("12.000 mm/min")."""
     found: dict[str, str] = {}
     for k in rows:
@@ -297,114 +341,35 @@ def metadata(lines: Sequence[str], rows: Sequence[int], delimiter: str) -> dict[
     return found
 
 
-_TEXT_LINE = re.compile(rb'^[ \t;,"]*[A-Za-z#*<\[({=_\x80-\xff][^\n]*', re.M)
-_LABEL = re.compile(r"\b(step|segment|specimen|probe|cycle|interval|data acquisition|run|schritt|zyklus)\b", re.I)
-
-
-@dataclass(frozen=True)
-class Block:
-    """One table: its layout, and the bytes from ``start`` to ``end`` that hold its rows."""
-
-    layout: Layout
-    start: int
-    end: int
-    label: str = ""
-
-
-def whole_block(source: Source, layout: Layout) -> Block:
-    """Everything below the header as one table."""
-    return Block(layout, source.offset(source.start, layout.header_rows), len(source.data))
-
-
-def split_blocks(source: Source, layout: Layout, given: Given) -> tuple[tuple[Block, ...], tuple[str, ...]]:
-    """Tables one below the other, and the closing lines that hold no data.
-
-    A line of text inside a table begins a new header only if a table with known column names follows, and the
-    closing lines only if no number follows and they have not the shape of a row; else it is damage, left in place.
-    """
-    blocks, footer = [], []
-    current = whole_block(source, layout)
-    searched = current.start
-    while (found := _TEXT_LINE.search(source.data, searched)) is not None:
-        start = found.start()
-        line = source.text(found.group())
-        if len(cut(line, current.layout.delimiter)) == current.layout.n_cells and _is_damaged_row(line, current):
-            searched = found.end()
-            continue
-        rows_above = current.layout.header_rows + source.data[current.start : start].count(b"\n")
-        try:
-            following = sniff(source, given, start, rows_above)
-        except ReadError:
-            footer = [text for text in source.text(bytes(source.data[start:])).split("\n") if text.strip()][:20]
-            current = replace(current, end=start)
-            break
-        begin = source.offset(start, following.header_rows - rows_above)
-        known = following.names == layout.names or any(
-            n and (given.names(n) or match_column(n)) for n in following.names
-        )
-        if not known:
-            searched = max(begin, found.end())
-            continue
-        blocks.append(replace(current, end=start))
-        current = Block(following, begin, len(source.data))
-        searched = begin
-    blocks.append(current)
-    return tuple(_labelled(block, k) for k, block in enumerate(blocks)), tuple(footer)
-
-
-def _is_damaged_row(line: str, block: Block) -> bool:
-    cells = cut(line, block.layout.delimiter)
-    return len(cells) > 1 and any(re.match(r"[-+]?[.,]?\d", cell) for cell in cells)
-
-
-def _labelled(block: Block, k: int) -> Block:
-    for key, value in reversed(block.layout.metadata.items()):
-        if _LABEL.search(key) and not key.lower().startswith(("step type", "number of")):
-            return replace(block, label=f"{key} {value}".strip())
-    return replace(block, label=f"table {k + 1}")
-
-
-_SUFFIXES = (".toml", ".json", ".hdr", ".header", ".names", ".columns", ".meta", ".info", ".ini")
-_MOST_BYTES = 100_000
-
-
-def names_beside(path: Path, n_cells: int) -> tuple[tuple[str, ...], str] | None:
-    """(names with their units, name of the sidecar) of an export with ``n_cells`` columns, or None.
+def _names_beside(path: Path) -> Iterator[tuple[tuple[str, ...], str]]:
+    """(names with their units, name of the sidecar) of each file beside an export that may name its columns.
 
     A sidecar shares the stem of the export, or adds its suffix to the whole name. TOML and JSON hold ``columns``,
     a list of "name [unit]" or of tables with name and unit; any other text one "name [unit]" a line.
     """
-    for suffix in _SUFFIXES:
+    for suffix in _SIDECARS:
         for beside in (path.with_suffix(suffix), path.with_name(path.name + suffix)):
-            if beside == path or not beside.is_file() or beside.stat().st_size > _MOST_BYTES:
+            if beside == path or not beside.is_file() or beside.stat().st_size > _LARGEST_SIDECAR_BYTES:
                 continue
-            names = _names(beside)
-            if len(names) == n_cells:
-                return tuple(names), beside.name
-    return None
+            text = read_input(beside, _LARGEST_SIDECAR_BYTES).decode("utf-8-sig", errors="replace")
+            listed: object = []
+            try:
+                if beside.suffix == ".toml":
+                    listed = tomllib.loads(text).get("columns", [])
+                elif beside.suffix == ".json":
+                    stored = json.loads(text)
+                    listed = stored.get("columns", []) if isinstance(stored, dict) else stored
+                else:
+                    lines = (line.strip() for line in text.splitlines())
+                    listed = [line for line in lines if line and not line.startswith("#")]
+            except (ValueError, RecursionError):
+                continue
+            if isinstance(listed, Sequence) and not isinstance(listed, str):
+                yield tuple(map(_name_and_unit, listed)), beside.name
 
 
-def _names(path: Path) -> list[str]:
-    text = read_input(path, _MOST_BYTES).decode("utf-8-sig", errors="replace")
-    try:
-        if path.suffix == ".toml":
-            return _listed(tomllib.loads(text).get("columns", []))
-        if path.suffix == ".json":
-            stored = json.loads(text)
-            return _listed(stored.get("columns", []) if isinstance(stored, dict) else stored)
-    except (ValueError, RecursionError):
-        return []
-    return [line.strip() for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-
-
-def _listed(columns: Any) -> list[str]:
-    if not isinstance(columns, Sequence) or isinstance(columns, str):
-        return []
-    return [_one(column) for column in columns]
-
-
-def _one(column: Any) -> str:
-    if isinstance(column, dict):
-        unit = column.get("unit", "")
-        return f"{column.get('name', '')} [{unit}]" if unit else str(column.get("name", ""))
-    return str(column)
+def _name_and_unit(column: object) -> str:
+    if not isinstance(column, dict):
+        return str(column)
+    unit = column.get("unit", "")
+    return f"{column.get('name', '')} [{unit}]" if unit else str(column.get("name", ""))

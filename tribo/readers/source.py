@@ -1,6 +1,6 @@
-"""From a file to bytes with one line ending, and to the text of any stretch of it.
+"""From a file to bytes with one line ending, unpacked where it is packed, and to the text of any stretch of it.
 
-Exports inside a .zip or .gz: one entry is read as the file itself, one of several by PATH.zip/ENTRY.
+One entry of a .zip is read as the file itself, one of several by PATH.zip/ENTRY.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import mmap
 import re
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import IO, Protocol
+from typing import IO
 
 from tribo.errors import Problem, ReadError, unexpected
 from tribo.input_files import (
@@ -48,6 +48,13 @@ _MULTIBYTE = ("gb18030", "cp932", "cp949", "big5")
 _ASCII = bytes(range(128))
 # Letters and signs that western machines write; anything else makes cp1252 an unlikely reading.
 _PLAUSIBLE = frozenset("äöüÄÖÜßéèêëàâçîïôùûÉÈÀÇñÑåÅøØæÆáíóúìòãõµ°²³±·×«»‘’“”–—…€ \xa0")
+_CHUNK = 1 << 20
+_MOST_LISTED = 12
+_GZIP, _ZIP = b"\x1f\x8b", b"PK\x03\x04"
+_WORKBOOK_ENTRIES = {"[Content_Types].xml", "META-INF/manifest.xml"}
+_DAMAGED = (
+    zipfile.BadZipFile, gzip.BadGzipFile, NotImplementedError, EOFError, OSError, RuntimeError, ValueError, zlib.error,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -55,7 +62,8 @@ class Source:
     """An export as bytes without BOM, wide encodings made UTF-8, lines ending in ``\\n``.
 
     A mapped source (a large file) keeps its bytes as they are on disk. ``arrays`` holds the columns where the
-    file is no text but named arrays (MATLAB), ``names`` their names; ``part`` the sheet of a workbook.
+    file is no text but named arrays, ``names`` their names, and ``machine`` the binary machine that wrote it; ``part``
+    is the sheet of a workbook, the group of channels, or the record of several side by side.
     """
 
     path: Path
@@ -66,6 +74,7 @@ class Source:
     part: str = ""
     names: tuple[str, ...] = ()
     arrays: tuple[FloatArray, ...] = ()
+    machine: str = ""
 
     def lines(self, start: int, size: int) -> tuple[tuple[str, ...], bool]:
         """Whole lines of the ``size`` bytes from ``start``, and whether the file goes on after them."""
@@ -142,6 +151,117 @@ class Source:
             start = stop
 
 
+def export_bytes(path: Path, file: str) -> bytes | mmap.mmap:
+    """The bytes of an export, mapped where they are many, unpacked where it is in a .zip or .gz.
+
+    PATH may go on into a .zip: ``a.zip/b.csv``.
+
+    Raises
+    ------
+    ReadError
+        missing, unreadable, not_a_file, too_large, bad_archive, encrypted, several_entries or unknown_entry.
+    """
+    path, entry = _archive_and_entry(path)
+    try:
+        raw = read_or_map(path, LARGEST_FILE_BYTES, MAPPED_BYTES)
+    except FileNotFoundError as why:
+        raise ReadError(Problem("missing", "this file does not exist", file=file)) from why
+    except TooLargeError as why:
+        raise _too_large(why.size, LARGEST_FILE_BYTES, file) from why
+    except NotRegularError as why:
+        raise ReadError(Problem("not_a_file", "not a regular file", file=file)) from why
+    except OSError as why:
+        raise ReadError(replace(unexpected(why, "cannot be opened"), file=file)) from why
+    if raw[:4] == _ZIP and not is_workbook_archive(raw):
+        raw = _unpacked("zip", partial(_from_zip, raw, entry, file), file)
+    elif entry:
+        raise ReadError(Problem("missing", "this file does not exist", file=file))
+    if raw[:2] == _GZIP:
+        raw = _unpacked("gz", partial(gzip.GzipFile, fileobj=_stream(raw)), file)
+    return raw
+
+
+def _archive_and_entry(path: Path) -> tuple[Path, str]:
+    """(archive, entry) where a parent of the path is a file; the path itself and "" otherwise."""
+    parent = None if path.exists() else next((p for p in path.parents if p.is_file()), None)
+    return (path, "") if parent is None else (parent, path.relative_to(parent).as_posix())
+
+
+def entries_of(path: Path) -> tuple[str, ...]:
+    """Names of the files in a .zip of exports; nothing for any other file."""
+    try:
+        with path.open("rb") as stream:
+            if stream.read(4) != _ZIP:
+                return ()
+        with zipfile.ZipFile(path) as opened:
+            return () if _holds_workbook(opened) else tuple(e.filename for e in _files(opened))
+    except _DAMAGED:
+        return ()
+
+
+def is_workbook_archive(raw: bytes | mmap.mmap) -> bool:
+    """Whether a .zip is an .xlsx, .xlsb or .ods; one that cannot be listed counts as none."""
+    try:
+        with zipfile.ZipFile(_stream(raw)) as opened:
+            return _holds_workbook(opened)
+    except _DAMAGED:
+        return False
+
+
+def _holds_workbook(opened: zipfile.ZipFile) -> bool:
+    return bool(_WORKBOOK_ENTRIES & set(opened.namelist()))
+
+
+def _stream(raw: bytes | mmap.mmap) -> IO[bytes]:
+    if isinstance(raw, mmap.mmap):
+        raw.seek(0)
+        return raw  # type: ignore[return-value]
+    return io.BytesIO(raw)
+
+
+def _files(opened: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
+    """The entries that are files, those of the system that made the .zip left out."""
+    entries = [e for e in opened.infolist() if not e.is_dir() and not e.filename.startswith("__MACOSX/")]
+    return [e for e in entries if not e.filename.rpartition("/")[2].startswith(".")]
+
+
+def _unpacked(kind: str, opened: Callable[[], IO[bytes] | gzip.GzipFile], file: str) -> bytes:
+    """Everything a stream holds, up to the limit: what an archive says of its own size is not relied on."""
+    found = bytearray()
+    try:
+        with opened() as packed:
+            while chunk := packed.read(_CHUNK):
+                found += chunk
+                if len(found) > MOST_UNPACKED_EXPORT_BYTES:
+                    allowed = f"at most {MOST_UNPACKED_EXPORT_BYTES} bytes unpacked"
+                    raise ReadError(Problem("too_large", "the file is too large", file=file, allowed=allowed))
+    except _DAMAGED as why:
+        raise ReadError(Problem("bad_archive", f"not a readable .{kind} ({why})", file=file)) from why
+    return bytes(found)
+
+
+def _from_zip(raw: bytes | mmap.mmap, wanted: str, file: str) -> IO[bytes]:
+    """The wanted entry of a .zip, or its only one, as a stream."""
+    last_record(raw[-LAST_BYTES:])
+    opened = zipfile.ZipFile(_stream(raw))
+    entries = _files(opened)
+    found = [e for e in entries if wanted in ("", e.filename)]
+    if len(found) == 1 and found[0].flag_bits & 1:
+        what, allowed = "this .zip is encrypted", "a .zip without a password, or the file unpacked"
+        raise ReadError(Problem("encrypted", what, file=file, found=found[0].filename, allowed=allowed))
+    if len(found) == 1:
+        return opened.open(found[0])
+    names = [e.filename for e in entries]
+    listed = ", ".join(names[:_MOST_LISTED]) + (", ..." if len(names) > _MOST_LISTED else "")
+    if not names:
+        raise ReadError(Problem("empty", "this .zip contains no files", file=file))
+    if wanted:
+        raise ReadError(Problem("unknown_entry", "this .zip has no such entry", file=file, allowed=f"one of {listed}"))
+    what = f"this .zip contains {len(names)} files"
+    allowed = f"one of them, given after the name of the .zip: {Path(file).name}/{names[0]}; here: {listed}"
+    raise ReadError(Problem("several_entries", what, file=file, allowed=allowed))
+
+
 def open_text(path: Path, file: str, raw: bytes | mmap.mmap) -> Source:
     """A text export, read as bytes, with its encoding settled.
 
@@ -189,26 +309,6 @@ def _with_one_line_ending(source: Source, data: bytes) -> Source:
     return replace(source, data=data, start=0)
 
 
-def read_bytes(path: Path, file: str) -> bytes | mmap.mmap:
-    """A file's bytes, mapped where they are many.
-
-    Raises
-    ------
-    ReadError
-        missing, unreadable or too_large.
-    """
-    try:
-        return read_or_map(path, LARGEST_FILE_BYTES, MAPPED_BYTES)
-    except FileNotFoundError as why:
-        raise ReadError(Problem("missing", "this file does not exist", file=file)) from why
-    except TooLargeError as why:
-        raise _too_large(why.size, LARGEST_FILE_BYTES, file) from why
-    except NotRegularError as why:
-        raise ReadError(Problem("not_a_file", "not a regular file", file=file)) from why
-    except OSError as why:
-        raise ReadError(replace(unexpected(why, "cannot be opened"), file=file)) from why
-
-
 def _too_large(size: int, limit: int, file: str) -> ReadError:
     found, allowed = f"{size} bytes", f"at most {limit} bytes of this encoding"
     return ReadError(Problem("too_large", "the file is too large", file=file, found=found, allowed=allowed))
@@ -249,134 +349,3 @@ def _narrow_encoding(raw: bytes | mmap.mmap) -> str:
 
     best = from_bytes(looked_at[:HEAD_BYTES]).best()
     return best.encoding if best is not None else "cp1252"
-
-
-_CHUNK = 1 << 20
-_MOST_LISTED = 12
-_GZIP, _ZIP = b"\x1f\x8b", b"PK\x03\x04"
-_WORKBOOK_ENTRIES = {"[Content_Types].xml", "META-INF/manifest.xml"}
-_DAMAGED = (
-    zipfile.BadZipFile, gzip.BadGzipFile, NotImplementedError, EOFError, OSError, RuntimeError, ValueError, zlib.error,
-)  # fmt: skip
-
-
-class _Readable(Protocol):
-    def read(self, size: int, /) -> bytes: ...
-
-
-def export_bytes(path: Path, file: str) -> bytes | mmap.mmap:
-    """The bytes of an export, unpacked where it is in a .zip or .gz; PATH may go on into a .zip: ``a.zip/b.csv``.
-
-    Raises
-    ------
-    ReadError
-        missing, unreadable, too_large, bad_archive, encrypted, several_entries or unknown_entry.
-    """
-    archive, entry = split_entry(path)
-    raw = read_bytes(archive, file)
-    if raw[:4] == _ZIP and not is_workbook_archive(raw):
-        raw = _from_zip(raw, entry, file)
-    elif entry:
-        raise ReadError(Problem("missing", "this file does not exist", file=file))
-    if raw[:2] == _GZIP:
-        raw = _from_gzip(raw, file)
-    return raw
-
-
-def split_entry(path: Path) -> tuple[Path, str]:
-    """(archive, entry) where a parent of the path is a file; the path itself and "" otherwise."""
-    if not path.exists():
-        for parent in path.parents:
-            if parent.is_file():
-                return parent, path.relative_to(parent).as_posix()
-    return path, ""
-
-
-def entries_of(path: Path) -> tuple[str, ...]:
-    """Names of the files in a .zip of exports; nothing for any other file."""
-    try:
-        with path.open("rb") as stream:
-            if stream.read(4) != _ZIP:
-                return ()
-        with zipfile.ZipFile(path) as opened:
-            return () if _holds_workbook(opened) else tuple(e.filename for e in _files(opened))
-    except _DAMAGED:
-        return ()
-
-
-def is_workbook_archive(raw: bytes | mmap.mmap) -> bool:
-    """Whether a .zip is an .xlsx, .xlsb or .ods; one that cannot be listed counts as none."""
-    try:
-        with zipfile.ZipFile(_stream(raw)) as opened:
-            return _holds_workbook(opened)
-    except _DAMAGED:
-        return False
-
-
-def _holds_workbook(opened: zipfile.ZipFile) -> bool:
-    return bool(_WORKBOOK_ENTRIES & set(opened.namelist()))
-
-
-def _stream(raw: bytes | mmap.mmap) -> IO[bytes]:
-    if isinstance(raw, mmap.mmap):
-        raw.seek(0)
-        return raw  # type: ignore[return-value]
-    return io.BytesIO(raw)
-
-
-def _files(opened: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
-    """The entries that are files, those of the system that made the .zip left out."""
-    entries = [e for e in opened.infolist() if not e.is_dir() and not e.filename.startswith("__MACOSX/")]
-    return [e for e in entries if not e.filename.rpartition("/")[2].startswith(".")]
-
-
-def _from_zip(raw: bytes | mmap.mmap, wanted: str, file: str) -> bytes:
-    try:
-        last_record(raw[-LAST_BYTES:])
-        with zipfile.ZipFile(_stream(raw)) as opened:
-            entry = _chosen(_files(opened), wanted, file)
-            if entry.flag_bits & 1:
-                what, allowed = "this .zip is encrypted", "a .zip without a password, or the file unpacked"
-                raise ReadError(Problem("encrypted", what, file=file, found=entry.filename, allowed=allowed))
-            with opened.open(entry) as packed:
-                return _bounded(packed, file)
-    except _DAMAGED as why:
-        raise _bad(why, "zip", file) from why
-
-
-def _chosen(entries: list[zipfile.ZipInfo], wanted: str, file: str) -> zipfile.ZipInfo:
-    found = [e for e in entries if wanted in ("", e.filename)]
-    if len(found) == 1:
-        return found[0]
-    names = [e.filename for e in entries]
-    listed = ", ".join(names[:_MOST_LISTED]) + (", ..." if len(names) > _MOST_LISTED else "")
-    if not names:
-        raise ReadError(Problem("empty", "this .zip contains no files", file=file))
-    if wanted:
-        raise ReadError(Problem("unknown_entry", "this .zip has no such entry", file=file, allowed=f"one of {listed}"))
-    what = f"this .zip contains {len(names)} files"
-    allowed = f"one of them, given after the name of the .zip: {Path(file).name}/{names[0]}; here: {listed}"
-    raise ReadError(Problem("several_entries", what, file=file, allowed=allowed))
-
-
-def _from_gzip(raw: bytes | mmap.mmap, file: str) -> bytes:
-    try:
-        with gzip.GzipFile(fileobj=_stream(raw)) as packed:
-            return _bounded(packed, file)
-    except _DAMAGED as why:
-        raise _bad(why, "gz", file) from why
-
-
-def _bounded(packed: _Readable, file: str) -> bytes:
-    """Everything a stream holds, up to the limit: what an archive says of its own size is not relied on."""
-    found = bytearray()
-    while chunk := packed.read(_CHUNK):
-        found += chunk
-        if len(found) > MOST_UNPACKED_EXPORT_BYTES:
-            allowed = f"at most {MOST_UNPACKED_EXPORT_BYTES} bytes unpacked"
-            raise ReadError(Problem("too_large", "the file is too large", file=file, allowed=allowed))
-    return bytes(found)
-
-
-def _bad(why: Exception, kind: str, file: str) -> ReadError:
-    return ReadError(Problem("bad_archive", f"not a readable .{kind} ({why})", file=file))

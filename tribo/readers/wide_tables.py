@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 
 from tribo.errors import Problem, ReadError
 from tribo.readers.columns import Given, Hint, bare_unit, is_unit, match_column, split_unit
-from tribo.readers.layout import Block, Layout, cut, whole_block
+from tribo.readers.layout import Layout, cut
 from tribo.readers.source import Source
 
 _NUMBER_BEHIND = re.compile(r"(?<=\w)[ ._#-]*\(?\d+\)?$")
@@ -18,24 +18,50 @@ _NUMERIC = re.compile(r"[-+]?\d*[.,]?\d+")
 _NOTHING = frozenset({"", "nan", "n/a", "na", "#n/a", "-", "--", "null", "none"})
 
 
-@dataclass(frozen=True)
-class Record:
-    """One of several records side by side: its label, all its columns, and those that are its own."""
-
-    label: str
-    columns: tuple[int, ...]
-    own: tuple[int, ...]
-    hints: tuple[Hint, ...] = ()
+Part = tuple[Source, Layout, Given]  # a table, and what was stated about it
+Record = tuple[str, tuple[int, ...], tuple[int, ...], tuple[Hint, ...]]  # label, its columns, those not shared, hints
 
 
-def records_side_by_side(layout: Layout, given: Given) -> tuple[Record, ...]:
-    """The records of a table that holds several, nothing where it is one.
+def records_side_by_side(source: Source, layout: Layout, given: Given) -> Iterator[Part]:
+    """Each record of a table that holds several, as a table of its own; nothing where it is one.
+
+    A record keeps the rows of the file, without rows past its end.
 
     Raises
     ------
     ReadError
         A pattern of names in columns fits no column, or patterns fit different numbers of columns.
     """
+    try:
+        records = _records(layout, given)
+    except ReadError as why:
+        raise ReadError(replace(p, file=source.file, row=layout.names_row) for p in why.problems) from None
+    rows = [] if source.arrays or not records else _rows(source, layout)
+    for number, (label, columns, own, hints) in enumerate(records, start=1):
+        alone = replace(
+            layout,
+            delimiter="\t" if layout.delimiter in (" ", layout.decimal) else layout.delimiter,
+            n_cells=len(columns),
+            names=tuple(layout.names[k] for k in columns),
+            units=tuple(layout.units[k] for k in columns),
+            filled=tuple(layout.filled[k] or k in own for k in columns),
+            metadata={**layout.metadata, "record": label} if label else layout.metadata,
+            label=label or _label_above(source, layout, columns[0]) or f"specimen {number}",
+        )
+        if source.arrays:
+            part = replace(source, part=alone.label, names=alone.names, arrays=tuple(source.arrays[k] for k in columns))
+        else:
+            end = len(rows)
+            while end and all(_is_nothing(rows[end - 1], k) for k in own):
+                end -= 1
+            lines = [alone.delimiter.join(row[k] if k < len(row) else "" for k in columns) for row in rows[:end]]
+            data = ("\n" * layout.header_rows + "\n".join(lines) + "\n").encode(source.codec, errors="replace")
+            part = replace(source, data=data, start=0, part=alone.label)
+            alone = replace(alone, start=layout.header_rows, end=len(data))
+        yield part, alone, _restated(given, columns, hints)
+
+
+def _records(layout: Layout, given: Given) -> tuple[Record, ...]:
     if any(hint.is_pattern for hint in given.hints):
         return _by_patterns(layout, given)
     whole = tuple(_repeated(layout.names))
@@ -54,8 +80,7 @@ def records_side_by_side(layout: Layout, given: Given) -> tuple[Record, ...]:
         if len(rest) % width == 0 and stems == stems[:width] * (len(rest) // width) and len(forces) == 1:
             groups = [tuple(rest[at : at + width]) for at in range(0, len(rest), width)]
             return tuple(
-                Record(_label(layout, group), (*times, *group), group, _hints(layout, (*times, *group)))
-                for group in groups
+                (_label(layout, group), (*times, *group), group, _hints(layout, (*times, *group))) for group in groups
             )
     if all(_is_a_force_by_unit(layout, k) for k in rest):
         return tuple(_forced(layout, (*times, k), k) for k in rest)
@@ -99,7 +124,7 @@ def _repeated(names: Sequence[str]) -> Iterator[Record]:
         if not rest and kept == kept[:width] * repeats and len(set(kept[:width])) == width:
             for k in range(repeats):
                 columns = tuple(at[k * width : (k + 1) * width])
-                yield Record("", columns, columns)
+                yield "", columns, columns, ()
             return
 
 
@@ -114,7 +139,7 @@ def _with_own_time(layout: Layout, used: Sequence[int]) -> Iterator[Record]:
             continue
         for k in range(repeats):
             columns = tuple(used[k * width : (k + 1) * width])
-            yield Record(_label(layout, columns), columns, columns, _hints(layout, columns))
+            yield _label(layout, columns), columns, columns, _hints(layout, columns)
         return
 
 
@@ -138,7 +163,7 @@ def _is_a_force_by_unit(layout: Layout, k: int) -> bool:
 
 def _forced(layout: Layout, columns: tuple[int, ...], own: int) -> Record:
     hint = Hint("friction force", f"#{columns.index(own) + 1}", f'"{layout.names[own]}", by its unit')
-    return Record(layout.names[own], columns, (own,), (hint,))
+    return layout.names[own], columns, (own,), (hint,)
 
 
 def _by_patterns(layout: Layout, given: Given) -> tuple[Record, ...]:
@@ -162,7 +187,7 @@ def _by_patterns(layout: Layout, given: Given) -> tuple[Record, ...]:
             Hint(h.quantity, f"#{columns.index(fitted[r]) + 1}{_unit_of(h)}", f"asked for by {h.wanted}")
             for h, fitted in fitting.items()
         )
-        records.append(Record(_label(layout, own), columns, own, hints))
+        records.append((_label(layout, own), columns, own, hints))
     return tuple(records)
 
 
@@ -199,30 +224,6 @@ def _fits_nothing(hint: Hint, layout: Layout) -> Problem:
     return Problem("missing_column", what, found=hint.wanted, allowed=listed)
 
 
-def parted(
-    source: Source, layout: Layout, records: Sequence[Record], given: Given
-) -> Iterator[tuple[Source, Block, Given]]:
-    """Each record as a table of its own that keeps the rows of the file, without rows past its end."""
-    rows = [] if source.arrays else _rows(source, layout)
-    for number, record in enumerate(records, start=1):
-        alone = _layout_of(layout, record)
-        label = record.label or _label_above(source, layout, record) or f"specimen {number}"
-        stated = _restated(given, record)
-        if source.arrays:
-            part = replace(
-                source, part=label, names=alone.names, arrays=tuple(source.arrays[k] for k in record.columns)
-            )
-            yield part, Block(alone, 0, 0, label), stated
-            continue
-        end = len(rows)
-        while end and all(_is_nothing(rows[end - 1], k) for k in record.own):
-            end -= 1
-        lines = [alone.delimiter.join(row[k] if k < len(row) else "" for k in record.columns) for row in rows[:end]]
-        data = ("\n" * layout.header_rows + "\n".join(lines) + "\n").encode(source.codec, errors="replace")
-        part = replace(source, data=data, start=0, part=label)
-        yield part, replace(whole_block(part, alone), label=label), stated
-
-
 def _rows(source: Source, layout: Layout) -> list[list[str]]:
     text = source.text(bytes(source.data[source.offset(source.start, layout.header_rows) :])).replace("\r\n", "\n")
     return [cut(line, layout.delimiter) for line in text.split("\n") if line.strip()]
@@ -232,41 +233,29 @@ def _is_nothing(row: Sequence[str], k: int) -> bool:
     return k >= len(row) or row[k].lower() in _NOTHING
 
 
-def _layout_of(layout: Layout, record: Record) -> Layout:
-    delimiter = "\t" if layout.delimiter in (" ", layout.decimal) else layout.delimiter
-    return replace(
-        layout,
-        delimiter=delimiter,
-        n_cells=len(record.columns),
-        names=tuple(layout.names[k] for k in record.columns),
-        units=tuple(layout.units[k] for k in record.columns),
-        filled=tuple(layout.filled[k] or k in record.own for k in record.columns),
-        metadata={**layout.metadata, "record": record.label} if record.label else layout.metadata,
-    )
-
-
-def _label_above(source: Source, layout: Layout, record: Record) -> str:
+def _label_above(source: Source, layout: Layout, column: int) -> str:
     above = [cut(line, layout.delimiter) for line in source.head[: (layout.names_row or 1) - 1]]
-    first = record.columns[0]
-    return next((row[first] for row in reversed(above) if first < len(row)), "")
+    return next((row[column] for row in reversed(above) if column < len(row)), "")
 
 
-def _restated(given: Given, record: Record) -> Given:
+def _restated(given: Given, columns: Sequence[int], hints: Sequence[Hint]) -> Given:
     """What was stated, for the columns of one record: positions counted within it, patterns made positions."""
+
+    def within(position: str) -> str | None:
+        """ "#5" as a position within the record, None where the column is not in it; a name as it is."""
+        if not re.fullmatch(r"#\d+", position):
+            return position
+        k = int(position[1:]) - 1
+        return f"#{columns.index(k) + 1}" if k in columns else None
+
     kept = []
     for hint in given.hints:
         name, unit = split_unit(hint.wanted)
-        if hint.is_pattern:
+        position = within(name)
+        if hint.is_pattern or position is None:
             continue
-        if re.fullmatch(r"#\d+", name):
-            if int(name[1:]) - 1 not in record.columns:
-                continue
-            position = f"#{record.columns.index(int(name[1:]) - 1) + 1}"
+        if position != name:
             hint = replace(hint, wanted=f"{position} [{unit}]" if unit else position)
         kept.append(hint)
-    ignored = [
-        f"#{record.columns.index(int(n[1:]) - 1) + 1}" if re.fullmatch(r"#\d+", n) else n
-        for n in given.ignored
-        if not re.fullmatch(r"#\d+", n) or int(n[1:]) - 1 in record.columns
-    ]
-    return replace(given, hints=(*kept, *record.hints), ignored=tuple(ignored))
+    ignored = tuple(kept_name for n in given.ignored if (kept_name := within(n)) is not None)
+    return replace(given, hints=(*kept, *hints), ignored=ignored)

@@ -139,14 +139,14 @@ def _only_campaign_below(folder: Path) -> Path:
 
 def _zipped_hashes(archive: Path, recorded: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     with opened_zip(archive) as (opened, entries):
-        files = [entry for entry in entries if not entry.is_folder]
-        tomls = [e.name for e in files if e.name.rpartition("/")[2] == DESCRIBED_IN[0]]
+        files = {path: info for path, info in entries.items() if not path.endswith("/")}
+        tomls = [path for path in files if path.rpartition("/")[2] == DESCRIBED_IN[0]]
         base = tomls[0].removesuffix(DESCRIBED_IN[0]) if len(tomls) == 1 else ""
-        for entry in files:
-            inside = entry.name.removeprefix(base)
+        for path, info in files.items():
+            inside = path.removeprefix(base)
             if inside in DESCRIBED_IN or inside.startswith(f"{RAW}/") or inside in recorded:
                 digest = sha256()
-                for piece in pieces(opened, entry, archive.name):
+                for piece in pieces(opened, info, archive.name):
                     digest.update(piece)
                 yield inside, digest.hexdigest()
 

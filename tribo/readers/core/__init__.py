@@ -1,1 +1,0 @@
-"""Shared by all readers: sources, layout, columns, numbers and doubts."""
