@@ -76,6 +76,7 @@ def test_one_of_several_files_in_a_zip_is_given_after_its_name(tmp_path: Path) -
     assert "a.zip/one.csv; here: one.csv, in/two.csv" in str(problem.allowed)
     assert inspect_export(path).refused
     assert table_in(path / "in" / "two.csv") == TABLE
+    assert not inspect_export(path / "in" / "two.csv").refused
     with pytest.raises(ReadError, match="no such entry"):
         read_export(path / "three.csv")
 

@@ -53,6 +53,25 @@ def test_one_time_and_many_forces_headed_by_loads_are_a_record_each(tmp_path: Pa
     assert [t.label for t in inspect_export(path, columns=columns).tables] == ["250", "250", "500"]
 
 
+@pytest.mark.parametrize("rest", [[], ["Normal load [N]"]])
+def test_a_column_without_any_number_is_no_record(tmp_path: Path, rest: list[str]) -> None:
+    rows = [[*row[:3], "", *("5" for _ in rest)] for row in forces("")]
+    path = saved(tmp_path, "\t".join(["Time", "a", "b", "c", *rest]), rows)
+    columns = {"time": "Time [s]", "friction_force": "* [N]"}
+    assert [t.metadata["record"] for t in read_blocks(path, columns=columns)] == ["a", "b"]
+    seen = inspect_export(path, columns=columns)
+    assert ([t.label for t in seen.tables], seen.other_tables) == (["a", "b"], ("c",))
+
+
+def test_a_table_without_any_row_of_numbers_is_refused(tmp_path: Path) -> None:
+    path = saved(tmp_path, "Time\tnote\tF1", [[row[0], "5", ""] for row in forces("")])
+    columns = {"time": "Time [s]", "friction_force": "F* [N]"}
+    with pytest.raises(ReadError) as caught:
+        read_blocks(path, columns=columns)
+    assert {p.kind for p in caught.value.problems} == {"header_only"}
+    assert inspect_export(path, columns=columns).refused
+
+
 def test_a_wide_table_without_units_is_refused_with_what_to_give(tmp_path: Path) -> None:
     with pytest.raises(ReadError, match=r'friction_force = "\* \[N\]"'):
         read_export(saved(tmp_path, "Time\t250\t250\t500", forces()))

@@ -134,7 +134,8 @@ def inspect_export(
 
 def _unseen(path: Path, file: str) -> tuple[Problem, ...]:
     """The doubt about a large file of which only the beginning was checked; with its last line."""
-    source = open_sources(path, file)[0] if path.stat().st_size > MAPPED_BYTES else None
+    is_mapped = path.is_file() and path.stat().st_size > MAPPED_BYTES  # PATH.zip/ENTRY is no file, and never mapped
+    source = open_sources(path, file)[0] if is_mapped else None
     if source is None or not source.is_large:
         return ()
     seen, everything = len(source.beginning_only().data), len(source.data)

@@ -86,6 +86,8 @@ def parse_block(source: Source, table: Layout, used: Sequence[int]) -> tuple[Flo
 
 def parse_rows(rows: bytes, table: Layout, used: Sequence[int]) -> FloatArray | None:
     """Rows by used columns, or None where a row or a cell is not as the others."""
+    if not rows.strip():
+        return np.empty((0, len(used)))
     if b'"' in rows and rows.count(b'"') % 2:
         return None
     delimiter, n_cells = (None if table.delimiter == " " else table.delimiter), table.n_cells

@@ -218,7 +218,7 @@ def _sorted_out(
     for outcome, label in zip(outcomes, labels, strict=True):
         if isinstance(outcome, Reading):
             read.append(outcome)
-        elif all(p.kind == "missing_column" for p in outcome.problems):
+        elif all(p.kind in ("missing_column", "header_only") for p in outcome.problems):
             others.append(label)
             misfits += outcome.problems
         else:
@@ -277,6 +277,9 @@ def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -
         written, end = parse_block(source, layout, used)
     except ReadError as why:
         return why
+    if not written.size:
+        problem = Problem("header_only", "a header without data rows", source.file, layout.header_rows)
+        return ReadError(problem)
     arrays = {c.quantity: _in_si(row, c) for c, row in zip(columns, written, strict=True)}
     arrays, columns, completed = complete(arrays, columns, given.correction, source.file)
     labels, row_of = {c.quantity: c.label for c in columns}, partial(_row_of, source, layout)
