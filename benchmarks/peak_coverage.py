@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from tribo import read_pull
 from tribo.errors import TraceError
 from tribo.records import Trace
-from tribo.traces import read_pull
 
 STATIC_N, SLIDING_N = 2.0, 1.3
 ZERO_S, SLIDE_S = 2.0, 12.0

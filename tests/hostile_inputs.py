@@ -409,7 +409,7 @@ def check_overrides(draw: Draw, folder: Path, ingested: Ingested) -> str:
         file.write_bytes(damaged(draw, clean) if way == "bytes" else clean)
     try:
         found = read_overrides(file, ingested)
-        apply_overrides(ingested, file, "seed")
+        apply_overrides(ingested, file, "first_peak")
     except CampaignError as why:
         if way == "spelled":
             raise DifferentError(f"a clean table is refused: {why}") from why

@@ -112,7 +112,7 @@ def test_overrides_that_are_a_link_out_of_their_folder_are_refused(campaign: Pat
     put_link(campaign / "overrides.csv", elsewhere / "secret-file.csv")
     ingested = stages.ingest(load_campaign(campaign))
     with pytest.raises(TriboError, match="is not followed") as caught:
-        apply_overrides(ingested, campaign / "overrides.csv", "seed")
+        apply_overrides(ingested, campaign / "overrides.csv", "first_peak")
     assert "secret" not in str(caught.value)
 
 

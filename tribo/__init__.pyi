@@ -2,6 +2,7 @@ from . import plot as plot
 from .campaign import load_campaign as load_campaign, open_campaign as open_campaign, write_template as write_template
 from .diagnostics import plan_design as plan_design
 from .errors import Problem as Problem, TriboError as TriboError
+from .ingestion.exports import read_pull as read_pull
 from .mechanisms_in_model import simulate_with as simulate_with
 from .published import (
     contradictions as contradictions,
@@ -37,6 +38,5 @@ from .stages import (
     ingest as ingest,
     study as study,
 )
-from .traces import read_pull as read_pull
 
 __version__: str

@@ -71,10 +71,10 @@ def check(
 
 def _with_known_rule(options: StudyOptions, faults: list[Problem]) -> StudyOptions:
     """The options; with the usual rule, and a fault, where the rule is not known."""
-    from tribo.traces.evaluation import named_rule
+    from tribo.traces.rules import named_rule
 
     try:
-        named_rule(options.rule, None)
+        named_rule(options.rule)
     except TraceError as why:
         faults += [replace(p, file="--rule") for p in why.problems]
         return replace(options, rule=DEFAULTS.rule)

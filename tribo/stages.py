@@ -44,7 +44,7 @@ def _silent(stage: str, done: int, total: int) -> None:
 class StudyOptions:
     """Options of a study; each is recorded with the results."""
 
-    rule: str = "seed"
+    rule: str = "first_peak"
     weights: Weights = "relative"
     zero: str = ""  # of the force, for tests without their own
     load_zero: str = ""  # of the recorded normal load
@@ -78,7 +78,7 @@ DEFAULTS = StudyOptions()
 def ingest(
     campaign: Campaign,
     *,
-    rule: str = "seed",
+    rule: str = "first_peak",
     jobs: int = 1,
     overrides: Path | None = None,
     progress: Progress = _silent,
@@ -96,7 +96,9 @@ def ingest(
     """
     from tribo.ingestion.exports import ingest_campaign
     from tribo.ingestion.overrides import apply_overrides
+    from tribo.traces.rules import rule_of_today
 
+    rule = rule_of_today(rule)
     ingested = ingest_campaign(campaign, rule, jobs, progress)
     return ingested if overrides is None else apply_overrides(ingested, overrides, rule)
 

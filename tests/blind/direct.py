@@ -50,7 +50,7 @@ def ingested(bench: Bench, seed: int = 0) -> Ingested:
         tests.append(test)
         stiffness = float(bench.stiffness_N_per_mm[k]) * 1e3 * np.exp(0.05 * rng.normal())
         pulls[test.test_id] = Pull(
-            test.test_id, "seed", bench.static[k] + rng.normal(0, READING_N[0]), READING_N[0],
+            test.test_id, "first_peak", bench.static[k] + rng.normal(0, READING_N[0]), READING_N[0],
             bench.sliding[k] + rng.normal(0, READING_N[1]), READING_N[1],
             zero_N=bench.zero[k] + rng.normal(0, ZERO_N), zero_u_N=ZERO_N, onset_s=1.0, peak_s=2.0,
             window_s=(3.0, 9.0), rise_N_per_s=float(bench.stiffness_N_per_mm[k]) * row.speed_mm_s,

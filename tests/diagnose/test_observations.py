@@ -28,7 +28,7 @@ def row(k: int, **changes: object) -> Test:
 
 def pull(k: int, **changes: object) -> Pull:
     plain = Pull(
-        f"T{k}", "seed", 2.0 + k, 0.02, 1.0 + k, 0.01, zero_N=0.1 * k, zero_u_N=0.003, onset_s=2.0, peak_s=3.0,
+        f"T{k}", "first_peak", 2.0 + k, 0.02, 1.0 + k, 0.01, zero_N=0.1 * k, zero_u_N=0.003, onset_s=2.0, peak_s=3.0,
         window_s=(4.0, 9.0), rise_N_per_s=2.0, rise_stiffness_N_per_m=5e3, stick_slip_amplitude_N=0.2, noise_N=0.01,
     )  # fmt: skip
     return replace(plain, **changes)  # type: ignore[arg-type]

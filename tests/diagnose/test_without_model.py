@@ -156,7 +156,7 @@ def long_slides(excess: float, records: int = 4) -> Ingested:
         traces[name] = Trace(name, time, force)
         nan = float("nan")
         pulls[name] = Pull(
-            test_id=name, rule="seed", static_N=nan, static_u_N=nan, sliding_N=10.0, sliding_u_N=0.1, zero_N=0.0,
+            test_id=name, rule="first_peak", static_N=nan, static_u_N=nan, sliding_N=10.0, sliding_u_N=0.1, zero_N=0.0,
             zero_u_N=nan, onset_s=nan, peak_s=nan, window_s=(500.0, 999.0),
         )  # fmt: skip
     return Ingested(Campaign("pins", Path(), 1.0, tuple(tests), {"pin": Pattern("pin")}), traces, pulls, ())

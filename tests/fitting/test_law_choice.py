@@ -64,7 +64,7 @@ def ingested(order: np.ndarray, load: np.ndarray, ratio: np.ndarray) -> Ingested
         for k, (n, o) in enumerate(zip(load, order, strict=True))
     )
     pulls = {
-        t.test_id: Pull(t.test_id, "seed", math.nan, math.nan, float(r) * t.normal_load_N, 0.01, 0, 0, 0, 0, (0, 1))
+        t.test_id: Pull(t.test_id, "given", math.nan, math.nan, float(r) * t.normal_load_N, 0.01, 0, 0, 0, 0, (0, 1))
         for t, r in zip(tests, ratio, strict=True)
     }
     return Ingested(Campaign("made", Path(), 1.0, tests, {"S": Pattern("S")}), {}, pulls, ())

@@ -12,7 +12,7 @@ import pytest
 
 from tribo import stages
 from tribo.campaign import load_campaign
-from tribo.records import Ingested, Test
+from tribo.records import Ingested, Pull, Trace
 from tribo.report import gather_provenance
 
 
@@ -67,14 +67,14 @@ def test_an_exception_while_evaluating_one_export_is_the_fault_of_that_test(
     from tribo import traces
 
     campaign = load_campaign(folder)
-    read_record, bad = traces.read_record, campaign.tests[3].test_id
+    evaluate, bad = traces.evaluate, campaign.tests[3].test_id
 
-    def broken(trace: object, *, test: Test, **options: object) -> object:
-        if test.test_id == bad:
+    def broken(trace: Trace, options: traces.PullOptions) -> Pull:
+        if options.test and options.test.test_id == bad:
             raise ZeroDivisionError("division by zero")
-        return read_record(trace, test=test, **options)  # type: ignore[arg-type]
+        return evaluate(trace, options)
 
-    monkeypatch.setattr(traces, "read_record", broken)
+    monkeypatch.setattr(traces, "evaluate", broken)
     ingested = stages.ingest(campaign)
     (fault,) = ingested.set_aside
     assert fault.test_id == bad

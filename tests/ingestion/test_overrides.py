@@ -29,14 +29,14 @@ def written(folder: Path, *rows: str, header: str = HEADER) -> Path:
 
 def faults(ingested: Ingested, path: Path) -> list[Problem]:
     with pytest.raises(CampaignError) as caught:
-        apply_overrides(ingested, path, "seed")
+        apply_overrides(ingested, path, "first_peak")
     return list(caught.value.problems)
 
 
 def test_an_excluded_pull_is_set_aside_with_its_reason_and_keeps_its_reading(
     ingested: Ingested, tmp_path: Path
 ) -> None:
-    decided = apply_overrides(ingested, written(tmp_path, "T003,exclude,sled tipped,,,"), "seed")
+    decided = apply_overrides(ingested, written(tmp_path, "T003,exclude,sled tipped,,,"), "first_peak")
     assert "T003" not in decided.pulls
     assert "T003" not in decided.traces
     (aside,) = (s for s in decided.set_aside if s.test_id == "T003")
@@ -50,7 +50,7 @@ def test_a_moved_window_changes_that_pull_alone(ingested: Ingested, tmp_path: Pa
     pull = ingested.pulls["T005"]
     start, end = pull.window_s
     middle = (start + end) / 2
-    decided = apply_overrides(ingested, written(tmp_path, f"T005,move,drift,{middle},{end},"), "seed")
+    decided = apply_overrides(ingested, written(tmp_path, f"T005,move,drift,{middle},{end},"), "first_peak")
     trace = ingested.traces["T005"]
     inside = (trace.time_s >= middle) & (trace.time_s <= end)
     assert decided.pulls["T005"].sliding_N == pytest.approx(float(np.mean(trace.force_N[inside])) - pull.zero_N)
@@ -60,14 +60,14 @@ def test_a_moved_window_changes_that_pull_alone(ingested: Ingested, tmp_path: Pa
 
 
 def test_what_is_set_aside_already_stays_so(ingested: Ingested, tmp_path: Path) -> None:
-    once = apply_overrides(ingested, written(tmp_path, "T003,exclude,sled tipped,,,"), "seed")
-    again = apply_overrides(once, written(tmp_path, "T003,exclude,sled tipped,,,"), "seed")
+    once = apply_overrides(ingested, written(tmp_path, "T003,exclude,sled tipped,,,"), "first_peak")
+    again = apply_overrides(once, written(tmp_path, "T003,exclude,sled tipped,,,"), "first_peak")
     assert again.set_aside == once.set_aside
     assert again.pulls == once.pulls
 
 
 def test_an_empty_table_decides_nothing(ingested: Ingested, tmp_path: Path) -> None:
-    assert apply_overrides(ingested, written(tmp_path), "seed").pulls == ingested.pulls
+    assert apply_overrides(ingested, written(tmp_path), "first_peak").pulls == ingested.pulls
 
 
 def test_every_fault_is_listed_at_once_with_its_place(ingested: Ingested, tmp_path: Path) -> None:
@@ -111,9 +111,9 @@ def test_a_column_that_is_none_is_refused_with_the_known_ones(ingested: Ingested
 
 
 def test_a_semicolon_table_with_decimal_commas_means_the_same(ingested: Ingested, tmp_path: Path) -> None:
-    comma = apply_overrides(ingested, written(tmp_path, "T005,move,drift,10.5,12.5,"), "seed")
+    comma = apply_overrides(ingested, written(tmp_path, "T005,move,drift,10.5,12.5,"), "first_peak")
     rows = ("T005;move;drift;10,5;12,5;",)
-    semicolon = apply_overrides(ingested, written(tmp_path, *rows, header=HEADER.replace(",", ";")), "seed")
+    semicolon = apply_overrides(ingested, written(tmp_path, *rows, header=HEADER.replace(",", ";")), "first_peak")
     assert semicolon.pulls["T005"] == comma.pulls["T005"]
 
 

@@ -136,9 +136,9 @@ def test_two_lists_of_tests_are_refused(campaign: Path) -> None:
 
 def test_a_dry_run_lists_faults_of_options_table_and_output_at_once(campaign: Path) -> None:
     each_row(lambda row: {"mass_g": f"{row['mass_g']} g"}, 0, 1)(campaign)
-    result = run("report", campaign, "-o", campaign, "--rule", "sead", "--flat", "Q", "--dry-run")
+    result = run("report", campaign, "-o", campaign, "--rule", "first_peek", "--flat", "Q", "--dry-run")
     assert result.exit_code == 1
-    for said in ("did you mean seed?", "--flat", "outside of every campaign", "did you mean 25?"):
+    for said in ("did you mean first_peak?", "--flat", "outside of every campaign", "did you mean 25?"):
         assert said in result.output or said.replace("25", "138.5") in result.output
 
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tribo import read_pull
 from tribo.errors import ReadError
 from tribo.readers import inspect_export, read_export
-from tribo.traces import read_pull
 
 ROWS = 60_000
 HOLDS_THREE_COLUMNS = 3 * 8

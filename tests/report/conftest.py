@@ -15,7 +15,7 @@ from tribo.records import Study
 from tribo.report import Provenance, write_report
 
 Once = Callable[[str, Callable[[Path], object]], Path]
-PROVENANCE = Provenance("tribo report 'a b' -o out", "2026-01-01T00:00:00", 3, {"rule": "seed"})
+PROVENANCE = Provenance("tribo report 'a b' -o out", "2026-01-01T00:00:00", 3, {"rule": "first_peak"})
 
 
 class Written(NamedTuple):

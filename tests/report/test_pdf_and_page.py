@@ -92,7 +92,7 @@ def whole(study: Study) -> dict[str, Any]:
         "misfits": [misfit(text="Friction falls.")], "excluded": [{"mechanism": "tilt", "reason": "it acts otherwise"}],
         "equivalent": [["suction", "normal_load_error"]],
     }  # fmt: skip
-    return content(full, Provenance("tribo report", "2026-01-01T00:00:00", 3, {"rule": "seed"}), verdict)
+    return content(full, Provenance("tribo report", "2026-01-01T00:00:00", 3, {"rule": "first_peak"}), verdict)
 
 
 def test_whatever_the_page_says_stands_in_the_pdf(whole: dict[str, Any]) -> None:

@@ -32,7 +32,7 @@ def placed(study: Study, tmp_path: Path) -> tuple[Study, Path, Path]:
     campaign = replace(study.ingested.campaign, root=root)
     only_read = Study(replace(study.ingested, campaign=campaign))
     out = tmp_path / "out"
-    write_until(only_read, out, "ingest", provenance=gather_provenance(only_read, options={"rule": "seed"}))
+    write_until(only_read, out, "ingest", provenance=gather_provenance(only_read, options={"rule": "first_peak"}))
     return only_read, root, out
 
 
@@ -154,9 +154,9 @@ def test_a_later_command_over_the_same_inputs_keeps_what_an_earlier_one_wrote(
 ) -> None:
     only_read, _, out = placed
     fitted = replace(study, ingested=only_read.ingested, comparison=None)
-    write_until(fitted, out, "fit", provenance=gather_provenance(fitted, options={"rule": "seed", "runs": "4"}))
+    write_until(fitted, out, "fit", provenance=gather_provenance(fitted, options={"rule": "first_peak", "runs": "4"}))
     assert "fits.csv" in outputs(out)
-    write_until(only_read, out, "ingest", provenance=gather_provenance(only_read, options={"rule": "seed"}))
+    write_until(only_read, out, "ingest", provenance=gather_provenance(only_read, options={"rule": "first_peak"}))
     assert "fits.csv" in outputs(out)
     assert verify(out).unchanged
     with xr.open_datatree(out / "campaign.nc", engine="h5netcdf") as tree:
@@ -169,7 +169,7 @@ def test_what_no_longer_holds_is_removed_unless_someone_changed_it(
 ) -> None:
     only_read, _, out = placed
     fitted = replace(study, ingested=only_read.ingested, comparison=None)
-    write_until(fitted, out, "fit", provenance=gather_provenance(fitted, options={"rule": "seed"}))
+    write_until(fitted, out, "fit", provenance=gather_provenance(fitted, options={"rule": "first_peak"}))
     (out / "other_fits.csv").write_text("my own notes\n")
     (out / "mine.txt").write_text("mine\n")
     write_until(only_read, out, "ingest", provenance=gather_provenance(only_read, options={"rule": "iso_8295"}))

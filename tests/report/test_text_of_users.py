@@ -70,7 +70,7 @@ def test_decisions_by_hand_are_joined_to_ids_as_text(study: Study, tmp_path: Pat
 
     table = tmp_path / "overrides.csv"
     table.write_text("test_id,action,reason\n01,exclude,slipped\n1.0,exclude,slipped\nNone,exclude,slipped\n")
-    left = apply_overrides(study.ingested, table, "seed").pulls
+    left = apply_overrides(study.ingested, table, "first_peak").pulls
     assert set(study.ingested.pulls) - set(left) == {"01", "1.0", "None"}
 
 

@@ -16,13 +16,17 @@ from typing import Any
 import numpy as np
 from kept_numbers import scatter, write
 
+from tribo import read_pull
 from tribo.errors import TraceError
-from tribo.records import Pull, Trace
-from tribo.traces import RULES, orient_strokes, read_pull, read_pulls, split_pulls
+from tribo.records import Pull, Test, Trace
+from tribo.traces import RULES, pieces_of, read_pulls
 from tribo.traces.oscillation import stick_slip_cycles
+from tribo.zeroing import zero_choice
 
 from .synthetic import Shape, with_samples
 
+FROM_REST = Test("T", "", "", math.nan, "", zero=zero_choice("before contact"))
+LEFT_OUT = {"test_id", "rule", "zero_rule", "oscillation", "phases", "recorded_load_N", "recorded_load_u_N"}
 KEPT = Path(__file__).with_name("kept_readings.json")
 
 
@@ -142,10 +146,9 @@ def others() -> dict[str, Any]:
     found["a window chosen by hand"] = numbers(read_pull(by_hand, window_s=(5.0, 9.0)))
     found["a known zero"] = numbers(read_pull(by_hand, zero=(0.25, 0.02)))
     for name, record in records():
-        strokes = orient_strokes(split_pulls(record))
-        spans = [[t.time_s[0], t.time_s[-1], t.first_row] for t in strokes.traces]
-        zero = [strokes.zero_N, strokes.zero_u_N]
-        found[f"{name}, pieces"] = {"directions": list(strokes.directions), "zero": zero, "spans": spans}
+        pieces = pieces_of(record).values()
+        spans = [[t.time_s[0], t.time_s[-1], t.first_row] for t, _ in pieces]
+        found[f"{name}, pieces"] = {"directions": [-1 if o.turned else 1 for _, o in pieces], "spans": spans}
         for k, pull in enumerate(read_pulls(record), start=1):
             found[f"{name}, pull {k}"] = numbers(pull)
     for name, trace in cycles():
@@ -156,7 +159,7 @@ def others() -> dict[str, Any]:
 
 def read(trace: Trace, rule: str) -> Any:
     try:
-        return numbers(read_pull(trace, rule=rule))
+        return numbers(read_pull(trace, rule=rule, test=FROM_REST))
     except TraceError as fault:
         return [[p.kind, p.row, str(p.found)] for p in fault.problems]
 
@@ -164,7 +167,7 @@ def read(trace: Trace, rule: str) -> Any:
 def numbers(pull: Pull) -> Mapping[str, Any]:
     record = asdict(pull)
     said = [[p["kind"], p["row"]] for p in record.pop("problems")]
-    return {**{name: value for name, value in record.items() if name not in ("test_id", "rule")}, "problems": said}
+    return {**{name: value for name, value in record.items() if name not in LEFT_OUT}, "problems": said}
 
 
 if __name__ == "__main__":

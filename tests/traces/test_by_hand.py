@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from traces.synthetic import Shape
-from tribo.traces import read_pull
+from tribo import read_pull
 
 SHAPE = Shape(noise_N=0.004, offset_N=0.05)
 PEAK_S = SHAPE.zero_s + SHAPE.rise_s

@@ -12,10 +12,10 @@ import pandas as pd
 import pytest
 from made_campaigns import DIALECTS, MadeCampaign
 
+from tribo import read_pull
 from tribo.errors import TriboError
 from tribo.readers import read_export
 from tribo.records import Pull
-from tribo.traces import read_pull
 
 TRACE_KINDS = {"stopped_before_peak", "sign_flipped", "saturated"}
 

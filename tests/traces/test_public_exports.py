@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from in_one_test import in_one_test
 
+from tribo import read_pull
 from tribo.readers import read_blocks, read_export
 from tribo.records import Trace
-from tribo.traces import pieces_of, read_pull, read_pulls, split_pulls
-from tribo.traces.evaluation import load_of
+from tribo.traces import load_of, pieces_of, read_pulls, split_pulls
 from tribo.traces.oscillation import stick_slip_cycles
 
 GF = 9.80665e-3
@@ -34,15 +34,16 @@ def test_cetr_strokes_part_into_friction_and_zero(exports: Path, stroke: str, me
         second_half = np.abs(block.force_N[block.force_N.size // 2 :])
         assert second_half.mean() / GF == pytest.approx(mean, abs=1.0)
     strokes = pieces_of(blocks)
-    assert strokes.directions == (-1, 1)
-    assert strokes.zero_N / GF == pytest.approx(20, abs=7)
+    assert [options.turned for _, options in strokes.values()] == [True, False]
+    zeros = [options.zero.force_N / GF for _, options in strokes.values() if options.zero]
+    assert zeros == pytest.approx([-20, 20], abs=7)
     pulls = read_pulls(blocks, rule="last_share", parameters={"start_s": 0.6})
     halves = [p.sliding_N / GF for p in pulls]
     assert np.mean(halves) == pytest.approx(np.mean(means), abs=2)
     assert abs(halves[0] - halves[1]) < 0.3 * abs(means[0] - means[1])
     assert load_of(blocks[0])[0] == pytest.approx(1.96, abs=0.01)
     if stroke == "001":  # early maxima are static
-        raw = [p.static_N / GF + sign * p.zero_N / GF for p, sign in zip(pulls, (-1, 1), strict=True)]
+        raw = [(p.static_N + p.zero_N) / GF for p in pulls]
         assert raw == pytest.approx([153, 179], abs=1)
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from in_one_test import in_one_test
 
+from tribo import read_pull
 from tribo.records import STANDARD_GRAVITY, Pull, Test, Trace
-from tribo.traces import read_record
 from tribo.zeroing import zero_choice
 
 REAL = Path(__file__).resolve().parents[3] / "shared" / "real"
@@ -47,7 +47,7 @@ def quartz() -> list[Pull]:
     for column in table.T[1:]:
         there = np.isfinite(column) & np.isfinite(table[:, 0])
         trace = Trace("sand", table[there, 0], column[there])
-        pulls.append(read_record(trace, rule="highest", test=a_test("none")))
+        pulls.append(read_pull(trace, rule="highest", test=a_test("none")))
     return pulls
 
 
@@ -85,7 +85,7 @@ def test_the_paper_slider_is_read_while_it_slides(exports: Path, *rig: str) -> N
     mean, peak, trough, loading, regime = PAPER[rig[0], rig[1]]
     file = loadmat(exports / "paper-slider-stick-slip" / f"k{rig[0]}Nm_v{rig[1]}.mat")
     trace = Trace("paper", file["t"].ravel(), file["Fnorm"].ravel() * SLIDER_N)
-    pull = read_record(trace, test=a_test("", SLIDER_N, float(rig[1]) * 1e-6, float(rig[0])))
+    pull = read_pull(trace, test=a_test("", SLIDER_N, float(rig[1]) * 1e-6, float(rig[0])))
     found = pull.oscillation
     assert found is not None
     assert not pull.problems  # no sample is left out
@@ -104,7 +104,7 @@ def test_friction_in_motor_oil_is_a_constant_and_a_slope() -> None:
         table = np.genfromtxt(file, delimiter=";", skip_header=1)
         columns = {"normal_force_N": table[:, 2], "speed_m_s": table[:, 5] * 2 * math.pi * 8e-3 / 3}
         trace = Trace(file.stem, table[:, 1], table[:, 3] / (8e-3 / 3), columns=columns)
-        pull = read_record(trace, test=a_test("at rest"))
+        pull = read_pull(trace, test=a_test("at rest"))
         loads.append(pull.recorded_load_N)
         forces.append(pull.sliding_N)
     assert len(forces) == 16
@@ -118,5 +118,5 @@ def test_a_pin_on_disc_record_has_no_static_force_above_its_samples(exports: Pat
     from tribo.readers import read_export
 
     trace = read_export(exports / "ptfe-pin-on-disc" / f"{file}.tsv")
-    pull = read_record(trace, test=a_test(""))
+    pull = read_pull(trace, test=a_test(""))
     assert pull.static_N + pull.zero_N <= trace.force_N.max() + 0.5

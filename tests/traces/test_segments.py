@@ -10,14 +10,8 @@ import pytest
 
 from tribo.errors import TraceError
 from tribo.records import Trace
-from tribo.traces import orient_strokes, read_pulls, split_pulls
-from tribo.traces.evaluation import (
-    _slides_at_once as slides_at_once,
-    load_of,
-    pieces_of,
-    sampling_clip_N,
-    sampling_rate_Hz,
-)
+from tribo.traces import load_of, pieces_of, read_pulls, split_pulls
+from tribo.traces.evaluation import _slides_at_once as slides_at_once
 from tribo.traces.phases import reversals, steps
 
 from .synthetic import Shape
@@ -75,11 +69,14 @@ def test_strokes_are_cut_where_the_force_passes_its_middle(strokes: int, zero: f
 @pytest.mark.parametrize("zero", [0.0, 0.2, -0.5])
 def test_the_zero_is_half_the_asymmetry_of_the_strokes(zero: float) -> None:
     strokes = pieces_of(reciprocating(zero=zero))
-    assert strokes.zero_N == pytest.approx(zero, abs=0.01)
-    assert strokes.directions == (1, -1, 1, -1, 1, -1)
-    assert abs(strokes.zero_N - zero) < 4 * strokes.zero_u_N
-    for piece in strokes.traces:
-        assert float(np.median(piece.force_N)) == pytest.approx(1.0, rel=0.02)
+    assert list(strokes) == [f"1/{k}" for k in range(1, 7)]
+    assert [options.turned for _, options in strokes.values()] == [False, True] * 3
+    for piece, options in strokes.values():
+        assert options.zero is not None
+        sign = -1 if options.turned else 1
+        assert sign * options.zero.force_N == pytest.approx(zero, abs=0.01)
+        assert abs(sign * options.zero.force_N - zero) < 4 * options.zero.u_N
+        assert float(np.median(piece.force_N)) - options.zero.force_N == pytest.approx(1.0, rel=0.02)
 
 
 def test_strokes_of_both_directions_give_the_same_friction() -> None:
@@ -87,7 +84,8 @@ def test_strokes_of_both_directions_give_the_same_friction() -> None:
     assert [p.test_id for p in pulls] == [f"rig/{k}" for k in range(1, 7)]
     assert [p.sliding_N for p in pulls] == pytest.approx([1.0] * 6, rel=0.01)
     assert [p.static_N for p in pulls] == pytest.approx([1.2] * 6, rel=0.03)
-    assert {p.zero_N for p in pulls} == {pieces_of(reciprocating(zero=0.3)).zero_N}
+    assert [p.zero_N for p in pulls] == pytest.approx([0.3, -0.3] * 3, abs=0.01)
+    assert {p.zero_rule for p in pulls} == {"strokes in both directions"}
     assert "forward" in pulls[0].flags
     assert "backward" in pulls[1].flags
 
@@ -106,17 +104,17 @@ def test_a_stroke_without_a_static_peak_is_read_for_its_sliding_friction_and_a_f
 
 
 def test_strokes_all_one_way_have_no_zero() -> None:
-    strokes = orient_strokes([Shape(noise_N=0.01, offset_N=0.3).trace()])
-    assert math.isnan(strokes.zero_N)
+    ((_, options),) = pieces_of(Shape(noise_N=0.01, offset_N=0.3).trace()).values()
+    assert options.zero is None
     with pytest.raises(TraceError, match="no stroke"):
-        orient_strokes([])
+        pieces_of([])
 
 
 def test_several_loads_in_one_record_give_the_law() -> None:
     loads = (0.5, 1.0, 2.0, 4.0)
     record = loaded_pulls(loads, mu=0.8, tau0_A=0.4)
     pieces = split_pulls(record)
-    pulls = read_pulls(record, rule="seed")
+    pulls = read_pulls(record, rule="first_peak")
     n = np.array([load_of(p)[0] for p in pieces])
     assert n == pytest.approx(loads, rel=0.01)
     mu, tau0_area = np.polyfit(n, [p.static_N for p in pulls], 1)
@@ -139,7 +137,7 @@ def test_an_impulse_in_a_later_pull_is_listed_with_its_row_of_the_file() -> None
     at = record.time_s.size - 200
     force = record.force_N.copy()
     force[at] += 5.0
-    first, second = read_pulls(replace(record, force_N=force, first_row=30), rule="seed")
+    first, second = read_pulls(replace(record, force_N=force, first_row=30), rule="first_peak")
     assert first.problems == ()
     assert [(p.kind, p.row) for p in second.problems] == [("spike", 30 + at)]
 
@@ -177,14 +175,6 @@ def test_a_force_of_one_sign_is_not_reversed() -> None:
     assert reversals(Shape(noise_N=0.05).trace().force_N) == []
 
 
-def test_sampling_clip_is_half_the_rise_between_two_samples() -> None:
-    trace = Shape(rate_Hz=50).trace()
-    assert sampling_rate_Hz(trace) == pytest.approx(50)
-    assert sampling_clip_N(2.0, 50) == pytest.approx(0.02)
-    lost = [Shape(rate_Hz=50, zero_s=2 + k / 5000).trace().force_N.max() for k in range(100)]
-    assert 2.0 - np.mean(lost) < sampling_clip_N(2.0 / 1.5, 50) * 1.05
-
-
 @pytest.mark.parametrize(
     ("climb", "swing", "at_once"),
     [(0.0, 0.01, True), (0.15, 0.01, False), (0.15, 0.05, True), (1.2, 0.5, False)],
@@ -195,4 +185,4 @@ def test_a_piece_slides_at_once_where_it_climbs_little_for_the_swing_of_its_seco
     """From 1 N to a top at 30 % of the piece; with a climb of 1.2 N it begins below half of its maximum."""
     k = np.arange(400)
     force = 1.0 + climb * np.exp(-(((k - 120) / 30) ** 2)) + swing * np.where(k % 40 < 20, 1.0, -1.0) * (k >= 200)
-    assert slides_at_once(Trace("piece", k / RATE, force)) == at_once
+    assert slides_at_once(force) == at_once

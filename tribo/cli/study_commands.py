@@ -385,9 +385,7 @@ def _checked(
     "--with", "law_file", type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="LAW.TOML",
     help="Test this law, found in another campaign, instead of searching.",
 )
-@click.option(
-    "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
-)
+@RULE
 @click.option("--flat", default="", metavar="SAMPLE", help="Flat sample for the calibration, as in tribo report.")
 @command_options
 def discover(

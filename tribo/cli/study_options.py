@@ -96,9 +96,21 @@ OUT = output_options()
 SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler; its workers run the simulations.")
 DRY_RUN = click.option("--dry-run", is_flag=True, help="Check everything and list the steps, without results.")
 
+
+
+def _rule(context: click.Context, parameter: click.Parameter, given: str) -> str:
+    """The name of the rule today, said once where an old one was given."""
+    from tribo.traces.rules import OLD_NAMES
+
+    if given in OLD_NAMES:
+        click.echo(f"--rule {given} is now called {OLD_NAMES[given]}; both mean the same.", err=True)
+    return OLD_NAMES.get(given, given)
+
+
 RULE = click.option(
-    "--rule", default="seed", show_default=True, help="Rule by which static and sliding force are determined."
-)
+    "--rule", default="first_peak", show_default=True, callback=_rule,
+    help="Rule by which static and sliding force are determined.",
+)  # fmt: skip
 WEIGHTS = click.option(
     "--weights",
     type=click.Choice(["relative", "ratio", "force", "repeats"]),

@@ -485,12 +485,12 @@ def _takes_both_signs(record: Trace) -> bool:
 
 def _positive_over_rest(record: Trace) -> bool:
     """Whether the force while sliding lies above the level at which nothing pulls, by the recorded drive or load."""
-    from tribo.traces import read_record
+    from tribo.traces import PullOptions, evaluate
     from tribo.zeroing import zero_choice
 
     test = Test(record.name, record.file, "", math.nan, "", zero=zero_choice("at rest"))
     try:
-        return read_record(record, test=test).sliding_N > 0
+        return evaluate(record, PullOptions(test=test)).sliding_N > 0
     except TriboError:
         return False
 

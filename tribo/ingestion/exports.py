@@ -1,8 +1,7 @@
-"""Exports under the wrong test: the numbers of one test given twice, or a header that names another test.
+"""The exports of a campaign, each into tests with their traces and pulls; what cannot be used is set aside.
 
-The exports of a campaign, read one by one or on several processes, each into traces and their pulls.
-
-Every usable test of a campaign as a trace and a pull; what cannot be used is set aside with its reason.
+A row of tests.csv is read on its own, one by one or on several processes. An export that stands under the wrong test,
+because its numbers are given twice or its header names another test, is set aside at the end.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ import hashlib
 import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,204 +22,248 @@ from tribo.campaign.table import is_chosen, names_pulls, split_choice
 from tribo.errors import CampaignError, Problem, TraceError, TriboError, unexpected
 from tribo.forked import each, may_fork
 from tribo.input_files import LARGEST_LOAD_N, SMALLEST_LOAD_N, hashes_of_reads
-from tribo.records import Campaign, Correction, Ingested, Pull, SetAside, Test, Trace
-from tribo.traces.evaluation import evaluated_pull
+from tribo.records import UNCORRECTED, Campaign, Correction, Ingested, Override, Pull, SetAside, Test, Trace
 
 if TYPE_CHECKING:
     from tribo.readers import Inspection
+    from tribo.traces import PullOptions
 
-
+FEWEST_FOR_PROCESSES = 100  # below, starting processes costs more than it gains
+CHUNK = 16
+_UNLOADED = 0.05  # share of the largest load of an export below which a piece of it carries none
 _LABELLED = 0.9  # share of exports that name their own test from which on a header that names another one counts
 _FEWEST = 5
 _WORD = re.compile(r"[\w.+-]+")
 
-
-def under_the_wrong_test(traces: Mapping[str, Trace], test_ids: Collection[str]) -> dict[str, Problem]:
-    """The problem of each test whose trace belongs to another one; ``test_ids`` are all tests of the campaign.
-
-    ``other_test``: its header names another test, where the headers of a campaign name their own. ``same_numbers``: its
-    data are those of another test, and no header states to which test they belong; then none of them is used.
-    """
-    ids = frozenset(test_ids)
-    named = {test_id: ids.intersection(_words(trace)) for test_id, trace in traces.items()}
-    own = [test_id for test_id, words in named.items() if test_id in words]
-    labelled = len(own) >= max(_FEWEST, _LABELLED * len(traces))
-    found = {
-        test_id: _other_test(test_id, traces[test_id], words)
-        for test_id, words in named.items()
-        if labelled and words and test_id not in words
-    }
-    for group in _same_samples(traces):
-        doubtful = [test_id for test_id in group if test_id not in found]
-        if len(doubtful) > 1:
-            found |= {test_id: _same_numbers(test_id, traces[test_id], group) for test_id in doubtful}
-    return found
-
-
-def _words(trace: Trace) -> set[str]:
-    return {word for pair in trace.metadata.items() for text in pair for word in _WORD.findall(text)}
-
-
-def _same_samples(traces: Mapping[str, Trace]) -> list[list[str]]:
-    """Tests that share every sample of time and force, in groups of two or more."""
-    groups: dict[bytes, list[str]] = {}
-    for test_id, trace in traces.items():
-        samples = np.ascontiguousarray(np.concatenate((trace.time_s, trace.force_N)))
-        groups.setdefault(hashlib.blake2b(samples.tobytes(), digest_size=16).digest(), []).append(test_id)
-    return [group for group in groups.values() if len(group) > 1]
-
-
-def _other_test(test_id: str, trace: Trace, words: Collection[str]) -> Problem:
-    what = "the header of this export names a different test"
-    return Problem("other_test", what, trace.file, found=", ".join(sorted(words)), allowed=test_id, test_id=test_id)
-
-
-def _same_numbers(test_id: str, trace: Trace, group: Collection[str]) -> Problem:
-    others = ", ".join(other for other in group if other != test_id)
-    what = f"the data are identical to those of {others}; the correct test is not known, so none of them is used"
-    return Problem("same_numbers", what, trace.file, allowed="one measurement per test", test_id=test_id)
-
-
-FEWEST_FOR_PROCESSES = 100  # below, starting processes costs more than it gains
-CHUNK = 16
-_OFF_LOAD = 0.02  # share by which the recorded load may differ from that of the test
-_OFF_SPEED = 0.2  # share by which the travel while sliding may differ from the speed of the test times the time
-_UNLOADED = 0.05  # share of the largest load of an export below which a piece of it carries none
-
-Outcome = tuple[Trace | None, Pull] | SetAside
+Progress = Callable[[str, int, int], None]
 ColumnsFor = Callable[[str], Columns]  # the columns stated for an export, by its path in the campaign
+Outcome = tuple[Trace | None, Pull] | SetAside
 Outcomes = tuple[tuple[Test, Outcome], ...]
 
 
-@dataclass(frozen=True)
-class RowRead:
-    """The tests of a row of tests.csv with their outcomes, and the SHA-256 of every file read for them."""
+def ingest_campaign(campaign: Campaign, rule: str, jobs: int, progress: Progress) -> Ingested:
+    """Read every usable test of a campaign on ``jobs`` processes where that pays; the result does not depend on them.
 
-    outcomes: Outcomes
-    hashes: Mapping[str, str]
+    Raises
+    ------
+    CampaignError
+        No test could be read.
+    """
+    traces: dict[str, Trace] = {}
+    pulls: dict[str, Pull] = {}
+    set_aside = list(campaign.set_aside)
+    tests: list[Test] = []
+    inputs = dict(campaign.inputs)
+    read = partial(read_hashed, campaign.root, stated_columns(campaign), rule)
+    rows: Iterator[tuple[Outcomes, Mapping[str, str]]] = map(read, campaign.tests)
+    if jobs > 1 and len(campaign.tests) >= FEWEST_FOR_PROCESSES and may_fork():
+        read(campaign.tests[0])  # what it imports is then in every process
+        rows = each(read, campaign.tests, jobs, CHUNK)
+    for done, (outcomes, hashes) in enumerate(rows, start=1):
+        inputs |= hashes
+        for test, outcome in outcomes:
+            tests.append(test)
+            if isinstance(outcome, SetAside):
+                set_aside.append(outcome)
+            else:
+                trace, pulls[test.test_id] = outcome
+                if trace is not None:
+                    traces[test.test_id] = trace
+        progress("reading exports", done, len(campaign.tests))
+    ids = {test.test_id for test in tests} | {fault.test_id for fault in set_aside}
+    for test_id, problem in under_the_wrong_test(traces, ids).items():
+        del traces[test_id], pulls[test_id]
+        set_aside.append(SetAside(test_id, str(problem), (problem,)))
+    if not pulls:
+        raise CampaignError(
+            [p for fault in set_aside for p in fault.problems]
+            or [Problem("no_usable_test", "no test of this campaign is usable", file=str(campaign.root))]
+        )
+    return Ingested(replace(campaign, tests=tuple(tests), inputs=inputs), traces, pulls, tuple(set_aside))
 
 
-def read_hashed(root: Path, columns: ColumnsFor, rule: str, test: Test) -> RowRead:
-    """:func:`read_row` with the hashes of the bytes that were read, by their path in the campaign."""
+def stated_columns(campaign: Campaign) -> ColumnsFor:
+    """The columns that a campaign states for each of its exports."""
+    return partial(columns_of, general=campaign.columns, by_file=campaign.columns_by_file)
+
+
+def read_hashed(root: Path, columns: ColumnsFor, rule: str, test: Test) -> tuple[Outcomes, Mapping[str, str]]:
+    """:func:`read_row`, and the SHA-256 of the bytes of every file that was read, by its path in the campaign."""
     with hashes_of_reads() as found:
         outcomes = read_row(root, columns, rule, test)
-    return RowRead(outcomes, {Path(p).relative_to(root).as_posix(): digest for p, digest in found.items()})
+    return outcomes, {Path(p).relative_to(root).as_posix(): digest for p, digest in found.items()}
 
 
-def read_row(root: Path, columns: ColumnsFor, rule: str, test: Test) -> Outcomes:
+def read_row(root: Path, columns: ColumnsFor, rule: str, test: Test, by_hand: Override | None = None) -> Outcomes:
     """The tests of a row of tests.csv: usually one, or one per pull if the row selects pulls of its export.
 
     ``PATH#2/3`` is the third pull of the second table, ``PATH#2/*`` every pull of it, ``PATH#*`` every pull of every
-    table; if a row selects several, each becomes a separate test called ``ID#2/3``. A row without a load uses
-    the normal force recorded in the export.
+    table; if a row selects several, each becomes a separate test called ``ID#2/3``. A row without a load uses the
+    normal force recorded in the export. A test that cannot be read is set aside with its problems.
     """
-    given = evaluated_pull(test)
-    if given is not None:
-        return ((test, (None, given)),)
+    from tribo.traces import PullOptions, evaluate
+
+    options = PullOptions(rule, test=test)
+    if by_hand is not None:
+        options = replace(options, peak_s=by_hand.peak_s, window_s=by_hand.window_s)
+    outcomes: list[tuple[Test, Outcome]] = []
     try:
-        if names_pulls(split_choice(test.file)[1]):
-            return _chosen_pulls(root, columns, rule, test)
-        return (_whole(root, columns, rule, test),)
+        if test.evaluated is not None:
+            return ((test, (None, evaluate(None, options))),)
+        export, choice = split_choice(test.file)
+        if names_pulls(choice):
+            measured = list(_chosen(root / export, choice, columns(test.file), test, options).values())
+        else:
+            trace = _whole(root / test.file, columns(test.file), test.correction, test.test_id, test.file)
+            measured = [(trace, options)]
+        for trace, own in measured:
+            one = own.test or test
+            try:
+                pull = evaluate(trace, own)
+                outcomes.append((_with_load(one, pull.recorded_load_N), (trace, pull)))
+            except TraceError as why:
+                outcomes.append((one, _set_aside(one, why.problems)))
     except TriboError as why:
         return ((test, _set_aside(test, why.problems)),)
     except Exception as why:  # one export must not cost the others
         return ((test, _set_aside(test, [unexpected(why, "this export cannot be evaluated", test.file)])),)
+    return tuple(outcomes)
 
 
-def inspect_file(path: Path, columns: Columns | None = None, correction: Correction | None = None) -> Inspection:
-    """Description of an export with its pulls, each by the text that selects it in tests.csv."""
-    from tribo.readers import inspect_export, read_blocks
+def read_pull(
+    source: Trace | Path | str,
+    *,
+    rule: str = "first_peak",
+    test: Test | None = None,
+    parameters: Mapping[str, float] | None = None,
+    zero: tuple[float, float] | None = None,
+    peak_s: float | None = None,
+    window_s: tuple[float, float] | None = None,
+    columns: Columns | None = None,
+) -> Pull:
+    """Static and sliding friction of one export or trace, on the road that every test of a campaign takes.
 
-    seen = inspect_export(path, columns=columns, correction=correction)
-    if seen.refused or any(doubt.kind == "only_beginning" for doubt in seen.doubts):
-        return seen
-    try:
-        return replace(seen, pulls=_pulls_in_words(read_blocks(path, columns=columns, correction=correction)))
-    except TriboError:
-        return seen
+    Parameters
+    ----------
+    source : Trace, Path or str
+        A trace, or an export: ``"raw/a.csv"``, or ``"raw/a.csv#1/2"`` for the second pull of its first table.
+    rule : str
+        How static and sliding friction are defined: an entry of ``tribo.traces.RULES``.
+    test : Test, optional
+        Gives the pull its id, and states speed, load, stiffness and zeros.
+    parameters : Mapping[str, float], optional
+        Replace those of the rule: ``length_m``, ``skip_m``, ``share``, ``start_s``.
+    zero : (float, float), optional
+        Zero of the force and its standard uncertainty (N), where they are known otherwise than from the record.
+    peak_s, window_s : float and (float, float), optional
+        A static peak and a sliding window chosen by hand, on the clock of the record (s). The peak is then searched for
+        within two data points of ``peak_s``; the flags state what was chosen by hand.
+    columns : mapping, optional
+        What the columns of the export are, as for :func:`tribo.read_export`.
+
+    Returns
+    -------
+    Pull
+        Forces in N above the zero. The standard uncertainties (k = 1) include the scatter of the signal with its
+        correlation, that of the zero, and the drift since the zero was measured, estimated from the drift while
+        sliding; that of the static peak also the difference between a sharp and a rounded peak where the data do not
+        tell. NaN where the record does not determine a number.
+
+    Raises
+    ------
+    ReadError
+        The export cannot be read.
+    TraceError
+        The rule is unknown, no single pull is chosen, or the record holds no friction force; every problem is listed.
+
+    Examples
+    --------
+    >>> import tribo
+    >>> pull = tribo.read_pull(tribo.data_dir() / "example" / "raw" / "T001.csv")
+    >>> pull.rule, pull.flags
+    ('first_peak', ())
+    """
+    from tribo.traces import PullOptions, evaluate
+    from tribo.traces.loading import Zero
+
+    known = Zero(*zero, "known otherwise") if zero is not None else None
+    options = PullOptions(rule, parameters, test, known, peak_s=peak_s, window_s=window_s)
+    if isinstance(source, Trace):
+        return evaluate(source, options)
+    path, choice = split_choice(str(source))
+    if not names_pulls(choice):
+        return evaluate(_whole(source, columns), options)
+    pulls = _chosen(Path(path), choice, columns, test, options)
+    if len(pulls) > 1:
+        what = "several pulls are chosen, and read_pull reads one"
+        raise TraceError(Problem("several_pulls", what, path, found=choice, allowed=f"one of {', '.join(pulls)}"))
+    ((trace, own),) = pulls.values()
+    return evaluate(trace, own)
 
 
-def _pulls_in_words(tables: Sequence[Trace]) -> tuple[str, ...]:
-    """One line per pull; nothing where no table holds more than one."""
-    from tribo.traces import load_of, split_pulls
+def _whole(
+    path: Path | str,
+    columns: Columns | None,
+    correction: Correction = UNCORRECTED,
+    name: str | None = None,
+    file: str | None = None,
+) -> Trace:
+    """An export, or one table of it, as one record; with a doubt if it holds several pulls.
 
-    pieces = {f"#{t}/{p}": piece for t, table in enumerate(tables, 1) for p, piece in enumerate(split_pulls(table), 1)}
-    if len(pieces) == len(tables):
-        return ()
-    found = []
-    for choice, piece in pieces.items():
-        load = load_of(piece)[0]
-        under = "" if math.isnan(load) else f" under {load:.4g} N"
-        middle = piece.force_N[piece.force_N.size // 4 : 3 * piece.force_N.size // 4]
-        found.append(f"{choice}: {piece.time_s[0]:.6g} to {piece.time_s[-1]:.6g} s{under}, force {middle.mean():.4g} N")
-    return tuple(found)
-
-
-def _set_aside(test: Test, found: Sequence[Problem]) -> SetAside:
-    problems = tuple(replace(p, file=test.file, test_id=test.test_id) for p in found)
-    return SetAside(test.test_id, "; ".join(str(p) for p in problems), problems)
-
-
-def _whole(root: Path, columns: ColumnsFor, rule: str, test: Test) -> tuple[Test, Outcome]:
-    """An export, or one table of it, as one pull."""
+    They are recognised by steps of load or speed, or by reversals.
+    """
     from tribo.readers import read_export
-    from tribo.traces import read_record
-
-    trace = read_export(
-        root / test.file, columns=columns(test.file), correction=test.correction, name=test.test_id, file=test.file
-    )
-    pull = _without_rates(trace, read_record(trace, rule=rule, test=test))
-    test = _with_load(test, pull.recorded_load_N)
-    doubts = [d for d in (_several_pulls(trace), _off_speed(trace, pull, test), _other_load(pull, test)) if d]
-    if doubts:
-        flags, problems = (*trace.flags, *(d.kind for d in doubts)), (*trace.problems, *doubts)
-        trace = replace(trace, flags=flags, problems=problems)
-    return test, (trace, replace(pull, flags=tuple(dict.fromkeys((*trace.flags, *pull.flags)))))
-
-
-def _without_rates(trace: Trace, pull: Pull) -> Pull:
-    """The pull without what is counted per second, where path stands for time in its trace."""
-    if "no_time" not in trace.flags:
-        return pull
-    return replace(pull, rise_N_per_s=math.nan, stick_slip_period_s=math.nan, drift_N_per_s=math.nan)
-
-
-def _several_pulls(trace: Trace) -> Problem | None:
-    """A doubt if a trace read as one pull holds several, recognised by steps of load or speed or by reversals."""
     from tribo.traces import split_pulls
 
+    trace = read_export(path, columns=columns, correction=correction, name=name, file=file)
     pieces = split_pulls(trace)
     loaded = [] if len(pieces) == 1 else [k for k, there in enumerate(_carry_load(pieces)) if there]
     if len(loaded) < 2:
-        return None
+        return trace
     export, choice = split_choice(trace.file)
     table = choice or "1"
     what = f"this trace contains {len(loaded)} pulls but was read as one"
     allowed = f"{export}#{table}/{loaded[0] + 1} (and so on) for a single pull, {export}#{table}/* for all"
-    return Problem("several_pulls", what, trace.file, allowed=allowed)
+    doubt = Problem("several_pulls", what, trace.file, allowed=allowed)
+    return replace(trace, flags=(*trace.flags, doubt.kind), problems=(*trace.problems, doubt))
 
 
-def _off_speed(trace: Trace, pull: Pull, test: Test) -> Problem | None:
-    """A doubt if the displacement recorded while sliding does not match the speed given in the campaign."""
-    if trace.displacement_m is None or not test.speed_m_s or math.isnan(pull.window_s[0]):
-        return None
-    start, end = np.searchsorted(trace.time_s, pull.window_s)
-    time_s = float(trace.time_s[end] - trace.time_s[start])
-    travel_m = abs(float(trace.displacement_m[end] - trace.displacement_m[start]))
-    if time_s <= 0 or abs(travel_m / time_s / test.speed_m_s - 1.0) < _OFF_SPEED:
-        return None
-    what, found = "the displacement does not match the speed of the test", f"{travel_m / time_s * 1e3:.4g} mm/s"
-    stated = f"{test.speed_m_s * 1e3:.4g} mm/s"
-    slip = _unit_of_speed(test.speed_m_s * time_s / travel_m) if travel_m > 0 else ""
-    allowed = f"{stated}; {slip}" if slip else stated
-    return Problem("off_speed", what, trace.file, None, "displacement", found, allowed)
+def _chosen(
+    path: Path, choice: str, columns: Columns | None, test: Test | None, options: PullOptions
+) -> dict[str, tuple[Trace, PullOptions]]:
+    """Every pull of an export that a choice means, by address; all strokes of the export share one zero.
 
+    Where all pulls are chosen, those without a load are left out, and a doubt of the first one names them.
+    """
+    from tribo.readers import read_blocks
+    from tribo.traces import pieces_of
 
-def _unit_of_speed(factor: float) -> str:
-    """The unit that the stated speed may be in, as a question; ``factor`` is stated over recorded."""
-    units = {60.0: "mm/min: divide by 60", 1e3: "um/s: divide by 1000", 1e-3: "m/s: multiply by 1000"}
-    found = [words for times, words in units.items() if abs(factor / times - 1.0) < _OFF_SPEED]
-    return f"does speed_mm_s hold {found[0]}?" if found else ""
+    name, export = (test.test_id, split_choice(test.file)[0]) if test else (None, str(path))
+    correction = test.correction if test else UNCORRECTED
+    tables = read_blocks(path, columns=columns, correction=correction, name=name, file=test.file if test else None)
+    pieces = pieces_of(tables, options)
+    every = "*" in choice
+    loaded = dict(zip(pieces, _carry_load([piece for piece, _ in pieces.values()]), strict=True))
+    meant = [address for address in pieces if is_chosen(address, choice)]
+    chosen = [address for address in meant if loaded[address] or not every]
+    if not chosen:
+        what, allowed = f"no such pull; the export has {len(pieces)}", f"{export}#*, or {', '.join(pieces)} after the #"
+        raise TraceError(Problem("no_such_pull", what, found=choice, allowed=allowed))
+    found = {}
+    for address in chosen:
+        piece, own = pieces[address]
+        file = f"{export}#{address}"
+        if test:
+            test_id = f"{test.test_id}#{address}" if every else test.test_id
+            own = replace(own, test=replace(test, test_id=test_id, file=file))
+            piece = replace(piece, name=test_id)
+        piece = replace(piece, file=file)
+        if address == chosen[0] and len(chosen) < len(meant):
+            left_out = ", ".join(address for address in meant if not loaded[address])
+            doubt = Problem("unloaded", f"parts without normal load left out: {left_out}", file)
+            piece = replace(piece, problems=(*piece.problems, doubt))
+        found[address] = piece, own
+    return found
 
 
 def _carry_load(pieces: Sequence[Trace]) -> list[bool]:
@@ -229,15 +272,6 @@ def _carry_load(pieces: Sequence[Trace]) -> list[bool]:
 
     loads = np.nan_to_num(np.abs([load_of(piece)[0] for piece in pieces]))
     return [bool(load >= _UNLOADED * loads.max()) for load in loads]
-
-
-def _other_load(pull: Pull, test: Test) -> Problem | None:
-    """A doubt if the load recorded while sliding is not the one that tests.csv gives."""
-    recorded, given = pull.recorded_load_N, test.normal_load_N
-    if math.isnan(recorded) or not given > 0 or abs(recorded / given - 1.0) < _OFF_LOAD:
-        return None
-    what, found = "the normal load recorded while sliding differs from that of the test", f"{recorded:.4g} N"
-    return Problem("off_load", what, test.file, None, "normal force", found, f"about {given:.4g} N, which is used")
 
 
 def _with_load(test: Test, load: float) -> Test:
@@ -257,111 +291,63 @@ def _with_load(test: Test, load: float) -> Test:
     return replace(test, normal_load_N=load)
 
 
-def _chosen_pulls(root: Path, columns: ColumnsFor, rule: str, test: Test) -> tuple[tuple[Test, Outcome], ...]:
-    """Every pull that the choice of a test means, as a test of its own; all strokes of an export share one zero."""
-    from tribo.readers import read_blocks
-    from tribo.traces import orient_strokes, split_pulls
-    from tribo.traces.evaluation import read_pieces
-
-    export, choice = split_choice(test.file)
-    tables = read_blocks(
-        root / export, columns=columns(test.file), correction=test.correction, name=test.test_id, file=test.file
-    )
-    pieces = {f"{t}/{p}": piece for t, table in enumerate(tables, 1) for p, piece in enumerate(split_pulls(table), 1)}
-    strokes = orient_strokes(list(pieces.values()))
-    loaded = dict(zip(pieces, _carry_load(strokes.traces), strict=True))
-    chosen = [address for address in pieces if is_chosen(address, choice) and (loaded[address] or "*" not in choice)]
-    if not chosen:
-        what, allowed = f"no such pull; the export has {len(pieces)}", f"{export}#*, or {', '.join(pieces)} after the #"
-        raise TraceError(Problem("no_such_pull", what, found=choice, allowed=allowed))
-    zero = 0.0 if math.isnan(strokes.zero_N) else strokes.zero_N
-    found = []
-    read = read_pieces(strokes, rule=rule, test=test)
-    for address, piece, sign, pull in zip(pieces, strokes.traces, strokes.directions, read, strict=True):
-        if address in chosen:
-            name = f"{test.test_id}#{address}" if "*" in choice else test.test_id
-            one = replace(test, test_id=name, file=f"{export}#{address}")
-            found.append(_one_of_several(one, piece, sign * zero, pull))
-    left_out = [address for address in pieces if is_chosen(address, choice) and not loaded[address]]
-    return _with_note(tuple(found), left_out if "*" in choice else [])
+def _set_aside(test: Test, found: Sequence[Problem]) -> SetAside:
+    problems = tuple(replace(p, file=test.file, test_id=test.test_id) for p in found)
+    return SetAside(test.test_id, "; ".join(str(p) for p in problems), problems)
 
 
-def _one_of_several(test: Test, piece: Trace, zero_N: float, pull: Pull | TraceError) -> tuple[Test, Outcome]:
-    """One pull of an export; the trace keeps its zero, as one that was read alone does."""
-    if isinstance(pull, TraceError):
-        return test, _set_aside(test, pull.problems)
-    from tribo.traces import load_of
+def inspect_file(path: Path, columns: Columns | None = None, correction: Correction | None = None) -> Inspection:
+    """Description of an export with its pulls, each by the text that selects it in tests.csv."""
+    from tribo.readers import inspect_export, read_blocks
+    from tribo.traces import load_of, split_pulls
 
+    seen = inspect_export(path, columns=columns, correction=correction)
+    if seen.refused or any(doubt.kind == "only_beginning" for doubt in seen.doubts):
+        return seen
     try:
-        test = _with_load(test, load_of(piece)[0])
-    except TraceError as why:
-        return test, _set_aside(test, why.problems)
-    trace = replace(piece, name=test.test_id, file=test.file, force_N=piece.force_N + zero_N)
-    flags = tuple(dict.fromkeys((*trace.flags, *pull.flags)))
-    pull = _without_rates(trace, pull)
-    return test, (trace, replace(pull, test_id=test.test_id, zero_N=zero_N or pull.zero_N, flags=flags))
+        tables = read_blocks(path, columns=columns, correction=correction)
+    except TriboError:
+        return seen
+    pieces = {f"#{t}/{p}": piece for t, table in enumerate(tables, 1) for p, piece in enumerate(split_pulls(table), 1)}
+    if len(pieces) == len(tables):  # no table holds more than one
+        return seen
+    lines = []
+    for choice, piece in pieces.items():
+        load = load_of(piece)[0]
+        under = "" if math.isnan(load) else f" under {load:.4g} N"
+        middle = piece.force_N[piece.force_N.size // 4 : 3 * piece.force_N.size // 4]
+        lines.append(f"{choice}: {piece.time_s[0]:.6g} to {piece.time_s[-1]:.6g} s{under}, force {middle.mean():.4g} N")
+    return replace(seen, pulls=tuple(lines))
 
 
-def _with_note(found: tuple[tuple[Test, Outcome], ...], left_out: Sequence[str]) -> tuple[tuple[Test, Outcome], ...]:
-    """The pulls of an export, the first with a doubt that names the pieces left out because they carry no load."""
-    first = next((k for k, (_, outcome) in enumerate(found) if not isinstance(outcome, SetAside)), None)
-    if not left_out or first is None:
-        return found
-    test, outcome = found[first]
-    assert not isinstance(outcome, SetAside)
-    trace, pull = outcome
-    assert trace is not None
-    doubt = Problem("unloaded", f"parts without normal load left out: {', '.join(left_out)}", test.file)
-    trace = replace(trace, problems=(*trace.problems, doubt))
-    return *found[:first], (test, (trace, pull)), *found[first + 1 :]
+def under_the_wrong_test(traces: Mapping[str, Trace], test_ids: Collection[str]) -> dict[str, Problem]:
+    """The problem of each test whose trace belongs to another one; ``test_ids`` are all tests of the campaign.
 
-
-def read_all(campaign: Campaign, rule: str, jobs: int = 1) -> Iterator[RowRead]:
-    """The tests of every row with their outcomes, in the order of the campaign."""
-    columns = partial(columns_of, general=campaign.columns, by_file=campaign.columns_by_file)
-    read = partial(read_hashed, campaign.root, columns, rule)
-    if jobs == 1 or len(campaign.tests) < FEWEST_FOR_PROCESSES or not may_fork():
-        yield from map(read, campaign.tests)
-        return
-    read(campaign.tests[0])  # what it imports is then in every process
-    yield from each(read, campaign.tests, jobs, CHUNK)
-
-
-Progress = Callable[[str, int, int], None]
-
-
-def ingest_campaign(campaign: Campaign, rule: str, jobs: int, progress: Progress) -> Ingested:
-    """Read every usable test of a campaign on ``jobs`` processes where that pays; the result does not depend on them.
-
-    Raises
-    ------
-    CampaignError
-        No test could be read.
+    ``other_test``: its header names another test, where the headers of a campaign name their own. ``same_numbers``: its
+    data are those of another test, and no header states to which test they belong; then none of them is used.
     """
-
-    traces: dict[str, Trace] = {}
-    pulls: dict[str, Pull] = {}
-    set_aside = list(campaign.set_aside)
-    tests: list[Test] = []
-    inputs = dict(campaign.inputs)
-    for done, row in enumerate(read_all(campaign, rule, jobs), start=1):
-        inputs |= row.hashes
-        for test, outcome in row.outcomes:
-            tests.append(test)
-            if isinstance(outcome, SetAside):
-                set_aside.append(outcome)
-            else:
-                trace, pulls[test.test_id] = outcome
-                if trace is not None:
-                    traces[test.test_id] = trace
-        progress("reading exports", done, len(campaign.tests))
-    ids = {test.test_id for test in tests} | {fault.test_id for fault in set_aside}
-    for test_id, problem in under_the_wrong_test(traces, ids).items():
-        del traces[test_id], pulls[test_id]
-        set_aside.append(SetAside(test_id, str(problem), (problem,)))
-    if not pulls:
-        raise CampaignError(
-            [p for fault in set_aside for p in fault.problems]
-            or [Problem("no_usable_test", "no test of this campaign is usable", file=str(campaign.root))]
-        )
-    return Ingested(replace(campaign, tests=tuple(tests), inputs=inputs), traces, pulls, tuple(set_aside))
+    ids = frozenset(test_ids)
+    named: dict[str, set[str]] = {}
+    groups: dict[bytes, list[str]] = {}  # tests that share every sample of time and force
+    for test_id, trace in traces.items():
+        words = {word for pair in trace.metadata.items() for text in pair for word in _WORD.findall(text)}
+        named[test_id] = words & ids
+        samples = np.ascontiguousarray(np.concatenate((trace.time_s, trace.force_N)))
+        groups.setdefault(hashlib.blake2b(samples.tobytes(), digest_size=16).digest(), []).append(test_id)
+    labelled = sum(test_id in words for test_id, words in named.items()) >= max(_FEWEST, _LABELLED * len(traces))
+    found: dict[str, Problem] = {}
+    for test_id, words in named.items():
+        if labelled and words and test_id not in words:
+            what, other = "the header of this export names a different test", ", ".join(sorted(words))
+            file = traces[test_id].file
+            found[test_id] = Problem("other_test", what, file, found=other, allowed=test_id, test_id=test_id)
+    for group in groups.values():
+        doubtful = [test_id for test_id in group if test_id not in found]
+        for test_id in doubtful if len(doubtful) > 1 else ():
+            others = ", ".join(other for other in group if other != test_id)
+            what = (
+                f"the data are identical to those of {others}; the correct test is not known, so none of them is used"
+            )
+            file, allowed = traces[test_id].file, "one measurement per test"
+            found[test_id] = Problem("same_numbers", what, file, allowed=allowed, test_id=test_id)
+    return found

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from tribo.campaign.table import Table, TestRow, read_table
-from tribo.errors import CampaignError, Problem, TraceError, system_problem, unexpected
+from tribo.errors import CampaignError, Problem, system_problem
 from tribo.files import LEADS_OUT, leads_out
+from tribo.ingestion.exports import read_row, stated_columns
 from tribo.input_files import hashes_of_reads
-from tribo.records import ByHand, Ingested, Override, Pull, SetAside, Trace
+from tribo.records import ByHand, Ingested, Override, SetAside, Trace
 from tribo.user_text import did_you_mean
 
 TIMES = ("window_start_s", "window_end_s", "peak_s")
@@ -27,8 +29,8 @@ def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
     """The campaign with overrides.csv applied: pulls excluded, static peaks and windows moved.
 
     Columns: test_id, action (``exclude`` or ``move``), reason, window_start_s, window_end_s, peak_s; times on the
-    clock of the trace. A pull excluded is set aside with its reason; a moved one is evaluated again by the same rule,
-    with the given peak or window. The automatic results of both are kept in ``by_hand``.
+    clock of the trace. A pull excluded is set aside with its reason; a moved one is read again from its export by the
+    same rule, with the given peak or window. The automatic results of both are kept in ``by_hand``.
 
     Raises
     ------
@@ -38,48 +40,35 @@ def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
     with hashes_of_reads() as hashes:
         overrides = read_overrides(path, ingested)
     known = [o for o in overrides if o.test_id in ingested.pulls]  # what is set aside already stays so
-    by_hand = {o.test_id: ByHand(o, ingested.traces[o.test_id], ingested.pulls[o.test_id]) for o in known}
-    left_out = tuple(_left_out(o, path.name) for o in known if o.action == "exclude")
+    by_hand = {
+        o.test_id: ByHand(o, ingested.traces[o.test_id], ingested.pulls[o.test_id])
+        for o in known
+        if o.test_id in ingested.traces
+    }
+    left_out = tuple(
+        SetAside(o.test_id, f"excluded by hand in {path.name}: {o.reason}") for o in known if o.action == "exclude"
+    )
     gone = {s.test_id for s in left_out}
     pulls = {i: p for i, p in ingested.pulls.items() if i not in gone}
     if not pulls:
         raise CampaignError(Problem("no_usable_test", "all tests are excluded", file=path.name))
-    pulls |= _moved(ingested, [o for o in known if o.action == "move"], rule)
+    tests = {t.test_id: t for t in ingested.campaign.tests}
+    columns, problems = stated_columns(ingested.campaign), []
+    for o in known:
+        if o.action == "move":
+            ((_, outcome),) = read_row(ingested.campaign.root, columns, rule, tests[o.test_id], o)
+            if isinstance(outcome, SetAside):
+                problems += outcome.problems
+            else:
+                pulls[o.test_id] = outcome[1]
+    if problems:
+        raise CampaignError(problems)
     traces = {i: t for i, t in ingested.traces.items() if i not in gone}
     inputs = {**ingested.campaign.inputs, **dict.fromkeys([OVERRIDES], *hashes.values())}
     return replace(
         ingested, campaign=replace(ingested.campaign, inputs=inputs), traces=traces, pulls=pulls,
         set_aside=(*ingested.set_aside, *left_out), by_hand=by_hand,
     )  # fmt: skip
-
-
-def _left_out(override: Override, file: str) -> SetAside:
-    return SetAside(override.test_id, f"excluded by hand in {file}: {override.reason}")
-
-
-def _moved(ingested: Ingested, overrides: list[Override], rule: str) -> dict[str, Pull]:
-    from tribo.traces import read_pull
-
-    tests = {t.test_id: t for t in ingested.campaign.tests}
-    found: dict[str, Pull] = {}
-    problems: list[Problem] = []
-    for o in overrides:
-        trace = ingested.traces[o.test_id]
-        try:
-            automatic = ingested.pulls[o.test_id]
-            known = automatic.zero_rule not in ("", "before contact") and math.isfinite(automatic.zero_u_N)
-            zero = (automatic.zero_N, automatic.zero_u_N) if known else None
-            pull = read_pull(trace, rule=rule, test=tests[o.test_id], zero=zero, peak_s=o.peak_s, window_s=o.window_s)
-        except TraceError as why:
-            problems += why.problems
-            continue
-        except Exception as why:
-            problems.append(unexpected(why, "this pull cannot be evaluated", trace.file).at(test_id=o.test_id))
-            continue
-        found[o.test_id] = replace(pull, flags=tuple(dict.fromkeys((*trace.flags, *pull.flags))))
-    if problems:
-        raise CampaignError(problems)
-    return found
 
 
 def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
@@ -104,24 +93,30 @@ def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
         raise CampaignError(Problem("empty", "the file has no header", file=file, allowed=",".join(COLUMNS)))
     if faults := list(_header_faults(table, file)):
         raise CampaignError(faults)
-    known = _known_tests(ingested)
-    problems = list(_repeated(table, file))
+    traces: dict[str, Trace | None] = dict.fromkeys([s.test_id for s in ingested.set_aside])
+    traces |= {t.test_id: ingested.traces.get(t.test_id) for t in ingested.campaign.tests}
+    elsewhere = ingested.pulls.keys() - ingested.traces.keys()
+    first: dict[str, int] = {}
+    problems: list[Problem] = []
     overrides = []
     for row in table.rows:
-        faults = [row.fault] if row.fault else list(_row_faults(row, file, known))
+        if row.test_id in first:
+            what = f"this test already occurs in row {first[row.test_id]}"
+            found = Problem("duplicate_row", what, file, row.row, "test_id", row.test_id, "one row per test")
+            problems.append(found)
+        first.setdefault(row.test_id, row.row)
+        times, faults = _times(row, file)
+        faults += _row_faults(row, file, traces, elsewhere, None if faults else times)
+        faults = [row.fault] if row.fault else faults
         problems += faults
         if not faults:
-            overrides.append(_override(row))
+            window = (times["window_start_s"], times["window_end_s"]) if "window_start_s" in times else None
+            action: Literal["exclude", "move"] = "exclude" if row.cells["action"] == "exclude" else "move"
+            reason = row.cells.get("reason", "")
+            overrides.append(Override(row.cells["test_id"], action, reason, window, times.get("peak_s"), row.row))
     if problems:
         raise CampaignError(problems)
     return tuple(overrides)
-
-
-def _known_tests(ingested: Ingested) -> dict[str, Trace | None]:
-    """Every test of the campaign with its trace, None where it has none."""
-    found: dict[str, Trace | None] = {s.test_id: None for s in ingested.set_aside}
-    found |= {t.test_id: None for t in ingested.campaign.tests}
-    return found | dict(ingested.traces)
 
 
 def _header_faults(table: Table, file: str) -> Iterator[Problem]:
@@ -135,40 +130,6 @@ def _header_faults(table: Table, file: str) -> Iterator[Problem]:
                           did_you_mean(name, COLUMNS) or ", ".join(COLUMNS))  # fmt: skip
         elif table.names.count(name) > 1:
             yield Problem("duplicate_column", "this column occurs twice", file, table.header_row, name)
-
-
-def _repeated(table: Table, file: str) -> Iterator[Problem]:
-    first: dict[str, int] = {}
-    for row in table.rows:
-        if row.test_id in first:
-            what = f"this test already occurs in row {first[row.test_id]}"
-            yield Problem("duplicate_row", what, file, row.row, "test_id", row.test_id, "one row per test")
-        first.setdefault(row.test_id, row.row)
-
-
-def _row_faults(row: TestRow, file: str, known: Mapping[str, Trace | None]) -> Iterator[Problem]:
-    test_id, action = row.cells.get("test_id", ""), row.cells.get("action", "")
-    if test_id not in known:
-        hint = "; ".join(filter(None, ("a test of this campaign", did_you_mean(test_id, known, 0.5))))
-        yield Problem("unknown_test", "no test has this test_id", file, row.row, "test_id", test_id, hint)
-    if action not in ACTIONS:
-        hint = did_you_mean(action, ACTIONS) or " or ".join(ACTIONS)
-        yield Problem("unknown_action", "unknown action", file, row.row, "action", action, hint)
-    times, faults = _times(row, file)
-    yield from faults
-    if action == "exclude":
-        yield from _exclude_faults(row, file)
-    elif action == "move" and not faults:
-        yield from _move_faults(row, file, times, known.get(test_id))
-
-
-def _exclude_faults(row: TestRow, file: str) -> Iterator[Problem]:
-    if not row.cells.get("reason"):
-        yield Problem("no_reason", "an excluded test needs a reason", file, row.row, "reason", "", "a short text")
-    for column in TIMES:
-        if cell := row.cells.get(column):
-            what = "an excluded test cannot have a peak or window"
-            yield Problem("unused_cell", what, file, row.row, column, cell, "an empty cell")
 
 
 def _times(row: TestRow, file: str) -> tuple[dict[str, float], list[Problem]]:
@@ -188,6 +149,35 @@ def _times(row: TestRow, file: str) -> tuple[dict[str, float], list[Problem]]:
     return found, problems
 
 
+def _row_faults(
+    row: TestRow,
+    file: str,
+    traces: Mapping[str, Trace | None],
+    elsewhere: Collection[str],
+    times: Mapping[str, float] | None,
+) -> Iterator[Problem]:
+    """Faults of a row; ``times`` are None where one of them is none, ``elsewhere`` the tests evaluated elsewhere."""
+    test_id, action = row.cells.get("test_id", ""), row.cells.get("action", "")
+    if test_id not in traces:
+        hint = "; ".join(filter(None, ("a test of this campaign", did_you_mean(test_id, traces, 0.5))))
+        yield Problem("unknown_test", "no test has this test_id", file, row.row, "test_id", test_id, hint)
+    if action not in ACTIONS:
+        hint = did_you_mean(action, ACTIONS) or " or ".join(ACTIONS)
+        yield Problem("unknown_action", "unknown action", file, row.row, "action", action, hint)
+    if action == "exclude":
+        if not row.cells.get("reason"):
+            yield Problem("no_reason", "an excluded test needs a reason", file, row.row, "reason", "", "a short text")
+        for column in TIMES:
+            if cell := row.cells.get(column):
+                what = "an excluded test cannot have a peak or window"
+                yield Problem("unused_cell", what, file, row.row, column, cell, "an empty cell")
+    elif action == "move" and test_id in elsewhere:
+        what = "the forces of this test were evaluated elsewhere, so it has no peak and no window to move"
+        yield Problem("no_trace", what, file, row.row, "action", action, "exclude")
+    elif action == "move" and times is not None:
+        yield from _move_faults(row, file, times, traces.get(test_id))
+
+
 def _move_faults(row: TestRow, file: str, times: Mapping[str, float], trace: Trace | None) -> Iterator[Problem]:
     start, end = times.get("window_start_s"), times.get("window_end_s")
     if not times:
@@ -201,32 +191,15 @@ def _move_faults(row: TestRow, file: str, times: Mapping[str, float], trace: Tra
         yield Problem("window_reversed", "the window must end after its start", file, row.row, "window_end_s", found,
                       f"more than {start:g}")  # fmt: skip
         return
-    if trace is not None:
-        yield from _outside(row, file, times, trace)
-
-
-def _outside(row: TestRow, file: str, times: Mapping[str, float], trace: Trace) -> Iterator[Problem]:
+    if trace is None:
+        return
     first, last = float(trace.time_s[0]), float(trace.time_s[-1])
     for column, value in times.items():
         if not first <= value <= last:
             what = "this time is outside the recorded trace"
             yield Problem("outside_trace", what, file, row.row, column, row.cells[column], f"{first:g} to {last:g}")
-    if {"window_start_s", "window_end_s"} <= times.keys():
-        inside = (trace.time_s >= times["window_start_s"]) & (trace.time_s <= times["window_end_s"])
-        if np.count_nonzero(inside) < FEWEST_IN_WINDOW:
+    if start is not None and end is not None:
+        inside = np.count_nonzero((trace.time_s >= start) & (trace.time_s <= end))
+        if inside < FEWEST_IN_WINDOW:
             yield Problem("window_short", "too few data points in this window", file, row.row, "window_end_s",
-                          f"{np.count_nonzero(inside)} data points", f"at least {FEWEST_IN_WINDOW}")  # fmt: skip
-
-
-def _override(row: TestRow) -> Override:
-    times, _ = _times(row, "")
-    window = (times["window_start_s"], times["window_end_s"]) if "window_start_s" in times else None
-    action = row.cells["action"]
-    return Override(
-        row.cells["test_id"],
-        "exclude" if action == "exclude" else "move",
-        row.cells.get("reason", ""),
-        window,
-        times.get("peak_s"),
-        row.row,
-    )
+                          f"{inside} data points", f"at least {FEWEST_IN_WINDOW}")  # fmt: skip

@@ -12,7 +12,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ from tribo.site.steps import INDEX, JOURNAL, OF_A_REPORT, Step, due_steps, input
 from tribo.site.workflow import Progress, run_workflow
 from tribo.stages import StudyOptions, Weights
 from tribo.temporary import PREFIX, clear_abandoned, place_of_temporary_files
-from tribo.traces.evaluation import named_rule
+from tribo.traces.rules import named_rule
 from tribo.user_text import well_formed
 
 GONE = "report.html has been deleted"
@@ -44,7 +44,7 @@ class BuildError(TriboError):
 class BuildOptions:
     """What a build may choose: ``settle_s`` is how long a file must rest, ``keep`` how many dated copies stay."""
 
-    rule: str = "seed"
+    rule: str = "first_peak"
     weights: Weights = "relative"
     flat: str = ""  # as --flat of the commands
     runs: int = 4
@@ -138,7 +138,7 @@ def build_site(
     if find_spec("snakemake") is None:
         what, allowed = "tribo build requires snakemake", "pip install 'tribo[pipelines]'"
         raise BuildError(Problem("missing_package", what, allowed=allowed))
-    named_rule(options.rule, None)
+    options = replace(options, rule=named_rule(options.rule).name)
     check_site(site, drop, options.force)
     state = site.resolve() / STATE
     if dry_run:

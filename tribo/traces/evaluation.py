@@ -1,274 +1,378 @@
-"""From a trace to a pull: static and sliding friction by a named rule, with within-trace uncertainties.
+"""From a trace to a pull: the one road by which a measurement becomes static and sliding friction.
 
-Friction forces of a record of any shape: started from rest or in motion, with stops of the drive or none.
-
-All pulls of a record that contains several: reciprocating strokes, steps of load or speed.
-
-Tests whose forces were evaluated elsewhere: they have no trace, and their forces are taken as they stand.
+:func:`evaluate` cuts a record into its phases first, by its channels and its force, and then reads every stretch of
+motion: the first one for the forces of the pull, each one after a stop of the drive for a static force of its own. A
+whole record, a stroke or another piece cut from a record (:func:`pieces_of`), a window moved by hand and forces that
+were evaluated elsewhere are inputs to it. Nothing else makes a :class:`~tribo.records.Pull`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from tribo.errors import Problem, TraceError
-from tribo.records import STANDARD_GRAVITY, FloatArray, Oscillation, Phase, Pull, Restart, Test, Trace
-from tribo.traces.loading import climb_of, starting_level
+from tribo.records import STANDARD_GRAVITY, Evaluated, FloatArray, Phase, Pull, Restart, Test, Trace
+from tribo.traces.loading import Zero, climb_of, starting_level
 from tribo.traces.oscillation import oscillation_of
-from tribo.traces.peak import Apex, find_apex, near
-from tribo.traces.phases import Course, Range, Strokes, course_of, orient_strokes, piece_of, split_pulls
-from tribo.traces.rules import RULES, Rule
-from tribo.traces.signal import Signal, line, median_of_three, signal_of, steady, unreadable
-from tribo.traces.sliding import (
-    Motion,
-    Sliding,
-    in_motion,
-    settled,
-    slides_on_closed_track,
-    sliding_over,
-    window_between,
-)
-from tribo.traces.static_readings import StaticReadings, static_readings, within_samples
-from tribo.traces.zero import Level, chosen_zero, disagreement_N, load_level
-from tribo.user_text import did_you_mean
+from tribo.traces.peak import Apex, Motion, find_apex, in_motion, left_open_N, near, static_readings, within_samples
+from tribo.traces.phases import Course, course_of, directions_of, piece_of, split_pulls
+from tribo.traces.rules import DEFAULT_RULE, Rule, named_rule
+from tribo.traces.signal import Signal, line, median_of_three, signal_of, steady
+from tribo.traces.sliding import Sliding, settled, slides_on_closed_track, sliding_over, window_between
+from tribo.traces.zero import BEFORE_CONTACT, chosen_zero, disagreement_N, load_level, stated_zeros
 
+GIVEN = "given"  # the rule of forces that were evaluated elsewhere
+_LEFT_OUT = 0.1  # share at the start of a record that slides from its first sample, left out as not yet settled
+_FEWEST = 20
+_FEWEST_BY_HAND = 10
+_WITH_LOAD = 0.6  # correlation of force and load from which on the force follows the load
+_SETTLED = 0.05  # share of its mean by which a force may change while it slides and still count as settled
+_LEAD_IN = 0.75  # share of a stop after which the piece that holds its restart begins
 _GAP = 3.0
-
-
-def read_pull(
-    trace: Trace,
-    *,
-    rule: str = "seed",
-    test: Test | None = None,
-    parameters: Mapping[str, float] | None = None,
-    zero: tuple[float, float] | None = None,
-    peak_s: float | None = None,
-    window_s: tuple[float, float] | None = None,
-) -> Pull:
-    """Determine static and sliding friction from one trace.
-
-    ``rule`` names an entry of ``RULES``; ``parameters`` replace its own (``length_m``, ``skip_m``,
-    ``share``, ``start_s``). ``test`` gives the pull its id and, where the trace has no displacement, its speed.
-    ``zero`` is the zero of the force with its standard uncertainty (N) where it is known otherwise than from the
-    force before contact, such as from the asymmetry of strokes. ``peak_s`` and ``window_s``, on the clock of the
-    trace, are a static peak and a sliding window chosen by hand: the peak is then searched for within two data points
-    of ``peak_s``, and the flags state what was chosen by hand.
-
-    The standard uncertainties include the scatter of the signal (with its correlation), that of the zero, and the drift
-    of the signal since the zero was measured, estimated from the drift while sliding. That of the static peak also
-    includes the difference between a sharp peak and a rounded one that the data do not exclude.
-
-    Raises
-    ------
-    TraceError
-        The rule is unknown, or the trace holds no readable pull; every problem found is listed.
-    """
-    asked = Asked(named_rule(rule, parameters), test.speed_m_s if test else None, zero, peak_s, window_s)
-    test_id, file = (test.test_id if test else None), trace.file or None
-    try:
-        pull = pull_of(signal_of(trace), asked)
-    except TraceError as fault:
-        raise TraceError([p.at(file=file, test_id=test_id) for p in fault.problems]) from None
-    return replace(
-        pull,
-        test_id=test_id or trace.name,
-        problems=tuple(p.at(file=file, test_id=test_id) for p in pull.problems),
-    )
+_NO_PEAK = {"stopped_before_peak", "sign_flipped", "spike"}  # problems of a piece that only slides
+_CLIMB_OVER_SWING = 5.0
+_OFF_LOAD = 0.02  # share by which the recorded load may differ from that of the test
+_OFF_SPEED = 0.2  # share by which the travel while sliding may differ from the speed of the test times the time
 
 
 @dataclass(frozen=True)
-class Asked:
-    """How a pull is to be read: its rule, its speed, and what is known otherwise or was chosen by hand."""
+class PullOptions:
+    """How a trace is read.
 
-    rule: Rule
-    speed_m_s: float | None = None
-    zero: tuple[float, float] | None = None
+    Parameters
+    ----------
+    rule : str
+        An entry of ``RULES``.
+    parameters : Mapping[str, float], optional
+        Replace those of the rule: ``length_m``, ``skip_m``, ``share``, ``start_s``.
+    test : Test, optional
+        The test that the trace belongs to: its id, speed, load and stiffness, and the zeros stated for it.
+    zero, load_zero : Zero, optional
+        Zero of the force and of the load where they are known otherwise than from this trace, such as from the strokes
+        beside it. They stand before those of ``test``.
+    begins : {"", "step", "reversal"}
+        How a piece begins that was cut from a record: at a step of load or speed, or where the pull changes direction.
+        Empty for a whole record, whose channels and force tell.
+    turned : bool
+        Whether the sign of the force was changed, so that friction is positive.
+    peak_s, window_s : float and (float, float), optional
+        A static peak and a sliding window chosen by hand, on the clock of the trace.
+    """
+
+    rule: str = DEFAULT_RULE
+    parameters: Mapping[str, float] | None = None
+    test: Test | None = None
+    zero: Zero | None = None
+    load_zero: Zero | None = None
+    begins: Literal["", "step", "reversal"] = ""
+    turned: bool = False
     peak_s: float | None = None
     window_s: tuple[float, float] | None = None
 
 
-def pull_of(signal: Signal, asked: Asked) -> Pull:
-    """The pull of a signal, without a name (see :func:`read_pull`)."""
-    rule, peak_s, window_s = asked.rule, asked.peak_s, asked.window_s
-    climb = climb_of(signal, asked.zero)
-    climb = climb if peak_s is None else near(climb, peak_s)
-    apex = find_apex(climb)
-    motion = in_motion(climb, apex, asked.speed_m_s)
+WHOLE = PullOptions()
+
+
+def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
+    """Static and sliding friction of one trace, whatever it begins and ends with.
+
+    The channels of a record tell when the bodies touch, when the drive moves, stops and goes on
+    (:mod:`tribo.traces.phases`). A record that starts from rest gives a static peak and a sliding mean; one that slides
+    from its first sample only the mean; each restart after a stop a static force of its own, with the time the drive
+    stood still. The zero is the one that is known or stated, else the level before contact; a level read while sliding
+    is never subtracted. Where two levels without load differ, the difference is part of every uncertainty.
+
+    Parameters
+    ----------
+    trace : Trace, optional
+        Force (n,) against time (n,) with n >= 20. None for a test whose forces were evaluated elsewhere.
+    options : PullOptions
+        Rule, test, zeros, and what was chosen by hand.
+
+    Returns
+    -------
+    Pull
+        Forces in N above the zero with standard uncertainties (k = 1); NaN where the trace does not determine one.
+
+    Raises
+    ------
+    TraceError
+        The rule is unknown, a zero cannot be read as stated, or the trace holds no friction force; all problems.
+    """
+    rule = named_rule(options.rule, options.parameters)
+    if trace is None:
+        assert options.test is not None
+        assert options.test.evaluated is not None
+        return _evaluated_elsewhere(options.test.test_id, options.test.evaluated)
+    test = options.test or Test(trace.name, trace.file, "", math.nan, "")
+    options = replace(options, rule=rule.name, test=test)
+    zero, load_zero, load = options.zero, options.load_zero, trace.columns.get("normal_force_N")
+    try:
+        signal = signal_of(trace)
+        if options.begins:
+            whole = (0, signal.time_s.size)
+            course = Course(whole, whole[1], (), (), options.begins == "step" and _slides_at_once(trace.force_N))
+        else:
+            course = course_of(trace, signal)
+            zero = zero or chosen_zero(test.zero, signal.time_s, signal.force_N, course, trace.file)
+            if zero is None and test.zero.kind == "before contact":  # as stated, whatever the force looks like
+                course = replace(course, slides_at_once=False)
+        pull = _first_motion(trace, signal, course, zero, options, rule)
+        if zero and zero.drifts:
+            pull = replace(pull, flags=(*pull.flags, "zero_uncertain"))
+        if course.stops:
+            pull = _with_restarts(pull, trace, signal, course, rule, options)
+        if options.window_s is not None and "window_by_hand" not in pull.flags:
+            pull = _over(pull, signal, *options.window_s)
+        if zero is None or zero.rule == BEFORE_CONTACT:
+            pull = _with_doubt_of_zero(pull, signal, course)
+        window = course.contact
+        if not options.begins and math.isfinite(pull.window_s[0]):
+            window = tuple(int(k) for k in np.searchsorted(trace.time_s, pull.window_s))
+        if load is not None and not options.begins:
+            load_zero = load_zero or chosen_zero(test.load_zero, trace.time_s, load, course, trace.file)
+        load_N, load_u_N = load_level(trace, load_zero, window)
+        pull = _with_oscillation(replace(pull, recorded_load_N=load_N, recorded_load_u_N=load_u_N), trace, signal, test)
+    except TraceError as fault:
+        raise TraceError([p.at(file=trace.file or None, test_id=test.test_id) for p in fault.problems]) from None
+    doubts = _doubts(trace, pull, test)
+    flags = [*trace.flags, *(doubt.kind for doubt in doubts), *pull.flags]
+    flags += ["impulsive"] if signal.impulsive else []
+    if options.turned or options.begins == "reversal":
+        flags.append("backward" if options.turned else "forward")
+    pull = replace(
+        pull, test_id=test.test_id, flags=tuple(dict.fromkeys(flags)), phases=_phases(pull, signal, course),
+        problems=tuple(p.at(file=trace.file or None, test_id=test.test_id) for p in (*doubts, *pull.problems)),
+    )  # fmt: skip
+    if "no_time" in trace.flags:  # path stands for time, so nothing can be counted per second
+        pull = replace(pull, rise_N_per_s=math.nan, stick_slip_period_s=math.nan, drift_N_per_s=math.nan)
+    return pull
+
+
+def pieces_of(tables: Trace | Sequence[Trace], options: PullOptions = WHOLE) -> dict[str, tuple[Trace, PullOptions]]:
+    """The pulls of a record, or of several tables of one, by address: "2/3" is the third pull of the second table.
+
+    Each is turned so that friction is positive, and comes with the options for :func:`evaluate`. Strokes in both
+    directions share a zero, determined from their asymmetry where ``options.test`` states none. A zero that is stated
+    is read on the clock of the table. A table of one pull is read as a whole record.
+
+    Parameters
+    ----------
+    tables : Trace or sequence of Trace
+        A record, or the tables of an export.
+    options : PullOptions
+        Rule and test of all pulls.
+
+    Raises
+    ------
+    TraceError
+        A zero cannot be read as stated.
+    """
+    tables = [tables] if isinstance(tables, Trace) else list(tables)
+    test = options.test or Test("", "", "", math.nan, "")
+    cut: dict[str, tuple[Trace, bool, Zero | None, Zero | None]] = {}
+    for t, table in enumerate(tables, 1):
+        zeros = stated_zeros(table, test.zero, test.load_zero)
+        pieces = split_pulls(table)
+        cut |= {f"{t}/{k}": (piece, len(pieces) == 1, *zeros) for k, piece in enumerate(pieces, 1)}
+    if not cut:
+        raise TraceError(Problem("no_strokes", "no strokes are given"))
+    offsets = [zero.force_N if zero else 0.0 for _, _, zero, _ in cut.values()]
+    signs, shared = directions_of([piece for piece, _, _, _ in cut.values()], offsets)
+    found = {}
+    for sign, (address, (piece, alone, zero, load_zero)) in zip(signs, cut.items(), strict=True):
+        whole = alone and shared is None
+        if whole and test.zero.kind != "value":
+            zero = None  # it is read from the whole record as from any other
+        elif zero is None and shared is not None:
+            zero = Zero(*shared, "strokes in both directions")
+        found[address] = (
+            piece if sign > 0 else replace(piece, force_N=-piece.force_N),
+            replace(
+                options, zero=zero and replace(zero, force_N=sign * zero.force_N),
+                load_zero=None if whole else load_zero, turned=sign < 0,
+                begins="" if whole else "step" if shared is None else "reversal",
+            ),
+        )  # fmt: skip
+    return found
+
+
+def read_pulls(
+    tables: Trace | Sequence[Trace],
+    *,
+    rule: str = "middle_share",
+    test: Test | None = None,
+    parameters: Mapping[str, float] | None = None,
+) -> tuple[Pull, ...]:
+    """Read every pull of one record, or of several tables of one (see :func:`pieces_of`).
+
+    A piece that slides from its first sample, after a step of load or speed, has no static peak: its ``static_N`` is
+    NaN and it is flagged ``no_static``. ``test_id`` of a pull is the name of its piece, ``recorded_load_N`` its load.
+
+    Parameters
+    ----------
+    tables : Trace or sequence of Trace
+        A record, or the tables of an export.
+    rule, parameters
+        As in :class:`PullOptions`.
+    test : Test, optional
+        States speed, stiffness and zeros of all pulls.
+
+    Returns
+    -------
+    tuple of Pull
+
+    Raises
+    ------
+    TraceError
+        A piece cannot be read; every problem of every piece is listed.
+    """
+    pulls: list[Pull] = []
+    problems: list[Problem] = []
+    for piece, options in pieces_of(tables, PullOptions(rule, parameters, test)).values():
+        own = replace(options, test=replace(test, test_id=piece.name) if test else None)
+        try:
+            pulls.append(evaluate(piece, own))
+        except TraceError as fault:
+            problems += fault.problems
+    if problems:
+        raise TraceError(problems)
+    return tuple(pulls)
+
+
+def _evaluated_elsewhere(test_id: str, forces: Evaluated) -> Pull:
+    """Forces that were evaluated elsewhere, taken as they stand."""
+    flags = ("evaluated_elsewhere", "no_static") if math.isnan(forces.static_N) else ("evaluated_elsewhere",)
+    return Pull(
+        test_id=test_id, rule=GIVEN, static_N=forces.static_N, static_u_N=forces.static_u_N,
+        sliding_N=forces.sliding_N, sliding_u_N=forces.sliding_u_N, zero_N=0.0, zero_u_N=0.0, onset_s=math.nan,
+        peak_s=math.nan, window_s=(math.nan, math.nan), flags=flags,
+    )  # fmt: skip
+
+
+def _slides_at_once(force_N: FloatArray) -> bool:
+    """Whether a piece begins near the force it keeps: above half its maximum, and climbing little for its swing."""
+    force = median_of_three(force_N)
+    start, top = starting_level(force), float(force.max())
+    return start > 0.5 * top and top - start < _CLIMB_OVER_SWING * float(force[force.size // 2 :].std())
+
+
+def _first_motion(
+    trace: Trace, signal: Signal, course: Course, zero: Zero | None, options: PullOptions, rule: Rule
+) -> Pull:
+    """The first stretch of motion of a record: from rest to its peak and sliding, or sliding from its first sample."""
+    samples = signal.time_s.size
+    start, end = course.pieces[0]
+    sliding = course.slides_at_once and options.peak_s is None
+    if sliding and end - start >= min(_FEWEST, samples):
+        return _sliding(signal, (start, end), zero, options)
+    piece = signal
+    beyond = options.peak_s is not None and not signal.time_s[start] <= options.peak_s <= signal.time_s[end - 1]
+    if not sliding and not beyond and (start, end) != (0, samples) and end >= _FEWEST:
+        piece = signal_of(piece_of(trace, 0 if zero is None else start, end, trace.name))
+    window_s = options.window_s
+    if window_s is not None and not piece.time_s[0] <= window_s[0] < window_s[1] <= piece.time_s[-1]:
+        window_s = None
+    try:
+        return _from_rest(piece, zero, rule, options.test, options.peak_s, window_s)
+    except TraceError as fault:
+        if not options.begins or not {p.kind for p in fault.problems} <= _NO_PEAK:
+            raise
+    return _sliding(signal, (0, samples), zero, options)
+
+
+def _from_rest(
+    signal: Signal,
+    zero: Zero | None,
+    rule: Rule,
+    test: Test | None,
+    peak_s: float | None = None,
+    window_s: tuple[float, float] | None = None,
+) -> Pull:
+    """Static peak and sliding mean of a pull; each uncertainty holds a slow wander since the zero was read."""
+    climb = climb_of(signal, zero)
+    if peak_s is not None:
+        climb = near(climb, peak_s)
+    static = find_apex(climb)
+    motion = in_motion(climb, static, test.speed_m_s if test else None)
+    readings = static.force_N, math.nan, math.nan
     if peak_s is None:
-        motion = replace(motion, apex=within_samples(motion, apex))
-    static = within_samples(motion, rule.static(motion, rule.parameters)) if peak_s is None else apex
-    window = rule.sliding(motion, rule.parameters) if window_s is None else window_between(motion, *window_s)
+        motion = replace(motion, apex=within_samples(motion, static))
+        static = within_samples(motion, rule.static(motion, rule.parameters))
+        readings = static_readings(motion, climb.end)
+    window = rule.sliding(motion, rule.parameters) if window_s is None else window_between(motion.time_s, *window_s)
     sliding = sliding_over(motion, window)
-    readings = StaticReadings(static.force_N, math.nan, math.nan) if peak_s else static_readings(motion, climb.end)
-    pull = _reduce(motion, static, sliding, rule, readings)
-    by_hand = {"peak_by_hand": peak_s is not None, "window_by_hand": window_s is not None}
-    flags = (*pull.flags, *(flag for flag, raised in by_hand.items() if raised))
-    return replace(pull, problems=motion.problems, flags=flags)
-
-
-def named_rule(name: str, parameters: Mapping[str, float] | None) -> Rule:
-    if name not in RULES:
-        hint = "; ".join(filter(None, (", ".join(RULES), did_you_mean(name, RULES))))
-        raise TraceError(Problem("unknown_rule", "unknown rule", found=name, allowed=hint))
-    rule = RULES[name]
-    if not parameters:
-        return rule
-    if unknown := sorted(set(parameters) - set(rule.parameters)):
-        allowed = ", ".join(rule.parameters) or "none"
-        raise TraceError(Problem("unknown_parameter", f"not in rule {name}", found=", ".join(unknown), allowed=allowed))
-    return replace(rule, parameters={**rule.parameters, **parameters})
-
-
-def _reduce(motion: Motion, static: Apex, sliding: Sliding, rule: Rule, readings: StaticReadings) -> Pull:
-    """The numbers of a pull; every uncertainty holds what a slow wander may have done since the zero was seen."""
-    zero, mean, window_s = motion.zero, sliding.mean, sliding.window_s
-    static_wander = zero.wander_rate * max(static.time_s - zero.time_s, 0.0)
-    open_N = readings.open_N(static)
-    since_zero_s = window_s[0] - zero.time_s + (window_s[1] - window_s[0]) / 3.0
+    level, mean = motion.zero, sliding.mean
+    static_wander = level.wander_rate * max(static.time_s - level.time_s, 0.0)
+    since_zero_s = sliding.window_s[0] - level.time_s + (sliding.window_s[1] - sliding.window_s[0]) / 3.0
+    open_N = left_open_N(readings, static)
+    stiffness = math.nan
+    if motion.travel_m is not None:
+        rising = slice(motion.rise.first, motion.rise.last + 1)
+        pace = line(motion.time_s[rising], motion.travel_m[rising])[0]
+        stiffness = motion.rise.rate / pace if pace > 0 else math.nan
     return Pull(
         test_id="",
         rule=rule.name,
         static_N=static.force_N,
-        static_u_N=math.sqrt(static.u_N**2 + static.shape_u_N**2 + zero.u_N**2 + static_wander + open_N**2),
+        static_u_N=math.sqrt(static.u_N**2 + static.shape_u_N**2 + level.u_N**2 + static_wander + open_N**2),
         sliding_N=mean.mean_N,
-        sliding_u_N=math.sqrt(mean.u_N**2 + zero.u_N**2 + sliding.wander_rate * max(since_zero_s, 0.0)),
-        zero_N=zero.force_N,
-        zero_u_N=zero.u_N,
+        sliding_u_N=math.sqrt(mean.u_N**2 + level.u_N**2 + sliding.wander_rate * max(since_zero_s, 0.0)),
+        zero_N=level.force_N,
+        zero_u_N=level.u_N,
+        zero_rule=zero.rule if zero else BEFORE_CONTACT,
         onset_s=motion.onset_s,
         peak_s=static.time_s,
-        window_s=window_s,
+        window_s=sliding.window_s,
         rise_N_per_s=motion.rise.rate,
-        rise_stiffness_N_per_m=_rise_stiffness(motion),
+        rise_stiffness_N_per_m=stiffness,
         stick_slip_amplitude_N=sliding.swing_N,
         stick_slip_period_s=sliding.period_s,
         noise_N=mean.noise_N if sliding.enough else motion.noise_N,
         drift_N_per_s=mean.drift_N_per_s,
-        flags=(*_flags(motion, static, sliding, rule), *(("peak_ambiguous",) if open_N else ())),
-        first_maximum_N=readings.first_N,
-        highest_N=readings.highest_N,
-        first_drop_N=readings.drop_N,
-    )
+        flags=_flags(motion, static, sliding, rule, peak_ambiguous=open_N > 0, peak_by_hand=peak_s is not None,
+                     window_by_hand=window_s is not None),
+        problems=motion.problems,
+        first_maximum_N=readings[0],
+        highest_N=readings[1],
+        first_drop_N=readings[2],
+    )  # fmt: skip
 
 
-def _rise_stiffness(motion: Motion) -> float:
-    """Slope of force against travel over the loading line (N/m); NaN where no travel is known."""
-    if motion.travel_m is None:
-        return math.nan
-    rising = slice(motion.rise.first, motion.rise.last + 1)
-    slope = line(motion.time_s[rising], motion.travel_m[rising])[0]
-    return motion.rise.rate / slope if slope > 0 else math.nan
-
-
-def _gap_at(motion: Motion, time_s: float) -> bool:
-    """Whether the samples on either side of a time lie further apart than ``_GAP`` mean steps of the record."""
-    time = motion.time_s
-    after = min(max(int(np.searchsorted(time, time_s)), 1), time.size - 1)
-    return float(time[after] - time[after - 1]) > _GAP * float(time[-1] - time[0]) / (time.size - 1)
-
-
-def _flags(motion: Motion, static: Apex, sliding: Sliding, rule: Rule) -> tuple[str, ...]:
+def _flags(motion: Motion, static: Apex, sliding: Sliding, rule: Rule, **more: bool) -> tuple[str, ...]:
     enough, mean, travel = sliding.enough, sliding.mean, motion.travel_m
     start, end = sliding.window
     asked = rule.parameters.get("length_m", 0.0)
     raised = {
         "no_zero_phase": not motion.zero.seen,
         "spike": bool(motion.problems),
-        "gap_at_peak": _gap_at(motion, static.time_s),
+        "gap_at_peak": _gap_at(motion.time_s, static.time_s),
         "rounded_peak": static.shape == "rounded",
         "peak_between_samples": static.shape == "highest sample",
         "no_drop": enough and static.force_N - mean.mean_N < 3.0 * math.hypot(static.u_N, mean.u_N),
         "no_sliding": not enough,
         "window_short": enough and travel is not None and bool(travel[end - 1] - travel[start] < 0.9 * asked),
         "stick_slip": not math.isnan(sliding.period_s),
+        **more,
     }
     return tuple(name for name, is_raised in raised.items() if is_raised)
 
 
-_LEFT_OUT = 0.1  # share at the start of a record that slides from its first sample, left out as not yet settled
-_FEWEST = 20
-_WITH_LOAD = 0.6  # correlation of force and load from which on the force follows the load
-_SETTLED = 0.05  # share of its mean by which a force may change while it slides and still count as settled
-_LEAD_IN = 0.75  # share of a stop after which the piece that holds its restart begins
+def _gap_at(time_s: FloatArray, at_s: float) -> bool:
+    """Whether the samples on either side of a time lie further apart than ``_GAP`` mean steps of the record."""
+    after = min(max(int(np.searchsorted(time_s, at_s)), 1), time_s.size - 1)
+    return float(time_s[after] - time_s[after - 1]) > _GAP * float(time_s[-1] - time_s[0]) / (time_s.size - 1)
 
 
-@dataclass(frozen=True)
-class Reading:
-    """How a record is to be read: the rule, and the test it belongs to with its zero, speed and stiffness."""
-
-    rule: Rule
-    test: Test
-
-    def asked(self, zero: Level | None) -> Asked:
-        return Asked(self.rule, self.test.speed_m_s, (zero.force_N, zero.u_N) if zero else None)
-
-    def drive(self, load_N: float) -> dict[str, float]:
-        """k v in N/s and the free period of the slider on its spring in s; NaN where not known."""
-        load = self.test.normal_load_N if math.isfinite(self.test.normal_load_N) else load_N
-        mass, k, v = load / STANDARD_GRAVITY, self.test.stiffness_N_per_m or math.nan, self.test.speed_m_s or math.nan
-        return {"drive_N_per_s": k * v, "free_period_s": 2.0 * math.pi * math.sqrt(mass / k) if k > 0 else math.nan}
-
-
-def read_record(
-    trace: Trace,
-    *,
-    rule: str = "seed",
-    test: Test | None = None,
-    parameters: Mapping[str, float] | None = None,
-) -> Pull:
-    """Friction forces of one record, whatever it begins and ends with.
-
-    Its channels tell when the bodies touch, when the drive moves, stops and goes on (:mod:`tribo.traces.phases`). A
-    record that starts from rest gives a static peak and a sliding mean (:func:`read_pull`); one that slides from its
-    first sample only the mean; each restart after a stop a static force of its own, with the time the drive stood
-    still. The zero is the one ``test`` chooses, else the level before contact; a level read while sliding is never
-    subtracted. Where two levels without load differ, the difference is part of every uncertainty.
-
-    Raises
-    ------
-    TraceError
-        The rule is unknown, the zero cannot be read as chosen, or the trace holds no friction force; all problems.
-    """
-    test = test or Test(trace.name, trace.file, "", math.nan, "")
-    reading = Reading(named_rule(rule, parameters), test)
-    try:
-        signal = signal_of(trace)
-        course = course_of(trace, signal)
-        zero = chosen_zero(test.zero, signal.time_s, signal.force_N, course, trace.file)
-        pull = _read(trace, signal, course, zero, reading)
-        pull = _with_load(pull, trace, course, test)
-        pull = _with_oscillation(pull, trace, signal, reading)
-    except TraceError as fault:
-        raise TraceError([p.at(file=trace.file or None, test_id=test.test_id) for p in fault.problems]) from None
-    problems = tuple(p.at(file=trace.file or None, test_id=test.test_id) for p in pull.problems)
-    flags = (*pull.flags, "impulsive") if signal.impulsive else pull.flags
-    return replace(pull, test_id=test.test_id, problems=problems, flags=flags, phases=phases_of(pull, signal, course))
-
-
-def _read(trace: Trace, signal: Signal, course: Course, zero: Level | None, reading: Reading) -> Pull:
-    whole = (0, signal.time_s.size)
-    pieces = course.pieces
-    if course.slides_at_once and pieces[0][1] - pieces[0][0] >= min(_FEWEST, signal.time_s.size):
-        first = _sliding_from(signal, pieces[0], zero, reading)
-    elif course.slides_at_once or pieces[0] == whole or pieces[0][1] < _FEWEST:
-        first = pull_of(signal, reading.asked(zero))
-    else:
-        start = 0 if zero is None else course.contact[0]
-        first = pull_of(signal_of(piece_of(trace, start, pieces[0][1], trace.name)), reading.asked(zero))
-    rule = zero.rule if zero else "none" if course.slides_at_once else "before contact"
-    first = replace(first, zero_rule=rule)
-    if zero and zero.drifts:
-        first = replace(first, flags=(*first.flags, "zero_uncertain"))
-    if course.stops:
-        first = _with_restarts(first, trace, signal, course, reading)
-    return first if zero and zero.rule != "before contact" else _with_doubt_of_zero(first, signal, course)
-
-
-def _sliding_from(signal: Signal, span: Range, zero: Level | None, reading: Reading) -> Pull:
+def _sliding(signal: Signal, span: tuple[int, int], zero: Zero | None, options: PullOptions) -> Pull:
     """Sliding friction of a range that slides from its first sample; its static friction is NaN.
+
+    The start of a record is left out as running-in; a piece was sliding before it began.
 
     Raises
     ------
@@ -282,62 +386,84 @@ def _sliding_from(signal: Signal, span: Range, zero: Level | None, reading: Read
         what = f"only {last - first} data points of sliding"
         raise TraceError(Problem("too_short", what, allowed=f"{_FEWEST} data points or more"))
     force = signal.force_N[first:last]
-    start = first + max(settled(force), int(_LEFT_OUT * force.size))
-    if reading.test.speed_m_s and slides_on_closed_track(reading.test.speed_m_s * signal.time_s, span):
-        start = first + force.size // 2
-    level = zero or Level(0.0, math.nan, "none")
+    start, speed = first + settled(force), options.test.speed_m_s if options.test else None
+    if not options.begins:
+        start = max(start, first + int(_LEFT_OUT * force.size))
+        if speed and slides_on_closed_track(speed * signal.time_s, span):
+            start = first + force.size // 2
+    level = zero or Zero(0.0, math.nan, "none")
     mean = steady(signal.time_s[start:last], signal.force_N[start:last])
     if mean.mean_N - level.force_N < 0:
         what = "the force acts against the pull direction; its sign may be reversed"
         raise TraceError(Problem("sign_flipped", what, column="force", found=f"{mean.mean_N - level.force_N:.6g} N"))
-    known_u = level.u_N if math.isfinite(level.u_N) else 0.0
     flags = ("no_static",) if zero else ("no_static", "no_zero_phase")
     nan = math.nan
     return Pull(
-        test_id="", rule=reading.rule.name, static_N=nan, static_u_N=nan, sliding_N=mean.mean_N - level.force_N,
-        sliding_u_N=math.hypot(mean.u_N, known_u), zero_N=level.force_N, zero_u_N=level.u_N, onset_s=nan, peak_s=nan,
+        test_id="", rule=options.rule, static_N=nan, static_u_N=nan,
+        sliding_N=mean.mean_N - level.force_N,
+        sliding_u_N=math.hypot(mean.u_N, level.u_N if math.isfinite(level.u_N) else 0.0), zero_N=level.force_N,
+        zero_u_N=level.u_N, zero_rule=level.rule, onset_s=nan, peak_s=nan,
         window_s=(float(signal.time_s[start]), float(signal.time_s[last - 1])), noise_N=mean.noise_N,
         drift_N_per_s=mean.drift_N_per_s, flags=(*flags, "spike") if signal.problems else flags,
         problems=signal.problems,
     )  # fmt: skip
 
 
-def _with_restarts(first: Pull, trace: Trace, signal: Signal, course: Course, reading: Reading) -> Pull:
+def _over(pull: Pull, signal: Signal, start_s: float, end_s: float) -> Pull:
+    """A pull with its sliding mean over a window chosen by hand that no rise comes before within its stretch.
+
+    Raises
+    ------
+    TraceError
+        ``window_short``: fewer than ten data points lie in it.
+    """
+    first, end = window_between(signal.time_s, start_s, end_s)
+    if end - first < _FEWEST_BY_HAND:
+        what, allowed = "too few data points in this window", f"{_FEWEST_BY_HAND} data points or more"
+        raise TraceError(Problem("window_short", what, found=f"{end - first} data points", allowed=allowed))
+    mean = steady(signal.time_s[first:end], signal.force_N[first:end])
+    zero_u = pull.zero_u_N if math.isfinite(pull.zero_u_N) else 0.0
+    return replace(
+        pull, sliding_N=mean.mean_N - pull.zero_N, sliding_u_N=math.hypot(mean.u_N, zero_u),
+        window_s=(float(signal.time_s[first]), float(signal.time_s[end - 1])), noise_N=mean.noise_N,
+        drift_N_per_s=mean.drift_N_per_s, flags=(*pull.flags, "window_by_hand"),
+    )  # fmt: skip
+
+
+def _with_restarts(first: Pull, trace: Trace, signal: Signal, course: Course, rule: Rule, options: PullOptions) -> Pull:
     """A pull with the restarts of its record.
 
     Where its force has not settled before the first stop, the sliding mean is that of the steadiest slide.
     """
-    zero = Level(first.zero_N, first.zero_u_N if math.isfinite(first.zero_u_N) else 0.0, first.zero_rule)
-    found, slides = [], [first]
-    ends = [b for _, b in course.pieces[1:]]
-    for (stop, restart), end in zip(course.stops, ends, strict=True):
+    zero = Zero(first.zero_N, first.zero_u_N if math.isfinite(first.zero_u_N) else 0.0, first.zero_rule)
+    restarts, slides = [], [first]
+    for (stop, restart), (_, end) in zip(course.stops, course.pieces[1:], strict=True):
         begin = stop + int(_LEAD_IN * (restart - stop))
         try:
-            pull = pull_of(signal_of(piece_of(trace, begin, end, trace.name)), reading.asked(zero))
+            pull = _from_rest(signal_of(piece_of(trace, begin, end, trace.name)), zero, rule, options.test)
         except TraceError:
             continue  # a last piece too short for a peak
         stop_s, hold_s = float(signal.time_s[stop]), float(signal.time_s[restart] - signal.time_s[stop])
-        found.append(
+        restarts.append(
             Restart(hold_s, stop_s, pull.peak_s, pull.static_N, pull.static_u_N, pull.sliding_N, pull.sliding_u_N)
         )
         slides.append(pull)
-    best = first if _drift_share(first) < _SETTLED else min(slides, key=_unsteadiness)
+
+    def changed(pull: Pull) -> float:
+        """How far the force drifts over the sliding window."""
+        return abs(pull.drift_N_per_s) * (pull.window_s[1] - pull.window_s[0])
+
+    def unsteadiness(pull: Pull) -> float:
+        """What the mean of a sliding window leaves open, its drift included; infinite where there is none."""
+        known = math.isfinite(pull.sliding_u_N + changed(pull))
+        return math.hypot(pull.sliding_u_N, changed(pull) / math.sqrt(12.0)) if known else math.inf
+
+    has_settled = first.sliding_N and changed(first) / abs(first.sliding_N) < _SETTLED
+    best = first if has_settled or options.window_s is not None else min(slides, key=unsteadiness)
     return replace(
-        first, restarts=tuple(found), sliding_N=best.sliding_N, sliding_u_N=best.sliding_u_N, window_s=best.window_s,
-        drift_N_per_s=best.drift_N_per_s, flags=tuple(dict.fromkeys((*first.flags, "restarts"))),
+        first, restarts=tuple(restarts), sliding_N=best.sliding_N, sliding_u_N=best.sliding_u_N,
+        window_s=best.window_s, drift_N_per_s=best.drift_N_per_s, flags=(*first.flags, "restarts"),
     )  # fmt: skip
-
-
-def _drift_share(pull: Pull) -> float:
-    """Change of the force over its sliding window as a share of its mean; infinite where there is none."""
-    changed = abs(pull.drift_N_per_s) * (pull.window_s[1] - pull.window_s[0])
-    return changed / abs(pull.sliding_N) if math.isfinite(changed) and pull.sliding_N else math.inf
-
-
-def _unsteadiness(pull: Pull) -> float:
-    """What the mean of a sliding window leaves open, its drift included; infinite where there is none."""
-    drift = abs(pull.drift_N_per_s) * (pull.window_s[1] - pull.window_s[0]) / math.sqrt(12.0)
-    return math.hypot(pull.sliding_u_N, drift) if math.isfinite(pull.sliding_u_N + drift) else math.inf
 
 
 def _with_doubt_of_zero(pull: Pull, signal: Signal, course: Course) -> Pull:
@@ -346,35 +472,36 @@ def _with_doubt_of_zero(pull: Pull, signal: Signal, course: Course) -> Pull:
     away = disagreement_N(course, signal, pull.zero_N, u) / math.sqrt(3.0)
     if not away:
         return pull
-
-    def wider(u_N: float) -> float:
-        return math.hypot(u_N, away)
-
     restarts = tuple(
-        replace(r, static_u_N=wider(r.static_u_N), sliding_u_N=wider(r.sliding_u_N)) for r in pull.restarts
+        replace(r, static_u_N=math.hypot(r.static_u_N, away), sliding_u_N=math.hypot(r.sliding_u_N, away))
+        for r in pull.restarts
     )
     return replace(
-        pull, static_u_N=wider(pull.static_u_N), sliding_u_N=wider(pull.sliding_u_N), zero_u_N=wider(u),
-        restarts=restarts, flags=(*pull.flags, "zero_uncertain"),
+        pull, static_u_N=math.hypot(pull.static_u_N, away), sliding_u_N=math.hypot(pull.sliding_u_N, away),
+        zero_u_N=math.hypot(u, away), restarts=restarts, flags=(*pull.flags, "zero_uncertain"),
     )  # fmt: skip
 
 
-def _with_load(pull: Pull, trace: Trace, course: Course, test: Test) -> Pull:
-    window = np.searchsorted(trace.time_s, pull.window_s) if math.isfinite(pull.window_s[0]) else course.contact
-    load, u = load_level(trace, test.load_zero, course, (int(window[0]), int(window[1])))
-    return replace(pull, recorded_load_N=load, recorded_load_u_N=u)
+def drive_of(test: Test, load_N: float) -> dict[str, float]:
+    """k v in N/s and the free period of the slider on its spring in s; NaN where not known."""
+    load = test.normal_load_N if math.isfinite(test.normal_load_N) else load_N
+    mass, k, v = load / STANDARD_GRAVITY, test.stiffness_N_per_m or math.nan, test.speed_m_s or math.nan
+    return {"drive_N_per_s": k * v, "free_period_s": 2.0 * math.pi * math.sqrt(mass / k) if k > 0 else math.nan}
 
 
-def _with_oscillation(pull: Pull, trace: Trace, signal: Signal, reading: Reading) -> Pull:
+def _with_oscillation(pull: Pull, trace: Trace, signal: Signal, test: Test) -> Pull:
     """A pull with the cycles of its sliding force, over the window its mean is taken from."""
     first, last = np.searchsorted(signal.time_s, pull.window_s) if math.isfinite(pull.window_s[0]) else (0, 0)
     if last - first < _FEWEST:
         return pull
     time, force = signal.time_s[first : last + 1], signal.force_N[first : last + 1] - pull.zero_N
-    found: Oscillation = oscillation_of(time, force, **reading.drive(pull.recorded_load_N))
+    found = oscillation_of(time, force, **drive_of(test, pull.recorded_load_N))
     load = trace.columns.get("normal_force_N")
-    if load is not None and found.cycles and _follows(force, load[first : last + 1]):
-        return replace(pull, oscillation=replace(found, regime="steady"), flags=(*pull.flags, "follows_load"))
+    if load is not None and found.cycles:
+        load = load[first : last + 1]
+        varies = np.isfinite(load).all() and np.ptp(load) > 0 and np.ptp(force) > 0
+        if varies and abs(float(np.corrcoef(force, load)[0, 1])) > _WITH_LOAD:  # as on a disc that runs out of true
+            return replace(pull, oscillation=replace(found, regime="steady"), flags=(*pull.flags, "follows_load"))
     if math.isfinite(pull.static_N) or found.regime in ("steady", "irregular"):
         return replace(pull, oscillation=found)
     flags = (*pull.flags, "stick_slip") if found.regime == "stick-slip" else pull.flags
@@ -383,204 +510,51 @@ def _with_oscillation(pull: Pull, trace: Trace, signal: Signal, reading: Reading
     )
 
 
-def _follows(force: FloatArray, load: FloatArray) -> bool:
-    """Whether the force goes up and down with the recorded load, as on a disc that runs out of true."""
-    if not np.isfinite(load).all() or np.ptp(load) == 0 or np.ptp(force) == 0:
-        return False
-    return abs(float(np.corrcoef(force, load)[0, 1])) > _WITH_LOAD
+def _doubts(trace: Trace, pull: Pull, test: Test) -> list[Problem]:
+    """Where what was recorded while sliding does not match the load or the speed of the test."""
+    found = []
+    if trace.displacement_m is not None and test.speed_m_s and math.isfinite(pull.window_s[0]):
+        start, end = np.searchsorted(trace.time_s, pull.window_s)
+        time_s = float(trace.time_s[end] - trace.time_s[start])
+        travel_m = abs(float(trace.displacement_m[end] - trace.displacement_m[start]))
+        if time_s > 0 and not abs(travel_m / time_s / test.speed_m_s - 1.0) < _OFF_SPEED:
+            units = {60.0: "mm/min: divide by 60", 1e3: "um/s: divide by 1000", 1e-3: "m/s: multiply by 1000"}
+            factor = test.speed_m_s * time_s / travel_m if travel_m > 0 else math.nan
+            slips = [f"; does speed_mm_s hold {w}?" for f, w in units.items() if abs(factor / f - 1.0) < _OFF_SPEED]
+            what = "the displacement does not match the speed of the test"
+            allowed = f"{test.speed_m_s * 1e3:.4g} mm/s" + "".join(slips[:1])
+            seen = f"{travel_m / time_s * 1e3:.4g} mm/s"
+            found.append(Problem("off_speed", what, trace.file, None, "displacement", seen, allowed))
+    recorded, given = pull.recorded_load_N, test.normal_load_N
+    if math.isfinite(recorded) and given > 0 and not abs(recorded / given - 1.0) < _OFF_LOAD:
+        what = "the normal load recorded while sliding differs from that of the test"
+        allowed = f"about {given:.4g} N, which is used"
+        found.append(Problem("off_load", what, trace.file, None, "normal force", f"{recorded:.4g} N", allowed))
+    return found
 
 
-def phases_of(pull: Pull, signal: Signal, course: Course) -> tuple[Phase, ...]:
+def _phases(pull: Pull, signal: Signal, course: Course) -> tuple[Phase, ...]:
     """The phases of a record in their order: what was picked, in the terms of the report."""
     time, last = signal.time_s, signal.time_s.size - 1
     begin, end = float(time[course.contact[0]]), float(time[min(course.end, last)])
     stops = [(float(time[a]), float(time[b])) for a, b in course.stops]
-    found = [Phase("approach", float(time[0]), begin)] if course.touches_later else []
+    found = []
     if course.touches_later:
-        found.append(Phase("contact", begin, begin))
+        found += [Phase("approach", float(time[0]), begin), Phase("contact", begin, begin)]
     until = stops[0][0] if stops else end
     if math.isfinite(pull.peak_s):
         found += [Phase("rest", begin, pull.onset_s)] if pull.onset_s > begin else []
-        slides = [w for w in (pull.window_s[0],) if pull.peak_s < w < until]
-        found += [Phase("rise", pull.onset_s, pull.peak_s), Phase("slip", pull.peak_s, slides[0] if slides else until)]
-        begin = slides[0] if slides else until
+        begin = pull.window_s[0] if pull.peak_s < pull.window_s[0] < until else until
+        found += [Phase("rise", pull.onset_s, pull.peak_s), Phase("slip", pull.peak_s, begin)]
     if begin < until:
-        found.append(Phase(_sliding_name(pull), begin, until))
-    found += _after_stops(stops, pull.restarts, end)
+        regime = pull.oscillation.regime if pull.oscillation else "steady"
+        found.append(Phase("steady sliding" if regime == "steady" else f"sliding ({regime})", begin, until))
+    peaks = {restart.stop_s: restart.peak_s for restart in pull.restarts}
+    for (stop, restart), until in zip(stops, [*(stop for stop, _ in stops[1:]), end], strict=False):
+        peak = peaks.get(stop, restart)
+        found += [Phase("hold", stop, restart), Phase("reactivation", restart, peak), Phase("sliding", peak, until)]
     if course.end <= last:
         rest = float(time[min(course.contact[1], last)])
         found += [Phase("rest", end, rest)] if rest > end else []
         found += [Phase("lift-off", rest, float(time[-1]))] if rest < time[-1] else []
     return tuple(found)
-
-
-def _sliding_name(pull: Pull) -> str:
-    regime = pull.oscillation.regime if pull.oscillation else "steady"
-    return "steady sliding" if regime == "steady" else f"sliding ({regime})"
-
-
-def _after_stops(stops: Sequence[tuple[float, float]], restarts: Sequence[Restart], end_s: float) -> list[Phase]:
-    found = []
-    peaks = {restart.stop_s: restart.peak_s for restart in restarts}
-    nexts = [*(stop for stop, _ in stops[1:]), end_s][: len(stops)]
-    for (stop, restart), until in zip(stops, nexts, strict=True):
-        peak = peaks.get(stop, restart)
-        found += [Phase("hold", stop, restart), Phase("reactivation", restart, peak), Phase("sliding", peak, until)]
-    return found
-
-
-_NO_PEAK = {"stopped_before_peak", "sign_flipped", "spike"}
-_CLIMB_OVER_SWING = 5.0
-
-
-def read_pulls(
-    traces: Trace | Sequence[Trace],
-    *,
-    rule: str = "middle_share",
-    test: Test | None = None,
-    parameters: Mapping[str, float] | None = None,
-) -> tuple[Pull, ...]:
-    """Read every pull of one record, or of several blocks of one (each split by :func:`split_pulls`).
-
-    Strokes in both directions share a zero, determined from their asymmetry. A piece that slides from its first sample,
-    after a step of load or speed, has no static peak: its ``static_N`` is NaN and it is flagged ``no_static``.
-    ``test_id`` of a pull is the name of its piece. With :func:`load_of` the pieces give friction against load.
-
-    Raises
-    ------
-    TraceError
-        A piece cannot be read; every problem of every piece is listed.
-    """
-    pulls: list[Pull] = []
-    problems: list[Problem] = []
-    for pull in read_pieces(pieces_of(traces), rule=rule, test=test, parameters=parameters):
-        if isinstance(pull, TraceError):
-            problems += pull.problems
-        else:
-            pulls.append(pull)
-    if problems:
-        raise TraceError(problems)
-    return tuple(pulls)
-
-
-def read_pieces(
-    strokes: Strokes,
-    *,
-    rule: str = "middle_share",
-    test: Test | None = None,
-    parameters: Mapping[str, float] | None = None,
-) -> Iterator[Pull | TraceError]:
-    """What each piece gives, in order: its pull (see :func:`read_pulls`), or why it cannot be read."""
-    zero = None if math.isnan(strokes.zero_N) else (0.0, strokes.zero_u_N)
-    for piece, direction in zip(strokes.traces, strokes.directions, strict=True):
-        try:
-            pull = _read_piece(piece, rule, test, parameters, zero)
-        except TraceError as fault:
-            yield fault
-            continue
-        offset = pull.zero_N if zero is None else strokes.zero_N
-        flags = (*pull.flags, "forward" if direction > 0 else "backward") if zero or direction < 0 else pull.flags
-        yield replace(pull, test_id=piece.name, zero_N=offset, flags=flags)
-
-
-def pieces_of(traces: Trace | Sequence[Trace]) -> Strokes:
-    """The pieces of a record in order, turned to one sign, with the zero that strokes of both directions share."""
-    blocks = [traces] if isinstance(traces, Trace) else list(traces)
-    return orient_strokes([piece for block in blocks for piece in split_pulls(block)])
-
-
-def _read_piece(
-    piece: Trace, rule: str, test: Test | None, parameters: Mapping[str, float] | None, zero: tuple[float, float] | None
-) -> Pull:
-    if zero is None and not unreadable(piece) and _slides_at_once(piece):
-        return read_sliding(piece, zero=zero, rule=rule)
-    try:
-        return read_pull(piece, rule=rule, test=test, parameters=parameters, zero=zero)
-    except TraceError as fault:
-        if not {p.kind for p in fault.problems} <= _NO_PEAK:
-            raise
-    return read_sliding(piece, zero=zero, rule=rule)
-
-
-def _slides_at_once(piece: Trace) -> bool:
-    """Whether a piece begins near the force it keeps: above half its maximum, and climbing little for its swing."""
-    force = median_of_three(piece.force_N)
-    start, top = starting_level(force), float(force.max())
-    return start > 0.5 * top and top - start < _CLIMB_OVER_SWING * float(force[force.size // 2 :].std())
-
-
-def read_sliding(trace: Trace, *, zero: tuple[float, float] | None = None, rule: str = "seed") -> Pull:
-    """Sliding friction of a trace that slides from its first sample: the mean once the force has stabilised.
-
-    Static friction, onset and peak are NaN, flagged ``no_static``; without a ``zero`` (force, standard uncertainty)
-    none is taken out, flagged ``no_zero_phase``.
-
-    Raises
-    ------
-    TraceError
-        ``too_short``, ``nan_gap``, ``time_goes_back``, ``time_stands_still``.
-    """
-    signal = signal_of(trace)
-    start = settled(signal.force_N)
-    window = steady(trace.time_s[start:], signal.force_N[start:])
-    offset, offset_u = zero or (0.0, 0.0)
-    flags = ("no_static",) if zero else ("no_static", "no_zero_phase")
-    nan = math.nan
-    return Pull(
-        test_id=trace.name, rule=rule, static_N=nan, static_u_N=nan, sliding_N=window.mean_N - offset,
-        sliding_u_N=math.hypot(window.u_N, offset_u), zero_N=offset, zero_u_N=offset_u if zero else nan, onset_s=nan,
-        peak_s=nan, window_s=(float(trace.time_s[start]), float(trace.time_s[-1])), noise_N=window.noise_N,
-        drift_N_per_s=window.drift_N_per_s, flags=(*flags, "spike") if signal.problems else flags,
-        problems=signal.problems,
-    )  # fmt: skip
-
-
-def load_of(trace: Trace) -> tuple[float, float]:
-    """Mean normal load of a piece (N, taken as positive) and its standard uncertainty; NaN where none was recorded."""
-    load = trace.columns.get("normal_force_N")
-    if load is None:
-        return math.nan, math.nan
-    level = steady(trace.time_s, np.abs(load) if float(np.median(load)) > 0 else -load)
-    return level.mean_N, level.u_N
-
-
-def sampling_clip_N(rise_N_per_s: float, rate_Hz: float) -> float:
-    """Limit (GUM type B) of how far the largest data point lies below a sharp peak on average: k v / (2 f_s).
-
-    ``rise_N_per_s`` is k v, the slope of the loading line, ``rate_Hz`` the sampling rate f_s. The apex fitted by
-    :func:`read_pull` lies between the data points; this limit applies if the fit fails.
-    """
-    return rise_N_per_s / (2.0 * rate_Hz)
-
-
-def sampling_rate_Hz(trace: Trace) -> float:
-    """Median number of samples per second; NaN with fewer than two."""
-    if trace.time_s.size < 2:
-        return math.nan
-    return float(1.0 / np.median(np.diff(trace.time_s)))
-
-
-RULE = "given"
-FLAG = "evaluated_elsewhere"
-
-
-def evaluated_pull(test: Test) -> Pull | None:
-    """The forces of a row of tests.csv without an export as a pull; None for a test with an export."""
-    forces = test.evaluated
-    if forces is None:
-        return None
-    nothing = math.nan
-    return Pull(
-        test_id=test.test_id,
-        rule=RULE,
-        static_N=forces.static_N,
-        static_u_N=forces.static_u_N,
-        sliding_N=forces.sliding_N,
-        sliding_u_N=forces.sliding_u_N,
-        zero_N=0.0,
-        zero_u_N=0.0,
-        onset_s=nothing,
-        peak_s=nothing,
-        window_s=(nothing, nothing),
-        flags=(FLAG, "no_static") if math.isnan(forces.static_N) else (FLAG,),
-    )

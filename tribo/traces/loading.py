@@ -28,11 +28,16 @@ _BACK_AT_LEVEL = 0.9
 
 @dataclass(frozen=True)
 class Zero:
-    """Force before contact: mean, standard uncertainty, middle of the time it was seen, variance rate of its wander."""
+    """Zero of a force or load: its value, standard uncertainty and rule; ``drifts`` where it moved while it was read.
+
+    One that was seen before contact also has the middle of the time it was seen and the variance rate of its wander.
+    """
 
     force_N: float
     u_N: float
-    time_s: float
+    rule: str = ""
+    drifts: bool = False
+    time_s: float = math.nan
     wander_rate: float = 0.0
     seen: bool = True
 
@@ -82,8 +87,8 @@ class Climb:
         return float(np.median(self.signal.smooth_N[(self.top + self.end) // 2 : self.end]))
 
 
-def climb_of(signal: Signal, zero: tuple[float, float] | None = None) -> Climb:
-    """Follow a pull up to its first maximum. ``zero`` (force, standard uncertainty), where known, is taken as it is.
+def climb_of(signal: Signal, zero: Zero | None = None) -> Climb:
+    """Follow a pull up to its first maximum, above a ``zero`` that is known, else above the force before the rise.
 
     Raises
     ------
@@ -97,7 +102,7 @@ def climb_of(signal: Signal, zero: tuple[float, float] | None = None) -> Climb:
     assert rise is not None
     if signal.recorder_fault:
         raise TraceError([signal.recorder_fault, *signal.problems])
-    known = Zero(*zero, time_s=float(signal.time_s[0])) if zero else zero_before(signal, rise)
+    known = replace(zero, time_s=float(signal.time_s[0])) if zero else zero_before(signal, rise)
     force, calm = signal.force_N - known.force_N, signal.calm_N - known.force_N
     width = 1 + 2 * ((rise.last - rise.first) // _RISE_OVER_SMOOTHING)
     zeroed = replace(signal, force_N=force, calm_N=calm, smooth_N=running_mean(calm, width))
@@ -228,8 +233,8 @@ def zero_before(signal: Signal, rise: Rise) -> Zero:
     slope, middle, level = line(time_s[:last], force[:last]) if last else (math.inf, 0.0, 0.0)
     by_noise = 3.0 * noise * math.sqrt(12.0 / last) / max(time_s[last - 1] - time_s[0], 1e-300) if last else 0.0
     if abs(slope) > _CLIMBING * rise.rate + by_noise:
-        return Zero(0.0, abs(float(force[0])) / math.sqrt(3.0), float(time_s[0]), seen=False)
+        return Zero(0.0, abs(float(force[0])) / math.sqrt(3.0), time_s=float(time_s[0]), seen=False)
     away = np.abs(force[:last] - level)
     kept = force[:last][away <= 4.0 * max(noise, math.sqrt(float(away @ away) / last))]
-    slow = wander(kept, float(time_s[last - 1] - time_s[0]))
-    return Zero(float(kept.mean()), max(slow.mean_u, noise / math.sqrt(last)), middle, slow.rate)
+    mean_u, rate, _ = wander(kept, float(time_s[last - 1] - time_s[0]))
+    return Zero(float(kept.mean()), max(mean_u, noise / math.sqrt(last)), time_s=middle, wander_rate=rate)

@@ -1,4 +1,8 @@
-"""The static peak of a pull: shapes fitted in closed form about its first maximum, finer than its samples."""
+"""The static peak of a pull: shapes fitted in closed form about its first maximum, finer than its samples.
+
+Where the first maximum, the highest force and the force before the first drop differ, the uncertainty of the peak holds
+the difference; no peak lies above what its samples and their noise allow.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tribo.errors import Problem
 from tribo.records import FloatArray
-from tribo.traces.loading import Climb
+from tribo.traces.loading import Climb, Rise, Zero
 from tribo.traces.signal import condense
 
 FEWEST_SAMPLES = 4
@@ -21,7 +26,22 @@ _CLOSEST = 2  # samples on either side of a top that tell a parabola
 _FITS = 1.5  # misfit per degree of freedom up to which a parabola fits
 _MOST_PAIRS = 8  # pairs of neighbours between which an apex is looked for; else samples are averaged together first
 _MOST_SAMPLES = 200  # on either side of the apex
+DROP = 0.05  # share of the highest force so far by which the force falls in a first drop
+_PEAKED = 3.0  # a peak stands above the later force by this many times the noise
+_CLEARLY = 0.02  # readings differ where it is by this share of the force,
+_BEYOND_U = 3.0  # and by this many times the uncertainty of the first maximum
+_RESOLVED = 3  # samples of the middle half of a rise from which on a corner between two samples is told
+_STEPS = 2.0  # steps between samples by which a corner on a resolved rise may lie above them
+_SAME = 5  # samples within which two maxima are the same one
+_FEWEST_READ = 16  # samples from which on the highest force and the first drop are read, and around a peak its noise
+_LATER = 0.25  # share of a record at its end that tells the level a peak stands above
+_HIGH = 0.3  # share of the largest force below which a fall is none of the peak
+_NOISE_AT_TOP = 3.0  # largest excess of the noise over a top sample that is allowed
 _CLEARLY_ROUNDED = 0.6  # a rounded top is taken where its misfit is below this share of that of a sharp apex
+
+
+Search = tuple[int, int, int, int]  # first sample of the rise, two between which the apex lies, last of the fall
+Side = tuple[FloatArray, FloatArray, FloatArray]  # force at the apex by one side: value, variance / noise^2, misfit
 
 
 @dataclass(frozen=True)
@@ -45,26 +65,6 @@ class Apex:
         return self.chi2_red < _FITS
 
 
-@dataclass(frozen=True)
-class _Side:
-    """What the samples on one side say of the force at the apex: value, variance over noise^2, misfit of the fit."""
-
-    value: FloatArray
-    variance: FloatArray
-    misfit: FloatArray
-
-
-@dataclass(frozen=True)
-class Search:
-    """Samples in which an apex is looked for: the rise starts at ``start``, the apex lies between ``low`` and ``high``,
-    the fall ends at ``end``."""
-
-    start: int
-    low: int
-    high: int
-    end: int
-
-
 def find_apex(climb: Climb) -> Apex:
     """The static peak of a pull: a sharp apex where the shape is one, else the top of a rounded one.
 
@@ -74,11 +74,11 @@ def find_apex(climb: Climb) -> Apex:
     time_s, force, smooth = climb.signal.time_s[held], climb.signal.force_N[held], climb.signal.smooth_N[held]
     depart, peak, noise = climb.depart, climb.top, climb.signal.noise_N
     long = max(depart - climb.rise.first, 2 * FEWEST_SAMPLES)
-    length = fall_length(smooth, peak, climb.level_N, 2 * FEWEST_SAMPLES, max(long, 3 * FEWEST_SAMPLES))
+    length = _fall_length(smooth, peak, climb.level_N, 2 * FEWEST_SAMPLES, max(long, 3 * FEWEST_SAMPLES))
     low, high = min(depart, peak + 1) - climb.lag, min(depart, peak + 1) + 2
-    candidates = [_resolved(time_s, force, Search(max(low - long, 0), low, high, high + length), noise)]
+    candidates = [_resolved(time_s, force, (max(low - long, 0), low, high, high + length), noise)]
     if not (candidates[0] and candidates[0].fits) and not low <= peak < high:
-        around = Search(max(peak - long, 0), peak - 2, peak + 2, peak + length)
+        around = (max(peak - long, 0), peak - 2, peak + 2, peak + length)
         candidates.append(_resolved(time_s, force, around, noise))
     sharp = min((a for a in candidates if a), key=lambda a: a.chi2_red, default=None)
     half = max(length // 2, 2)
@@ -97,7 +97,7 @@ def near(climb: Climb, peak_s: float) -> Climb:
     return replace(climb, depart=top, lag=2, top=top, end=max(climb.end, top + FEWEST_SAMPLES))
 
 
-def fall_length(smooth: FloatArray, peak: int, level: float, shortest: int, longest: int) -> int:
+def _fall_length(smooth: FloatArray, peak: int, level: float, shortest: int, longest: int) -> int:
     """Samples after ``peak`` until 80 % of the way down to ``level`` is gone, within the given bounds."""
     target = level + 0.2 * (smooth[peak] - level)
     down = smooth[peak : peak + longest + 1] <= target
@@ -106,51 +106,37 @@ def fall_length(smooth: FloatArray, peak: int, level: float, shortest: int, long
 
 
 def _resolved(time_s: FloatArray, force: FloatArray, search: Search, noise: float) -> Apex | None:
-    """Sharp apex within the search: on averaged samples where there are many, then finer while that tells more."""
-    factor = _factor(search)
-    apex = _condensed(time_s, force, search, factor, noise)
-    while apex and factor > 1:
-        finer = _closer(time_s, apex, search, factor)
-        if _factor(finer) > factor // 2:
-            break
-        factor = _factor(finer)
-        closer = _condensed(time_s, force, finer, factor, noise)
-        if closer is None or closer.u_N > apex.u_N:
-            break
-        apex, search = closer, finer
-    return apex
+    """Sharp apex within the search: on averaged samples where there are many, then finer while that tells more.
+
+    The next search reaches three standard uncertainties in time (an averaged sample at the least) about the apex.
+    """
+    best: Apex | None = None
+    factor = _samples_to_average(search)
+    while True:
+        start, low, high, end = search
+        t, f = condense(time_s[start : end + 1], factor), condense(force[start : end + 1], factor)
+        first, last, averaged = (low - start) // factor, (high - start) // factor + 1, noise / math.sqrt(factor)
+        apex = sharp_apex(t, f, first, last, averaged)
+        if apex is not None and not apex.fits and (skipped := _smooth_from(t, f, first, averaged)):
+            apex = sharp_apex(t[skipped:], f[skipped:], first - skipped, last - skipped, averaged)
+        if best is not None and (apex is None or apex.u_N > best.u_N):
+            return best
+        best = apex
+        if best is None or factor == 1:
+            return best
+        around_s = (best.time_s - 3.0 * best.time_u_s, best.time_s + 3.0 * best.time_u_s)
+        low, high = (int(k) + side * factor for k, side in zip(np.searchsorted(time_s, around_s), (-1, 1), strict=True))
+        reach = _MOST_SAMPLES * max(1, (high - low) // _MOST_PAIRS) // 2
+        search = (max(start, low - reach), low, high, min(end, high + reach))
+        if _samples_to_average(search) > factor // 2:
+            return best
+        factor = _samples_to_average(search)
 
 
-def _factor(search: Search) -> int:
+def _samples_to_average(search: Search) -> int:
     """Samples to average so that the pairs searched and the samples fitted stay few."""
-    longest = max(search.low - search.start, search.end - search.high)
-    return max(1, math.ceil((search.high - search.low) / _MOST_PAIRS), longest // _MOST_SAMPLES)
-
-
-def _closer(time_s: FloatArray, apex: Apex, search: Search, factor: int) -> Search:
-    """The search narrowed to three standard uncertainties in time (a condensed sample at the least) about an apex."""
-    low, high = np.searchsorted(time_s, (apex.time_s - 3.0 * apex.time_u_s, apex.time_s + 3.0 * apex.time_u_s))
-    low, high = int(low) - factor, int(high) + factor
-    finest = max(1, (high - low) // _MOST_PAIRS)
-    return Search(
-        max(search.start, low - _MOST_SAMPLES * finest // 2),
-        low,
-        high,
-        min(search.end, high + _MOST_SAMPLES * finest // 2),
-    )
-
-
-def _condensed(time_s: FloatArray, force: FloatArray, search: Search, factor: int, noise: float) -> Apex | None:
-    """Sharp apex of the samples of a search, averaged by ``factor``."""
-    t = condense(time_s[search.start : search.end + 1], factor)
-    f = condense(force[search.start : search.end + 1], factor)
-    low = (search.low - search.start) // factor
-    high = (search.high - search.start) // factor + 1
-    noise = noise / math.sqrt(factor)
-    apex = sharp_apex(t, f, low, high, noise)
-    if apex is None or apex.fits or not (skipped := _smooth_from(t, f, low, noise)):
-        return apex
-    return sharp_apex(t[skipped:], f[skipped:], low - skipped, high - skipped, noise)
+    start, low, high, end = search
+    return max(1, math.ceil((high - low) / _MOST_PAIRS), max(low - start, end - high) // _MOST_SAMPLES)
 
 
 def _smooth_from(t: FloatArray, f: FloatArray, end: int, noise: float) -> int:
@@ -200,29 +186,30 @@ def sharp_apex(time_s: FloatArray, force: FloatArray, first: int, last: int, noi
 
 
 def _weigh(
-    t: FloatArray, force: FloatArray, at: FloatArray, rise: _Side, fall: _Side, noise: float, origin: float
+    t: FloatArray, force: FloatArray, at: FloatArray, rise: Side, fall: Side, noise: float, origin: float
 ) -> Apex | None:
     """Mean and spread of the apex over all positions and falls, each by its likelihood (see :func:`sharp_apex`)."""
-    both = rise.variance + fall.variance
-    apart = rise.value - fall.value
-    misfit = rise.misfit + fall.misfit
+    (rise_N, rise_variance, rise_misfit), (fall_N, fall_variance, fall_misfit) = rise, fall
+    both = rise_variance + fall_variance
+    apart = rise_N - fall_N
+    misfit = rise_misfit + fall_misfit
     meeting = misfit + apart**2 / both
     best = float(meeting.min())
     if not math.isfinite(best):
         return None
     chi2_red = best / noise**2 / max(t.size - 6, 1)
     scale = noise**2 * max(chi2_red, 1.0)
-    possible = np.maximum(rise.value - float(force[-3:].mean()), noise)
+    possible = np.maximum(rise_N - float(force[-3:].mean()), noise)
     occam = np.minimum(np.sqrt(2.0 * math.pi * scale * both) / possible, 1.0)
     occam[-1] = 0.0  # without a fall there is no drop to begin it
     sudden = np.where(apart > 0, occam * np.exp((best - misfit) / (2.0 * scale)), 0.0).sum(axis=0)  # (J, S)
     smooth = np.exp((best - meeting) / (2.0 * scale))
     total = float(smooth.sum() + sudden.sum())
-    met = (rise.value * fall.variance + fall.value * rise.variance) / both
-    height = (np.vdot(smooth, met) + np.vdot(sudden, rise.value)) / total
+    met = (rise_N * fall_variance + fall_N * rise_variance) / both
+    height = (np.vdot(smooth, met) + np.vdot(sudden, rise_N)) / total
     variance = (
-        np.vdot(smooth, scale * rise.variance * fall.variance / both + (met - height) ** 2)
-        + np.vdot(sudden, scale * rise.variance + (rise.value - height) ** 2)
+        np.vdot(smooth, scale * rise_variance * fall_variance / both + (met - height) ** 2)
+        + np.vdot(sudden, scale * rise_variance + (rise_N - height) ** 2)
     ) / total
     weight = smooth.sum(axis=0) + sudden
     when = float(np.vdot(weight, at)) / total
@@ -230,7 +217,7 @@ def _weigh(
     return Apex(when + origin, when_u, float(height), math.sqrt(variance), chi2_red, "sharp")
 
 
-def _rise_side(t: FloatArray, f: FloatArray, before: FloatArray, at: FloatArray) -> _Side:
+def _rise_side(t: FloatArray, f: FloatArray, before: FloatArray, at: FloatArray) -> Side:
     """Parabola (a line under eight samples) through the samples of each row of ``before`` (J, n), at times (J, S)."""
     terms = 3 if before[0].sum() >= _FEWEST_FOR_PARABOLA else 2
     reach = max(-float(t[0]), float(t[-1]))
@@ -244,10 +231,10 @@ def _rise_side(t: FloatArray, f: FloatArray, before: FloatArray, at: FloatArray)
     misfit = np.maximum(before @ (f * f) - (c * right).sum(axis=1), 0.0)
     basis = np.array((np.ones_like(x_at), x_at, x_at * x_at)[:terms]).transpose(1, 2, 0)
     value = (basis @ c[:, :, None])[:, :, 0]
-    return _Side(value, ((basis @ inverse) * basis).sum(axis=-1), misfit[:, None])
+    return value, ((basis @ inverse) * basis).sum(axis=-1), misfit[:, None]
 
 
-def _fall_side(t: FloatArray, f: FloatArray, after: FloatArray, at: FloatArray, shares: FloatArray) -> _Side:
+def _fall_side(t: FloatArray, f: FloatArray, after: FloatArray, at: FloatArray, shares: FloatArray) -> Side:
     """Exponential falls through the samples of each row of ``after`` (J, n), one a fall time: arrays (K, J, S).
 
     ``shares`` (K,) are the fall times as shares of the time looked at, the last infinite: a level. A fit that climbs
@@ -263,7 +250,7 @@ def _fall_side(t: FloatArray, f: FloatArray, after: FloatArray, at: FloatArray, 
     misfit = np.where(slope >= 0, np.maximum(sff - sf * sf / n - slope * joint, 0.0), np.inf)
     away = np.exp((t[-1] - at) / fall_s[:, :, None]) - (su / n)[:, :, None]
     value = (sf / n)[:, None] + slope[:, :, None] * away
-    return _Side(value, (1.0 / n)[:, None] + away * away / spread[:, :, None], misfit[:, :, None])
+    return value, (1.0 / n)[:, None] + away * away / spread[:, :, None], misfit[:, :, None]
 
 
 def rounded_apex(
@@ -324,3 +311,89 @@ def _parabola_top(time_s: FloatArray, force: FloatArray, peak: int, half: int, n
     return Apex(
         float(time_s[peak] + top * reach), reach / 2.0, float(row @ c), math.sqrt(variance), chi2_red, "rounded"
     )
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A pull in motion; arrays (n,) share the trace's samples, ``force_N`` is zeroed and free of impulses.
+
+    ``sliding`` is the range of indices after the static peak and before any unloading; ``travel_m`` the distance since
+    the onset, where the trace or the test's speed tells it.
+    """
+
+    time_s: FloatArray
+    force_N: FloatArray
+    smooth_N: FloatArray
+    travel_m: FloatArray | None
+    zero: Zero
+    rise: Rise
+    onset_s: float
+    apex: Apex
+    sliding: tuple[int, int]
+    noise_N: float
+    problems: tuple[Problem, ...]
+
+
+def in_motion(climb: Climb, apex: Apex, speed_m_s: float | None = None) -> Motion:
+    """A pull once it moves: how far it has come, always counted forward, and between which samples it slides."""
+    signal, onset_s, x = climb.signal, climb.onset_s, climb.signal.displacement_m
+    travel = None if speed_m_s is None else np.asarray(speed_m_s * (signal.time_s - onset_s))
+    if x is not None:
+        away = x - float(np.interp(onset_s, signal.time_s, x))
+        travel = np.asarray(np.where(away[-1] < 0, -1.0, 1.0) * away)
+    first = int(np.searchsorted(signal.time_s, apex.time_s, side="right"))
+    return Motion(
+        signal.time_s, signal.force_N, signal.smooth_N, travel, climb.zero, climb.rise, onset_s, apex,
+        (first, climb.end), signal.noise_N, signal.problems,
+    )  # fmt: skip
+
+
+def static_readings(motion: Motion, end: int) -> tuple[float, float, float]:
+    """First maximum, highest force and force before the first drop up to the sample ``end``, in N above zero.
+
+    The drive stops there, or the record ends. NaN where there is none.
+    """
+    onset = int(np.searchsorted(motion.time_s, motion.onset_s))
+    force = motion.smooth_N[onset:end]
+    first = motion.apex.force_N
+    if force.size < _FEWEST_READ:
+        return first, math.nan, math.nan
+    at = int(np.searchsorted(motion.time_s, motion.apex.time_s)) - onset
+
+    def one_of(index: int) -> float:
+        """The first maximum where a maximum is the same one or lies below it, else its own force."""
+        own = float(force[index])
+        return first if abs(index - at) <= _SAME or (index > at and own < first) else own
+
+    later = float(np.median(force[-max(int(_LATER * force.size), 1) :]))
+    top = int(np.argmax(force))
+    highest = one_of(top) if float(force[top]) - later > _PEAKED * motion.noise_N else math.nan
+    so_far = np.maximum.accumulate(force)
+    fallen = so_far - force > np.maximum(DROP * so_far, _PEAKED * motion.noise_N)
+    fallen &= so_far > _HIGH * float(force.max())
+    drop = one_of(int(np.argmax(force[: int(np.argmax(fallen)) + 1]))) if fallen.any() else math.nan
+    return first, highest, drop
+
+
+def left_open_N(readings: tuple[float, float, float], chosen: Apex) -> float:
+    """Standard uncertainty that the difference of three readings leaves (GUM type B), 0 where they agree."""
+    widest = max((abs(x - chosen.force_N) for x in readings if math.isfinite(x)), default=0.0)
+    clear = widest > max(_CLEARLY * abs(chosen.force_N), _BEYOND_U * math.hypot(chosen.u_N, chosen.shape_u_N))
+    return widest / math.sqrt(3.0) if clear else 0.0
+
+
+def within_samples(motion: Motion, apex: Apex) -> Apex:
+    """A peak no higher than its samples and their noise allow; what is cut off stays in the uncertainty.
+
+    Where samples resolve the rise, a corner between two of them may lie above both by what the force rises in between.
+    """
+    around = np.abs(motion.time_s - apex.time_s)
+    near_it = motion.force_N[np.argsort(around, kind="stable")[:_FEWEST_READ]]
+    step_s = float(np.median(np.diff(motion.time_s)))
+    between = _STEPS * motion.rise.rate * step_s if motion.rise.last - motion.rise.first >= _RESOLVED else 0.0
+    highest = float(near_it.max())
+    if not apex.force_N > highest + _NOISE_AT_TOP * motion.noise_N + between:
+        return apex
+    missed = max(apex.force_N - highest, motion.rise.rate * step_s / 2.0)
+    u_N = math.hypot(motion.noise_N, missed / math.sqrt(3.0))
+    return Apex(apex.time_s, apex.time_u_s, highest, u_N, apex.chi2_red, "highest sample")

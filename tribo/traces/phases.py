@@ -12,8 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.display import displayed
-from tribo.errors import Problem, TraceError
 from tribo.records import FloatArray, Trace
 from tribo.traces.loading import starting_level
 from tribo.traces.signal import (
@@ -276,22 +274,6 @@ _FRAGMENT = 0.2  # share of the median piece below which a piece is what a cut l
 _MIDDLE = (0.3, 0.7)  # share of a stroke in which its force is taken to tell its direction and zero
 
 
-@displayed()
-@dataclass(frozen=True)
-class Strokes:
-    """Strokes with a common zero: each trace has positive friction and its zero subtracted.
-
-    ``zero_N`` is the offset determined from their asymmetry: half the sum of the force in the two directions, with its
-    standard uncertainty; NaN where all strokes have the same direction; then nothing is subtracted.
-    ``directions`` are +1 and -1, the sign of the recorded force.
-    """
-
-    traces: tuple[Trace, ...]
-    directions: tuple[int, ...]
-    zero_N: float
-    zero_u_N: float
-
-
 def split_pulls(trace: Trace) -> tuple[Trace, ...]:
     """Split a record where a new pull begins: at a reversal of the force, a step of the load, a step of the speed.
 
@@ -406,39 +388,25 @@ def _cut(jump: FloatArray, start: int, end: int) -> tuple[int, int]:
     return at, at
 
 
-def orient_strokes(strokes: Sequence[Trace]) -> Strokes:
-    """Convert strokes in both directions to pulls of one sign and subtract their common zero.
+def directions_of(
+    pieces: Sequence[Trace], zeros_N: Sequence[float]
+) -> tuple[tuple[int, ...], tuple[float, float] | None]:
+    """The direction of each piece, 1 or -1, and the zero (N, standard uncertainty) that strokes both ways share.
 
-    The force of a stroke is its mean over the middle (30 to 70 %); its direction is the side of the midpoint
-    of all strokes on which it lies. Friction is assumed equal in both directions, so the zero is half the sum.
-
-    Raises
-    ------
-    TraceError
-        ``no_strokes``: nothing is given.
+    The force of a piece is its mean over the middle (30 to 70 %) above a zero that is known, else above none. Strokes
+    go both ways where these forces have both signs; the direction is then the side of their midpoint. Friction is
+    assumed equal in both directions, so the zero is half the sum of the means of the two; its uncertainty comes from
+    their scatter, or from within strokes. None where all pieces go one way.
     """
-    if not strokes:
-        raise TraceError(Problem("no_strokes", "no strokes are given"))
-    middles = [_middle(stroke) for stroke in strokes]
-    forces = np.array([float(f.mean()) for f in middles])
-    u = np.array([wander(f, 1.0).mean_u for f in middles])
-    both = bool(forces.min() < 0 < forces.max())
-    side = np.where(forces >= (forces.max() + forces.min()) / 2.0, 1, -1) if both else np.sign(forces).astype(int)
-    zero, zero_u = _asymmetry(forces, u, side) if both else (math.nan, math.nan)
-    offset = zero if both else 0.0
-    turned = tuple(
-        replace(stroke, force_N=sign * (stroke.force_N - offset)) for stroke, sign in zip(strokes, side, strict=True)
-    )
-    return Strokes(turned, tuple(int(s) for s in side), zero, zero_u)
-
-
-def _middle(stroke: Trace) -> FloatArray:
-    start, end = (int(share * stroke.force_N.size) for share in _MIDDLE)
-    return stroke.force_N[start : max(end, start + 1)]
-
-
-def _asymmetry(forces: FloatArray, u: FloatArray, side: FloatArray) -> tuple[float, float]:
-    """Half the sum of the mean force of the two directions; its uncertainty from their scatter, or within strokes."""
+    middles = []
+    for piece in pieces:
+        start, end = (int(share * piece.force_N.size) for share in _MIDDLE)
+        middles.append(piece.force_N[start : max(end, start + 1)])
+    forces = np.array([float(f.mean()) for f in middles]) - np.array(zeros_N)
+    if not forces.min() < 0 < forces.max():
+        return tuple(-1 if force < 0 else 1 for force in forces), None
+    u = np.array([wander(f, 1.0)[0] for f in middles])
+    side = np.where(forces >= (forces.max() + forces.min()) / 2.0, 1, -1)
     means, us = [], []
     for sign in (1, -1):
         mine = side == sign
@@ -446,4 +414,4 @@ def _asymmetry(forces: FloatArray, u: FloatArray, side: FloatArray) -> tuple[flo
         means.append(float(forces[mine].mean()))
         scatter = float(forces[mine].std(ddof=1)) / math.sqrt(count) if count > 1 else 0.0
         us.append(max(scatter, float(np.sqrt((u[mine] ** 2).sum())) / count))
-    return sum(means) / 2.0, math.hypot(*us) / 2.0
+    return tuple(int(s) for s in side), (sum(means) / 2.0, math.hypot(*us) / 2.0)

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from tribo.display import displayed
 from tribo.errors import Problem, TraceError
-from tribo.traces.peak import Apex, rounded_apex
-from tribo.traces.sliding import Motion, Window, settled, slides_on_closed_track
+from tribo.traces.peak import Apex, Motion, rounded_apex
+from tribo.traces.sliding import Window, settled, slides_on_closed_track
+from tribo.user_text import did_you_mean
 
 Parameters = Mapping[str, float]
+DEFAULT_RULE = "first_peak"
+OLD_NAMES = {"seed": "first_peak"}  # still taken from users, who are told the name of today
 
 
 @displayed()
@@ -115,7 +119,7 @@ RULES: dict[str, Rule] = {
     rule.name: rule
     for rule in (
         Rule(
-            "seed",
+            "first_peak",
             "first maximum of the force",
             "mean from the time the force has stabilised (MSER-5) to the end of sliding; of a slide over more than "
             "10 m, the second half, so that running-in is left out",
@@ -178,3 +182,29 @@ RULES: dict[str, Rule] = {
         ),
     )
 }
+
+
+def rule_of_today(name: str) -> str:
+    """The name of a rule; for an old name that of today, which a warning states."""
+    if name in OLD_NAMES:
+        warnings.warn(f"the rule {name} is now called {OLD_NAMES[name]}", FutureWarning, stacklevel=2)
+    return OLD_NAMES.get(name, name)
+
+
+def named_rule(name: str, parameters: Parameters | None = None) -> Rule:
+    """The rule of a name, with its own parameters replaced by those given.
+
+    Raises
+    ------
+    TraceError
+        The rule or a parameter is unknown; what is allowed is listed.
+    """
+    name = rule_of_today(name)
+    if name not in RULES:
+        hint = "; ".join(filter(None, (", ".join(RULES), did_you_mean(name, RULES))))
+        raise TraceError(Problem("unknown_rule", "unknown rule", found=name, allowed=hint))
+    rule = RULES[name]
+    if unknown := sorted(set(parameters or {}) - set(rule.parameters)):
+        allowed = ", ".join(rule.parameters) or "none"
+        raise TraceError(Problem("unknown_parameter", f"not in rule {name}", found=", ".join(unknown), allowed=allowed))
+    return replace(rule, parameters={**rule.parameters, **(parameters or {})})

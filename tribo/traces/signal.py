@@ -82,22 +82,11 @@ def running_mean(values: FloatArray, width: int) -> FloatArray:
     return np.asarray((total[high] - total[low]) / (high - low))
 
 
-@dataclass(frozen=True)
-class Wander:
-    """Deviations of a steady signal from its mean.
-
-    ``mean_u`` is the standard uncertainty of the mean from correlated but stationary noise, ``rate`` the
-    variance a random walk gathers per second (unit of the signal squared, per second), ``noise`` that of
-    single samples.
-    """
-
-    mean_u: float
-    rate: float
-    noise: float
-
-
-def wander(values: FloatArray, duration_s: float) -> Wander:
+def wander(values: FloatArray, duration_s: float) -> tuple[float, float, float]:
     """Split the departures of ``values`` (spread evenly over ``duration_s``) into stationary noise and a slow walk.
+
+    Returns the standard uncertainty of the mean from correlated but stationary noise, the variance that a random walk
+    gathers per second (unit of the signal squared, per second), and the noise of a single sample.
 
     The mean squared difference of block means h blocks apart is 2 s^2 + q (h - 1/3) t_block for noise of
     block variance s^2 on top of a random walk of variance rate q (the 1/3 is what averaging within blocks
@@ -110,32 +99,24 @@ def wander(values: FloatArray, duration_s: float) -> Wander:
     count = means.size
     if count < 4:
         spread = float(values.std(ddof=1)) / math.sqrt(values.size) if values.size > 1 else math.nan
-        return Wander(spread, 0.0, noise)
-    variogram = _variogram_line(count)
-    squares = (means[variogram.later] - means[variogram.earlier]) ** 2
-    level, slope = float(variogram.level @ squares), float(variogram.slope @ squares)
+        return spread, 0.0, noise
+    later, earlier, to_level, to_slope, centre = _variogram_line(count)
+    squares = (means[later] - means[earlier]) ** 2
+    level, slope = float(to_level @ squares), float(to_slope @ squares)
     white = noise**2 * count / values.size
-    most = max(level - 2.0 * white, 0.0) / variogram.centre
-    slope = (_mean_within(slope, _SLOPE_U * level / variogram.centre, most) + most) / 2.0
-    stationary = max(level - slope * variogram.centre, 2.0 * white) / 2.0
+    most = max(level - 2.0 * white, 0.0) / centre
+    slope = (_mean_within(slope, _SLOPE_U * level / centre, most) + most) / 2.0
+    stationary = max(level - slope * centre, 2.0 * white) / 2.0
     rate = slope * count / duration_s if duration_s > 0 else 0.0
-    return Wander(math.sqrt(stationary / count), rate, noise)
-
-
-@dataclass(frozen=True)
-class _VariogramLine:
-    """Weights that turn squared differences of block means into the level and slope of their variogram."""
-
-    later: NDArray[np.int64]
-    earlier: NDArray[np.int64]
-    level: FloatArray
-    slope: FloatArray
-    centre: float
+    return math.sqrt(stationary / count), rate, noise
 
 
 @lru_cache(maxsize=BLOCKS * 2)
-def _variogram_line(count: int) -> _VariogramLine:
-    """Weighted straight line over lags of 1 to a quarter of ``count`` blocks; long lags overlap and count less."""
+def _variogram_line(count: int) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray, FloatArray, float]:
+    """Pairs of blocks (later, earlier), weights of their squared differences for level and slope, and the mean lag.
+
+    A weighted straight line over lags of 1 to a quarter of ``count`` blocks; long lags overlap and count less.
+    """
     earlier, later = np.triu_indices(count, 1)
     lags = np.arange(1, max(2, count // 4) + 1)
     near = later - earlier <= lags[-1]
@@ -146,13 +127,8 @@ def _variogram_line(count: int) -> _VariogramLine:
     centre = float(weights @ x)
     away = weights * (x - centre)
     lag = later - earlier
-    return _VariogramLine(
-        later,
-        earlier,
-        (weights / (count - lags))[lag - 1],
-        (away / (away @ x) / (count - lags))[lag - 1],
-        centre,
-    )
+    level, slope = weights / (count - lags), away / (away @ x) / (count - lags)
+    return later, earlier, level[lag - 1], slope[lag - 1], centre
 
 
 def _mean_within(estimate: float, u: float, most: float) -> float:
@@ -179,8 +155,8 @@ class Steady:
 
 def steady(time_s: FloatArray, force: FloatArray) -> Steady:
     """Mean over a window of samples with the uncertainty that their correlation leaves."""
-    slow = wander(force, float(time_s[-1] - time_s[0]))
-    return Steady(float(force.mean()), slow.mean_u, line(time_s, force)[0], slow.noise)
+    mean_u, _, noise = wander(force, float(time_s[-1] - time_s[0]))
+    return Steady(float(force.mean()), mean_u, line(time_s, force)[0], noise)
 
 
 MINIMUM_SAMPLES = 20

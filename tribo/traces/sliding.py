@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tribo.errors import Problem
 from tribo.records import CLOSED_TRACK_M, FloatArray
-from tribo.traces.loading import Climb, Rise, Zero
-from tribo.traces.peak import Apex
+from tribo.traces.peak import Motion
 from tribo.traces.signal import Steady, condense, line, steady, wander
 
 Window = tuple[int, int]
@@ -23,27 +21,6 @@ _LATEST = 0.5  # at most this share of the record after the peak is taken as uns
 _BEYOND_NOISE = 1.5  # stick-slip swings further from its line than noise does in so many samples, by this many times it
 _FEWEST_CYCLES = 3
 _REGULAR = 0.4  # largest spread of the cycle times over their mean that still counts as stick-slip
-
-
-@dataclass(frozen=True)
-class Motion:
-    """A pull in motion; arrays (n,) share the trace's samples, ``force_N`` is zeroed and free of impulses.
-
-    ``sliding`` is the range of indices after the static peak and before any unloading; ``travel_m`` the distance since
-    the onset, where the trace or the test's speed tells it.
-    """
-
-    time_s: FloatArray
-    force_N: FloatArray
-    smooth_N: FloatArray
-    travel_m: FloatArray | None
-    zero: Zero
-    rise: Rise
-    onset_s: float
-    apex: Apex
-    sliding: Window
-    noise_N: float
-    problems: tuple[Problem, ...]
 
 
 @dataclass(frozen=True)
@@ -67,29 +44,10 @@ class Sliding:
         return not math.isnan(self.window_s[0])
 
 
-def in_motion(climb: Climb, apex: Apex, speed_m_s: float | None = None) -> Motion:
-    """A pull once it moves: how far it has come, and between which samples it slides."""
-    signal, onset_s = climb.signal, climb.onset_s
-    first = int(np.searchsorted(signal.time_s, apex.time_s, side="right"))
-    return Motion(
-        signal.time_s, signal.force_N, signal.smooth_N, _travel(climb, speed_m_s), climb.zero, climb.rise, onset_s,
-        apex, (first, climb.end), signal.noise_N, signal.problems,
-    )  # fmt: skip
-
-
-def _travel(climb: Climb, speed_m_s: float | None) -> FloatArray | None:
-    """Distance travelled since the onset, always counted forward; from the speed where no displacement was recorded."""
-    time, x = climb.signal.time_s, climb.signal.displacement_m
-    if x is not None:
-        away = x - float(np.interp(climb.onset_s, time, x))
-        return np.asarray(np.where(away[-1] < 0, -1.0, 1.0) * away)
-    return None if speed_m_s is None else np.asarray(speed_m_s * (time - climb.onset_s))
-
-
-def window_between(motion: Motion, start_s: float, end_s: float) -> Window:
+def window_between(time_s: FloatArray, start_s: float, end_s: float) -> Window:
     """The range of samples from one time to another, both included."""
-    first, end = np.searchsorted(motion.time_s, (start_s, end_s))
-    return int(first), int(end) + int(end < motion.time_s.size and motion.time_s[end] == end_s)
+    first, end = np.searchsorted(time_s, (start_s, end_s))
+    return int(first), int(end) + int(end < time_s.size and time_s[end] == end_s)
 
 
 def sliding_over(motion: Motion, window: Window) -> Sliding:
@@ -104,7 +62,7 @@ def sliding_over(motion: Motion, window: Window) -> Sliding:
     if end - start < _FEWEST:
         return Sliding(_NO_STEADY, window, (math.nan, math.nan), swing, period, rate)
     if long:  # the window was chosen for its steadiness, so it alone would tell too little wander
-        rate = wander(after_N, float(after_s[-1] - after_s[0])).rate
+        rate = wander(after_N, float(after_s[-1] - after_s[0]))[1]
     mean = steady(time[start:end], force[start:end])
     return Sliding(mean, window, (float(time[start]), float(time[end - 1])), swing, period, rate)
 
