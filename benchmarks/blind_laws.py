@@ -34,6 +34,7 @@ from tribo.lawsearch.known_laws import validate_law
 from tribo.lawsearch.model_choice import CauseForms, FoundLaw, centred
 from tribo.lawsearch.scoring import terms_of
 from tribo.lawsearch.search import Discovery
+from tribo.wording.law_sentences import held_sentence
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "results" / "blind-laws.md"
 MARK = "<!-- below: python benchmarks/blind_laws.py page -->"
@@ -185,7 +186,7 @@ def _pair(piece: Piece) -> dict[str, Any]:
     d = examine(as_ingested(later.bench, seed, kept), seed=seed)
     held = validate_law(uncontested(d).model, found.laws[0].law, found.laws[0].parameters)
     return {
-        "answer": held.answer, "second": piece.second, "text": held.text, "verdict": d.verdict.verdict,
+        "answer": held.answer, "second": piece.second, "text": held_sentence(held), "verdict": d.verdict.verdict,
         "strength": round(later.strength, 2),
     }  # fmt: skip
 

@@ -15,7 +15,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
 GROUND = {
     "display", "errors", "user_text", "input_files", "units", "zeroing", "records", "published", "files", "temporary",
-    "forked", "laws",
+    "forked", "laws", "vocabulary",
 }  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
     ("user_text", set()),
@@ -26,6 +26,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("records", {"display", "errors", "zeroing"}),
     ("laws", {"records", "display"}),
     ("published", set()),
+    ("vocabulary", set()),
     ("files", {"errors"}),
     ("temporary", {"files", "errors"}),
     ("forked", set()),

@@ -186,6 +186,7 @@ class LawFit:
     nominal_area_m2: float
     specimens: Mapping[str, FloatArray] = field(default_factory=dict)  # specimen -> its own values
     notes: tuple[str, ...] = ()
+    bent: bool = False  # the load means deviate from a straight line beyond chance
 
     @property
     def has_area(self) -> bool:
@@ -637,6 +638,7 @@ class Study:
     notes: tuple[str, ...] = ()
     combined: tuple[CombinedFit, ...] = ()
     doubts: tuple[Doubt, ...] = ()
+    undiagnosed: str = ""  # why there is no diagnosis
 
 
 __all__ = [

@@ -32,7 +32,7 @@ Until = Literal["ingest", "fit", "compare", "report"]
 DIAGNOSED_BY = (
     "diagnostics", "lawsearch", "mechanisms", "mechanisms_in_model", "fitting", "laws", "springblock", "records",
 )  # fmt: skip
-ASSESSED_BY = ("fitting", "laws", "records")
+ASSESSED_BY = ("fitting", "laws", "records", "vocabulary")
 
 
 def _silent(stage: str, done: int, total: int) -> None:
@@ -300,6 +300,7 @@ def diagnose(
     from tribo.diagnostics import examine, predictor as pattern_table, with_simulation
     from tribo.lawsearch.diagnosis_with_laws import with_law_across, with_laws
     from tribo.lawsearch.known_laws import read_laws
+    from tribo.wording.verdict_sentences import worded
 
     predictor = own_predictor(ingested.campaign, kept)
     title = ingested.campaign.title
@@ -311,7 +312,8 @@ def diagnose(
         return with_simulation(examined, seed=seed, jobs=jobs, progress=progress).without_columns()
 
     made_from = (ingested, seed, predictor, pattern_table.record(), known)
-    return Shelf(kept).take("diagnosis", made_from, found, DIAGNOSED_BY)
+    diagnosed: Diagnosis = Shelf(kept).take("diagnosis", made_from, found, DIAGNOSED_BY)
+    return replace(diagnosed, verdict=worded(diagnosed.verdict))
 
 
 def diagnosis(ingested: Ingested, **options: Any) -> Diagnosis:
@@ -328,13 +330,15 @@ def diagnosis_without_model(study: Study, *, seed: int = 0, kept: Path | None = 
     """
     from tribo.diagnostics.diagnosis_record import DiagnosisWithoutModel
     from tribo.diagnostics.without_model import diagnose_without_model
+    from tribo.wording.verdict_sentences import worded
 
     made_from = (study.ingested, study.laws, seed)
 
-    def without() -> DiagnosisWithoutModel:
+    def diagnosed() -> DiagnosisWithoutModel:
         return DiagnosisWithoutModel(diagnose_without_model(study, seed=seed))
 
-    return Shelf(kept).take("alone", made_from, without, DIAGNOSED_BY)
+    found: DiagnosisWithoutModel = Shelf(kept).take("alone", made_from, diagnosed, DIAGNOSED_BY)
+    return DiagnosisWithoutModel(worded(found.verdict))
 
 
 def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:

@@ -14,6 +14,7 @@ from tribo.campaign import load_campaign
 from tribo.diagnostics import examine
 from tribo.diagnostics.verdict import Verdict
 from tribo.stages import ingest
+from tribo.wording.verdict_sentences import worded
 
 from .tribometer import LARGEST, Design, hide, write
 
@@ -33,7 +34,7 @@ def test_a_campaign_without_an_effect_is_said_to_have_none(tmp_path: Path, seed:
     v = verdict_on(tmp_path, seed, design=design)
     assert v.verdict == "no_misfit"
     assert v.causes == ()
-    assert "would have shown" in v.text
+    assert "would have shown" in worded(v).text
     assert 0 < v.smallest_effects["run_in"] < 40
 
 

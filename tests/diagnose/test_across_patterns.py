@@ -17,13 +17,15 @@ from tribo.lawsearch.across_patterns import (
     Term,
     across_patterns,
     deviations_of,
+    formula,
     geometry_of,
     grammar,
     left_out_errors,
     predicted,
+    table_of,
 )
-from tribo.lawsearch.across_words import formula, sentence, table_of
 from tribo.published import load_table2
+from tribo.wording.law_sentences import across_sentence
 
 from .known import baseline
 
@@ -56,7 +58,7 @@ def test_a_law_of_the_cavity_share_is_found_beyond_chance_and_predicts_patterns_
     assert search.p < 0.01
     assert search.best.error == pytest.approx(0.05, abs=0.02)
     assert search.nested < 0.1 < found.without
-    assert "One law across the patterns predicts" in sentence(found)
+    assert "One law across the patterns predicts" in across_sentence(found)
 
 
 def test_where_geometry_says_nothing_no_law_is_beyond_chance() -> None:
@@ -129,7 +131,7 @@ def test_with_five_patterns_the_best_law_of_table_2_is_not_beyond_chance() -> No
     assert found is not None
     assert found.searches[0].best.error < 0.65 * found.without
     assert found.searches[0].p > 0.05
-    assert "No law across the patterns is beyond chance" in sentence(found)
+    assert "No law across the patterns is beyond chance" in across_sentence(found)
     assert len(table_of(found)) == len(grammar(published()))
 
 

@@ -46,7 +46,7 @@ def seen() -> tuple[Contrast, ...]:
 
 def one(kind: str, observable: str, covariate: str, sample: str = "") -> Contrast:
     (found,) = [
-        c for c in seen() if (c.kind, c.observable, c.covariate, c.sample) == (kind, observable, covariate, sample)
+        c for c in seen() if (c.kind, c.observable, c.title, c.sample) == (kind, observable, covariate, sample)
     ]
     return found
 
@@ -167,7 +167,7 @@ def test_periods_are_harmonics_of_the_series_down_to_four_tests_and_three_of_the
     o = observed()
     rank = (o.conditions.run_order - 1) / 48
     series = [contrast for contrast in of_kind("period") if contrast.covariate.startswith("run_order")]
-    assert [contrast.covariate for contrast in series] == [f"run_order, period {48 / k:.3g}" for k in range(1, 13)]
+    assert [contrast.title for contrast in series] == [f"run_order, period {48 / k:.3g}" for k in range(1, 13)]
     for k, contrast in enumerate(series, start=1):
         wave = np.column_stack([np.sin(2 * np.pi * k * rank), np.cos(2 * np.pi * k * rank)])
         assert contrast.columns[:, 0] == pytest.approx(wave)
@@ -201,7 +201,7 @@ def test_stretches_are_runs_of_two_to_five_successive_tenths_of_the_series() -> 
     for (first, last), contrast in zip(wanted, found, strict=True):
         inside = (tenth >= first) & (tenth <= last)
         assert contrast.columns[:, 0, 0].tolist() == contrast.columns[:, 1, 0].tolist() == inside.astype(float).tolist()
-        assert contrast.covariate == f"run_order, from {order[inside].min():.0f} to {order[inside].max():.0f}"
+        assert contrast.title == f"run_order, from {order[inside].min():.0f} to {order[inside].max():.0f}"
 
 
 @pytest.mark.parametrize(("tests", "there"), [(29, False), (30, True)])

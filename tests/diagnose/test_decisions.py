@@ -11,6 +11,7 @@ from tribo.diagnostics import candidates as naming, examine
 from tribo.diagnostics.candidates import best_beyond_chance, weigh
 from tribo.diagnostics.model import Setup
 from tribo.diagnostics.score_statistics import start_effects
+from tribo.wording.verdict_sentences import worded
 
 from .known import acting, baseline, made
 
@@ -48,7 +49,7 @@ def test_a_mechanism_whose_own_column_is_still_wrong_is_left_out_and_said(monkey
     monkeypatch.setattr(naming, "_misfit_in_own_column", lambda cause, *_: cause.name == "humidity")
     verdict = examine(made(acting("humidity", 0.03), seed=0), replicates=FEW).verdict
     assert "humidity" not in [cause.mechanism for cause in verdict.causes]
-    assert "Tried and left out: humidity." in verdict.text
+    assert "Tried and left out: humidity." in worded(verdict).text
 
 
 def test_of_the_mechanisms_weighed_only_one_beyond_chance_can_be_the_cause() -> None:

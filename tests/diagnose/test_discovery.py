@@ -20,16 +20,17 @@ from tribo.display import exact_text
 from tribo.errors import CampaignError
 from tribo.figures.extended_model import draw_law, law_numbers, law_numbers_of
 from tribo.lawsearch import diagnosis_with_laws
-from tribo.lawsearch.diagnosis_with_laws import searched_laws, separating_test, with_laws, with_misfits
+from tribo.lawsearch.diagnosis_with_laws import law_layers, searched_laws, separating_test, with_laws, with_misfits
 from tribo.lawsearch.grammar import ADHESION_TERM, LOAD_TERM, UNITS, Shape, WrittenLaw, groups_of, shapes_of
 from tribo.lawsearch.known_laws import validate_law
 from tribo.lawsearch.law_file import law_text, read_law
-from tribo.lawsearch.law_words import discovery_text, law_layers, law_sentence, size_sentence
 from tribo.lawsearch.scoring import Projection
 from tribo.lawsearch.search import RESCORED, Discovery, Grammar, best_of, discover_laws
 from tribo.mechanisms.record import Base, Conditions
 from tribo.mechanisms.table import MECHANISMS
-from tribo.report.verdict_file import verdict_in_words
+from tribo.wording.law_sentences import discovery_sentence, held_sentence, law_sentence, size_sentence
+from tribo.wording.part_sentences import layer_sentence, misfit_sentence, next_test_sentence
+from tribo.wording.verdict_sentences import verdict_in_words, worded
 
 from .known import acting, baseline, made
 
@@ -79,7 +80,7 @@ def test_laws_of_the_two_pressures_are_told_apart_at_equal_contact_pressures() -
         for name in ("pressure_Pa", "contact_pressure_Pa")
     )
     conditions = baseline(made(nothing, seed=1)).setup.observations.conditions
-    assert "at equal contact pressures" in separating_test(one, other, conditions).text
+    assert "at equal contact pressures" in next_test_sentence(separating_test(one, other, conditions))
 
 
 def nothing(s: Setup) -> np.ndarray:
@@ -104,7 +105,7 @@ def test_the_column_the_form_the_regime_and_the_place_are_found(found: Discovery
 
 
 def test_the_law_is_said_in_a_sentence_and_as_a_layer(found: Discovery) -> None:
-    text, layer = discovery_text(found), law_layers(found)[0]
+    text, layer = discovery_sentence(found), law_layers(found)[0]
     assert "Sliding friction is higher (+" in text
     assert "near the temperature = 2" in text
     assert (layer.kind, layer.regimes) == ("law", ("sliding",))
@@ -121,8 +122,9 @@ def test_a_diagnosis_adds_the_law_of_what_no_mechanism_explains(diagnosed: Diagn
     assert diagnosed.verdict.verdict == "unknown"
     assert layers["law"].name == "temperature_C"
     assert "remainder" not in layers
-    assert layers["law"].text in diagnosed.verdict.text
-    assert "the remaining differences are within chance" in diagnosed.verdict.text
+    said = worded(diagnosed.verdict)
+    assert layer_sentence(layers["law"]).rstrip(".") in said.sentence
+    assert "the remaining differences are within chance" in said.evidence
 
 
 @pytest.fixture(scope="module")
@@ -142,16 +144,16 @@ def test_a_law_that_no_contrast_had_shown_is_a_misfit(found: Discovery, quiet: D
     assert v.verdict == "unknown"
     assert [(m.observable, m.covariate) for m in v.misfits] == [("sliding", "temperature_C")]
     assert v.misfits[0].low < v.misfits[0].effect_percent < v.misfits[0].high
-    assert law_sentence(found.laws[0]) in v.text
+    assert misfit_sentence(v.misfits[0]) == law_sentence(found.laws[0])
     assert v.next_test is not None
-    assert "temperature" in v.next_test.text
+    assert "temperature" in next_test_sentence(v.next_test)
 
 
 def test_a_law_beside_a_cause_leaves_it_a_part_of_the_answer(found: Discovery, quiet: Diagnosis) -> None:
-    cause = Cause("suction", 1.0, {}, "Suction.")
+    cause = Cause("suction", 1.0, {})
     v = with_misfits(replace(quiet.verdict, verdict="named", causes=(cause,)), found)
     assert (v.verdict, v.causes) == ("partly", (cause,))
-    assert "A misfit remains beyond chance" in v.text
+    assert "A misfit remains beyond chance" in worded(v).text
 
 
 @pytest.mark.parametrize("step", [with_laws, searched_laws])
@@ -192,7 +194,7 @@ def test_a_diagnosis_with_a_law_can_be_kept(diagnosed: Diagnosis) -> None:
 
 
 def test_the_report_shows_a_law_with_its_size(diagnosed: Diagnosis) -> None:
-    words = verdict_in_words(diagnosed.verdict.as_dict())
+    words = verdict_in_words(worded(diagnosed.verdict))
     assert words["outcome"].endswith("A law was found that it follows.")
     assert words["laws"][0]["formula"].startswith("T * exp(a ")
     assert "a = " in words["laws"][0]["formula"]
@@ -219,7 +221,7 @@ def test_the_best_law_by_the_fitted_noise_is_among_those_scored_anew() -> None:
 def test_nothing_is_written_where_nothing_is_hidden() -> None:
     quiet = discover_laws(baseline(made(nothing, seed=102)), replicates=20)
     assert quiet.laws == ()
-    assert "None of the" in discovery_text(quiet)
+    assert "None of the" in discovery_sentence(quiet)
 
 
 def test_a_law_is_read_as_it_was_written(found: Discovery, tmp_path: Path) -> None:
@@ -253,7 +255,8 @@ def test_a_law_whose_column_is_not_recorded_cannot_be_told(found: Discovery) -> 
     elsewhere = replace(law.law, shapes=(replace(law.law.shapes[0], column="lot"),))
     answer = validate_law(baseline(made(nothing, seed=22)), elsewhere, law.parameters)
     assert answer.answer == "cannot be told"
-    assert "lot is not recorded" in answer.text
+    assert answer.untested == ("not recorded", ("lot",))
+    assert "lot is not recorded" in held_sentence(answer)
 
 
 def _ends(e: Estimate) -> tuple[float, float, float]:
@@ -312,7 +315,8 @@ def test_a_day_is_not_to_be_varied_but_what_it_had_in_particular() -> None:
     shape = Shape("level", "date", level="2026-03-04")
     one, other = (WrittenLaw((shape,), acts_on=term) for term in (LOAD_TERM, ADHESION_TERM))
     test = separating_test(one, other, baseline(made(nothing, seed=1)).setup.observations.conditions)
-    assert test.text.startswith("Find out what differed on 2026-03-04, and pull with it and without it at ")
+    said = "Find out what differed on 2026-03-04, and pull with it and without it at "
+    assert next_test_sentence(test).startswith(said)
 
 
 def best_at_23(s: Setup) -> np.ndarray:

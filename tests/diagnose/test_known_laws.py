@@ -23,6 +23,9 @@ from tribo.lawsearch.model_choice import without_wrong_forms
 from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model import columns_from, with_law
 from tribo.springblock.config import SimConfig
+from tribo.wording.law_sentences import planned_law_sentence
+from tribo.wording.part_sentences import layer_sentence
+from tribo.wording.verdict_sentences import worded
 
 from .known import Change, baseline, made
 from .synthetic import SMALL, ingested
@@ -58,14 +61,15 @@ def test_a_known_law_that_holds_is_added_and_one_that_cannot_be_tested_says_why(
     tested = validate_laws(baseline(made(warming, seed=31)), read_laws(folder), np.random.default_rng(0))
     assert [held.answer for _, held in tested.answers] == ["held", "cannot be told"]
     assert [layer.name for layer in tested.layers] == ["temperature_C"]
-    assert "The law of first held" in tested.text
+    assert "The law of first held" in layer_sentence(tested.layers[0])
     assert tested.layers[0].low < tested.layers[0].effect_percent < tested.layers[0].high
 
 
 def test_a_verdict_lists_the_answers_about_known_laws(folder: Path) -> None:
     quiet = with_laws(examine(made(nothing, seed=102), replicates=(40, 40)), read_laws(folder))
-    assert [law["answer"] for law in quiet.verdict.model["known_laws"]] == ["not held", "cannot be told"]
-    assert "0 of 2 known laws held." in quiet.verdict.text
+    said = worded(quiet.verdict)
+    assert [law["answer"] for law in said.model["known_laws"]] == ["not held", "cannot be told"]
+    assert "0 of 2 known laws held." in said.text
     assert all(layer.kind == "pattern_correction" for layer in quiet.verdict.layers)
 
 
@@ -180,10 +184,10 @@ def test_a_plan_says_whether_a_design_would_show_a_law() -> None:
     large = plan_law(campaign, WARM, SIZE)
     small = plan_law(campaign, WARM, {"a": Estimate(0.03, 0.01, 0.05, "")})
     assert large.strength == pytest.approx(20.0 * small.strength, rel=1e-2)
-    assert "would show" in large.text
+    assert "would show" in planned_law_sentence(large)
     assert small.tests_needed > len(campaign.tests)
     elsewhere = replace(WARM, shapes=(replace(WARM.shapes[0], column="lot"),))
-    assert "lot is not recorded" in plan_law(campaign, elsewhere, SIZE).text
+    assert "lot is not recorded" in planned_law_sentence(plan_law(campaign, elsewhere, SIZE))
 
 
 def test_a_law_in_the_model_changes_the_thresholds_of_every_block() -> None:

@@ -25,6 +25,7 @@ from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model import parse_with, simulate_with
 from tribo.records import Ingested
 from tribo.springblock import SimConfig, simulate
+from tribo.wording.verdict_sentences import worded
 
 from .synthetic import hidden
 
@@ -86,7 +87,7 @@ def test_it_is_weighed_and_recovered(toy: Mechanism, examined: Diagnosis) -> Non
 
 
 def test_the_verdict_names_it_and_words_it_by_what_its_record_says(examined: Diagnosis) -> None:
-    v = examined.verdict
+    v = worded(examined.verdict)
     assert v.verdict == "named"
     assert [c.mechanism for c in v.causes] == [NAME]
     assert "alternating static friction" in v.text
@@ -116,7 +117,7 @@ def test_evidence_that_it_states_in_the_traces_is_read_and_bars_it(monkeypatch: 
     stated = TraceEvidence("zero", "", "read from the force before contact", corrected=True)
     monkeypatch.setitem(MECHANISMS, NAME, replace(TOY, evidence=stated))
     monkeypatch.setitem(MECHANISMS, "load_cell_offset", replace(MECHANISMS["load_cell_offset"], evidence=None))
-    v = examine(hidden(("load_cell_offset", 1.0)), replicates=(20, 10)).verdict
+    v = worded(examine(hidden(("load_cell_offset", 1.0)), replicates=(20, 10)).verdict)
     assert [c.mechanism for c in v.causes] == [NAME]
     assert v.causes[0].text.endswith("read from the force before contact.")
     assert v.gain is not None

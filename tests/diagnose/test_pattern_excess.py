@@ -6,6 +6,7 @@ import math
 
 from tribo.diagnostics import examine
 from tribo.diagnostics.intervals import pattern_excess
+from tribo.wording.verdict_sentences import worded
 
 from .synthetic import hidden
 from .test_scatter import baseline, off
@@ -23,7 +24,7 @@ def test_patterns_six_times_as_far_off_as_stated_are_reported_each_with_its_own_
         assert (m.effect_percent, m.p_adjusted) == (
             own[m.sample, m.observable].effect_percent, own[m.sample, m.observable].p_adjusted
         )  # fmt: skip
-    assert "times the error that is stated for it" in verdict.text
+    assert "times the error that is stated for it" in worded(verdict).text
 
 
 def test_the_reported_percentages_are_those_by_which_the_patterns_were_moved() -> None:

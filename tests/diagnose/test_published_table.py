@@ -24,6 +24,7 @@ from tribo.berardo2019.table_model import (
 from tribo.figures.catalogue import PUBLISHED_FIGURES
 from tribo.mechanisms.table import MECHANISMS
 from tribo.published import load_table2, load_table2_simulated_anew
+from tribo.wording.verdict_sentences import worded
 
 
 def published(source: str) -> pd.DataFrame:
@@ -108,13 +109,14 @@ def test_suction_is_excluded_in_every_reading_and_deformed_patterns_are_not(whol
         gains = {w.name: w.gain for w in o.weighed}
         assert gains["suction"] < 0.1
         assert gains["cavity_shear_deformation"] > max(gains["suction"], gains["contact_area_loss"]) - 1
-    reason = next(e.reason for e in whole.verdict.excluded if e.mechanism == "suction")
-    assert "sign" in reason
+    suction = next(e for e in whole.verdict.excluded if e.mechanism == "suction")
+    assert suction.why == "wrong sign"
+    assert 0.0 < suction.shows < 2000.0
     assert upper_limit(whole.main.baseline, "suction") < 2000.0
 
 
 def test_the_verdict_says_what_holds_of_each_guess_and_accounts_for_every_mechanism(whole: PublishedDiagnosis) -> None:
-    v = whole.verdict
+    v = worded(whole.verdict)
     assert all(word in v.text for word in ("Deformed patterns", "contact area", "Suction cups", "covariance"))
     named = {c.mechanism for c in v.causes} | {e.mechanism for e in v.excluded} | {whole.main.weighed[0].name}
     assert named == set(MECHANISMS)

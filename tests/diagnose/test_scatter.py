@@ -51,7 +51,7 @@ def test_specimens_with_slopes_of_5_percent_are_no_misfit(seed: int) -> None:
 def test_the_slope_of_a_specimen_is_judged_against_those_of_the_others() -> None:
     """Slopes of 10 % per e-fold: no contrast of one specimen by load is beyond four standard deviations."""
     f = baseline(5, replace(LARGE, specimen_slope=0.10))
-    contrasts = [contrast for contrast in contrasts_of(f) if contrast.covariate.endswith(" by load")]
+    contrasts = [contrast for contrast in contrasts_of(f) if contrast.detail == "by load"]
     assert screen(f, contrasts, replicates=0, rng=np.random.default_rng(0)).strength.max() < 4.0
 
 

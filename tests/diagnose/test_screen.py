@@ -106,4 +106,4 @@ def test_a_stretch_of_the_series_that_differs_is_found_as_such() -> None:
     contrasts = contrasts_of(f)
     strongest = contrasts[int(screen(f, contrasts, replicates=0, rng=np.random.default_rng(0)).strength.argmax())]
     assert strongest.kind == "block"
-    assert strongest.covariate.startswith("run_order, from")
+    assert strongest.title.startswith("run_order, from")

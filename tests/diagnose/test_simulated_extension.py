@@ -13,6 +13,7 @@ from tribo.diagnostics.model import effect_of
 from tribo.diagnostics.predictor import flat_law
 from tribo.diagnostics.simulated_extension import MOST_LOADS, local_friction, representatives, residual_percent
 from tribo.springblock import SimConfig, simulate
+from tribo.wording.verdict_sentences import worded
 
 from .synthetic import hidden
 
@@ -52,7 +53,7 @@ def test_few_tests_are_simulated_and_the_most_moved_is_among_them(hot: Diagnosis
 
 
 def test_the_verdict_says_what_was_simulated_and_whose_shares_it_used(hot: Diagnosis) -> None:
-    v = hot.verdict
+    v = worded(hot.verdict)
     assert "tabulated simulations" in v.text
     assert "in the simulator itself" in v.text
     model = v.as_dict()["model"]
@@ -114,4 +115,4 @@ def test_a_simulation_that_fails_is_reported_with_its_reason(hot: Diagnosis, mon
         "mechanisms": ["temperature"],
         "reason": "the force is not finite",
     }
-    assert "was not simulated: the force is not finite." in d.verdict.text
+    assert "was not simulated: the force is not finite." in worded(d.verdict).text

@@ -12,6 +12,7 @@ from tribo.diagnostics.planning import bits
 from tribo.diagnostics.verdict import Misfit, Verdict
 from tribo.errors import FitError
 from tribo.records import SetAside
+from tribo.wording.verdict_sentences import worded
 
 from .synthetic import hidden
 
@@ -21,7 +22,8 @@ FEW = (40, 25)
 
 @pytest.fixture(scope="module")
 def tied() -> Diagnosis:
-    return examine(hidden(("suction", 1.0)), replicates=FEW)
+    found = examine(hidden(("suction", 1.0)), replicates=FEW)
+    return replace(found, verdict=worded(found.verdict))
 
 
 def test_the_json_has_every_key_of_the_schema(tied: Diagnosis) -> None:
@@ -144,7 +146,7 @@ def one_pattern_falls() -> Verdict:
         k: replace(p, static_N=p.static_N * falls.get(k, 1.0), sliding_N=p.sliding_N * falls.get(k, 1.0))
         for k, p in ingested.pulls.items()
     }
-    return examine(replace(ingested, pulls=pulls), replicates=FEW).verdict
+    return worded(examine(replace(ingested, pulls=pulls), replicates=FEW).verdict)
 
 
 def test_a_misfit_is_said_in_words_of_the_field_and_not_of_the_flat_sample(tied: Diagnosis) -> None:

@@ -17,7 +17,7 @@ import pandas as pd
 
 from tribo.comparison.study_lookup import load_levels
 from tribo.fitting import outlying_pulls, outlying_specimens, power_of_campaign
-from tribo.report.words.wording import FLAGS
+from tribo.wording.study_sentences import FLAGS
 
 WORDS = {"p", "li", "td", "th", "dt", "dd", "h3", "caption"}
 VOID = {"br", "meta", "input"}

@@ -6,12 +6,16 @@ peak, and slide with stick-slip that dies out. The "model" is the same law with 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from tribo.diagnostics.verdict import Cause, Estimate, Excluded, Gain, Layer, Misfit, NextTest, Verdict
 from tribo.errors import Problem
 from tribo.records import (
     REGIMES,
@@ -29,6 +33,7 @@ from tribo.records import (
     Test,
     Trace,
 )
+from tribo.wording.verdict_sentences import worded
 
 AREA_M2 = 55e-6
 MASSES_kg = np.array([5, 12, 25, 50, 90, 138.5]) * 1e-3
@@ -221,3 +226,44 @@ def make_study(
     runs = tuple(make_run(s, ingested.campaign.area_fraction(s)) for s in samples)
     comparison = compare(ingested.campaign, samples, fits, model)
     return Study(ingested, tuple(fits), tuple(other), comparison, simulated, runs, notes=("a note of the study",))
+
+
+def verdict_of(plain: Mapping[str, Any]) -> Verdict:
+    """A worded verdict with the numbers and texts of one in the form of verdict.json."""
+
+    def number(value: float | None) -> float:
+        return math.nan if value is None else float(value)
+
+    def estimates(of: Mapping[str, Any]) -> dict[str, Estimate]:
+        return {
+            name: Estimate(number(e["value"]), number(e["low"]), number(e["high"]), e["unit"])
+            for name, e in (of.get("parameters") or {}).items()
+        }
+
+    def layer(of: Mapping[str, Any]) -> Layer:
+        lists = {name: tuple(of.get(name) or ()) for name in ("samples", "regimes", "tied_with")}
+        numbers = {name: number(of.get(name)) for name in ("p_adjusted", "effect_percent", "low", "high")}
+        texts = {name: of.get(name, "") for name in ("formula", "text", "at", "choice")}
+        return Layer(of["kind"], of["name"], parameters=estimates(of), **lists, **numbers, **texts)
+
+    test = plain.get("next_test")
+    given = Verdict(
+        plain["verdict"],
+        misfits=tuple(Misfit(**m) for m in plain.get("misfits") or ()),
+        causes=tuple(
+            Cause(c["mechanism"], c["weight"], estimates(c), c["text"]) for c in plain.get("causes") or ()
+        ),
+        equivalent=tuple(map(tuple, plain.get("equivalent") or ())),
+        excluded=tuple(
+            Excluded(e["mechanism"], "explains less", 4.0) for e in plain.get("excluded") or ()
+        ),
+        not_testable=tuple(Excluded(e["mechanism"], "not varied") for e in plain.get("not_testable") or ()),
+        layers=tuple(map(layer, plain.get("layers") or ())),
+        gain=Gain(**plain["gain"]) if plain.get("gain") else None,
+        model=plain.get("model") or {},
+        shows=plain.get("shows"),
+    )
+    said = worded(given)
+    if not test:
+        return said
+    return replace(said, next_test=NextTest("measure", tuple(test["separates"]), test["design"], text=test["text"]))

@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 
 from report.conftest import Written
+from report.synthetic import verdict_of
 from tribo.errors import Problem
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import CombinedFit, LawFit, SetAside, Study
-from tribo.report.card import Card, card_law, card_of, card_text, why_next
 from tribo.report.page import html
-from tribo.report.verdict_file import verdict_in_words
+from tribo.wording.card import Card, card_law, card_of
+from tribo.wording.terminal import card_text
+from tribo.wording.verdict_sentences import why_next
 
 LAYER: dict[str, Any] = {
     "kind": "cause", "name": "suction", "samples": ["B", "C"], "regimes": ["static"], "p_adjusted": 1e-9,
@@ -45,7 +47,7 @@ def misfit(**other: Any) -> dict[str, Any]:
 
 @pytest.fixture
 def card(study: Study) -> Card:
-    return card_of(study, FOUND)
+    return card_of(study, verdict_of(FOUND))
 
 
 def test_the_sentence_says_what_happens_how_much_where_and_its_name(card: Card) -> None:
@@ -68,7 +70,7 @@ def test_every_mechanism_has_a_meaning_that_reads_as_a_sentence(name: str) -> No
 def test_no_card_of_any_mechanism_shows_an_identifier(study: Study) -> None:
     for name in MECHANISMS:
         found = FOUND | {"causes": [{**CAUSE, "mechanism": name}], "layers": [{**LAYER, "name": name}]}
-        card = card_of(study, found)
+        card = card_of(study, verdict_of(found))
         assert "_" not in card_text(card)
         assert MECHANISMS[name].in_words in card.sentence
 
@@ -79,20 +81,19 @@ def test_causes_that_cannot_be_told_apart_are_not_called_identified(study: Study
         "equivalent": [["suction", "normal_load_error"]],
         "causes": [CAUSE, {**CAUSE, "mechanism": "normal_load_error"}],
     }
-    card = card_of(study, tied)
+    card = card_of(study, verdict_of(tied))
     assert card.sentence.startswith(
         "Suction under the cavities or an error of the normal load (this campaign cannot tell which) changes"
     )
     assert any("each of these equally well" in sentence for sentence in card.to_know)
-    assert "identified" not in verdict_in_words(tied)["outcome"]
-    assert "identified" in verdict_in_words(FOUND)["outcome"]
 
 
 def test_laws_that_a_test_would_part_are_called_by_their_column() -> None:
     formulas = ("T * exp(a sin(2 pi elapsed_s / 100))", "load term * exp(a sin(2 pi elapsed_s / 100))")
     law = {"kind": "law", "name": "elapsed_s", "formula": formulas[0], "tied_with": formulas[1:]}
-    verdict = {"verdict": "unknown", "layers": [law], "next_test": {"separates": formulas}}
-    assert why_next(verdict) == "it distinguishes laws of the time since the first pull that fit equally well"
+    verdict = {"verdict": "unknown", "layers": [law], "next_test": {"text": "", "design": {}, "separates": formulas}}
+    why = "it distinguishes laws of the time since the first pull that fit equally well"
+    assert why_next(verdict_of(verdict)) == why
 
 
 def test_the_next_test_says_why_and_how_long(card: Card) -> None:
@@ -112,7 +113,7 @@ def test_what_the_design_cannot_test_is_said(card: Card) -> None:
     ("verdict", "words"),
     [
         ({"verdict": "unknown", "misfits": [misfit()], "causes": [], "layers": []},
-         "Static and sliding friction of all samples changes with the time of day by −21 % (90 % interval −25 to "),
+         "Friction (static and sliding) of all samples changes with the time of day by −21 % (90 % interval −25 to "),
         ({"verdict": "unknown", "misfits": [misfit(sample="C", covariate="sample", observable="sliding")], "causes": [],
           "layers": []},
          "The model predicts the wrong friction for C: measured sliding friction of C differs most, by −21 %"),
@@ -123,14 +124,14 @@ def test_what_the_design_cannot_test_is_said(card: Card) -> None:
     ],
 )  # fmt: skip
 def test_every_outcome_has_a_sentence_with_its_size(verdict: dict[str, Any], words: str, study: Study) -> None:
-    assert words in card_of(study, FOUND | verdict).sentence
+    assert words in card_of(study, verdict_of(FOUND | verdict)).sentence
 
 
 def test_tests_set_aside_are_counted_with_their_reasons_also_where_nothing_was_found(study: Study) -> None:
     nothing = FOUND | {"verdict": "no_misfit", "causes": [], "layers": []}
     faults = tuple(SetAside(f"X{k}", "cut", (Problem("truncated", "the file is cut"),)) for k in range(14))
     spoiled = replace(study, ingested=replace(study.ingested, set_aside=(*study.ingested.set_aside, *faults)))
-    card = card_of(spoiled, nothing)
+    card = card_of(spoiled, verdict_of(nothing))
     assert card.set_aside == 16
     assert "16 tests set aside" in card.counts
     assert any("14 × the file is cut" in sentence for sentence in card.to_know)
@@ -150,15 +151,15 @@ def test_a_specimen_pulled_in_two_directions_counts_once(study: Study) -> None:
 
 def test_a_law_that_is_no_straight_line_is_said(study: Study) -> None:
     note = "the load means deviate from a straight line: chi2_red 19.31, p = 1e-05"
-    fits = tuple(replace(f, notes=(note,), chi2_red=19.31) if f.sample == "C" else f for f in study.fits)
-    said = card_of(replace(study, fits=fits), FOUND).to_know
+    fits = tuple(replace(f, notes=(note,), bent=True, chi2_red=19.31) if f.sample == "C" else f for f in study.fits)
+    said = card_of(replace(study, fits=fits), verdict_of(FOUND)).to_know
     assert any("not a straight line for C static (χ²/ν = 19) and C sliding (χ²/ν = 19)" in s for s in said)
 
 
 def test_another_flat_sample_than_f_is_said(study: Study) -> None:
     chosen = replace(study.ingested.campaign, chosen_flat="Q")
     other = replace(study, ingested=replace(study.ingested, campaign=chosen))
-    assert "The model is calibrated on sample Q (as chosen)." in card_of(other, FOUND).to_know
+    assert "The model is calibrated on sample Q (as chosen)." in card_of(other, verdict_of(FOUND)).to_know
 
 
 def combined(fit: LawFit, largest: dict[str, tuple[str, float]]) -> CombinedFit:
@@ -169,8 +170,8 @@ def combined(fit: LawFit, largest: dict[str, tuple[str, float]]) -> CombinedFit:
 def test_the_uncertainty_of_the_card_is_the_combined_one_with_what_dominates_it(study: Study) -> None:
     largest = {"mu": ("wire angle", 60.4), "tau0_Pa": ("specimens", 48.0), "T": ("wire angle", 50.0)}
     fits = tuple(combined(fit, largest) for fit in study.fits)
-    card = card_of(replace(study, combined=fits), FOUND)
-    alone = card_of(study, FOUND)
+    card = card_of(replace(study, combined=fits), verdict_of(FOUND))
+    alone = card_of(study, verdict_of(FOUND))
     assert card.laws[0].mu.split(" ± ")[1] != alone.laws[0].mu.split(" ± ")[1]
     assert card.laws[0].largest == "μ: wire angle (60 %); τ₀: specimens (48 %)"
     assert card_law(combined(study.fits[0], dict.fromkeys(largest, ("repeats", 50.0)))).largest == "repeats (50 %)"
@@ -178,7 +179,7 @@ def test_the_uncertainty_of_the_card_is_the_combined_one_with_what_dominates_it(
 
 
 def test_page_terminal_and_file_hold_the_same_card(written: Written, study: Study, card: Card) -> None:
-    page = html_text.unescape(html(study, drawn={}, verdict=FOUND)).replace("\u00a0", " ")
+    page = html_text.unescape(html(study, drawn={}, verdict=verdict_of(FOUND))).replace("\u00a0", " ")
     for words in (card.sentence, card.counts, *card.to_know):
         assert words in page
         assert words in card_text(card)

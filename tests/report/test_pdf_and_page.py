@@ -13,6 +13,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from report.synthetic import verdict_of
 from report.test_card import FOUND, misfit
 from report.test_report_uncertainty import components
 from tribo.records import Study
@@ -85,13 +86,13 @@ def whole(study: Study) -> dict[str, Any]:
     """The content of a report in which every section has something to say."""
     rows = [r for s in ("A", "F") for r in components(s, "static", 60.0)]
     notes = ("the load means deviate from a straight line: chi2_red 9.1, p = 1e-05",)
-    fits = tuple(replace(f, notes=notes) if f.sample == "C" else f for f in study.fits)
+    fits = tuple(replace(f, notes=notes, bent=True) if f.sample == "C" else f for f in study.fits)
     said = {"power": ("two samples apart",), "outlying": ("T0007 is far",)}
     full = replace(study, budget=pd.DataFrame(rows), fits=fits, **said)
-    verdict = FOUND | {
+    verdict = verdict_of(FOUND | {
         "misfits": [misfit(text="Friction falls.")], "excluded": [{"mechanism": "tilt", "reason": "it acts otherwise"}],
         "equivalent": [["suction", "normal_load_error"]],
-    }  # fmt: skip
+    })  # fmt: skip
     return content(full, Provenance("tribo report", "2026-01-01T00:00:00", 3, {"rule": "first_peak"}), verdict)
 
 

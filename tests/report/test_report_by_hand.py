@@ -11,7 +11,7 @@ import pytest
 from tribo.records import ByHand, Override, SetAside, Study
 from tribo.report.page import html
 from tribo.report.pulls import pull_cards
-from tribo.report.words.wording import by_hand_sentence
+from tribo.wording.study_sentences import by_hand_sentence
 
 
 @pytest.fixture(scope="module")

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 
+from report.synthetic import verdict_of
+from tribo.diagnostics.verdict import Outcome
 from tribo.records import Study
 from tribo.report import write_verdict
 from tribo.report.page import html
-from tribo.report.verdict_file import OUTCOMES, verdict_in_words
+from tribo.wording.verdict_sentences import verdict_in_words
 
 NAMED: dict[str, Any] = {
     "schema": "tribo.verdict/1",
     "verdict": "named",
-    "text": "Patterned samples have <more> friction.",
+    "text": "Patterned samples have more friction.",
     "misfits": [
         {
-            "observable": "static_force", "sample": "C", "covariate": "area_fraction", "effect_percent": 12.0,
-            "p_adjusted": 0.0001, "text": "C is 12 % above the model.",
+            "observable": "static", "sample": "C", "covariate": "area_fraction", "effect_percent": 12.0,
+            "p_adjusted": 0.0001, "text": "C is <12 %> above the model.",
         }
     ],
     "causes": [
@@ -46,30 +48,34 @@ def test_the_verdict_is_written_whole(tmp_path: Path) -> None:
 
 
 def test_the_page_tells_the_verdict_first_and_in_full(study: Study) -> None:
-    page = html(study, drawn={}, verdict=NAMED)
-    assert page.index("Patterned samples have &lt;more&gt; friction.") < page.index("Fitted friction law")
+    verdict = verdict_of(NAMED)
+    page = html(study, drawn={}, verdict=verdict)
+    assert page.index(verdict.sentence.partition(" (")[0]) < page.index("Fitted friction law")
+    assert page.count(verdict.sentence.partition(" (")[0]) == 2  # in the title of the first page, and in the card
+    assert "C is &lt;12 %&gt; above the model." in page.replace("\u00a0", " ")
     for words in (
         "between suction under the cavities and an error of the normal load", "3000 (2000 to 4000)",
-        "acts the other way",
+        "log likelihood lower by 4.0",
         "Weigh the sled.", "below 0.001", "predicts better by a log score of 0.500",
     ):  # fmt: skip
         assert words in page.replace("\u00a0", " ")
 
 
-@pytest.mark.parametrize("outcome", list(OUTCOMES))
-def test_a_bare_verdict_has_words_too(outcome: str, study: Study) -> None:
-    empty = {"verdict": outcome, "misfits": [], "causes": [], "equivalent": [], "excluded": [], "gain": None}
-    assert OUTCOMES[outcome] in html(study, drawn={}, verdict=empty)
+@pytest.mark.parametrize("outcome", get_args(Outcome))
+def test_a_bare_verdict_has_a_sentence_too(outcome: str, study: Study) -> None:
+    empty = verdict_of({"verdict": outcome})
+    assert empty.sentence.endswith(".")
+    assert empty.sentence in html(study, drawn={}, verdict=empty)
 
 
 def test_a_gain_within_two_standard_errors_may_be_chance() -> None:
     gain = {**NAMED["gain"], "difference": 0.1, "se": 0.1}
-    assert "may be due to chance" in verdict_in_words({**NAMED, "gain": gain})["gain"]
+    assert "may be due to chance" in verdict_in_words(verdict_of({**NAMED, "gain": gain}))["gain"]
 
 
 def test_a_number_that_does_not_exist_is_a_dash() -> None:
     cause = {**NAMED["causes"][0], "parameters": {"c": {"value": 1.0, "low": None, "high": None, "unit": ""}}}
-    assert verdict_in_words({**NAMED, "causes": [cause]})["causes"][0]["sizes"] == ["c = 1.00 (– to –)"]
+    assert verdict_in_words(verdict_of({**NAMED, "causes": [cause]}))["causes"][0]["sizes"] == ["c = 1.00 (– to –)"]
 
 
 def test_a_study_without_a_diagnosis_does_not_speak_of_one(study: Study) -> None:

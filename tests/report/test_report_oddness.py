@@ -9,7 +9,7 @@ import pytest
 from tribo.comparison.oddness import odd_pulls
 from tribo.records import Study
 from tribo.report.page import html
-from tribo.report.words import wording
+from tribo.wording import study_sentences as wording
 
 
 def with_static(study: Study, test_id: str, factor: float) -> Study:

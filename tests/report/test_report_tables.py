@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tribo.comparison.study_lookup import all_set_aside
 from tribo.errors import Problem
 from tribo.records import SetAside, Study
 from tribo.report import tables as result_tables
@@ -97,7 +98,7 @@ def test_a_number_that_is_none_is_an_empty_cell() -> None:
 def test_a_test_faulty_in_its_row_and_its_export_is_listed_once(study: Study) -> None:
     fault = study.ingested.set_aside[0]
     doubled = replace(study.ingested, set_aside=(fault, *study.ingested.set_aside))
-    assert list(result_tables.all_set_aside(replace(study, ingested=doubled))).count(fault.test_id) == 1
+    assert list(all_set_aside(replace(study, ingested=doubled))).count(fault.test_id) == 1
 
 
 def test_a_faulty_row_of_the_campaign_keeps_its_place(study: Study) -> None:

@@ -24,6 +24,7 @@ from tribo.berardo2019.table_model import (
     Reading,
     Table,
     TableFit,
+    TableLook,
     Weighed,
     candidates_of,
     design_correlation,
@@ -35,7 +36,7 @@ from tribo.berardo2019.table_model import (
     read_table,
     root_of,
 )
-from tribo.berardo2019.table_sentences import verdict_of
+from tribo.berardo2019.table_verdict import verdict_of
 from tribo.diagnostics.verdict import Gain, Verdict
 from tribo.lawsearch.across_patterns import AcrossPatterns, Deviations, across_patterns, geometry_of
 from tribo.mechanisms.table import MECHANISMS
@@ -104,12 +105,12 @@ def _widened(f: TableFit) -> TableFit:
 
 @dataclass(frozen=True)
 class _Screen:
-    names: tuple[str, ...]
+    names: tuple[TableLook | str, ...]
     strength: FloatArray  # (looks,)
     chance: FloatArray  # (replicates, looks)
     library: np.ndarray  # which looks are laws
 
-    def adjusted(self) -> dict[str, float]:
+    def adjusted(self) -> dict[TableLook | str, float]:
         """Chance that the strongest of all looks is at least as strong as each."""
         most = np.sort(self.chance.max(axis=1))
         above = len(most) - np.searchsorted(most, self.strength)
@@ -135,19 +136,20 @@ def _screen(f: TableFit, rng: np.random.Generator) -> _Screen:
     return _Screen(kept, np.abs(clear.T @ f.residual), np.abs(drawn @ clear), library[shown])
 
 
-def _looks(f: TableFit) -> tuple[list[str], FloatArray, np.ndarray]:
+def _looks(f: TableFit) -> tuple[list[TableLook | str], FloatArray, np.ndarray]:
     """Offset and slope of ln T of every sample in either regime and in both; every mechanism."""
     table = f.table
     friction = friction_at(table, f.law, f.acting, f.parameters)
     log_p = np.log(table.pressures_Pa) - np.log(table.pressures_Pa).mean()
-    names, columns = [], []
+    names: list[TableLook | str] = []
+    columns = []
     for i, sample in enumerate(table.samples):
-        for regimes, what in (((0,), "static friction"), ((1,), "sliding friction"), ((0, 1), "friction")):
-            for shape, how in ((np.ones_like(log_p), ""), (log_p, " against load")):
+        for regimes, observable in (((0,), "static"), ((1,), "sliding"), ((0, 1), "both")):
+            for shape, along in ((np.ones_like(log_p), False), (log_p, True)):
                 change = np.zeros_like(friction)
                 for r in regimes:
                     change[i, r] = friction[i, r] * shape
-                names.append(f"{what} of {PATTERNS if sample == 'F' else sample}{how}")
+                names.append(TableLook(observable, PATTERNS if sample == "F" else sample, along))
                 columns.append((change @ table.line.T).ravel())
     for acting in candidates_of(table):
         if acting not in f.acting:

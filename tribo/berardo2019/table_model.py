@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -296,6 +296,14 @@ CLOSE = 3.0
 PATTERNS = "patterns"  # the flat law is free: a misfit of F is one of the patterned samples together
 
 
+class TableLook(NamedTuple):
+    """A look at one sample of the table, or at the patterned ones together: its level, or its course over the load."""
+
+    observable: str  # static, sliding or both
+    sample: str
+    along_load: bool
+
+
 @dataclass(frozen=True)
 class Reading:
     """One way to read the table: whose simulation is the model, the correlation of mu and tau0, the meaning of sd."""
@@ -321,15 +329,18 @@ class Weighed:
 
 @dataclass(frozen=True)
 class Outlook:
-    """What one reading gives: the adjusted p value of every look at the table, before and after the best mechanism."""
+    """What one reading gives: the adjusted p value of every look at the table, before and after the best mechanism.
+
+    A look is one at a sample, or the name of a mechanism.
+    """
 
     reading: Reading
     table: Table
     baseline: TableFit
-    looks: Mapping[str, float]
+    looks: Mapping[TableLook | str, float]
     weighed: tuple[Weighed, ...]
     p_library: float
-    looks_left: Mapping[str, float]
+    looks_left: Mapping[TableLook | str, float]
 
     @property
     def p_misfit(self) -> float:

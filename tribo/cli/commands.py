@@ -86,16 +86,21 @@ def plan(console: Console, campaign: Path, law_file: Path | None, **_: Any) -> N
     from tribo.diagnostics import plan_design
     from tribo.lawsearch.known_laws import plan_law
     from tribo.lawsearch.law_file import read_law
-    from tribo.report.words.verdict_text import plan_text
+    from tribo.wording.law_sentences import planned_law_sentence
+    from tribo.wording.terminal import plan_text, why_not_found
 
     law = read_law(law_file) if law_file is not None else None
     with open_campaign(campaign, measured=False) as opened:
         planned = plan_design(opened)
         shown = plan_law(opened, *law) if law is not None else None
-    record = {"tests": planned.n_tests, "findings": [asdict(f) for f in planned.findings], "tied": planned.tied}
+    findings = [asdict(f) | {"why": why_not_found(f)} for f in planned.findings]
+    record = {"tests": planned.n_tests, "findings": findings, "tied": planned.tied}
     if shown is not None:
-        record["law"] = asdict(shown)
-    console.result(record, "\n".join([*([shown.text] if shown is not None else []), plan_text(planned)]))
+        text = planned_law_sentence(shown)
+        own = {"formula": shown.formula, "strength": shown.strength, "tests_needed": shown.tests_needed, "text": text}
+        console.result(record | {"law": own}, f"{text}\n{plan_text(planned)}")
+    else:
+        console.result(record, plan_text(planned))
 
 
 @main.command()

@@ -48,8 +48,8 @@ if TYPE_CHECKING:
     from tribo.diagnostics.verdict import Verdict
     from tribo.dry_run import Until as DryUntil
     from tribo.records import Campaign, Study
-    from tribo.report.card import Card
     from tribo.stages import Progress, StudyOptions, Until
+    from tribo.wording.card import Card
 
 
 @click.command()
@@ -173,9 +173,9 @@ def diagnose(
     from tribo.cache.kept_results import Shelf
     from tribo.campaign import open_campaign
     from tribo.report import write_until
-    from tribo.report.card import card_of, card_text
     from tribo.report.drawing_choices import Drawing
-    from tribo.report.words.verdict_text import verdict_text
+    from tribo.wording.card import card_of
+    from tribo.wording.terminal import card_text, verdict_text
 
     chosen = stages.StudyOptions(kept=out.kept, **options)
     if dry_run:
@@ -188,7 +188,7 @@ def diagnose(
             found = _diagnosis(study, chosen, progress)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
         verdict = found.verdict
-        card = card_of(stages.with_fits(study), verdict.as_dict())
+        card = card_of(stages.with_fits(study), verdict)
         write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found, card)
     console.result(verdict.as_dict() | {"card": card.as_dict()}, f"{card_text(card)}\n\n{verdict_text(verdict)}")
     console.list_doubts(study.doubts)
@@ -197,20 +197,26 @@ def diagnose(
 
 def _diagnose_published(console: Console, out: Output, seed: int) -> int:
     """The verdict on Table 2 of Berardo et al. (2019), for every interpretation of what it leaves open."""
+    from dataclasses import replace
+
     from tribo.berardo2019.table_diagnosis import across_published, diagnose_published
-    from tribo.lawsearch.across_words import record_of, sentence
     from tribo.published import BERARDO2019, data_dir, load_table2, load_table2_simulated_anew
     from tribo.report.provenance import provenance_of_table
     from tribo.report.without_study import write_published
-    from tribo.report.words.verdict_text import verdict_text
+    from tribo.wording.law_sentences import across_record, across_sentence
+    from tribo.wording.terminal import verdict_text
+    from tribo.wording.verdict_sentences import worded
 
     folder, tables = data_dir() / BERARDO2019, ("table2.csv", "table2_tribo.csv")
     with out.taken(folder), console.progress() as progress:
         found = diagnose_published(load_table2(), load_table2_simulated_anew(), seed=seed, progress=progress)
+        found = replace(found, verdict=worded(found.verdict))
         across = across_published(found, seed=seed)
         write_published(found, across, out.path, provenance_of_table(folder, tables, command_line(), seed, now()))
-    record = {**found.verdict.as_dict(), "across_patterns": record_of(across)}
-    console.result(record, f"{verdict_text(found.verdict)}\n{sentence(across)}")
+    record = {**found.verdict.as_dict(), "across_patterns": across_record(across)}
+    next_test = found.verdict.next_test.text if found.verdict.next_test is not None else ""
+    lines = [found.verdict.sentence, verdict_text(found.verdict), f"  next test: {next_test}", across_sentence(across)]
+    console.result(record, "\n".join(lines))
     return 0
 
 
@@ -267,9 +273,9 @@ def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool
 
 
 def _card(study: Study, found: Diagnosis | DiagnosisWithoutModel | None) -> Card:
-    from tribo.report.card import card_of
+    from tribo.wording.card import card_of
 
-    return card_of(study, found.verdict.as_dict() if found is not None else None)
+    return card_of(study, found.verdict if found is not None else None)
 
 
 def _diagnosed(
@@ -283,12 +289,12 @@ def _diagnosed(
     try:
         return study, _diagnosis(study, chosen, progress)
     except FitError as why:
-        return replace(study, notes=(*study.notes, f"no diagnosis: {why}")), None
+        return replace(study, notes=(*study.notes, f"no diagnosis: {why}"), undiagnosed=str(why)), None
     except (TriboError, OSError):
         raise
     except Exception as why:  # the other results stand without it
         problem = unexpected(why, "the diagnosis stopped")
-        return replace(study, notes=(*study.notes, f"no diagnosis: {problem}")), None
+        return replace(study, notes=(*study.notes, f"no diagnosis: {problem}"), undiagnosed=str(problem)), None
 
 
 def _diagnosis(study: Study, chosen: StudyOptions, progress: Progress) -> Diagnosis | DiagnosisWithoutModel:
@@ -308,8 +314,8 @@ def _conclude(
     """Print the results and the tests set aside; return the exit status."""
     from dataclasses import asdict
 
-    from tribo.report import summary_text, table2_text
     from tribo.report.tables import fits_table
+    from tribo.wording.terminal import summary_text, table2_text
 
     set_aside = study.ingested.set_aside
     doubts = study.ingested.doubts()
@@ -343,7 +349,7 @@ def _conclude(
 def _card_words(card: Card | None) -> list[str]:
     if card is None:
         return []
-    from tribo.report.card import card_text
+    from tribo.wording.terminal import card_text
 
     return [card_text(card)]
 
@@ -351,7 +357,7 @@ def _card_words(card: Card | None) -> list[str]:
 def _verdict_words(verdict: Verdict | None) -> list[str]:
     if verdict is None:
         return []
-    from tribo.report.words.verdict_text import verdict_text
+    from tribo.wording.terminal import verdict_text
 
     return [verdict_text(verdict)]
 

@@ -7,8 +7,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from tribo.fitting.linear import levels_of
-from tribo.records import FloatArray, LawFit, Pattern, Study
+from tribo.records import FloatArray, LawFit, Pattern, SetAside, Study
 
+PA_PER_KPA = 1e3
 LOAD_TOLERANCE = 0.02  # loads closer than this (relative) are repeats of one load
 
 
@@ -52,3 +53,9 @@ def load_levels(normal_load_N: FloatArray, tolerance: float = LOAD_TOLERANCE) ->
 def shown(study: Study) -> bool:
     """Whether the study was made without the spring-block model, whose report shows other figures."""
     return study.comparison is None and bool(study.ingested.pulls)
+
+
+def all_set_aside(study: Study) -> dict[str, SetAside]:
+    """Every test that takes no part, by its id: faulty rows of tests.csv and exports that fail."""
+    ingested = study.ingested
+    return {fault.test_id: fault for fault in (*ingested.campaign.set_aside, *ingested.set_aside)}

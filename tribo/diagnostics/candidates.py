@@ -307,8 +307,8 @@ def _misfit_in_own_column(cause: Candidate, left: Screen, level: float) -> bool:
     if cause.acting.mechanism.any_column and choice != column:
         return False
     return any(
-        p < level and c.kind in ("trend", "shape", "level", "period") and c.covariate.split(",")[0] == column
-        for c, p in zip(left.contrasts, left.p, strict=True)
+        p < level and contrast.kind in ("trend", "shape", "level", "period") and contrast.covariate == column
+        for contrast, p in zip(left.contrasts, left.p, strict=True)
     )
 
 

@@ -1,19 +1,16 @@
-"""The layers of a verdict: corrections of patterns, causes, and what follows a column without a law.
-
-The verdict of a diagnosis, put together from its finished pieces.
-"""
+"""The verdict of a diagnosis, put together from its finished pieces: misfits, causes, what was left out, layers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tribo.diagnostics.candidates import Candidate, Named, judged, refitted, weights_of
+from tribo.diagnostics.candidates import Candidate, Named, Remainder, judged, refitted, weights_of
 from tribo.diagnostics.contrasts import Screen
-from tribo.diagnostics.direct_evidence import TraceFindings, stated_evidence
-from tribo.diagnostics.effect_sizes import Residual, percent, residual_of
+from tribo.diagnostics.direct_evidence import Evidence, TraceFindings, stated_evidence
+from tribo.diagnostics.effect_sizes import Effect, Residual, effect_of_contrast, percent, residual_of
 from tribo.diagnostics.fit import ModelFit, residual_on_flat
 from tribo.diagnostics.gain import gain, gain_of_zero
 from tribo.diagnostics.intervals import (
@@ -27,28 +24,158 @@ from tribo.diagnostics.intervals import (
 from tribo.diagnostics.model import effect_of
 from tribo.diagnostics.planning import next_test_of
 from tribo.diagnostics.score_statistics import StartEffects
-from tribo.diagnostics.sentences import (
-    NOT_TESTABLE,
-    Weighed,
-    causes_from_evidence,
-    causes_weighed,
-    each_once,
-    excess_in_words,
-    exclusions_beside,
-    misfit_remaining,
-    misfits_of,
-    misfits_of_patterns,
-    misfits_remaining,
-    other_formula,
-    p_text,
-    patterns_apart,
-    sentence_case,
-    summary,
+from tribo.diagnostics.verdict import (
+    CERTAIN_CAUSES,
+    UNTESTED,
+    AgainstModel,
+    Cause,
+    Estimate,
+    Excluded,
+    Gain,
+    Layer,
+    Misfit,
+    Outcome,
+    Verdict,
+    Why,
 )
-from tribo.diagnostics.verdict import CERTAIN_CAUSES, Estimate, Excluded, Gain, Layer, Outcome, Verdict
+from tribo.mechanisms.record import Conditions, Mechanism
+from tribo.mechanisms.table import MECHANISMS
 from tribo.records import REGIMES, FloatArray
 
+Weighed = tuple[Candidate, float, Mapping[str, Estimate]]  # with its share and its parameters
+SHOWN = 8
 SHARE = 0.1  # of the largest effect, above which a cause is said to act on a sample or in a regime
+
+
+def misfits_of(screened: Screen, level: float, residual: Residual, flat: str = "") -> list[Misfit]:
+    """The contrasts that chance does not explain, the strongest first. Mechanisms are reported as causes instead.
+
+    ``residual`` is that of the model that was looked at; the size of each misfit is read off it.
+
+    A difference between the sample ``flat`` and the other samples is reported as a misfit of the other samples, because
+    the model is calibrated on the flat one.
+    """
+
+    def at(k: int) -> Misfit:
+        size, strength = float(screened.size[k]), float(screened.strength[k])
+        effect = effect_of_contrast(screened.contrasts[k], residual, screened.coefficients[k], size, strength)
+        return misfit_of(effect, float(screened.p[k]))
+
+    found: list[Misfit] = []
+    order = np.argsort(-screened.strength)
+    seen: set[tuple[str, str]] = set()
+    for k in order:
+        contrast = screened.contrasts[k]
+        key = (contrast.column, contrast.sample)
+        if screened.p[k] >= level or len(found) >= SHOWN:
+            break
+        if contrast.kind != "mechanism" and not contrast.is_taken_up(flat) and key not in seen:
+            seen.add(key)
+            found.append(at(int(k)))
+    if not found and len(order) and screened.p[order[0]] < level:
+        found.append(at(int(order[0])))
+    return found
+
+
+def misfit_remaining(r: Remainder, residual: Residual) -> Misfit:
+    """What follows a recorded column and no mechanism."""
+    return misfit_of(effect_of_contrast(r.contrast, residual, r.coefficients, r.size, r.strength), r.p)
+
+
+def misfit_of(effect: Effect, p: float) -> Misfit:
+    """What a contrast sees as a misfit."""
+    c = effect.contrast
+    return Misfit(
+        c.observable, c.sample, c.column, effect.percent, p, low=effect.low, high=effect.high, shows=effect
+    )  # fmt: skip
+
+
+def each_once(misfits: Sequence[Misfit]) -> tuple[Misfit, ...]:
+    """Each column of each observable and sample once: the first of its misfits."""
+    first = {(m.observable, m.sample, m.covariate): m for m in reversed(misfits)}
+    return tuple(m for m in misfits if first[m.observable, m.sample, m.covariate] is m)
+
+
+def misfits_of_patterns(corrections: Sequence[Layer], level: float) -> list[Misfit]:
+    """Each patterned sample whose mean friction differs from the model beyond chance, the largest first."""
+    found = [
+        Misfit(c.regimes[0], c.name, "sample", c.effect_percent, c.p_adjusted, low=c.low, high=c.high, shows=c)
+        for c in corrections
+        if c.p_adjusted < level
+    ]
+    return sorted(found, key=lambda m: -abs(m.effect_percent))
+
+
+def patterns_apart(misfits: Sequence[Misfit]) -> tuple[str, ...]:
+    """The samples that each have a misfit of their own, where there are three or more and no other column has one."""
+    samples = tuple(dict.fromkeys(m.sample for m in misfits if m.sample))
+    alone = all(m.covariate in ("sample", "normal_load_N") for m in misfits)
+    return samples if alone and len(samples) >= 3 else ()
+
+
+def causes_weighed(shown: Sequence[Weighed], baseline: ModelFit) -> list[Cause]:
+    """Weighed mechanisms with their parameters, the effect of each beyond what ``baseline`` fits."""
+    found = []
+    for candidate, weight, parameters in shown:
+        moved = candidate.fit.predicted - baseline.predicted
+        low, high = percent(np.array([moved.min(), moved.max()]))
+        changes = float(low), float(high)
+        found.append(Cause(candidate.name, weight, parameters, choice=candidate.acting.choice, changes=changes))
+    return found
+
+
+def causes_from_evidence(certain: Mapping[str, tuple[Evidence, float]]) -> list[tuple[Cause, Misfit]]:
+    """Mechanisms that direct evidence shows with certainty, each as a cause and as the misfit that it is."""
+    found = []
+    for name, stated in stated_evidence().items():
+        if name in certain:
+            e, p = certain[name]
+            parameters = {MECHANISMS[name].amplitude.name: Estimate(e.value, *e.interval, e.unit)}
+            cause = Cause(name, 1.0, parameters, shows=stated)
+            observable, size = ("rise", 100.0 * e.change) if stated.quantity == "rise" else ("zero", float("nan"))
+            found.append((cause, Misfit(observable, "", stated.covariate, size, p, shows=cause)))
+    return found
+
+
+def exclusions(
+    conditions: Conditions, evidence: Mapping[str, Evidence], absorbed: Collection[str]
+) -> list[Excluded]:
+    """What is not weighed: mechanisms that the design cannot show, and those that direct evidence decides."""
+    reasons = {
+        name: _why_not_weighed(m, evidence.get(name), name in absorbed, m.applies(conditions))
+        for name, m in MECHANISMS.items()
+    }
+    return [Excluded(name, why, shows=evidence.get(name)) for name, why in reasons.items() if why is not None]
+
+
+def _why_not_weighed(m: Mechanism, e: Evidence | None, absorbed: bool, applies: bool) -> Why | None:
+    """The reason; None where a mechanism is weighed."""
+    stated = m.evidence
+    if stated is not None and e is not None and stated.corrected:
+        return "zero subtracted"
+    if absorbed:
+        return "absorbed"
+    if not applies:
+        return "not varied"
+    if stated is not None and e is not None and not e.certain:
+        return "not certain"
+    return "only in traces" if m.untested else None
+
+
+def exclusions_beside(
+    causes: Sequence[Cause], barred: Sequence[Excluded], weighed: Sequence[Candidate]
+) -> list[Excluded]:
+    """What was not weighed, and what explains the campaign less well than the causes."""
+    shown = {c.mechanism for c in causes}
+    found = [e for e in barred if e.mechanism not in shown]
+    if not causes:
+        return found
+    for c in weighed:
+        if c.name not in shown and c.name not in {e.mechanism for e in found}:
+            size = c.acting.mechanism.amplitude
+            one_sided = c.values[0] == size.zero and size.zero in (size.low, size.high)
+            found.append(Excluded(c.name, "wrong sign" if one_sided else "explains less", weighed[0].gain - c.gain))
+    return found
 
 
 def pattern_layers(model: ModelFit) -> list[Layer]:
@@ -58,14 +185,9 @@ def pattern_layers(model: ModelFit) -> list[Layer]:
 
 def _pattern_layer(c: PatternCorrection) -> Layer:
     parameters = {f"at {load:g} N": _estimate(percent) for load, percent in c.at_load.items()}
-    text = (
-        f"{sentence_case(c.regime)} friction of {c.sample}: measured over modelled T, less one, is "
-        f"{c.mean.value:+.0f} % (geometric mean over its tests; 90 % interval {c.mean.low:+.0f} to {c.mean.high:+.0f} "
-        f"%; adjusted p {p_text(c.p)})."
-    )
     return Layer(
         kind="pattern_correction", name=c.sample, samples=(c.sample,), regimes=(c.regime,), p_adjusted=c.p,
-        effect_percent=c.mean.value, low=c.mean.low, high=c.mean.high, parameters=parameters, text=text,
+        effect_percent=c.mean.value, low=c.mean.low, high=c.mean.high, parameters=parameters,
     )  # fmt: skip
 
 
@@ -96,15 +218,12 @@ def _cause_layer(
     where = int(test), int(regime)
     value, low, high = _effect_percent(best, parameters[m.amplitude.name], where)
     gained: Gain | None = gain(without, beside.fit, rng)
-    text = (
-        f"{sentence_case(m.in_words)} changes T by {value:+.0f} % (90 % interval {low:+.0f} to "
-        f"{high:+.0f} %) where it acts most: {_place(best.fit, where)}."
-    )
+    c = best.fit.setup.observations.conditions
+    most = REGIMES[where[1]], str(c.sample[where[0]]), float(c.normal_load_N[where[0]])
     return Layer(
         kind="cause", name=best.name, samples=samples, regimes=regimes, p_adjusted=first.p_library(beside.strength),
         effect_percent=value, low=low, high=high, parameters=parameters, formula=m.formula,
-        tied_with=tuple(c.name for c in tied), gain=gained, text=text, at=_place(best.fit, where),
-        choice=best.acting.choice,
+        tied_with=tuple(other.name for other in tied), gain=gained, choice=best.acting.choice, most=most,
     )  # fmt: skip
 
 
@@ -114,12 +233,6 @@ def _where(f: ModelFit, change: FloatArray) -> tuple[tuple[str, ...], tuple[str,
     sample = f.setup.observations.conditions.sample
     samples = tuple(str(name) for name in np.unique(sample) if np.abs(change[sample == name]).max() > least)
     return samples, tuple(r for k, r in enumerate(REGIMES) if np.abs(change[:, k]).max() > least)
-
-
-def _place(f: ModelFit, where: tuple[int, int]) -> str:
-    """ "sliding friction of C at 1.37 N"."""
-    c = f.setup.observations.conditions
-    return f"{REGIMES[where[1]]} friction of {c.sample[where[0]]} at {c.normal_load_N[where[0]]:.3g} N"
 
 
 def _effect_percent(best: Candidate, amplitude: Estimate, where: tuple[int, int]) -> tuple[float, float, float]:
@@ -143,7 +256,7 @@ def remainder_layers(named: Named) -> list[Layer]:
         regimes = (m.observable,) if m.observable in REGIMES else tuple(REGIMES)
         layer = Layer(
             kind="remainder", name=m.covariate, samples=tuple(samples), regimes=regimes, p_adjusted=r.p,
-            effect_percent=m.effect_percent, low=m.low, high=m.high, text=m.text,
+            effect_percent=m.effect_percent, low=m.low, high=m.high, shows=m,
         )  # fmt: skip
         found.append(layer)
     return found
@@ -185,31 +298,27 @@ def conclude(found: Findings, rng: np.random.Generator) -> Verdict:
     causes = [c for c, _ in direct] + sorted(weighed, key=lambda c: -c.weight)
     if named is not None:
         beyond = residual_of(named.model)
-        left = [*misfits_remaining(named.remainders, beyond), *misfits_of(named.left, level, beyond, flat)]
+        left = [misfit_remaining(r, beyond) for r in named.remainders] + misfits_of(named.left, level, beyond, flat)
         misfits = [*left, *misfits] if named.causes and not patterns_apart(misfits) else [*misfits, *left]
     layers = _layers(found, shown, rng)
     corrections = [layer for layer in layers if layer.kind == "pattern_correction"]
     misfits = [*(misfits_of_patterns(corrections, level) if excess is not None else ()), *misfits]
     excluded = exclusions_beside(causes, found.barred, named.weighed if named is not None else ())
-    shown_misfits = each_once(misfits)
-    text = summary(outcome, causes, equivalent, misfits, smallest)
-    if named is not None and outcome in ("unknown", "partly"):
-        text += other_formula(named.wrong_in_form)
-    if excess is not None:
-        text = f"{text} {excess_in_words(excess)}"
+    wrong_in_form = named.wrong_in_form if named is not None and outcome in ("unknown", "partly") else ()
+    o = baseline.setup.observations
     return Verdict(
         verdict=outcome,
-        misfits=shown_misfits,
+        misfits=each_once(misfits),
         causes=tuple(causes),
         equivalent=equivalent,
-        excluded=tuple(e for e in excluded if not e.reason.startswith(NOT_TESTABLE)),
-        not_testable=tuple(e for e in excluded if e.reason.startswith(NOT_TESTABLE)),
+        excluded=tuple(e for e in excluded if e.why not in UNTESTED),
+        not_testable=tuple(e for e in excluded if e.why in UNTESTED),
         layers=layers,
         gain=gained,
-        set_aside=baseline.setup.observations.set_aside,
-        next_test=next_test_of(named, outcome, misfits, baseline.setup.observations.conditions),
-        text=text,
+        set_aside=o.set_aside,
+        next_test=next_test_of(named, outcome, misfits, o.conditions),
         smallest_effects=smallest,
+        shows=AgainstModel(tuple(sorted(set(o.conditions.sample.tolist()))), o.flat, excess, wrong_in_form),
     )
 
 

@@ -33,7 +33,7 @@ from tribo.records import FloatArray
 OBSERVABLES = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (1.0, 1.0), "drop": (1.0, -1.0)}
 BINS = 6
 TENTHS = 10
-BENT = ", bend"  # what a contrast of the curve of a sample adds to its column
+BEND, BY_LOAD = "bend", "by load"  # details of the curve of a sample, the slope of a specimen
 MOST_LEVELS = 200  # names of a text column: the work grows with their cube
 CYCLES = 24  # periods down to a twenty-fourth of the series
 
@@ -42,7 +42,10 @@ CYCLES = 24  # periods down to a twenty-fourth of the series
 @dataclass(frozen=True)
 class Contrast:
     """One contrast: an observable against a covariate, and the columns it would follow: those of one course, or of
-    two that add up, on different specimens."""
+    two that add up, on different specimens.
+
+    ``detail`` is the part of the covariate: BEND, BY_LOAD, "period 12.5" or "from 20 to 40".
+    """
 
     kind: str  # mechanism, trend, shape, level, sample, specimen, period, block
     observable: str
@@ -50,6 +53,20 @@ class Contrast:
     sample: str
     courses: tuple[Course, ...]
     acting: Acting | None = None
+    detail: str = ""
+
+    @property
+    def title(self) -> str:
+        """The covariate with its detail."""
+        between = " " if self.detail == BY_LOAD else ", "
+        return f"{self.covariate}{between}{self.detail}" if self.detail else self.covariate
+
+    @property
+    def column(self) -> str:
+        """The column that it follows; of a mechanism the columns it needs."""
+        if self.acting is not None:
+            return self.acting.mechanism.column(self.acting.choice)
+        return self.title if self.kind == "specimen" else self.covariate
 
     @property
     def columns(self) -> FloatArray:
@@ -58,7 +75,7 @@ class Contrast:
 
     def is_taken_up(self, flat: str) -> bool:
         """Whether calibrating on the sample ``flat`` removes this: the level of its force, and its slope with load."""
-        return self.kind == "sample" and self.sample == flat and not self.covariate.endswith(BENT)
+        return self.kind == "sample" and self.sample == flat and self.detail != BEND
 
     @property
     def wholeness(self) -> float:
@@ -158,9 +175,9 @@ def _samples(s: Setup) -> Iterator[Contrast]:
         here = (c.sample == sample).astype(float)
         for observable in OBSERVABLES:
             for name, shape in shapes.items():
-                covariate = {"offset": "sample", "slope": "normal_load_N"}.get(name, f"normal_load_N{BENT}")
+                covariate, detail = "sample" if name == "offset" else "normal_load_N", BEND if name == "curve" else ""
                 columns = _spread((here * shape)[:, None], observable)
-                yield Contrast("sample", observable, covariate, str(sample), _course(s, columns))
+                yield Contrast("sample", observable, covariate, str(sample), _course(s, columns), detail=detail)
 
 
 def _specimens(s: Setup) -> Iterator[Contrast]:
@@ -169,10 +186,10 @@ def _specimens(s: Setup) -> Iterator[Contrast]:
     for number, tests in enumerate(s.random_effects.tests_of):
         name, where = f"specimen {c.specimen[tests[0]]}", "/".join(sorted(set(c.sample[tests])))
         ones, load = np.ones((len(tests), 1)), s.log_pressure[tests, None]
-        seen = [(observable, name, ones) for observable in ("static", "sliding", "both")]
-        for observable, covariate, shape in (*seen, ("both", f"{name} by load", load)):
+        seen = [(observable, "", ones) for observable in ("static", "sliding", "both")]
+        for observable, detail, shape in (*seen, ("both", BY_LOAD, load)):
             along = Course(s.observations.n, number, tests, _spread(shape, observable))
-            yield Contrast("specimen", observable, covariate, where, (along,))
+            yield Contrast("specimen", observable, name, where, (along,), detail=detail)
 
 
 def _periods(s: Setup) -> Iterator[Contrast]:
@@ -181,8 +198,8 @@ def _periods(s: Setup) -> Iterator[Contrast]:
     if np.isfinite(c.run_order).all() and len(np.unique(c.run_order)) > 3 * BINS:
         rank = np.argsort(np.argsort(c.run_order)) / s.observations.n
         for k in range(1, min(CYCLES, s.observations.n // 4) + 1):
-            period = f"run_order, period {s.observations.n / k:.3g}"
-            yield Contrast("period", "both", period, "", _course(s, _spread(_wave(k * rank), "both")))
+            wave = _course(s, _spread(_wave(k * rank), "both"))
+            yield Contrast("period", "both", "run_order", "", wave, detail=f"period {s.observations.n / k:.3g}")
     hours = s.observations.clock_h
     if np.isfinite(hours).all() and np.ptp(hours) > 2:
         for k in (1, 2, 3):
@@ -199,8 +216,9 @@ def _blocks(s: Setup) -> Iterator[Contrast]:
     for first in range(TENTHS):
         for last in range(first + 1, min(first + TENTHS // 2, TENTHS)):
             inside = ((tenth >= first) & (tenth <= last)).astype(float)
-            where = f"run_order, from {order[inside > 0].min():.0f} to {order[inside > 0].max():.0f}"
-            yield Contrast("block", "both", where, "", _course(s, _spread(inside[:, None], "both")))
+            where = f"from {order[inside > 0].min():.0f} to {order[inside > 0].max():.0f}"
+            along = _course(s, _spread(inside[:, None], "both"))
+            yield Contrast("block", "both", "run_order", "", along, detail=where)
 
 
 def _wave(turns: FloatArray) -> FloatArray:

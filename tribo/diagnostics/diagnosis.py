@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tribo.diagnostics.candidates import Rules, name_causes
-from tribo.diagnostics.conclusion import Findings, conclude
+from tribo.diagnostics.conclusion import Findings, conclude, exclusions
 from tribo.diagnostics.contrasts import Progress, all_contrasts, screen
 from tribo.diagnostics.diagnosis_record import Diagnosis
 from tribo.diagnostics.direct_evidence import trace_findings
@@ -14,7 +14,6 @@ from tribo.diagnostics.model import setup
 from tribo.diagnostics.observations import enough, observe
 from tribo.diagnostics.predictor import Predictor, tabled_predictor
 from tribo.diagnostics.score_statistics import start_effects
-from tribo.diagnostics.sentences import exclusions
 from tribo.records import Ingested
 
 REPLICATES = 120

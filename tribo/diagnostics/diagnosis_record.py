@@ -152,7 +152,7 @@ def contrast_table(d: Diagnosis) -> pd.DataFrame:
     s = d.screened
     rows = [
         {
-            "kind": c.kind, "observable": c.observable, "covariate": c.covariate, "sample": c.sample,
+            "kind": c.kind, "observable": c.observable, "covariate": c.title, "sample": c.sample,
             "choice": c.acting.choice if c.acting else "", "strength": strength,
             "p_adjusted": s.p_adjusted(float(strength)), "peak_to_peak_percent": float(percent(min(size, 5.0))),
         }

@@ -7,11 +7,12 @@ The size of a contrast, as a signed percentage: 100 (measured / model - 1), or t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from tribo.diagnostics.contrasts import BENT, Contrast
+from tribo.diagnostics.contrasts import BEND, Contrast
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.intervals import NORMAL_90
 from tribo.mechanisms.record import Conditions
@@ -78,14 +79,22 @@ def residual_of(model: ModelFit) -> Residual:
     return Residual(model.residual, model.setup.observations.conditions)
 
 
+Between = Literal["mean", "bend", "ends", "groups", "extremes"]
+
+
 @dataclass(frozen=True)
 class Effect:
-    """A signed percentage with its 90 % interval, and between what it is taken."""
+    """A signed percentage with its 90 % interval, between what it is taken, and the contrast that sees it.
+
+    ``course`` is the run of the means of groups, of a contrast at several of them.
+    """
 
     percent: float
     low: float
     high: float
-    between: str
+    between: Between
+    contrast: Contrast
+    course: Literal["rising", "falling", "hump", "hollow"]
 
 
 def effect_of_contrast(
@@ -99,25 +108,37 @@ def effect_of_contrast(
     if not np.isfinite(value):
         change = (contrast.columns @ coefficients).ravel()
         sign = float(np.sign(change[np.abs(change).argmax()])) if contrast.freedom == 1 else 1.0
-        value, between = float(percent(sign * min(size, 5.0))), "between its extremes"
-    return Effect(value, *interval_percent(value, strength, NORMAL_90), between)
+        value, between = float(percent(sign * min(size, 5.0))), "extremes"
+    ends = interval_percent(value, strength, NORMAL_90)
+    return Effect(value, *ends, between, replace(contrast, courses=()), _course(coefficients))
 
 
-def _signed(contrast: Contrast, residual: Residual) -> tuple[float, str]:
+def _course(coefficients: FloatArray) -> Literal["rising", "falling", "hump", "hollow"]:
+    """The run of the means of groups; that of the first is zero."""
+    steps = np.diff(np.concatenate([[0.0], coefficients]))
+    if np.all(steps > 0):
+        return "rising"
+    if np.all(steps < 0):
+        return "falling"
+    middle = coefficients[:-1].mean() if len(coefficients) > 1 else coefficients[0]
+    return "hump" if middle > 0.5 * coefficients[-1] else "hollow"
+
+
+def _signed(contrast: Contrast, residual: Residual) -> tuple[float, Between]:
     weight = np.array(SHARES[contrast.observable])
     y, x = residual.log_ratio @ weight, contrast.columns[:, int(weight[0] == 0.0), 0]
     sample = residual.conditions.sample
     here = sample == contrast.sample if contrast.kind == "sample" else np.ones(len(y), bool)
     if contrast.kind == "sample" and contrast.covariate == "sample":
         return mean_percent(y[here]), "mean"
-    if contrast.kind == "sample" and contrast.covariate.endswith(BENT):
+    if contrast.kind == "sample" and contrast.detail == BEND:
         line = np.log(residual.conditions.normal_load_N[here])
-        return bend_percent(x[here], line, y[here]), "the ends above the middle"
+        return bend_percent(x[here], line, y[here]), "bend"
     if contrast.kind in ("sample", "trend") and np.ptp(x[here]) > 0:
-        return change_percent(x[here], y[here]), "from the low to the high end"
-    if contrast.kind == "block" or (contrast.kind == "specimen" and not contrast.covariate.endswith(" by load")):
+        return change_percent(x[here], y[here]), "ends"
+    if contrast.kind == "block" or (contrast.kind == "specimen" and not contrast.detail):
         siblings = np.isin(sample, contrast.sample.split("/")) if contrast.kind == "specimen" else here
         inside, outside = siblings & (x > 0), siblings & (x <= 0)
         if inside.any() and outside.any():
-            return contrast_percent(y[inside], y[outside]), "ratio of geometric means"
-    return float("nan"), ""
+            return contrast_percent(y[inside], y[outside]), "groups"
+    return float("nan"), "extremes"

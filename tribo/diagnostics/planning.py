@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -19,8 +19,7 @@ from tribo.diagnostics.observations import NO_FLAT, Observations, conditions_of
 from tribo.diagnostics.predictor import Predictor, tabled_predictor
 from tribo.diagnostics.scatter import Noise
 from tribo.diagnostics.score_statistics import StartEffects, start_effects
-from tribo.diagnostics.terms import ABSORBED, in_words, not_varied
-from tribo.diagnostics.verdict import Misfit, NextTest, Outcome
+from tribo.diagnostics.verdict import Misfit, NextKind, NextTest, Outcome
 from tribo.display import displayed
 from tribo.mechanisms.record import Conditions
 from tribo.mechanisms.table import MECHANISMS
@@ -46,7 +45,7 @@ class Finding:
     unit: str
     effect_percent: float
     confused_with: tuple[str, ...]
-    why: str
+    why: Literal["", "absorbed", "not varied", "in the trace"]
     separates: str
 
 
@@ -134,8 +133,7 @@ def _finding(
     a = acting[k]
     m = a.mechanism
     if a.name in hidden:
-        why = ABSORBED
-        return Finding(a.name, float("nan"), m.amplitude.unit, float("nan"), (), why, m.separates)
+        return Finding(a.name, float("nan"), m.amplitude.unit, float("nan"), (), "absorbed", m.separates)
     times = NINE_IN_TEN / max(float(size[k]), 1e-12)
     alike = [
         acting[j].name for j in np.flatnonzero(np.abs(cosine[k]) >= ALIKE) if j != k and acting[j].name not in hidden
@@ -151,8 +149,7 @@ def _not_applying(s: Setup) -> list[Finding]:
         varied = m.applies(s.observations.conditions)
         if varied and m.changes_forces:
             continue
-        in_shape = "it changes the shape of the trace, not the friction forces"
-        why = in_shape if varied else not_varied(m)
+        why: Literal["in the trace", "not varied"] = "in the trace" if varied else "not varied"
         found.append(Finding(m.name, float("nan"), m.amplitude.unit, float("nan"), (), why, m.separates))
     return found
 
@@ -188,19 +185,10 @@ def next_test(tied: Sequence[Candidate]) -> NextTest | None:
     return best
 
 
-ALONE = {
-    "normal_load_N": "Pull one specimen at nine loads over the range, first upwards, then downwards",
-    "sample": "Pull one fresh specimen of every sample in turn, at one load and within one day",
-    "date": "Pull the same specimens of one sample at one load again on several days",
-}
-
-
 def first_test_of(covariate: str) -> NextTest:
     """For a misfit that follows a column but no law: vary that column alone."""
-    how = ALONE.get(covariate, f"Vary {in_words(covariate)} alone, in random order, on one sample at one load")
-    text = f"{how}: {PULLS} pulls."
     design = {"covariate": covariate, "pulls": PULLS, "hours": PULLS * HOURS_PER_PULL}
-    return NextTest(text, (covariate,), design, float("nan"))
+    return NextTest("vary one column", (covariate,), design)
 
 
 def widening_test(conditions: Conditions) -> NextTest | None:
@@ -210,9 +198,8 @@ def widening_test(conditions: Conditions) -> NextTest | None:
     }
     if not fixed:
         return None
-    text = f"Vary {' and '.join(v.text for v in fixed.values())} in random order: {PULLS} pulls of the flat sample."
     design: dict[str, Any] = {v.column: list(v.values) for v in fixed.values()}
-    return NextTest(text, tuple(fixed), design | {"pulls": PULLS, "hours": 3 * PULLS * HOURS_PER_PULL}, float("nan"))
+    return NextTest("vary what was fixed", tuple(fixed), design | {"pulls": PULLS, "hours": 3 * PULLS * HOURS_PER_PULL})
 
 
 def bits(distance2: float) -> float:
@@ -237,7 +224,7 @@ def _direct(first: Candidate, second: Candidate) -> list[NextTest]:
             measured = ":".join(filter(None, (acting.mechanism.name, acting.choice)))
             design = {"measure": measured, "parameter": size.name, "unit": size.unit, "uncertainty": m.uncertainty}
             design["hours"] = m.hours
-            found.append(_named(first, second, m.text, design, information))
+            found.append(_named("measure", first, second, design, information))
     return found
 
 
@@ -253,10 +240,9 @@ def _without(first: Candidate, second: Candidate) -> list[NextTest]:
         strongest = max(set(conditions.sample.tolist()), key=lambda n: np.abs(change[conditions.sample == n]).mean())
         rows = np.flatnonzero(conditions.sample == strongest)
         rows = rows[np.argsort(-np.abs(change[rows]).sum(axis=1))][:PULLS]
-        text = f"{m.removed_by[0].upper()}{m.removed_by[1:]}: {len(rows)} pulls of {strongest}."
         design = {"without": m.name, "sample": strongest, "repeat_tests": _test_ids(f, rows), "pulls": len(rows)}
         design["hours"] = 1.0 + len(rows) * HOURS_PER_PULL
-        found.append(_named(first, second, text, design, bits(_distance2(f, change[rows], rows))))
+        found.append(_named("remove", first, second, design, bits(_distance2(f, change[rows], rows))))
     return found
 
 
@@ -273,15 +259,18 @@ def _loads(first: Candidate, second: Candidate) -> list[NextTest]:
         rows = np.resize(np.flatnonzero(conditions.sample == sample), PULLS)
         for load in (loads[0] / 2, loads[0], loads[-1], loads[-1] * 2):
             difference = _predicted_at(first.fit, rows, load) - _predicted_at(second.fit, rows, load)
-            text = f"{PULLS} further pulls of {sample} at {load:.3g} N."
             design = {"sample": str(sample), "normal_load_N": float(load), "pulls": PULLS}
             design["hours"] = PULLS * HOURS_PER_PULL
-            found.append(_named(first, second, text, design, bits(_distance2(first.fit, difference, rows))))
+            found.append(
+                _named("pull further", first, second, design, bits(_distance2(first.fit, difference, rows)))
+            )
     return found
 
 
-def _named(first: Candidate, second: Candidate, text: str, design: Mapping[str, Any], information: float) -> NextTest:
-    return NextTest(text, (first.name, second.name), design, information)
+def _named(
+    kind: NextKind, first: Candidate, second: Candidate, design: Mapping[str, Any], information: float
+) -> NextTest:
+    return NextTest(kind, (first.name, second.name), design, information)
 
 
 def _predicted_at(f: ModelFit, rows: np.ndarray, load_N: float) -> FloatArray:

@@ -20,7 +20,6 @@ from tribo.diagnostics.effect_sizes import rms_percent
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.model import effect_of
 from tribo.diagnostics.predictor import flat_law
-from tribo.diagnostics.terms import name_in_words
 from tribo.diagnostics.verdict import CERTAIN_CAUSES
 from tribo.errors import SimulationError
 from tribo.mechanisms.record import Conditions, Values
@@ -235,40 +234,23 @@ def with_simulation(
 ) -> Diagnosis:
     """The same diagnosis with its named mechanisms simulated.
 
-    The text and the ``model`` record of its verdict say where the predictions come from and what the simulation gave,
-    or why there is none.
+    The ``model`` record of its verdict says where the predictions come from and what the simulation gave, or why there
+    is none.
     """
     model: dict[str, object] = {**d.verdict.model, "shares_from": d.baseline.setup.predictor.source}
-    words = [d.verdict.text, f"The predictions for the patterned samples are based on {model['shares_from']}."]
-    found = None
-    if d.named is not None and d.named.causes and d.verdict.verdict in CERTAIN_CAUSES:
-        found = simulate_extension(d.named.model, seed=seed, jobs=jobs, progress=progress)
-        key, record, sentence = _reported(d, found)
-        model[key] = record
-        words.append(sentence)
-    simulated = found if isinstance(found, SimulatedExtension) else None
-    return replace(d, simulated=simulated, verdict=replace(d.verdict, text=" ".join(words), model=model))
-
-
-def _reported(d: Diagnosis, found: SimulatedExtension | NotSimulated) -> tuple[str, dict[str, object], str]:
-    """The key and the record of a simulation in ``model`` of the verdict, and a sentence about it."""
-    names = " and ".join(name_in_words(name) for name in found.mechanisms)
+    if d.named is None or not d.named.causes or d.verdict.verdict not in CERTAIN_CAUSES:
+        return replace(d, verdict=replace(d.verdict, model=model))
+    found = simulate_extension(d.named.model, seed=seed, jobs=jobs, progress=progress)
     if isinstance(found, NotSimulated):
-        record: dict[str, object] = {"mechanisms": list(found.mechanisms), "reason": found.reason}
-        return "not_simulated", record, f"The model with {names} was not simulated: {found.reason}."
+        model["not_simulated"] = {"mechanisms": list(found.mechanisms), "reason": found.reason}
+        return replace(d, verdict=replace(d.verdict, model=model))
     before, quick, after = residual_percent(d, found)
-    record = {
+    model["simulated"] = {
         "mechanisms": list(found.mechanisms), "pairs_of_runs": len(found.table), "effect_over_law": found.ratio,
         "effect_over_law_u": found.ratio_u, "rms_percent_before": before, "rms_percent_law": quick,
         "rms_percent_simulated": after,
     }  # fmt: skip
-    sentence = (
-        f"With {names} in the simulator itself ({len(found.table)} pairs of runs), the effect is {found.ratio:.3f} +- "
-        f"{found.ratio_u:.3f} times that of its law. The root mean square of measured over modelled T, less one, is "
-        f"{before:.1f} % for the calibrated model, {after:.1f} % with the simulated effect and {quick:.1f} % with the "
-        "law."
-    )
-    return "simulated", record, sentence
+    return replace(d, simulated=found, verdict=replace(d.verdict, model=model))
 
 
 def residual_percent(d: Diagnosis, found: SimulatedExtension) -> tuple[float, float, float]:

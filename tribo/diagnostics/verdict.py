@@ -1,11 +1,15 @@
-"""The verdict: what a diagnosis hands on, and its JSON form (schema tribo.verdict/2)."""
+"""The verdict: what a diagnosis hands on, and its JSON form (schema tribo.verdict/2).
+
+A diagnosis fills in numbers and enumerations. Every ``text`` is empty until ``worded`` of the room wording writes it,
+from the fields beside it and from ``shows``, the record of the statistic that is spoken of.
+"""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from typing import Any, Literal
 
 from tribo.display import displayed
@@ -14,6 +18,19 @@ from tribo.records import SetAside
 SCHEMA = "tribo.verdict/2"
 Outcome = Literal["no_misfit", "named", "undetermined", "partly", "unknown"]
 LayerKind = Literal["pattern_correction", "cause", "law", "remainder", "baseline"]
+# why a mechanism is not among the causes
+Why = Literal[
+    "zero subtracted", "absorbed", "not varied", "not certain", "only in traces", "wrong sign", "explains less",
+    "a law explains more", "not printed", "contradicted", "only with the load", "vary together",
+]  # fmt: skip
+UNTESTED: frozenset[Why] = frozenset(
+    {"absorbed", "not varied", "only in traces", "not printed", "only with the load", "vary together"}
+)
+# what a further test does
+NextKind = Literal[
+    "measure", "remove", "pull further", "vary one column", "vary what was fixed", "part laws", "part columns",
+    "part from load", "at the bench",
+]  # fmt: skip
 CERTAIN_CAUSES: tuple[Outcome, ...] = ("named", "undetermined", "partly")  # verdicts that hold causes
 
 
@@ -31,9 +48,10 @@ class Misfit:
     covariate: str
     effect_percent: float
     p_adjusted: float
-    text: str
+    text: str = ""
     low: float = math.nan
     high: float = math.nan
+    shows: Any = field(default=None, compare=False, repr=False)
 
 
 @displayed()
@@ -50,21 +68,31 @@ class Estimate:
 @displayed()
 @dataclass(frozen=True)
 class Cause:
-    """A mechanism that explains the misfit. ``weight`` is its share among all that were weighed."""
+    """A mechanism that explains the misfit. ``weight`` is its share among all that were weighed.
+
+    ``choice`` is the specimen, pattern or value it concerns, ``changes`` the least and the largest change of T
+    (percent) that it adds to the calibrated model.
+    """
 
     mechanism: str
     weight: float
     parameters: Mapping[str, Estimate]
-    text: str
+    text: str = ""
+    choice: str = ""
+    changes: tuple[float, float] | None = None
+    shows: Any = field(default=None, compare=False, repr=False)
 
 
 @displayed()
 @dataclass(frozen=True)
 class Excluded:
-    """A mechanism that was left out of the weighing or lost, and why."""
+    """A mechanism that was left out of the weighing or lost, and ``why``; ``by`` is the log likelihood it lost by."""
 
     mechanism: str
-    reason: str
+    why: Why
+    by: float = math.nan
+    reason: str = ""
+    shows: Any = field(default=None, compare=False, repr=False)
 
 
 @displayed()
@@ -108,6 +136,8 @@ class Layer:
     text: str = ""
     at: str = ""
     choice: str = ""
+    most: tuple[str, str, float] | None = None  # regime, sample and load (N) of ``at``
+    shows: Any = field(default=None, compare=False, repr=False)
 
 
 @displayed()
@@ -115,16 +145,41 @@ class Layer:
 class NextTest:
     """The test that best distinguishes mechanisms that explain a campaign about equally."""
 
-    text: str
+    kind: NextKind
     separates: tuple[str, ...]
     design: Mapping[str, Any]
-    expected_bits: float
+    expected_bits: float = math.nan
+    text: str = ""
+    shows: Any = field(default=None, compare=False, repr=False)
+
+
+@displayed()
+@dataclass(frozen=True)
+class AgainstModel:
+    """What a verdict on the spring-block model rests on beside its parts.
+
+    ``samples`` were measured and the model was calibrated on ``flat``. ``excess`` (a PatternExcess) says by how much
+    patterned samples differ from the model beyond its own error; ``wrong_in_form`` are mechanisms that left a misfit in
+    the column they depend on. Of the law search: the answers about ``known`` laws (pairs of KnownLaw and Held), whether
+    what its laws leave is ``within_chance`` (None without laws), and the search ``across`` patterns (AcrossPatterns).
+    """
+
+    samples: tuple[str, ...] = ()
+    flat: str = ""
+    excess: Any = None
+    wrong_in_form: tuple[str, ...] = ()
+    known: tuple[Any, ...] = ()
+    within_chance: bool | None = None
+    across: Any = None
 
 
 @displayed()
 @dataclass(frozen=True)
 class Verdict:
-    """The outcome of a diagnosis."""
+    """The outcome of a diagnosis.
+
+    ``sentence`` is the finding in one sentence, ``evidence`` what it rests on, ``text`` both.
+    """
 
     verdict: Outcome
     misfits: tuple[Misfit, ...] = ()
@@ -139,31 +194,56 @@ class Verdict:
     text: str = ""
     smallest_effects: Mapping[str, float] = field(default_factory=dict)
     model: Mapping[str, Any] = field(default_factory=dict)  # source of the predictions, and the simulation
+    sentence: str = ""
+    evidence: str = ""
+    shows: Any = field(default=None, compare=False, repr=False)
 
     def as_dict(self) -> dict[str, Any]:
         """The verdict as plain types, in the order of the schema; numbers that do not exist are null."""
-        plain = {
+        found = {
             "schema": SCHEMA,
             "verdict": self.verdict,
             "text": self.text,
-            "misfits": [asdict(m) for m in self.misfits],
-            "causes": [asdict(c) for c in self.causes],
+            "misfits": [plain(m) for m in self.misfits],
+            "causes": [plain(c) for c in self.causes],
             "equivalent": [list(names) for names in self.equivalent],
-            "excluded": [asdict(e) for e in self.excluded],
-            "not_testable": [asdict(e) for e in self.not_testable],
-            "layers": [asdict(layer) for layer in self.layers],
+            "excluded": [plain(e) for e in self.excluded],
+            "not_testable": [plain(e) for e in self.not_testable],
+            "layers": [plain(layer) for layer in self.layers],
             "gain": asdict(self.gain) if self.gain else None,
             "set_aside": [{"test_id": s.test_id, "reason": s.reason} for s in self.set_aside],
-            "next_test": asdict(self.next_test) if self.next_test else None,
+            "next_test": plain(self.next_test) if self.next_test else None,
             "smallest_effects_percent": dict(self.smallest_effects),
             "model": dict(self.model),
         }
-        clean: dict[str, Any] = _finite(plain)
+        clean: dict[str, Any] = _finite(found)
         return clean
 
     def to_json(self) -> str:
         """verdict.json."""
         return json.dumps(self.as_dict(), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+KEPT = {  # fields of the records in verdict.json, in the order of its schema
+    Misfit: ("observable", "sample", "covariate", "effect_percent", "p_adjusted", "text", "low", "high"),
+    Cause: ("mechanism", "weight", "parameters", "text"),
+    Excluded: ("mechanism", "reason"),
+    Layer: (
+        "kind", "name", "samples", "regimes", "p_adjusted", "effect_percent", "low", "high", "parameters", "formula",
+        "tied_with", "gain", "text", "at", "choice",
+    ),
+    NextTest: ("text", "separates", "design", "expected_bits"),
+}  # fmt: skip
+
+
+def plain(record: Any) -> Any:
+    """A record by the names of its fields in verdict.json, with all that is in it."""
+    if is_dataclass(record):
+        names = KEPT.get(type(record)) or [f.name for f in fields(record)]
+        return {name: plain(getattr(record, name)) for name in names}
+    if isinstance(record, Mapping):
+        return {name: plain(value) for name, value in record.items()}
+    return record
 
 
 def _finite(value: Any) -> Any:

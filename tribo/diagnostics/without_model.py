@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from scipy.stats import t as t_distribution
 
-from tribo.diagnostics import alone_words as words
 from tribo.diagnostics.column_search import (
     FEWEST_TESTS,
     ColumnEffect,
@@ -23,9 +23,10 @@ from tribo.diagnostics.column_search import (
 )
 from tribo.diagnostics.verdict import Cause, Estimate, Excluded, Layer, Misfit, NextTest, Outcome, Verdict
 from tribo.diagnostics.within_records import RunningIn, StrokeOffset, running_in, stroke_offset
-from tribo.fitting.dependence import LABELS
 from tribo.mechanisms.record import ALONG_RECORDS, STROKES_APART
+from tribo.mechanisms.table import MECHANISMS
 from tribo.records import REGIMES, Study
+from tribo.vocabulary import label_with_unit
 
 UNITS = {"constant": ("N", ""), "linear": ("", "N"), "three_term": ("", "N")}
 NAMES = {"constant": ("T0",), "proportional": ("mu",), "hertz": ("a",), "linear": ("mu", "T0"), "power": ("a", "b")}
@@ -74,40 +75,36 @@ def _of_law(row: Mapping[str, Any], line: Mapping[str, Any] | None, loads: np.nd
         for name, key, unit in zip(names, ("a", "b"), units, strict=False)
         if math.isfinite(row[key])
     }
-    sizes = ", ".join(f"{n} = {_sized(e)}" for n, e in parameters.items())
-    text = f"{regime.capitalize()} friction of {sample} follows {row['formula']} with {sizes}."
-    if row["law"] in ("power", "linear", "constant", "three_term", "hertz") and line is not None:
-        text += f" {_constant_part(line, loads)}"
+    has_constant = row["law"] in ("power", "linear", "constant", "three_term", "hertz") and line is not None
     return Layer(
         kind="baseline", name="normal_load_N", samples=(sample,), regimes=(regime,), p_adjusted=float("nan"),
         effect_percent=float("nan"), low=float("nan"), high=float("nan"), parameters=parameters,
-        formula=str(row["formula"]), text=text,
+        formula=str(row["formula"]), shows=_constant_part(line, loads) if has_constant else None,
     )  # fmt: skip
 
 
-def _constant_part(line: Mapping[str, Any], loads: np.ndarray) -> str:
-    """How much of T does not depend on the load, by the straight line."""
+@dataclass(frozen=True)
+class ConstantPart:
+    """What a straight line leaves at zero load, and its share of T (percent) at the middle load."""
+
+    constant: Estimate
+    share_percent: float
+    load_N: float
+
+
+def _constant_part(line: Mapping[str, Any], loads: np.ndarray) -> ConstantPart:
     constant = _estimate(line["b"], line["b_u"], "N", line["loads"] - 2)
-    if constant.low <= 0.0 <= constant.high:
-        return "A straight line leaves no certain part of T that does not depend on the load."
-    if constant.value < 0.0:
-        return f"A straight line falls to {_sized(constant)} at zero load: friction is weak at small loads."
     middle = float(np.median(loads))
     share = 100.0 * line["b"] / max(line["a"] * middle + line["b"], 1e-300)
-    return (
-        f"A straight line leaves {_sized(constant)} at zero load: {share:.0f} % of T at {middle:.3g} N does not depend "
-        "on the load."
-    )
+    return ConstantPart(constant, float(share), middle)
 
 
 def _of_mean(sample: str, regime: str, ratio: np.ndarray) -> Layer:
     u = float(ratio.std(ddof=1) / math.sqrt(ratio.size)) if ratio.size > 1 else float("nan")
     mean = _estimate(float(ratio.mean()), u, "", ratio.size - 1)
-    text = f"Mean {regime} T/N of {sample}: {_sized(mean)}; the loads do not determine a law."
     return Layer(
         kind="baseline", name="normal_load_N", samples=(sample,), regimes=(regime,), p_adjusted=float("nan"),
         effect_percent=float("nan"), low=float("nan"), high=float("nan"), parameters={"T/N": mean}, formula="T = μ N",
-        text=text,
     )  # fmt: skip
 
 
@@ -117,14 +114,28 @@ def _estimate(value: float, u: float, unit: str, dof: int) -> Estimate:
     return Estimate(float(value), float(value - half), float(value + half), unit)
 
 
-def _sized(e: Estimate) -> str:
-    said = f"{e.value:.3g} {e.unit}".rstrip()
-    return f"{said} (90 % interval {e.low:.3g} to {e.high:.3g})" if math.isfinite(e.low) else said
-
-
 BASELINE = "the law of each sample alone"
 
-RUNNING_IN, OFFSET = words.SHOWN_BY[ALONG_RECORDS], words.SHOWN_BY[STROKES_APART]
+SHOWN_BY = {shown: m.name for m in MECHANISMS.values() for shown in m.without_model}
+ANY_COLUMN = next(m.name for m in MECHANISMS.values() if m.any_column)
+RUNNING_IN, OFFSET = SHOWN_BY[ALONG_RECORDS], SHOWN_BY[STROKES_APART]
+MECHANISMS_OF_COLUMNS = {k: name for k, name in SHOWN_BY.items() if k not in (ALONG_RECORDS, STROKES_APART)}
+SERIES = ("run_order", "specimen_run", "started_at", "date")  # columns that no one can vary
+
+
+def name_of_column(column: str) -> str:
+    """The name in a verdict of what follows a column: a mechanism of the library, or the column itself."""
+    return MECHANISMS_OF_COLUMNS.get(column, f"{ANY_COLUMN}:{column}")
+
+
+@dataclass(frozen=True)
+class ColumnsTested:
+    """The ``columns`` that were tested without the model, or why none was: ``n_tests`` are fewer than ``needed``."""
+
+    columns: tuple[str, ...]
+    untested: Literal["", "no tests", "no column varies", "too few tests"]
+    n_tests: int = 0
+    needed: int = 0
 
 
 def diagnose_without_model(study: Study, *, seed: int = 0, level: float = 0.01) -> Verdict:
@@ -149,7 +160,7 @@ def diagnose_without_model(study: Study, *, seed: int = 0, level: float = 0.01) 
     causes = [*_column_causes(found), *_record_causes(records), *_offset_causes(apart)]
     inseparable = _inseparable(study, found)
     tied = ((f.name, *f.alike) for s in found for f in s.follows if f.alike)
-    equivalent = tuple(dict.fromkeys(tuple(map(words.name_of_column, names)) for names in tied))
+    equivalent = tuple(dict.fromkeys(tuple(map(name_of_column, names)) for names in tied))
     outcome: Outcome = "named" if causes else "no_misfit"
     return Verdict(
         verdict=outcome,
@@ -160,30 +171,27 @@ def diagnose_without_model(study: Study, *, seed: int = 0, level: float = 0.01) 
         layers=tuple(layers),
         set_aside=study.ingested.set_aside,
         next_test=_next_test(found),
-        text=words.summary(layers, causes, inseparable, found, _too_few(points, found)),
-        smallest_effects={},
         model={"baseline": BASELINE},
+        shows=_tested(points, found),
     )
 
 
-def _too_few(points: list[RegimeTests], found: list[SearchedColumns]) -> str:
+def _tested(points: list[RegimeTests], found: list[SearchedColumns]) -> ColumnsTested:
     if found or not points:
-        return ""
+        columns = tuple(sorted({name for s in found for name in s.columns}))
+        return ColumnsTested(columns, "" if found else "no tests")
     if not any(t.columns or t.only_with_load for t in points):
-        return "No recorded column varies beside the load."
+        return ColumnsTested((), "no column varies")
     needed = max(FEWEST_TESTS, 2 * points[-1].law.shape[1])
-    return (
-        f"Dependence on recorded columns was not tested: there are {max(t.n for t in points)} tests, and at least "
-        f"{needed} are needed beside the laws of these samples."
-    )
+    return ColumnsTested((), "too few tests", max(t.n for t in points), needed)
 
 
 def _column_layers(found: list[SearchedColumns]) -> list[Layer]:
     return [
         Layer(
-            kind="cause", name=words.name_of_column(f.name), samples=(), regimes=(f.regime,), p_adjusted=f.p,
+            kind="cause", name=name_of_column(f.name), samples=(), regimes=(f.regime,), p_adjusted=f.p,
             effect_percent=f.change_percent, low=f.low_percent, high=f.high_percent,
-            tied_with=tuple(map(words.name_of_column, f.alike)), text=words.of_column(f),
+            tied_with=tuple(map(name_of_column, f.alike)), shows=(f,),
         )
         for s in found for f in s.follows
     ]  # fmt: skip
@@ -197,8 +205,8 @@ def _column_causes(found: list[SearchedColumns]) -> list[Cause]:
             each.setdefault(f.name, []).append(f)
     return [
         Cause(
-            words.name_of_column(alike[0].name), 1.0, {f"change of {f.regime} T": _size(f) for f in alike},
-            " ".join(words.of_column(f) for f in alike),
+            name_of_column(alike[0].name), 1.0, {f"change of {f.regime} T": _size(f) for f in alike},
+            shows=tuple(alike),
         )
         for alike in each.values()
     ]  # fmt: skip
@@ -210,12 +218,12 @@ def _size(f: ColumnEffect) -> Estimate:
 
 def _misfits(found: list[SearchedColumns], records: list[RunningIn]) -> list[Misfit]:
     all_found = [f for s in found for f in s.follows]
-    misfits = [Misfit(f.regime, "", f.name, f.change_percent, f.p, words.of_column(f)) for f in all_found]
+    misfits = [Misfit(f.regime, "", f.name, f.change_percent, f.p, shows=(f,)) for f in all_found]
     for sample in dict.fromkeys(r.sample for r in records):
         part = [r for r in records if r.sample == sample]
         strongest = max(part, key=lambda r: abs(r.first_percent))
         misfits.append(Misfit("sliding", sample, "distance", strongest.first_percent, min(r.p for r in part),
-                              words.of_records(part)))  # fmt: skip
+                              shows=tuple(part)))  # fmt: skip
     return misfits
 
 
@@ -228,7 +236,7 @@ def _record_layers(records: list[RunningIn]) -> list[Layer]:
         found.append(
             Layer(kind="cause", name=RUNNING_IN, samples=(sample,), regimes=("sliding",), p_adjusted=p,
                   effect_percent=float(np.median(changes)), low=min(changes), high=max(changes),
-                  text=words.of_records(part))
+                  shows=tuple(part))
         )  # fmt: skip
     return found
 
@@ -238,7 +246,7 @@ def _record_causes(records: list[RunningIn]) -> list[Cause]:
         return []
     changes = [r.first_percent for r in records]
     size = Estimate(float(np.median(changes)), min(changes), max(changes), "%")
-    return [Cause(RUNNING_IN, 1.0, {"first twentieth over second half": size}, words.of_records(records))]
+    return [Cause(RUNNING_IN, 1.0, {"first twentieth over second half": size}, shows=tuple(records))]
 
 
 def _offset_layers(apart: StrokeOffset | None) -> list[Layer]:
@@ -246,13 +254,13 @@ def _offset_layers(apart: StrokeOffset | None) -> list[Layer]:
         return []
     return [Layer(kind="cause", name=OFFSET, samples=(), regimes=(), p_adjusted=apart.p,
                   effect_percent=apart.percent, low=apart.low_percent, high=apart.high_percent,
-                  parameters={"F0": apart.offset}, text=words.of_strokes(apart))]  # fmt: skip
+                  parameters={"F0": apart.offset}, shows=(apart,))]  # fmt: skip
 
 
 def _offset_causes(apart: StrokeOffset | None) -> list[Cause]:
     if apart is None or not apart.certain:
         return []
-    return [Cause(OFFSET, 1.0, {"F0": apart.offset}, words.of_strokes(apart))]
+    return [Cause(OFFSET, 1.0, {"F0": apart.offset}, shows=(apart,))]
 
 
 def _inseparable(study: Study, found: list[SearchedColumns]) -> list[Excluded]:
@@ -260,16 +268,19 @@ def _inseparable(study: Study, found: list[SearchedColumns]) -> list[Excluded]:
     pairs: dict[tuple[str, str], list[str]] = {}
     table = study.dependence
     for row in [] if table is None else table.to_dict("records"):
-        for other in filter(None, str(row["inseparable_from"]).split(", ")):
-            one, two = sorted((str(row["label"]), other))
-            if LABELS["normal_load_N"] in (one, two):
+        for other in row["inseparable_from"]:
+            one, two = sorted((str(row["variable"]), other), key=label_with_unit)
+            if "normal_load_N" in (one, two):
                 continue  # said of the columns that vary only with the load
             samples = pairs.setdefault((one, two), [])
             if row["sample"] not in samples:
                 samples.append(str(row["sample"]))
-    said = [Excluded(words.name_of_column(name), words.only_with_load(name)) for name in _only_with_load(found)]
-    together = ((f"{a} or {b}", words.vary_together(a, b, samples)) for (a, b), samples in pairs.items())
-    return [*said, *(Excluded(names, reason) for names, reason in together)]
+    said = [Excluded(name_of_column(name), "only with the load", shows=name) for name in _only_with_load(found)]
+    together = (
+        Excluded(f"{label_with_unit(a)} or {label_with_unit(b)}", "vary together", shows=(a, b, tuple(samples)))
+        for (a, b), samples in pairs.items()
+    )
+    return [*said, *together]
 
 
 def _only_with_load(found: list[SearchedColumns]) -> list[str]:
@@ -280,16 +291,17 @@ def _not_testable(found: list[SearchedColumns]) -> list[Excluded]:
     """Mechanisms whose column does not vary, or was not recorded."""
     there = {name for s in found for name in (*s.columns, *s.only_with_load)}
     return [
-        Excluded(mechanism, words.not_varied_column(column))
-        for column, mechanism in words.MECHANISMS_OF_COLUMNS.items()
+        Excluded(mechanism, "not varied", shows=column)
+        for column, mechanism in MECHANISMS_OF_COLUMNS.items()
         if found and column not in there
     ]
 
 
 def _next_test(found: list[SearchedColumns]) -> NextTest | None:
     if columns := _only_with_load(found):
-        return words.load_test(columns)
+        design: dict[str, Any] = {"loads": 4, "repeats": 3, "order": "random", "pulls": 12, "hours": 1.4}
+        return NextTest("part from load", (*columns, "normal_load_N"), design)
     tied = next((f for s in found for f in s.follows if f.alike), None)
-    if tied is not None:
-        return words.parting_test(tied)
-    return None
+    if tied is None:
+        return None
+    return NextTest("part columns", (tied.name, *tied.alike), {"covariate": tied.name, "pulls": 12, "hours": 1.4})

@@ -143,7 +143,7 @@ def power_numbers(d: Diagnosis, level: float = LEVEL) -> pd.DataFrame:
     contrast = d.screened.contrasts[best]
     seen, nothing = float(d.screened.strength[best]), [float("nan")] * 3
     rows = [*chance, ("need", f"level {level:g}", need, *nothing)]
-    rows.append(("observed", f"{contrast.observable}, {contrast.covariate}", seen, *nothing))
+    rows.append(("observed", f"{contrast.observable}, {contrast.title}", seen, *nothing))
     for name, percent in sorted(d.verdict.smallest_effects.items(), key=lambda item: item[1])[:SHOWN]:
         low, high = (percent * (need + s * TENTH) / need for s in (-1, 1))
         rows.append(("mechanism", name, float("nan"), low, percent, high))

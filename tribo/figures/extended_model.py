@@ -14,10 +14,10 @@ from matplotlib.patches import Patch
 from tribo.comparison import study_lookup
 from tribo.diagnostics.effect_sizes import percent, rms_percent
 from tribo.diagnostics.model import effect_of
-from tribo.diagnostics.terms import in_words
 from tribo.figures import style
 from tribo.lawsearch.grammar import UNITS, WrittenLaw, column_values
 from tribo.records import REGIMES
+from tribo.vocabulary import in_words
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis

@@ -14,9 +14,10 @@ from matplotlib.ticker import MaxNLocator
 from tribo.comparison.study_lookup import sample_numbers, shown
 from tribo.figures import style
 from tribo.fitting.alternatives import force_N
-from tribo.fitting.dependence import LABELS, SPEED, measured_points, test_values, variables_of
+from tribo.fitting.dependence import SPEED, measured_points, test_values, variables_of
 from tribo.fitting.linear import meant_to_be_one
 from tribo.records import REGIMES, Study
+from tribo.vocabulary import label_with_unit
 
 POINTS_COLUMNS = [
     "sample_number", "sample", "regime", "test_id", "variable", "label", "value", "T_over_N", "T_over_N_u",
@@ -38,7 +39,7 @@ def dependence_points(study: Study) -> pd.DataFrame:
     points = measured_points(study.ingested) if shown(study) else pd.DataFrame()
     order = sample_numbers(study)
     frames = [
-        points.assign(variable=name, label=LABELS.get(name, name.replace("_", " ")), value=points[name])
+        points.assign(variable=name, label=label_with_unit(name), value=points[name])
         for name in (variables_of(points)[:_MOST_VARIABLES] if len(points) else ())
     ]
     if not frames:
@@ -103,7 +104,8 @@ def oscillation_points(study: Study) -> pd.DataFrame:
         if found is None or not found.cycles or found.regime == "steady" or not value or not test.normal_load_N > 0:
             continue
         said = {"sample_number": order[test.sample], "sample": test.sample, "test_id": test.test_id,
-                "regime": found.regime, "variable": variable, "label": LABELS[variable], "value": value}  # fmt: skip
+                "regime": found.regime, "variable": variable, "label": label_with_unit(variable),
+                "value": value}  # fmt: skip
         load = test.normal_load_N
         rows.append({**said, "quantity": "drop / N", "y": found.drop_N / load, "y_u": found.drop_u_N / load})
         rows.append({**said, "quantity": "period (s)", "y": found.period_s, "y_u": found.period_u_s})

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from tribo.diagnostics.effect_sizes import bend_percent, change_percent, mean_percent, percent
 from tribo.figures import style
 from tribo.records import FloatArray
+from tribo.vocabulary import axis_label, short_label
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
@@ -24,17 +25,6 @@ if TYPE_CHECKING:
 
 
 BEND = "bend"  # the square of ln N: whether T(N) bends
-LABELS = {
-    "normal_load_N": "load", "specimen_run": "pull of specimen", "run_order": "run order", "started_at": "time",
-    "time of day": "time of day", "temperature_C": "temperature", "humidity_pct": "humidity",
-    "speed_mm_s": "speed", "hold_s": "hold time", BEND: "bend with load",
-}  # fmt: skip
-AXES = {
-    "normal_load_N": "Normal load N (N)", "specimen_run": "Pull of the specimen", "run_order": "Run order",
-    "started_at": "Time since the first pull (h)", "time of day": "Time of day (h)",
-    "temperature_C": "Temperature (°C)", "humidity_pct": "Relative humidity (%)", "speed_mm_s": "Speed (mm/s)",
-    "hold_s": "Hold (s)",
-}  # fmt: skip
 LOGARITHMIC = ("normal_load_N", "speed_mm_s", "hold_s")
 MOST_LABEL = 16
 
@@ -58,21 +48,21 @@ class Covariate:
     @property
     def label(self) -> str:
         """A short name for a table."""
-        text = LABELS.get(self.name, self.name)
+        text = short_label(self.name)
         return text if len(text) <= MOST_LABEL else f"{text[: MOST_LABEL - 1]}…"
 
     @property
     def axis(self) -> str:
         """A name with unit for an axis."""
-        return AXES.get(self.name, self.name)
+        return axis_label(self.name)
 
 
 def mechanism_label(name: str) -> str:
     """The plain name of a mechanism without its article; of one that follows any column, that column."""
-    from tribo.diagnostics.terms import name_in_words
+    from tribo.wording.part_sentences import name_in_words
 
     column = name.partition(":")[2]
-    plain = f"dependence on {LABELS.get(column, column)}" if column else name_in_words(name)
+    plain = f"dependence on {short_label(column)}" if column else name_in_words(name)
     return plain.removeprefix("a ").removeprefix("an ")
 
 

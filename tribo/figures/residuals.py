@@ -92,9 +92,9 @@ def _panel(d: Diagnosis, contrast: Contrast, p: float) -> Panel | None:
     if contrast.kind == "sample":
         here = c.sample == contrast.sample
     if contrast.kind == "specimen":
-        here = c.specimen == contrast.covariate.split()[1]
-    if contrast.kind == "period":
-        name = contrast.covariate.split(",")[0]
+        here = c.specimen == contrast.covariate.removeprefix("specimen ")
+    if contrast.kind == "block":
+        return None
     try:
         return Panel(contrast, covariate(d.baseline.setup, name), here, p)
     except KeyError:
@@ -201,7 +201,7 @@ def _observable(contrast: Contrast) -> str:
 
 def _title(contrast: Contrast) -> str:
     if contrast.kind == "specimen":
-        return f"{contrast.covariate} ({contrast.sample})"
+        return f"{contrast.title} ({contrast.sample})"
     return f"Sample {contrast.sample}" if contrast.sample else "All samples"
 
 
@@ -254,7 +254,7 @@ def _residual_axis(ax: Axes, part: pd.DataFrame, names: pd.DataFrame | None) -> 
             for label in ax.get_xticklabels():
                 label.set(rotation=40, ha="right", rotation_mode="anchor", fontsize=6.5)
         ax.set_xlim(-0.6, float(names["x"].max()) + 0.6)
-    elif str(first["axis"]).split(" (")[0] in ("Normal load N", "Speed", "Hold"):
+    elif str(first["axis"]).split(" (")[0] in ("Normal load", "Speed", "Hold"):
         ax.set_xscale("log")
         style.plain_log_axis(ax.xaxis, tests["x"])
 

@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.records import REGIMES, FloatArray, Ingested, Test
+from tribo.vocabulary import label_with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
 
-LABELS = {
-    "normal_load_N": "normal load (N)", "speed_mm_s": "speed (mm/s)", "hold_s": "hold (s)", "run_order": "run order",
-    "specimen_run": "run on the specimen", "repeat": "repeat", "temperature_C": "temperature (°C)",
-    "humidity_pct": "relative humidity (%)",
-}  # fmt: skip
+VARIABLES = (
+    "normal_load_N", "speed_mm_s", "hold_s", "run_order", "specimen_run", "repeat", "temperature_C", "humidity_pct",
+)  # fmt: skip
 SPEED = "speed_mm_s"
 COLUMNS = ["sample", "regime", "variable", "label", "n", "low", "high", "change_percent", "change_u_percent", "rank",
            "p", "p_adjusted", "inseparable_from"]  # fmt: skip
@@ -27,7 +26,7 @@ _FEWEST_VALUES = 2
 
 def test_values(test: Test) -> dict[str, float]:
     """Every number recorded for a test, by name."""
-    found = {name: getattr(test, name) for name in LABELS if name != SPEED}
+    found = {name: getattr(test, name) for name in VARIABLES if name != SPEED}
     found[SPEED] = None if test.speed_m_s is None else 1e3 * test.speed_m_s
     for name, cell in test.covariates.items():
         if name == NOMINAL_LOAD:
@@ -61,7 +60,7 @@ def variables_of(points: pd.DataFrame) -> list[str]:
     """The recorded variables that take more than one value, load first."""
     said = ("test_id", "sample", "regime", "T_over_N", "T_over_N_u", "T_N")
     return [
-        name for name in (*LABELS, *(c for c in points.columns if c not in LABELS and c not in said))
+        name for name in (*VARIABLES, *(c for c in points.columns if c not in VARIABLES and c not in said))
         if name in points.columns and points[name].nunique() >= _FEWEST_VALUES
     ]  # fmt: skip
 
@@ -81,9 +80,8 @@ def dependence(ingested: Ingested) -> pd.DataFrame:
         for name in names:
             row = _one(part, name)
             if row:
-                others = [o for o in names if o != name and _same(part, name, o)]
-                joined = ", ".join(LABELS.get(o, o.replace("_", " ")) for o in others)
-                found.append({"sample": sample, "regime": regime, **row, "inseparable_from": joined})
+                others = tuple(o for o in names if o != name and _same(part, name, o))
+                found.append({"sample": sample, "regime": regime, **row, "inseparable_from": others})
     table = pd.DataFrame(found, columns=COLUMNS)
     return table.assign(p_adjusted=_holm(table["p"].to_numpy(float)))
 
@@ -98,7 +96,7 @@ def _one(part: pd.DataFrame, name: str) -> dict[str, object]:
     line, rank = linregress(x, y), spearmanr(x, y)
     span = float(np.ptp(x))
     return {
-        "variable": name, "label": LABELS.get(name, name.replace("_", " ")), "n": len(known), "low": float(x.min()),
+        "variable": name, "label": label_with_unit(name), "n": len(known), "low": float(x.min()),
         "high": float(x.max()), "change_percent": 100 * float(np.expm1(line.slope * span)),
         "change_u_percent": 100 * float(line.stderr * span), "rank": float(rank.statistic), "p": float(rank.pvalue),
     }  # fmt: skip

@@ -167,6 +167,7 @@ def _fit_sample(rows: Rows, regime: Regime, area: float, weights: str, by: str) 
         chi2_red=ratio,
         specimens={name: fit.values for name, fit in usable.items()},
         notes=(*notes, *part.notes, *bend),
+        bent=bool(bend),
     )
 
 

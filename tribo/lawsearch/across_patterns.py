@@ -16,12 +16,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, permutations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tribo.diagnostics.fit import ModelFit
 from tribo.lawsearch.grammar import ADHESION_TERM, LOAD_TERM, T
 from tribo.records import REGIMES, FloatArray
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 BENT = "T, in proportion to ln p"
 LOADS = 3  # groups of tests by load
@@ -245,3 +249,30 @@ def predicted(law: LawAcross, d: Deviations) -> FloatArray:
     """ln(measured / model) by the law, (n, 2, m)."""
     parts = [c * term.column(d) for c, term in zip(law.coefficients, law.terms, strict=True)]
     return np.asarray(sum(parts))
+
+
+def formula(law: LawAcross) -> str:
+    """The law as a formula for ln(T measured / T model)."""
+    parts = [f"{c:+.3g}{_term_formula(term)}" for c, term in zip(law.coefficients, law.terms, strict=True)]
+    return "ln(T measured / T model) = " + " ".join(parts).removeprefix("+")
+
+
+def _term_formula(term: Term) -> str:
+    what = "" if term.quantity == "1" else f" {term.quantity}"
+    acts = {T: "", BENT: " ln(p/p_mean)"}.get(term.acts_on, f" x share of the {term.acts_on}")
+    return f"{what}{acts}" + ("" if term.regime == "both" else f" ({term.regime})")
+
+
+def table_of(found: AcrossPatterns) -> pd.DataFrame:
+    """The best laws of every number of terms: formula, errors (rms of ln T), and chance."""
+    import pandas as pd
+
+    rows = [
+        {
+            "terms": s.terms, "formula": formula(law), "left_out_error": law.error, "model_error": found.without,
+            "best_of_chance_error": s.chance, "p_of_the_best": s.p, "nested_error": s.nested, "laws_tried": s.tried,
+        }
+        for s in found.searches
+        for law in s.laws
+    ]  # fmt: skip
+    return pd.DataFrame(rows)

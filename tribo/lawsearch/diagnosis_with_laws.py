@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,15 +14,11 @@ from tribo.diagnostics.diagnosis import examine
 from tribo.diagnostics.diagnosis_record import Diagnosis
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.planning import HOURS_PER_PULL, PULLS, first_test_of
-from tribo.diagnostics.sentences import summary
-from tribo.diagnostics.terms import in_words
-from tribo.diagnostics.verdict import CERTAIN_CAUSES, Estimate, Excluded, Layer, NextTest, Outcome, Verdict
+from tribo.diagnostics.verdict import CERTAIN_CAUSES, Estimate, Excluded, Layer, Misfit, NextTest, Outcome, Verdict
 from tribo.lawsearch.across_patterns import CERTAIN, AcrossPatterns, across_patterns, deviations_of
-from tribo.lawsearch.across_words import sentence
-from tribo.lawsearch.grammar import BOTH, PRESSURES, UNITS, WrittenLaw, column_values
-from tribo.lawsearch.known_laws import KnownLaw, ValidatedLaws, Validation, validate_law, validate_laws
-from tribo.lawsearch.law_words import law_layers, law_misfit, laws_text, tied_text
-from tribo.lawsearch.model_choice import CauseForms, Contested, without_wrong_forms
+from tribo.lawsearch.grammar import PRESSURES, WrittenLaw, column_values
+from tribo.lawsearch.known_laws import KnownLaw, ValidatedLaws, Validation, law_layer, validate_law, validate_laws
+from tribo.lawsearch.model_choice import CauseForms, Contested, FoundLaw, without_wrong_forms
 from tribo.lawsearch.search import Discovery, Progress, discover_laws
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray, Ingested
@@ -91,15 +87,8 @@ def validate_on_campaign(
 
 
 def with_tested(v: Verdict, tested: ValidatedLaws) -> Verdict:
-    """The verdict with the answers about known laws in its ``model`` record."""
-    if not tested.answers:
-        return v
-    answers = [
-        {"law": known.name, "found_in": known.found_in, "formula": known.law.formula(), "answer": held.answer,
-         "text": held.text}
-        for known, held in tested.answers
-    ]  # fmt: skip
-    return replace(v, model={**v.model, "known_laws": answers}, text=f"{v.text} {tested.text}")
+    """The verdict with the answers about known laws."""
+    return replace(v, shows=replace(v.shows, known=tested.answers)) if tested.answers else v
 
 
 def explained(d: Diagnosis) -> ModelFit:
@@ -123,7 +112,7 @@ def with_forms_of_causes(v: Verdict, forms: Sequence[CauseForms], model: ModelFi
     if not tied:
         return v
     layers = tuple(
-        replace(layer, text=f"{layer.text}{tied_text(tied[layer.name].ties)}")
+        replace(layer, shows=tied[layer.name])
         if layer.kind == "cause" and layer.name in tied else layer
         for layer in v.layers
     )  # fmt: skip
@@ -137,10 +126,28 @@ def with_misfits(v: Verdict, found: Discovery) -> Verdict:
     outcome = AS_MISFIT.get(v.verdict)
     if outcome is None or not found.laws:
         return v
-    misfits = tuple(law_misfit(f) for f in found.laws)
+    misfits = tuple(_law_misfit(f) for f in found.laws)
     next_test = v.next_test if v.equivalent else first_test_of(misfits[0].covariate)
-    text = summary(outcome, v.causes, v.equivalent, misfits, dict(v.smallest_effects))
-    return replace(v, verdict=outcome, misfits=(*v.misfits, *misfits), next_test=next_test, text=text)
+    return replace(v, verdict=outcome, misfits=(*v.misfits, *misfits), next_test=next_test)
+
+
+def _law_misfit(f: FoundLaw) -> Misfit:
+    """A law as the misfit that it describes, for where nothing else showed one."""
+    value, low, high = f.effect_percent
+    return Misfit(
+        f.law.regime, f.law.sample, " and ".join(f.law.columns), value, f.p, low=low, high=high, shows=f
+    )  # fmt: skip
+
+
+def law_layers(d: Discovery) -> list[Layer]:
+    """The laws as layers of a verdict."""
+    return [
+        replace(
+            law_layer(f.law, f.model, f.parameters, f.effect_percent), p_adjusted=f.p,
+            tied_with=tuple(t.formula() for t in f.ties), gain=f.gain, shows=f,
+        )
+        for f in d.laws
+    ]  # fmt: skip
 
 
 def without_causes(v: Verdict, lost: Mapping[str, float]) -> Verdict:
@@ -154,14 +161,11 @@ def without_causes(v: Verdict, lost: Mapping[str, float]) -> Verdict:
     causes = tuple(c for c in v.causes if c.mechanism not in gone)
     outcome: Outcome = "partly" if causes else "unknown"
     equivalent = tuple(names for names in v.equivalent if not set(names) & gone)
-    excluded = [
-        Excluded(name, f"a law of the same column explains the campaign better: log likelihood higher by {by:.1f}")
-        for name, by in lost.items()
-    ]
+    excluded = [Excluded(name, "a law explains more", by) for name, by in lost.items()]
     layers = tuple(layer for layer in v.layers if not (layer.kind == "cause" and layer.name in gone))
     return replace(
         v, verdict=outcome, causes=causes, equivalent=equivalent, excluded=(*v.excluded, *excluded), layers=layers,
-        gain=v.gain if causes else None, text=summary(outcome, causes, equivalent, v.misfits, dict(v.smallest_effects)),
+        gain=v.gain if causes else None,
     )  # fmt: skip
 
 
@@ -182,21 +186,19 @@ def _extended(
     columns = {name for law in found.laws for name in law.law.columns} | tested.columns
     kept = [layer for layer in v.layers if layer.kind == "cause"]
     remainders = _still_left([layer for layer in v.layers if layer.kind == "remainder"], columns, screened, level)
-    within = screened.p.min() >= level
-    rest = "With this included, the remaining differences are within chance." if within else "A misfit remains."
     ties = [(law.law, law.ties[0]) for law in found.laws if law.ties]
     next_test = v.next_test
     if ties and not v.equivalent:
         next_test = separating_test(*ties[0], model.setup.observations.conditions)
     layers = (*pattern_layers(model), *kept, *tested.layers, *law_layers(found), *remainders)
-    said = [v.text, laws_text(found, v.text), rest] if v.verdict != "no_misfit" else [v.text]
-    return replace(v, layers=layers, next_test=next_test, text=" ".join(filter(None, said)))
+    shows = replace(v.shows, within_chance=bool(screened.p.min() >= level))
+    return replace(v, layers=layers, next_test=next_test, shows=shows)
 
 
 def _still_left(layers: Sequence[Layer], columns: set[str], screened: Screen, level: float) -> list[Layer]:
     """Remainders of other columns that are still beyond chance beside the laws."""
     follows = {
-        contrast.covariate.split(",")[0]
+        contrast.column
         for contrast, p in zip(screened.contrasts, screened.p, strict=True)
         if p < level and contrast.kind != "mechanism"
     }
@@ -209,67 +211,41 @@ def across_of(d: Diagnosis, *, seed: int = 0) -> AcrossPatterns | None:
 
 
 def with_law_across(d: Diagnosis, *, seed: int = 0) -> Diagnosis:
-    """The same diagnosis, its text with the law across patterns where the model is wrong about several of them."""
+    """The same diagnosis with the search across patterns, where the model is wrong about several of them."""
     wrong = {x.name for x in d.verdict.layers if x.kind == "pattern_correction" and x.p_adjusted < CERTAIN}
     found = across_of(d, seed=seed) if len(wrong) > 1 and d.verdict.verdict != "no_misfit" else None
     if found is None:
         return d
-    return replace(d, verdict=replace(d.verdict, text=f"{d.verdict.text} {sentence(found)}"))
+    return replace(d, verdict=replace(d.verdict, shows=replace(d.verdict.shows, across=found)))
 
 
 BEYOND = 0.25  # of the measured range, on either side, within which a further test may lie
 PLACES = 61
-PARTS_PRESSURES = (
-    "Pull patterned samples and the flat one at equal contact pressures, with loads in proportion to the contact area"
-)
+Parting = Literal["pressures", "columns", "samples", "terms", "regimes", "corners", "place"]
 
 
 def separating_test(law: WrittenLaw, other: WrittenLaw, c: Conditions) -> NextTest:
     """Where two tied laws differ: in their columns, samples, terms, regimes or, at last, in their courses."""
-    text, design = _how(law, other, c)
+    parting, design = _differ(law, other, c)
     design |= {"pulls": PULLS, "hours": PULLS * HOURS_PER_PULL}
-    return NextTest(f"{text}: {PULLS} pulls.", (law.formula(), other.formula()), design, float("nan"))
+    return NextTest("part laws", (law.formula(), other.formula()), design, shows=(parting, law, other))
 
 
-def _how(law: WrittenLaw, other: WrittenLaw, c: Conditions) -> tuple[str, dict[str, Any]]:
+def _differ(law: WrittenLaw, other: WrittenLaw, c: Conditions) -> tuple[Parting, dict[str, Any]]:
     if set(law.columns) ^ set(other.columns) == PRESSURES:
-        return PARTS_PRESSURES, {"vary": sorted(PRESSURES)}
+        return "pressures", {"vary": sorted(PRESSURES)}
     if set(law.columns) != set(other.columns):
-        only = [name for name in (*law.columns, *other.columns) if not (name in law.columns and name in other.columns)]
-        varied = " and ".join(dict.fromkeys(in_words(name) for name in only))
-        return f"Vary {varied} independently of each other and of all other conditions", {"vary": sorted(set(only))}
+        return "columns", {"vary": sorted(set(law.columns) ^ set(other.columns))}
     if law.where != other.where:
-        sample = _told_by(law, other, c)
-        return f"{_vary(law)} on sample {sample} alone, at one load", {"sample": sample, "vary": list(law.columns)}
+        return "samples", {"sample": _told_by(law, other, c), "vary": list(law.columns)}
     if law.acts_on != other.acts_on:
-        ends = [float(c.normal_load_N.min()), float(c.normal_load_N.max())]
-        return f"{_vary(law)} at {ends[0]:.3g} N and at {ends[1]:.3g} N alone", {"normal_load_N": ends}
+        return "terms", {"normal_load_N": [float(c.normal_load_N.min()), float(c.normal_load_N.max())]}
     if law.regime != other.regime:
-        regime = next(r for r in (law.regime, other.regime) if r != BOTH)
-        again = _vary(law) if _days(law) else f"Repeat pulls at the lowest and the highest value of {_words(law)}"
-        return f"{again} ({regime} friction decides)", {"vary": list(law.columns)}
+        return "regimes", {"vary": list(law.columns)}
     if len(law.shapes) > 1 or law.shapes[0].kind == "level":
-        again = _vary(law) if _days(law) else f"Pull at the corners of the ranges of {_words(law)}"
-        return again, {"vary": list(law.columns)}
+        return "corners", {"vary": list(law.columns)}
     name = law.columns[0]
-    at = _apart(law, other, column_values(c, name))
-    return f"Pull at {in_words(name)} = {at:.4g} {UNITS.get(name, '')}".rstrip(), {name: at}
-
-
-def _vary(law: WrittenLaw) -> str:
-    """What to change for a further test: a column, or what a day had in particular, since no day comes back."""
-    days = _days(law)
-    if not days:
-        return f"Vary {_words(law)}"
-    return f"Find out what differed on {' and '.join(days)}, and pull with it and without it"
-
-
-def _days(law: WrittenLaw) -> list[str]:
-    return [s.level for s in law.shapes if s.kind == "level" and s.column == "date"]
-
-
-def _words(law: WrittenLaw) -> str:
-    return " and ".join(dict.fromkeys(in_words(name) for name in law.columns))
+    return "place", {name: _apart(law, other, column_values(c, name))}
 
 
 def _told_by(law: WrittenLaw, other: WrittenLaw, c: Conditions) -> str:

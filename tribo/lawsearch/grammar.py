@@ -112,6 +112,11 @@ class WrittenLaw:
     def columns(self) -> tuple[str, ...]:
         return tuple(s.column for s in self.shapes)
 
+    @property
+    def sample(self) -> str:
+        """The one sample it acts on; empty where it acts on more."""
+        return self.where.removeprefix("sample ") if self.where.startswith("sample ") else ""
+
     def course(self, c: Conditions) -> FloatArray:
         """The product of its shapes, (n, d)."""
         found = self.shapes[0].of(c)

@@ -1,4 +1,4 @@
-"""Whether a law of one campaign holds in another one.
+"""Whether a law of one campaign validate_law in another one.
 
 Laws of earlier campaigns: read from a folder, tested on a campaign, and added to it where they hold.
 
@@ -24,26 +24,31 @@ from tribo.diagnostics.planning import PAPER_LAW, TYPICAL, expected_fit
 from tribo.diagnostics.verdict import Estimate, Layer
 from tribo.errors import CampaignError, Problem
 from tribo.files import found_below
-from tribo.lawsearch.grammar import UNITS, WrittenLaw
+from tribo.lawsearch.grammar import BOTH, UNITS, WrittenLaw
 from tribo.lawsearch.law_file import read_law, read_title
-from tribo.lawsearch.law_words import law_layer, size_sentence
 from tribo.lawsearch.model_choice import without_rivals
 from tribo.mechanisms.record import Conditions
-from tribo.records import Campaign
+from tribo.records import REGIMES, Campaign
 
 Answer = Literal["held", "not held", "cannot be told"]
+# why a law cannot be tested, and the columns that this concerns
+Untested = tuple[Literal["not recorded", "not varied", "no such sample", "no effect"], tuple[str, ...]]
 SURE = 2.58  # standard errors: both decisions are at 1 %
 SHOWS = 4.0  # standard errors that the effect must have for its absence to be certain
 
 
 @dataclass(frozen=True)
 class Validation:
-    """The ``answer`` on one campaign, the amplitude found there beside the earlier one, and a sentence."""
+    """The ``answer`` on one campaign, the amplitude found there beside the earlier one.
+
+    ``parameters`` are all amplitudes by name, here and earlier; ``untested`` says why the law could not be tested.
+    """
 
     answer: Answer
     found: Estimate | None
     earlier: Estimate
-    text: str
+    untested: Untested | None = None
+    parameters: tuple[tuple[str, Estimate, Estimate], ...] = ()
 
 
 def validate_law(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimate], tried: int = 1) -> Validation:
@@ -57,12 +62,12 @@ def validate_law(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimat
     """
     c, a0 = model.setup.observations.conditions, earlier["a"]
     if (why := why_not_testable(c, law)) or not np.any(law.weight(c)):
-        return Validation("cannot be told", None, a0, f"The law cannot be tested here: {why or 'no such sample'}.")
+        return Validation("cannot be told", None, a0, why or ("no such sample", ()))
     acting = Acting(law.mechanism())
     names = [p.name for p in acting.mechanism.parameters]
     before = [earlier[name] for name in names]
     if np.abs(effect_of(model.setup, model.law, acting, np.array([e.value for e in before]))).max() < 1e-9:
-        return Validation("cannot be told", None, a0, "The law changes nothing in this design.")
+        return Validation("cannot be told", None, a0, ("no effect", ()))
     model, _ = without_rivals(model, law)
     after = fit(model.setup, (*model.acting, acting), start=model)
     found = [Estimate(*ends, a0.unit) for ends in recovered(after, len(after.acting) - 1)]
@@ -72,12 +77,12 @@ def validate_law(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimat
         abs(e.value - e0.value) < SURE * np.linalg.norm([_error(e), _error(e0), wrong_form])
         for e, e0 in zip(found, before, strict=True)
     )
-    said = "; ".join(_both(*each) for each in zip(names, found, before, strict=True))
+    parameters = tuple(zip(names, found, before, strict=True))
     if beyond > sure(tried) and alike:
-        return Validation("held", found[0], a0, f"The law held: {said}.")
+        return Validation("held", found[0], a0, None, parameters)
     if max(abs(e0.value) / _error(e) for e, e0 in zip(found, before, strict=True)) < SHOWS:
-        return Validation("cannot be told", found[0], a0, f"This campaign is too small to test the law: {said}.")
-    return Validation("not held", found[0], a0, f"The law did not hold: {said}.")
+        return Validation("cannot be told", found[0], a0, None, parameters)
+    return Validation("not held", found[0], a0, None, parameters)
 
 
 def sure(tried: int) -> float:
@@ -91,22 +96,13 @@ def _error(e: Estimate) -> float:
     return max((e.high - e.low) / (2 * NORMAL_90), 1e-12)
 
 
-def _both(name: str, found: Estimate, earlier: Estimate) -> str:
-    return (
-        f"{name} = {found.value:.3g} ({found.low:.3g} to {found.high:.3g}) here, {earlier.value:.3g} "
-        f"({earlier.low:.3g} to {earlier.high:.3g}) before"
-    )
-
-
-def why_not_testable(c: Conditions, law: WrittenLaw) -> str:
-    """Why the columns of a law do not allow a test; empty where they do."""
+def why_not_testable(c: Conditions, law: WrittenLaw) -> Untested | None:
+    """Why the columns of a law do not allow a test; None where they do."""
     for name in law.columns:
         if name not in UNITS and name not in c.columns:
-            return f"the column {name} is not recorded"
+            return "not recorded", (name,)
     course = law.course(c)[law.weight(c) != 0]
-    if not len(course) or np.ptp(course) < 1e-9:
-        return f"{' and '.join(law.columns)} does not vary"
-    return ""
+    return ("not varied", law.columns) if not len(course) or np.ptp(course) < 1e-9 else None
 
 
 @dataclass(frozen=True)
@@ -131,14 +127,6 @@ class ValidatedLaws:
     answers: tuple[tuple[KnownLaw, Validation], ...]
     layers: tuple[Layer, ...]
     replaced: Mapping[str, float]
-
-    @property
-    def text(self) -> str:
-        """How many held, and what those say."""
-        if not self.answers:
-            return ""
-        n = sum(held.answer == "held" for _, held in self.answers)
-        return " ".join([f"{n} of {len(self.answers)} known laws held.", *(layer.text for layer in self.layers)])
 
     @property
     def columns(self) -> set[str]:
@@ -202,12 +190,10 @@ def _strength(held: Validation) -> float:
 def _layer(known: KnownLaw, model: ModelFit, after: ModelFit, rng: np.random.Generator) -> Layer:
     parameters = estimates(after, len(after.acting) - 1)
     effect = _percent(known.law, after.setup.observations.conditions, parameters)
-    said = size_sentence(known.law, {**known.parameters, **parameters}, effect)
-    text = f"The law of {known.found_in or known.name} held: {said}."
-    layer = law_layer(known.law, after, parameters, effect, text)
+    layer = law_layer(known.law, after, parameters, effect)
     error = max(parameters["a"].high - parameters["a"].low, 1e-12) / (2.0 * NORMAL_90)
     p = float(erfc(abs(parameters["a"].value) / error / np.sqrt(2.0)))
-    return replace(layer, gain=gain(model, after, rng), p_adjusted=p)
+    return replace(layer, gain=gain(model, after, rng), p_adjusted=p, shows=known)
 
 
 def _percent(law: WrittenLaw, c: Conditions, parameters: Mapping[str, Estimate]) -> tuple[float, float, float]:
@@ -231,7 +217,13 @@ class PlannedLaw:
     formula: str
     strength: float
     tests_needed: int
-    text: str
+    n_tests: int = 0
+    untested: Untested | None = None
+
+    @property
+    def shows(self) -> bool:
+        """Whether the planned tests would show the law."""
+        return self.strength >= SHOWS
 
 
 def plan_law(campaign: Campaign, law: WrittenLaw, parameters: Mapping[str, Estimate]) -> PlannedLaw:
@@ -239,16 +231,27 @@ def plan_law(campaign: Campaign, law: WrittenLaw, parameters: Mapping[str, Estim
     f = expected_fit(campaign, TYPICAL, PAPER_LAW, None)
     c, formula, n = f.setup.observations.conditions, law.formula(), len(campaign.tests)
     if why := why_not_testable(c, law):
-        return PlannedLaw(formula, 0.0, 0, f"This design cannot test the law {formula}: {why}.")
+        return PlannedLaw(formula, 0.0, 0, n, why)
     acting = Acting(law.mechanism())
     values = np.array([parameters[p.name].value for p in acting.mechanism.parameters])
     left = f.linear.cleared(effect_of(f.setup, f.law, acting, values)[:, :, None])[0]
     strength = float(np.sqrt(np.sum(left**2)))
     needed = int(np.ceil(n * (SHOWS / max(strength, 1e-6)) ** 2))
-    shows = "would show" if strength >= SHOWS else "would not show"
-    more = "" if strength >= SHOWS else f"; about {needed} tests would" if needed < 100 * n else ""
-    text = (
-        f"This design {shows} the law {formula} at the size that was found: {strength:.1f} standard errors, "
-        f"{SHOWS:g} are needed to say that it is absent{more}."
-    )
-    return PlannedLaw(formula, strength, needed, text)
+    return PlannedLaw(formula, strength, needed, n)
+
+
+def law_layer(
+    law: WrittenLaw,
+    model: ModelFit,
+    parameters: Mapping[str, Estimate],
+    effect_percent: tuple[float, float, float],
+) -> Layer:
+    """A law that ``model`` validate_law as a layer, without its evidence."""
+    c = model.setup.observations.conditions
+    samples = tuple(sorted({str(name) for name, w in zip(c.sample, law.weight(c), strict=True) if w != 0}))
+    return Layer(
+        kind="law", name=" and ".join(law.columns), samples=samples,
+        regimes=tuple(REGIMES) if law.regime == BOTH else (law.regime,), p_adjusted=float("nan"),
+        effect_percent=effect_percent[0], low=effect_percent[1], high=effect_percent[2], parameters=parameters,
+        formula=law.formula(),
+    )  # fmt: skip

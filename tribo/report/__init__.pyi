@@ -4,5 +4,4 @@ from .provenance import Provenance as Provenance, gather_provenance as gather_pr
 from .tables import write_tables as write_tables
 from .verdict_file import write_verdict as write_verdict
 from .verify import Verification as Verification, verify as verify
-from .words.terminal_text import summary_text as summary_text, table2_text as table2_text
 from .write import write_report as write_report, write_until as write_until

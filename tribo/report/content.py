@@ -5,7 +5,6 @@ The content of a report in its order: made once, then laid out as a page (page.p
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,19 +13,19 @@ import pandas as pd
 
 from tribo import __version__
 from tribo.comparison import findings, study_lookup
+from tribo.comparison.study_lookup import PA_PER_KPA, all_set_aside
+from tribo.diagnostics.verdict import Verdict
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
 from tribo.records import REGIMES, Campaign, Regime, Study
 from tribo.report.campaign_nc import unit_of
-from tribo.report.card import Card, card_of
 from tribo.report.crate import conditions
 from tribo.report.provenance import Provenance
 from tribo.report.pulls import pull_cards
-from tribo.report.tables import PA_PER_KPA, all_set_aside
-from tribo.report.verdict_file import verdict_in_words
-from tribo.report.words import wording
-from tribo.report.words.terminal_text import fit_cells
-from tribo.wording.friction_words import friction_sentences
+from tribo.wording import study_sentences as wording
+from tribo.wording.card import Card, card_of
 from tribo.wording.numerals import joined, significant
+from tribo.wording.terminal import fit_cells
+from tribo.wording.verdict_sentences import verdict_in_words
 
 SUM = "combined"
 
@@ -120,7 +119,7 @@ VERDICT_MARKS = {"agrees": "=", "model too high": "▲", "model too low": "▼",
 
 
 def content(
-    study: Study, provenance: Provenance | None, verdict: Mapping[str, Any] | None, card: Card | None = None
+    study: Study, provenance: Provenance | None, verdict: Verdict | None, card: Card | None = None
 ) -> dict[str, Any]:
     """Everything but the figures, by the names the templates use."""
     return {
@@ -129,7 +128,7 @@ def content(
         "card": card if card is not None else card_of(study, verdict),
         "verdict": verdict_in_words(verdict) if verdict is not None else None,
         "summary": _summary(study),
-        "friction": friction_sentences(study),
+        "friction": wording.friction_sentences(study),
         "has_area": study.ingested.campaign.has_area,
         "about": about(study.ingested.campaign),
         "table2": _table2(study),

@@ -10,6 +10,7 @@ from typing import Any
 from markupsafe import Markup, escape
 
 from tribo import __version__
+from tribo.diagnostics.verdict import Verdict
 from tribo.figures.catalogue import TITLES
 from tribo.records import Study
 from tribo.report.content import content, figure_numbers, figure_places
@@ -17,7 +18,7 @@ from tribo.report.drawings import Drawn, draw_all, inline_svg
 from tribo.report.provenance import Provenance
 from tribo.report.pulls import PullCard, figure_data, on_pages, trace_data
 from tribo.report.shell import STYLE, WORKING, environment, style_and_script
-from tribo.report.words.wording import flags_in_words
+from tribo.wording.study_sentences import flags_in_words
 
 PAGE = "report.html"
 
@@ -26,12 +27,12 @@ def html(
     study: Study,
     provenance: Provenance | None = None,
     drawn: Mapping[str, Drawn] | None = None,
-    verdict: Mapping[str, Any] | None = None,
+    verdict: Verdict | None = None,
 ) -> str:
     """The page as text: the same bytes for the same study, provenance and verdict.
 
-    ``drawn`` are the figures by name where they are at hand already, ``verdict`` the diagnosis in the form of
-    verdict.json.
+    ``drawn`` are the figures by name where they are at hand already, ``verdict`` the worded one of the
+    diagnosis.
     """
     return page_of(content(study, provenance, verdict), draw_all(study) if drawn is None else drawn)
 

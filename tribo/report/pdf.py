@@ -9,12 +9,13 @@ from importlib.resources import files
 from typing import Any
 
 from tribo.comparison.findings import LoadRatio
+from tribo.diagnostics.verdict import Verdict
 from tribo.records import Study
-from tribo.report.card import Card
 from tribo.report.content import BudgetTable, content, figure_numbers, figure_places
 from tribo.report.drawings import Drawn, document, draw_all
 from tribo.report.provenance import Provenance
 from tribo.report.pulls import PullCard
+from tribo.wording.card import Card
 from tribo.wording.numerals import ratio_text, significant, unbroken
 
 TEMPLATE = "report.typ"
@@ -30,7 +31,7 @@ def pdf(
     study: Study,
     provenance: Provenance | None = None,
     drawn: Mapping[str, Drawn] | None = None,
-    verdict: Mapping[str, Any] | None = None,
+    verdict: Verdict | None = None,
 ) -> bytes:
     """The document. Its date is that of the last test, or none if no test has a time.
 

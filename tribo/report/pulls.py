@@ -20,8 +20,8 @@ from tribo.figures.one_pull import thin_trace
 from tribo.records import ByHand, FloatArray, Pull, Study, Test, Trace
 from tribo.report.drawings import Series
 from tribo.report.shell import script_json
-from tribo.report.words.wording import by_hand_sentence, flags_in_words, odd_sentence
 from tribo.wording.numerals import significant, with_uncertainty
+from tribo.wording.study_sentences import by_hand_sentence, flags_in_words, odd_sentence
 
 WIDTH, HEIGHT = 180, 56
 PICTURE_BYTES = 1_200_000  # all pictures together, so that the page stays easy to send

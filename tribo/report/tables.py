@@ -14,16 +14,17 @@ import numpy as np
 import pandas as pd
 
 from tribo.comparison.agreement import ratios
+from tribo.comparison.study_lookup import PA_PER_KPA, all_set_aside
 from tribo.files import write_text
 from tribo.records import CombinedFit, LawFit, Pull, SetAside, Study, Test
 from tribo.user_text import for_spreadsheet
+from tribo.vocabulary import label_with_unit
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
 
 
 FLOAT_FORMAT = "%.8g"
-PA_PER_KPA = 1e3
 _PER_AREA = (
     "tau0_kPa", "tau0_u_kPa", "cov", "tau0_low_kPa", "tau0_high_kPa", "tau0_u_combined_kPa", "cov_combined",
     "tau0_combined_low_kPa", "tau0_combined_high_kPa",
@@ -63,12 +64,6 @@ _CONDITIONS = [
     "sample", "specimen", "normal_load_N", "direction", "speed_m_s", "hold_s", "repeat", "run_order",
     "specimen_run", "started_at", "temperature_C", "humidity_pct", "operator", "file",
 ]  # fmt: skip
-
-
-def all_set_aside(study: Study) -> dict[str, SetAside]:
-    """Every test that takes no part, by its id: faulty rows of tests.csv and exports that fail."""
-    ingested = study.ingested
-    return {fault.test_id: fault for fault in (*ingested.campaign.set_aside, *ingested.set_aside)}
 
 
 def tests_table(study: Study) -> pd.DataFrame:
@@ -255,6 +250,12 @@ def to_csv(table: pd.DataFrame) -> str:
     return str(table.to_csv(index=False, float_format=FLOAT_FORMAT, lineterminator="\n"))
 
 
+def _dependence_table(table: pd.DataFrame) -> pd.DataFrame:
+    """The dependences with the labels of the variables that cannot be separated."""
+    others = [", ".join(map(label_with_unit, names)) for names in table["inseparable_from"]]
+    return table.assign(inseparable_from=others)
+
+
 def write_tables(study: Study, out: Path) -> list[Path]:
     """tests.csv, and fits, other_fits, budget, differences and comparison as far as the study went."""
     tables = {"tests.csv": tests_table(study)}
@@ -266,7 +267,7 @@ def write_tables(study: Study, out: Path) -> list[Path]:
     if study.laws is not None and not study.laws.empty:
         tables["laws.csv"] = study.laws
     if study.dependence is not None and not study.dependence.empty:
-        tables["dependence.csv"] = study.dependence
+        tables["dependence.csv"] = _dependence_table(study.dependence)
     if study.budget is not None:
         tables["budget.csv"] = study.budget
     if study.differences is not None:

@@ -6,19 +6,22 @@ Output of the diagnosis of a published table: verdict.json, and its figures with
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tribo.diagnostics.verdict import plain
 from tribo.figures.catalogue import PUBLISHED_FIGURES
 from tribo.files import write_bytes, write_text
-from tribo.lawsearch.across_words import table_of
+from tribo.lawsearch.across_patterns import table_of
+from tribo.lawsearch.diagnosis_with_laws import law_layers
 from tribo.lawsearch.law_file import law_text
-from tribo.lawsearch.law_words import discovery_text, law_layers, subject
 from tribo.report.drawings import figure_files, svg_text
 from tribo.report.provenance import Provenance, read_record, settle_outputs, write_provenance
 from tribo.report.tables import to_csv
 from tribo.report.verdict_file import write_verdict
+from tribo.wording.law_sentences import discovery_sentence, held_sentence, subject
+from tribo.wording.part_sentences import layer_sentence
 
 if TYPE_CHECKING:
     from tribo.berardo2019.table_diagnosis import PublishedDiagnosis
@@ -46,7 +49,7 @@ def write_discovery(d: Discovery, title: str, out: Path, provenance: Provenance)
     from tribo.figures.extended_model import draw_law, law_numbers_of
     from tribo.figures.style import as_svg
 
-    text = discovery_text(d)
+    text = discovery_sentence(d)
     laws = law_texts(d, title)
     rows = [
         {
@@ -57,7 +60,8 @@ def write_discovery(d: Discovery, title: str, out: Path, provenance: Provenance)
     ]  # fmt: skip
     record: dict[str, Any] = {
         "schema": SCHEMA, "text": text, "laws_tried": d.searched,
-        "layers": [asdict(layer) for layer in law_layers(d)], "ties": [f.n_ties for f in d.laws],
+        "layers": [plain(replace(layer, text=layer_sentence(layer))) for layer in law_layers(d)],
+        "ties": [f.n_ties for f in d.laws],
     }  # fmt: skip
     numbers = law_numbers_of(d)
     figure = {} if numbers.empty else {"law.svg": as_svg(draw_law(numbers)), "law.csv": to_csv(numbers)}
@@ -72,9 +76,11 @@ def law_texts(d: Discovery, title: str) -> dict[str, str]:
 
 def write_validation(held: Validation, out: Path, provenance: Provenance) -> Written:
     """discovery.json of the test of one law, and provenance.json."""
-    record: dict[str, Any] = {"schema": SCHEMA, **asdict(held)}
+    text = held_sentence(held)
+    own = {"answer": held.answer, "found": plain(held.found), "earlier": plain(held.earlier), "text": text}
+    record: dict[str, Any] = {"schema": SCHEMA, **own}
     _write({RECORD: _json(record)}, out, provenance)
-    return Written(record, held.text)
+    return Written(record, text)
 
 
 def _json(record: dict[str, Any]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,7 @@ from tribo.report.tables import write_tables
 
 if TYPE_CHECKING:
     from tribo.diagnostics.diagnosis_record import Diagnosis, DiagnosisWithoutModel
-    from tribo.report.card import Card
+    from tribo.wording.card import Card
 
 
 def write_until(
@@ -46,7 +47,11 @@ def write_until(
     """
     before = read_record(out)
     made_by = provenance if provenance is not None else gather_provenance(study)
-    verdict = diagnosis.verdict.as_dict() if diagnosis is not None else None
+    if diagnosis is not None and not diagnosis.verdict.text:
+        from tribo.wording.verdict_sentences import worded
+
+        diagnosis = replace(diagnosis, verdict=worded(diagnosis.verdict))
+    verdict = diagnosis.verdict if diagnosis is not None else None
     keep_earlier = before is not None and until != "report" and same_origin(before, made_by) and _is_as_recorded(
         out / "campaign.nc", before
     )
@@ -55,7 +60,7 @@ def write_until(
     if verdict is not None:
         from tribo.report.verdict_file import write_verdict
 
-        written.append(write_verdict(verdict, out))
+        written.append(write_verdict(verdict.as_dict(), out))
     if modelled is not None:
         written += _write_diagnosed(modelled, study.ingested.campaign.title, out)
     if until in ("compare", "report") or diagnosis is not None:
@@ -65,10 +70,11 @@ def write_until(
         drawn = write_figures(shown, out, modelled, made_by.origin, drawing)
         written += [out / "figures" / f"{f.name}.{ending}" for f in drawn.values() for ending in f.files]
     if card is not None or until == "report":
-        from tribo.report.card import card_of, write_card
+        from tribo.report.verdict_file import write_card
+        from tribo.wording.card import card_of
 
         card = card or card_of(study, verdict)
-        written.append(write_card(card, out))
+        written.append(write_card(card.as_dict(), out))
     if until == "report":
         from tribo.report.content import content
         from tribo.report.crate import write_crate

@@ -75,3 +75,13 @@ def counted(number: int, noun: str) -> str:
 
 def _signed(text: str) -> str:
     return text.replace("-", "−")
+
+
+def sentence_case(text: str) -> str:
+    """With a capital first letter."""
+    return text[:1].upper() + text[1:]
+
+
+def p_text(p: float) -> str:
+    """A p value to three decimals."""
+    return "below 0.001" if p < 1e-3 else f"{p:.3f}"

@@ -1,12 +1,18 @@
-"""Terminal output of a study: the table of fitted laws, tests set aside, agreement with the model."""
+"""Text for a terminal: the card, the table of fitted laws, agreement with the model, a verdict, a planned design."""
 
 from __future__ import annotations
 
 from tribo.comparison import findings, study_lookup
+from tribo.comparison.study_lookup import PA_PER_KPA
+from tribo.diagnostics.planning import Finding, Plan
+from tribo.diagnostics.verdict import Verdict
+from tribo.mechanisms.table import mechanism
 from tribo.records import REGIMES, LawFit, Regime, Study
-from tribo.report.tables import PA_PER_KPA
-from tribo.report.words import wording
+from tribo.wording import study_sentences as study_words
+from tribo.wording.card import Card
 from tribo.wording.numerals import with_uncertainty
+from tribo.wording.part_sentences import name_in_words, not_varied
+from tribo.wording.verdict_sentences import verdict_in_words
 
 HEAD = ("sample", "mu", "tau0 (kPa)", "T (N)", "mu", "tau0 (kPa)", "T (N)", "specimens", "tests")
 
@@ -18,7 +24,7 @@ def table2_text(study: Study) -> str:
     load = findings.common_loads(study)[1]
     blocks = [_regime_block(study, regime, load) for regime in REGIMES]
     foot = (
-        f"T at N = {load:.3g} N. After ±: {wording.uncertainty_kind(study)}.\n"
+        f"T at N = {load:.3g} N. After ±: {study_words.uncertainty_kind(study)}.\n"
         "mu and tau0 of a fit are correlated: compare T rather than mu or tau0 alone."
     )
     return "\n\n".join([*(b for b in blocks if b), foot])
@@ -74,7 +80,48 @@ def fit_cells(fit: LawFit | None, load_N: float) -> tuple[str, str, str]:
 def summary_text(study: Study) -> str:
     """The measurements and the agreement with the model, in the words of the report, one sentence per line."""
     agreements = findings.agreements(study)
-    lines = [wording.what_was_measured(study), *wording.in_short(agreements, study_lookup.flat_sample(study))]
-    lines += [wording.ranking_sentence(r) for r in findings.rankings(study)]
-    lines += wording.direction_sentences(findings.direction_ratios(study))
+    lines = [study_words.what_was_measured(study), *study_words.in_short(agreements, study_lookup.flat_sample(study))]
+    lines += [study_words.ranking_sentence(r) for r in findings.rankings(study)]
+    lines += study_words.direction_sentences(findings.direction_ratios(study))
+    return "\n".join(lines)
+
+
+def card_text(card: Card) -> str:
+    """The sentence, what it means, the tests, what else to know and the next test; the laws have their own table."""
+    lines = [card.sentence, *(f"{name}: {meaning}" for name, meaning in card.meanings), card.counts, *card.to_know]
+    if card.next_test is not None:
+        lines.append(f"Next test: {card.next_test.line}")
+    return "\n".join(lines)
+
+
+def verdict_text(v: Verdict) -> str:
+    """What a finding rests on, for a terminal: evidence, misfits, causes with intervals, ties and gain."""
+    words = verdict_in_words(v)
+    lines = [words["evidence"]]
+    lines += [f"  misfit: {misfit['text']}" for misfit in words["misfits"]]
+    lines += [f"  cause, weight {c['weight']}: {c['text']}" for c in words["causes"]]
+    lines += [f"  {text}" for text in (*words["equivalent"], words["gain"])]
+    return "\n".join(line for line in lines if line.strip())
+
+
+def why_not_found(f: Finding) -> str:
+    """Why a planned design cannot show a mechanism; empty where it can."""
+    return {
+        "": "", "absorbed": "the calibration on the flat sample absorbs its effect",
+        "not varied": not_varied(mechanism(f.mechanism).needs),
+        "in the trace": "it changes the shape of the trace, not the friction forces",
+    }[f.why]  # fmt: skip
+
+
+def plan_text(plan: Plan) -> str:
+    """The effect of each mechanism that a design detects with 90 % probability, and what it cannot distinguish."""
+    lines = [f"{plan.n_tests} planned tests. Smallest effects detected with 90 % probability, easiest first:"]
+    for f in (f for f in plan.findings if not f.why):
+        size = f"{f.amplitude:.3g} {f.unit}".rstrip()
+        names = ", ".join(map(name_in_words, f.confused_with))
+        tie = f"; not distinguishable from {names}; to separate them: {f.separates}" if names else ""
+        effect = f"changes T by {f.effect_percent:.0f} % over the design"
+        lines.append(f"  {name_in_words(f.mechanism)}: {size} or more ({effect}){tie}")
+    for f in (f for f in plan.findings if f.why):
+        lines.append(f"  {name_in_words(f.mechanism)}: not detectable with this design ({why_not_found(f)})")
     return "\n".join(lines)

@@ -1,1 +1,0 @@
-"""The text of a report: findings, sentences, number formats, terminal output."""

@@ -1,0 +1,216 @@
+"""Laws in words: what follows what, the laws a design cannot tell from one, and whether a law holds elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from tribo.diagnostics.verdict import Estimate
+from tribo.lawsearch.across_patterns import AcrossPatterns, LawsAcross, formula
+from tribo.lawsearch.diagnosis_with_laws import CERTAIN, Parting
+from tribo.lawsearch.grammar import ALL, BOTH, CAVITY_SHARE, ELONGATION, FLAT, PATTERNED, RIM, Shape, T, WrittenLaw
+from tribo.lawsearch.known_laws import SHOWS, PlannedLaw, Untested, Validation
+from tribo.lawsearch.model_choice import FoundLaw
+from tribo.lawsearch.search import Discovery
+from tribo.vocabulary import COLUMNS, in_words
+from tribo.wording.numerals import p_text
+
+NAMED = 3  # tied laws that are written out in a sentence
+WHERE = {
+    ALL: "", PATTERNED: " of the patterned samples", FLAT: " of the flat sample",
+    CAVITY_SHARE: ", in proportion to the share of cavities,", RIM: ", in proportion to the rim length,",
+    ELONGATION: ", in proportion to the elongation along the pull,",
+}  # fmt: skip
+
+
+def law_sentence(found: FoundLaw) -> str:
+    """What follows what, where, in which regime and by how much."""
+    said = size_sentence(found.law, found.parameters, found.effect_percent)
+    return f"{said} (adjusted p {p_text(found.p)})."
+
+
+def size_sentence(
+    law: WrittenLaw, parameters: Mapping[str, Estimate], effect_percent: tuple[float, float, float]
+) -> str:
+    """The same of any law with these parameters, without evidence and full stop."""
+    value, low, high = effect_percent
+    size = f"{value:+.0f} %, 90 % interval {low:+.0f} to {high:+.0f} %"
+    if law.shapes[0].kind == "wave":
+        return f"{subject(law)} {_wave(law.shapes[0])}; highest relative to lowest: {size}"
+    return f"{subject(law)} {'is higher' if value > 0 else 'is lower'} ({size}) {_where(law, parameters)}"
+
+
+def subject(law: WrittenLaw) -> str:
+    """The observable and the samples."""
+    regime = "Friction" if law.regime == BOTH else f"{law.regime.capitalize()} friction"
+    what = regime if law.acts_on == T else f"The {law.acts_on} of {regime.lower()}"
+    of = WHERE.get(law.where, f" of {law.where}")
+    return f"{what}{of}"
+
+
+def _where(law: WrittenLaw, parameters: Mapping[str, Estimate]) -> str:
+    if len(law.shapes) > 1:
+        names = " and ".join(in_words(s.column) for s in law.shapes)
+        return f"where {names} are both at their highest than where one of them is at its lowest"
+    s = law.shapes[0]
+    if s.kind == "window":
+        return f"for {in_words(s.column)} from {_value(s, s.place)} to {_value(s, s.place + s.width)} than elsewhere"
+    if s.kind == "ramp":
+        side = "above" if s.high > s.place else "below"
+        return f"at {in_words(s.column)} = {_value(s, s.high)}, growing {side} {_value(s, s.place)}"
+    if s.kind == "level":
+        return f"where {in_words(s.column)} is {s.level}"
+    if s.kind in ("step", "soft step"):
+        return f"where {in_words(s.column)} is above {_value(s, s.place)}"
+    if s.kind in ("optimum", "hump"):
+        place = parameters["place"]
+        factor, _ = _readable(s.column)
+        near = f"{_value(s, place.value)} (90 % interval {factor * place.low:.4g} to {factor * place.high:.4g})"
+        return f"near {in_words(s.column)} = {near} than far from it"
+    how = {"log": ", in proportion to its logarithm", "saturating": ", approaching a limit"}.get(s.kind, "")
+    return f"at {in_words(s.column)} = {_value(s, s.high)} than at {_value(s, s.low)}{how}"
+
+
+def _wave(s: Shape) -> str:
+    return f"varies periodically with {in_words(s.column)}, period {_value(s, s.width)}"
+
+
+def _value(s: Shape, x: float) -> str:
+    factor, unit = _readable(s.column)
+    return f"{factor * x:.4g} {unit}".rstrip()
+
+
+def _readable(column: str) -> tuple[float, str]:
+    """The factor and the unit in which a column stands in a sentence."""
+    return (COLUMNS[column].factor, COLUMNS[column].unit) if column in COLUMNS else (1.0, "")
+
+
+def tied_laws(ties: Sequence[WrittenLaw]) -> str:
+    """The laws that the design cannot distinguish from one, as a sentence; nothing without any."""
+    if not ties:
+        return ""
+    names = "; ".join(f"{tie.formula()} ({subject(tie)})" for tie in ties[:NAMED])
+    more = f"; and {len(ties) - NAMED} more" if len(ties) > NAMED else ""
+    return f"This design cannot distinguish it from: {names}{more}."
+
+
+def discovery_sentence(d: Discovery) -> str:
+    """What was found, or that nothing was."""
+    if not d.laws:
+        return f"None of the {d.searched} laws that were tried explains more than chance does."
+    said = [text for f in d.laws for text in (law_sentence(f), tied_laws(f.ties)) if text]
+    return f"{' '.join(said)} {d.searched} laws were tried."
+
+
+def held_sentence(h: Validation) -> str:
+    """Whether a law of another campaign held in this one."""
+    if h.untested is not None:
+        return "The law changes nothing in this design." if h.untested[0] == "no effect" else (
+            f"The law cannot be tested here: {untested_clause(h.untested)}."
+        )
+    opening = {
+        "held": "The law held", "not held": "The law did not hold",
+        "cannot be told": "This campaign is too small to test the law",
+    }[h.answer]  # fmt: skip
+    both = (
+        f"{name} = {e.value:.3g} ({e.low:.3g} to {e.high:.3g}) here, {e0.value:.3g} ({e0.low:.3g} to {e0.high:.3g}) "
+        "before"
+        for name, e, e0 in h.parameters
+    )
+    return f"{opening}: {'; '.join(both)}."
+
+
+def untested_clause(untested: Untested) -> str:
+    """Why a design cannot test a law."""
+    why, columns = untested
+    return {
+        "not recorded": f"the column {columns[0]} is not recorded" if columns else "",
+        "not varied": f"{' and '.join(columns)} does not vary", "no such sample": "no such sample",
+        "no effect": "it changes nothing",
+    }[why]  # fmt: skip
+
+
+def planned_law_sentence(p: PlannedLaw) -> str:
+    """Whether the planned tests would show a law of another campaign."""
+    if p.untested is not None:
+        return f"This design cannot test the law {p.formula}: {untested_clause(p.untested)}."
+    more = f"; about {p.tests_needed} tests would" if not p.shows and p.tests_needed < 100 * p.n_tests else ""
+    return (
+        f"This design would {'' if p.shows else 'not '}show the law {p.formula} at the size that was found: "
+        f"{p.strength:.1f} standard errors, {SHOWS:g} are needed to say that it is absent{more}."
+    )
+
+
+def law_test(parting: Parting, law: WrittenLaw, other: WrittenLaw, design: Mapping[str, object]) -> str:
+    """The test that parts two laws, without the number of its pulls."""
+    words = " and ".join(dict.fromkeys(map(in_words, law.columns)))
+    days = [s.level for s in law.shapes if s.kind == "level" and s.column == "date"]  # no day comes back
+    found_out = f"Find out what differed on {' and '.join(days)}, and pull with it and without it"
+    vary = found_out if days else f"Vary {words}"
+    if parting == "pressures":
+        return (
+            "Pull patterned samples and the flat one at equal contact pressures, with loads in proportion to the "
+            "contact area"
+        )
+    if parting == "columns":
+        apart = set(law.columns) ^ set(other.columns)
+        varied = dict.fromkeys(in_words(name) for name in (*law.columns, *other.columns) if name in apart)
+        return f"Vary {' and '.join(varied)} independently of each other and of all other conditions"
+    if parting == "samples":
+        return f"{vary} on sample {design['sample']} alone, at one load"
+    if parting == "terms":
+        low, high = design["normal_load_N"]  # type: ignore[misc]
+        return f"{vary} at {low:.3g} N and at {high:.3g} N alone"
+    if parting == "regimes":
+        regime = next(r for r in (law.regime, other.regime) if r != BOTH)
+        again = vary if days else f"Repeat pulls at the lowest and the highest value of {words}"
+        return f"{again} ({regime} friction decides)"
+    if parting == "corners":
+        return vary if days else f"Pull at the corners of the ranges of {words}"
+    column = law.columns[0]
+    factor, unit = _readable(column)
+    return f"Pull at {in_words(column)} = {factor * float(str(design[column])):.4g} {unit}".rstrip()
+
+
+def across_sentence(found: AcrossPatterns) -> str:
+    """Whether the geometry of the patterns predicts what the model gets wrong about them."""
+    beyond = [s for s in found.searches if s.p < CERTAIN and s.nested < found.without]
+    if beyond:
+        best = min(beyond, key=lambda s: s.nested)
+        return (
+            f"One law across the patterns predicts the deviation of a pattern that it was not fitted to: "
+            f"{formula(best.best)}. It lowers the error of friction from {_factor(found.without)} to "
+            f"{_factor(best.nested)} (p {p_text(best.p)}). {_tried(best)}"
+        )
+    best = min(found.searches, key=lambda s: s.best.error)
+    return (
+        f"No law across the patterns is beyond chance. The best one, {formula(best.best)}, predicts patterns that it "
+        f"was not fitted to within {_factor(best.best.error)}, where the model alone is wrong by "
+        f"{_factor(found.without)}; but a search with the deviations assigned to other patterns does as well in "
+        f"{100 * best.p:.0f} % of all assignments, and a law that is also chosen without the pattern it predicts is "
+        f"wrong by {_factor(best.nested)}. {_tried(best)}"
+    )
+
+
+def _tried(s: LawsAcross) -> str:
+    return f"{s.tried} laws of {s.terms} term{'s' if s.terms > 1 else ''} were tried."
+
+
+def _factor(rms: float) -> str:
+    """An rms error of ln T as a factor of friction."""
+    return f"a factor of {np.exp(rms):.2f}"
+
+
+def across_record(found: AcrossPatterns) -> Mapping[str, object]:
+    """The outcome for a JSON file."""
+    return {
+        "text": across_sentence(found), "patterns": list(found.deviations.patterns), "model_error": found.without,
+        "searches": [
+            {
+                "terms": s.terms, "laws_tried": s.tried, "best": formula(s.best), "left_out_error": s.best.error,
+                "p": s.p, "best_of_chance_error": s.chance, "nested_error": s.nested,
+            }
+            for s in found.searches
+        ],
+    }  # fmt: skip

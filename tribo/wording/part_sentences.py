@@ -1,0 +1,346 @@
+"""Sentences of the parts of a verdict: misfits, causes, layers, what was left out and why, and the next test."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from tribo.berardo2019.table_verdict import OverLoads
+from tribo.diagnostics.column_search import ColumnEffect
+from tribo.diagnostics.direct_evidence import Evidence
+from tribo.diagnostics.effect_sizes import Effect
+from tribo.diagnostics.verdict import UNTESTED, Cause, Estimate, Excluded, Layer, Misfit, NextTest
+from tribo.diagnostics.within_records import RunningIn, StrokeOffset
+from tribo.diagnostics.without_model import SERIES, ConstantPart
+from tribo.lawsearch.known_laws import KnownLaw
+from tribo.lawsearch.model_choice import CauseForms, FoundLaw
+from tribo.mechanisms.record import Mechanism, TraceEvidence
+from tribo.mechanisms.table import MECHANISMS, mechanism
+from tribo.vocabulary import COLUMNS, OBSERVABLES, in_words, label_with_unit
+from tribo.wording.law_sentences import law_sentence, law_test, size_sentence, tied_laws
+from tribo.wording.numerals import joined, p_text, sentence_case
+
+BETWEEN = {
+    "mean": "mean", "bend": "the ends above the middle", "ends": "from the low to the high end",
+    "groups": "ratio of geometric means", "extremes": "between its extremes",
+}  # fmt: skip
+COURSES = {
+    "rising": "rising throughout", "falling": "falling throughout", "hump": "highest in the middle",
+    "hollow": "lowest in the middle",
+}  # fmt: skip
+MOST_LISTED, MOST_RECORDS = 6, 8
+ALONE = {
+    "normal_load_N": "Pull one specimen at nine loads over the range, first upwards, then downwards",
+    "sample": "Pull one fresh specimen of every sample in turn, at one load and within one day",
+    "date": "Pull the same specimens of one sample at one load again on several days",
+}
+
+
+def name_in_words(name: str) -> str:
+    """The plain name of a mechanism that a verdict names; of one that follows any column, with that column.
+
+    A law, and whatever else the library does not know, keeps its name, with spaces.
+    """
+    _, _, column = name.partition(":")
+    if column:
+        return f"a dependence on {in_words(column)}"
+    if name in MECHANISMS:
+        return MECHANISMS[name].in_words
+    return name.replace("_", " ") if name.isidentifier() else name
+
+
+def meaning_in_words(name: str) -> str:
+    """What a mechanism that a verdict names means, as a clause."""
+    _, _, column = name.partition(":")
+    return f"friction follows the recorded column {in_words(column)}" if column else mechanism(name).meaning
+
+
+def with_choice(name: str, choice: str) -> str:
+    """The plain name of a mechanism, with the specimen, pattern or value it concerns in brackets."""
+    said = name.partition(":")[2]  # a column that the name holds already
+    return name_in_words(name) + (f" ({choice})" if choice and choice != said else "")
+
+
+def estimate_text(name: str, e: Estimate) -> str:
+    """ "n = 0.27 (90 % interval 0.241 to 0.3)"."""
+    return f"{name} = {e.value:.3g} {e.unit}".rstrip() + f" (90 % interval {e.low:.3g} to {e.high:.3g})"
+
+
+def signs_of(m: Mechanism) -> str:
+    """The signs of a mechanism, and how to distinguish it from what has similar ones."""
+    return f"Expected signs: {m.shows}. To distinguish it from {m.confused_with}: {m.separates}."
+
+
+def not_varied(columns: Sequence[str]) -> str:
+    """That a design holds these columns fixed, or does not record them."""
+    needs = [in_words(name) for name in columns]
+    verb, be = ("does", "is") if len(needs) == 1 else ("do", "are")
+    return f"{' and '.join(needs)} {verb} not vary or {be} not recorded"
+
+
+def misfit_sentence(m: Misfit) -> str:
+    """What follows what, by how much and how surely."""
+    shows = m.shows
+    if isinstance(shows, Effect):
+        of = f" of {m.sample}" if m.sample and shows.contrast.kind != "specimen" else ""
+        size = f"{m.effect_percent:+.0f} % (90 % interval {m.low:+.0f} to {m.high:+.0f} %), {BETWEEN[shows.between]}"
+        what = f"{sentence_case(OBSERVABLES[m.observable])}{of} {_seen(shows)}"
+        return f"{what}: {size} (adjusted p {p_text(m.p_adjusted)})."
+    if isinstance(shows, OverLoads):
+        whose = m.sample or "the patterned samples together"
+        first, last = shows.pressures_kPa
+        return (
+            f"{sentence_case(OBSERVABLES[m.observable])} of {whose} is {_off(shows)} of the calibrated model at "
+            f"{first:g} to {last:g} kPa (adjusted p {p_text(m.p_adjusted)})."
+        )
+    if isinstance(shows, Layer):
+        return layer_sentence(shows)
+    if isinstance(shows, Cause):
+        return cause_sentence(shows)
+    if isinstance(shows, FoundLaw):
+        return law_sentence(shows)
+    return without_model_sentence(shows) if shows else m.text
+
+
+def _seen(e: Effect) -> str:
+    """What the observable does relative to the model."""
+    contrast, up = e.contrast, e.percent > 0
+    goes, lies, words = "rises" if up else "falls", "is higher" if up else "is lower", in_words(contrast.covariate)
+    if contrast.acting is not None:
+        return f"varies as expected from {with_choice(contrast.acting.name, contrast.acting.choice)}"
+    if contrast.kind == "sample" and contrast.covariate == "sample":
+        return f"{lies} at all loads than the model predicts"
+    if contrast.kind == "sample" and contrast.detail:
+        return f"bends {'upwards' if up else 'downwards'} with {words} relative to the model"
+    if contrast.kind == "specimen":
+        by_load = f"{goes} with the normal load relative to the other specimens"
+        said = by_load if contrast.detail else f"{lies} than that of the other specimens"
+        return f"of {contrast.covariate} ({contrast.sample}) {said}"
+    if contrast.kind in ("sample", "trend"):
+        return f"{goes} with {words} relative to the model"
+    if contrast.kind == "period":
+        return f"varies periodically with {words}" + (f" ({contrast.detail} pulls)" if contrast.detail else "")
+    if contrast.kind == "block":
+        return f"{lies} for {words} {contrast.detail} than in the rest of the series"
+    return f"differs between values of {words}" if contrast.kind == "level" else f"follows {words}, {COURSES[e.course]}"
+
+
+def _off(o: OverLoads) -> str:
+    if o.high < 0:
+        return f"{-o.high:.0f} to {-o.low:.0f} % below that"
+    if o.low > 0:
+        return f"{o.low:.0f} to {o.high:.0f} % above that"
+    return f"from {-o.low:.0f} % below to {o.high:.0f} % above that"
+
+
+def cause_sentence(c: Cause) -> str:
+    """A cause with its size and what distinguishes it."""
+    if isinstance(c.shows, tuple):
+        return without_model_sentence(c.shows)
+    name = sentence_case(with_choice(c.mechanism, c.choice))
+    if c.mechanism.partition(":")[0] not in MECHANISMS:
+        return c.text
+    m, size = mechanism(c.mechanism), next((estimate_text(*item) for item in c.parameters.items()), "")
+    if isinstance(c.shows, TraceEvidence):
+        return f"{name}: {size}, {c.shows.source}."
+    if c.changes is None:
+        return f"{name}. {signs_of(m)}"
+    low, high = c.changes
+    return f"{name}: {size}. With it, the calibrated model changes by {low:+.0f} to {high:+.0f} %. {signs_of(m)}"
+
+
+def layer_sentence(layer: Layer) -> str:
+    """One part of what explains a campaign."""
+    shows, value, low, high = layer.shows, layer.effect_percent, layer.low, layer.high
+    if layer.kind == "pattern_correction":
+        return (
+            f"{sentence_case(layer.regimes[0])} friction of {layer.name}: measured over modelled T, less one, is "
+            f"{value:+.0f} % (geometric mean over its tests; 90 % interval {low:+.0f} to {high:+.0f} %; adjusted p "
+            f"{p_text(layer.p_adjusted)})."
+        )
+    if layer.kind == "baseline":
+        return _own_law(layer)
+    if isinstance(shows, FoundLaw):
+        return law_sentence(shows)
+    if isinstance(shows, KnownLaw):
+        said = size_sentence(shows.law, {**shows.parameters, **layer.parameters}, (value, low, high))
+        return f"The law of {shows.found_in or shows.name} held: {said}."
+    if isinstance(shows, Misfit):
+        return misfit_sentence(shows)
+    if isinstance(shows, tuple):
+        return without_model_sentence(shows)
+    if layer.kind != "cause" or layer.most is None:
+        return layer.text
+    said = (
+        f"{sentence_case(mechanism(layer.name).in_words)} changes T by {value:+.0f} % (90 % interval {low:+.0f} to "
+        f"{high:+.0f} %) where it acts most: {place(layer)}."
+    )
+    return f"{said} {tied_laws(shows.ties)}" if isinstance(shows, CauseForms) else said
+
+
+def place(layer: Layer) -> str:
+    """ "sliding friction of C at 1.37 N": where a cause acts most."""
+    if layer.most is None:
+        return layer.at
+    regime, sample, load_N = layer.most
+    return f"{regime} friction of {sample} at {load_N:.3g} N"
+
+
+def _own_law(layer: Layer) -> str:
+    """The law of one sample alone, and what a straight line leaves at zero load."""
+    (regime,), (sample,) = layer.regimes, layer.samples
+    if "T/N" in layer.parameters:
+        return f"Mean {regime} T/N of {sample}: {_sized(layer.parameters['T/N'])}; the loads do not determine a law."
+    sizes = ", ".join(f"{n} = {_sized(e)}" for n, e in layer.parameters.items())
+    said = f"{sentence_case(regime)} friction of {sample} follows {layer.formula} with {sizes}."
+    part = layer.shows
+    if not isinstance(part, ConstantPart):
+        return said
+    constant = part.constant
+    if constant.low <= 0.0 <= constant.high:
+        return f"{said} A straight line leaves no certain part of T that does not depend on the load."
+    if constant.value < 0.0:
+        return f"{said} A straight line falls to {_sized(constant)} at zero load: friction is weak at small loads."
+    return (
+        f"{said} A straight line leaves {_sized(constant)} at zero load: {part.share_percent:.0f} % of T at "
+        f"{part.load_N:.3g} N does not depend on the load."
+    )
+
+
+def _sized(e: Estimate) -> str:
+    said = f"{e.value:.3g} {e.unit}".rstrip()
+    return f"{said} (90 % interval {e.low:.3g} to {e.high:.3g})" if math.isfinite(e.low) else said
+
+
+def without_model_sentence(shows: Sequence[Any]) -> str:
+    """What friction varies with beside the law of each sample: columns, running-in along records, an offset."""
+    if isinstance(shows[0], RunningIn):
+        return _running_in(shows)
+    return " ".join(_follows(f) if isinstance(f, ColumnEffect) else _offset(f) for f in shows)
+
+
+def _follows(f: ColumnEffect) -> str:
+    unit = f" {COLUMNS[f.name].unit}".rstrip() if f.name in COLUMNS else ""
+    first, last = f.where
+    between = f"from {first} to {last}{unit}" if f.kind == "trend" else f"between {first} and {last}{unit}"
+    low, high = sorted((abs(f.low_percent), abs(f.high_percent)))
+    said = (
+        f"{sentence_case(f.regime)} friction {'rises' if f.change_percent > 0 else 'falls'} by "
+        f"{abs(f.change_percent):.1f} % with {in_words(f.name)}, {between} (90 % interval {low:.1f} to {high:.1f} %, "
+        f"adjusted p {p_text(f.p)})."
+    )
+    if f.alike:
+        said += f" This design cannot tell {in_words(f.name)} from {' and '.join(map(in_words, f.alike))}."
+    return said
+
+
+def _running_in(records: Sequence[RunningIn]) -> str:
+    sizes = [f"{r.first_percent:+.0f} %".replace("-", "−") for r in records]
+    shown = [f"{r.test_id} ({r.sample}) {size}" for r, size in zip(records[:MOST_RECORDS], sizes, strict=False)]
+    more = f" and {len(records) - MOST_RECORDS} more" if len(records) > MOST_RECORDS else ""
+    share = 100.0 * records[0].distance_m / records[0].whole_m
+    return (
+        f"Running-in: over the first {share:.0f} % of the distance, sliding friction differs from that of the second "
+        f"half in {len(records)} record{'s' if len(records) > 1 else ''}: {', '.join(shown)}{more} (adjusted p at most "
+        f"{max(max(r.p for r in records), 0.001):.2g})."
+    )
+
+
+def _offset(a: StrokeOffset) -> str:
+    return (
+        f"The force recorded in {a.strokes[0]} forward and {a.strokes[1]} backward strokes is offset by "
+        f"{a.offset.value:.3g} N (90 % interval {a.offset.low:.3g} to {a.offset.high:.3g} N), {abs(a.percent):.0f} % "
+        "of the sliding force: the directions differ by twice that. The offset was subtracted as the zero of each pair."
+    )
+
+
+def reason(e: Excluded, of_a_table: bool = False) -> str:
+    """Why a mechanism is not among the causes; for verdict.json, where nothing stands above it."""
+    if of_a_table and e.why in ("not varied", "not printed"):
+        return f"cannot be tested with this table: {why_not(e)}"
+    if e.why in UNTESTED and e.why not in ("only with the load", "vary together"):
+        return f"cannot be tested with this design: {why_not(e)}"
+    if e.why == "explains less":
+        return f"explains the {'table' if of_a_table else 'campaign'} less well: log likelihood lower by {e.by:.1f}"
+    return why_not(e)
+
+
+def why_not(e: Excluded) -> str:
+    """The same as a clause under a heading that says that it was left out, or that it cannot be tested."""
+    if e.why == "only with the load":
+        return (
+            f"This design cannot tell the effect of {in_words(e.shows)} from that of the normal load: within each "
+            f"sample, {in_words(e.shows)} varies only together with the load."
+        )
+    if e.why == "vary together":
+        one, other, samples = e.shows
+        return (
+            f"This design cannot tell the effect of {label_with_unit(one)} from that of {label_with_unit(other)}: they "
+            f"vary together for {_listed(samples)}."
+        )
+    if isinstance(e.shows, str):
+        return not_varied([e.shows])
+    m = MECHANISMS[e.mechanism.partition(":")[0]]
+    if e.why == "zero subtracted" and isinstance(e.shows, Evidence) and m.evidence is not None:
+        changes = "changes by" if m.evidence.quantity == "zero drift" else "is"
+        return (
+            f"the force before contact {changes} {e.shows.value:.2g} +- {e.shows.standard_error:.1g} {e.shows.unit}; "
+            "the zero of each pull was subtracted, so it cannot explain the friction forces"
+        )
+    if e.why == "not certain" and isinstance(e.shows, Evidence) and m.evidence is not None:
+        return m.evidence.absent.format(value=e.shows.value, percent=100.0 * e.shows.value)
+    if e.why == "wrong sign" and isinstance(e.shows, float):
+        most = f"at most {m.amplitude.name} = {e.shows:.2g} {m.amplitude.unit}".rstrip()
+        return f"wrong sign: it can change friction in one direction only; {most} (95 %)"
+    return {
+        "absorbed": f"the calibration on the flat sample absorbs its effect; to test it, {m.separates}",
+        "not varied": not_varied(m.needs),
+        "only in traces": m.untested,
+        "not printed": m.in_table.missing,
+        "contradicted": m.in_table.barred,
+        "wrong sign": "wrong sign: it can change friction in one direction only, and the misfit has the opposite sign",
+        "explains less": f"log likelihood lower by {e.by:.1f}",
+        "a law explains more": (
+            f"a law of the same column explains the campaign better: log likelihood higher by {e.by:.1f}"
+        ),
+    }.get(e.why, e.reason)
+
+
+def next_test_sentence(t: NextTest) -> str:
+    """What to do next, without the reason."""
+    design, pulls = t.design, t.design.get("pulls")
+    if t.kind == "measure":
+        measurement = mechanism(str(design["measure"])).measurement
+        return measurement.text if measurement is not None else ""
+    if t.kind == "remove":
+        return f"{sentence_case(mechanism(design['without']).removed_by)}: {pulls} pulls of {design['sample']}."
+    if t.kind == "pull further":
+        return f"{pulls} further pulls of {design['sample']} at {design['normal_load_N']:.3g} N."
+    if t.kind == "vary one column":
+        column = str(design["covariate"])
+        alone = f"Vary {in_words(column)} alone, in random order, on one sample at one load"
+        return f"{ALONE.get(column, alone)}: {pulls} pulls."
+    if t.kind == "vary what was fixed":
+        varied = [v.text for name in t.separates if (v := mechanism(name).variation) is not None]
+        return f"Vary {' and '.join(varied)} in random order: {pulls} pulls of the flat sample."
+    if t.kind == "part laws":
+        return f"{law_test(*t.shows, design)}: {pulls} pulls."
+    if t.kind == "part columns":
+        varied_one = next((name for name in t.separates if name not in SERIES), "")
+        others = _listed([in_words(name) for name in t.separates if name != varied_one])
+        if not varied_one:
+            return f"Repeat pulls of the beginning of the series after all others, to separate {others}: {pulls} pulls."
+        return f"Choose the values of {in_words(varied_one)} at random, independently of {others}: {pulls} pulls."
+    if t.kind == "part from load":
+        names = _listed([in_words(name) for name in t.separates if name != "normal_load_N"])
+        return f"To tell {names} from the load, repeat four loads of the range, three times each, in random order."
+    return (
+        "Print T at every load, or the covariance of mu and tau0, which decides what is beyond chance. At the bench: "
+        f"{t.shows.text}"
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = [f"{len(names) - MOST_LISTED} more"] if len(names) > MOST_LISTED else []
+    return joined([*names[:MOST_LISTED], *more])

@@ -1,0 +1,130 @@
+"""What a published table of mu and tau0 says about the model, and what it leaves open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tribo.berardo2019.table_model import LEVEL, Outlook, TableLook, Weighed, estimate_of, upper_limit
+from tribo.diagnostics.verdict import Gain, Verdict
+from tribo.mechanisms.record import Readings
+from tribo.mechanisms.table import MECHANISMS
+from tribo.vocabulary import OBSERVABLES
+from tribo.wording.numerals import p_text
+
+LEAST_ALIKE = 0.6  # correlations above this (less negative) no line over the range of the paper can have
+
+
+def published_sentence(v: Verdict) -> str:
+    """Whether the model of the paper fails, and in which readings of the table."""
+    outlooks, _ = v.shows
+    return _against_the_model(outlooks)
+
+
+def published_evidence(v: Verdict) -> str:
+    """What the numbers say of the explanations of the authors, and of the best extension."""
+    outlooks, gain = v.shows
+    return " ".join([*_guesses(outlooks), _extension(outlooks[0], outlooks[0].weighed[0], gain)])
+
+
+def _look(look: TableLook | str) -> str:
+    if isinstance(look, str):
+        return look
+    what = "friction" if look.observable == "both" else OBSERVABLES[look.observable]
+    return f"{what} of {look.sample}{' against load' if look.along_load else ''}"
+
+
+def _against_the_model(outlooks: Sequence[Outlook]) -> str:
+    """Whether the model of the paper fails, and on what that depends."""
+    possible = [o for o in outlooks if o.reading.correlation < -LEAST_ALIKE]
+    free = [o for o in outlooks if o.reading.correlation == 0.0 and o.reading.specimens == 1]
+    failing = sum(o.p_misfit < LEVEL for o in possible)
+    main = outlooks[0]
+    verb = "differs" if main.p_misfit < LEVEL else "does not differ"
+    text = (
+        f"The model calibrated on the flat sample {verb} from Table 2 beyond chance: adjusted p "
+        f"{p_text(main.p_misfit)} for a correlation of mu and tau0 of {main.reading.correlation:.2f}, "
+        "which loads spread evenly over 3 to 25 "
+        f"kPa would give. It differs beyond chance in {failing} of {len(possible)} readings with a correlation that is "
+        "possible for a line fit over these loads."
+    )
+    if free and all(o.p_misfit >= LEVEL for o in free):
+        text += (
+            " If mu and tau0 were uncorrelated, nothing would be beyond chance: the result depends on their "
+            "covariance, which the paper does not print."
+        )
+    return text
+
+
+def _guesses(outlooks: Sequence[Outlook]) -> list[str]:
+    """What the numbers say of each explanation that the authors propose, and of errors of the instrument instead."""
+    possible = [o for o in outlooks if o.reading.correlation < -LEAST_ALIKE]
+    found = [
+        m.in_table.finding(_readings_of(name, outlooks[0], possible))
+        for name, m in MECHANISMS.items()
+        if m.in_table.finding is not None
+    ]
+    return [*found, _adhesion_along_y(outlooks[0]), *_instrument_instead(possible)]
+
+
+def _readings_of(name: str, main: Outlook, outlooks: Sequence[Outlook]) -> Readings:
+    weighed = [next(w for w in o.weighed if w.name == name) for o in outlooks]
+    return Readings(
+        gains=tuple(w.gain for w in weighed),
+        sizes=tuple(float(w.fit.parameters[0][0]) for w in weighed),
+        limit=lambda: upper_limit(main.baseline, name),
+        flat_traction_Pa=_flat_traction_Pa(main),
+    )
+
+
+def _instrument_instead(outlooks: Sequence[Outlook]) -> list[str]:
+    """In how many readings another mechanism explains more than the authors' explanations."""
+    best = [o.weighed[0].acting.mechanism for o in outlooks]
+    ahead = [m.in_words for m in best if not m.in_table.guess]
+    if not ahead:
+        return []
+    names = " or ".join(sorted(set(ahead)))
+    return [f"In {len(ahead)} of these readings {names} explains more; nothing printed in the paper rules it out."]
+
+
+def _adhesion_along_y(outlook: Outlook) -> str:
+    """The adhesion of S across its long cavities, from the table itself."""
+    table = outlook.table
+    i = table.samples.index("Sy")
+    measured = table.values.reshape(-1, 2, 2)[i, :, 1]
+    sd = np.sqrt(np.diag(table.data_covariance)).reshape(-1, 2, 2)[i, :, 1]
+    model = table.shares[i, [1, 3]] * table.values.reshape(-1, 4)[table.samples.index("F"), [1, 3]]
+    return (
+        f"Across its long cavities S shows hardly any adhesion: tau0 is {measured[0]:.1f} +- {sd[0]:.1f} kPa (static) "
+        f"and {measured[1]:.1f} +- {sd[1]:.1f} kPa (sliding); the model gives {model[0]:.1f} and {model[1]:.1f} kPa."
+    )
+
+
+def _flat_traction_Pa(outlook: Outlook) -> float:
+    """Static traction of the flat sample at 10 kPa by the calibrated law."""
+    law = outlook.table.values.reshape(-1, 4)[outlook.table.samples.index("F")]
+    return float(law[0] * 10e3 + law[1] * 1e3)
+
+
+def _extension(main: Outlook, best: Weighed, gain: Gain) -> str:
+    """How much the best extended model explains, in the table and on samples left out, and what remains."""
+    name, e = next(iter(estimate_of(best).items()))
+    before, after = -2 * main.baseline.score, -2 * best.fit.score
+    clear = gain.difference > 2 * gain.se
+    text = (
+        f"The best extension is {best.acting.mechanism.in_words}, {name} = {e.value:.2g} {e.unit}".rstrip()
+        + f" (90 % interval {e.low:.2g} to {e.high:.2g}): chi-squared of the {len(main.table.values)} numbers falls "
+        f"from {before:.0f} to {after:.0f}. On whole samples left out of the fit its gain is {gain.difference:+.2f} +- "
+        f"{gain.se:.2f} in log score per number, which {'is clear' if clear else 'may be chance'}."
+    )
+    strongest = min(main.looks_left, key=lambda look: main.looks_left[look])
+    if main.p_left < LEVEL:
+        text += (
+            f" A misfit remains ({_look(strongest)}, adjusted p {p_text(main.p_left)}): no single law of the library "
+            "is sufficient."
+        )
+    rivals = [w.acting.mechanism.in_words for w in main.near if w is not best]
+    if rivals:
+        text += f" About as well explained by: {', '.join(rivals)}."
+    return text

@@ -1,0 +1,435 @@
+"""A finished verdict in sentences: written once, last, and read by nothing.
+
+:func:`worded` writes the finding, what it rests on, and every part. Cards, pages and terminals take their words from
+there; nothing else says what a diagnosis found.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from tribo.diagnostics.intervals import WITHIN
+from tribo.diagnostics.verdict import AgainstModel, Cause, Estimate, Excluded, Gain, Layer, LayerKind, Misfit, Verdict
+from tribo.diagnostics.without_model import ColumnsTested
+from tribo.vocabulary import OBSERVABLES, in_words, short_label
+from tribo.wording.law_sentences import across_sentence, held_sentence, tied_laws
+from tribo.wording.numerals import joined, p_text, sentence_case, significant
+from tribo.wording.part_sentences import (
+    cause_sentence,
+    layer_sentence,
+    meaning_in_words,
+    misfit_sentence,
+    name_in_words,
+    next_test_sentence,
+    place,
+    reason,
+    why_not,
+)
+from tribo.wording.table_sentences import published_evidence, published_sentence
+
+MOST_LAWS = 4
+HEADINGS = {
+    "fails": "Where the model fails", "misfits": "Significant misfits", "none": "No statistically significant misfit.",
+    "cause": "Cause", "causes": "Possible causes, in order of weight",
+    "not_testable": "Mechanisms that this design cannot test",
+}  # fmt: skip
+HEADINGS_WITHOUT_MODEL = {
+    "fails": "What friction varies with", "misfits": "Significant dependences",
+    "none": "No statistically significant dependence beyond the law of each sample.", "cause": "Result",
+    "causes": "What friction varies with, with its size", "not_testable": "What this design cannot test",
+}  # fmt: skip
+
+
+def worded(v: Verdict) -> Verdict:
+    """The same verdict with its finding, its evidence and every text in words.
+
+    Parameters
+    ----------
+    v : Verdict
+        As a diagnosis hands it on, in numbers and enumerations.
+
+    Returns
+    -------
+    Verdict
+        With ``sentence``, ``evidence`` and ``text``, and the texts of its parts.
+    """
+    of_a_table = isinstance(v.shows, tuple)
+    excluded, not_testable = (
+        tuple(replace(e, reason=reason(e, of_a_table)) for e in part) for part in (v.excluded, v.not_testable)
+    )
+    v = replace(
+        v,
+        misfits=tuple(replace(m, text=misfit_sentence(m)) for m in v.misfits),
+        causes=tuple(replace(c, text=cause_sentence(c)) for c in v.causes),
+        excluded=excluded,
+        not_testable=not_testable,
+        layers=tuple(replace(layer, text=layer_sentence(layer), at=place(layer)) for layer in v.layers),
+        next_test=replace(v.next_test, text=next_test_sentence(v.next_test)) if v.next_test is not None else None,
+    )
+    if isinstance(v.shows, tuple):
+        v = replace(v, sentence=published_sentence(v), evidence=published_evidence(v))
+        return replace(v, text=f"{v.sentence} {v.evidence}")
+    if isinstance(v.shows, ColumnsTested):
+        said = _own_laws(v) + [_names_found(v)] + [c.text for c in v.causes] + _untold(v)
+        return replace(v, sentence=_without_model(v), evidence=" ".join(_untold(v)), text=" ".join(filter(None, said)))
+    v = replace(v, shows=v.shows or AgainstModel())
+    if v.shows.known:
+        v = replace(v, model={**v.model, "known_laws": _known_laws(v.shows.known)})
+    v = replace(v, sentence=finding(v), evidence=" ".join(filter(None, _evidence(v))))
+    return replace(v, text=f"{v.sentence} {v.evidence}")
+
+
+def _known_laws(known: Sequence[tuple[Any, Any]]) -> list[dict[str, str]]:
+    return [
+        {"law": k.name, "found_in": k.found_in, "formula": k.law.formula(), "answer": held.answer,
+         "text": held_sentence(held)}
+        for k, held in known
+    ]  # fmt: skip
+
+
+def of_kind(v: Verdict, kind: LayerKind) -> list[Layer]:
+    """The layers of one kind."""
+    return [layer for layer in v.layers if layer.kind == kind]
+
+
+def without_model(v: Verdict) -> bool:
+    """Whether a verdict was made without the spring-block model."""
+    return "baseline" in v.model
+
+
+# ---------------------------------------------------------------------------------------------- the finding
+
+
+def finding(v: Verdict) -> str:
+    """What happens to friction, how much, with its interval, where, and what it is called."""
+    if v.verdict == "no_misfit":
+        return _no_misfit(v)
+    layers = sorted(of_kind(v, "cause"), key=lambda layer: -abs(layer.effect_percent))
+    if layers and v.verdict != "unknown":
+        return _caused(v, layers)
+    if laws := of_kind(v, "law"):
+        law = laws[0].text.rstrip(".")
+        return f"{law}; no mechanism of the library explains it." if v.verdict == "unknown" else f"{law}."
+    if v.causes and v.verdict != "unknown":
+        return _seen_in_traces(v)
+    return _unknown(v)
+
+
+def _no_misfit(v: Verdict) -> str:
+    flat = v.shows.flat or "the flat sample"
+    said = f"The model calibrated on {flat} describes static and sliding friction of all samples within its own error"
+    corrections = of_kind(v, "pattern_correction")
+    if not corrections:
+        return f"{said}."
+    most = max(corrections, key=lambda layer: abs(layer.effect_percent))
+    return f"{said}: the largest mean difference, {most.regimes[0]} friction of {most.name}, is {size_in_words(most)}."
+
+
+def _caused(v: Verdict, layers: Sequence[Layer]) -> str:
+    """The cause that acts most, with what is tied with it; then the others by name and size."""
+    first, *others = layers
+    names = _alternatives(v, first)
+    if len(names) == 1:
+        choice = f": {first.choice}" if first.choice else ""
+        subject = f"{sentence_case(meaning_in_words(names[0]))} ({name_in_words(names[0])}{choice}): this changes"
+    else:
+        subject = f"{sentence_case(_either(names))} (this campaign cannot tell which) changes"
+    most = f", most in {first.at}" if first.at else ""
+    also = [f"{_either(_alternatives(v, layer))} ({size_in_words(layer)})" for layer in others]
+    also += [f"a change with {_columns(law)} ({size_in_words(law)})" for law in of_kind(v, "law")]
+    added = f"; in addition, {joined(also)}" if also else ""
+    rest = v.verdict == "partly" and not v.shows.within_chance
+    left = "; part of the difference from the model remains unexplained" if rest else ""
+    return f"{subject} {_where(v, first)} by up to {size_in_words(first)}{most}{added}{left}."
+
+
+def _where(v: Verdict, layer: Layer) -> str:
+    """ "static and sliding friction of all samples"."""
+    everywhere = len(v.shows.samples) > 1 and set(layer.samples) >= set(v.shows.samples)
+    whose = "all samples" if everywhere else joined(list(layer.samples))
+    return f"{' and '.join(layer.regimes)} friction" + (f" of {whose}" if whose else "")
+
+
+def _alternatives(v: Verdict, layer: Layer) -> list[str]:
+    rivals = [c.mechanism for c in v.causes] if v.verdict == "undetermined" else []
+    return list(dict.fromkeys([layer.name, *layer.tied_with, *rivals]))
+
+
+def _either(names: Sequence[str]) -> str:
+    return " or ".join(map(name_in_words, names))
+
+
+def _columns(law: Layer) -> str:
+    return joined([in_words(name) for name in law.name.split(" and ")])
+
+
+def _seen_in_traces(v: Verdict) -> str:
+    """A cause without a layer, one that the traces show besides the forces, with the size of its parameter."""
+    cause = v.causes[0]
+    sizes = [
+        f"{name.replace('_', ' ')} = {significant(e.value)} {e.unit}".rstrip()
+        + f" (90 % interval {significant(e.low)} to {significant(e.high)})"
+        for name, e in cause.parameters.items()
+    ]
+    ties = next((names for names in v.equivalent if cause.mechanism in names), ())
+    others = [name_in_words(name) for name in ties if name != cause.mechanism]
+    or_else = f"; {joined(others)} would explain the data equally well" if others else ""
+    size = f": {joined(sizes)}" if sizes else ""
+    return f"{sentence_case(meaning_in_words(cause.mechanism))} ({name_in_words(cause.mechanism)}){size}{or_else}."
+
+
+def _unknown(v: Verdict) -> str:
+    if not v.misfits:
+        return (
+            "Friction differs from the model beyond chance, and neither a mechanism nor a recorded column explains it."
+        )
+    largest = v.misfits[0]
+    if largest.covariate == "sample":
+        apart = list(dict.fromkeys(m.sample for m in v.misfits if m.covariate == "sample"))
+        return (
+            f"The model predicts the wrong friction for {joined(apart)}: measured {OBSERVABLES[largest.observable]} of "
+            f"{largest.sample} differs most, by {size_in_words(largest)}; no mechanism of the library explains it."
+        )
+    return (
+        f"{sentence_case(OBSERVABLES.get(largest.observable, 'friction'))} of {largest.sample or 'all samples'} "
+        f"changes with {in_words(largest.covariate)} by {size_in_words(largest)} relative to the model, and no "
+        "mechanism of the library explains it."
+    )
+
+
+def size_in_words(effect: Layer | Misfit) -> str:
+    """ "−27 % (90 % interval −31 to −23 %)" of a layer or a misfit."""
+    value, low, high = (_signed(x) for x in (effect.effect_percent, effect.low, effect.high))
+    known = math.isfinite(effect.low) and math.isfinite(effect.high)
+    return f"{value} %" + (f" (90 % interval {low} to {high} %)" if known else "")
+
+
+def _signed(value: float) -> str:
+    """A percentage in whole numbers with its sign."""
+    return f"{value:+.0f}".replace("-", "−") if math.isfinite(value) else "–"
+
+
+# ------------------------------------------------------------------------------------- what the finding rests on
+
+
+def _evidence(v: Verdict) -> Iterator[str]:
+    """What a verdict on the spring-block model rests on, in the order of the search."""
+    shows: AgainstModel = v.shows
+    laws = of_kind(v, "law")
+    stated = laws[0] if laws and (v.verdict == "unknown" or not of_kind(v, "cause")) else None  # in the finding
+    if v.verdict == "no_misfit":
+        yield "No misfit is beyond chance."
+        weak = sorted(v.smallest_effects.items(), key=lambda item: item[1])[:6]
+        if weak:
+            sizes = ", ".join(f"{name_in_words(name)} {size:.0f} %" for name, size in weak)
+            yield (
+                "This campaign would have shown these effects with a probability of one half (peak to peak): "
+                f"{sizes}."
+            )
+    elif v.verdict == "named":
+        these = "this mechanism" if len(v.causes) == 1 else "these mechanisms"
+        yield f"With {these} included, the remaining differences are within chance."
+    elif v.verdict == "partly" and not laws:
+        yield f"A misfit remains beyond chance: {v.misfits[0].text if v.misfits else 'no single column explains it.'}"
+    elif v.verdict == "unknown" and (apart := _patterns_apart(v)):
+        yield (
+            f"{joined(apart)} differ from the model independently of each other, and no recorded column explains the "
+            "differences."
+        )
+    if v.equivalent:
+        yield 'This design cannot distinguish the mechanisms joined by "or".'
+    if shows.wrong_in_form and v.verdict in ("unknown", "partly"):
+        names = ", ".join(sorted(map(name_in_words, shows.wrong_in_form)))
+        yield (
+            f"Tried and left out: {names}. Beside the formula of the library, a dependence on the same quantity "
+            "remains beyond chance; the true formula may be another one."
+        )
+    if shows.excess is not None:
+        yield (
+            f"The patterned samples differ from the model by about {shows.excess.factor:.1f} times the error that is "
+            f"stated for it (p {p_text(shows.excess.p)} for a factor of at most {WITHIN:g})."
+        )
+    if shows.known:
+        held = sum(answer.answer == "held" for _, answer in shows.known)
+        yield f"{held} of {len(shows.known)} known laws held."
+    for law in laws:
+        if law is not stated:
+            yield law.text
+        yield tied_laws(getattr(law.shows, "ties", ()))
+    if shows.within_chance is not None and v.verdict not in ("no_misfit", "named"):
+        within = "With this included, the remaining differences are within chance."
+        yield within if shows.within_chance else "A misfit remains."
+    if shows.across is not None:
+        yield across_sentence(shows.across)
+    yield from _simulation(v.model)
+
+
+def _patterns_apart(v: Verdict) -> list[str]:
+    """The samples that each have a misfit of their own, where there are three or more and no other column has one."""
+    samples = list(dict.fromkeys(m.sample for m in v.misfits if m.sample))
+    alone = all(m.covariate in ("sample", "normal_load_N") for m in v.misfits)
+    return samples if alone and len(samples) >= 3 else []
+
+
+def _simulation(model: Any) -> Iterator[str]:
+    """Where the predictions come from, and what the named mechanisms give in the simulator itself."""
+    if "shares_from" in model:
+        yield f"The predictions for the patterned samples are based on {model['shares_from']}."
+    if found := model.get("not_simulated"):
+        yield f"The model with {_all(found['mechanisms'])} was not simulated: {found['reason']}."
+    if found := model.get("simulated"):
+        yield (
+            f"With {_all(found['mechanisms'])} in the simulator itself ({found['pairs_of_runs']} pairs of runs), the "
+            f"effect is {found['effect_over_law']:.3f} +- {found['effect_over_law_u']:.3f} times that of its law. The "
+            "root mean square of measured over modelled T, less one, is "
+            f"{found['rms_percent_before']:.1f} % for the calibrated model, {found['rms_percent_simulated']:.1f} % "
+            f"with the simulated effect and {found['rms_percent_law']:.1f} % with the law."
+        )
+
+
+def _all(names: Sequence[str]) -> str:
+    return " and ".join(map(name_in_words, names))
+
+
+# ------------------------------------------------------------------------------------------ without the model
+
+
+def _without_model(v: Verdict) -> str:
+    """What friction varies with beside the load; without anything, the first law."""
+    laws = [layer.text for layer in of_kind(v, "baseline")]
+    return " ".join([c.text for c in v.causes] or [*laws[:1], "Nothing beyond the law of each sample was found."])
+
+
+def _own_laws(v: Verdict) -> list[str]:
+    laws = [layer.text for layer in of_kind(v, "baseline")]
+    more = [f"The laws of {len(laws) - MOST_LAWS} more are listed below."] if len(laws) > MOST_LAWS else []
+    return [*laws[:MOST_LAWS], *more]
+
+
+def _names_found(v: Verdict) -> str:
+    names = list(dict.fromkeys(name_in_words(c.mechanism) for c in v.causes))
+    return f"Found beside the law of each sample: {'; '.join(names)}." if names else ""
+
+
+def _untold(v: Verdict) -> list[str]:
+    """What was tested without effect, what could not be tested, and what cannot be told apart."""
+    shows: ColumnsTested = v.shows
+    said = []
+    if not v.causes and not shows.untested:
+        tested = joined(sorted(map(in_words, shows.columns)))
+        columns = f"Tested: {tested}." if tested else "No further column varies."
+        said.append(f"Beside the law of each sample, nothing exceeds chance. {columns}")
+    if shows.untested == "no column varies":
+        said.append("No recorded column varies beside the load.")
+    if shows.untested == "too few tests":
+        said.append(
+            f"Dependence on recorded columns was not tested: there are {shows.n_tests} tests, and at least "
+            f"{shows.needed} are needed beside the laws of these samples."
+        )
+    return said + [e.reason for e in v.not_testable if e.why in ("only with the load", "vary together")]
+
+
+# ------------------------------------------------------------------------------------ its parts, for a report
+
+
+def meanings(v: Verdict | None) -> tuple[tuple[str, str], ...]:
+    """The plain name and the meaning of every mechanism that the verdict names, each once."""
+    names = dict.fromkeys(c.mechanism for c in v.causes) if v is not None else {}
+    return tuple((sentence_case(name_in_words(name)), f"{sentence_case(meaning_in_words(name))}.") for name in names)
+
+
+def why_next(v: Verdict) -> str:
+    """Why the next test is the one to make."""
+    separates = list(v.next_test.separates) if v.next_test is not None else []
+    if not separates:
+        return "it is the most informative test"
+    if v.verdict == "unknown" and not of_kind(v, "law"):
+        return f"to see whether friction follows {joined(list(map(in_words, separates)))} when nothing else changes"
+    for law in of_kind(v, "law"):
+        if set(separates) <= {law.formula, *law.tied_with}:
+            return f"it distinguishes laws of {_columns(law)} that fit equally well"
+    first, *others = [in_words(s) if without_model(v) else name_in_words(s) for s in separates]
+    if v.verdict == "no_misfit" and not without_model(v):
+        return f"this campaign could not test {joined([first, *others])}"
+    if others:
+        tells = "it tells the effect of" if without_model(v) else "it distinguishes"
+        return f"{tells} {first} from {'that of ' if without_model(v) else ''}{joined(others)}"
+    return f"it tests {first}"
+
+
+def verdict_in_words(v: Verdict) -> dict[str, Any]:
+    """The parts of a worded verdict as text for the report; empty where the verdict has none."""
+    return {
+        "headings": HEADINGS_WITHOUT_MODEL if without_model(v) else HEADINGS,
+        "own_laws": [layer.text for layer in of_kind(v, "baseline")],
+        "evidence": v.evidence,
+        "equivalent": [
+            f"This campaign cannot distinguish between {joined(list(map(name_in_words, names)))}."
+            for names in v.equivalent
+            if len(names) > 1
+        ],
+        "causes": [_cause(cause) for cause in v.causes],
+        "gain": _gain(v.gain),
+        "next_test": v.next_test.text if v.next_test is not None else "",
+        "misfits": [_misfit(misfit) for misfit in v.misfits],
+        "excluded": [_excluded(e, e.reason) for e in v.excluded],
+        "not_testable": [_excluded(e, why_not(e)) for e in v.not_testable],
+        "corrections": [_correction(x) for x in of_kind(v, "pattern_correction")],
+        "laws": [_law(x) for x in of_kind(v, "law")],
+    }
+
+
+def _excluded(e: Excluded, why: str) -> tuple[str, str]:
+    return name_in_words(e.mechanism), why
+
+
+def _law(layer: Layer) -> dict[str, str]:
+    """A law: the formula, what it says with its size, the laws that the design cannot tell apart from it, its gain."""
+    return {
+        "formula": "; ".join([layer.formula, *_sizes(layer)]), "text": layer.text,
+        "ties": "; ".join(layer.tied_with) or "none", "gain": _gain(layer.gain) or "not tested",
+    }  # fmt: skip
+
+
+def _correction(layer: Layer) -> tuple[str, str, str, str]:
+    """Sample, regime, mean of measured over modelled T less one with its interval, and the adjusted p value."""
+    value, low, high = map(_signed, (layer.effect_percent, layer.low, layer.high))
+    return layer.name, layer.regimes[0], f"{value} % ({low} to {high} %)", p_text(layer.p_adjusted)
+
+
+def _cause(cause: Cause) -> dict[str, Any]:
+    name = sentence_case(name_in_words(cause.mechanism))
+    return {"mechanism": name, "weight": f"{cause.weight:.2f}", "sizes": _sizes(cause), "text": cause.text}
+
+
+def _sizes(named: Cause | Layer) -> list[str]:
+    """The parameters of a cause or a law with their intervals."""
+
+    def size(name: str, e: Estimate) -> str:
+        interval = f"({significant(e.low)} to {significant(e.high)})"
+        return f"{name.replace('_', ' ')} = {significant(e.value)} {interval} {e.unit}".rstrip()
+
+    return [size(name, e) for name, e in named.parameters.items()]
+
+
+def _misfit(m: Misfit) -> dict[str, str]:
+    return {
+        "observable": OBSERVABLES.get(m.observable, m.observable), "sample": m.sample or "all",
+        "covariate": short_label(m.covariate).replace("_", " ") or "–", "p": p_text(m.p_adjusted), "text": m.text,
+    }  # fmt: skip
+
+
+def _gain(gain: Gain | None) -> str:
+    """Improvement by the extended model on tests not used in the fit, in one sentence."""
+    if gain is None:
+        return ""
+    clear = abs(gain.difference) > 2 * gain.se
+    return (
+        f"For tests left out of the fit ({gain.held_out.replace('_', ' ')}), the extended model predicts "
+        f"{'better' if gain.difference > 0 else 'worse'} by a log score of {significant(abs(gain.difference))} ± "
+        f"{significant(gain.se, 2)} per test{'' if clear else ', which may be due to chance'}; the RMSE changes from "
+        f"{significant(gain.rmse_percent_before, 2)} % to {significant(gain.rmse_percent_after, 2)} %."
+    )
