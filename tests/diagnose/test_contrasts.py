@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tribo.diagnostics.contrasts import BENT, Contrast, all_contrasts, numeric_covariates
+from tribo.diagnostics.contrasts import Contrast, all_contrasts, numeric_covariates
 from tribo.diagnostics.model import Acting, Setup, setup, start_changes
 from tribo.diagnostics.observations import Observations, observe
 from tribo.diagnostics.predictor import tabled_predictor
@@ -247,7 +247,7 @@ def test_a_sample_has_an_offset_a_slope_and_a_bend_of_its_own_tests() -> None:
     for name, covariate in (("F", "normal_load_N"), ("B", "normal_load_N")):
         slope = one("sample", "static", covariate, name).columns[:, 0, 0]
         assert slope == pytest.approx(np.where(o.conditions.sample == name, log_pressure, 0.0))
-        bend = one("sample", "static", covariate + BENT, name).columns[:, 0, 0]
+        bend = one("sample", "static", f"{covariate}, bend", name).columns[:, 0, 0]
         curved = log_pressure**2 - np.mean(log_pressure**2)
         assert bend == pytest.approx(np.where(o.conditions.sample == name, curved, 0.0))
         offset = one("sample", "static", "sample", name).columns[:, 0, 0]

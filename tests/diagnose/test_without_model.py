@@ -177,7 +177,7 @@ def test_diagnose_writes_a_verdict_without_the_model(tmp_path: Path) -> None:
     verdict = json.loads((tmp_path / "out" / "verdict.json").read_text())
     assert verdict["model"] == {"baseline": "the law of each sample alone"}
     assert [cause["mechanism"] for cause in verdict["causes"]] == ["velocity_dependence"]
-    assert "Friction varies with more than the load." in done.output
+    assert "Sliding friction rises by" in done.output
 
 
 def test_a_column_named_by_another_name_of_the_load_is_no_column(tmp_path: Path) -> None:
