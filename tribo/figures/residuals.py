@@ -254,7 +254,7 @@ def _residual_axis(ax: Axes, part: pd.DataFrame, names: pd.DataFrame | None) -> 
             for label in ax.get_xticklabels():
                 label.set(rotation=40, ha="right", rotation_mode="anchor", fontsize=6.5)
         ax.set_xlim(-0.6, float(names["x"].max()) + 0.6)
-    elif str(first["axis"]).split(" (")[0] in ("Normal load", "Speed", "Hold"):
+    elif str(first["axis"]).split(" (")[0] in ("Normal load N", "Speed", "Hold"):
         ax.set_xscale("log")
         style.plain_log_axis(ax.xaxis, tests["x"])
 
