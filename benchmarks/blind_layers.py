@@ -67,7 +67,7 @@ class Piece:
 @cache
 def measured_shares() -> dict[str, Shares]:
     """Coefficient and adhesion of the patterns that were measured for the paper, over those of its flat sample."""
-    from tribo.published import load_table2
+    from tribo.berardo2019.published_tables import load_table2
 
     table = load_table2()
     rows = table[table["source"] == "experiment"].set_index(["sample", "regime"])

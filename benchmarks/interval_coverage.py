@@ -19,9 +19,9 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t
 
+from tribo.berardo2019.published_tables import load_table2
 from tribo.errors import FitError
 from tribo.fitting import fit_samples, mixed_model, pool_specimen_scatter
-from tribo.published import load_table2
 from tribo.records import LawFit
 
 AREA_M2 = 55e-6

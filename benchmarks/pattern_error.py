@@ -22,8 +22,8 @@ import numpy as np
 
 from tribo.diagnostics.predictor import TabledPattern, interpolated_shares
 from tribo.records import REGIMES, FloatArray
-from tribo.springblock.calibration import simulated_law
-from tribo.springblock.table2_column import PRESSURES_PA
+from tribo.springblock.config import PAPER_PRESSURES_PA
+from tribo.springblock.ensemble_laws import simulated_law
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 FLAT = "F"
 SHAPES = ("offset", "slope", "curve")
-LEVELS_PA = np.geomspace(PRESSURES_PA[0], PRESSURES_PA[-1], 12)
+LEVELS_PA = np.geomspace(PAPER_PRESSURES_PA[0], PAPER_PRESSURES_PA[-1], 12)
 OWN_READING = {"static": ("baseline", "highest peak"), "sliding": ("baseline", "1.05 to 3 peak times")}
 NOT_ADMITTED = {
     "p l2 on every block": "blocks under cavities would carry load, and those in contact less than the load applied",

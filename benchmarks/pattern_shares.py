@@ -19,16 +19,16 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pattern_error
+from pattern_laws import KEPT, origin, pattern_laws, write_table
 
+from tribo.berardo2019.table2 import table2_design
 from tribo.cache.kept_results import sources
 from tribo.diagnostics.predictor import flat_law, simulated_patterns
 from tribo.springblock import run_stored
-from tribo.springblock.pattern_laws import KEPT, origin, pattern_laws, write_table
-from tribo.springblock.table2_column import table2_design
 
 SEED = 0
 COMMAND = "python benchmarks/pattern_shares.py"
-ENGINE = tuple(f"simulate/{name}" for name in ("engines", "config", "ensemble", "friction", "masks", "run"))
+ENGINE = tuple(f"springblock/{name}" for name in ("engines", "config", "ensemble", "lattice", "run"))
 
 
 def said(done: int, total: int) -> None:

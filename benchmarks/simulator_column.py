@@ -25,14 +25,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from tribo.published import load_table2
+from tribo.berardo2019.published_tables import load_table2
+from tribo.berardo2019.table2 import beside, table2_design
 from tribo.records import FloatArray, Run
-from tribo.springblock import SimConfig, read_stored, simulate, stratified_design, table2_design
+from tribo.springblock import SimConfig, read_stored, simulate, stratified_design
 from tribo.springblock.calibration import expected_minimum
-from tribo.springblock.config import PAPER
-from tribo.springblock.engines.fast import lattice_of, thresholds_of
+from tribo.springblock.config import PAPER, PAPER_PRESSURES_PA, PAPER_SAMPLES
+from tribo.springblock.engines.start import lattice_of, thresholds_of
 from tribo.springblock.ensemble import run_row
-from tribo.springblock.table2_column import PRESSURES_PA, SAMPLES, beside, fitted, means
+from tribo.springblock.ensemble_laws import fitted, means
 
 READING = SimConfig().of_reading("berardo2019")
 REGIMES = ("static", "sliding")
@@ -55,7 +56,7 @@ def printed_entry(law: pd.Series, p_kPa: FloatArray | float) -> tuple[Any, Any]:
 
     The covariance is not published; it is that of a straight line in 1/p through eight equally certain loads.
     """
-    x = 1e6 / np.asarray(PRESSURES_PA) / 1e3
+    x = 1e6 / np.asarray(PAPER_PRESSURES_PA) / 1e3
     correlation = -x.mean() / np.sqrt((x**2).mean())
     variance = law.mu_sd**2 + (law.tau0_sd_kPa / p_kPa) ** 2
     variance = variance + 2.0 * correlation * law.mu_sd * law.tau0_sd_kPa / p_kPa
@@ -90,7 +91,7 @@ def entries(store: str, out: str) -> None:
         print(f"\n{regime}: rms {np.sqrt((off**2).mean()):.2f} %, largest {off.abs().max():.2f} %")
         for column in ("deviation_percent", "se_percent"):
             by_load = group.pivot(index="pressure_kPa", columns="sample", values=column)
-            print(by_load[list(SAMPLES)].round(2).to_string())
+            print(by_load[list(PAPER_SAMPLES)].round(2).to_string())
         unused = group[~group["used_in_choosing"]]
         beyond = unused[unused["deviation_percent"].abs() > 2.0 * unused["se_percent"]]
         print(f"not used in choosing: {len(unused)}, beyond two standard errors {len(beyond)}")
@@ -101,7 +102,7 @@ def angles(store: str, out: str) -> None:
     """Means over ten angles against those of the nominal direction; standard deviation over the angle alone."""
     runs = read_stored(store)
     rows = []
-    for sample in SAMPLES:
+    for sample in PAPER_SAMPLES:
         design = stratified_design([sample], SOME_PRESSURES_PA, ANGLES, base=READING)
         found = pd.DataFrame([run_row(simulate(config)) for config in design])
         for p, group in found.groupby("pressure_Pa"):
@@ -145,7 +146,7 @@ def peaks(store: str, out: str, *samples: str) -> None:
     """Static friction of all runs at three loads, with both steps up to 1.2 times the peak time of the column."""
     rows = []
     for config, coarse, repeat in pairs(store):
-        if config.sample in (samples or SAMPLES):
+        if config.sample in (samples or PAPER_SAMPLES):
             short_run = config.with_(duration_s=1.2 * coarse["peak_s"], window_start_peaks=1.01)
             here, there = (simulate(short_run.with_(dt_s=dt)).static_friction for dt in (config.dt_s, FINE_S))
             of = {"sample": config.sample, "pressure_kPa": config.pressure_Pa / 1e3, "repeat": repeat}
@@ -160,7 +161,7 @@ def peaks(store: str, out: str, *samples: str) -> None:
 def pairs(store: str, repeats: int | None = None) -> Iterator[tuple[SimConfig, pd.Series, int]]:
     """The runs of the column at three loads, the first of every entry first: configuration, stored row, number."""
     runs = read_stored(store)
-    per_load = len(runs) // (len(SAMPLES) * len(PRESSURES_PA))
+    per_load = len(runs) // (len(PAPER_SAMPLES) * len(PAPER_PRESSURES_PA))
     design = table2_design(READING, per_load, angles="nominal")
     for repeat in range(per_load if repeats is None else repeats):
         for k in range(repeat, len(design), per_load):
@@ -188,7 +189,7 @@ def of_figures(runs: pd.DataFrame) -> Iterator[Claim]:
     gap = max(abs(found[s] - af) for s, af in AREA_FRACTIONS.items())
     yield "Figure 8: area fractions", ".94, .57, .46, .72", f"largest difference {gap:.3f}", bool(gap < 0.01)
     for regime, figure in (("static", 6), ("sliding", 7)):
-        off = max(bend(runs, s, regime) for s in SAMPLES)
+        off = max(bend(runs, s, regime) for s in PAPER_SAMPLES)
         yield f"Figure {figure}: {regime} T is a straight line in N", "", f"means within {off:.1f} % of it", off < 1
     order = [static_order(laws) for laws in (paper, here)]
     yield "text of Figure 6: order of static mu", *(" > ".join(names) for names in order), order[0] == order[1]
@@ -270,7 +271,7 @@ def exact(runs: pd.DataFrame) -> Iterator[Claim]:
     words = f"{moved[1:3].max():.4f} %; {moved[3]:.3f} %"
     holds = bool(moved[1:3].max() < 0.005 and moved[3] < 0.06)
     yield "flat peak at 2e-8 and 5e-8 s; at 1e-7 s, against 1e-8", "four decimals; 0.03 %", words, holds
-    for sample in SAMPLES:
+    for sample in PAPER_SAMPLES:
         turned = np.array([rotation_percent(sample, seed) for seed in range(2, 6)])
         words = f"{turned.mean():+.3f} % (mean of 4), single runs up to {np.abs(turned).max():.2f} %"
         yield f"finite rotation moves the peak, {sample}", "0.5 %", words, bool(abs(turned.mean()) < 0.5)

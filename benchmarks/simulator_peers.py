@@ -54,7 +54,10 @@ def ours() -> list[Figure]:
     from importlib.metadata import version
 
     from tribo.springblock import SimConfig
-    from tribo.springblock.engine_speed import dense_rate, timed_run
+    sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
+    from support.dense_engine import dense_rate
+
+    from tribo.springblock.engine_speed import timed_run
 
     figures = [Figure("tribo", version("tribo"), "step of all blocks", next(iter(dense_rate())).value)]
     for sample, angle_deg in (("F", 20.0), ("C", 20.0)):

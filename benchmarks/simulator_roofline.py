@@ -5,20 +5,24 @@
 One core, float64, best of several rounds in processor time: products and sums, roots and quotients on numbers that lie
 in the nearest cache, and the traffic of a sum of arrays that together are as large as the planes of 85 x 85 blocks, or
 far larger than any cache. Then what the step needs of each, counted from the two loops in
-``tribo.springblock.engines.dense``.
+``tests/support/dense_engine.py``.
 """
 
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
 from tribo.records import FloatArray
-from tribo.springblock.engine_speed import dense_rate
 from tribo.springblock.engines.jit import vectorised, widest_vectors
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
+from support.dense_engine import dense_rate
 
 # of one block and step: sums and products of both loops, roots, quotients, bytes read and written (planes of float64)
 FLOPS, ROOTS, QUOTIENTS = 26 + 24, 1, 1

@@ -20,11 +20,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from table2_readings import mean_between
 
-from tribo.published import load_table2
+from tribo.berardo2019.published_tables import load_table2
 from tribo.records import FloatArray
 from tribo.springblock import SimConfig, simulate
-from tribo.springblock.table2_readings import mean_between
 
 SPREAD = {"F": (10.0,), "A": (11.25, 33.75), "B": (11.25, 33.75), "C": (11.25, 33.75), "Sx": (5.0,), "Sy": (85.0,)}
 NOMINAL = {"F": (10.0,), "A": (0.0,), "B": (0.0,), "C": (0.0,), "Sx": (0.0,), "Sy": (90.0,)}

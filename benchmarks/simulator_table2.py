@@ -16,10 +16,12 @@ import sys
 import time
 from pathlib import Path
 
-from tribo.published import load_table2
+from table2_readings import combinations, run_study, study_designs
+
+from tribo.berardo2019.published_tables import load_table2
+from tribo.berardo2019.table2 import beside, distance
 from tribo.springblock import SimConfig, read_stored
-from tribo.springblock.table2_column import beside, distance, fitted
-from tribo.springblock.table2_readings import combinations, run_study, study_designs
+from tribo.springblock.ensemble_laws import fitted
 
 BASE = SimConfig(dt_s=1e-7, rest_tolerance=1e-2)
 

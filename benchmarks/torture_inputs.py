@@ -49,7 +49,7 @@ def stop(number: int, frame: FrameType | None) -> None:
 
 def example() -> Ingested:
     """The bundled campaign, read; its decisions by hand are what overrides.csv is about."""
-    from tribo.published import data_dir
+    from tribo.files import data_dir
 
     return stages.ingest(load_campaign(data_dir() / "example"))
 

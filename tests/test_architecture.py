@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
 GROUND = {
-    "display", "errors", "user_text", "input_files", "units", "zeroing", "records", "published", "files", "temporary",
+    "display", "errors", "user_text", "input_files", "units", "zeroing", "records", "files", "temporary",
     "forked", "laws", "vocabulary",
 }  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
@@ -25,7 +25,7 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("zeroing", {"display"}),
     ("records", {"display", "errors", "zeroing"}),
     ("laws", {"records", "display"}),
-    ("published", set()),
+    (set()),
     ("vocabulary", set()),
     ("files", {"errors"}),
     ("temporary", {"files", "errors"}),

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tribo import published
+from tribo.berardo2019 import published_tables as published
 
 
 def test_the_area_fractions_follow_from_the_sizes_printed_beside_them() -> None:

@@ -210,3 +210,23 @@ def whole_hdf5(path: Path) -> Iterator[HeldBackErrors]:
                 raise
         if held.failure is not None:
             raise held.failure
+
+
+PATTERN_SHARES = "pattern_shares"
+"""Folder of the bundled data with the table of what the model makes of each pattern."""
+
+
+def data_dir() -> Path:
+    """Folder of the bundled data: ``tribo/_data`` of an installed wheel, ``data`` of a source checkout.
+
+    Raises
+    ------
+    FileNotFoundError
+        Neither is there: the installation is incomplete.
+    """
+    package = Path(__file__).resolve().parent
+    places = (package / "_data", package.parent / "data")
+    for folder in places:
+        if folder.is_dir():
+            return folder
+    raise FileNotFoundError(f"the bundled data are neither in {places[0]} nor in {places[1]}; install tribo again")

@@ -10,7 +10,7 @@ import on_the_command_line
 import pytest
 import xarray as xr
 
-from tribo.published import load_table2
+from tribo.berardo2019.published_tables import load_table2
 from tribo.springblock import SimConfig, simulate as library_run
 
 QUICK = ("--blocks", 45, "--dt", 1e-7, "--set", "rest_tolerance=0.01", "--set", "duration_peaks=1.5")

@@ -10,6 +10,7 @@ import pytest
 from blind.direct import ingested
 from blind.tribometer import Design, hide
 
+from tribo.berardo2019.published_tables import load_table2
 from tribo.berardo2019.table_diagnosis import readings, table_deviations
 from tribo.berardo2019.table_model import read_table
 from tribo.lawsearch.across_patterns import (
@@ -24,7 +25,6 @@ from tribo.lawsearch.across_patterns import (
     predicted,
     table_of,
 )
-from tribo.published import load_table2
 from tribo.wording.law_sentences import across_sentence
 
 from .known import baseline

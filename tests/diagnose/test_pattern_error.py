@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from tribo.diagnostics.predictor import error_sizes, simulated_patterns
-from tribo.published import data_dir
+from tribo.files import data_dir
 from tribo.records import Pattern
 
 ROOT = Path(__file__).resolve().parents[2]

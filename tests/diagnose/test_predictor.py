@@ -19,7 +19,7 @@ from tribo.diagnostics.predictor import (
     simulated_predictor,
     tabled_predictor,
 )
-from tribo.published import data_dir
+from tribo.files import data_dir
 from tribo.records import Pattern
 
 from .synthetic import PATTERNS

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tribo.berardo2019.published_tables import load_table2, load_table2_simulated_anew
 from tribo.berardo2019.table_diagnosis import (
     LEAST_CORRELATION,
     PublishedDiagnosis,
@@ -23,7 +24,6 @@ from tribo.berardo2019.table_model import (
 )
 from tribo.figures.catalogue import PUBLISHED_FIGURES
 from tribo.mechanisms.table import MECHANISMS
-from tribo.published import load_table2, load_table2_simulated_anew
 from tribo.wording.verdict_sentences import worded
 
 

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from report.recomputed import Written, unchecked
 from tribo.campaign import open_campaign
 from tribo.cli import main
-from tribo.published import data_dir
+from tribo.files import data_dir
 
 
 def written(campaign: Path, out: Path) -> Written:

@@ -12,8 +12,9 @@ import pandas as pd
 import pytest
 
 from tribo.springblock import SimConfig
-from tribo.springblock.engines.fast import Trajectory, lattice_of, run_fast, thresholds_of
-from tribo.springblock.engines.reference import run_reference
+from tribo.springblock.engines.fast import integrate as run_fast
+from tribo.springblock.engines.reference import integrate as run_reference
+from tribo.springblock.engines.start import Trajectory, lattice_of, thresholds_of
 from tribo.springblock.run import run_of
 
 RECORD = Path(__file__).resolve().parents[2] / "docs" / "data"
@@ -27,7 +28,7 @@ def to_the_peak(config: SimConfig) -> tuple[Trajectory, Trajectory]:
     ahead = run_fast(config, lattice, thresholds)
     end = ahead.first_peak_s if config.peak_rule == "first" else ahead.peak_s
     config = config.with_(duration_s=1.01 * end)
-    return run_fast(config, lattice, thresholds), run_reference(config, lattice, thresholds, 0.995)
+    return run_fast(config, lattice, thresholds), run_reference(config, lattice, thresholds, start_share=0.995)
 
 
 @pytest.mark.parametrize("pressure_Pa", [2e3, 10e3, 40e3])

@@ -8,26 +8,16 @@ import re
 import numpy as np
 import pytest
 from numba import njit, typeof, types
+from support import dense_engine as dense
 
 from tribo.errors import SimulationError
 from tribo.records import FloatArray
 from tribo.springblock import FrictionTerms, SimConfig
-from tribo.springblock.engines import dense, state as k, strips
+from tribo.springblock.engines import ENGINES, state as k, strips
 from tribo.springblock.engines.active import advance
-from tribo.springblock.engines.fast import (
-    Drive,
-    Thresholds,
-    _initial_state,
-    _numerics,
-    _refuse_not_finite,
-    active_set,
-    drive_of,
-    lattice_of,
-    put_back,
-    run_fast,
-    thresholds_of,
-)
+from tribo.springblock.engines.fast import active_set, at_rest, integrate as run_fast, put_back, refuse_not_finite
 from tribo.springblock.engines.jit import VECTOR_OPTIONS
+from tribo.springblock.engines.start import Drive, Thresholds, drive_of, lattice_of, thresholds_of
 from tribo.springblock.engines.state import sliding_threshold, static_threshold
 from tribo.springblock.lattice import Lattice
 
@@ -85,8 +75,7 @@ def test_a_compiled_step_is_the_plain_step(engine: str, sample: str, edges: str,
     )  # fmt: skip
     lattice = lattice_of(config)
     thresholds, drive = thresholds_of(config, lattice), drive_of(config, lattice)
-    numerics = _numerics(config, lattice, thresholds, drive, 3e-3)
-    state = _initial_state(config, lattice, thresholds, drive, numerics)
+    state, numerics = at_rest(config, lattice, thresholds, drive, 3e-3)
     rng = np.random.default_rng(3)
     cells = state.cells
     moves = rng.random(len(cells)) < 0.5
@@ -134,8 +123,7 @@ def test_loops_over_strips_use_vector_instructions():
     config = SimConfig(blocks=(12, 12))
     lattice = lattice_of(config)
     drive = drive_of(config, lattice)
-    numerics = _numerics(config, lattice, thresholds_of(config, lattice), drive, 3e-3)
-    state = _initial_state(config, lattice, thresholds_of(config, lattice), drive, numerics)
+    state, numerics = at_rest(config, lattice, thresholds_of(config, lattice), drive, 3e-3)
     a = active_set(state, numerics, lattice, drive, config)
     sums = strips.Sums(*(rows[0] for rows in a.sums))
     given = {
@@ -157,7 +145,7 @@ def test_an_unstable_step_stops_the_run_and_names_a_block(engine: str, sample: s
     config = SimConfig(sample=sample, blocks=(17, 17), dt_s=4e-7, engine=engine)
     lattice = lattice_of(config)
     with pytest.raises(SimulationError, match=r"no longer finite at t = .*x = \d+, y = \d+"):
-        run_fast(config, lattice, thresholds_of(config, lattice))
+        ENGINES[engine].integrate(config, lattice, thresholds_of(config, lattice), 1)
 
 
 def test_a_block_without_velocity_is_named_in_the_step_it_appears():
@@ -166,8 +154,7 @@ def test_a_block_without_velocity_is_named_in_the_step_it_appears():
         config = SimConfig(blocks=(20, 15), engine=engine, seed=2)
         lattice = lattice_of(config)
         thresholds, drive = thresholds_of(config, lattice), drive_of(config, lattice)
-        numerics = _numerics(config, lattice, thresholds, drive, 3e-3)
-        state = _initial_state(config, lattice, thresholds, drive, numerics)
+        state, numerics = at_rest(config, lattice, thresholds, drive, 3e-3)
         state.cells[7 * 20 + 4, k.VX] = np.nan
         if engine == "dense":
             dense.advance_dense(state, samples(80), numerics, 60, lattice, drive.follow)
@@ -176,7 +163,7 @@ def test_a_block_without_velocity_is_named_in_the_step_it_appears():
             advance(active, state, samples(80), numerics, 60)
             put_back(active, state, numerics)
         with pytest.raises(SimulationError, match=r"t = 0\.00300005 s; found '1 blocks, the first at x = 4, y = 7'"):
-            _refuse_not_finite(state, numerics)
+            refuse_not_finite(state, numerics)
 
 
 def test_thresholds_that_are_not_numbers_are_refused():

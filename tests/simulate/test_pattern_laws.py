@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
-from tribo.published import data_dir
+from tribo.berardo2019.table2 import table2_design
+from tribo.files import data_dir
 from tribo.springblock import simulate
-from tribo.springblock.pattern_laws import origin, pattern_laws, write_table
-from tribo.springblock.table2_column import table2_design
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
+from pattern_laws import origin, pattern_laws, write_table
 
 FOLDER = data_dir() / "pattern_shares"
 RUNS = pd.read_csv(FOLDER / "runs.csv", comment="#")

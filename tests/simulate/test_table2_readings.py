@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,9 @@ import pandas as pd
 import pytest
 
 from tribo.springblock import SimConfig, simulate
-from tribo.springblock.table2_readings import (
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
+from table2_readings import (
     VARIANTS,
     Variant,
     combinations,

@@ -253,7 +253,7 @@ def diagnose_published(
 
     Parameters
     ----------
-    table2 : as :func:`tribo.published.load_table2` gives it
+    table2 : as :func:`tribo.berardo2019.published_tables.load_table2` gives it
     own : the same table simulated anew: sample, regime, mu, tau0_kPa
     seed : of the simulated tables that stand for chance
     """

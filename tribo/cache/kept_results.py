@@ -24,8 +24,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from tribo.files import bytes_of, found_below, found_in
-from tribo.published import PATTERN_SHARES, data_dir
+from tribo.files import PATTERN_SHARES, bytes_of, data_dir, found_below, found_in
 
 T = TypeVar("T")
 

@@ -136,7 +136,7 @@ def bench(console: Console, campaign: Path | None, large: bool, jobs: int, **_: 
     Times are compared with those of reference programs, measured alternately in the same run.
     """
     from tribo.cli.setup_commands import against_pandas, in_words_reading_speed, timing_in_words
-    from tribo.published import data_dir
+    from tribo.files import data_dir
     from tribo.springblock.engine_speed import simulator_benchmarks
 
     with console.progress() as progress:

@@ -168,7 +168,7 @@ def needed() -> list[str]:
 def examine() -> dict[str, Any]:
     """Versions of required and optional packages; ``healthy`` is False if something required is missing."""
     from tribo import __version__
-    from tribo.published import data_dir
+    from tribo.files import data_dir
 
     versions = {p: _version(p) for p in needed()}
     example = (data_dir() / "example" / "campaign.toml").is_file()

@@ -43,7 +43,7 @@ _RUNS = (
     click.option(
         "--duration", "duration_ms", type=float, help="Duration of a run in ms.  [default: 3 x time of the peak]",
     ),
-    click.option("--engine", help="Engine: fast, dense or reference.  [default: fast]"),
+    click.option("--engine", help="Engine: fast or reference.  [default: fast]"),
     click.option(
         "--reading", type=click.Choice(["text", "berardo2019"]),
         help="Reading of the paper where its text leaves a choice: text, its letter; berardo2019, the one closest to "
@@ -201,8 +201,9 @@ def _work(added: Added) -> Work:
 
 def _say_ensemble(console: Console, table: pd.DataFrame, out: Path, table2: bool) -> None:
     """The ensemble in words and as a record: beside the published column, or means and laws."""
-    from tribo.published import load_table2
-    from tribo.springblock.table2_column import beside, described, fitted, table2_text
+    from tribo.berardo2019.published_tables import load_table2
+    from tribo.berardo2019.table2 import beside, table2_text
+    from tribo.springblock.ensemble_laws import described, fitted
 
     record: dict[str, Any] = {"out": str(out), "runs": len(table)}
     if table2:

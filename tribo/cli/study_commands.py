@@ -199,8 +199,9 @@ def _diagnose_published(console: Console, out: Output, seed: int) -> int:
     """The verdict on Table 2 of Berardo et al. (2019), for every interpretation of what it leaves open."""
     from dataclasses import replace
 
+    from tribo.berardo2019.published_tables import BERARDO2019, load_table2, load_table2_simulated_anew
     from tribo.berardo2019.table_diagnosis import across_published, diagnose_published
-    from tribo.published import BERARDO2019, data_dir, load_table2, load_table2_simulated_anew
+    from tribo.files import data_dir
     from tribo.report.provenance import provenance_of_table
     from tribo.report.without_study import write_published
     from tribo.wording.law_sentences import across_record, across_sentence
@@ -244,7 +245,7 @@ def report(console: Console, campaign: Path, out: Output, dry_run: bool, **optio
 @command_options
 def demo(console: Console, out: Output, **options: Any) -> int:
     """Write the report on the bundled example."""
-    from tribo.published import data_dir
+    from tribo.files import data_dir
 
     status = _walk(console, data_dir() / "example", out, "report", False, **options)
     console.say(f"open {out.path / 'report.html'}")

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.display import displayed
-from tribo.published import PATTERN_SHARES, data_dir
+from tribo.files import PATTERN_SHARES, data_dir
 from tribo.records import REGIMES, FloatArray, Pattern
 
 if TYPE_CHECKING:

@@ -22,16 +22,15 @@ from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model.measuring_chain import SLED_AREA_M2
 from tribo.records import FloatArray, Pattern, Run
 from tribo.springblock.config import LocalFriction, SimConfig
-from tribo.springblock.engines.fast import Thresholds, lattice_of, run_fast, thresholds_of
-from tribo.springblock.engines.reference import run_reference
-from tribo.springblock.lattice import Lattice
+from tribo.springblock.engines import ENGINES
+from tribo.springblock.engines.start import Thresholds, lattice_of, thresholds_of
+from tribo.springblock.lattice import SIDES, Lattice
 from tribo.springblock.run import run_of, simulate
 
 RECORDED = {
     "hold_s": 10.0, "specimen_run": 1.0, "temperature_C": 23.0, "humidity_pct": 50.0, "speed_m_s": 2e-4,
     "elapsed_s": 3600.0, "samples_in_rise": 100.0, "nominal_area_m2": SLED_AREA_M2,
 }  # fmt: skip
-CARDINAL = 4  # neighbours E, W, N, S come first in the lattice
 
 
 Placed = tuple[Placement, Values]
@@ -65,8 +64,8 @@ def run_with(
     for placement, values in placed:
         if placement.rims is not None:
             thresholds = on_rims(changed, thresholds, placement.rims(values), conditions)
-    run = run_reference if changed.engine == "reference" else run_fast
-    return run_of(changed, run(changed, lattice, thresholds), float(lattice_of(changed).area_fraction))
+    trajectory = ENGINES[changed.engine].integrate(changed, lattice, thresholds, 1)
+    return run_of(changed, trajectory, float(lattice_of(changed).area_fraction))
 
 
 def on_every_block(
@@ -234,7 +233,7 @@ def _sides_at_cavities(config: SimConfig) -> FloatArray:
     """Of every contact block the number of its four sides that face a cavity block, (n,)."""
     lattice = lattice_of(config)
     cavity = np.append(~lattice.contact, False)
-    near = cavity[lattice.neighbours[:-1, :CARDINAL]].sum(axis=1)
+    near = cavity[lattice.neighbours[:-1, SIDES]].sum(axis=1)
     return np.where(lattice.contact, near, 0).astype(float)
 
 

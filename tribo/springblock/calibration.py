@@ -9,15 +9,12 @@ from functools import lru_cache
 import numpy as np
 
 from tribo.display import displayed
-from tribo.records import FloatArray
 from tribo.springblock.config import PAPER, LocalFriction, SimConfig
 from tribo.springblock.ensemble import Progress, run_ensemble, stratified_design
+from tribo.springblock.ensemble_laws import simulated_law
 
 Law = tuple[float, float]
 """mu and tau0 (Pa) of T = mu N + tau0 A."""
-
-WEIGHTS = ("ratio", "force", "relative")
-"""Scatter assumed equal at all loads: that of T/N, of T, or of T in percent."""
 
 
 @lru_cache(maxsize=32)
@@ -104,14 +101,3 @@ def calibrate(
             table["pressure_Pa"].to_numpy(float), table["sliding_friction"].to_numpy(float)
         )
     return friction()
-
-
-def simulated_law(pressure_Pa: FloatArray, friction: FloatArray, weights: str = "ratio") -> FloatArray:
-    """(mu, tau0 in Pa) of T/N over p by least squares.
-
-    ``weights="ratio"`` fits T/N = mu + tau0/p, ``"force"`` fits T = mu N + tau0 A, and ``"relative"`` either of them
-    with deviations relative to each force.
-    """
-    scale = {"ratio": np.ones_like(pressure_Pa), "force": pressure_Pa, "relative": 1.0 / friction}[weights]
-    columns = np.stack([scale, scale / pressure_Pa], axis=1)
-    return np.asarray(np.linalg.lstsq(columns, friction * scale, rcond=None)[0])

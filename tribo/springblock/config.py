@@ -19,7 +19,8 @@ from tribo.display import displayed
 from tribo.errors import Problem, SimulationError
 from tribo.input_files import LARGEST_NUMBER, MOST_BLOCKS, MOST_STEPS, SMALLEST_NUMBER
 from tribo.records import Pattern
-from tribo.springblock.lattice import contact_mask, pattern_of
+from tribo.springblock.engines import ENGINES, engines_with
+from tribo.springblock.lattice import STIFFEST, contact_mask, pattern_of
 
 
 @displayed()
@@ -94,6 +95,11 @@ ANGLES: dict[str, str] = {"text": "midpoints", "berardo2019": "nominal"}
 """The law of the pull angle of each reading, as :func:`tribo.springblock.stratified_design` takes it."""
 
 
+PAPER_SAMPLES = ("F", "A", "B", "C", "Sx", "Sy")
+PAPER_PRESSURES_PA = (3e3, 5e3, 8e3, 11e3, 14e3, 17.5e3, 21e3, 25e3)
+"""Eight pressures over the range of the paper, which does not list its own."""
+
+
 def reading_of(choices: Mapping[str, Any]) -> str:
     """The name of the reading with these values of the open choices, "own" where none has them."""
     for name, changes in READINGS.items():
@@ -104,7 +110,6 @@ def reading_of(choices: Mapping[str, Any]) -> str:
 
 NormalForce = Literal["redistributed", "uniform"]
 Edges = Literal["free", "periodic"]
-Engine = Literal["fast", "dense", "reference"]
 Rotation = Literal["small", "finite"]
 Sticking = Literal["turned", "slow", "never"]
 BlockMass = Literal["layer", "cube"]
@@ -143,8 +148,8 @@ class SimConfig:
     edges, pattern_first, cavity_shape
         Free or periodic edges, first block of the first cavity, and whether circles become squares.
     rotation
-        "small" for linearised springs, "finite" for the full r_ij of the paper (engines dense and reference;
-        the peaks differ by under 0.5 %).
+        "small" for linearised springs, "finite" for the full r_ij of the paper (engine reference; the peaks differ
+        by under 0.5 %).
     dt_s
         Time step. 5e-8 s moves the sliding mean by under 1 % against 1e-8 s; see docs/results/simulator-accuracy.md.
     duration_s, duration_peaks
@@ -184,7 +189,7 @@ class SimConfig:
     pattern_first: tuple[int, int] | None = None
     cavity_shape: Literal["square", "round"] = "square"
     rotation: Rotation = "small"
-    engine: Engine = "fast"
+    engine: str = "fast"
     dt_s: float = 5e-8
     duration_s: float | None = None
     duration_peaks: float = 3.0
@@ -243,8 +248,7 @@ class SimConfig:
     @property
     def largest_dt_s(self) -> float:
         """Where the explicit step turns unstable: the stiffest lattice mode with its damping."""
-        # x-zigzag against the axis springs (4 K) and the diagonals (2 K), plus the shear spring
-        omega2 = (6.0 * self.stiffness_N_m + self.shear_stiffness_N_m) / self.mass_kg
+        omega2 = (STIFFEST * self.stiffness_N_m + self.shear_stiffness_N_m) / self.mass_kg
         # v' = (1 - g dt) v - w2 dt x, x' = x + dt v' is stable while (w dt)^2 < 4 - 2 g dt
         g = self.damping_per_s
         return (math.sqrt(g**2 + 4.0 * omega2) - g) / omega2
@@ -293,7 +297,6 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "edges": ("free", "periodic"),
     "cavity_shape": ("square", "round"),
     "rotation": ("small", "finite"),
-    "engine": ("fast", "dense", "reference"),
     "peak_rule": ("highest", "first"),
     "block_mass": ("layer", "cube"),
     "sticking": ("turned", "slow", "never"),
@@ -312,8 +315,7 @@ def _problems(config: SimConfig) -> Iterator[Problem]:
         *_number_problems(config),
         *_choice_problems(config),
         *_friction_problems(config.friction),
-        *_term_problems(config),
-        *_sticking_problems(config),
+        *_term_problems(config.terms),
     ]
     yield from faults
     faulty = {problem.column for problem in faults}
@@ -335,27 +337,32 @@ def _problems(config: SimConfig) -> Iterator[Problem]:
             "empty_window", "the sliding window ends before it starts", column="window_end_peaks",
             found=f"{end:g}", allowed=f"more than {config.window_start_peaks:g}",
         )  # fmt: skip
-    if config.rotation == "finite" and config.engine == "fast":
+    if not faulty & {"engine", "rotation", "sticking"}:
+        yield from _unsupported(config)
+
+
+def _unsupported(config: SimConfig) -> Iterator[Problem]:
+    """What the engine of a configuration cannot do."""
+    engine = ENGINES[config.engine]
+    if config.rotation == "finite" and not engine.finite_rotation:
         yield Problem(
-            "unsupported", "the fast engine requires linear forces", column="rotation",
-            found="finite", allowed="rotation small, or engine dense or reference",
+            "unsupported", f"the {config.engine} engine requires linear forces", column="rotation",
+            found="finite", allowed=f"rotation small, or engine {engines_with('finite_rotation')}",
+        )  # fmt: skip
+    for name, found in (("sticking", config.sticking), ("stick_interval_s", config.stick_interval_s)):
+        if found not in ("turned", None) and not engine.sticking_rules:
+            yield Problem(
+                "unsupported", f"the {config.engine} engine supports only the default", column=name,
+                found=str(found), allowed=f"the default, or engine {engines_with('sticking_rules')}",
+            )  # fmt: skip
+    if config.terms.active and not engine.friction_terms:
+        yield Problem(
+            "unsupported", f"the {config.engine} engine supports only the friction law of the paper", column="engine",
+            found=config.engine, allowed=engines_with("friction_terms"),
         )  # fmt: skip
 
 
-def _sticking_problems(config: SimConfig) -> Iterator[Problem]:
-    """Only the reference engine has rules of sticking other than the default."""
-    if config.engine == "reference":
-        return
-    for name, found in (("sticking", config.sticking), ("stick_interval_s", config.stick_interval_s)):
-        if found not in ("turned", None):
-            yield Problem(
-                "unsupported", f"the {config.engine} engine supports only the default", column=name,
-                found=str(found), allowed="the default, or engine reference",
-            )  # fmt: skip
-
-
-def _term_problems(config: SimConfig) -> Iterator[Problem]:
-    terms = config.terms
+def _term_problems(terms: FrictionTerms) -> Iterator[Problem]:
     for field in fields(terms):
         value = getattr(terms, field.name)
         if not math.isfinite(value):
@@ -364,11 +371,6 @@ def _term_problems(config: SimConfig) -> Iterator[Problem]:
             yield Problem("negative", "must not be negative", column=field.name, found=f"{value:g}", allowed=">= 0")
         elif field.name in ("ageing_t0_s", "speed_v0_m_s") and value <= 0:
             yield Problem("not_positive", "must be positive", column=field.name, found=f"{value:g}", allowed="> 0")
-    if terms.active and config.engine == "reference":
-        yield Problem(
-            "unsupported", "the reference engine supports only the friction law of the paper", column="engine",
-            found="reference", allowed="fast or dense",
-        )  # fmt: skip
 
 
 def _beyond_measure(name: str, value: float) -> bool:
@@ -409,7 +411,7 @@ def _number_problems(config: SimConfig) -> Iterator[Problem]:
 
 
 def _choice_problems(config: SimConfig) -> Iterator[Problem]:
-    for name, allowed in _CHOICES.items():
+    for name, allowed in {**_CHOICES, "engine": tuple(ENGINES)}.items():
         value = getattr(config, name)
         if value not in allowed:
             yield Problem(

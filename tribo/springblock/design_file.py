@@ -37,9 +37,8 @@ from tribo.campaign.load import pattern_of_table
 from tribo.errors import Problem, SimulationError, system_problem
 from tribo.input_files import DEEPEST_NESTING, LARGEST_DESCRIPTION_BYTES, MOST_RUNS, nests_too_deeply, read_input
 from tribo.records import Pattern
-from tribo.springblock.config import ANGLES, FrictionTerms, LocalFriction, SimConfig
+from tribo.springblock.config import ANGLES, PAPER_PRESSURES_PA, PAPER_SAMPLES, FrictionTerms, LocalFriction, SimConfig
 from tribo.springblock.ensemble import AngleRule, angle_range_deg, check_all, middle_deg, stratified_design
-from tribo.springblock.table2_column import PRESSURES_PA, SAMPLES
 from tribo.user_text import did_you_mean
 
 DESIGNED = {"sample", "pattern", "pressure_Pa", "angle_deg", "seed", "friction", "terms"}
@@ -152,8 +151,8 @@ def _too_many(design: DesignTable, axes: Mapping[str, Sequence[Any]]) -> Problem
 
 def described_by_options(options: Mapping[str, Any], seed: int, table2: bool) -> tuple[bool, dict[str, Any]]:
     """The design that the options of ``tribo simulate`` describe, and whether it is one single run."""
-    samples = list(options["samples"]) or (list(SAMPLES) if table2 else [])
-    pressures = list(options["pressures_kPa"]) or ([p / 1e3 for p in PRESSURES_PA] if table2 else [])
+    samples = list(options["samples"]) or (list(PAPER_SAMPLES) if table2 else [])
+    pressures = list(options["pressures_kPa"]) or ([p / 1e3 for p in PAPER_PRESSURES_PA] if table2 else [])
     given = {name: options[name] for name in ("blocks", "dt_s", "engine") if options[name] is not None}
     parameters = given | dict(setting(text) for text in options["settings"])
     if options["duration_ms"] is not None:

@@ -9,8 +9,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 
 from tribo.springblock.config import SimConfig
-from tribo.springblock.engines.fast import Thresholds, Trajectory, lattice_of, run_fast, thresholds_of
-from tribo.springblock.engines.reference import run_reference
+from tribo.springblock.engines import ENGINES
+from tribo.springblock.engines.fast import integrate as run_fast
+from tribo.springblock.engines.reference import integrate as run_reference
+from tribo.springblock.engines.start import Thresholds, Trajectory, lattice_of, thresholds_of
 from tribo.springblock.lattice import Lattice
 
 Progress = Callable[[int, int], None]
@@ -48,7 +50,6 @@ def simulator_benchmarks(
     """
     parts: list[Callable[[], Iterator[Timing]]] = [
         lambda: engine_ratios(dt_s, reference_steps),
-        dense_rate,
         table2_cost,
     ]
     if large:
@@ -74,18 +75,6 @@ def engine_ratios(dt_s: float = 1e-8, reference_steps: int = 300) -> Iterator[Ti
             f"fast over reference, {sample}", reference / seconds, "ratio", aim,
             note=f"10 ms at dt = {dt_s:g} s in {seconds:.2f} s; reference {reference:.0f} s by its step",
         )  # fmt: skip
-
-
-def dense_rate() -> Iterator[Timing]:
-    """Block updates a second of the dense step on one core, in float64: a long run less a short one, best of three."""
-    config = SimConfig(engine="dense")
-    (short_s, short), (long_s, long) = (
-        min((timed_run(config.with_(duration_s=end)) for _ in range(3)), key=lambda timed: timed[0])
-        for end in (3.0e-3, 4.5e-3)
-    )
-    steps, seconds = long.dense_steps - short.dense_steps, long_s - short_s
-    rate = steps * config.blocks[0] * config.blocks[1] / seconds
-    yield Timing("dense step", rate, "block updates/s", 2.5e8, note=f"{steps} steps in {seconds:.2f} s")
 
 
 def table2_cost(repeats: int = 20, pressures: int = 8, jobs: int = 2) -> Iterator[Timing]:
@@ -133,7 +122,7 @@ def reference_cost(config: SimConfig, steps: int) -> float:
 
     def run(n: int) -> float:
         began = time.process_time()
-        run_reference(config.with_(duration_s=failure + n * config.dt_s), lattice, thresholds, 1.0)
+        run_reference(config.with_(duration_s=failure + n * config.dt_s), lattice, thresholds, start_share=1.0)
         return time.process_time() - began
 
     run(20)  # compiles
@@ -143,9 +132,10 @@ def reference_cost(config: SimConfig, steps: int) -> float:
 def timed_run(config: SimConfig) -> tuple[float, Trajectory]:
     """Processor seconds of one run on compiled code, and the run."""
     lattice, thresholds = _prepared(config)
-    run_fast(config.with_(duration_s=1e-6), lattice, thresholds)
+    integrate = ENGINES[config.engine].integrate
+    integrate(config.with_(duration_s=1e-6), lattice, thresholds, 1)
     began = time.process_time()
-    run = run_fast(config, lattice, thresholds)
+    run = integrate(config, lattice, thresholds, 1)
     return time.process_time() - began, run
 
 

@@ -96,10 +96,27 @@ def _in_blocks(lengths_m: tuple[float, float], spacing_m: float) -> tuple[float,
     return x, y
 
 
-OFFSETS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (-1, 1), (1, -1))  # E W N S NE SW NW SE
-# K_int n nT of each of the eight springs, in units of K_int: (xx, yy, xy); diagonals have half the stiffness
-SPRINGS = ((1, 0, 0), (1, 0, 0), (0, 1, 0), (0, 1, 0)) + ((0.25, 0.25, 0.25),) * 2 + ((0.25, 0.25, -0.25),) * 2
-INNER = (3.0, 3.0, 0.0)  # their sum
+NEIGHBOURHOOD = (
+    (1, 0, 1.0), (-1, 0, 1.0), (0, 1, 1.0), (0, -1, 1.0), (1, 1, 0.5), (-1, -1, 0.5), (-1, 1, 0.5), (1, -1, 0.5),
+)  # fmt: skip
+"""Blocks that springs join with one at the origin: offsets along x and y, and the stiffness of the spring over K_int.
+
+All else follows from this, but for the loop over strips (:func:`tribo.springblock.engines.strips.forces`), which is
+written out for the vector units.
+"""
+OFFSETS = tuple((x, y) for x, y, _ in NEIGHBOURHOOD)
+NEIGHBOURS = len(NEIGHBOURHOOD)
+SIDES = [k for k, (x, y) in enumerate(OFFSETS) if 0 in (x, y)]  # neighbours that share a side with the block
+# k n nT of each spring in units of K_int: (xx, yy, xy)
+SPRINGS = tuple((x * x * k / (x * x + y * y), y * y * k / (x * x + y * y), x * y * k / (x * x + y * y))
+                for x, y, k in NEIGHBOURHOOD)  # fmt: skip
+INNER = tuple(sum(parts) for parts in zip(*SPRINGS, strict=True))  # of a block within the lattice
+# largest stiffness, per K_int, of a mode that turns from each block to the next along x, along y or along both
+STIFFEST = max(
+    sum(2.0 * spring[axis] for (x, y), spring in zip(OFFSETS, SPRINGS, strict=True) if (x * turn_x + y * turn_y) % 2)
+    for axis in (0, 1)
+    for turn_x, turn_y in ((1, 0), (0, 1), (1, 1))
+)
 
 
 @dataclass(frozen=True)
@@ -116,7 +133,7 @@ class Lattice:
     periodic: bool
     shear: float
     contact: NDArray[np.bool_]  # (n,)
-    neighbours: NDArray[np.int64]  # (n + 1, 8)
+    neighbours: NDArray[np.int64]  # (n + 1, NEIGHBOURS)
     own: FloatArray  # (n + 1, 3)
     follow: FloatArray  # (n + 1, 2, 2)
     lag: FloatArray  # (n + 1, 2, 2)
@@ -161,7 +178,7 @@ def _make_lattice(packed: bytes, shape: tuple[int, int], shear: float, periodic:
 
 def _neighbours(nx: int, ny: int, periodic: bool) -> NDArray[np.int64]:
     y, x = np.divmod(np.arange(nx * ny), nx)
-    table = np.full((nx * ny + 1, 8), nx * ny, np.int64)
+    table = np.full((nx * ny + 1, NEIGHBOURS), nx * ny, np.int64)
     for k, (dx, dy) in enumerate(OFFSETS):
         near_x, near_y = x + dx, y + dy
         if periodic:

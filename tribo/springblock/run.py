@@ -7,8 +7,8 @@ import numpy as np
 from tribo.errors import Problem, SimulationError
 from tribo.records import Run
 from tribo.springblock.config import SimConfig
-from tribo.springblock.engines.fast import Trajectory, lattice_of, run_fast, thresholds_of
-from tribo.springblock.engines.reference import run_reference
+from tribo.springblock.engines import ENGINES
+from tribo.springblock.engines.start import Trajectory, lattice_of, thresholds_of
 
 
 def simulate(config: SimConfig, threads: int = 1) -> Run:
@@ -27,11 +27,7 @@ def simulate(config: SimConfig, threads: int = 1) -> Run:
     """
     config.check()
     lattice = lattice_of(config)
-    thresholds = thresholds_of(config, lattice)
-    if config.engine == "reference":
-        trajectory = run_reference(config, lattice, thresholds)
-    else:
-        trajectory = run_fast(config, lattice, thresholds, threads)
+    trajectory = ENGINES[config.engine].integrate(config, lattice, thresholds_of(config, lattice), threads)
     return run_of(config, trajectory, float(lattice.area_fraction))
 
 

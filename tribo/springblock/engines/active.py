@@ -46,16 +46,19 @@ from tribo.springblock.engines.team import (
     team_of,
     wait_for_all,
 )
+from tribo.springblock.lattice import OFFSETS
 
 LISTENING, GLIDING, SLIDING, ASLEEP = range(4)  # states of a strip
 PENDING = -1  # row of Lists.strips and .members: strips that fell asleep and are not in the queue yet
 # columns of Lists.links: state, number of moving strips that reach it, which neighbours it reaches itself (a bit each)
 # and would with its cavities alone, place in its list, share of the lattice, bucket of the queue, the strips before and
-# after it there, and the eight neighbours, -1 where there is none
+# after it there, and the strips AROUND it, -1 where there is none
 STATUS, TOUCHED, REACH, OWN_REACH, PLACE, SHARE, BUCKET, BEFORE, AFTER, NEAR = range(10)
-LINKS = NEAR + 8
-AROUND = ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1))  # a bit of REACH each
-WEST, MIDDLE, EAST = 0b00000111, 0b00011000, 0b11100000
+# the strips that springs of a strip reach, a bit of REACH each; which of them its first, any and its last block reaches
+AROUND = tuple(sorted({(x, dy) for dx, dy in OFFSETS for x in (0, dx)} - {(0, 0)}))
+N_AROUND = len(AROUND)
+LINKS = NEAR + N_AROUND
+WEST, MIDDLE, EAST = (sum(1 << bit for bit, (x, _) in enumerate(AROUND) if x == side) for side in (-1, 0, 1))
 RING = 1 << 15  # steps the queue looks ahead
 
 
@@ -156,7 +159,7 @@ def set_reach(strip: int, reach: int, lists: Lists) -> None:
     links = lists.links
     changed = reach ^ links[strip, REACH]
     links[strip, REACH] = reach
-    for bit in range(8):
+    for bit in range(N_AROUND):
         other = links[strip, NEAR + bit]
         if (changed >> bit) & 1 == 0 or other < 0:
             continue

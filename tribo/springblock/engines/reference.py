@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 from tribo.errors import Problem, SimulationError
 from tribo.records import FloatArray
 from tribo.springblock.config import SimConfig
-from tribo.springblock.engines.fast import Thresholds, Trajectory, drive_of, first_failure_s, once
 from tribo.springblock.engines.jit import compiled
-from tribo.springblock.lattice import OFFSETS, Lattice
+from tribo.springblock.engines.start import Thresholds, Trajectory, drive_of, first_failure_s, once
+from tribo.springblock.lattice import NEIGHBOURHOOD, NEIGHBOURS, Lattice
 
 START_SHARE = 0.98  # of the first failure
 
@@ -37,9 +37,9 @@ START_SHARE = 0.98  # of the first failure
 class Model(NamedTuple):
     """Constants of a run in SI units; arrays over the n blocks."""
 
-    neighbours: NDArray[np.int64]  # (n + 1, 8), n where there is none
-    rest: FloatArray  # (8, 3): rest vector to each neighbour and its length
-    springs: FloatArray  # (8,): k_ij
+    neighbours: NDArray[np.int64]  # (n + 1, NEIGHBOURS), n where there is none
+    rest: FloatArray  # (NEIGHBOURS, 3): rest vector to each neighbour and its length
+    springs: FloatArray  # (NEIGHBOURS,): k_ij
     static: FloatArray  # (n,)
     sliding: FloatArray
     contact: NDArray[np.bool_]
@@ -99,7 +99,7 @@ def driving_force(u: FloatArray, t: float, m: Model, out: FloatArray) -> None:
     for i in range(len(u)):
         fx = m.shear_stiffness * (m.velocity[0] * t - u[i, 0])
         fy = m.shear_stiffness * (m.velocity[1] * t - u[i, 1])
-        for k in range(8):
+        for k in range(NEIGHBOURS):
             j = m.neighbours[i, k]
             if j == len(u):
                 continue
@@ -260,13 +260,13 @@ def integrate_all(state: State, steps: Steps, m: Model, w: FloatArray, rec: Reco
 
 def reference_model(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Model:
     """The constants of a configuration as the reference engine takes them."""
-    offsets = np.array(OFFSETS, float)
+    offsets, stiffness = np.split(np.array(NEIGHBOURHOOD), [2], axis=1)
     lengths = np.hypot(*offsets.T)
     drive = drive_of(config, lattice)
     return Model(
         neighbours=lattice.neighbours,
         rest=config.spacing_m * np.column_stack([offsets, lengths]),
-        springs=config.stiffness_N_m * np.where(lengths > 1.0, 0.5, 1.0),
+        springs=config.stiffness_N_m * stiffness[:, 0],
         static=thresholds.static_N.copy(),
         sliding=thresholds.sliding_N,
         contact=lattice.contact,
@@ -282,10 +282,10 @@ def reference_model(config: SimConfig, lattice: Lattice, thresholds: Thresholds)
     )
 
 
-def run_reference(
-    config: SimConfig, lattice: Lattice, thresholds: Thresholds, start_share: float = START_SHARE
+def integrate(
+    config: SimConfig, lattice: Lattice, thresholds: Thresholds, threads: int = 1, start_share: float = START_SHARE
 ) -> Trajectory:
-    """One run on the reference engine, from ``start_share`` of the first failure on.
+    """One run on the reference engine, on one thread, from ``start_share`` of the first failure on.
 
     Raises
     ------

@@ -25,7 +25,7 @@ from tribo.springblock.engines.jit import copied_into_callers, inner, inner_vect
 from tribo.springblock.engines.state import Numerics, State, sliding_threshold, static_threshold
 from tribo.springblock.lattice import INNER, Lattice
 
-LINE, PAGE = 8, 512  # numbers in a cache line, and in the bytes after which cache sets repeat
+LINE = 8  # numbers in a cache line
 
 
 class Layout(NamedTuple):
@@ -35,15 +35,6 @@ class Layout(NamedTuple):
     first: int
     last: int  # end of the stretch that is worked on, a whole number of vectors
     places: int
-
-
-def layout_of(nx: int, ny: int) -> Layout:
-    """Rows and first blocks begin at cache lines; equal places of two planes never share a cache set."""
-    width = -(-(nx + 2) // LINE) * LINE
-    first = LINE + width
-    last = first + -(-ny * width // (4 * LINE)) * 4 * LINE
-    least = last + width + LINE
-    return Layout(width, first, last, least + (PAGE // 7 // LINE * LINE - least) % PAGE)
 
 
 def interleaved(nx: int, ny: int, planes: int) -> tuple[Layout, list[FloatArray]]:
@@ -182,7 +173,7 @@ def forces(p: Planes, strips: IntArray, starts: BoolArray, c: Numerics, t: float
     copied_into_callers()
     one, width = np.uint64(1), np.uint64(p.width)
     quarter = 0.25 * c.stiffness
-    own = 12.0 + 4.0 * c.shear_stiffness / c.stiffness
+    own = 4.0 * INNER[0] + 4.0 * c.shear_stiffness / c.stiffness
     for m in range(len(strips)):
         first = np.uint64(p.place[strips[m]])  # unsigned, so that no index counts from the end
         beyond = False

@@ -4,19 +4,27 @@ The lattice lies row by row in one array, between rows and columns of blocks tha
 repeat the opposite side), so that one loop without branches runs over all rows. Displacements and velocities are the
 true ones here, not counted from the quasi-static motion: the slider then pulls every block with the same force.
 A velocity is stored as m v / dt, the force in N that would stop the block within one step.
+
+It makes nothing that the fast engine does not make faster; importing it adds "dense" to the table of engines, against
+which tests and benchmarks hold the fast one.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tribo.records import FloatArray
-from tribo.springblock.engines import state as k
+from tribo.springblock.config import SimConfig
+from tribo.springblock.engine_speed import Timing, timed_run
+from tribo.springblock.engines import ENGINES, Engine, state as k
+from tribo.springblock.engines.fast import at_rest, in_chunks, refuse_thresholds, trajectory_of
 from tribo.springblock.engines.jit import compiled, copied_into_callers, inner, inner_vectorised, widest_vectors
+from tribo.springblock.engines.start import Thresholds, Trajectory, drive_of, first_failure_s
 from tribo.springblock.engines.state import (
     CODE,
     DENSE_STEPS,
@@ -29,12 +37,28 @@ from tribo.springblock.engines.state import (
     sliding_threshold,
     static_threshold,
 )
-from tribo.springblock.engines.strips import Layout, aligned, layout_of, places_of, spare_stiffness, wrap
-from tribo.springblock.lattice import OFFSETS, Lattice
+from tribo.springblock.engines.strips import LINE, Layout, aligned, places_of, spare_stiffness, wrap
+from tribo.springblock.lattice import INNER, NEIGHBOURHOOD, Lattice
 
 # rows of Field.planes: m v / dt and its amount (zero at rest), thresholds (static now, sliding), time of the last
 # stop, static threshold after a slip
 PX, PY, PACE, FS, FD, SINCE, FA, PLANES = range(8)
+
+
+PAGE = 512  # numbers in the bytes after which cache sets repeat
+ENGINES["dense"] = Engine(__name__, finite_rotation=True, friction_terms=True)
+
+
+def integrate(config: SimConfig, lattice: Lattice, thresholds: Thresholds, threads: int = 1) -> Trajectory:
+    """One run on all blocks at once; as :func:`tribo.springblock.engines.fast.integrate`."""
+    refuse_thresholds(thresholds, lattice)
+    drive = drive_of(config, lattice)
+    failure = first_failure_s(lattice, thresholds, drive, config.stiffness_N_m)
+    state, numerics = at_rest(config, lattice, thresholds, drive, failure - 1.5 * config.dt_s)
+    kept: list[Samples] = []
+    for samples, step in in_chunks(config, thresholds, state, numerics, kept):
+        advance_dense(state, samples, numerics, step, lattice, drive.follow)
+    return trajectory_of(kept, state, numerics, drive, failure)
 
 
 class Field(NamedTuple):
@@ -50,6 +74,15 @@ class Field(NamedTuple):
     pull_x: float  # N/s: rate of the slider's pull on every block
     pull_y: float
     weakens: int | None  # None if a block that has slipped holds as much as before
+
+
+def layout_of(nx: int, ny: int) -> Layout:
+    """Rows and first blocks begin at cache lines; equal places of two planes never share a cache set."""
+    width = -(-(nx + 2) // LINE) * LINE
+    first = LINE + width
+    last = first + -(-ny * width // (4 * LINE)) * 4 * LINE
+    least = last + width + LINE
+    return Layout(width, first, last, least + (PAGE // 7 // LINE * LINE - least) % PAGE)
 
 
 def field_of(state: State, numerics: Numerics, lattice: Lattice, follow: FloatArray) -> Field:
@@ -86,7 +119,7 @@ def advance_dense(
 ) -> None:
     """Integrate all blocks of a state to a step, or to the end of the run."""
     field = field_of(state, numerics, lattice, follow)
-    swapped = integrate(field, state, out, numerics, until_step)
+    swapped = steps_of_all(field, state, out, numerics, until_step)
     inside = places_of(field.layout, lattice.nx, lattice.ny)
     cells = state.cells
     now = numerics.start + int(state.counts[STEP]) * numerics.dt
@@ -99,7 +132,7 @@ def advance_dense(
 
 
 @compiled
-def integrate(f: Field, s: State, out: Samples, c: Numerics, until_step: int) -> bool:
+def steps_of_all(f: Field, s: State, out: Samples, c: Numerics, until_step: int) -> bool:
     """Steps of all blocks up to ``until_step``; true if the newest positions are the second two rows."""
     widest_vectors()
     swapped = False
@@ -107,7 +140,7 @@ def integrate(f: Field, s: State, out: Samples, c: Numerics, until_step: int) ->
     p_x, p_y, pace = f.planes[PX, first:last], f.planes[PY, first:last], f.planes[PACE, first:last]
     fs, fd, since = f.planes[FS, first:last], f.planes[FD, first:last], f.planes[SINCE, first:last]
     again = None if f.weakens is None else f.planes[FA, first:last]
-    own = 12.0 + 4.0 * c.shear_stiffness / c.stiffness
+    own = 4.0 * INNER[0] + 4.0 * c.shear_stiffness / c.stiffness
     way = c.dt * c.dt / c.mass
     while s.counts[STEP] < until_step and s.counts[CODE] == RUNNING:
         before, after = (2, 0) if swapped else (0, 2)
@@ -148,14 +181,13 @@ def pushed_apart(f: Field, x: FloatArray, y: FloatArray, c: Numerics, t: float) 
     for i in range(f.layout.first, f.layout.last):
         force_x = f.pull_x * t - c.shear_stiffness * x[i]
         force_y = f.pull_y * t - c.shear_stiffness * y[i]
-        for column, row in OFFSETS:
+        for column, row, share in NEIGHBOURHOOD:
             j = i + row * f.layout.width + column
-            long = column * row != 0
-            rest = c.spacing * (math.sqrt(2.0) if long else 1.0)
+            rest = c.spacing * math.sqrt(float(column * column + row * row))
             r_x = c.spacing * column + x[j] - x[i]
             r_y = c.spacing * row + y[j] - y[i]
             r = math.sqrt(r_x * r_x + r_y * r_y)
-            pull = f.there[j] * c.stiffness * (0.5 if long else 1.0) * (r - rest) / r
+            pull = f.there[j] * c.stiffness * share * (r - rest) / r
             force_x += pull * r_x
             force_y += pull * r_y
         f.planes[PX, i] = keep * f.planes[PX, i] + f.there[i] * force_x
@@ -279,3 +311,15 @@ def count_moving(pace: FloatArray, fs: FloatArray) -> int:
     for i in range(len(pace)):
         contacts += 1 if (fs[i] > 0.0) & (pace[i] > 0.0) else 0
     return contacts
+
+
+def dense_rate() -> Iterator[Timing]:
+    """Block updates a second of the dense step on one core, in float64: a long run less a short one, best of three."""
+    config = SimConfig(engine="dense")
+    (short_s, short), (long_s, long) = (
+        min((timed_run(config.with_(duration_s=end)) for _ in range(3)), key=lambda timed: timed[0])
+        for end in (3.0e-3, 4.5e-3)
+    )
+    steps, seconds = long.dense_steps - short.dense_steps, long_s - short_s
+    rate = steps * config.blocks[0] * config.blocks[1] / seconds
+    yield Timing("dense step", rate, "block updates/s", 2.5e8, note=f"{steps} steps in {seconds:.2f} s")

@@ -16,10 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tribo.records import FloatArray, Run
-from tribo.springblock.calibration import WEIGHTS
-from tribo.springblock.config import SimConfig
+from tribo.springblock.config import PAPER_SAMPLES, SimConfig
 from tribo.springblock.ensemble import Angles, Progress, Work, run_stored, stratified_design
-from tribo.springblock.table2_column import SAMPLES, resampled_laws
+from tribo.springblock.ensemble_laws import WEIGHTS, resampled_laws
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,8 +52,8 @@ class Variant:
         return runs
 
 
-NOMINAL_DEG: dict[str, Angles] = {s: (90.0,) if s == "Sy" else (0.0,) for s in SAMPLES}
-DIAGONAL_DEG: dict[str, Angles] = {s: (45.0,) if s in "ABC" else NOMINAL_DEG[s] for s in SAMPLES}
+NOMINAL_DEG: dict[str, Angles] = {s: (90.0,) if s == "Sy" else (0.0,) for s in PAPER_SAMPLES}
+DIAGONAL_DEG: dict[str, Angles] = {s: (45.0,) if s in "ABC" else NOMINAL_DEG[s] for s in PAPER_SAMPLES}
 VARIANTS: dict[str, Variant] = {
     "baseline": Variant(),
     "K_s halved": Variant({"shear_factor": 0.5}),
@@ -110,7 +109,7 @@ def study_designs(
     base: SimConfig | None = None,
     repeats: int = 4,
     pressures_Pa: Sequence[float] = STUDY_PRESSURES_PA,
-    samples: Sequence[str] = SAMPLES,
+    samples: Sequence[str] = PAPER_SAMPLES,
     variants: Mapping[str, Variant] = VARIANTS,
 ) -> dict[str, list[SimConfig]]:
     """The runs of every variant, by its name."""

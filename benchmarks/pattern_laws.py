@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 from tribo.files import write_text
 from tribo.springblock.config import SimConfig
 from tribo.springblock.ensemble import angle_range_deg
+from tribo.springblock.ensemble_laws import fitted
 from tribo.springblock.lattice import UM, pattern_of
 from tribo.springblock.results_file import versions
-from tribo.springblock.table2_column import fitted
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,8 +8,8 @@ import numpy as np
 
 from tribo.records import FloatArray
 from tribo.springblock.config import SimConfig
-from tribo.springblock.engines.fast import Trajectory
-from tribo.springblock.lattice import OFFSETS, Lattice
+from tribo.springblock.engines.start import Trajectory
+from tribo.springblock.lattice import NEIGHBOURHOOD, Lattice
 
 
 @dataclass(frozen=True)
@@ -49,12 +49,12 @@ def _spring_energy(config: SimConfig, lattice: Lattice, u: FloatArray) -> float:
     n = len(u)
     padded = np.concatenate([u, np.zeros((1, 2))])
     energy = 0.0
-    for k, offset in enumerate(OFFSETS):
+    for k, (*offset, share) in enumerate(NEIGHBOURHOOD):
         near = lattice.neighbours[:n, k]
         rest = config.spacing_m * np.array(offset, float)
         length = float(np.hypot(*rest))
         stretch = (padded[near] - u)[near < n]
         change = np.hypot(*(rest + stretch).T) - length if config.rotation == "finite" else stretch @ rest / length
-        stiffness = config.stiffness_N_m * (1.0 if 0 in offset else 0.5)
-        energy += 0.25 * stiffness * float((change**2).sum())  # each spring is met from both its ends
+        # each spring is met from both its ends
+        energy += 0.25 * config.stiffness_N_m * share * float((change**2).sum())
     return energy

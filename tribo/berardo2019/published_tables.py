@@ -1,31 +1,15 @@
-"""Published tables bundled with tribo, in the units of their source."""
+"""The published tables bundled with tribo, and those its simulator made beside them, in the units of their source."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
+
+from tribo.files import PATTERN_SHARES, data_dir
 
 if TYPE_CHECKING:
     import pandas as pd
 
 BERARDO2019 = "berardo2019"
-PATTERN_SHARES = "pattern_shares"
-_PACKAGE = Path(__file__).resolve().parent
-
-
-def data_dir() -> Path:
-    """Folder of the bundled data: ``tribo/_data`` of an installed wheel, ``data`` of a source checkout.
-
-    Raises
-    ------
-    FileNotFoundError
-        Neither is there: the installation is incomplete.
-    """
-    places = (_PACKAGE / "_data", _PACKAGE.parent / "data")
-    for folder in places:
-        if folder.is_dir():
-            return folder
-    raise FileNotFoundError(f"the bundled data are neither in {places[0]} nor in {places[1]}; install tribo again")
 
 
 def load_table1() -> pd.DataFrame:
