@@ -37,6 +37,11 @@ def test_diagnosis_is_the_old_name_of_diagnose(monkeypatch: pytest.MonkeyPatch) 
         assert tribo.diagnosis(ingested, seed=3) == (ingested, {"seed": 3})
 
 
+def test_a_run_of_the_model_is_one_call() -> None:
+    run = tribo.simulate(tribo.SimConfig(blocks=(12, 12), dt_s=1e-7, duration_peaks=1.3))
+    assert run.static_friction > run.sliding_friction > 0
+
+
 def test_importing_tribo_imports_none_of_the_heavy_libraries() -> None:
     code = "import sys, tribo; print([m for m in sys.modules if m.split('.')[0] in sys.argv[1:]])"
     heavy = ["numba", "xarray", "statsmodels", "matplotlib", "scipy", "pandas", "numpy", "pydantic"]

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tribo import files
 from tribo.berardo2019 import published_tables as published
 
 
@@ -66,8 +67,8 @@ def test_every_contradiction_says_both_places_and_what_tribo_does() -> None:
 def test_an_installed_wheel_reads_its_own_copy_of_the_data(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(published, "_PACKAGE", tmp_path)
+    monkeypatch.setattr(files, "_PACKAGE", tmp_path)
     with pytest.raises(FileNotFoundError):
-        published.data_dir()
+        files.data_dir()
     (tmp_path / "_data").mkdir()
-    assert published.data_dir() == tmp_path / "_data"
+    assert files.data_dir() == tmp_path / "_data"

@@ -212,6 +212,7 @@ def whole_hdf5(path: Path) -> Iterator[HeldBackErrors]:
             raise held.failure
 
 
+_PACKAGE = Path(__file__).resolve().parent
 PATTERN_SHARES = "pattern_shares"
 """Folder of the bundled data with the table of what the model makes of each pattern."""
 
@@ -224,8 +225,7 @@ def data_dir() -> Path:
     FileNotFoundError
         Neither is there: the installation is incomplete.
     """
-    package = Path(__file__).resolve().parent
-    places = (package / "_data", package.parent / "data")
+    places = (_PACKAGE / "_data", _PACKAGE.parent / "data")
     for folder in places:
         if folder.is_dir():
             return folder

@@ -12,7 +12,6 @@ from .ensemble import (
     run_stored as run_stored,
     stratified_design as stratified_design,
 )
-from .ensemble_laws import simulated_law as simulated_law
 from .lattice import PAPER_PATTERNS as PAPER_PATTERNS, contact_mask as contact_mask
 from .results_file import write_ensemble as write_ensemble, write_run as write_run
 from .run import simulate as simulate
