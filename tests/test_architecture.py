@@ -25,7 +25,6 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("zeroing", {"display"}),
     ("records", {"display", "errors", "zeroing"}),
     ("laws", {"records", "display"}),
-    (set()),
     ("vocabulary", set()),
     ("files", {"errors"}),
     ("temporary", {"files", "errors"}),
