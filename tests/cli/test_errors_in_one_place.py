@@ -157,7 +157,7 @@ def test_a_diagnosis_that_fails_leaves_the_report_with_a_note(
     def broken(*_: object, **__: object) -> None:
         raise IndexError("index 3 is out of bounds")
 
-    monkeypatch.setattr("tribo.stages.diagnosis", broken)
+    monkeypatch.setattr("tribo.stages.diagnose", broken)
     from tribo.campaign import load_campaign
 
     study = stages.study(load_campaign(small_campaign), until="fit")

@@ -1,13 +1,10 @@
-"""The progress of a build: one moving line on a terminal, a line for every change elsewhere.
-
-Commands for many campaigns: tribo build, tribo schedule print.
-"""
+"""Commands for many campaigns: tribo build with its progress, tribo schedule print."""
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tribo.cli.console import DONE, FOLDER, FORCE, SOME_SET_ASIDE, Console, GivenPath, command_options
-from tribo.cli.study_options import RULE, WEIGHTS
+from tribo.cli.study_options import FLAT, RULE, RUNS, SCHEDULER, WEIGHTS
 from tribo.site.workflow import Progress
 
 if TYPE_CHECKING:
@@ -119,9 +116,9 @@ KEEP = click.option(
 @KEEP
 @RULE
 @WEIGHTS
-@click.option("--flat", default="", metavar="SAMPLE", help="Flat sample for the calibration, as in tribo report.")
-@click.option("--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulations per load.")
-@click.option("--scheduler", help="Address of a dask scheduler; its workers run the simulations.")
+@FLAT
+@RUNS
+@SCHEDULER
 @command_options
 def build(console: Console, drop: Path, site: Path, dry_run: bool, **options: Any) -> int:
     """Build the reports of a folder of campaigns.
@@ -144,10 +141,6 @@ def build(console: Console, drop: Path, site: Path, dry_run: bool, **options: An
     return SOME_SET_ASIDE if unusable or built.waiting else DONE
 
 
-def _unusable(name: str, why: Sequence[str]) -> str:
-    return f"unusable: {name}: {'; '.join(why)}" if why else f"unusable: {name}"
-
-
 def _words(built: Built, dry_run: bool, *, all_of_them: bool) -> str:
     """What was built, or would be built, and why."""
     from tribo.cli.console import findings_text
@@ -156,7 +149,7 @@ def _words(built: Built, dry_run: bool, *, all_of_them: bool) -> str:
     lines = [f"{verb} {name}: {why}" for name, why in built.due.items()]
     lines += [f"postponed to the next build: {name}: {'; '.join(why)}" for name, why in built.waiting.items()]
     unusable = [name for name, status in built.status.items() if status == "unusable"]
-    lines += [_unusable(name, built.refused.get(name, ())) for name in unusable]
+    lines += [": ".join(filter(None, ("unusable", name, "; ".join(built.refused.get(name, ()))))) for name in unusable]
     if dry_run:
         lines += [f"  {step}" for step in built.steps]
         for name, found in built.checked.items():

@@ -1,16 +1,7 @@
-"""Paths that a user gives and that must exist; one that cannot be looked at is not called missing.
+"""What all commands share: given paths, the output folder, results and progress, faults as text or JSON, exit statuses.
 
-Faults as lines of text: equal ones once, with their number, one example in full and the tests they concern.
-
-What happens beside a command: the system asks it to end, or a kept result turns out to be damaged.
-
-What a dry run found, in lines: the steps, then tests set aside, doubts and notes.
-
-Where a command writes: -o, --force and --wait, and the folder held as long as the command runs.
-
-What is recorded of a run: the command line, the time, the inputs and the options.
-
-Shared by all commands: common options, progress, errors as text or JSON, exit statuses.
+Results go to standard output, everything else to standard error. Faults are listed, equal ones once with their number,
+one example in full and the tests they concern. Nothing ends with a traceback.
 """
 
 from __future__ import annotations
@@ -21,6 +12,7 @@ import logging
 import math
 import os
 import re
+import shlex
 import shutil
 import signal
 import stat
@@ -31,6 +23,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -86,12 +79,16 @@ _SAME_BEGINNING = 24  # characters by which two sentences of one kind count as t
 
 def faults_text(problems: Sequence[Problem], *, all_of_them: bool = False) -> str:
     """The problems, equal ones grouped: an example in full, then the others by test or row."""
+    groups: dict[object, list[Problem]] = {}  # of one kind in one column, in the order of their first
+    for problem in problems:
+        groups.setdefault(_key(problem), []).append(problem)
     lines = []
-    for group in _groups(problems):
+    for group in groups.values():
+        full = [f"{p.test_id + ': ' if p.test_id else ''}{p}" for p in group]
         if all_of_them or len(group) < FEWEST_GROUPED:
-            lines += [f"  {_full(problem)}" for problem in group]
+            lines += [f"  {text}" for text in full]
         else:
-            lines += [f"  {len(group)} times, for example {_full(group[0])}", f"    also {_others(group[1:])}"]
+            lines += [f"  {len(group)} times, for example {full[0]}", f"    also {_others(group[1:])}"]
     return "\n".join(lines)
 
 
@@ -125,21 +122,9 @@ def set_aside_text(tests: Sequence[SetAside], *, all_of_them: bool = False) -> s
     return "\n".join(lines)
 
 
-def _groups(problems: Sequence[Problem]) -> list[list[Problem]]:
-    """Problems of one kind in one column together, in the order of their first."""
-    groups: dict[object, list[Problem]] = {}
-    for problem in problems:
-        groups.setdefault(_key(problem), []).append(problem)
-    return list(groups.values())
-
-
 def _key(problem: Problem) -> tuple[object, ...]:
     what = re.sub(r"^sample [^:]*: ", "", problem.what)
     return problem.kind, problem.column, re.sub(r"\d+", "#", what)[:_SAME_BEGINNING]
-
-
-def _full(problem: Problem) -> str:
-    return f"{problem.test_id + ': ' if problem.test_id else ''}{problem}"
 
 
 def _others(problems: Sequence[Problem]) -> str:
@@ -304,17 +289,11 @@ def provenance_of_run(study: Study, campaign: Path, chosen: StudyOptions) -> Pro
 
 
 def command_line() -> str:
-    import shlex
-    import sys
-
     return shlex.join(["tribo", *sys.argv[1:]])
 
 
 def now() -> str:
     """The time of this run, or that of SOURCE_DATE_EPOCH (reproducible-builds.org) where it is set."""
-    import os
-    from datetime import UTC, datetime
-
     fixed = os.environ.get("SOURCE_DATE_EPOCH")
     now = datetime.fromtimestamp(int(fixed), UTC) if fixed else datetime.now(UTC)
     return now.isoformat(timespec="seconds")
@@ -487,7 +466,10 @@ def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
         except (click.ClickException, BrokenPipeError):
             raise
         except Exception as why:
-            _report_faults(console, why)
+            problems = problems_of(why)
+            console.list_problems(problems)
+            if console.as_json:
+                click.echo(json.dumps({"problems": [asdict(p) for p in problems]}, indent=1, default=str))
             status = BUSY if isinstance(why, BusyError) else UNUSABLE
         except (KeyboardInterrupt, click.Abort):
             console.say("interrupted; finished results are kept and no file is incomplete", level=-1)
@@ -495,13 +477,6 @@ def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
         sys.exit(status or DONE)
 
     return command
-
-
-def _report_faults(console: Console, why: Exception) -> None:
-    problems = problems_of(why)
-    console.list_problems(problems)
-    if console.as_json:
-        click.echo(json.dumps({"problems": [asdict(p) for p in problems]}, indent=1, default=str))
 
 
 def problems_of(why: Exception) -> tuple[Problem, ...]:

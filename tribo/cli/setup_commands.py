@@ -1,9 +1,4 @@
-"""tribo init: a campaign to fill in, or one drafted from the exports at hand.
-
-State of this installation: versions, cores, optional packages.
-
-Speed as ratios measured in one run: each pair is timed alternately; the result is the median of the ratios.
-"""
+"""Commands around an analysis: tribo init, the state of an installation (doctor), speed as ratios (bench)."""
 
 from __future__ import annotations
 

@@ -1,13 +1,9 @@
-"""Commands that run the stages of a study on one campaign and write their results: ingest to report.
-
-tribo discover: the missing law.
-
-tribo compare-reports: two reports side by side.
-"""
+"""Commands on one campaign, and on two reports: each runs the stages and writes their results."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +16,7 @@ from tribo.cli.console import (
     Output,
     command_line,
     command_options,
+    dry_run_text,
     now,
     output_options,
     provenance_of_run,
@@ -41,6 +38,7 @@ from tribo.cli.study_options import (
     reading_options,
     with_reading_options,
 )
+from tribo.errors import FitError, TriboError, unexpected
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
@@ -259,6 +257,7 @@ def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool
     from tribo.campaign import open_campaign
     from tribo.report import write_until
     from tribo.report.drawing_choices import Drawing
+    from tribo.wording.card import card_of
 
     stated = options.pop("stated")
     chosen = stages.StudyOptions(kept=out.kept, **options)
@@ -268,25 +267,16 @@ def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool
         study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
         study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
         drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
-        card = _card(study, found) if until == "report" else None
+        verdict = found.verdict if found else None
+        card = card_of(study, verdict) if until == "report" else None
         write_until(study, out.path, until, drawing, provenance_of_run(study, path, chosen), found, card)
-    return _conclude(console, study, out.path, found.verdict if found else None, card)
-
-
-def _card(study: Study, found: Diagnosis | DiagnosisWithoutModel | None) -> Card:
-    from tribo.wording.card import card_of
-
-    return card_of(study, found.verdict if found is not None else None)
+    return _conclude(console, study, out.path, verdict, card)
 
 
 def _diagnosed(
     study: Study, chosen: StudyOptions, progress: Progress
 ) -> tuple[Study, Diagnosis | DiagnosisWithoutModel | None]:
     """The diagnosis of a study; a note instead where there is too little to diagnose."""
-    from dataclasses import replace
-
-    from tribo.errors import FitError, TriboError, unexpected
-
     try:
         return study, _diagnosis(study, chosen, progress)
     except FitError as why:
@@ -313,10 +303,8 @@ def _conclude(
     console: Console, study: Study, out: Path, verdict: Verdict | None = None, card: Card | None = None
 ) -> int:
     """Print the results and the tests set aside; return the exit status."""
-    from dataclasses import asdict
-
     from tribo.report.tables import fits_table
-    from tribo.wording.terminal import summary_text, table2_text
+    from tribo.wording.terminal import card_text, summary_text, table2_text, verdict_text
 
     set_aside = study.ingested.set_aside
     doubts = study.ingested.doubts()
@@ -336,10 +324,11 @@ def _conclude(
         "verdict": verdict.verdict if verdict else None,
         "card": card.as_dict() if card else None,
     }
-    table = [table2_text(study)] if study.fits else []
-    looks = ["\n".join(lines) for lines in (study.power, study.outlying) if lines]
-    words = [*_card_words(card), *table, summary_text(study), *_verdict_words(verdict), *looks]
-    console.result(record, "\n\n".join(words))
+    words = [
+        card_text(card) if card else "", table2_text(study) if study.fits else "", summary_text(study),
+        verdict_text(verdict) if verdict else "", "\n".join(study.power), "\n".join(study.outlying),
+    ]  # fmt: skip
+    console.result(record, "\n\n".join(filter(None, words)))
     console.list_doubts(study.doubts)
     for note in study.notes:
         console.say(f"note: {note}", level=-1)
@@ -347,32 +336,12 @@ def _conclude(
     return console.status_after(set_aside)
 
 
-def _card_words(card: Card | None) -> list[str]:
-    if card is None:
-        return []
-    from tribo.wording.terminal import card_text
-
-    return [card_text(card)]
-
-
-def _verdict_words(verdict: Verdict | None) -> list[str]:
-    if verdict is None:
-        return []
-    from tribo.wording.terminal import verdict_text
-
-    return [verdict_text(verdict)]
-
-
 def _checked(
     console: Console, path: Path, out: Output, until: DryUntil, chosen: StudyOptions,
     prepared: Callable[[Campaign], Campaign],
 ) -> int:  # fmt: skip
     """Print everything that a study of a campaign would meet, and the status it would end with."""
-    from dataclasses import replace
-
-    from tribo.cli.console import dry_run_text
     from tribo.dry_run import check
-    from tribo.errors import TriboError
 
     with console.progress() as progress:
         found = check(path, chosen, until, prepared, progress)
@@ -393,7 +362,7 @@ def _checked(
     help="Test this law, found in another campaign, instead of searching.",
 )
 @RULE
-@click.option("--flat", default="", metavar="SAMPLE", help="Flat sample for the calibration, as in tribo report.")
+@FLAT
 @command_options
 def discover(
     console: Console, campaign: Path, out: Output, law_file: Path | None, **options: Any

@@ -1,7 +1,4 @@
-"""Options of the command line that state how exports are read: columns, sign, gain, lever arm, sampling rate.
-
-Options of the commands that run the stages of a study: rule, weights, zeros, flat sample, model.
-"""
+"""Options that several commands share: how exports are read, rule, weights, zeros, flat sample, model."""
 
 from __future__ import annotations
 
@@ -93,6 +90,7 @@ def with_reading_options(campaign: Campaign, columns: str, stated: dict[str, flo
 
 CAMPAIGN = click.argument("campaign", type=GivenPath())
 OUT = output_options()
+RUNS = click.option("--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulations per load.")
 SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler; its workers run the simulations.")
 DRY_RUN = click.option("--dry-run", is_flag=True, help="Check everything and list the steps, without results.")
 
@@ -184,7 +182,7 @@ def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         FLAT,
         NO_MODEL,
-        click.option("--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulations per load."),
+        RUNS,
         SCHEDULER,
     ):
         function = option(function)
