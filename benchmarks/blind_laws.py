@@ -28,10 +28,10 @@ from tribo.diagnostics.diagnosis import examine
 from tribo.diagnostics.fit import fit
 from tribo.diagnostics.model import Acting, Setup, predict, setup
 from tribo.diagnostics.observations import observe
-from tribo.lawsearch.diagnosis_with_laws import searched_laws, uncontested
+from tribo.lawsearch.diagnosis_with_laws import explained, searched_laws
 from tribo.lawsearch.grammar import LOAD_TERM
 from tribo.lawsearch.known_laws import validate_law
-from tribo.lawsearch.model_choice import CauseForms, FoundLaw, centred
+from tribo.lawsearch.model_choice import CauseForms, FoundLaw, centred, without_refuted_causes
 from tribo.lawsearch.scoring import terms_of
 from tribo.lawsearch.search import Discovery
 from tribo.wording.law_sentences import held_sentence
@@ -146,8 +146,9 @@ def _band(law: FoundLaw, change: np.ndarray) -> tuple[float, float]:
     absorb; and the mean half width of the band."""
     true = centred(change, law.model.setup.observations.conditions, terms_of(law.model)[LOAD_TERM])
     either = (change != 0) | _acts(law)
-    held = (law.band.low <= true) & (true <= law.band.high)
-    return float(held[either].mean()), float((0.5 * (law.band.high - law.band.low))[either].mean())
+    _, low, high = law.band
+    held = (low <= true) & (true <= high)
+    return float(held[either].mean()), float((0.5 * (high - low))[either].mean())
 
 
 def _held_out(hidden: Hidden, law: FoundLaw, seed: int) -> tuple[float, float, float]:
@@ -184,7 +185,7 @@ def _pair(piece: Piece) -> dict[str, Any]:
     later = hide_law(seed, piece.second, piece.seed if same else None)
     kept = later.bench.column("repeat") <= KEPT
     d = examine(as_ingested(later.bench, seed, kept), seed=seed)
-    held = validate_law(uncontested(d).model, found.laws[0].law, found.laws[0].parameters)
+    held = validate_law(without_refuted_causes(explained(d))[0], found.laws[0].law, found.laws[0].parameters)
     return {
         "answer": held.answer, "second": piece.second, "text": held_sentence(held), "verdict": d.verdict.verdict,
         "strength": round(later.strength, 2),

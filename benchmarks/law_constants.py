@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -27,10 +27,11 @@ from blind.hidden_laws import FORMS, Hidden, as_ingested, hide_law  # isort: ski
 
 from tribo.diagnostics.diagnosis import examine
 from tribo.diagnostics.diagnosis_record import Diagnosis
-from tribo.lawsearch.diagnosis_with_laws import uncontested
+from tribo.lawsearch.diagnosis_with_laws import explained
 from tribo.lawsearch.grammar import WrittenLaw
-from tribo.lawsearch.model_choice import Searched, best_form
-from tribo.lawsearch.search import Grammar
+from tribo.lawsearch.model_choice import forms_in_reach, without_refuted_causes
+from tribo.lawsearch.scoring import Grammar
+from tribo.mechanisms.record import Conditions
 
 SEED = 7_701
 HOUSE = "tribo.lawsearch"
@@ -49,9 +50,14 @@ def _each(value: dict[bool, float], factor: float) -> dict[bool, float]:
     return {key: factor * each for key, each in value.items()}
 
 
-def _dearer(groups_of: Callable[..., Any], factor: float) -> Callable[..., Any]:
+def _dearer(scopes_of: Callable[..., Any], factor: float) -> Callable[..., Any]:
     """The choice of regime, term and samples at another price."""
-    return lambda c: [replace(group, cost=factor * group.cost) for group in groups_of(c)]
+
+    def priced(c: Conditions) -> Any:
+        scopes, cost = scopes_of(c)
+        return scopes, factor * cost
+
+    return priced
 
 
 @dataclass(frozen=True)
@@ -64,13 +70,13 @@ class Constant:
 
 
 CONSTANTS = {
-    "margin of a law over a mechanism": Constant("MARGIN", ("contested",), _each),
-    "margin of a law over a covariate": Constant("MARGIN_OF_COVARIATE", ("contested",), _each),
-    "cost of a place or width": Constant("PER_PARAMETER", ("settling",)),
-    "cost of regime, term and samples": Constant("groups_of", ("search", "contested"), _dearer),
-    "reach of forms that are looked at closely": Constant("IN_REACH", ("settling",)),
-    "forms that are looked at closely": Constant("LOOKED_AT", ("settling",), _whole),
-    "forms that are fitted in full": Constant("FITTED", ("settling",), _whole),
+    "margin of a law over a mechanism": Constant("MARGIN", ("model_choice",), _each),
+    "margin of a law over a covariate": Constant("MARGIN_OF_COVARIATE", ("model_choice",), _each),
+    "cost of a place or width": Constant("PER_PARAMETER", ("model_choice",)),
+    "cost of regime, term and samples": Constant("scopes_of", ("scoring",), _dearer),
+    "reach of forms that are looked at closely": Constant("IN_REACH", ("model_choice",)),
+    "forms that are looked at closely": Constant("LOOKED_AT", ("model_choice",), _whole),
+    "forms that are fitted in full": Constant("FITTED", ("model_choice",), _whole),
 }
 VARIANTS = [("as it is", 1.0), *((name, factor) for name in CONSTANTS for factor in (0.5, 2.0))]
 
@@ -90,9 +96,8 @@ def _right(d: Diagnosis, hidden: Hidden, name: str, factor: float) -> list[bool]
             module = import_module(f"{HOUSE}.{room}")
             changed = constant.change(getattr(module, constant.name), factor) if constant is not None else None
             stack.enter_context(patch.object(module, constant.name if constant is not None else "", changed))
-        model = uncontested(d).model
-        grammar = Grammar.of(model, ())
-        form, _ = best_form(model, Searched(grammar.courses, grammar.groups))
+        model, _, _ = without_refuted_causes(explained(d))
+        _, (form, *_) = forms_in_reach(model, Grammar.of(model))
     return [*_judged(form.best, d, hidden), len(model.acting) == 0]
 
 

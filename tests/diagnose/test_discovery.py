@@ -21,11 +21,11 @@ from tribo.errors import CampaignError
 from tribo.figures.extended_model import draw_law, law_numbers, law_numbers_of
 from tribo.lawsearch import diagnosis_with_laws
 from tribo.lawsearch.diagnosis_with_laws import law_layers, searched_laws, separating_test, with_laws, with_misfits
-from tribo.lawsearch.grammar import ADHESION_TERM, LOAD_TERM, UNITS, Shape, WrittenLaw, groups_of, shapes_of
+from tribo.lawsearch.grammar import ADHESION_TERM, LOAD_TERM, UNITS, Shape, WrittenLaw, scopes_of, shapes_of
 from tribo.lawsearch.known_laws import validate_law
 from tribo.lawsearch.law_file import law_text, read_law
-from tribo.lawsearch.scoring import Projection
-from tribo.lawsearch.search import RESCORED, Discovery, Grammar, best_of, discover_laws
+from tribo.lawsearch.scoring import Grammar, Projection
+from tribo.lawsearch.search import RESCORED, Discovery, best_of, discover_laws
 from tribo.mechanisms.record import Base, Conditions
 from tribo.mechanisms.table import MECHANISMS
 from tribo.wording.law_sentences import discovery_sentence, held_sentence, law_sentence, size_sentence
@@ -63,7 +63,7 @@ def test_a_law_that_lowers_friction_has_a_negative_size_and_interval() -> None:
 def test_a_law_of_the_pressure_alone_acts_on_several_patterns_or_on_none() -> None:
     model = baseline(made(nothing, seed=3))
     grammar = Grammar.of(model, ())
-    shapes, groups = grammar.courses.shapes, grammar.groups
+    shapes, groups = grammar.courses.shapes, grammar.scopes
     net = grammar.net(Projection(model.linear, model.linear.residual[None]))[0].reshape(len(groups), len(shapes))
     allowed = {
         groups[g].where
@@ -228,9 +228,10 @@ def test_a_law_is_read_as_it_was_written(found: Discovery, tmp_path: Path) -> No
     law = found.laws[0]
     path = tmp_path / "law.toml"
     path.write_text(law_text(law.law, law.parameters, 'series "7"\n[x]'), encoding="utf-8")
-    again, parameters = read_law(path)
-    assert again == law.law or exact_text(again) == exact_text(law.law)
-    assert parameters == law.parameters
+    again = read_law(path)
+    assert again.law == law.law or exact_text(again.law) == exact_text(law.law)
+    assert again.parameters == law.parameters
+    assert again.found_in == 'series "7"\n[x]'
 
 
 def test_faults_of_a_law_are_named_all_at_once(tmp_path: Path) -> None:
@@ -273,8 +274,8 @@ def test_every_law_of_the_grammar_leaves_the_forces_alone_at_zero_amplitude() ->
     base = Base(4.0 * ones, 1e-3 * ones, 3.0 * ones, 5e-4 * ones)
     before = base.forces(c.normal_load_N)
     for shapes, _ in shapes_of(c)[::7]:
-        for group in groups_of(c)[::5]:
-            mechanism = group.law(shapes).mechanism()
+        for scope in scopes_of(c)[0][::5]:
+            mechanism = replace(scope, shapes=shapes).mechanism()
             after = mechanism.law(mechanism.zero(), base, c, "")
             np.testing.assert_allclose(after.static_N, before.static_N, rtol=1e-12)
             np.testing.assert_allclose(after.sliding_N, before.sliding_N, rtol=1e-12)

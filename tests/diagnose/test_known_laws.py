@@ -14,12 +14,12 @@ from tribo.diagnostics.diagnosis import examine
 from tribo.diagnostics.model import Acting, Setup
 from tribo.diagnostics.verdict import Cause, Estimate, Layer, Verdict
 from tribo.errors import CampaignError, SimulationError
-from tribo.lawsearch import model_choice as contested
+from tribo.lawsearch import model_choice
 from tribo.lawsearch.diagnosis_with_laws import with_laws, without_causes
 from tribo.lawsearch.grammar import Shape, WrittenLaw
-from tribo.lawsearch.known_laws import KnownLaw, plan_law, read_laws, validate_law, validate_laws
-from tribo.lawsearch.law_file import law_text
-from tribo.lawsearch.model_choice import without_wrong_forms
+from tribo.lawsearch.known_laws import plan_law, read_laws, validate_law, validate_laws
+from tribo.lawsearch.law_file import KnownLaw, law_text
+from tribo.lawsearch.model_choice import without_refuted_causes
 from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model import columns_from, with_law
 from tribo.springblock.config import SimConfig
@@ -118,8 +118,8 @@ def test_a_mechanism_whose_form_is_wrong_loses_against_a_law_of_its_column() -> 
     temperature = Acting(MECHANISMS["temperature"])
     wrong = refitted(baseline(made(curved, seed=33)), [temperature])
     right = refitted(baseline(made(warming, seed=33)), [temperature])
-    assert set(without_wrong_forms(wrong).lost) == {"temperature"}
-    assert without_wrong_forms(right).lost == {}
+    assert set(without_refuted_causes(wrong)[1]) == {"temperature"}
+    assert without_refuted_causes(right)[1] == {}
 
 
 def test_a_cause_that_follows_one_name_of_a_column_loses_against_a_law_of_that_name_on_some_samples() -> None:
@@ -130,8 +130,8 @@ def test_a_cause_that_follows_one_name_of_a_column_loses_against_a_law_of_that_n
     one_name = [Acting(MECHANISMS["covariate"], "operator is op2")]
     everywhere = made(lambda s: by_op2(s, np.ones(s.observations.n, bool)), seed=33)
     patterned = made(lambda s: by_op2(s, s.observations.conditions.area_fraction < 1.0), seed=33)
-    assert without_wrong_forms(refitted(baseline(everywhere), one_name)).lost == {}
-    assert set(without_wrong_forms(refitted(baseline(patterned), one_name)).lost) == {"covariate:operator"}
+    assert without_refuted_causes(refitted(baseline(everywhere), one_name))[1] == {}
+    assert set(without_refuted_causes(refitted(baseline(patterned), one_name))[1]) == {"covariate:operator"}
 
 
 def test_other_forms_of_a_recorded_column_that_explain_as_much_are_told_with_its_cause() -> None:
@@ -145,7 +145,7 @@ def test_other_forms_of_a_recorded_column_that_explain_as_much_are_told_with_its
     tests = tuple(replace(t, covariates={"film_um": str(film_of(t.test_id))}) for t in plain.campaign.tests)
     filmed = replace(plain, campaign=replace(plain.campaign, tests=tests))
     line = refitted(baseline(filmed), [Acting(MECHANISMS["covariate"], "film_um")])
-    (forms,) = without_wrong_forms(line).forms
+    _, _, (forms,) = without_refuted_causes(line)
     assert forms.cause == "covariate:film_um"
     assert forms.law.form == ((("linear", "film_um", ""),), "T", "both", "all")
     assert "saturating" in {tie.shapes[0].kind for tie in forms.ties}
@@ -157,9 +157,9 @@ def test_other_forms_of_a_recorded_column_that_explain_as_much_are_told_with_its
 def test_a_law_of_the_same_column_has_to_be_better_by_more_than_one_of_another_column(
     own_column: bool, by: float, lost: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(contested, "_best_laws", lambda model, together: contested._BestLaws(by, own_column, ()))
+    monkeypatch.setattr(model_choice, "_laws_instead", lambda model, together: (by, own_column, ()))
     model = refitted(baseline(made(warming, seed=33)), [Acting(MECHANISMS["temperature"])])
-    assert set(without_wrong_forms(model).lost) == ({"temperature"} if lost else set())
+    assert set(without_refuted_causes(model)[1]) == ({"temperature"} if lost else set())
 
 
 def undetermined() -> Verdict:

@@ -7,8 +7,7 @@ import pytest
 
 from tribo.diagnostics.fit import ModelFit
 from tribo.lawsearch.grammar import fine_shapes, refined_shapes, shapes_of
-from tribo.lawsearch.scoring import Projection
-from tribo.lawsearch.search import Grammar
+from tribo.lawsearch.scoring import Grammar, Projection
 from tribo.mechanisms.record import Conditions
 
 from .known import baseline, made
@@ -31,7 +30,7 @@ def test_laws_scored_together_score_as_each_does_alone(model: ModelFit) -> None:
     one_column = np.flatnonzero(~np.isin(np.arange(laws.size) % len(laws.courses.shapes), laws.courses.two))
     some = one_column[:: len(one_column) // 60]
     groups, shapes = np.divmod(some, len(laws.courses.shapes))
-    columns = [laws.courses.column(k) * laws.acts_of_each[g] for g, k in zip(groups, shapes, strict=True)]
+    columns = [laws.courses.column(k) * laws.effects[g] for g, k in zip(groups, shapes, strict=True)]
     left, residual = model.linear.cleared(np.stack(columns, axis=2))
     alone = 0.5 * (left.T @ residual) ** 2 / np.sum(left**2, axis=0) - laws.cost(some)
     assert together[some] == pytest.approx(alone, abs=1e-6)

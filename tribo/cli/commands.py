@@ -92,7 +92,7 @@ def plan(console: Console, campaign: Path, law_file: Path | None, **_: Any) -> N
     law = read_law(law_file) if law_file is not None else None
     with open_campaign(campaign, measured=False) as opened:
         planned = plan_design(opened)
-        shown = plan_law(opened, *law) if law is not None else None
+        shown = plan_law(opened, law.law, law.parameters) if law is not None else None
     findings = [asdict(f) | {"why": why_not_found(f)} for f in planned.findings]
     record = {"tests": planned.n_tests, "findings": findings, "tied": planned.tied}
     if shown is not None:

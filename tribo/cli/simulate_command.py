@@ -162,8 +162,9 @@ def _laws_in(text: str) -> tuple[tuple[tuple[WrittenLaw, tuple[float, ...]], ...
     files = [Path(item.strip()) for item in items if item.strip().endswith(".toml")]
     laws = []
     for file in files:
-        law, parameters = read_law(file)
-        laws.append((law, tuple(parameters[p.name].value for p in law.mechanism().parameters)))
+        known = read_law(file)
+        values = tuple(known.parameters[p.name].value for p in known.law.mechanism().parameters)
+        laws.append((known.law, values))
     return tuple(laws), ",".join(item for item in items if not item.strip().endswith(".toml"))
 
 

@@ -386,7 +386,7 @@ def discover(
         record = provenance_of_run(study, campaign, chosen)
         with stages.naming_set_aside(study.ingested):
             if law is not None:
-                held = validate_on_campaign(study.ingested, *law, seed=chosen.seed)
+                held = validate_on_campaign(study.ingested, law, seed=chosen.seed)
                 written = write_validation(held, out.path, record)
             else:
                 found = discover_on_campaign(study.ingested, seed=chosen.seed, progress=progress)

@@ -156,7 +156,7 @@ def _of_law(number: int, found: FoundLaw) -> pd.DataFrame:
     c = s.observations.conditions
     left = found.model.residual - s.random_effects.on_tests(found.model.effects)
     change = effect_of(s, found.model.law, found.model.acting[-1], found.model.values[-1])
-    half = 0.5 * (found.band.high - found.band.low)
+    half = 0.5 * (found.band[2] - found.band[1])
     x, names = _abscissa(found)
     acts = law.weight(c) != 0
     parts = []

@@ -14,11 +14,12 @@ from tribo.diagnostics.diagnosis import examine
 from tribo.diagnostics.diagnosis_record import Diagnosis
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.planning import HOURS_PER_PULL, PULLS, first_test_of
-from tribo.diagnostics.verdict import CERTAIN_CAUSES, Estimate, Excluded, Layer, Misfit, NextTest, Outcome, Verdict
+from tribo.diagnostics.verdict import CERTAIN_CAUSES, Excluded, Layer, Misfit, NextTest, Outcome, Verdict
 from tribo.lawsearch.across_patterns import CERTAIN, AcrossPatterns, across_patterns, deviations_of
 from tribo.lawsearch.grammar import PRESSURES, WrittenLaw, column_values
-from tribo.lawsearch.known_laws import KnownLaw, ValidatedLaws, Validation, law_layer, validate_law, validate_laws
-from tribo.lawsearch.model_choice import CauseForms, Contested, FoundLaw, without_wrong_forms
+from tribo.lawsearch.known_laws import ValidatedLaws, Validation, law_layer, validate_law, validate_laws
+from tribo.lawsearch.law_file import KnownLaw
+from tribo.lawsearch.model_choice import CauseForms, FoundLaw, without_refuted_causes
 from tribo.lawsearch.search import Discovery, Progress, discover_laws
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray, Ingested
@@ -45,18 +46,18 @@ def with_laws(
     sample, say, may not show in any look at the whole campaign.
     """
     rng = np.random.default_rng(seed)
-    contested = uncontested(d)
-    d = replace(d, verdict=with_forms_of_causes(d.verdict, contested.forms, contested.model))
-    tested = validate_laws(contested.model, known, rng)
+    standing, lost, forms = without_refuted_causes(explained(d))
+    d = replace(d, verdict=with_forms_of_causes(d.verdict, forms, standing))
+    tested = validate_laws(standing, known, rng)
     strict = LEVEL_OF_LAWS * level
     found = discover_laws(tested.model, level=strict, rng=rng, progress=progress, without=tested.columns)
-    found = replace(found, of_causes=contested.forms)
+    found = replace(found, of_causes=forms)
     if not found.laws and not tested.layers:
         return replace(d, verdict=with_tested(d.verdict, tested), laws=found)
     model = found.laws[-1].model if found.laws else tested.model
     allowed = len(tested.model.acting) if found.laws else 0
     left = screen_left(model, replicates=REPLICATES_LEFT, rng=rng, progress=progress, allowed=allowed)
-    gone = {**(contested.lost if found.laws else {}), **tested.replaced}
+    gone = {**(lost if found.laws else {}), **tested.replaced}
     verdict = with_tested(with_misfits(without_causes(d.verdict, gone), found), tested)
     return replace(d, laws=found, verdict=_extended(verdict, (tested, found), model, (left, level)))
 
@@ -74,16 +75,17 @@ def searched_laws(d: Diagnosis, *, seed: int = 0, level: float = 0.01, progress:
 
     ``level`` is that of a misfit; a law has to be beyond chance at LEVEL_OF_LAWS times it.
     """
-    strict, contested = LEVEL_OF_LAWS * level, uncontested(d)
-    found = discover_laws(contested.model, level=strict, rng=np.random.default_rng(seed), progress=progress)
-    return replace(found, of_causes=contested.forms)
+    model, _, forms = without_refuted_causes(explained(d))
+    found = discover_laws(model, level=LEVEL_OF_LAWS * level, rng=np.random.default_rng(seed), progress=progress)
+    return replace(found, of_causes=forms)
 
 
 def validate_on_campaign(
-    ingested: Ingested, law: WrittenLaw, parameters: Mapping[str, Estimate], *, seed: int = 0, level: float = 0.01
+    ingested: Ingested, known: KnownLaw, *, seed: int = 0, level: float = 0.01
 ) -> Validation:
     """Whether a law of another campaign holds in this one, its own causes taken into account."""
-    return validate_law(uncontested(examine(ingested, seed=seed, level=level)).model, law, parameters)
+    model, _, _ = without_refuted_causes(explained(examine(ingested, seed=seed, level=level)))
+    return validate_law(model, known.law, known.parameters)
 
 
 def with_tested(v: Verdict, tested: ValidatedLaws) -> Verdict:
@@ -99,15 +101,9 @@ def explained(d: Diagnosis) -> ModelFit:
     return d.named.model if d.named is not None and certain else d.baseline
 
 
-def uncontested(d: Diagnosis) -> Contested:
-    """The model with the causes that no law of their own columns replaces, and those that are replaced."""
-    model = explained(d)
-    return without_wrong_forms(model) if model.acting else Contested(model, {}, ())
-
-
 def with_forms_of_causes(v: Verdict, forms: Sequence[CauseForms], model: ModelFit) -> Verdict:
-    """The verdict with the other forms that a recorded column among its causes may have, and the test that parts them
-    where it proposes none."""
+    """The verdict with the other forms that a recorded column among its causes may have, and the test that separates
+    them where it proposes none."""
     tied = {f.cause: f for f in forms if f.ties}
     if not tied:
         return v

@@ -1,12 +1,13 @@
-"""A law of the grammar: what it follows, its shape, what it acts on, in which regime and where; as a mechanism.
+"""Laws of recorded columns: a law as a mechanism, and all laws that a design allows.
 
-All laws that a design allows: column x shape x what it acts on x regime x where, and products of two columns.
+A law is a column x a shape x what it acts on x a regime x where; or a product of two columns.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 
@@ -92,6 +93,8 @@ class Shape:
 class WrittenLaw:
     """One law: the product of one or two shapes, acting on T or on one term of it, in a regime, on some samples.
 
+    Without shapes it is a scope: what laws act on, in which regime and where.
+
     ``where`` is ALL, PATTERNED, FLAT, the name of a sample after "sample ", or a property of the pattern in proportion
     to which it acts (CAVITY_SHARE, RIM, ELONGATION; the latter two over ``where_scale``).
     """
@@ -146,11 +149,17 @@ class WrittenLaw:
         needs = tuple(name for name in self.columns if name in UNITS and not name.endswith("pressure_Pa"))
         return Mechanism(
             name=f"law {self.formula()} ({self.regime}, {self.where})", kind="any", formula=self.formula(),
-            parameters=tuple(parameters), law=ActingLaw(self), sign=0,
+            parameters=tuple(parameters), law=self, sign=0,
             regimes=REGIMES if self.regime == BOTH else (self.regime,),
             enters="the friction forces", shows="", confused_with="", separates="", needs=needs,
             choosing=Choosing(held_out="loads" if self.where.startswith("sample ") else "samples"),
         )  # fmt: skip
+
+    def __call__(self, values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
+        """The forces under the law, as a mechanism calls for them."""
+        course = self.course(conditions)
+        change = course @ values[: course.shape[1]] * self.weight(conditions)
+        return self.changed(base, conditions.normal_load_N, change)
 
     def changed(self, base: Base, load_N: FloatArray, change: FloatArray) -> Forces:
         """The forces with ``change`` (n,) of ln T, or of the logarithm of the term it acts on."""
@@ -175,18 +184,6 @@ class WrittenLaw:
             return f"{self.acts_on} * exp(a sin({turns}) + b cos({turns}))"
         inner = " * ".join(_formula(s) for s in self.shapes)
         return f"{self.acts_on} * exp({a} {inner}{weight})"
-
-
-@dataclass(frozen=True)
-class ActingLaw:
-    """The forces under a law, as a mechanism calls for them; a record, so that it can be kept and sent to workers."""
-
-    law: WrittenLaw
-
-    def __call__(self, values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
-        course = self.law.course(conditions)
-        change = course @ values[: course.shape[1]] * self.law.weight(conditions)
-        return self.law.changed(base, conditions.normal_load_N, change)
 
 
 def _formula(s: Shape) -> str:
@@ -224,14 +221,11 @@ def column_values(c: Conditions, name: str) -> FloatArray:
     """
     if name in UNITS:
         return np.asarray(getattr(c, name), float)
-    return np.array([_number(text) for text in c.columns[name]])
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return float("nan")
+    values = np.full(len(c.columns[name]), np.nan)
+    for k, text in enumerate(c.columns[name]):
+        with suppress(ValueError):
+            values[k] = float(text)
+    return values
 
 
 DAY_S = 86400.0
@@ -250,34 +244,17 @@ ALIKE = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Group:
-    """Laws that differ by their shapes alone: what they act on, in which regime and where."""
+def shapes_of(c: Conditions, without: Collection[str] = ()) -> list[tuple[tuple[Shape, ...], float]]:
+    """Shapes of one column and products of two, each with what its choice costs; ``without`` some columns.
 
-    acts_on: str
-    regime: str
-    where: str
-    where_scale: float
-    cost: float
-
-    def law(self, shapes: tuple[Shape, ...]) -> WrittenLaw:
-        return WrittenLaw(shapes, self.acts_on, self.regime, self.where, self.where_scale)
-
-
-def numeric_columns(c: Conditions) -> dict[str, FloatArray]:
-    """Columns of numbers that take at least two values; missing values stay NaN."""
-    found = {}
+    A column of numbers has values for half of the tests at least, and two different ones; missing values stay NaN.
+    """
+    columns = {}
     for name in (*UNITS, *c.columns):
         values = column_values(c, name)
         known = values[np.isfinite(values)]
-        if len(known) >= 0.5 * len(values) and len(np.unique(known)) > 1:
-            found[name] = values
-    return found
-
-
-def shapes_of(c: Conditions, without: Collection[str] = ()) -> list[tuple[tuple[Shape, ...], float]]:
-    """Shapes of one column and products of two, each with what its choice costs; ``without`` some columns."""
-    columns = {name: values for name, values in numeric_columns(c).items() if name not in without}
+        if name not in without and len(known) >= 0.5 * len(values) and len(np.unique(known)) > 1:
+            columns[name] = values
     found: list[tuple[tuple[Shape, ...], float]] = []
     monotone: dict[str, list[Shape]] = {}
     for name, values in columns.items():
@@ -285,10 +262,11 @@ def shapes_of(c: Conditions, without: Collection[str] = ()) -> list[tuple[tuple[
         monotone[name] = [replace(s, place=float("nan")) for s in each if s.kind in ("linear", "log")]
         kinds = [s.kind for s in each]
         found += [((s,), float(np.log(kinds.count(s.kind)))) for s in each]
-    for name, names in _named_columns(c).items():
-        if name in without:
-            continue
-        found += [((Shape("level", name, level=level),), float(np.log(len(names)))) for level in names]
+    for name, column in c.columns.items():
+        names = [str(v) for v in np.unique(column) if v]
+        if name not in without and 1 < len(names) <= LEVELS and np.isnan(column_values(c, name)).all():
+            names = names if len(names) > 2 else names[1:]
+            found += [((Shape("level", name, level=level),), float(np.log(len(names)))) for level in names]
     pairs = [p for p in combinations(columns, 2) if not any(set(p) <= alike for alike in ALIKE)]
     products = [(one, other) for a, b in pairs for one in monotone[a] for other in monotone[b]]
     # the column of a law is free of charge; a product pays for the choice of its second column and of both shapes
@@ -413,50 +391,33 @@ def refined_shapes(s: Shape, c: Conditions) -> list[Shape]:
     return [replace(s, place=float(p), width=w) for p in np.unique(places) for w in widths if p != s.high]
 
 
-def _named_columns(c: Conditions) -> dict[str, list[str]]:
-    found = {}
-    for name, column in c.columns.items():
-        names = [str(v) for v in np.unique(column) if v]
-        if 1 < len(names) <= LEVELS and np.isnan(column_values(c, name)).all():
-            found[name] = names if len(names) > 2 else names[1:]
-    return found
+def scopes_of(c: Conditions) -> tuple[tuple[WrittenLaw, ...], FloatArray]:
+    """What laws may act on, in which regime and where; with what the choice of each costs."""
+    samples = np.unique(c.sample)
+    places: list[tuple[str, float]] = []  # besides everywhere, with the scale of the property
+    if len(samples) > 1:
+        places = [(f"sample {name}", 1.0) for name in samples]
+        patterned = c.area_fraction < 1.0
+        if patterned.any() and not patterned.all():
+            places += [(PATTERNED, 1.0), (FLAT, 1.0)]
+        if len(np.unique(c.area_fraction)) > 2:
+            places += [(CAVITY_SHARE, 1.0), (RIM, float(c.rim_per_m.max()))]
+        if len(np.unique(c.elongation)) > 1:
+            places.append((ELONGATION, float(np.abs(c.elongation).max())))
+    everywhere = [(ALL, 1.0, 0.0), *((name, scale, float(np.log(len(places)))) for name, scale in places)]
+    found, costs = [], []
+    for regime, chosen in ((BOTH, 0.0), ("static", float(np.log(2))), ("sliding", float(np.log(2)))):
+        for acts_on in (T, LOAD_TERM, ADHESION_TERM):
+            for where, scale, cost in everywhere:
+                if acts_on == T or where in (ALL, PATTERNED):
+                    found.append(WrittenLaw((), acts_on, regime, where, scale))
+                    costs.append(chosen + cost if acts_on == T else chosen + cost + float(np.log(2)))
+    return tuple(found), np.array(costs)
 
 
-def groups_of(c: Conditions) -> list[Group]:
-    """What laws may act on, in which regime and where."""
-    places = _places(c)
-    sides = [(ALL, 1.0, 0.0), *((name, scale, float(np.log(len(places)))) for name, scale in places)]
-    found = []
-    for regime, chosen in ((BOTH, 0.0), ("static", np.log(2)), ("sliding", np.log(2))):
-        found += [Group(T, regime, name, scale, float(chosen) + cost) for name, scale, cost in sides]
-        for acts_on in (LOAD_TERM, ADHESION_TERM):
-            found += [
-                Group(acts_on, regime, name, scale, float(chosen) + cost + float(np.log(2)))
-                for name, scale, cost in sides
-                if name in (ALL, PATTERNED)
-            ]
-    return found
-
-
-def corrects_a_pattern(groups: Sequence[Group], shapes: Sequence[tuple[Shape, ...]]) -> NDArray[np.bool_]:
-    """Which laws, (groups, shapes), follow the pressure alone on one sample, or by the elongation, which two samples
+def corrects_a_pattern(scopes: Sequence[WrittenLaw], shapes: Sequence[tuple[Shape, ...]]) -> NDArray[np.bool_]:
+    """Which laws, (scopes, shapes), follow the pressure alone on one sample, or by the elongation, which two samples
     have at most: no laws of their own, since they say how wrong the model is about that pattern."""
-    one = np.array([group.where == ELONGATION or group.where.startswith("sample ") for group in groups])
+    one = np.array([scope.where == ELONGATION or scope.where.startswith("sample ") for scope in scopes])
     pressure_alone = np.array([{s.column for s in each} <= PRESSURES for each in shapes], bool)
     return one[:, None] & pressure_alone
-
-
-def _places(c: Conditions) -> list[tuple[str, float]]:
-    """Where a law may act, besides everywhere, with the scale of the property."""
-    samples = np.unique(c.sample)
-    if len(samples) < 2:
-        return []
-    found = [(f"sample {name}", 1.0) for name in samples]
-    patterned = c.area_fraction < 1.0
-    if patterned.any() and not patterned.all():
-        found += [(PATTERNED, 1.0), (FLAT, 1.0)]
-    if len(np.unique(c.area_fraction)) > 2:
-        found += [(CAVITY_SHARE, 1.0), (RIM, float(c.rim_per_m.max()))]
-    if len(np.unique(c.elongation)) > 1:
-        found.append((ELONGATION, float(np.abs(c.elongation).max())))
-    return found

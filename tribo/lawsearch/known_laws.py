@@ -1,9 +1,4 @@
-"""Whether a law of one campaign validate_law in another one.
-
-Laws of earlier campaigns: read from a folder, tested on a campaign, and added to it where they hold.
-
-Before anything is measured: whether a design would show a law of an earlier campaign.
-"""
+"""Laws of earlier campaigns: whether they hold in another one, and whether a design would show them."""
 
 from __future__ import annotations
 
@@ -25,7 +20,7 @@ from tribo.diagnostics.verdict import Estimate, Layer
 from tribo.errors import CampaignError, Problem
 from tribo.files import found_below
 from tribo.lawsearch.grammar import BOTH, UNITS, WrittenLaw
-from tribo.lawsearch.law_file import read_law, read_title
+from tribo.lawsearch.law_file import KnownLaw, read_law
 from tribo.lawsearch.model_choice import without_rivals
 from tribo.mechanisms.record import Conditions
 from tribo.records import REGIMES, Campaign
@@ -106,16 +101,6 @@ def why_not_testable(c: Conditions, law: WrittenLaw) -> Untested | None:
 
 
 @dataclass(frozen=True)
-class KnownLaw:
-    """A law of an earlier campaign: the ``name`` of its file, the title of the campaign, and its parameters."""
-
-    name: str
-    found_in: str
-    law: WrittenLaw
-    parameters: Mapping[str, Estimate]
-
-
-@dataclass(frozen=True)
 class ValidatedLaws:
     """The answers of a campaign about known laws, the layers of those that held, and the model with these.
 
@@ -145,11 +130,9 @@ def read_laws(folder: Path) -> tuple[KnownLaw, ...]:
     problems: list[Problem] = []
     for path in found_below(folder, "law*.toml"):
         try:
-            law, parameters = read_law(path)
+            found.append(replace(read_law(path), name=str(path.relative_to(folder))))
         except CampaignError as why:
             problems += why.problems
-            continue
-        found.append(KnownLaw(str(path.relative_to(folder)), read_title(path), law, parameters))
     if not found and not problems:
         problems = [Problem("no_laws", "no law in this folder", file=str(folder), allowed="files such as law-1.toml")]
     if problems:

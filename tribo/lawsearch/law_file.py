@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -77,56 +80,50 @@ assert {T, LOAD_TERM, ADHESION_TERM, BOTH} == {"T", "load term", "adhesion term"
 
 def law_text(law: WrittenLaw, parameters: Mapping[str, Estimate], found_in: str) -> str:
     """law.toml of a law with its parameters, found in the campaign of this title."""
+    quoted = partial(json.dumps, ensure_ascii=True)  # escapes of JSON are escapes of TOML
     lines = [
-        f"schema = {_text(SCHEMA)}", f"formula = {_text(law.formula())}", f"found_in = {_text(found_in)}",
-        f"acts_on = {_text(law.acts_on)}", f"regime = {_text(law.regime)}", f"where = {_text(law.where)}",
+        f"schema = {quoted(SCHEMA)}", f"formula = {quoted(law.formula())}", f"found_in = {quoted(found_in)}",
+        f"acts_on = {quoted(law.acts_on)}", f"regime = {quoted(law.regime)}", f"where = {quoted(law.where)}",
         f"where_scale = {law.where_scale!r}",
     ]  # fmt: skip
     for s in law.shapes:
-        lines += ["", "[[shape]]", f"kind = {_text(s.kind)}", f"column = {_text(s.column)}"]
+        lines += ["", "[[shape]]", f"kind = {quoted(s.kind)}", f"column = {quoted(s.column)}"]
         lines += [f"low = {s.low!r}", f"high = {s.high!r}"]
         lines += [f"{name} = {value!r}" for name, value in (("place", s.place), ("width", s.width)) if value == value]
-        lines += [f"level = {_text(s.level)}"] if s.level else []
+        lines += [f"level = {quoted(s.level)}"] if s.level else []
     for name, e in parameters.items():
         lines += ["", f"[parameters.{name}]", f"value = {e.value!r}", f"low = {e.low!r}", f"high = {e.high!r}"]
-        lines += [f"unit = {_text(e.unit)}"]
+        lines += [f"unit = {quoted(e.unit)}"]
     return "\n".join(lines) + "\n"
 
 
-def _text(value: str) -> str:
-    """A TOML string: escapes of JSON are escapes of TOML."""
-    import json
+@dataclass(frozen=True)
+class KnownLaw:
+    """A law of an earlier campaign: the ``name`` of its file, the title of the campaign, and its parameters."""
 
-    return json.dumps(value, ensure_ascii=True)
+    name: str
+    found_in: str
+    law: WrittenLaw
+    parameters: Mapping[str, Estimate]
 
 
-def read_law(path: Path) -> tuple[WrittenLaw, dict[str, Estimate]]:
-    """The law of a law.toml and its parameters.
+def read_law(path: Path) -> KnownLaw:
+    """The law of a law.toml.
 
     Raises
     ------
     CampaignError
         The file is no law, with every fault of it.
     """
-    table = _table(path)
-    law = WrittenLaw(
-        tuple(s.shape() for s in table.shape), table.acts_on, table.regime, table.where, table.where_scale
-    )
-    parameters = {name: Estimate(p.value, p.low, p.high, p.unit) for name, p in table.parameters.items()}
-    return law, parameters
-
-
-def read_title(path: Path) -> str:
-    """The title of the campaign that a law was found in; raises as :func:`read_law`."""
-    return _table(path).found_in
-
-
-def _table(path: Path) -> LawTable:
     try:
-        return LawTable.model_validate(tomllib.loads(text_of(path)))
+        table = LawTable.model_validate(tomllib.loads(text_of(path)))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as why:
         raise CampaignError(Problem("bad_toml", f"not a TOML file: {why}", file=path.name)) from None
     except ValidationError as why:
         raise CampaignError(
             Problem("bad_law", e["msg"], file=path.name, column=".".join(map(str, e["loc"]))) for e in why.errors()
         ) from None
+    shapes = tuple(s.shape() for s in table.shape)
+    law = WrittenLaw(shapes, table.acts_on, table.regime, table.where, table.where_scale)
+    parameters = {name: Estimate(p.value, p.low, p.high, p.unit) for name, p in table.parameters.items()}
+    return KnownLaw(path.name, table.found_in, law, parameters)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,13 +11,25 @@ from numpy.typing import NDArray
 
 from tribo.diagnostics.fit import Linear, ModelFit, whitened
 from tribo.diagnostics.model import Setup, log_forces
-from tribo.diagnostics.score_statistics import TAKEN_UP, cleared
-from tribo.lawsearch.grammar import ADHESION_TERM, LOAD_TERM, Group, Shape, WrittenLaw
+from tribo.diagnostics.scatter import Replicates
+from tribo.diagnostics.score_statistics import TAKEN_UP, cleared, columns_in, scores
+from tribo.lawsearch.grammar import (
+    ADHESION_TERM,
+    LOAD_TERM,
+    Shape,
+    WrittenLaw,
+    corrects_a_pattern,
+    scopes_of,
+    shapes_of,
+)
 from tribo.mechanisms.record import Conditions
 from tribo.records import REGIMES, FloatArray
 
-AT_ONCE = 500  # columns
+COLUMNS_AT_ONCE = 500
 Index = NDArray[np.int64]
+# How scopes act, sample by sample: its tests (t,), and of each scope the share (scopes, b) of a few common courses
+# (b, t, 2). Within a sample scopes differ by regime and by the term of T alone, so that few courses make up all.
+Acts = tuple[tuple[Index, FloatArray, FloatArray], ...]
 
 
 @dataclass(frozen=True)
@@ -32,7 +44,7 @@ class Courses:
     cost: FloatArray
     first: FloatArray
     second: FloatArray
-    two: FloatArray
+    two: Index
 
     @cached_property
     def by_form(self) -> tuple[Index, Index, Index]:
@@ -85,49 +97,30 @@ def terms_of(model: ModelFit) -> dict[str, FloatArray]:
     return {LOAD_TERM: 1.0 - adhesion, ADHESION_TERM: adhesion}
 
 
-@dataclass(frozen=True)
-class OnSample:
-    """How groups of laws act on the ``tests`` (t,) of one sample: each is a ``share`` (groups, b) of a few common
-    ``courses`` (b, t, 2)."""
-
-    tests: Index
-    share: FloatArray
-    courses: FloatArray
-
-
-@dataclass(frozen=True)
-class Acts:
-    """By how much every group of laws changes ln T of every test and regime where its course is one, sample by sample:
-    within a sample the groups differ by regime and by the term of T alone, so that few courses make up all of them.
-
-    A specimen belongs to one part.
-    """
-
-    parts: tuple[OnSample, ...]
+def effects_of(scopes: Sequence[WrittenLaw], c: Conditions, terms: Mapping[str, FloatArray]) -> FloatArray:
+    """By how much laws of these scopes change ln T of every test and regime where their course is one, (scopes, n, 2);
+    ``terms`` as of :func:`terms_of`."""
+    found = []
+    for scope in scopes:
+        on_term = terms.get(scope.acts_on, np.ones((len(c.sample), 2)))
+        in_regime = np.array([scope.regime != REGIMES[1], scope.regime != REGIMES[0]])
+        found.append(on_term * in_regime * scope.weight(c)[:, None])
+    return np.stack(found)
 
 
-def acts_of(groups: Sequence[Group], s: Setup, terms: Mapping[str, FloatArray]) -> Acts:
-    """How these groups act; ``terms`` as of :func:`terms_of`."""
+def acts_of(effects: FloatArray, s: Setup) -> Acts:
+    """The same effects sample by sample. A specimen belongs to one part."""
     c, specimen = s.observations.conditions, s.random_effects.specimen
-    each = np.stack([acts_of_one(group, c, terms) for group in groups])
     first = [int(tests[0]) if len(tests) else 0 for tests in s.random_effects.tests_of]
     sample = c.sample[first][specimen]
-    return Acts(tuple(_on_sample(np.flatnonzero(sample == name), each) for name in np.unique(sample)))
-
-
-def acts_of_one(group: Group, c: Conditions, terms: Mapping[str, FloatArray]) -> FloatArray:
-    """By how much laws of a group change ln T of every test and regime where their course is one, (n, 2)."""
-    acts = terms.get(group.acts_on, np.ones((len(c.sample), 2)))
-    in_regime = np.array([group.regime != REGIMES[1], group.regime != REGIMES[0]])
-    return np.asarray(acts * in_regime * group.law(()).weight(c)[:, None])
-
-
-def _on_sample(tests: Index, acts: FloatArray) -> OnSample:
-    flat = acts[:, tests].reshape(len(acts), -1)
-    share, size, courses = np.linalg.svd(flat, full_matrices=False)
-    kept = size > 1e-10 * size[0]
-    kept[0] = True  # also where no group acts on this sample
-    return OnSample(tests, share[:, kept] * size[kept], courses[kept].reshape(-1, len(tests), 2))
+    parts = []
+    for name in np.unique(sample):
+        tests = np.flatnonzero(sample == name)
+        share, size, courses = np.linalg.svd(effects[:, tests].reshape(len(effects), -1), full_matrices=False)
+        kept = size > 1e-10 * size[0]
+        kept[0] = True  # also where no scope acts on this sample
+        parts.append((tests, share[:, kept] * size[kept], courses[kept].reshape(-1, len(tests), 2)))
+    return tuple(parts)
 
 
 class Projection:
@@ -139,86 +132,93 @@ class Projection:
         The model with the noise and weights at which columns are scored.
     residual : array (r, n, 2)
         ln T less the model, of the campaign itself or of campaigns with the same noise.
+
+    Attributes
+    ----------
+    own : array (2n, 4)
+    border : array (2n, m)
+        Columns whose products with a whitened column are what the model absorbs: of the specimens, each for its own
+        tests, and those that tests share.
+    left : array (2n, r)
+        The whitened residual less what the model absorbs of it.
     """
 
     def __init__(self, linear: Linear, residual: FloatArray) -> None:
         self.factor = linear.factor * np.sqrt(linear.weight)[:, None, None]
         self.n = len(linear.residual)
         self.specimen = linear.random_effects.specimen
-        self.own, self.border = self._bases(linear)
-        right = whitened(self.factor, residual.transpose(1, 2, 0))
-        self.left = right - self._taken(right)  # (2n, r)
-
-    def _bases(self, linear: Linear) -> tuple[FloatArray, FloatArray]:
-        """Columns whose products with a whitened column are what the model absorbs: of the specimens (2n, 4), each for
-        its own tests, and those that tests share (2n, m)."""
-        found = cleared(linear.normal, linear.right)
+        absorbed = cleared(linear.normal, linear.right)
         specimen = np.tile(self.specimen, 2)
         white = whitened(self.factor, linear.columns.own)
-        own = (found.own[0, specimen] @ white[:, :, None])[:, :, 0]
-        taken = (own[:, None] @ found.across[0, specimen])[:, 0]
-        return own, (whitened(self.factor, linear.columns.border) - taken) @ found.border[0].T
-
-    def _absorbed(self, white: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Products of whitened columns (2n, k) with those of the specimens (S, 4, k) and the shared ones (m, k)."""
-        own = np.zeros((int(self.specimen.max()) + 1, 4, white.shape[1]))
-        np.add.at(own, np.tile(self.specimen, 2), self.own[:, :, None] * white[:, None])
-        return own, self.border.T @ white
+        self.own = (absorbed.own[0, specimen] @ white[:, :, None])[:, :, 0]
+        taken = (self.own[:, None] @ absorbed.across[0, specimen])[:, 0]
+        self.border = (whitened(self.factor, linear.columns.border) - taken) @ absorbed.border[0].T
+        right = whitened(self.factor, residual.transpose(1, 2, 0))
+        self.left = right - self._taken(right)
 
     def _taken(self, white: FloatArray) -> FloatArray:
         """What the model absorbs of whitened columns, (2n, k)."""
-        own, border = self._absorbed(white)
-        return np.einsum("na,nak->nk", self.own, own[np.tile(self.specimen, 2)]) + self.border @ border
+        specimen = np.tile(self.specimen, 2)
+        own = np.zeros((int(self.specimen.max()) + 1, 4, white.shape[1]))
+        np.add.at(own, specimen, self.own[:, :, None] * white[:, None])
+        return np.einsum("na,nak->nk", self.own, own[specimen]) + self.border @ (self.border.T @ white)
 
     def gains(self, courses: Courses, acts: Acts) -> FloatArray:
-        """Log likelihood gained by each course in each group at its best amplitude, (r, groups, k)."""
+        """Log likelihood gained by each course in each scope at its best amplitude, (r, scopes, k); the second
+        amplitude of a wave costs one unit."""
         own, pull = self.products(courses.first, acts)
         found = 0.5 * pull**2 / own
         if len(courses.two):
-            first = own[:, courses.two], pull[:, :, courses.two]
-            found[:, :, courses.two] = self._of_waves(courses, first, acts)
+            own1, pull1 = own[:, courses.two], pull[:, :, courses.two]
+            own2, pull2 = self.products(courses.second, acts)
+            both, _ = self.products(courses.first[:, courses.two] + courses.second, acts)
+            with np.errstate(invalid="ignore"):
+                mixed = 0.5 * (both - own1 - own2)
+                determinant = own1 * own2 - mixed**2
+                together = 0.5 * (own2 * pull1**2 - 2 * mixed * pull1 * pull2 + own1 * pull2**2) / determinant
+            single = np.maximum(0.5 * pull1**2 / own1, 0.5 * pull2**2 / own2)
+            good = np.isfinite(determinant) & (determinant > 1e-6 * np.abs(own1 * own2))
+            found[:, :, courses.two] = np.where(good, together, single) - 1.0
         return found
 
     def products(self, columns: FloatArray, acts: Acts) -> tuple[FloatArray, FloatArray]:
-        """Information (groups, k), inf where nothing is left, and pull (r, groups, k) of columns (n, k)."""
-        parts = [self._some(columns[:, k : k + AT_ONCE], acts) for k in range(0, columns.shape[1], AT_ONCE)]
+        """Information (scopes, k), inf where nothing is left, and pull (r, scopes, k) of columns (n, k)."""
+        starts = range(0, columns.shape[1], COLUMNS_AT_ONCE)
+        parts = [self._products(columns[:, k : k + COLUMNS_AT_ONCE], acts) for k in starts]
         whole, own, pull = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
         return np.where(own > TAKEN_UP * whole + 1e-12, own, np.inf), pull
 
-    def _some(self, columns: FloatArray, acts: Acts) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Information before (groups, k) and after what the model absorbs, and pull, (r, groups, k)."""
+    def _products(self, columns: FloatArray, acts: Acts) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Information before (scopes, k) and after what the model absorbs, and pull, (r, scopes, k)."""
         shared = np.concatenate([self.border, self.left], axis=1)
-        m, k, groups = self.border.shape[1], columns.shape[1], len(acts.parts[0].share)
-        whole, own = np.zeros((groups, k)), np.zeros((groups, k))
+        m, k, scopes = self.border.shape[1], columns.shape[1], len(acts[0][1])
+        whole, own = np.zeros((scopes, k)), np.zeros((scopes, k))
         rows = []
-        for part in acts.parts:
-            white, here = self._whitened(part), columns[part.tests]
-            square = np.einsum("bit,cit->bct", white, white).reshape(-1, len(part.tests)) @ here**2
-            taken = self._of_specimens(part, white, here)
-            twice = (part.share[:, :, None] * part.share[:, None]).reshape(groups, -1)
+        for tests, share, courses in acts:
+            factor, here = self.factor[tests], columns[tests]
+            static = factor[:, 0, 0] * courses[:, :, 0]
+            sliding = factor[:, 1, 0] * courses[:, :, 0] + factor[:, 1, 1] * courses[:, :, 1]
+            white = np.stack([static, sliding], axis=1)  # (b, 2, t)
+            square = np.einsum("bit,cit->bct", white, white).reshape(-1, len(tests)) @ here**2
+            taken = self._taken_by_specimens(tests, white, here)
+            twice = (share[:, :, None] * share[:, None]).reshape(scopes, -1)
             whole += twice @ square
             own += twice @ (square - taken)
-            both = shared.reshape(2, self.n, -1)[:, part.tests]
-            beside = np.einsum("bit,itm->bmt", white, both).reshape(-1, len(part.tests)) @ here
+            both = shared.reshape(2, self.n, -1)[:, tests]
+            beside = np.einsum("bit,itm->bmt", white, both).reshape(-1, len(tests)) @ here
             rows.append(beside.reshape(len(white), -1))
-        share = np.concatenate([part.share for part in acts.parts], axis=1)
-        found = (share @ np.concatenate(rows)).reshape(groups, -1, k)
+        shares = np.concatenate([share for _, share, _ in acts], axis=1)
+        found = (shares @ np.concatenate(rows)).reshape(scopes, -1, k)
         own -= np.einsum("gmk,gmk->gk", found[:, :m], found[:, :m])
         return whole, own, found[:, m:].transpose(1, 0, 2)
 
-    def _whitened(self, part: OnSample) -> FloatArray:
-        """The common courses of a sample in units of the noise, (b, 2, t)."""
-        factor, courses = self.factor[part.tests], part.courses
-        static = factor[:, 0, 0] * courses[:, :, 0]
-        return np.stack([static, factor[:, 1, 0] * courses[:, :, 0] + factor[:, 1, 1] * courses[:, :, 1]], axis=1)
-
-    def _of_specimens(self, part: OnSample, white: FloatArray, columns: FloatArray) -> FloatArray:
+    def _taken_by_specimens(self, tests: Index, white: FloatArray, columns: FloatArray) -> FloatArray:
         """Products of what the specimens of a sample absorb of columns (t, k) times each two of its courses,
         (b b, k)."""
-        own, found = self.own.reshape(2, self.n, 4)[:, part.tests], 0.0
+        own, found = self.own.reshape(2, self.n, 4)[:, tests], 0.0
         b, k = len(white), columns.shape[1]
-        for specimen in np.unique(self.specimen[part.tests]):
-            here = np.flatnonzero(self.specimen[part.tests] == specimen)
+        for specimen in np.unique(self.specimen[tests]):
+            here = np.flatnonzero(self.specimen[tests] == specimen)
             rows = np.einsum("bit,ita->bat", white[:, :, here], own[:, here]).reshape(4 * b, -1)
             taken = (rows @ columns[here]).reshape(b, 4, k)
             found = found + np.einsum("bak,cak->bck", taken, taken)
@@ -230,23 +230,60 @@ class Projection:
         pull, own = self.left[:, 0] @ white, white.T @ (white - self._taken(white))
         return float(0.5 * pull @ np.linalg.lstsq(own, pull, rcond=1e-9)[0])
 
-    def _of_waves(self, courses: Courses, first: tuple[FloatArray, FloatArray], acts: Acts) -> FloatArray:
-        """Of shapes of two columns; the second amplitude costs one unit."""
-        (own1, pull1), (own2, pull2) = first, self.products(courses.second, acts)
-        both, _ = self.products(courses.first[:, courses.two] + courses.second, acts)
-        with np.errstate(invalid="ignore"):
-            mixed = 0.5 * (both - own1 - own2)
-            determinant = own1 * own2 - mixed**2
-            found = 0.5 * (own2 * pull1**2 - 2 * mixed * pull1 * pull2 + own1 * pull2**2) / determinant
-        single = np.maximum(0.5 * pull1**2 / own1, 0.5 * pull2**2 / own2)
-        good = np.isfinite(determinant) & (determinant > 1e-6 * np.abs(own1 * own2))
-        return np.where(good, found, single) - 1.0
-
 
 @dataclass(frozen=True)
-class Scored:
-    """One law by its score: log likelihood gained, and what is left of it after paying for the choice."""
+class Grammar:
+    """All laws of a campaign: every one of the scopes with every one of the courses.
 
-    law: WrittenLaw
-    gain: float
-    net: float
+    ``scope_cost`` (scopes,) is what the choice of each costs in log likelihood, ``effects`` (scopes, n, 2) how it acts.
+    A law has an index: that of its scope times the number of courses, plus that of its course.
+    """
+
+    courses: Courses
+    scopes: tuple[WrittenLaw, ...]
+    scope_cost: FloatArray
+    effects: FloatArray
+    acts: Acts
+
+    @classmethod
+    def of(
+        cls,
+        model: ModelFit,
+        without: Collection[str] = (),
+        shapes: Sequence[tuple[tuple[Shape, ...], float]] | None = None,
+    ) -> Grammar:
+        """The laws of a fitted campaign: of all columns but those ``without``, or of these ``shapes`` alone."""
+        c = model.setup.observations.conditions
+        scopes, cost = scopes_of(c)
+        effects = effects_of(scopes, c, terms_of(model))
+        courses = courses_of(shapes_of(c, without) if shapes is None else shapes, c)
+        return cls(courses, scopes, cost, effects, acts_of(effects, model.setup))
+
+    @property
+    def size(self) -> int:
+        return len(self.scopes) * len(self.courses.shapes)
+
+    def net(self, projected: Projection) -> FloatArray:
+        """What each law gains less its cost, (r, laws)."""
+        found = projected.gains(self.courses, self.acts) - self.courses.cost - self.scope_cost[:, None]
+        found[:, corrects_a_pattern(self.scopes, self.courses.shapes)] = -np.inf
+        return found.reshape(len(found), -1)
+
+    def law(self, index: int) -> WrittenLaw:
+        scope, shape = divmod(int(index), len(self.courses.shapes))
+        return replace(self.scopes[scope], shapes=self.courses.shapes[shape])
+
+    def cost(self, index: Index) -> FloatArray:
+        scope, shape = np.divmod(index, len(self.courses.shapes))
+        return np.asarray(self.courses.cost[shape] + self.scope_cost[scope])
+
+    def gains(self, fitted: Replicates, index: Index) -> FloatArray:
+        """Log likelihood that the laws at ``index`` gain at the noise of a campaign, (r, laws)."""
+        columns, spans, at = [], [], 0
+        for scope, shape in zip(*np.divmod(index, len(self.courses.shapes)), strict=True):
+            column = self.courses.column(int(shape))[:, None, :] * self.effects[scope][:, :, None]
+            columns.append(column)
+            spans.append(slice(at, at + column.shape[2]))
+            at += column.shape[2]
+        freedom = np.array([span.stop - span.start for span in spans])
+        return 0.5 * scores(fitted, columns_in(np.concatenate(columns, axis=2), spans))[0] - (freedom - 1.0)

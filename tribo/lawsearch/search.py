@@ -6,24 +6,30 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from tribo.diagnostics.contrasts import allowed_wrong_form, decided, share_beyond
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit
-from tribo.diagnostics.scatter import Replicates
-from tribo.diagnostics.score_statistics import columns_in, scores
-from tribo.lawsearch.grammar import Group, corrects_a_pattern, groups_of, shapes_of
-from tribo.lawsearch.model_choice import CauseForms, FoundLaw, Searched, settled
-from tribo.lawsearch.scoring import Acts, Courses, Projection, Scored, acts_of, acts_of_one, courses_of, terms_of
+from tribo.lawsearch.grammar import WrittenLaw
+from tribo.lawsearch.model_choice import CauseForms, FoundLaw, choose_form
+from tribo.lawsearch.scoring import Grammar, Index, Projection
 from tribo.records import FloatArray
 
 Progress = Callable[[str, int, int], None]
-AT_ONCE = 20  # simulated campaigns at a time
+CAMPAIGNS_AT_ONCE = 20
 RESCORED, RESCORED_MEASURED = 60, 400  # best laws at the fitted noise that are scored with each campaign's own noise
 SHOWN = 25  # of the best laws, in the table
 MOST_LAWS = 3
+
+
+@dataclass(frozen=True)
+class ScoredLaw:
+    """One law by its score: log likelihood gained, and what is left of it after paying for the choice."""
+
+    law: WrittenLaw
+    gain: float
+    net: float
 
 
 @dataclass(frozen=True)
@@ -34,7 +40,7 @@ class Discovery:
     """
 
     laws: tuple[FoundLaw, ...]
-    scored: tuple[Scored, ...]
+    scored: tuple[ScoredLaw, ...]
     searched: int
     of_causes: tuple[CauseForms, ...] = ()
 
@@ -63,12 +69,14 @@ def discover_laws(
         Simulated campaigns at most, each searched in the same way.
     rng : numpy Generator, optional
         Of the simulated campaigns and the resamples behind the error of the gain.
+    progress : callable, optional
+        Called with the stage, the simulated campaigns done and their number.
     without : collection of str
         Columns that have a law already.
     """
     rng = rng or np.random.default_rng(0)
     found: list[FoundLaw] = []
-    table: tuple[Scored, ...] = ()
+    table: tuple[ScoredLaw, ...] = ()
     searched = 0
     if model.acting:
         model = allowed_wrong_form(model)
@@ -77,84 +85,33 @@ def discover_laws(
         grammar = Grammar.of(model, used)
         if not grammar.courses.shapes:
             break
-        scored = _measured(model, grammar)
+        scored = _scored(model, grammar)
+        strongest = scored[0].net
         table, searched = table or tuple(scored[:SHOWN]), searched or grammar.size
-        if _by_chance_alone(scored[0].net) >= level:
+        # after Wilks, the chance that a law gains so much if it is the only one tried: less than that of the best of
+        # all, so that a law which fails here needs no simulated campaigns
+        if float(chdtrc(1, 2.0 * max(strongest, 0.0))) >= level:
             break
-        p = share_beyond(_chance(model, grammar, scored[0].net, (replicates, rng), progress), scored[0].net)
+        p = share_beyond(_best_by_chance(model, grammar, strongest, (replicates, rng), progress), strongest)
         if p >= level:
             break
-        law = settled(model, Searched(grammar.courses, grammar.groups, p), scored[0].law, rng)
+        law = choose_form(model, grammar, scored[0].law, p, rng)
         found.append(law)
         model = law.model
     return Discovery(tuple(found), table, searched)
 
 
-@dataclass(frozen=True)
-class Grammar:
-    """All laws of a campaign: every one of the groups with every one of the courses."""
-
-    courses: Courses
-    groups: tuple[Group, ...]
-    acts: Acts
-    acts_of_each: tuple[FloatArray, ...]
-
-    @classmethod
-    def of(cls, model: ModelFit, without: Collection[str]) -> Grammar:
-        c = model.setup.observations.conditions
-        groups, terms = tuple(groups_of(c)), terms_of(model)
-        each = tuple(acts_of_one(g, c, terms) for g in groups)
-        return cls(courses_of(shapes_of(c, without), c), groups, acts_of(groups, model.setup, terms), each)
-
-    @property
-    def size(self) -> int:
-        return len(self.groups) * len(self.courses.shapes)
-
-    def net(self, projected: Projection) -> FloatArray:
-        """What each law gains less its cost, (r, groups * shapes)."""
-        found = projected.gains(self.courses, self.acts) - self.courses.cost - self._costs[:, None]
-        found[:, corrects_a_pattern(self.groups, self.courses.shapes)] = -np.inf
-        return found.reshape(len(found), -1)
-
-    @property
-    def _costs(self) -> FloatArray:
-        return np.array([group.cost for group in self.groups])
-
-    def cost(self, index: NDArray[np.int64]) -> FloatArray:
-        group, shape = np.divmod(index, len(self.courses.shapes))
-        return np.asarray(self.courses.cost[shape] + self._costs[group])
-
-    def gains(self, fitted: Replicates, index: NDArray[np.int64]) -> FloatArray:
-        """Log likelihood that the laws at ``index`` gain at the noise of a campaign, (r, laws)."""
-        columns, spans, at = [], [], 0
-        for group, shape in zip(*np.divmod(index, len(self.courses.shapes)), strict=True):
-            column = self.courses.column(int(shape))[:, None, :] * self.acts_of_each[group][:, :, None]
-            columns.append(column)
-            spans.append(slice(at, at + column.shape[2]))
-            at += column.shape[2]
-        freedom = np.array([span.stop - span.start for span in spans])
-        return 0.5 * scores(fitted, columns_in(np.concatenate(columns, axis=2), spans))[0] - (freedom - 1.0)
-
-
-def _measured(model: ModelFit, grammar: Grammar) -> list[Scored]:
+def _scored(model: ModelFit, grammar: Grammar) -> list[ScoredLaw]:
     """The best laws of the campaign, scored with its own noise, the best first."""
     net = grammar.net(Projection(model.linear, model.linear.residual[None]))[0]
     index = best_of(net, RESCORED_MEASURED)
     gains = grammar.gains(as_measured(model), index)[0]
     nets = gains - grammar.cost(index)
-    shapes, groups = grammar.courses.shapes, grammar.groups
     each = zip(index, gains, nets, strict=True)
-    laws = [Scored(groups[i // len(shapes)].law(shapes[i % len(shapes)]), float(g), float(n)) for i, g, n in each]
-    return sorted(laws, key=lambda s: -s.net)
+    return sorted((ScoredLaw(grammar.law(i), float(g), float(n)) for i, g, n in each), key=lambda s: -s.net)
 
 
-def _by_chance_alone(net: float) -> float:
-    """The chance that a law gains so much if it is the only one tried, after Wilks: less than that of the best of all,
-    so that a law which fails here needs no simulated campaigns."""
-    return float(chdtrc(1, 2.0 * max(net, 0.0)))
-
-
-def _chance(
+def _best_by_chance(
     model: ModelFit,
     grammar: Grammar,
     strongest: float,
@@ -168,7 +125,7 @@ def _chance(
     replicates, rng = draws
     chance: list[float] = []
     while len(chance) < replicates:
-        drawn = drawn_residuals(model, rng, AT_ONCE)
+        drawn = drawn_residuals(model, rng, CAMPAIGNS_AT_ONCE)
         made = refit(model, drawn)
         nets = grammar.net(Projection(model.linear, drawn.transpose(0, 2, 1)))
         for k, net in enumerate(nets):
@@ -176,14 +133,12 @@ def _chance(
             chance.append(float((grammar.gains(made.one(k), index)[0] - grammar.cost(index)).max()))
         if progress is not None:
             progress("discover", len(chance), replicates)
-        if decided(np.array(chance), strongest, AT_ONCE):
+        if decided(np.array(chance), strongest, CAMPAIGNS_AT_ONCE):
             break
     return np.array(chance)
 
 
-def best_of(net: FloatArray, n: int) -> NDArray[np.int64]:
+def best_of(net: FloatArray, n: int) -> Index:
+    """The places of the n largest, in no order."""
     n = min(n, len(net))
     return np.asarray(np.argpartition(-net, n - 1)[:n])
-
-
-__all__ = ["Discovery", "FoundLaw", "Scored", "discover_laws"]

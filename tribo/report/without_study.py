@@ -61,7 +61,7 @@ def write_discovery(d: Discovery, title: str, out: Path, provenance: Provenance)
     record: dict[str, Any] = {
         "schema": SCHEMA, "text": text, "laws_tried": d.searched,
         "layers": [plain(replace(layer, text=layer_sentence(layer))) for layer in law_layers(d)],
-        "ties": [f.n_ties for f in d.laws],
+        "ties": [len(f.ties) for f in d.laws],
     }  # fmt: skip
     numbers = law_numbers_of(d)
     figure = {} if numbers.empty else {"law.svg": as_svg(draw_law(numbers)), "law.csv": to_csv(numbers)}

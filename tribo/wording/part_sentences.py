@@ -13,7 +13,7 @@ from tribo.diagnostics.effect_sizes import Effect
 from tribo.diagnostics.verdict import UNTESTED, Cause, Estimate, Excluded, Layer, Misfit, NextTest
 from tribo.diagnostics.within_records import RunningIn, StrokeOffset
 from tribo.diagnostics.without_model import SERIES, ConstantPart
-from tribo.lawsearch.known_laws import KnownLaw
+from tribo.lawsearch.law_file import KnownLaw
 from tribo.lawsearch.model_choice import CauseForms, FoundLaw
 from tribo.mechanisms.record import Mechanism, TraceEvidence
 from tribo.mechanisms.table import MECHANISMS, mechanism
