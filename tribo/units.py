@@ -1,9 +1,4 @@
-"""The names that quantities have in the exports of machines, in the languages of their programs.
-
-Names are plain: without case, accents, units or punctuation (:func:`tribo.units.plain_name`). Where several
-columns of an export fit a quantity, the name that stands first here is preferred.
-
-Physical quantities: name, symbol, SI unit, and their names in exports.
+"""Physical quantities, units, and the columns that exports and tests.csv have: each declared once.
 
 All unit conversions are done here (pint). Everything inside tribo is in SI units.
 """
@@ -18,396 +13,14 @@ from typing import Any
 
 from tribo.errors import Problem, ReadError
 
-ALIASES = {
-    "time": """
-        time
-        test time
-        step time
-        elapsed time
-        timestamp
-        time stamp
-        total time
-        run time
-        running time
-        zeit
-        prufzeit
-        laufzeit
-        versuchszeit
-        temps
-        temps d essai
-        duree
-        t
-        test zeit
-        temps ecoule
-        tiempo
-        tempo
-        tijd
-        total elapsed time
-        cycle elapsed time
-        czas
-        czas testu
-        aika
-        tid
-        cas
-        ido
-        zaman
-        sure
-        timp
-        время
-        час
-        χρονος
-        时间
-        试验时间
-        時間
-        試験時間
-        経過時間
-        시간
-    """,
-    "friction force": """
-        friction force
-        friction
-        tangential force
-        traction force
-        frictionforce
-        lateral force
-        reibkraft
-        reibungskraft
-        force de frottement
-        load
-        force
-        standard force
-        standardkraft
-        prufkraft
-        kraft
-        force standard
-        fx
-        ff
-        ft
-        f
-        load cell
-        axial force
-        traction force 1
-        effort
-        last
-        tangential load
-        tangentialkraft
-        force tangentielle
-        horizontal force
-        pull force
-        pulling force
-        tensile force
-        sled force
-        fuerza de friccion
-        forza di attrito
-        fuerza
-        forza
-        forca
-        kracht
-        carga
-        force x
-        fx force
-        daq fx
-        tensile load
-        zugkraft
-        charge
-        sila tarcia
-        sila
-        sila styczna
-        kitkavoima
-        voima
-        friktionskraft
-        friktion
-        wrijvingskracht
-        treci sila
-        sila treni
-        surtunme kuvveti
-        kuvvet
-        forta de frecare
-        forta
-        forca de atrito
-        forca de friccao
-        tangencialni sila
-        сила трения
-        сила
-        усилие
-        τριβη
-        摩擦力
-        obciazenie
-        нагрузка
-        力
-        负荷
-        切向力
-        载荷
-        試験力
-        摩擦荷重
-        荷重
-        마찰력
-        하중
-        힘
-    """,
-    "displacement": """
-        extension
-        displacement
-        stroke
-        crosshead
-        crosshead position
-        position
-        standard travel
-        standardweg
-        course standard
-        weg
-        hub
-        course
-        deplacement
-        axial displacement
-        traverse
-        course traverse
-        traverse abs
-        traverse absolue
-        maschine
-        maschinenweg
-        machine displacement
-        linear position
-        sliding distance
-        distance
-        x position
-        x
-        dx
-        tensile extension
-        tensile displacement
-        crosshead displacement
-        crosshead travel
-        axial extension
-        grip to grip separation
-        absolute crosshead travel
-        crosshead absolute
-        actuator displacement
-        sled displacement
-        travel
-        desplazamiento
-        spostamento
-        deslocamento
-        verplaatsing
-        extension en traction
-        disp
-        displ
-        xyz x position
-        droga
-        przemieszczenie
-        wydluzenie
-        droga tarcia
-        siirtyma
-        matka
-        forskjutning
-        forflyttning
-        stracka
-        weglange
-        draha
-        posun
-        posuv
-        elmozdulas
-        yer degistirme
-        deplasare
-        recorrido
-        corsa
-        percorso
-        curso
-        перемещение
-        путь
-        ход
-        位移
-        行程
-        変位
-        ストローク
-        移動距離
-        변위
-    """,
-    "normal force": """
-        normal force
-        normal load
-        vertical force
-        normal force fz
-        ball load
-        contact force
-        normalkraft
-        force normale
-        fz
-        fn
-        fz force
-        daq fz
-        nominal load
-        force z
-        carga normal
-        forza normale
-        fuerza normal
-        sila normalna
-        obciazenie normalne
-        sila nacisku
-        normaalivoima
-        normaalkracht
-        normalova sila
-        pritlacna sila
-        normal kuvvet
-        forta normala
-        forca normal
-        нормальная сила
-        нормальная нагрузка
-        法向力
-        正压力
-        法向载荷
-        垂直力
-        垂直荷重
-        法線力
-        押付力
-        수직하중
-        수직력
-    """,
-    "friction coefficient": """
-        cof
-        friction coefficient
-        coefficient of friction
-        traction coeff
-        daq cof
-        mu
-        reibwert
-        coefficient de frottement
-        reibungskoeffizient
-        reibzahl
-        reibungszahl
-        coefficiente di attrito
-        coeficiente de friccion
-        cof mu
-        wspolczynnik tarcia
-        kitkakerroin
-        friktionskoefficient
-        wrijvingscoefficient
-        koeficient treni
-        surtunme katsayisi
-        coeficient de frecare
-        coeficiente de atrito
-        coeficiente de rozamiento
-        coefficient de friction
-        коэффициент трения
-        摩擦系数
-        摩擦係数
-        마찰계수
-    """,
-    "torque": """
-        friction torque
-        torque
-        frictional torque
-        friction moment
-        reibmoment
-        drehmoment
-        moment
-        couple
-        couple de frottement
-        moment de frottement
-        coppia
-        momento
-        par
-        koppel
-        moment tarcia
-        moment sily
-        момент
-        момент трения
-        扭矩
-        摩擦力矩
-        トルク
-        摩擦トルク
-        토크
-    """,
-    "temperature": """
-        temperature
-        temp
-        temperatur
-        ambient temperature
-        room temperature
-        raumtemperatur
-        temperature c
-        temperatura
-        temperature ambiante
-        lampotila
-        teplota
-        sicaklik
-        температура
-        温度
-        온도
-    """,
-    "humidity": """
-        humidity
-        relative humidity
-        rh
-        feuchte
-        luftfeuchte
-        humidite
-        luftfeuchtigkeit
-        relative luftfeuchte
-        wilgotnosc
-        humedad
-        umidita
-        humidade
-        vochtigheid
-        kosteus
-        luftfuktighet
-        vlhkost
-        nem
-        влажность
-        湿度
-        습도
-    """,
-    "speed": """
-        sliding velocity
-        sliding speed
-        speed
-        velocity
-        geschwindigkeit
-        gleitgeschwindigkeit
-        vitesse
-        vitesse de glissement
-        gleitgeschw
-        predkosc
-        predkosc poslizgu
-        velocidad
-        velocita
-        velocidade
-        snelheid
-        nopeus
-        hastighet
-        rychlost
-        hiz
-        viteza
-        скорость
-        скорость скольжения
-        速度
-        滑动速度
-        すべり速度
-        속도
-    """,
-    "rotation speed": """
-        rotation speed
-        rotational speed
-        rotary speed
-        spindle speed
-        rotational velocity
-        rotation rate
-        revolution speed
-        rpm
-        drehzahl
-        vitesse de rotation
-        velocidad de giro
-        velocita di rotazione
-        toerental
-        转速
-        回転数
-        회전수
-    """,
-}
-
 
 @dataclass(frozen=True)
 class Quantity:
-    """A physical quantity; ``column`` is its SI column name, ``aliases`` plain names it goes by."""
+    """A physical quantity; ``column`` is its SI column name, ``aliases`` the names it goes by in exports.
+
+    These names are those of the programs of machines in their languages, plain as :func:`plain_name` makes them:
+    without case, accents, units or punctuation. Where several columns of an export fit, the first name is preferred.
+    """
 
     name: str
     symbol: str
@@ -416,24 +29,137 @@ class Quantity:
     aliases: tuple[str, ...]
 
 
-def _quantity(name: str, symbol: str, si_unit: str, column: str) -> Quantity:
-    aliases = tuple(line.strip() for line in ALIASES[name].strip().splitlines())
-    return Quantity(name, symbol, si_unit, column, aliases)
+def _quantity(name: str, symbol: str, si_unit: str, column: str, names: str) -> Quantity:
+    return Quantity(name, symbol, si_unit, column, tuple(alias.strip() for alias in names.split(",")))
 
 
 QUANTITIES: dict[str, Quantity] = {
     q.name: q
     for q in (
-        _quantity("time", "t", "s", "time_s"),
-        _quantity("friction force", "T", "N", "force_N"),
-        _quantity("displacement", "x", "m", "displacement_m"),
-        _quantity("normal force", "N", "N", "normal_force_N"),
-        _quantity("friction coefficient", "mu", "", "friction_coefficient"),
-        _quantity("torque", "M", "N m", "torque_Nm"),
-        _quantity("temperature", "theta", "degC", "temperature_C"),
-        _quantity("humidity", "RH", "percent", "humidity_pct"),
-        _quantity("speed", "v", "m/s", "speed_m_s"),
-        _quantity("rotation speed", "n", "revolution/s", "rotation_rev_per_s"),
+        _quantity("time", "t", "s", "time_s", """
+            time, test time, step time, elapsed time, timestamp, time stamp, total time, run time, running time, zeit,
+            prufzeit, laufzeit, versuchszeit, temps, temps d essai, duree, t, test zeit, temps ecoule, tiempo, tempo,
+            tijd, total elapsed time, cycle elapsed time, czas, czas testu, aika, tid, cas, ido, zaman, sure, timp,
+            время, час, χρονος, 时间, 试验时间, 時間, 試験時間, 経過時間, 시간
+        """),
+        _quantity("friction force", "T", "N", "force_N", """
+            friction force, friction, tangential force, traction force, frictionforce, lateral force, reibkraft,
+            reibungskraft, force de frottement, load, force, standard force, standardkraft, prufkraft, kraft,
+            force standard, fx, ff, ft, f, load cell, axial force, traction force 1, effort, last, tangential load,
+            tangentialkraft, force tangentielle, horizontal force, pull force, pulling force, tensile force,
+            sled force, fuerza de friccion, forza di attrito, fuerza, forza, forca, kracht, carga, force x, fx force,
+            daq fx, tensile load, zugkraft, charge, sila tarcia, sila, sila styczna, kitkavoima, voima, friktionskraft,
+            friktion, wrijvingskracht, treci sila, sila treni, surtunme kuvveti, kuvvet, forta de frecare, forta,
+            forca de atrito, forca de friccao, tangencialni sila, сила трения, сила, усилие, τριβη, 摩擦力, obciazenie,
+            нагрузка, 力, 负荷, 切向力, 载荷, 試験力, 摩擦荷重, 荷重, 마찰력, 하중, 힘
+        """),
+        _quantity("displacement", "x", "m", "displacement_m", """
+            extension, displacement, stroke, crosshead, crosshead position, position, standard travel, standardweg,
+            course standard, weg, hub, course, deplacement, axial displacement, traverse, course traverse,
+            traverse abs, traverse absolue, maschine, maschinenweg, machine displacement, linear position,
+            sliding distance, distance, x position, x, dx, tensile extension, tensile displacement,
+            crosshead displacement, crosshead travel, axial extension, grip to grip separation,
+            absolute crosshead travel, crosshead absolute, actuator displacement, sled displacement, travel,
+            desplazamiento, spostamento, deslocamento, verplaatsing, extension en traction, disp, displ,
+            xyz x position, droga, przemieszczenie, wydluzenie, droga tarcia, siirtyma, matka, forskjutning,
+            forflyttning, stracka, weglange, draha, posun, posuv, elmozdulas, yer degistirme, deplasare, recorrido,
+            corsa, percorso, curso, перемещение, путь, ход, 位移, 行程, 変位, ストローク, 移動距離, 변위
+        """),
+        _quantity("normal force", "N", "N", "normal_force_N", """
+            normal force, normal load, vertical force, normal force fz, ball load, contact force, normalkraft,
+            force normale, fz, fn, fz force, daq fz, nominal load, force z, carga normal, forza normale, fuerza normal,
+            sila normalna, obciazenie normalne, sila nacisku, normaalivoima, normaalkracht, normalova sila,
+            pritlacna sila, normal kuvvet, forta normala, forca normal, нормальная сила, нормальная нагрузка, 法向力,
+            正压力, 法向载荷, 垂直力, 垂直荷重, 法線力, 押付力, 수직하중, 수직력
+        """),
+        _quantity("friction coefficient", "mu", "", "friction_coefficient", """
+            cof, friction coefficient, coefficient of friction, traction coeff, daq cof, mu, reibwert,
+            coefficient de frottement, reibungskoeffizient, reibzahl, reibungszahl, coefficiente di attrito,
+            coeficiente de friccion, cof mu, wspolczynnik tarcia, kitkakerroin, friktionskoefficient,
+            wrijvingscoefficient, koeficient treni, surtunme katsayisi, coeficient de frecare, coeficiente de atrito,
+            coeficiente de rozamiento, coefficient de friction, коэффициент трения, 摩擦系数, 摩擦係数, 마찰계수
+        """),
+        _quantity("torque", "M", "N m", "torque_Nm", """
+            friction torque, torque, frictional torque, friction moment, reibmoment, drehmoment, moment, couple,
+            couple de frottement, moment de frottement, coppia, momento, par, koppel, moment tarcia, moment sily,
+            момент, момент трения, 扭矩, 摩擦力矩, トルク, 摩擦トルク, 토크
+        """),
+        _quantity("temperature", "theta", "degC", "temperature_C", """
+            temperature, temp, temperatur, ambient temperature, room temperature, raumtemperatur, temperature c,
+            temperatura, temperature ambiante, lampotila, teplota, sicaklik, температура, 温度, 온도
+        """),
+        _quantity("humidity", "RH", "percent", "humidity_pct", """
+            humidity, relative humidity, rh, feuchte, luftfeuchte, humidite, luftfeuchtigkeit, relative luftfeuchte,
+            wilgotnosc, humedad, umidita, humidade, vochtigheid, kosteus, luftfuktighet, vlhkost, nem, влажность, 湿度,
+            습도
+        """),
+        _quantity("speed", "v", "m/s", "speed_m_s", """
+            sliding velocity, sliding speed, speed, velocity, geschwindigkeit, gleitgeschwindigkeit, vitesse,
+            vitesse de glissement, gleitgeschw, predkosc, predkosc poslizgu, velocidad, velocita, velocidade, snelheid,
+            nopeus, hastighet, rychlost, hiz, viteza, скорость, скорость скольжения, 速度, 滑动速度, すべり速度, 속도
+        """),
+        _quantity("rotation speed", "n", "revolution/s", "rotation_rev_per_s", """
+            rotation speed, rotational speed, rotary speed, spindle speed, rotational velocity, rotation rate,
+            revolution speed, rpm, drehzahl, vitesse de rotation, velocidad de giro, velocita di rotazione, toerental,
+            转速, 回転数, 회전수
+        """),
+    )
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class CampaignColumn:
+    """A column of tests.csv: its unit and text, and what its cells are.
+
+    ``kind`` is name (text on one line), text, load, number, correction (of the numbers of an export), force (evaluated
+    elsewhere), uncertainty (of such a force), count or zero. A number or count whose name is also a field of
+    :class:`tribo.records.Test` gets there as it stands.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    text: str
+
+
+CAMPAIGN_COLUMNS: dict[str, CampaignColumn] = {
+    c.name: c
+    for c in (
+        CampaignColumn("test_id", "name", "", "name of the test; required"),
+        CampaignColumn("file", "name", "", "path of its export in the campaign; required unless forces are given"),
+        CampaignColumn("sample", "name", "", "name of a pattern of campaign.toml, or with x or y behind it; required"),
+        CampaignColumn("mass_g", "load", "g", "mass put on the slider, without the slider itself"),
+        CampaignColumn("normal_load_N", "load", "N", "normal load; used where a mass is given as well"),
+        CampaignColumn("normal_stress_Pa", "load", "Pa", "load over the nominal area"),
+        CampaignColumn("speed_mm_s", "number", "mm/s", "speed of the drive; pull_speed_mm_s of campaign.toml if empty"),
+        CampaignColumn("hold_s", "number", "s", "time at rest under load before the pull"),
+        CampaignColumn("temperature_C", "number", "°C", "temperature of the room or the contact"),
+        CampaignColumn("humidity_pct", "number", "%", "relative humidity"),
+        CampaignColumn("stiffness_N_per_m", "number", "N/m", "stiffness of the spring, wire or beam that pulls"),
+        CampaignColumn("sign", "correction", "", "1 or -1; multiplies the friction force"),
+        CampaignColumn("gain", "correction", "", "factor of the friction force, such as the ratio of two levers"),
+        CampaignColumn("lever_arm_mm", "correction", "mm", "a torque is divided by it and becomes the friction force"),
+        CampaignColumn("sampling_rate_Hz", "correction", "Hz", "gives the time of an export that has none"),
+        CampaignColumn("static_N", "force", "N", "static friction force, evaluated elsewhere"),
+        CampaignColumn("static_u_N", "uncertainty", "N", "its standard uncertainty"),
+        CampaignColumn("sliding_N", "force", "N", "sliding friction force, evaluated elsewhere"),
+        CampaignColumn("sliding_u_N", "uncertainty", "N", "its standard uncertainty"),
+        CampaignColumn("static_mu", "force", "", "static friction coefficient, evaluated elsewhere"),
+        CampaignColumn("static_mu_u", "uncertainty", "", "its standard uncertainty"),
+        CampaignColumn("sliding_mu", "force", "", "sliding friction coefficient, evaluated elsewhere"),
+        CampaignColumn("sliding_mu_u", "uncertainty", "", "its standard uncertainty"),
+        CampaignColumn("coefficient", "force", "", "friction coefficient while sliding, evaluated elsewhere"),
+        CampaignColumn("coefficient_u", "uncertainty", "", "its standard uncertainty"),
+        CampaignColumn("repeat", "count", "", "number of the repeat"),
+        CampaignColumn("run_order", "count", "", "place in the order in which the tests were made"),
+        CampaignColumn("specimen_run", "count", "", "number of the pull on its specimen"),
+        CampaignColumn("specimen", "name", "", "name of the specimen; that of the sample if empty"),
+        CampaignColumn("direction", "name", "", "x or y, along which it was pulled"),
+        CampaignColumn("started_at", "text", "", "date, or date and time, of the test"),
+        CampaignColumn("operator", "name", "", "who made the test"),
+        CampaignColumn("exclude", "text", "", "the reason, if the test is to be left out"),
+        CampaignColumn("zero", "zero", "", "where the zero of the force comes from"),
+        CampaignColumn("load_zero", "zero", "", "where the zero of the recorded load comes from"),
     )
 }
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from tribo.campaign import load
+from tribo.campaign import table
 from tribo.cli import main
 from tribo.report.provenance import read_record
 from tribo.site import build, index_page
@@ -85,7 +85,7 @@ def test_a_campaign_that_the_system_cannot_read_is_refused_for_this_build_and_li
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drop = drop_of(tmp_path / "drop", "a", "b")
-    real = load.tests_file
+    real = table._tests_file
 
     def failing(root: Path) -> Path:
         if root.name == "a":
@@ -100,7 +100,7 @@ def test_a_campaign_that_the_system_cannot_read_is_refused_for_this_build_and_li
         (campaign / "raw" / "1.csv").write_text("1,2\n")
         (campaign / "tests.csv").write_text("test_id,file,sample,normal_load_N\nT1,raw/1.csv,F,1\n")
     with monkeypatch.context() as patched:
-        patched.setattr(load, "tests_file", failing)
+        patched.setattr(table, "_tests_file", failing)
         found, ready = inputs_of(scan(drop, settle_s=0.0), tmp_path / "inputs")
     (refused,) = [campaign.refused for campaign in found if campaign.refused]
     assert "a/tests.csv" in refused[0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
+from tribo.campaign.description import write_template
 from tribo.campaign.load import load_campaign, open_campaign
-from tribo.campaign.template import write_template
 
 __all__ = ["load_campaign", "open_campaign", "write_template"]

@@ -1,4 +1,4 @@
-"""campaign.toml: its allowed contents, and all errors at once with their rows."""
+"""campaign.toml: its allowed contents, all errors at once with their rows, and a template to fill in."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from urllib.parse import quote
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from tribo.errors import Problem, system_problem
+from tribo.campaign.table import RAW, TABLES, TOML
+from tribo.errors import CampaignError, Problem, system_problem
+from tribo.files import write_new
 from tribo.input_files import (
     DEEPEST_NESTING,
     LARGEST_DESCRIPTION_BYTES,
@@ -21,9 +23,13 @@ from tribo.input_files import (
     nests_too_deeply,
     read_input,
 )
+from tribo.records import Pattern
 from tribo.units import QUANTITIES, quantity_named
 from tribo.user_text import did_you_mean, is_control
 from tribo.zeroing import zero_choice
+
+_UM = 1e-6
+_QUOTED_NUMBER = re.compile(r"([-+]?\d+(?:[.,]\d+)?)\s*[^\d]{0,10}")
 
 
 def _on_one_line(text: str) -> str:
@@ -48,9 +54,6 @@ Positive = Annotated[float, Field(gt=0, le=LARGEST_NUMBER, allow_inf_nan=False),
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST_NUMBER, allow_inf_nan=False), AfterValidator(_measurable)]
 Line = Annotated[str, AfterValidator(_on_one_line)]
 Name = Annotated[Line, AfterValidator(_fit_for_a_file_name)]
-
-
-_QUOTED_NUMBER = re.compile(r"([-+]?\d+(?:[.,]\d+)?)\s*[^\d]{0,10}")
 
 
 class _Strict(BaseModel):
@@ -109,6 +112,21 @@ class PatternTable(_Strict):
     def pitch(self) -> tuple[float, float] | None:
         """(x, y) of the lattice in micrometre."""
         return _pair(self.pitch_um)
+
+    def pattern(self, name: str) -> Pattern:
+        """The pattern in metre."""
+
+        def metres(pair: tuple[float, float] | None) -> tuple[float, float] | None:
+            return None if pair is None else (pair[0] * _UM, pair[1] * _UM)
+
+        return Pattern(
+            name=name,
+            cavity=self.cavity,
+            size_m=metres(self.size),
+            pitch_m=metres(self.pitch),
+            staggered=self.staggered,
+            measured_area_fraction=self.area_fraction,
+        )
 
     @model_validator(mode="after")
     def _keys_fit_the_cavity(self) -> PatternTable:
@@ -264,17 +282,23 @@ def _not_toml(why: str, text: str, file: str, row: int) -> Problem:
 
 
 def _problem(error: Any, text: str, file: str) -> Problem:
-    path = [str(part) for part in error["loc"] if not _is_branch(part)]
-    row = _row_of(path, text)
-    column = ".".join(path)
-    found = None if error["type"] == "missing" else _shown(error["input"])
+    # pydantic names the branch of a union in its path: "float", "list[float]"
+    path = [str(p) for p in error["loc"] if not (isinstance(p, str) and (p in {"float", "int", "str"} or "[" in p))]
+    row, column = _row_of(path, text), ".".join(path)
     if error["type"] == "extra_forbidden":
-        allowed = _allowed_keys(path)
+        tables: dict[str, type[BaseModel]] = {
+            "campaign": CampaignTable,
+            "patterns": PatternTable,
+            "instrument": InstrumentTable,
+            "plausible": PlausibleTable,
+        }
+        allowed = list((CampaignFile if len(path) == 1 else tables[path[0]]).model_fields)
         hint = did_you_mean(path[-1], allowed, 0.5) or ", ".join(allowed)
         return Problem("unknown_key", "unknown key", file, row, column, path[-1], hint)
     if error["type"] == "missing":
         return Problem("missing_key", "this required key is missing", file, row, column)
     what = error["msg"].removeprefix("Value error, ")
+    found = None if isinstance(error["input"], dict) else str(error["input"])[:200]
     return Problem("wrong_value", what[:1].lower() + what[1:], file, row, column, found, _meant_value(error))
 
 
@@ -287,27 +311,6 @@ def _meant_value(error: Any) -> str | None:
     if found and error["type"] in ("float_type", "float_parsing", "int_type"):
         return f"a number without quotation marks and unit: did you mean {found[1].replace(',', '.')}?"
     return None
-
-
-def _is_branch(part: object) -> bool:
-    """pydantic names the branch of a union in its path: "float", "list[float]"."""
-    return isinstance(part, str) and (part in {"float", "int", "str"} or "[" in part)
-
-
-def _shown(value: object) -> str | None:
-    return None if isinstance(value, dict) else str(value)[:200]
-
-
-def _allowed_keys(path: Sequence[str]) -> list[str]:
-    """Keys of the table that holds ``path``."""
-    tables: dict[str, type[BaseModel]] = {
-        "campaign": CampaignTable,
-        "patterns": PatternTable,
-        "instrument": InstrumentTable,
-        "plausible": PlausibleTable,
-    }
-    table = CampaignFile if len(path) == 1 else tables[path[0]]
-    return list(table.model_fields)
 
 
 def _row_of(path: Sequence[str], text: str) -> int | None:
@@ -327,3 +330,106 @@ def _row_of(path: Sequence[str], text: str) -> int | None:
         return start + 1
     key = re.compile(rf'\s*"?{re.escape(path[0])}"?\s*=') if path else None
     return next((k + 1 for k, line in enumerate(lines) if key and key.match(line)), None)
+
+
+_TOML_TEXT = """\
+# Description of a campaign: sample, counterface and patterns. Replace the example values by your own.
+
+[campaign]
+title = "Sled friction of patterned PDMS on polycarbonate"
+material = "PDMS (Sylgard 184)"
+counterface = "polycarbonate"
+nominal_area_mm2 = 55.0   # area of the sample face, including cavities
+slider_mass_g = 1.5       # mass of sled and sample, without the added mass
+pull_speed_mm_s = 0.2     # used for tests without speed_mm_s in tests.csv
+# zero = "none"           # of the force: "before contact", "at rest", "none", a number of newtons, or [from, to] in s
+# load_zero = "none"      # of the recorded normal load, in the same form
+
+# Patterns, one table each. cavity is "none", "circle" (with diameter_um), "square" or "rectangle" (with size_um);
+# all but "none" also need pitch_um. Sizes and pitches are one number or [x, y], in micrometres.
+# staggered = true shifts every other row of cavities by half a pitch along x.
+# area_fraction = 0.71 gives a measured contact area fraction; it replaces the one computed from the geometry.
+# Samples Sx and Sy in tests.csv mean pattern S pulled along x and along y.
+
+[patterns.F]
+cavity = "none"
+
+[patterns.A]
+cavity = "circle"
+diameter_um = 5.0
+pitch_um = [20.0, 20.0]
+
+[patterns.S]
+cavity = "rectangle"
+size_um = [200.0, 40.0]
+pitch_um = [220.0, 120.0]
+staggered = true
+
+# tests.csv has one row per pull; its column file names the export in raw/. If an export holds several pulls, file
+# also selects the pull:
+#   raw/log.csv#2     second table of the export (step, segment or specimen)
+#   raw/log.csv#2/3   third pull of that table (a stroke, or one of several loads or speeds)
+#   raw/log.csv#2/*   all pulls of that table, each as a separate test
+#   raw/log.csv#*     all pulls of the export, each as a separate test
+# In such a row the load may be left empty; the normal force recorded in the export is then used.
+
+# If tribo does not recognise the columns of your exports (check with: tribo inspect FILE), name them here: the
+# quantity, then the column by its name and unit, or by its position and unit.
+# [columns]
+# time = "Clock [s]"
+# force = "Channel 2 [N]"
+# displacement = "#3 [mm]"
+
+# Standard uncertainties (k = 1) of the test rig. Defaults are used for values not given here.
+# [instrument]
+# load_cell_u_percent = 0.5
+# mass_u_g = 0.05
+# area_u_percent = 1.0
+# wire_angle_u_deg = 0.5
+# stiffness_N_per_m = 2000.0
+"""
+
+# Required: test_id, file, sample, and mass_g or normal_load_N. Any further column is kept as a covariate.
+_TESTS_TEXT = """\
+test_id,file,sample,specimen,direction,mass_g,normal_load_N,speed_mm_s,hold_s,repeat,run_order,specimen_run,\
+started_at,temperature_C,humidity_pct,operator,exclude
+T0001,raw/T0001.csv,F,F1,,50,,0.2,10,1,1,1,2026-03-02T09:00:00,22.5,51,,
+T0002,raw/T0002.csv,Sx,S1,x,50,,0.2,10,1,2,1,2026-03-02T09:08:00,22.6,51,,slipped off the hook
+"""
+
+
+def write_template(folder: Path | str) -> tuple[Path, ...]:
+    """Write campaign.toml, tests.csv and an empty raw/ into a folder, to be filled in.
+
+    Parameters
+    ----------
+    folder : path
+        A new folder, or one that holds neither of the two files.
+
+    Returns
+    -------
+    tuple of Path
+        What was written: campaign.toml, tests.csv and raw/.
+
+    Raises
+    ------
+    CampaignError
+        One of them already exists. In this case nothing is written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     [path.name for path in tribo.write_template(folder)]
+    ['campaign.toml', 'tests.csv', 'raw']
+    """
+    folder = Path(folder)
+    texts = {folder / TOML: _TOML_TEXT, folder / TABLES[0]: _TESTS_TEXT}
+    there = [path for path in texts if path.exists()]
+    if there or (folder.exists() and not folder.is_dir()):
+        what = "this file or folder already exists and is not overwritten"
+        raise CampaignError(Problem("exists", what, file=str(path)) for path in there or [folder])
+    (folder / RAW).mkdir(parents=True, exist_ok=True)
+    for path, text in texts.items():
+        write_new(path, text)
+    return (*texts, folder / RAW)

@@ -1,10 +1,6 @@
-"""From campaign.toml and tests.csv to a Campaign in SI units.
+"""From a folder with campaign.toml and tests.csv, or a .zip of one, to a Campaign in SI units.
 
-A campaign in a folder or in a .zip that is not trusted.
-
-The flat sample that calibrates the model: chosen once, checked once, carried by the campaign.
-
-The zeros of a campaign replaced by those of the command line; a test with a zero of its own keeps it.
+Choices of the command line are made for it later: the flat sample that calibrates the model, zeros of force and load.
 """
 
 from __future__ import annotations
@@ -13,12 +9,12 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
-from tribo.campaign.description import CampaignFile, PatternTable, read_description
+from tribo.campaign.description import CampaignFile, read_description
 from tribo.campaign.rows import (
-    columns_by_file,
     correction_of,
     date_faults,
     evaluated_forces,
@@ -35,14 +31,14 @@ from tribo.campaign.table import (
     NUMBERS,
     RAW,
     TABLES,
+    TOML,
     TestRow,
     order_of,
     overlap,
     parsed,
-    read_tests_table,
-    tests_file,
+    read_tests,
 )
-from tribo.errors import CampaignError, Problem, system_problem
+from tribo.errors import CampaignError, Problem
 from tribo.files import LEADS_OUT, found_below, leads_out, paths_below
 from tribo.input_files import hashes_of_reads, unpack
 from tribo.records import NO_AREA_M2, STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
@@ -51,17 +47,22 @@ from tribo.user_text import did_you_mean, nearest, well_formed
 from tribo.zeroing import DEFAULT, ZeroChoice, zero_choice
 
 _NOT_WORTH_A_NOTE = (".", "~$", "Thumbs.db")
-TOML = "campaign.toml"
-TESTS = TABLES[0]
-_MM2, _GRAM, _MM, _UM = 1e-6, 1e-3, 1e-3, 1e-6
+_TABLES_OF_EXPORTS = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".xls", ".ods", ".tra", ".mat", ".tdms")
+_MM2, _GRAM, _MM = 1e-6, 1e-3, 1e-3
 _LOADS_AGREE = 0.05  # share by which normal_load_N may differ from the weight put on
 _NUMBER_ROW = re.compile(rb'^\s*"?[-+]?[.,]?\d+[.,\d]*"?\s*[,;\t|]', re.M)
+_FIELDS = {f.name for f in fields(Test)}
 
 
 def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     """Read campaign.toml and tests.csv of a folder, and the list of files in raw/.
 
-    With ``measured=False`` the exports need not exist yet: the campaign is a plan.
+    Parameters
+    ----------
+    folder : path
+        The folder that holds campaign.toml.
+    measured : bool, optional
+        False for a plan, whose exports need not exist yet.
 
     Returns
     -------
@@ -74,6 +75,12 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     CampaignError
         campaign.toml is wrong, a required column is missing, or no test is usable; with the errors of both
         files. Or one of the two files, or raw/, is a link that leads out of the folder.
+
+    Examples
+    --------
+    >>> campaign = tribo.load_campaign("data/example")
+    >>> campaign.tests[0].normal_load_N, campaign.samples["F"].cavity
+    (0.505042475, 'none')
     """
     root = Path(folder)
     links = (TOML, *TABLES, RAW)
@@ -82,73 +89,30 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
         raise CampaignError(problems)
     with hashes_of_reads() as hashes:
         described = read_description(root / TOML, TOML, problems)
-        rows = _rows(root, problems)
+        rows = read_tests(root, problems)
     if described is None or rows is None:
         raise CampaignError(problems)
-    patterns = {name: pattern_of_table(name, table) for name, table in described.patterns.items()}
-    usable, set_aside = _sort_rows(root, rows, patterns, measured)
+    patterns = {name: table.pattern(name) for name, table in described.patterns.items()}
+    order = order_of(row.cells.get("started_at", "") for row in rows)
+    usable, set_aside = _sort_rows(root, rows, patterns, order, measured)
     problems += [p for s in set_aside for p in s.problems]
     if not usable:
-        file = rows[0].file if rows else TESTS
-        nothing = Problem("no_usable_test", "no test of this campaign is usable", file=file)
-        raise CampaignError([*problems, nothing])
-    _require_area(described, usable)
-    area_m2 = _area_m2(described)
-    problems += _unlisted(root, rows)
-    problems += [note for row in usable if (note := _loads_disagree(row, described))]
-    order = _date_order(rows)
-    tests = tuple(_test(row, described, order, area_m2) for row in usable)
-    campaign = _campaign(root, described, patterns, tests, set_aside, problems)
-    return replace(campaign, inputs={Path(path).name: digest for path, digest in hashes.items()})
-
-
-def _rows(root: Path, problems: list[Problem]) -> list[TestRow] | None:
-    """The rows of the table of tests; None where it cannot be used, with every fault added to ``problems``."""
-    try:
-        file = tests_file(root)
-    except CampaignError as why:
-        problems += why.problems
-        return None
-    except OSError as why:
-        problems.append(system_problem(why, str(root)))
-        return None
-    return read_tests_table(root / file, file, problems)
-
-
-def _require_area(described: CampaignFile, rows: Sequence[TestRow]) -> None:
-    """Raises CampaignError where a load is given as normal stress and no nominal area is stated."""
-    if described.campaign.nominal_area_mm2 is None and any(row.cells.get("normal_stress_Pa") for row in rows):
+        file = rows[0].file if rows else TABLES[0]
+        raise CampaignError([*problems, Problem("no_usable_test", "no test of this campaign is usable", file=file)])
+    general = described.campaign
+    if general.nominal_area_mm2 is None and any(row.cells.get("normal_stress_Pa") for row in usable):
         what, allowed = "a load given as normal stress needs the nominal area", "more than 0 mm2"
         raise CampaignError(Problem("no_area", what, file=TOML, column="nominal_area_mm2", allowed=allowed))
-
-
-def _area_m2(described: CampaignFile) -> float:
-    """The nominal area, NO_AREA_M2 where none is stated."""
-    area = described.campaign.nominal_area_mm2
-    return NO_AREA_M2 if area is None else area * _MM2
-
-
-def _date_order(rows: Sequence[TestRow]) -> str:
-    """Order of day and month that the column started_at settles as a whole."""
-    return order_of(row.cells.get("started_at", "") for row in rows)
-
-
-def _campaign(
-    root: Path,
-    described: CampaignFile,
-    patterns: Mapping[str, Pattern],
-    tests: tuple[Test, ...],
-    set_aside: tuple[SetAside, ...],
-    problems: Sequence[Problem],
-) -> Campaign:
-    general = described.campaign
-    columns, by_file = columns_by_file(described.columns)
-    order = list(patterns)
-    names = sorted({t.sample for t in tests}, key=lambda n: (order.index(pattern_of(n, patterns)), n))
+    area_m2 = NO_AREA_M2 if general.nominal_area_mm2 is None else general.nominal_area_mm2 * _MM2
+    problems += _unlisted(root, rows)
+    problems += [note for row in usable if (note := _loads_disagree(row, described))]
+    tests = tuple(_test(row, described, order, area_m2) for row in usable)
+    names = sorted({t.sample for t in tests}, key=lambda n: (list(patterns).index(pattern_of(n, patterns)), n))
+    by_file = {key: value for key, value in described.columns.items() if isinstance(value, dict)}
     return Campaign(
         title=general.title,
         root=root,
-        nominal_area_m2=_area_m2(described),
+        nominal_area_m2=area_m2,
         contact=general.contact,
         material_class=general.material_class,
         plausible={k: (v[0], v[1]) for k, v in described.plausible.model_dump(exclude_none=True).items()},
@@ -161,30 +125,17 @@ def _campaign(
         pull_speed_m_s=None if general.pull_speed_mm_s is None else general.pull_speed_mm_s * _MM,
         set_aside=set_aside,
         problems=tuple(problems),
-        columns=columns,
+        columns={key: value for key, value in described.columns.items() if not isinstance(value, dict)},
         columns_by_file=by_file,
         instrument=described.instrument.model_dump(exclude_none=True),
         zero=zero_choice(general.zero),
         load_zero=zero_choice(general.load_zero),
-    )
-
-
-def pattern_of_table(name: str, table: PatternTable) -> Pattern:
-    def metres(pair: tuple[float, float] | None) -> tuple[float, float] | None:
-        return None if pair is None else (pair[0] * _UM, pair[1] * _UM)
-
-    return Pattern(
-        name=name,
-        cavity=table.cavity,
-        size_m=metres(table.size),
-        pitch_m=metres(table.pitch),
-        staggered=table.staggered,
-        measured_area_fraction=table.area_fraction,
+        inputs={Path(path).name: digest for path, digest in hashes.items()},
     )
 
 
 def _sort_rows(
-    root: Path, rows: Sequence[TestRow], patterns: Mapping[str, Pattern], measured: bool
+    root: Path, rows: Sequence[TestRow], patterns: Mapping[str, Pattern], order: str, measured: bool
 ) -> tuple[list[TestRow], tuple[SetAside, ...]]:
     """Usable rows, and the others with all their faults; rows that share a test_id are one set-aside test."""
     places: dict[str, list[int]] = {}
@@ -195,14 +146,15 @@ def _sort_rows(
         users.setdefault(path, []).append((row.test_id, choice))
     recorded = not any(row.cells.get(column) for row in rows for column in LOADS)  # by all exports
     usable, set_aside = [], []
-    order = _date_order(rows)
     for row in rows:
         test_id = row.test_id
         if row.row != places[test_id][0]:
             continue
         problems = row_faults(root, row, patterns, measured, recorded) + date_faults(row, order)
         if len(places[test_id]) > 1:
-            problems.append(_duplicate(row, places[test_id]))
+            what = f"this test_id occurs in rows {', '.join(map(str, places[test_id]))}; none of them is used"
+            place = (row.file, places[test_id][1], "test_id", test_id)
+            problems.append(Problem("duplicate_row", what, *place, "one row per test"))
         path, choice = export_of(row)
         others = [other for other, theirs in users[path] if other != test_id and overlap(choice, theirs)]
         if others and path:
@@ -219,59 +171,41 @@ def _sort_rows(
     return usable, tuple(set_aside)
 
 
-def _duplicate(row: TestRow, rows: Sequence[int]) -> Problem:
-    what = f"this test_id occurs in rows {', '.join(map(str, rows))}; none of them is used"
-    return Problem("duplicate_row", what, row.file, rows[1], "test_id", row.test_id, "one row per test")
-
-
 def _test(row: TestRow, described: CampaignFile, order: str, area_m2: float) -> Test:
     """A row without faults as a Test. N = normal_load_N, or (mass + slider mass) g; NaN where the export tells it."""
-    cells = row.cells
-    numbers = {column: number(row, column) for column in NUMBERS}
-    counts = {c: None if (v := number(row, c)) is None else int(v) for c in COUNTS}
-    speed = numbers["speed_mm_s"] if numbers["speed_mm_s"] is not None else described.campaign.pull_speed_mm_s
-    load = numbers["normal_load_N"]
-    if load is None and numbers["normal_stress_Pa"] is not None:
-        load = numbers["normal_stress_Pa"] * area_m2
-    if load is None and numbers["mass_g"] is None:
-        load = math.nan
+    cells, general = row.cells, described.campaign
+    numbers: dict[str, Any] = {column: number(row, column) for column in NUMBERS}
+    numbers |= {column: None if (v := number(row, column)) is None else int(v) for column in COUNTS}
+    speed = numbers["speed_mm_s"] if numbers["speed_mm_s"] is not None else general.pull_speed_mm_s
+    load, stress, mass = numbers["normal_load_N"], numbers["normal_stress_Pa"], numbers["mass_g"]
+    given = {"normal_load_N": load, "normal_stress_Pa": stress, "mass_g": mass}  # the first of them counts
+    if load is None and stress is not None:
+        load = stress * area_m2
     if load is None:
-        load = ((numbers["mass_g"] or 0.0) + described.campaign.slider_mass_g) * _GRAM * STANDARD_GRAVITY
-    mass = numbers["mass_g"]
+        load = math.nan if mass is None else (mass + general.slider_mass_g) * _GRAM * STANDARD_GRAVITY
+    speed_m_s = None if speed is None else speed * _MM
     sample = cells["sample"]
-    directed = sample[-1:] if sample not in described.patterns else ""
-    return Test(
-        test_id=cells["test_id"],
-        file="#".join(part for part in export_of(row) if part),
-        sample=sample,
-        normal_load_N=load,
-        specimen=cells.get("specimen") or sample,
-        direction=cells.get("direction") or directed,
-        speed_m_s=None if speed is None else speed * _MM,
-        hold_s=numbers["hold_s"],
-        repeat=counts["repeat"],
-        run_order=counts["run_order"],
-        specimen_run=counts["specimen_run"],
-        started_at=parsed(cells["started_at"], order) if cells.get("started_at") else "",
-        temperature_C=numbers["temperature_C"],
-        humidity_pct=numbers["humidity_pct"],
-        operator=cells.get("operator", ""),
-        covariates={name: cell for name, cell in cells.items() if name and name not in KNOWN},
-        row=row.row,
-        correction=correction_of(numbers, described.campaign, None if speed is None else speed * _MM),
-        evaluated=evaluated_forces(row, load),
-        zero=zero_choice(cells.get("zero") or described.campaign.zero),
-        load_zero=zero_choice(cells.get("load_zero") or described.campaign.load_zero),
-        stiffness_N_per_m=numbers["stiffness_N_per_m"] or described.instrument.stiffness_N_per_m,
-        load_from=_load_from(numbers),
-        mass_kg=None if mass is None else mass * _GRAM,
-    )
-
-
-def _load_from(numbers: Mapping[str, float | None]) -> str:
-    """The column that gives the load, the first of those that may: force, stress, mass."""
-    order = ("normal_load_N", "normal_stress_Pa", "mass_g")
-    return next((column for column in order if numbers[column] is not None), "")
+    stated = {
+        "test_id": cells["test_id"],
+        "file": "#".join(part for part in export_of(row) if part),
+        "sample": sample,
+        "normal_load_N": load,
+        "specimen": cells.get("specimen") or sample,
+        "direction": cells.get("direction") or (sample[-1:] if sample not in described.patterns else ""),
+        "speed_m_s": speed_m_s,
+        "started_at": parsed(cells["started_at"], order) if cells.get("started_at") else "",
+        "operator": cells.get("operator", ""),
+        "covariates": {name: cell for name, cell in cells.items() if name and name not in KNOWN},
+        "row": row.row,
+        "correction": correction_of(numbers, general, speed_m_s),
+        "evaluated": evaluated_forces(row, load),
+        "zero": zero_choice(cells.get("zero") or general.zero),
+        "load_zero": zero_choice(cells.get("load_zero") or general.load_zero),
+        "stiffness_N_per_m": numbers["stiffness_N_per_m"] or described.instrument.stiffness_N_per_m,
+        "load_from": next((column for column, value in given.items() if value is not None), ""),
+        "mass_kg": None if mass is None else mass * _GRAM,
+    }
+    return Test(**{column: value for column, value in numbers.items() if column in _FIELDS} | stated)
 
 
 def _loads_disagree(row: TestRow, described: CampaignFile) -> Problem | None:
@@ -300,9 +234,9 @@ def _unlisted(root: Path, rows: Sequence[TestRow]) -> list[Problem]:
         if name in named or path.name.startswith(_NOT_WORTH_A_NOTE) or not path.is_file():
             continue
         if _holds_numbers(path):
-            note = Problem("not_listed", f"not listed in {TESTS}; this export is not read", file=well_formed(name))
+            note = Problem("not_listed", f"not listed in {TABLES[0]}; this export is not read", file=well_formed(name))
         else:
-            what = f"not an export and not listed in {TESTS}; it is not read"
+            what = f"not an export and not listed in {TABLES[0]}; it is not read"
             note = Problem("not_an_export_and_not_listed", what, file=well_formed(name))
         notes.append(note)
     return notes
@@ -316,20 +250,33 @@ def _holds_numbers(path: Path) -> bool:
         return False
 
 
-_TABLES_OF_EXPORTS = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".xls", ".ods", ".tra", ".mat", ".tdms")
-
-
 @contextmanager
 def open_campaign(path: Path | str, *, measured: bool = True) -> Iterator[Campaign]:
     """Open a campaign folder, or a .zip that holds one (unpacked into a temporary folder while it is open).
 
-    ``measured`` as in :func:`tribo.campaign.load_campaign`.
+    Parameters
+    ----------
+    path : path
+        The folder or .zip; campaign.toml may stand in one folder below it.
+    measured : bool, optional
+        False for a plan, whose exports need not exist yet.
+
+    Returns
+    -------
+    context manager of Campaign
+        As :func:`load_campaign` gives it; of a .zip, its files exist while the context is open.
 
     Raises
     ------
     CampaignError
         The campaign is unusable; or the archive is refused (:func:`tribo.input_files.opened_zip`), or contains no
         campaign.toml, or more than one.
+
+    Examples
+    --------
+    >>> with tribo.open_campaign("data/example") as campaign:
+    ...     len(campaign.tests)
+    144
     """
     path = Path(path)
     if path.is_dir():

@@ -1,8 +1,6 @@
-"""The numbers of a row of tests.csv: finite, whole where they count, and within what a friction test can have.
+"""One row of tests.csv: all its faults at once, and what it states about the numbers of its export or in their place.
 
-What campaign.toml and tests.csv state about the numbers of an export, and forces that were evaluated elsewhere.
-
-The faults of one row of tests.csv, all at once: sample, direction, numbers, load, zero, date and file.
+Faults are those of the sample, the direction, numbers, load, zero, date and file.
 """
 
 from __future__ import annotations
@@ -11,19 +9,19 @@ import difflib
 import errno
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from tribo.campaign.table import (
-    ALLOWED as ALLOWED_DATES,
+    ALLOWED_DATES,
     COUNTS,
     LOADS,
     NUMBERS,
     RAW,
-    ZEROS,
     TestRow,
+    of_kind,
     parsed,
     split_choice,
 )
@@ -38,13 +36,78 @@ from tribo.input_files import (
     SMALLEST_NUMBER,
 )
 from tribo.records import Correction, Evaluated, Pattern
+from tribo.units import CAMPAIGN_COLUMNS
 from tribo.user_text import did_you_mean
 from tribo.zeroing import ALLOWED, zero_choice
 
 _NOT_NEGATIVE = ("speed_mm_s", "hold_s", "stiffness_N_per_m")
-_UNITS = {"g": "g", "N": "N", "Pa": "Pa", "s": "s", "C": "C", "pct": "%", "mm": "mm", "Hz": "Hz"}
 _WITH_UNIT = re.compile(r"([-+]?\d+(?:[.,]\d+)?)\s*([^\d\s.,+-][^\d]{0,9})?")
-_SMALL_OR_ZERO = ("mass_g", *_NOT_NEGATIVE)
+_ZEROS = of_kind("zero")
+_CORRECTIONS = of_kind("correction")
+_UNCERTAINTIES = of_kind("uncertainty")
+_FORCES = ("static_N", "sliding_N")
+_RATIOS = {"static_mu": "static_N", "sliding_mu": "sliding_N", "coefficient": "sliding_N"}
+_MM = 1e-3
+
+Columns = Mapping[str, str | list[str]]
+
+
+def row_faults(
+    root: Path, row: TestRow, patterns: Mapping[str, Pattern], measured: bool, recorded: bool
+) -> list[Problem]:
+    """Every fault of a row but that of its date.
+
+    ``measured`` says that the exports must exist, ``recorded`` that the load may be left to the normal force in them.
+    """
+    if row.fault is not None:
+        return [row.fault]
+    problems = []
+    if not row.cells["test_id"]:
+        problems.append(Problem("no_test_id", "test_id is missing", row.file, row.row, "test_id"))
+    problems += _sample_faults(row, patterns)
+    numbers, faults = _numbers_and_faults(row)
+    problems += faults
+    for column in _ZEROS:
+        cell = row.cells.get(column, "")
+        try:
+            zero_choice(cell)
+        except ValueError:
+            problems.append(Problem("unknown_zero", "not a zero", row.file, row.row, column, cell, ALLOWED))
+    problems += _stated_faults(row, numbers)
+    problems += _load_faults(row, numbers, load_in_export=measured and (recorded or bool(export_of(row)[1])))
+    given = [column for column in (*_FORCES, *_RATIOS) if row.cells.get(column)]
+    if given:
+        return [*problems, *_force_faults(row, given)]
+    problems += [p for p in _file_faults(root, row) if measured or p.kind != "missing"]
+    return problems
+
+
+def date_faults(row: TestRow, order: str) -> list[Problem]:
+    cell = row.cells.get("started_at", "")
+    if not cell or row.fault is not None:
+        return []
+    try:
+        parsed(cell, order)
+    except ValueError as why:
+        return [Problem("not_a_date", str(why), row.file, row.row, "started_at", cell, ALLOWED_DATES)]
+    return []
+
+
+def _sample_faults(row: TestRow, patterns: Mapping[str, Pattern]) -> list[Problem]:
+    """A sample without a pattern; or one named after one direction and pulled along the other."""
+    sample, direction = row.cells["sample"], row.cells.get("direction", "").strip().lower()
+    if not pattern_of(sample, patterns):
+        hint = did_you_mean(sample, [*patterns, *(f"{name}{axis}" for name in patterns for axis in "xy")])
+        hint = hint or f"or state its geometry in a table [patterns.{sample}] of campaign.toml"
+        allowed = f"{', '.join(patterns)}, or one of these names followed by x or y; {hint}"
+        return [Problem("unknown_sample", "no pattern has this name", row.file, row.row, "sample", sample, allowed)]
+    axis = "" if sample in patterns else sample[-1:]
+    if direction not in ("x", "y") or axis in ("", direction):
+        return []
+    what = f"sample {sample} is pulled along {axis}, and the column direction says {direction}"
+    place = (row.file, row.row, "direction", row.cells["direction"])
+    allowed = f"{axis} or an empty cell; or {sample[:-1]}{direction} in the column sample"
+    return [Problem("direction_against_sample", what, *place, allowed)]
 
 
 def number(row: TestRow, column: str) -> float | None:
@@ -60,32 +123,38 @@ def number(row: TestRow, column: str) -> float | None:
     return value
 
 
-def number_faults(row: TestRow, file: str) -> list[Problem]:
-    """Every cell that holds no number, or one that is impossible where it stands."""
-    problems, at = [], (file, row.row)
+def _numbers_and_faults(row: TestRow) -> tuple[dict[str, float], list[Problem]]:
+    """The numbers of a row, and every cell that holds none, or one that is impossible where it stands."""
+    numbers: dict[str, float] = {}
+    problems, at = [], (row.file, row.row)
     for column in (*NUMBERS, *COUNTS):
         cell = row.cells.get(column, "")
         try:
             value = number(row, column)
         except ValueError:
             kind = "load_not_a_number" if column in LOADS else "not_a_number"
-            problems.append(Problem(kind, "not a number", *at, column, cell, _meant_number(row, column)))
+            problems.append(Problem(kind, "not a number", *at, column, cell, _meant_number(column, cell)))
             continue
         if value is None:
             continue
+        numbers[column] = value
         if column in COUNTS and value != int(value):
             problems.append(Problem("not_a_number", "not a whole number", *at, column, cell, "1, 2, ..."))
+        least = ABSOLUTE_ZERO_C if column == "temperature_C" else -LARGEST_NUMBER
+        least, most = (-LARGEST_COUNT, LARGEST_COUNT) if column in COUNTS else (least, LARGEST_NUMBER)
+        outside = "" if least <= value <= most else f"{least:g} to {most:g}"
+        if column in ("mass_g", *_NOT_NEGATIVE) and 0 < abs(value) < SMALLEST_NUMBER:
+            outside = f"0, or {SMALLEST_NUMBER:g} or more"
         if column in _NOT_NEGATIVE and value < 0:
             problems.append(Problem("negative", "must not be negative", *at, column, cell, "0 or more"))
-        elif outside := _outside(column, value):
+        elif outside:
             problems.append(Problem("impossible_number", "not a possible value", *at, column, cell, outside))
-    return problems
+    return numbers, problems
 
 
-def _meant_number(row: TestRow, column: str) -> str:
+def _meant_number(column: str, cell: str) -> str:
     """What a cell that holds no number may mean: a number with its unit, or one with a decimal comma."""
-    cell, unit = row.cells[column], _UNITS.get(column.rpartition("_")[2], "")
-    found = _WITH_UNIT.fullmatch(cell)
+    found, unit = _WITH_UNIT.fullmatch(cell), CAMPAIGN_COLUMNS[column].unit
     if not found:
         return "a number"
     digits, given = found[1].replace(",", "."), found[2]
@@ -93,220 +162,61 @@ def _meant_number(row: TestRow, column: str) -> str:
         return f"a number with a decimal point: did you mean {digits}?"
     if not unit:
         return f"a number without a unit: did you mean {digits}?"
-    if given.casefold() == unit.casefold():
+    if given.casefold().lstrip("°") == unit.casefold().lstrip("°"):
         return f"a number without its unit, which is in the name of the column: did you mean {digits}?"
     return f"a number in {unit}, without the unit: convert {cell} to {unit}"
 
 
-def _outside(column: str, value: float) -> str:
-    """The allowed range where a number lies outside it, else an empty text."""
-    least, most = -LARGEST_NUMBER, LARGEST_NUMBER
-    if column in COUNTS:
-        least, most = -LARGEST_COUNT, LARGEST_COUNT
-    if column in _SMALL_OR_ZERO and 0 < abs(value) < SMALLEST_NUMBER:
-        return f"0, or {SMALLEST_NUMBER:g} or more"
-    if column == "temperature_C":
-        least = ABSOLUTE_ZERO_C
-    return "" if least <= value <= most else f"{least:g} to {most:g}"
+def _stated_faults(row: TestRow, numbers: Mapping[str, float]) -> Iterator[Problem]:
+    """A sign that is none, a gain, lever arm or rate that is not positive, an uncertainty below zero."""
+    for column in (*_CORRECTIONS, *_UNCERTAINTIES):
+        value = numbers.get(column)
+        if value is None:
+            continue
+        at = (row.file, row.row, column, row.cells[column])
+        if column == "sign" and value not in (1.0, -1.0):
+            yield Problem("not_a_sign", "not a sign", *at, "1 or -1")
+        elif column in _UNCERTAINTIES and value < 0:
+            yield Problem("negative", "must not be negative", *at, "0 or more")
+        elif column in _CORRECTIONS[1:] and value <= 0:
+            yield Problem("not_positive", "must be positive", *at, "more than 0; a reversed direction is sign = -1")
 
 
-def load_faults(row: TestRow, file: str, load_in_export: bool) -> list[Problem]:
+def _load_faults(row: TestRow, numbers: Mapping[str, float], load_in_export: bool) -> list[Problem]:
     """normal_load_N must be positive; a sled may carry no mass of its own, but none may be negative.
 
     With ``load_in_export`` the load may be left to the normal force recorded there.
     """
-    at, loads = (file, row.row), _loads(row)
-    if not loads and not any(row.cells.get(column) for column in LOADS):
-        if load_in_export:
-            return []
+    at = (row.file, row.row)
+    if not any(row.cells.get(column) for column in LOADS):
         allowed = "mass_g, normal_load_N or normal_stress_Pa"
-        return [Problem("no_load", "the load is missing", *at, " or ".join(LOADS[:2]), None, allowed)]
-    stress = loads.get("normal_stress_Pa")
-    if stress is not None and stress <= 0:
-        found, what = row.cells["normal_stress_Pa"], "a load must be positive"
-        return [Problem("load_not_positive", what, *at, "normal_stress_Pa", found, "more than 0 Pa")]
-    load = loads.get("normal_load_N")
-    if load is not None and load <= 0:
-        found, what = row.cells["normal_load_N"], "a load must be positive"
-        return [Problem("load_not_positive", what, *at, "normal_load_N", found, "more than 0 N")]
+        missing = Problem("no_load", "the load is missing", *at, " or ".join(LOADS[:2]), None, allowed)
+        return [] if load_in_export else [missing]
+    for column, unit in (("normal_stress_Pa", "Pa"), ("normal_load_N", "N")):
+        if numbers.get(column, 1.0) <= 0:
+            found, what = row.cells[column], "a load must be positive"
+            return [Problem("load_not_positive", what, *at, column, found, f"more than 0 {unit}")]
+    load = numbers.get("normal_load_N")
     if load is not None and not SMALLEST_LOAD_N <= load <= LARGEST_LOAD_N:
         place = (*at, "normal_load_N", row.cells["normal_load_N"], f"{SMALLEST_LOAD_N:g} to {LARGEST_LOAD_N:g} N")
         return [Problem("impossible_load", "not a possible load of a friction test", *place)]
-    if load is None and loads.get("mass_g", 1.0) < 0:
+    if load is None and numbers.get("mass_g", 1.0) < 0:
         found, what = row.cells["mass_g"], "a mass must not be negative"
         return [Problem("load_not_positive", what, *at, "mass_g", found, "0 g or more")]
     return []
 
 
-def _loads(row: TestRow) -> Mapping[str, float]:
-    """The loads that a row gives as numbers."""
-    found = {}
-    for column in LOADS:
-        try:
-            value = number(row, column)
-        except ValueError:
-            continue
-        if value is not None:
-            found[column] = value
-    return found
-
-
-CORRECTIONS = ("sign", "gain", "lever_arm_mm", "sampling_rate_Hz")
-FORCES = ("static_N", "sliding_N")
-RATIOS = {"static_mu": "static_N", "sliding_mu": "sliding_N", "coefficient": "sliding_N"}
-UNCERTAINTIES = ("static_u_N", "sliding_u_N", "static_mu_u", "sliding_mu_u", "coefficient_u")
-_MM = 1e-3
-
-Columns = Mapping[str, str | list[str]]
-
-
-def correction_of(numbers: Mapping[str, float | None], general: Any, speed_m_s: float | None) -> Correction:
-    """The correction of one test: its own cells first, then [campaign] of campaign.toml."""
-    given = {key: numbers.get(key) if numbers.get(key) is not None else getattr(general, key) for key in CORRECTIONS}
-    lever = given["lever_arm_mm"]
-    return Correction(
-        sign=1.0 if given["sign"] is None else given["sign"],
-        gain=1.0 if given["gain"] is None else given["gain"],
-        lever_arm_m=None if lever is None else lever * _MM,
-        sampling_rate_Hz=given["sampling_rate_Hz"],
-        speed_m_s=speed_m_s or None,
-    )
-
-
-def stated_faults(row: TestRow, file: str) -> Iterator[Problem]:
-    """A sign that is none, a gain, lever arm or rate that is not positive, an uncertainty below zero."""
-    for column in (*CORRECTIONS, *UNCERTAINTIES):
-        try:
-            value = number(row, column)
-        except ValueError:
-            continue  # named with the other numbers
-        if value is None:
-            continue
-        at = (file, row.row, column, row.cells[column])
-        if column == "sign" and value not in (1.0, -1.0):
-            yield Problem("not_a_sign", "not a sign", *at, "1 or -1")
-        elif column in UNCERTAINTIES and value < 0:
-            yield Problem("negative", "must not be negative", *at, "0 or more")
-        elif column in CORRECTIONS[1:] and value <= 0:
-            yield Problem("not_positive", "must be positive", *at, "more than 0; a reversed direction is sign = -1")
-
-
-def has_forces(row: TestRow) -> bool:
-    """Whether a row gives a force or a coefficient of friction in place of an export."""
-    return any(row.cells.get(column) for column in (*FORCES, *RATIOS))
-
-
-def force_faults(row: TestRow, file: str) -> Iterator[Problem]:
-    """A row has an export or forces, not both; a force is given once; a coefficient needs the load."""
-    at = (file, row.row)
-    given = [column for column in (*FORCES, *RATIOS) if row.cells.get(column)]
+def _force_faults(row: TestRow, given: Sequence[str]) -> Iterator[Problem]:
+    """A row has an export or forces, not both; a force is given once."""
+    at = (row.file, row.row)
     if row.cells.get("file"):
         what = "this row has an export and a force evaluated elsewhere"
         allowed = "an empty cell in file, or empty cells in " + ", ".join(given)
         yield Problem("file_and_force", what, *at, given[0], row.cells[given[0]], allowed)
-    for force in FORCES:
-        twice = [column for column in given if RATIOS.get(column, column) == force]
+    for force in _FORCES:
+        twice = [column for column in given if _RATIOS.get(column, column) == force]
         if len(twice) > 1:
             yield Problem("force_given_twice", "the same force is given twice", *at, " and ".join(twice))
-
-
-def evaluated_forces(row: TestRow, load_N: float) -> Evaluated | None:
-    """The forces of a row without an export, in newton; a coefficient is multiplied by the load."""
-    if row.cells.get("file") or not has_forces(row):
-        return None
-    found: dict[str, float] = {}
-    for force in FORCES:
-        if (value := number(row, force)) is not None:
-            found[force] = value
-            found[_u(force)] = number(row, _u(force)) or 0.0
-    for ratio, force in RATIOS.items():
-        if (value := number(row, ratio)) is not None:
-            found[force] = value * load_N
-            found[_u(force)] = (number(row, f"{ratio}_u") or 0.0) * load_N
-    return Evaluated(**found)
-
-
-def _u(force: str) -> str:
-    return force.replace("_N", "_u_N")
-
-
-def columns_by_file(columns: Mapping[str, Any]) -> tuple[Columns, dict[str, Columns]]:
-    """[columns] of campaign.toml: what holds for every export, and what holds for a file or a glob of files."""
-    general = {key: value for key, value in columns.items() if not isinstance(value, dict)}
-    return general, {key: value for key, value in columns.items() if isinstance(value, dict)}
-
-
-def columns_of(file: str, general: Columns, by_file: Mapping[str, Columns]) -> Columns:
-    """Columns of one export: those of the campaign, replaced by those of every glob that fits, in their order."""
-    path = file.partition("#")[0]
-    found = dict(general)
-    for pattern, columns in by_file.items():
-        if any(fnmatchcase(text, pattern) for text in (file, path, path.rpartition("/")[2])):
-            found.update(columns)
-    return found
-
-
-def row_faults(
-    root: Path, row: TestRow, patterns: Mapping[str, Pattern], measured: bool, recorded: bool
-) -> list[Problem]:
-    if row.fault is not None:
-        return [row.fault]
-    problems = []
-    if not row.cells["test_id"]:
-        problems.append(Problem("no_test_id", "test_id is missing", row.file, row.row, "test_id"))
-    problems += _sample_faults(row, patterns) + _direction_faults(row, patterns)
-    problems += number_faults(row, row.file) + _zero_faults(row)
-    problems += stated_faults(row, row.file)
-    problems += load_faults(row, row.file, load_in_export=measured and (recorded or bool(export_of(row)[1])))
-    if has_forces(row):
-        return [*problems, *force_faults(row, row.file)]
-    problems += [p for p in _file_faults(root, row) if measured or p.kind != "missing"]
-    return problems
-
-
-def _sample_faults(row: TestRow, patterns: Mapping[str, Pattern]) -> list[Problem]:
-    sample = row.cells["sample"]
-    if pattern_of(sample, patterns):
-        return []
-    directed = [f"{name}{axis}" for name in patterns for axis in "xy"]
-    hint = did_you_mean(sample, [*patterns, *directed])
-    hint = hint or f"or state its geometry in a table [patterns.{sample}] of campaign.toml"
-    allowed = f"{', '.join(patterns)}, or one of these names followed by x or y; {hint}"
-    return [Problem("unknown_sample", "no pattern has this name", row.file, row.row, "sample", sample, allowed)]
-
-
-def _direction_faults(row: TestRow, patterns: Mapping[str, Pattern]) -> list[Problem]:
-    """A sample named after one direction and pulled along the other: one of the two cells is wrong."""
-    sample, direction = row.cells["sample"], row.cells.get("direction", "").strip().lower()
-    axis = "" if sample in patterns else sample[-1:]
-    if direction not in ("x", "y") or axis in ("", direction) or not pattern_of(sample, patterns):
-        return []
-    what = f"sample {sample} is pulled along {axis}, and the column direction says {direction}"
-    place = (row.file, row.row, "direction", row.cells["direction"])
-    allowed = f"{axis} or an empty cell; or {sample[:-1]}{direction} in the column sample"
-    return [Problem("direction_against_sample", what, *place, allowed)]
-
-
-def _zero_faults(row: TestRow) -> list[Problem]:
-    problems = []
-    for column in ZEROS:
-        cell = row.cells.get(column, "")
-        try:
-            zero_choice(cell)
-        except ValueError:
-            problems.append(Problem("unknown_zero", "not a zero", row.file, row.row, column, cell, ALLOWED))
-    return problems
-
-
-def date_faults(row: TestRow, order: str) -> list[Problem]:
-    cell = row.cells.get("started_at", "")
-    if not cell or row.fault is not None:
-        return []
-    try:
-        parsed(cell, order)
-    except ValueError as why:
-        return [Problem("not_a_date", str(why), row.file, row.row, "started_at", cell, ALLOWED_DATES)]
-    return []
 
 
 def _file_faults(root: Path, row: TestRow) -> list[Problem]:
@@ -317,22 +227,18 @@ def _file_faults(root: Path, row: TestRow) -> list[Problem]:
         if path is None or leads_out(root, root / path):
             what = "the path leads outside the campaign"
             return [Problem("path_outside_campaign", what, *place, "a path inside the campaign folder")]
-        if (root / path).is_file() or _is_in_a_zip(root, path):
+        in_a_zip = any(p.suffix.lower() == ".zip" and (root / p).is_file() for p in path.parents)
+        if (root / path).is_file() or in_a_zip:  # its reader looks for the entry
             return []
         if (root / path).exists() and name:
             return [Problem("not_a_file", "not a regular file", *place, "a file of the campaign")]
         hint = _meant_file(root, path)
     except (OSError, ValueError, RuntimeError) as why:  # too long, no permission, links in a circle
         problem = unexpected(why, "this path cannot be followed")
-        kind = "path_not_usable" if _is_of_the_name(why) else problem.kind
-        return [Problem(kind, problem.what, *place)]
+        of_the_name = isinstance(why, OSError) and why.errno in (errno.ENAMETOOLONG, errno.ELOOP)
+        return [Problem("path_not_usable" if of_the_name else problem.kind, problem.what, *place)]
     allowed = f"a file of the campaign{f'; {hint}' if hint else ''}"
     return [Problem("missing", "this file does not exist" if name else "no file is given", *place, allowed)]
-
-
-def _is_of_the_name(why: Exception) -> bool:
-    """Whether the path itself is at fault, and not the system that could not follow it now."""
-    return isinstance(why, OSError) and why.errno in (errno.ENAMETOOLONG, errno.ELOOP)
 
 
 def _meant_file(root: Path, path: PurePosixPath) -> str:
@@ -346,11 +252,6 @@ def _meant_file(root: Path, path: PurePosixPath) -> str:
         if near := same or difflib.get_close_matches(path.name, beside, 1, 0.9):
             return f"did you mean {(folder / near[0]).relative_to(root).as_posix()}?"
     return ""
-
-
-def _is_in_a_zip(root: Path, path: PurePosixPath) -> bool:
-    """Whether a part of a path is a .zip of the campaign: the rest is an entry of it, which its reader looks for."""
-    return any(parent.suffix.lower() == ".zip" and (root / parent).is_file() for parent in path.parents)
 
 
 def relative_path(name: str) -> PurePosixPath | None:
@@ -372,3 +273,41 @@ def pattern_of(sample: str, patterns: Mapping[str, Pattern]) -> str:
     if sample in patterns:
         return sample
     return sample[:-1] if sample[-1:] in ("x", "y") and sample[:-1] in patterns else ""
+
+
+def correction_of(numbers: Mapping[str, float | None], general: Any, speed_m_s: float | None) -> Correction:
+    """The correction of one test: its own cells first, then [campaign] of campaign.toml."""
+    given = {key: numbers.get(key) if numbers.get(key) is not None else getattr(general, key) for key in _CORRECTIONS}
+    lever = given["lever_arm_mm"]
+    return Correction(
+        sign=1.0 if given["sign"] is None else given["sign"],
+        gain=1.0 if given["gain"] is None else given["gain"],
+        lever_arm_m=None if lever is None else lever * _MM,
+        sampling_rate_Hz=given["sampling_rate_Hz"],
+        speed_m_s=speed_m_s or None,
+    )
+
+
+def evaluated_forces(row: TestRow, load_N: float) -> Evaluated | None:
+    """The forces of a row without an export, in newton; a coefficient is multiplied by the load."""
+    if row.cells.get("file") or not any(row.cells.get(column) for column in (*_FORCES, *_RATIOS)):
+        return None
+    found: dict[str, float] = {}
+    for column, force in {**{force: force for force in _FORCES}, **_RATIOS}.items():
+        if (value := number(row, column)) is not None:
+            is_force = column in _FORCES
+            uncertainty = force.replace("_N", "_u_N")
+            u = number(row, uncertainty if is_force else f"{column}_u") or 0.0
+            found[force] = value if is_force else value * load_N
+            found[uncertainty] = u if is_force else u * load_N
+    return Evaluated(**found)
+
+
+def columns_of(file: str, general: Columns, by_file: Mapping[str, Columns]) -> Columns:
+    """Columns of one export: those of the campaign, replaced by those of every glob that fits, in their order."""
+    path = file.partition("#")[0]
+    found = dict(general)
+    for pattern, columns in by_file.items():
+        if any(fnmatchcase(text, pattern) for text in (file, path, path.rpartition("/")[2])):
+            found.update(columns)
+    return found

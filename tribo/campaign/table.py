@@ -1,8 +1,7 @@
 """tests.csv: rows of cells by column name, for any delimiter, and errors of the table itself.
 
-Which pulls of an export a row of tests.csv means: PATH, PATH#2, PATH#2/3, PATH#2/* or PATH#*.
-
-Times of tests: ISO 8601, or day, month and year in the order that the column as a whole settles.
+Two kinds of cells are read here as well: which pulls of an export a row means (PATH, PATH#2, PATH#2/3, PATH#2/* or
+PATH#*), and times of tests (ISO 8601, or day, month and year in the order that the column as a whole settles).
 """
 
 from __future__ import annotations
@@ -28,25 +27,40 @@ from tribo.input_files import (
     read_input,
     sheets_as_text,
 )
+from tribo.units import CAMPAIGN_COLUMNS
 from tribo.user_text import is_control, nearest
 
-REQUIRED = ("test_id", "file", "sample")
-LOADS = ("mass_g", "normal_load_N", "normal_stress_Pa")
-NUMBERS = (
-    "mass_g", "normal_load_N", "normal_stress_Pa", "speed_mm_s", "hold_s", "temperature_C", "humidity_pct",
-    "stiffness_N_per_m",
-    "sign", "gain", "lever_arm_mm", "sampling_rate_Hz", "static_N", "static_u_N", "sliding_N", "sliding_u_N",
-    "static_mu", "static_mu_u", "sliding_mu", "sliding_mu_u", "coefficient", "coefficient_u",
-)  # fmt: skip
-EVALUATED = ("static_N", "sliding_N", "static_mu", "sliding_mu", "coefficient")
-COUNTS = ("repeat", "run_order", "specimen_run")
-TEXTS = ("specimen", "direction", "started_at", "operator", "exclude")
-ZEROS = ("zero", "load_zero")
-NAMES = ("test_id", "file", "sample", "specimen", "direction", "operator")  # on one line, without control characters
+TOML = "campaign.toml"
 RAW = "raw"
 TABLES = ("tests.csv", "tests.xlsx", "tests.ods", "tests.xls")
 _NAMES_OF_TESTS = ("tests", "test")
-KNOWN = (*REQUIRED, *NUMBERS, *COUNTS, *TEXTS, *ZEROS)
+
+
+def of_kind(*kinds: str) -> tuple[str, ...]:
+    """Columns of tests.csv of these kinds, in the order of the reference."""
+    return tuple(c.name for c in CAMPAIGN_COLUMNS.values() if c.kind in kinds)
+
+
+KNOWN = tuple(CAMPAIGN_COLUMNS)
+REQUIRED = ("test_id", "file", "sample")
+LOADS = of_kind("load")
+NUMBERS = of_kind("load", "number", "correction", "force", "uncertainty")
+COUNTS = of_kind("count")
+EVALUATED = of_kind("force")
+_NAMES = of_kind("name")  # on one line, without control characters
+
+_CHOICE = re.compile(r"#(\*|\d+(?:/(?:\d+|\*))?)$")
+ALLOWED_DATES = (
+    "YYYY-MM-DD or YYYY-MM-DDTHH:MM:SS; DD/MM/YYYY or MM/DD/YYYY where a day after the 12th settles the order"
+)
+_DATE = re.compile(r"(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})")
+_TIME = re.compile(r"(\d{1,2}):(\d\d)(?::(\d\d)(?:[.,](\d{1,9}))?)?(?: ?([AaPp])\.?[Mm]\.?)?")
+_ISO = re.compile(r"\d{4}-?\d\d-?\d\d(?:[T ]\d\d.*)?|\d{4}-?W\d\d.*")
+DAY_FIRST, MONTH_FIRST, UNSETTLED, CONTRADICTORY = "day first", "month first", "unsettled", "contradictory"
+_WHY = {
+    UNSETTLED: "no date of this column settles whether the day or the month comes first",
+    CONTRADICTORY: "some dates of this column name the day first and others the month",
+}
 
 
 @dataclass(frozen=True)
@@ -75,45 +89,39 @@ class Table:
     rows: tuple[TestRow, ...]
 
 
-def tests_file(root: Path) -> str:
-    """Name of the table of tests in a campaign folder: tests.csv, or tests.xlsx or tests.ods where there is no .csv.
+def read_tests(root: Path, problems: list[Problem]) -> list[TestRow] | None:
+    """The rows of the table of tests; None where it cannot be used, with every fault added to ``problems``."""
+    file = str(root)
+    try:
+        file = _tests_file(root)
+        table = read_table(root / file, file)
+    except OSError as why:
+        problems.append(system_problem(why, file))
+        return None
+    except CampaignError as why:
+        problems += why.problems
+        return None
+    if table is None:
+        problems.append(Problem("empty", "the file has neither a header nor tests", file=file))
+        return None
+    found = _header_faults(list(table.names), file, table.header_row)
+    problems += found
+    return None if any(p.kind != "resembles_a_column" for p in found) else list(table.rows)
 
-    Raises
-    ------
-    CampaignError
-        There are two of them, so that it is not clear which one holds; or none.
-    """
+
+def _tests_file(root: Path) -> str:
+    """tests.csv, or tests.xlsx or tests.ods where there is none; CampaignError where there are two of them, or none."""
     there = [name for name in TABLES if (root / name).exists() or (root / name).is_symlink()]
     if len(there) > 1:
         what = "the tests are listed in more than one file; it is not clear which one is meant"
         raise CampaignError(Problem("several_tables", what, file=there[0], found=", ".join(there), allowed="one file"))
     if there:
         return there[0]
-    beside = sorted(path.name for path in root.iterdir() if path.is_file() and path.name != "campaign.toml")
-    near = next((n for n in beside if n.partition(".")[0].casefold() in _NAMES_OF_TESTS), "") or nearest(
-        TABLES[0], beside, 0.75
-    )
-    hint = f"; rename {near}?" if near else ""
-    allowed = f"{TABLES[0]}, {' or '.join(TABLES[1:3])}{hint}"
+    beside = sorted(path.name for path in root.iterdir() if path.is_file() and path.name != TOML)
+    near = next((n for n in beside if n.partition(".")[0].casefold() in _NAMES_OF_TESTS), "")
+    near = near or nearest(TABLES[0], beside, 0.75)
+    allowed = f"{TABLES[0]}, {' or '.join(TABLES[1:3])}{f'; rename {near}?' if near else ''}"
     raise CampaignError(Problem("missing_file", f"a campaign must contain {TABLES[0]}", TABLES[0], allowed=allowed))
-
-
-def read_tests_table(path: Path, file: str, problems: list[Problem]) -> list[TestRow] | None:
-    """The rows of tests.csv; None where the table cannot be used, with every fault added to ``problems``."""
-    try:
-        table = read_table(path, file)
-    except OSError as why:
-        problems.append(system_problem(why, file))
-        return None
-    except CampaignError as why:
-        problems.extend(why.problems)
-        return None
-    if table is None:
-        problems.append(Problem("empty", "the file has neither a header nor tests", file=file))
-        return None
-    found = _header_faults(list(table.names), file, table.header_row)
-    problems.extend(found)
-    return None if any(p.kind != "resembles_a_column" for p in found) else list(table.rows)
 
 
 def read_table(path: Path, file: str) -> Table | None:
@@ -153,7 +161,12 @@ def read_table(path: Path, file: str) -> Table | None:
             rows.append(_row(stripped, names, reader.line_num, delimiter, file))
             _check_size("too_many_rows", len(rows), MOST_TABLE_ROWS, "rows", file)
     except csv.Error as why:
-        raise CampaignError(_unreadable_cell(why, file, reader.line_num)) from why
+        problem = Problem("not_a_table", f"not a readable table ({why})", file, reader.line_num)
+        if "field limit" in str(why):  # of the csv module, usually behind a quotation mark that is not closed
+            what = "a cell is too long; a quotation mark before it may not be closed"
+            allowed = f"at most {LONGEST_CELL} characters"
+            problem = Problem("cell_too_long", what, file, reader.line_num, allowed=allowed)
+        raise CampaignError(problem) from why
     return Table(tuple(names), header_row, tuple(rows))
 
 
@@ -174,14 +187,6 @@ def _check_size(kind: str, found: int, most: int, what: str, file: str) -> None:
     if found > most:
         allowed = f"at most {most}"
         raise CampaignError(Problem(kind, f"too many {what}", file, found=f"{found} or more", allowed=allowed))
-
-
-def _unreadable_cell(why: csv.Error, file: str, row: int) -> Problem:
-    """A cell beyond the limit of the csv module, usually behind a quotation mark that is not closed."""
-    if "field limit" not in str(why):
-        return Problem("not_a_table", f"not a readable table ({why})", file, row)
-    what = "a cell is too long; a quotation mark before it may not be closed"
-    return Problem("cell_too_long", what, file, row, allowed=f"at most {LONGEST_CELL} characters")
 
 
 def _decoded(raw: bytes) -> str:
@@ -211,7 +216,7 @@ def _cell_fault(name: str, cell: str, file: str, row: int) -> Problem | None:
     if len(cell) > LONGEST_CELL:
         found, allowed = f"{len(cell)} characters", f"at most {LONGEST_CELL} characters"
         return Problem("cell_too_long", "this cell is too long", file, row, name, found, allowed)
-    if "\0" in cell or (name in NAMES and any(map(is_control, cell))):
+    if "\0" in cell or (name in _NAMES and any(map(is_control, cell))):
         what = "this cell contains a control character or a line break"
         return Problem("control_character", what, file, row, name, cell[:80], "text on one line")
     return None
@@ -239,7 +244,10 @@ def _header_faults(names: list[str], file: str, row: int) -> list[Problem]:
         wanted.append(" or ".join(LOADS[:2]))
     problems += [_missing(name, unknown, names, file, row) for name in wanted]
     if not problems:
-        problems += [_resembling(n, near, file, row) for n in unknown if (near := _near(n, names))]
+        for name in unknown:
+            if near := nearest(name, [n for n in KNOWN if n not in names], 0.8):
+                what = f"this column is kept as a covariate; did you mean {near}?"
+                problems.append(Problem("resembles_a_column", what, file, row, name))
     return problems
 
 
@@ -249,17 +257,6 @@ def _missing(name: str, unknown: list[str], names: list[str], file: str, row: in
     meant = next((one for one in name.split(" or ") if near and nearest(near, [one])), name)
     found = f"{near} (did you mean {meant}?)" if near else ", ".join(names)
     return Problem("missing_column", "this required column is missing", file, row, name, found)
-
-
-def _near(name: str, names: list[str]) -> str:
-    return nearest(name, [n for n in KNOWN if n not in names], 0.8)
-
-
-def _resembling(name: str, near: str, file: str, row: int) -> Problem:
-    return Problem("resembles_a_column", f"this column is kept as a covariate; did you mean {near}?", file, row, name)
-
-
-_CHOICE = re.compile(r"#(\*|\d+(?:/(?:\d+|\*))?)$")
 
 
 def split_choice(file: str) -> tuple[str, str]:
@@ -289,14 +286,6 @@ def overlap(one: str, other: str) -> bool:
     if tables[0][0] != tables[1][0]:
         return False
     return any(pull in ("", "*") for _, _, pull in tables) or one == other
-
-
-ALLOWED = "YYYY-MM-DD or YYYY-MM-DDTHH:MM:SS; DD/MM/YYYY or MM/DD/YYYY where a day after the 12th settles the order"
-_DATE = re.compile(r"(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})")
-_TIME = re.compile(r"(\d{1,2}):(\d\d)(?::(\d\d)(?:[.,](\d{1,9}))?)?(?: ?([AaPp])\.?[Mm]\.?)?")
-_ISO = re.compile(r"\d{4}-?\d\d-?\d\d(?:[T ]\d\d.*)?|\d{4}-?W\d\d.*")
-
-DAY_FIRST, MONTH_FIRST, UNSETTLED, CONTRADICTORY = "day first", "month first", "unsettled", "contradictory"
 
 
 def order_of(cells: Iterable[str]) -> str:
@@ -367,12 +356,6 @@ def _day(found: re.Match[str], order: str) -> date:
         return date(year, month, day)
     except ValueError:
         raise ValueError("not a date") from None
-
-
-_WHY = {
-    UNSETTLED: "no date of this column settles whether the day or the month comes first",
-    CONTRADICTORY: "some dates of this column name the day first and others the month",
-}
 
 
 def _clock(text: str) -> time | None:

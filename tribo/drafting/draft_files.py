@@ -9,8 +9,7 @@ import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
-from tribo.campaign.load import RAW, TESTS, TOML
-from tribo.campaign.table import KNOWN
+from tribo.campaign.table import KNOWN, LOADS, RAW, TABLES, TOML
 from tribo.drafting.draft import Draft, Stated
 from tribo.errors import CampaignError, Problem
 from tribo.files import found_below, write_new
@@ -34,7 +33,7 @@ def texts(folder: Path, draft: Draft, stated: Stated, area_mm2: float | None) ->
     """The two files of a campaign by their paths."""
     return {
         folder / TOML: _campaign_toml(folder.resolve().name, draft, stated, area_mm2),
-        folder / TESTS: _tests_csv(draft),
+        folder / TABLES[0]: _tests_csv(draft),
     }
 
 
@@ -77,7 +76,7 @@ def _columns(stated: Stated) -> str:
 def _tests_csv(draft: Draft) -> str:
     """Rows under the columns that any of them has: the known ones first, in the order of the reference."""
     present = {column for row in draft.rows for column in row}
-    if not present & {"normal_load_N", "mass_g", "normal_stress_Pa"}:
+    if not present & set(LOADS):
         present.add("normal_load_N")
     columns = [c for c in KNOWN if c in present] + sorted(present - set(KNOWN))
     out = io.StringIO()

@@ -33,7 +33,6 @@ from typing import Annotated, Any, Literal, get_args, get_type_hints
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator
 
 from tribo.campaign.description import PatternTable
-from tribo.campaign.load import pattern_of_table
 from tribo.errors import Problem, SimulationError, system_problem
 from tribo.input_files import DEEPEST_NESTING, LARGEST_DESCRIPTION_BYTES, MOST_RUNS, nests_too_deeply, read_input
 from tribo.records import Pattern
@@ -116,7 +115,7 @@ def runs_of_design(table: Mapping[str, Any], file: str | None = None) -> list[Si
     axes = _axes(design.parameters, problems)
     if too_many := _too_many(design, axes):
         raise SimulationError([p.at(file=file) for p in (*problems, too_many)])
-    patterns = {name: pattern_of_table(name, p) for name, p in design.patterns.items()}
+    patterns = {name: p.pattern(name) for name, p in design.patterns.items()}
     runs = [
         run
         for combination in product(*axes.values())
