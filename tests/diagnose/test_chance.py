@@ -12,8 +12,8 @@ from tribo.diagnostics.fit import fit
 from tribo.diagnostics.model import setup
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
-from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit, refit_sizes, standardised
-from tribo.diagnostics.score_statistics import columns_in, scores
+from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit, refits, standardised
+from tribo.diagnostics.score_statistics import scores, terms_in
 
 from .known import contrasts_of
 from .synthetic import SMALL, hidden
@@ -26,7 +26,7 @@ def test_a_batch_of_replicates_contrasts_like_each_fitted_by_itself() -> None:
     contrasts = contrasts_of(f)
     ends = np.cumsum([contrast.freedom for contrast in contrasts])
     spans = [slice(int(e - contrast.freedom), int(e)) for e, contrast in zip(ends, contrasts, strict=True)]
-    ready = columns_in(np.concatenate([contrast.columns for contrast in contrasts], axis=2), spans)
+    ready = terms_in(np.concatenate([contrast.columns for contrast in contrasts], axis=2), spans)
     drawn = drawn_residuals(f, np.random.default_rng(5), 6)
     alone = np.array([contrast.freedom == 1 for contrast in contrasts])
     batch = np.sqrt(scores(refit(f, drawn), ready)[0][:, alone].max(axis=1))
@@ -41,7 +41,7 @@ def test_the_null_is_simulated_from_the_fitted_model() -> None:
     """Scores of a trend are close to standard normal, robust weights making them a little smaller."""
     f = baseline()
     trend = next(c for c in contrasts_of(f) if c.covariate == "run_order" and c.kind == "trend")
-    ready = columns_in(trend.columns, [slice(0, 1)])
+    ready = terms_in(trend.columns, [slice(0, 1)])
     chi2 = scores(refit(f, drawn_residuals(f, np.random.default_rng(1), 300)), ready)[0][:, 0]
     assert 0.8 < np.sqrt(np.mean(chi2)) < 1.2
     assert 0.005 < np.mean(chi2 > 3.84) < 0.09
@@ -63,7 +63,7 @@ def test_repeats_of_a_replicate_scatter_as_those_of_the_campaign_were_made_to() 
 def test_a_column_that_the_law_takes_up_counts_for_nothing() -> None:
 
     f = baseline()
-    law = columns_in(f.linear.jacobian, [slice(k, k + 1) for k in range(4)])
+    law = terms_in(f.linear.jacobian, [slice(k, k + 1) for k in range(4)])
     chi2, coefficients = scores(as_measured(f), law)
     assert chi2.max() == 0.0
     assert all((c == 0.0).all() for c in coefficients)
@@ -93,7 +93,7 @@ def test_the_campaign_refitted_as_a_replicate_keeps_its_law_and_its_noise() -> N
     f = baseline()
     again = refit(f, f.residual.T[None])
     assert pytest.approx(f.residual, abs=2e-3) == again.residual[0].T
-    sizes = refit_sizes(f, f.residual.T[None])
+    sizes = refits(f, f.residual.T[None])[0]
     assert sizes.effects[0] == pytest.approx(f.noise.sizes, rel=0.02)
     assert sizes.repeat[0] == pytest.approx(f.noise.repeat, rel=0.02, abs=2e-5)
     assert sizes.scatter[0] == pytest.approx(f.noise.scatter, abs=0.02)

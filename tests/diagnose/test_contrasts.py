@@ -232,9 +232,9 @@ def test_a_mechanism_that_is_present_as_a_whole_is_known_by_its_own_spread() -> 
     (label,) = [contrast for contrast in of_kind("mechanism") if contrast.covariate == "mislabelled_specimen"][:1]
     sd = MECHANISMS["mislabelled_specimen"].choosing.all_or_nothing_sd
     assert sd is not None
-    assert label.wholeness == pytest.approx(1 / sd**2)
-    assert replace(label, acting=Acting(MECHANISMS["suction"])).wholeness == 0.0
-    assert one("trend", "both", "tau0").wholeness == 0.0
+    assert label.about_one == pytest.approx(1 / sd**2)
+    assert replace(label, acting=Acting(MECHANISMS["suction"])).about_one == 0.0
+    assert one("trend", "both", "tau0").about_one == 0.0
 
 
 def test_a_contrast_that_is_not_finite_or_does_not_vary_is_none() -> None:

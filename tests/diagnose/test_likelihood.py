@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,37 +17,38 @@ from scipy.stats import multivariate_normal
 from tribo.diagnostics.fit import (
     Linear,
     State,
-    begin,
     penalised,
     scored,
     solved,
+    state_at,
     weights,
     whitened,
     with_noise_estimated,
 )
 from tribo.diagnostics.model import FIXED, GAIN, PATTERN, SLOPE, Setup, Target, setup
-from tribo.diagnostics.normal_equations import model_columns, normal_of, weighted_columns
+from tribo.diagnostics.normal_equations import Inverse, ModelColumns, model_columns
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
-from tribo.diagnostics.scatter import (
-    REPEAT_PRIOR,
-    SCATTER_SD,
-    SIZE_PRIORS,
+from tribo.diagnostics.replicates import (
     SIZE_STEPS,
-    SMALLEST_SD,
-    Noise,
-    at_noise,
-    first_noise,
-    fitted_sizes,
-    inverse_noise,
-    log_prior,
+    fitted_noise,
     log_priors,
-    log_size_prior,
-    prior_sd,
     products_of,
     replicate_weights,
     replicates_at,
     solved_at_once,
+)
+from tribo.diagnostics.scatter import (
+    REPEAT_PRIOR,
+    SCATTER_SD,
+    SIZE_PRIORS,
+    SMALLEST_SD,
+    Noise,
+    first_noise,
+    inverse_noise,
+    log_prior,
+    log_size_prior,
+    prior_sd,
     updated_repeats,
     updated_sizes,
     whitener,
@@ -105,12 +107,32 @@ def residual_of(s: Setup) -> np.ndarray:
     return Target(s, ()).residual(s.first_law)
 
 
+def whole_inverse(inverse: Inverse, columns: ModelColumns) -> np.ndarray:
+    """The whole matrices in the order of :meth:`ModelColumns.vector`, (r, p + q, p + q)."""
+    r, specimens, _, m = inverse.across.shape
+    wide = inverse.across.reshape(r, 4 * specimens, m)
+    own = wide @ inverse.border @ wide.transpose(0, 2, 1)
+    for k in range(specimens):
+        own[:, 4 * k : 4 * k + 4, 4 * k : 4 * k + 4] += inverse.own[:, k]
+    side = -wide @ inverse.border
+    whole = np.block([[own, side], [side.transpose(0, 2, 1), inverse.border]])
+    numbers = np.arange(whole.shape[1], dtype=float)[None]
+    own, shared = numbers[:, : 4 * specimens].reshape(1, -1, 4), numbers[:, 4 * specimens :]
+    order = columns.vector(own, shared)[0].astype(int)
+    return np.asarray(whole[:, order][:, :, order])
+
+def step_from(s: Setup, state: State, jacobian: np.ndarray, bounds: Any) -> tuple[Inverse, np.ndarray, ModelColumns]:
+    """One step of a fit: the inverse of the normal matrix, the solution, and the columns of the model."""
+    columns = model_columns(jacobian, s.random_effects)
+    return *solved(state, columns, weights(s, state), bounds), columns
+
+
 def at_the_mode(s: Setup, noise: Noise) -> State:
     """The random effects that are most likely given the tests."""
     residual = residual_of(s)
     whole, _, random = dense(s, noise)
     effects = np.diag(of_effects(s, noise)) @ random.T @ np.linalg.solve(whole, residual.ravel())
-    return State(s.first_law, effects, residual, at_noise(s, noise))
+    return state_at(s, s.first_law, effects, residual, noise)
 
 
 def test_the_score_is_the_log_density_of_one_normal_vector_and_that_of_the_sizes() -> None:
@@ -127,22 +149,18 @@ def test_the_penalised_density_falls_by_the_tests_and_by_the_effects() -> None:
     s, rng = campaign(), np.random.default_rng(2)
     noise = noise_of(s, tail=6.0)
     effects = 0.05 * rng.normal(size=len(s.group))
-    state = State(s.first_law, effects, residual_of(s), at_noise(s, noise))
+    state = state_at(s, s.first_law, effects, residual_of(s), noise)
     left = (residual_of(s).ravel() - dense(s, noise)[2] @ effects).reshape(-1, 2)
     distance = [x @ np.linalg.solve(v, x) for x, v in zip(left, of_tests(s, noise), strict=True)]
     tests = -0.5 * (6.0 + 2.0) * np.sum(np.log1p(np.array(distance) / 6.0))
     assert penalised(s, state) == pytest.approx(tests - 0.5 * np.sum(effects**2 / of_effects(s, noise)))
     expected = 8.0 / (6.0 + np.array(distance))
-    assert weights(noise, state.at.factor, left) == pytest.approx(expected)
+    assert weights(s, state) == pytest.approx(expected)
 
 
-def test_a_fit_begins_without_random_effects() -> None:
-    s = campaign()
-    state = begin(s, s.first_law, residual_of(s), first_noise())
-    assert not state.effects.any()
-    assert len(state.effects) == len(s.group)
-    assert state.at.noise.sizes == pytest.approx(SIZE_PRIORS[:, 0])
-    assert state.at.noise.repeat == pytest.approx(REPEAT_PRIOR[0] ** 2 * np.eye(2))
+def test_the_noise_begins_as_expected() -> None:
+    assert first_noise().sizes == pytest.approx(SIZE_PRIORS[:, 0])
+    assert first_noise().repeat == pytest.approx(REPEAT_PRIOR[0] ** 2 * np.eye(2))
 
 
 def test_whitened_tests_have_unit_covariance() -> None:
@@ -161,16 +179,16 @@ def test_a_step_is_that_of_generalised_least_squares() -> None:
     x = s.first_law
     state = at_the_mode(s, noise)
     jacobian = target.jacobian(x, target.predict(x))
-    found = solved(s, state, jacobian, target.bounds)
+    inverse, solution, columns = step_from(s, state, jacobian, target.bounds)
     whole, flat = dense(s, noise)[0], jacobian.reshape(-1, 4)
     information = flat.T @ np.linalg.solve(whole, flat)
     step = np.linalg.solve(information, flat.T @ np.linalg.solve(whole, residual_of(s).ravel()))
-    assert found.solution[:4] == pytest.approx(step, rel=1e-4, abs=1e-7)
-    assert found.inverse.dense(found.columns)[0, :4, :4] == pytest.approx(np.linalg.inv(information), rel=1e-4)
-    assert found.inverse.border[0, :4, :4] == pytest.approx(np.linalg.inv(information), rel=1e-4)
+    assert solution[:4] == pytest.approx(step, rel=1e-4, abs=1e-7)
+    assert whole_inverse(inverse, columns)[0, :4, :4] == pytest.approx(np.linalg.inv(information), rel=1e-4)
+    assert inverse.border[0, :4, :4] == pytest.approx(np.linalg.inv(information), rel=1e-4)
     left = residual_of(s).ravel() - flat @ step
     effects = np.diag(of_effects(s, noise)) @ dense(s, noise)[2].T @ np.linalg.solve(whole, left)
-    assert found.solution[4:] == pytest.approx(effects, rel=1e-3, abs=1e-6)
+    assert solution[4:] == pytest.approx(effects, rel=1e-3, abs=1e-6)
 
 
 @pytest.mark.parametrize("side", [0, 1])
@@ -179,29 +197,29 @@ def test_a_parameter_at_a_bound_that_would_leave_it_is_held_and_the_others_are_f
     noise, target = noise_of(s), Target(s, ())
     state = at_the_mode(s, noise)
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
-    free = solved(s, state, jacobian, target.bounds).solution[:4]
+    free = step_from(s, state, jacobian, target.bounds)[1][:4]
     outward = free < 0 if side == 0 else free > 0
     held = int(np.flatnonzero(outward)[0])
     bounds = tuple(b.copy() for b in target.bounds)
     bounds[side][held] = s.first_law[held]
-    found = solved(s, state, jacobian, bounds)  # type: ignore[arg-type]
-    assert found.solution[held] == 0.0
-    assert not found.inverse.dense(found.columns)[0, held].any()
+    inverse, solution, columns = step_from(s, state, jacobian, bounds)
+    assert solution[held] == 0.0
+    assert not whole_inverse(inverse, columns)[0, held].any()
     others = [k for k in range(4) if k != held]
     whole, flat = dense(s, noise)[0], jacobian.reshape(-1, 4)[:, others]
     information = flat.T @ np.linalg.solve(whole, flat)
     step = np.linalg.solve(information, flat.T @ np.linalg.solve(whole, residual_of(s).ravel()))
-    assert found.solution[others] == pytest.approx(step, rel=1e-4, abs=1e-7)
+    assert solution[others] == pytest.approx(step, rel=1e-4, abs=1e-7)
     inward = bounds[1 - side].copy()
     inward[held] = s.first_law[held]
     kept = (target.bounds[0], inward) if side == 0 else (inward, target.bounds[1])
-    assert solved(s, state, jacobian, kept).solution[:4] == pytest.approx(free, rel=1e-6)
+    assert step_from(s, state, jacobian, kept)[1][:4] == pytest.approx(free, rel=1e-6)
 
 
 def test_cleared_columns_have_the_informations_and_scores_of_the_marginal_model() -> None:
     s, rng = campaign(), np.random.default_rng(3)
     noise, target = noise_of(s), Target(s, ())
-    at = at_noise(s, noise)
+    at = at_the_mode(s, noise)
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
     weight = 0.5 + rng.random(s.observations.n)
     linear = Linear(jacobian, s.random_effects, residual_of(s), at.factor, at.precision, weight)
@@ -338,12 +356,12 @@ def test_the_noise_is_estimated_from_what_is_left_and_from_how_uncertain_it_is()
     noise, target = replace(noise_of(s), tail=8.0), Target(s, ())
     state = at_the_mode(s, noise)
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
-    system = solved(s, state, jacobian, target.bounds)
-    after = with_noise_estimated(s, state, system).at.noise
+    solved_inverse, _, columns = step_from(s, state, jacobian, target.bounds)
+    after = with_noise_estimated(s, state, columns, weights(s, state), solved_inverse).noise
     left = residual_of(s) - s.random @ state.effects
-    inverse = system.inverse.dense(system.columns)[0]
+    inverse = whole_inverse(solved_inverse, columns)[0]
     spread = np.array([c @ inverse @ c.T for c in np.concatenate([jacobian, s.random], axis=2)])
-    square = system.weight[:, None, None] * (left[:, :, None] * left[:, None, :] + spread)
+    square = weights(s, state)[:, None, None] * (left[:, :, None] * left[:, None, :] + spread)
     squares = np.array([square[:, 0, 0], square[:, 0, 1], square[:, 1, 1]])
     assert noise.scatter is not None
     repeat, scatter = updated_repeats(s, (noise.repeat, noise.scatter), squares, 8.0)
@@ -357,7 +375,7 @@ def test_many_replicates_are_weighed_and_solved_as_each_by_dense_matrices() -> N
     s, rng = campaign(), np.random.default_rng(4)
     noise, target = noise_of(s, tail=8.0), Target(s, ())
     n = s.observations.n
-    sizes = fitted_sizes(s, noise, 2)
+    sizes = fitted_noise(s, noise, 2)
     assert sizes.effects.tolist() == [noise.sizes.tolist()] * 2
     assert sizes.precision == pytest.approx(np.array([1 / of_effects(s, noise)] * 2))
     inverse = np.linalg.inv(of_tests(s, noise))
@@ -375,7 +393,7 @@ def test_many_replicates_are_weighed_and_solved_as_each_by_dense_matrices() -> N
     columns = model_columns(jacobian, s.random_effects)
     precision = sizes.inverse * weight[:, None]
     inverted, (own, border) = solved_at_once(columns, precision, residual, sizes)
-    spread, solution = inverted.dense(columns), columns.vector(own, border)
+    spread, solution = whole_inverse(inverted, columns), columns.vector(own, border)
     for r in range(2):
         whole = np.einsum("ank,n,nab,bnl->kl", along, weight[r], inverse, along)
         right = np.einsum("ank,n,nab,bn->k", along, weight[r], inverse, residual[r])
@@ -405,8 +423,8 @@ def test_the_normal_matrix_by_blocks_is_the_dense_one() -> None:
     precision = np.array([[inverse[:, 0, 0], inverse[:, 0, 1], inverse[:, 1, 1]]])
     along = np.concatenate([jacobian, s.random], axis=2)
     whole = np.einsum("nak,nab,nbl->kl", along, inverse, along)
-    found = weighted_columns(columns, precision)
-    normal = normal_of(found)
+    found = columns.weighted(precision)
+    normal = found.normal
     specimens = s.random_effects.specimens
     here = np.arange(4, 4 + 4 * specimens).reshape(specimens, 4)
     border = np.concatenate([np.arange(4), np.arange(4 + 4 * specimens, whole.shape[0])])
@@ -434,28 +452,27 @@ def test_the_covariance_of_predictions_is_that_of_the_whole_matrix_and_random_ef
     effects = s.random_effects
     values = rng.normal(size=(2, effects.count))
     assert effects.on_tests(values) == pytest.approx(np.einsum("nak,rk->rna", s.random, values))
-    weight = np.array([1.0, -0.5])
-    assert effects.summed(weight) == pytest.approx(np.einsum("nrq,r->q", s.random, weight))
     target = Target(s, ())
     state = at_the_mode(s, noise_of(s))
-    system = solved(s, state, target.jacobian(s.first_law, target.predict(s.first_law)), target.bounds)
+    jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
+    inverse, _, columns = step_from(s, state, jacobian, target.bounds)
     rows = np.array([0, 5, 6, 20])
     some = model_columns(np.zeros((len(rows), 2, 4)), effects.take(rows))
     flat = np.concatenate([np.zeros((len(rows), 2, 4)), s.random[rows]], axis=2).reshape(2 * len(rows), -1)
-    expected = flat @ system.inverse.dense(system.columns)[0] @ flat.T
-    assert system.inverse.between(some, effects.specimen[rows]) == pytest.approx(expected)
+    expected = flat @ whole_inverse(inverse, columns)[0] @ flat.T
+    assert inverse.between(some, effects.specimen[rows]) == pytest.approx(expected)
     of_tests_alone = np.einsum("nanb->abn", expected.reshape(len(rows), 2, len(rows), 2))  # some specimens have none
-    assert system.inverse.spread(some)[0] == pytest.approx(of_tests_alone[[0, 0, 1], [0, 1, 1]])
+    assert inverse.spread(some)[0] == pytest.approx(of_tests_alone[[0, 0, 1], [0, 1, 1]])
 
 
 def test_steps_of_the_sizes_have_the_density_of_the_sizes_they_lead_to() -> None:
     s = campaign()
-    sizes = fitted_sizes(s, noise_of(s), 3)
-    found = log_priors(s, sizes, SIZE_STEPS)
+    sizes = fitted_noise(s, noise_of(s), 3)
+    found = log_priors(s, sizes.effects, SIZE_STEPS)
     assert found.shape == (len(SIZE_STEPS), 3)
     for step, row in zip(SIZE_STEPS, found, strict=True):
         stepped = noise_of(s).sizes * np.exp(step)
         assert row == pytest.approx(sum(float(log_size_prior(k, v)) for k, v in enumerate(stepped)))
     only = replace(s, group=np.where(s.group == PATTERN, FIXED, s.group))
-    fewer = log_priors(only, sizes, SIZE_STEPS[:1])[0]
+    fewer = log_priors(only, sizes.effects, SIZE_STEPS[:1])[0]
     assert fewer == pytest.approx(found[0] - float(log_size_prior(PATTERN, noise_of(s).sizes[PATTERN])))

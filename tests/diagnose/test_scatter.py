@@ -15,7 +15,7 @@ from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.model import setup
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
-from tribo.diagnostics.replicates import drawn_residuals, refit_sizes
+from tribo.diagnostics.replicates import drawn_residuals, refits
 
 from .known import contrasts_of
 from .synthetic import PATTERNS, SMALL, hidden
@@ -109,6 +109,6 @@ def precision(f: ModelFit) -> np.ndarray:
 def test_sizes_are_estimated_anew_in_every_simulated_campaign() -> None:
     """Replicates of a campaign with slopes of 8 % and patterns off by three times: sizes scatter about the fit's."""
     f = baseline(7, off(3.0, specimen_slope=0.08, specimens=8))
-    sizes = refit_sizes(f, drawn_residuals(f, np.random.default_rng(2), 60)).effects
+    sizes = refits(f, drawn_residuals(f, np.random.default_rng(2), 60))[0].effects
     assert np.exp(np.mean(np.log(sizes), axis=0)) == pytest.approx(f.noise.sizes, rel=0.25)
     assert np.all(np.std(np.log(sizes), axis=0) > 0.05)

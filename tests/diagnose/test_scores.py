@@ -7,8 +7,9 @@ import pytest
 
 from tribo.diagnostics.model import EVERY, Course, Setup, Target, added, course
 from tribo.diagnostics.normal_equations import model_columns
-from tribo.diagnostics.scatter import SIZE_STEPS, Noise, Replicates, fitted_sizes, log_size_prior, replicates_at
-from tribo.diagnostics.score_statistics import AS_FITTED, columns_in, columns_of, informations, scores
+from tribo.diagnostics.replicates import SIZE_STEPS, Replicates, fitted_noise, replicates_at
+from tribo.diagnostics.scatter import Noise, log_size_prior
+from tribo.diagnostics.score_statistics import AS_FITTED, informations, scores, terms_in, terms_of
 
 from .test_likelihood import campaign, dense, noise_of, residual_of
 
@@ -26,7 +27,7 @@ def one_replicate(s: Setup, noise: Noise) -> tuple[Replicates, np.ndarray]:
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
     along = model_columns(jacobian, s.random_effects)
     residual = residual_of(s).T[None]
-    return replicates_at(s, along, fitted_sizes(s, noise, 1), residual, residual, noise.tail), jacobian.reshape(-1, 4)
+    return replicates_at(s, along, fitted_noise(s, noise, 1), residual, residual, noise.tail), jacobian.reshape(-1, 4)
 
 
 def at_step(s: Setup, noise: Noise, flat: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
@@ -46,7 +47,7 @@ def test_a_contrast_scores_at_the_sizes_that_favour_it_and_pays_for_what_the_mod
     s = campaign()
     noise = noise_of(s)
     replicate, flat = one_replicate(s, noise)
-    ready = columns_in(columns(s), SPANS)
+    ready = terms_in(columns(s), SPANS)
     steps = [at_step(s, noise, flat, step) for step in SIZE_STEPS]
     best = max(likelihood for _, _, likelihood in steps)
     expected = np.zeros((len(steps), 3))
@@ -69,14 +70,14 @@ def test_a_contrast_that_is_there_as_a_whole_or_not_at_all_is_tested_at_a_coeffi
     noise = noise_of(s)
     replicate, flat = one_replicate(s, noise)
     known = 1 / 0.2**2
-    ready = columns_in(columns(s), SPANS, np.array([known, 0.0, 0.0]))
+    ready = terms_in(columns(s), SPANS, np.array([known, 0.0, 0.0]))
     information, score, _ = at_step(s, noise, flat, SIZE_STEPS[0])
     c = np.linspace(-1.0, 3.0, 40_001)
     ratio = 2 * (score[0] * c - 0.5 * information[0, 0] * c**2 - 0.5 * known * (c - 1) ** 2)
     found, coefficients = scores(replicate, ready, steps=AS_FITTED)
     assert found[0, 0] == pytest.approx(max(ratio.max(), 0.0), abs=1e-3)
     assert coefficients[0][0, 0] == pytest.approx(c[ratio.argmax()], abs=1e-3)
-    free = scores(replicate, columns_in(columns(s), SPANS), steps=AS_FITTED)[0]
+    free = scores(replicate, terms_in(columns(s), SPANS), steps=AS_FITTED)[0]
     assert found[0, 1:] == pytest.approx(free[0, 1:])
 
 
@@ -85,7 +86,7 @@ def test_a_column_that_the_law_explains_but_for_a_thousandth_is_not_seen_as_a_co
     noise = noise_of(s)
     replicate, flat = one_replicate(s, noise)
     law = flat.reshape(s.observations.n, 2, 4)
-    ready = columns_in(law + 1e-5 * np.abs(law).mean() * columns(s), [slice(k, k + 1) for k in range(4)])
+    ready = terms_in(law + 1e-5 * np.abs(law).mean() * columns(s), [slice(k, k + 1) for k in range(4)])
     found, coefficients = scores(replicate, ready)
     assert not found.any()
     assert not any(c.any() for c in coefficients)
@@ -98,9 +99,9 @@ def test_a_campaign_of_two_replicates_is_scored_one_by_one() -> None:
     target = Target(s, ())
     along = model_columns(target.jacobian(s.first_law, target.predict(s.first_law)), s.random_effects)
     residual = np.repeat(residual_of(s).T[None], 2, axis=0)
-    both = replicates_at(s, along, fitted_sizes(s, noise, 2), residual, residual * np.array([1.0, 0.5])[:, None, None],
+    both = replicates_at(s, along, fitted_noise(s, noise, 2), residual, residual * np.array([1.0, 0.5])[:, None, None],
                          noise.tail)  # fmt: skip
-    ready = columns_in(columns(s), SPANS)
+    ready = terms_in(columns(s), SPANS)
     found, _ = scores(both, ready, steps=AS_FITTED)
     assert found[1] == pytest.approx(0.25 * found[0])
     assert found[0] == pytest.approx(scores(replicate, ready, steps=AS_FITTED)[0][0])
@@ -143,8 +144,8 @@ def test_contrasts_at_one_specimen_and_at_two_score_as_the_same_columns_written_
     ends = np.cumsum([contrast[0].freedom for contrast in contrasts])
     spans = [slice(int(e) - contrast[0].freedom, int(e)) for e, contrast in zip(ends, contrasts, strict=True)]
     for whole in (np.zeros(len(contrasts)), np.where(np.arange(len(contrasts)) == 1, 0.0, 25.0)):
-        found, coefficients = scores(replicate, columns_of(contrasts, whole, s.observations.n))
-        expected, written_out = scores(replicate, columns_in(stacked, spans, whole))
+        found, coefficients = scores(replicate, terms_of(contrasts, whole, s.observations.n))
+        expected, written_out = scores(replicate, terms_in(stacked, spans, whole))
         assert found == pytest.approx(expected, rel=1e-6, abs=1e-9)
         for a, b in zip(coefficients, written_out, strict=True):
             assert a == pytest.approx(b, rel=1e-6)
@@ -157,7 +158,7 @@ def test_the_information_and_the_score_of_candidates_are_those_of_the_marginal_m
     alone = local_courses(s)
     wide = course(columns(s)[:, :, :1], s.random_effects)
     contrasts = [(alone[2],), (wide,), (alone[0],), (alone[0], alone[2]), (alone[0], alone[3])]
-    left, pull = informations(replicate, columns_of(contrasts, np.zeros(5), s.observations.n))
+    left, pull = informations(replicate, terms_of(contrasts, np.zeros(5), s.observations.n))
     inverse = np.linalg.inv(dense(s, noise)[0])
     rest = inverse - inverse @ flat @ np.linalg.solve(flat.T @ inverse @ flat, flat.T @ inverse)
     for k, contrast in enumerate(contrasts):

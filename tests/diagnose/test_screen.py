@@ -12,7 +12,7 @@ from tribo.diagnostics.model import setup
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
 from tribo.diagnostics.replicates import as_measured
-from tribo.diagnostics.score_statistics import AS_FITTED, columns_in, scores
+from tribo.diagnostics.score_statistics import AS_FITTED, scores, terms_in
 
 from .known import contrasts_of
 from .synthetic import hidden
@@ -44,7 +44,7 @@ def test_the_quick_score_is_that_of_the_cleared_columns() -> None:
     size = np.sqrt(np.sum(left**2, axis=0))
     seen = size > 1e-3
     ends = [slice(k, k + 1) for k in range(len(contrasts))]
-    ready = columns_in(np.concatenate([contrast.columns for contrast in contrasts], axis=2), ends)
+    ready = terms_in(np.concatenate([contrast.columns for contrast in contrasts], axis=2), ends)
     quick = np.sqrt(scores(as_measured(f), ready, steps=AS_FITTED)[0][0])
     assert quick[seen] == pytest.approx(np.abs(left.T @ target / size)[seen], rel=1e-4, abs=1e-5)
 
@@ -55,7 +55,7 @@ def test_a_contrast_that_is_whole_or_absent_is_tested_at_a_size_about_one() -> N
     stacked = np.concatenate([c.columns for c in contrasts], axis=2)
     about_one = np.full(len(contrasts), 0.15**-2)
     spans = [slice(k, k + 1) for k in range(len(contrasts))]
-    found = scores(as_measured(f), columns_in(stacked, spans, about_one), steps=AS_FITTED)[0][0]
+    found = scores(as_measured(f), terms_in(stacked, spans, about_one), steps=AS_FITTED)[0][0]
     left, target = f.linear.cleared(stacked)
     sizes = np.linspace(-1.0, 3.0, 40001)[:, None]
     at_size = 2.0 * sizes * (left.T @ target) - sizes**2 * np.sum(left**2, axis=0) - ((sizes - 1.0) / 0.15) ** 2
@@ -65,9 +65,9 @@ def test_a_contrast_that_is_whole_or_absent_is_tested_at_a_size_about_one() -> N
 
 def test_every_wrong_label_is_looked_for_as_a_whole_and_nothing_else_is() -> None:
     contrasts = contrasts_of(baseline())
-    whole = {contrast.acting.name for contrast in contrasts if contrast.wholeness > 0 and contrast.acting is not None}
+    whole = {contrast.acting.name for contrast in contrasts if contrast.about_one > 0 and contrast.acting is not None}
     assert whole == {"mislabelled_specimen"}
-    assert all(contrast.wholeness == 0 for contrast in contrasts if contrast.acting is None)
+    assert all(contrast.about_one == 0 for contrast in contrasts if contrast.acting is None)
 
 
 def test_an_effect_is_the_strongest_contrast_at_its_own_column() -> None:

@@ -24,9 +24,8 @@ from tribo.diagnostics.model import (
     start_changes,
     with_form_error,
 )
-from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit
-from tribo.diagnostics.scatter import Replicates
-from tribo.diagnostics.score_statistics import Columns, columns_of, scores
+from tribo.diagnostics.replicates import Replicates, as_measured, drawn_residuals, refit
+from tribo.diagnostics.score_statistics import Terms, scores, terms_of
 from tribo.display import displayed
 from tribo.records import FloatArray
 
@@ -78,7 +77,7 @@ class Contrast:
         return self.kind == "sample" and self.sample == flat and self.detail != BEND
 
     @property
-    def wholeness(self) -> float:
+    def about_one(self) -> float:
         """Precision with which its coefficient is known to be one: of a mechanism that is present as a whole."""
         sd = self.acting.mechanism.choosing.all_or_nothing_sd if self.acting is not None else None
         return 0.0 if sd is None else sd**-2.0
@@ -289,8 +288,8 @@ def screen(
 
     Replicates end once the strongest contrast is clearly within chance, or clearly beyond it.
     """
-    whole = np.array([contrast.wholeness for contrast in contrasts])
-    ready = columns_of([contrast.courses for contrast in contrasts], whole, f.setup.observations.n)
+    whole = np.array([contrast.about_one for contrast in contrasts])
+    ready = terms_of([contrast.courses for contrast in contrasts], whole, f.setup.observations.n)
     strengths, found = strengths_of(as_measured(f), ready)
     strength, coefficients = strengths[0], [c[0] for c in found]
     library = np.array([contrast.kind == "mechanism" for contrast in contrasts])
@@ -357,7 +356,7 @@ def decided(chance: FloatArray, strongest: float, fewest: int = FEWEST) -> bool:
     return bool(np.sum(chance >= strongest) >= 10 or beyond)
 
 
-def strengths_of(fitted: Replicates, contrasts: Columns) -> tuple[FloatArray, list[FloatArray]]:
+def strengths_of(fitted: Replicates, contrasts: Terms) -> tuple[FloatArray, list[FloatArray]]:
     """Strength of every contrast as a standard normal deviate, (r, contrasts), and the coefficients of each, (r, d)."""
     chi2, coefficients = scores(fitted, contrasts)
     return deviate(chi2, contrasts.freedom), coefficients

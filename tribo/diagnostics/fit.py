@@ -1,7 +1,5 @@
-"""One campaign at given noise: whitening, normal equations, likelihood; and the fitted model, linear about its
-parameters, with what its own columns can absorb of others.
-
-Fitting a model: Gauss-Newton on law and mechanisms, robust weights, the noise estimated along with them.
+"""Fitting the mixed model of a campaign: Gauss-Newton on law and mechanisms, robust weights, the noise estimated along
+with them; and the fitted model, linear about its parameters, with what its own columns absorb of others.
 """
 
 from __future__ import annotations
@@ -15,60 +13,63 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.diagnostics.model import N_LAW, Acting, RandomEffects, Setup, Target, in_batches, predict
-from tribo.diagnostics.normal_equations import (
-    Inverse,
-    ModelColumns,
-    Normal,
-    Sides,
-    Weighted,
-    model_columns,
-    normal_of,
-    weighted_columns,
+from tribo.diagnostics.normal_equations import Inverse, ModelColumns, Normal, Sides, Weighted, model_columns
+from tribo.diagnostics.scatter import (
+    Noise,
+    first_noise,
+    log_prior,
+    prior_sd,
+    updated_repeats,
+    updated_sizes,
+    whitener,
 )
-from tribo.diagnostics.scatter import AtNoise, Noise, at_estimated_noise, at_noise, first_noise
 from tribo.display import displayed
 from tribo.records import FloatArray
+
+TRIAL_GAIN, END_GAIN = 0.5, 2e-3  # log likelihood that a step has to earn for another one to be made
+STILL = 0.02  # standard errors of a step below which derivatives are not taken anew
+LENGTHS = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a step that does not worsen the penalised likelihood: the first
 
 
 @displayed()
 @dataclass(frozen=True)
 class State:
-    """Where a fit has got to: parameters, random effects (q,), residual (n, 2) without them, and the noise."""
+    """Where a fit has got to: parameters, random effects (q,), residual (n, 2) without them, and the noise.
+
+    At this noise, ``factor`` (n, 2, 2) whitens the tests, ``precision`` (q,) is that of the random effects, and
+    ``log_prior`` the log density of the sizes.
+    """
 
     x: FloatArray
     effects: FloatArray
     residual: FloatArray
-    at: AtNoise
+    noise: Noise
+    factor: FloatArray
+    precision: FloatArray
+    log_prior: float
+
+    def left(self, s: Setup) -> FloatArray:
+        """What is left of every test, (n, 2), random effects taken out."""
+        return np.asarray(self.residual - s.random_effects.on_tests(self.effects))
 
 
-@displayed()
-@dataclass(frozen=True)
-class System:
-    """The normal equations of one iteration solved: the inverse of their matrix and the step (p + q,).
-
-    ``weight`` (n,) is that of the tests, ``columns`` are those of the model.
-    """
-
-    inverse: Inverse
-    solution: FloatArray
-    weight: FloatArray
-    columns: ModelColumns
-
-
-def begin(s: Setup, x: FloatArray, residual: FloatArray, noise: Noise) -> State:
-    """The state of a fit before its first step, all random effects zero."""
-    return State(x, np.zeros(s.random_effects.count), residual, at_noise(s, noise))
-
-
-def weights(noise: Noise, factor: FloatArray, left: FloatArray) -> FloatArray:
-    """Weight of every test under the bivariate t, one on average for normal noise, shape (n,)."""
-    return (noise.tail + 2.0) / (noise.tail + distance(factor, left))
+def state_at(s: Setup, x: FloatArray, effects: FloatArray, residual: FloatArray, noise: Noise) -> State:
+    """The state of a fit with these parameters and effects at this noise."""
+    return State(
+        x, effects, residual, noise, whitener(s, noise), prior_sd(s, noise.sizes) ** -2, log_prior(s, noise)
+    )
 
 
 def distance(factor: FloatArray, left: FloatArray) -> FloatArray:
     """Squared length of what is left of every test, whitened, shape (n,)."""
     static = factor[:, 0, 0] * left[:, 0]
     return static**2 + (factor[:, 1, 0] * left[:, 0] + factor[:, 1, 1] * left[:, 1]) ** 2
+
+
+def weights(s: Setup, state: State) -> FloatArray:
+    """Weight of every test under the bivariate t, one on average for normal noise, shape (n,)."""
+    tail = state.noise.tail
+    return (tail + 2.0) / (tail + distance(state.factor, state.left(s)))
 
 
 def whitened(factor: FloatArray, columns: FloatArray) -> FloatArray:
@@ -81,14 +82,26 @@ def whitened(factor: FloatArray, columns: FloatArray) -> FloatArray:
     return white
 
 
-def solved(s: Setup, state: State, jacobian: FloatArray, bounds: tuple[FloatArray, FloatArray]) -> System:
-    """One step under the weighted noise; a parameter at a bound that would leave it is held there."""
+def precision_of(factor: FloatArray, weight: FloatArray) -> FloatArray:
+    """Precision of every test from the triangles (n, 2, 2) that whiten it: static, mixed, sliding, (1, 3, n)."""
+    first, second, third = factor[:, 0, 0], factor[:, 1, 0], factor[:, 1, 1]
+    return (np.stack([first**2 + second**2, second * third, third**2]) * weight)[None]
+
+
+def prior_of(columns: ModelColumns, precision: FloatArray) -> Sides:
+    """Precision of the coefficients of a model: next to none for law and mechanisms, (q,) of the random effects."""
+    return columns.sides(np.concatenate([np.full(columns.parameters, 1e-12), precision])[None])
+
+
+def solved(
+    state: State, columns: ModelColumns, weight: FloatArray, bounds: tuple[FloatArray, FloatArray]
+) -> tuple[Inverse, FloatArray]:
+    """The inverse of the normal matrix at the weighted noise and one step, (p + q,); a parameter at a bound that would
+    leave it is held there."""
     x, p = state.x, len(state.x)
-    weight = weights(state.at.noise, state.at.factor, _left(s, state))
-    columns = model_columns(jacobian, s.random_effects)
-    found = weighted_columns(columns, precision_of(state.at.factor, weight)[None])
-    normal = normal_of(found).with_prior(*prior_of(columns, state.at.precision))
-    right = found.with_residual(state.residual.T[None])
+    weighted = columns.weighted(precision_of(state.factor, weight))
+    normal = weighted.normal.with_prior(*prior_of(columns, state.precision))
+    right = weighted.with_residual(state.residual.T[None])
     held = np.zeros(columns.border.shape[2], bool)
     for _ in range(3):
         inverse = normal.inverse_without(held)
@@ -97,49 +110,39 @@ def solved(s: Setup, state: State, jacobian: FloatArray, bounds: tuple[FloatArra
         if not (outward & ~held[:p]).any():
             break
         held[:p] |= outward
-    return System(inverse, solution, weight, columns)
-
-
-def precision_of(factor: FloatArray, weight: FloatArray) -> FloatArray:
-    """Precision of every test from the triangles (n, 2, 2) that whiten it: static, mixed, sliding entries, (3, n)."""
-    first, second, third = factor[:, 0, 0], factor[:, 1, 0], factor[:, 1, 1]
-    return np.stack([first**2 + second**2, second * third, third**2]) * weight
-
-
-def prior_of(columns: ModelColumns, precision: FloatArray) -> Sides:
-    """Precision of the coefficients of a model: next to none for law and mechanisms, (q,) of the random effects."""
-    return columns.sides(np.concatenate([np.full(columns.parameters, 1e-12), precision])[None])
-
-
-def _left(s: Setup, state: State) -> FloatArray:
-    """What is left of every test, (n, 2), random effects taken out."""
-    return np.asarray(state.residual - s.random_effects.on_tests(state.effects))
+    return inverse, solution
 
 
 def penalised(s: Setup, state: State) -> float:
     """Log density of the tests given the effects, plus that of the effects, without constants of the noise."""
-    tail = state.at.noise.tail
-    tests = -0.5 * (tail + 2.0) * np.sum(np.log1p(distance(state.at.factor, _left(s, state)) / tail))
-    return float(tests - 0.5 * np.sum(state.effects**2 * state.at.precision))
+    tail = state.noise.tail
+    tests = -0.5 * (tail + 2.0) * np.sum(np.log1p(distance(state.factor, state.left(s)) / tail))
+    return float(tests - 0.5 * np.sum(state.effects**2 * state.precision))
 
 
-def with_noise_estimated(s: Setup, state: State, system: System) -> State:
-    """The same state, the noise estimated anew; the system says how uncertain each prediction is."""
-    left, columns = _left(s, state), system.columns
+def with_noise_estimated(
+    s: Setup, state: State, columns: ModelColumns, weight: FloatArray, inverse: Inverse
+) -> State:
+    """The same state, the noise estimated anew; the inverse says how uncertain each prediction is."""
+    left, noise = state.left(s), state.noise
     products = np.stack([left[:, 0] ** 2, left[:, 0] * left[:, 1], left[:, 1] ** 2])
-    squares = system.weight * (products + system.inverse.spread(columns)[0])
-    variance = columns.vector(*system.inverse.variances)[0, columns.parameters :]
-    return replace(state, at=at_estimated_noise(s, state.at, (state.effects, variance), squares))
+    squares = weight * (products + inverse.spread(columns)[0])
+    variance = columns.vector(*inverse.variances)[0, columns.parameters :]
+    sizes = updated_sizes(s, noise.sizes, state.effects, variance)
+    scatter = np.zeros(s.scatter.shape[1]) if noise.scatter is None else noise.scatter
+    repeat, scatter = updated_repeats(s, (noise.repeat, scatter), squares, noise.tail)
+    estimated = replace(noise, repeat=repeat, scatter=scatter).with_sizes(sizes)
+    return state_at(s, state.x, state.effects, state.residual, estimated)
 
 
 def scored(s: Setup, state: State) -> tuple[float, FloatArray]:
     """Log marginal likelihood by Laplace's method, with the priors of the noise sizes; and the weights of the tests."""
-    weight = weights(state.at.noise, state.at.factor, _left(s, state))
+    weight = weights(s, state)
     columns = model_columns(np.zeros((len(weight), 2, 0)), s.random_effects)
-    normal = normal_of(weighted_columns(columns, precision_of(state.at.factor, weight)[None]))
-    curvature = float(normal.with_prior(*columns.sides(state.at.precision[None])).log_determinant()[0])
-    scale = float(np.sum(np.log(state.at.factor[:, 0, 0] * state.at.factor[:, 1, 1])))
-    prior = 0.5 * np.sum(np.log(state.at.precision)) + state.at.log_prior
+    normal = columns.weighted(precision_of(state.factor, weight)).normal
+    curvature = float(normal.with_prior(*columns.sides(state.precision[None])).log_determinant()[0])
+    scale = float(np.sum(np.log(state.factor[:, 0, 0] * state.factor[:, 1, 1])))
+    prior = 0.5 * np.sum(np.log(state.precision)) + state.log_prior
     return float(penalised(s, state) + scale + prior - 0.5 * curvature), weight
 
 
@@ -149,8 +152,8 @@ class Linear:
     """A fitted model linear about its parameters, with the noise at which it was fitted.
 
     ``jacobian`` (n, 2, p) is the derivative of ln T by law and mechanisms; the ``precision`` of the ``random_effects``
-    is (q,). ``residual`` (n, 2) is that of the fit; ``factor`` (n, 2, 2) whitens
-    a test without its robust ``weight`` (n,).
+    is (q,). ``residual`` (n, 2) is that of the fit; ``factor`` (n, 2, 2) whitens a test without its robust ``weight``
+    (n,).
     """
 
     jacobian: FloatArray = field(repr=False)
@@ -168,12 +171,12 @@ class Linear:
     @cached_property
     def weighted(self) -> Weighted:
         """These columns times the precision of every test."""
-        return weighted_columns(self.columns, precision_of(self.factor, self.weight)[None])
+        return self.columns.weighted(precision_of(self.factor, self.weight))
 
     @property
     def normal(self) -> Normal:
         """The normal matrix with the prior of the random effects."""
-        return normal_of(self.weighted).with_prior(*prior_of(self.columns, self.precision))
+        return self.weighted.normal.with_prior(*prior_of(self.columns, self.precision))
 
     @property
     def right(self) -> Sides:
@@ -208,7 +211,6 @@ class Linear:
         q = np.linalg.qr(flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300))[0]
         rows = columns.reshape(-1, columns.shape[2])
         return np.asarray((rows - q @ (q.T @ rows)).reshape(columns.shape))
-
 
     def size_beyond_law(self, columns: Iterable[FloatArray]) -> FloatArray:
         """Peak-to-peak of each of many columns (n, 2) beyond what law and mechanisms absorb, (k,)."""
@@ -250,11 +252,6 @@ class ModelFit:
     @property
     def predicted(self) -> FloatArray:
         return self.setup.observations.log_force - self.residual
-
-
-TRIAL_GAIN, END_GAIN = 0.5, 2e-3  # log likelihood that a step has to earn for another one to be made
-STILL = 0.02  # standard errors of a step below which derivatives are not taken anew
-LENGTHS = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a step that does not worsen the penalised likelihood: the first
 
 
 def fit(
@@ -323,24 +320,26 @@ def _fitted(target: Target, x: FloatArray, noise: Noise, estimate: bool, until: 
     s, log_force = target.setup, target.setup.observations.log_force
     iterations, least_gain = until
     x = np.clip(x, *target.bounds)
+    p = len(x)
     residual = target.residual(x)
     jacobian = target.jacobian(x, log_force - residual)
-    state = begin(s, x, residual, noise)
+    state = state_at(s, x, np.zeros(s.random_effects.count), residual, noise)
     score, weight = -np.inf, np.zeros(0)
     for _ in range(iterations):
-        system = solved(s, state, jacobian, target.bounds)
-        before, p = state, len(state.x)
+        columns, weight = model_columns(jacobian, s.random_effects), weights(s, state)
+        inverse, solution = solved(state, columns, weight, target.bounds)
+        before = state
         least = penalised(s, before) - 1e-9
         for length in LENGTHS:
-            x = np.clip(before.x + length * system.solution[:p], *target.bounds)
-            effects = before.effects + length * (system.solution[p:] - before.effects)
+            x = np.clip(before.x + length * solution[:p], *target.bounds)
+            effects = before.effects + length * (solution[p:] - before.effects)
             trial = replace(before, x=x, effects=effects, residual=target.residual(x))
             if penalised(s, trial) >= least:
                 state = trial
                 break
-        variance = np.diag(system.inverse.border[0])[:p]
+        variance = np.diag(inverse.border[0])[:p]
         moved = float(np.max(np.abs(state.x - before.x) / np.sqrt(variance + 1e-300)))
-        state = with_noise_estimated(s, state, system) if estimate else state
+        state = with_noise_estimated(s, state, columns, weight, inverse) if estimate else state
         last, (score, weight) = score, scored(s, state)
         if abs(score - last) < least_gain:
             break
@@ -348,7 +347,6 @@ def _fitted(target: Target, x: FloatArray, noise: Noise, estimate: bool, until: 
             jacobian = target.jacobian(state.x, log_force - state.residual)
     jacobian = target.jacobian(state.x, log_force - state.residual)
     return ModelFit(
-        s, target.acting, state.x[:N_LAW], target.values(state.x), state.at.noise, state.effects, state.residual, score,
-        system.inverse,
-        Linear(jacobian, s.random_effects, state.residual, state.at.factor, state.at.precision, weight),
+        s, target.acting, state.x[:N_LAW], target.values(state.x), state.noise, state.effects, state.residual, score,
+        inverse, Linear(jacobian, s.random_effects, state.residual, state.factor, state.precision, weight),
     )  # fmt: skip

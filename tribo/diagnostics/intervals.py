@@ -62,11 +62,11 @@ def understated(f: ModelFit, index: int) -> FloatArray:
     The curvature knows neither that the weights of the tests are estimated nor that the repeats need not follow the t
     distribution. Campaigns that the fit makes itself, with its own residuals, show how far their estimates scatter.
     """
-    made = refits(f, drawn_residuals(f, np.random.default_rng(0), REPLICATES))
+    _, solution, variances, _ = refits(f, drawn_residuals(f, np.random.default_rng(0), REPLICATES))
     first = N_LAW + sum(len(v) for v in f.values[:index])
     here = slice(first, first + len(f.values[index]))
-    variance = made.variance[:, here] / informed_share(f.noise)
-    squares = made.solution[:, here] ** 2 / np.maximum(variance, 1e-300)
+    variance = variances[:, here] / informed_share(f.noise)
+    squares = solution[:, here] ** 2 / np.maximum(variance, 1e-300)
     return np.asarray(np.clip(np.sqrt(np.mean(squares, axis=0)), 1.0, WIDEST))
 
 

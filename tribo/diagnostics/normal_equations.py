@@ -1,9 +1,12 @@
-"""Normal equations of a model with random effects of specimens, by blocks.
+"""Normal equations of a mixed model by blocks.
 
 A test shows the effects of its own specimen alone, so the normal matrix is one 4 x 4 block a specimen, bordered by the
 columns that tests share: law, mechanisms, patterns. Eliminating the blocks leaves a matrix of the size of the border
 (its Schur complement), so that the work grows with the number of specimens and not with its cube. All functions take a
 batch of replicates, r; one campaign is a batch of one.
+
+The algebra stays by hand: 20 replicates of 324 tests (15 specimens, border 34) take 1.3 ms, by scipy's dense Cholesky
+factors 5 ms, by its sparse ones 14 ms, and as a band 40 ms.
 """
 
 from __future__ import annotations
@@ -51,10 +54,14 @@ class ModelColumns:
 
     def on_tests(self, own: FloatArray, border: FloatArray) -> FloatArray:
         """What coefficients of specimens (r, S, 4) and of the border (r, m) add to every test, (r, 2, n)."""
-        found = np.tensordot(border, self.border, axes=(1, 2))
+        total = np.tensordot(border, self.border, axes=(1, 2))
         for k, tests in enumerate(self.tests_of):
-            found[:, tests] += np.tensordot(own[:, k], self.own[tests], axes=(1, 2))
-        return np.asarray(found.transpose(0, 2, 1))
+            total[:, tests] += np.tensordot(own[:, k], self.own[tests], axes=(1, 2))
+        return np.asarray(total.transpose(0, 2, 1))
+
+    def weighted(self, precision: FloatArray) -> Weighted:
+        """The columns times the precision (r, 3, n) of every test."""
+        return Weighted(self, _weighted(precision, self.own), _weighted(precision, self.border))
 
 
 def model_columns(jacobian: FloatArray, effects: RandomEffects) -> ModelColumns:
@@ -63,15 +70,15 @@ def model_columns(jacobian: FloatArray, effects: RandomEffects) -> ModelColumns:
     return ModelColumns(effects.own, border, int(jacobian.shape[2]), effects.tests_of)
 
 
-def weighted(precision: FloatArray, columns: FloatArray) -> FloatArray:
+def _weighted(precision: FloatArray, columns: FloatArray) -> FloatArray:
     """Columns (n, 2, k) times the precision (r, 3, n) of every test, (r, n, 2, k)."""
     static, mixed, sliding = (precision[:, i, :, None] for i in range(3))
-    found = np.empty((len(precision), *columns.shape))
-    np.multiply(static, columns[:, 0], out=found[:, :, 0])
-    found[:, :, 0] += mixed * columns[:, 1]
-    np.multiply(sliding, columns[:, 1], out=found[:, :, 1])
-    found[:, :, 1] += mixed * columns[:, 0]
-    return found
+    products = np.empty((len(precision), *columns.shape))
+    np.multiply(static, columns[:, 0], out=products[:, :, 0])
+    products[:, :, 0] += mixed * columns[:, 1]
+    np.multiply(sliding, columns[:, 1], out=products[:, :, 1])
+    products[:, :, 1] += mixed * columns[:, 0]
+    return products
 
 
 @displayed()
@@ -107,10 +114,10 @@ class Weighted:
         own = self.own[0]
         each = own[:, 0, :, None] * other[:, 0, None] + own[:, 1, :, None] * other[:, 1, None]
         order, specimen = self.columns.in_order
-        found = np.zeros((1, len(self.columns.tests_of), *each.shape[1:]))
+        products = np.zeros((1, len(self.columns.tests_of), *each.shape[1:]))
         there, first = np.unique(specimen, return_index=True)
-        found[0, there] = np.add.reduceat(each[order], first)
-        return found
+        products[0, there] = np.add.reduceat(each[order], first)
+        return products
 
     def border_times(self, tests: NDArray[np.int64], other: FloatArray) -> FloatArray:
         """The same of the border, (r, m, k)."""
@@ -125,10 +132,14 @@ class Weighted:
         own = np.stack([each[:, tests].sum(axis=1) for tests in self.columns.tests_of], axis=1)
         return own, (self.flat_border @ by_test.reshape(len(residual), -1, 1))[..., 0]
 
+    @property
+    def normal(self) -> Normal:
+        """The normal matrix of the model, without the prior of its random effects."""
+        columns = self.columns
+        own = self.own_with(np.concatenate([columns.own, columns.border], axis=2))
+        n, _, m = columns.border.shape
+        return Normal(own[..., :4], own[..., 4:], self.flat_border @ columns.border.reshape(2 * n, m))
 
-def weighted_columns(columns: ModelColumns, precision: FloatArray) -> Weighted:
-    """The columns times the precision (r, 3, n) of every test."""
-    return Weighted(columns, weighted(precision, columns.own), weighted(precision, columns.border))
 
 
 @displayed()
@@ -142,7 +153,14 @@ class Normal:
 
     def with_prior(self, own: FloatArray, border: FloatArray) -> Normal:
         """Precisions (r, S, 4) and (r, m) added to the diagonal, and a ridge in proportion to it."""
-        return Normal(_raised(self.own, own), self.across, _raised(self.border, border))
+
+        def raised(matrix: FloatArray, prior: FloatArray) -> FloatArray:
+            here = np.arange(matrix.shape[-1])
+            copy = matrix.copy()
+            copy[..., here, here] = (copy[..., here, here] + prior) * (1.0 + ROUNDING)
+            return copy
+
+        return Normal(raised(self.own, own), self.across, raised(self.border, border))
 
     def inverse(self) -> Inverse:
         own = np.asarray(np.linalg.inv(self.own), float)
@@ -154,12 +172,12 @@ class Normal:
     def inverse_without(self, held: NDArray[np.bool_]) -> Inverse:
         """The inverse without the columns of the border that ``held`` (m,) marks: nothing there."""
         free = np.flatnonzero(~held)
-        found = Normal(self.own, self.across[..., free], self.border[:, free][:, :, free]).inverse()
+        inverse = Normal(self.own, self.across[..., free], self.border[:, free][:, :, free]).inverse()
         border = np.zeros_like(self.border)
-        border[:, free[:, None], free] = found.border
+        border[:, free[:, None], free] = inverse.border
         across = np.zeros_like(self.across)
-        across[..., free] = found.across
-        return Inverse(found.own, across, border)
+        across[..., free] = inverse.across
+        return Inverse(inverse.own, across, border)
 
     def log_determinant(self) -> FloatArray:
         """Of the whole matrix, (r,)."""
@@ -178,21 +196,6 @@ class Normal:
         r, specimens, _, m = across.shape
         first, second = (side.reshape(r, 4 * specimens, m) for side in (self.across, across))
         return across, self.border - first.transpose(0, 2, 1) @ second
-
-
-def _raised(matrix: FloatArray, prior: FloatArray) -> FloatArray:
-    raised = matrix.copy()
-    here = np.arange(matrix.shape[-1])
-    raised[..., here, here] = (raised[..., here, here] + prior) * (1.0 + ROUNDING)
-    return raised
-
-
-def normal_of(found: Weighted) -> Normal:
-    """The normal matrix of a model without the prior."""
-    columns = found.columns
-    own = found.own_with(np.concatenate([columns.own, columns.border], axis=2))
-    n, _, m = columns.border.shape
-    return Normal(own[..., :4], own[..., 4:], found.flat_border @ columns.border.reshape(2 * n, m))
 
 
 @displayed()
@@ -222,29 +225,26 @@ class Inverse:
 
     def spread(self, columns: ModelColumns) -> FloatArray:
         """Variance of what the model predicts for every test: static, mixed and sliding entries, (r, 3, n)."""
-        if len(self.own) == 1:
-            return self._spread_of_one(columns)[None]
-        found = np.empty((len(self.own), 3, len(columns.own)))
+        variance = np.empty((len(self.own), 3, len(columns.own)))
+        entries = tuple(enumerate(((0, 0), (0, 1), (1, 1))))
+        if len(self.own) == 1:  # all specimens at once
+            order, specimen = columns.in_order
+            own = columns.own[order]
+            free = columns.border[order] - own @ self.across[0, specimen]
+            moved = (free.reshape(-1, free.shape[2]) @ self.border[0]).reshape(free.shape)
+            alone = own @ self.own[0, specimen]
+            for i, (a, b) in entries:
+                shared = np.einsum("nm,nm->n", moved[:, a], free[:, b])
+                variance[0, i, order] = shared + np.einsum("nm,nm->n", alone[:, a], own[:, b])
+            return variance
         for k, tests in enumerate(columns.tests_of):
             own = columns.own[tests].reshape(-1, 4)  # the two rows of every test one after another
             free = columns.border[tests].reshape(len(own), columns.border.shape[2]) - own @ self.across[:, k]
             moved, alone = free @ self.border, own @ self.own[:, k]
-            for i, (a, b) in enumerate(((0, 0), (0, 1), (1, 1))):
+            for i, (a, b) in entries:
                 shared = np.einsum("rtm,rtm->rt", moved[:, a::2], free[:, b::2])
-                found[:, i, tests] = shared + np.einsum("rta,ta->rt", alone[:, a::2], own[b::2])
-        return found
-
-    def _spread_of_one(self, columns: ModelColumns) -> FloatArray:
-        """The same of a batch of one, all specimens at once, (3, n)."""
-        order, specimen = columns.in_order
-        own, found = columns.own[order], np.empty((3, len(order)))
-        free = columns.border[order] - own @ self.across[0, specimen]
-        moved = (free.reshape(-1, free.shape[2]) @ self.border[0]).reshape(free.shape)
-        alone = own @ self.own[0, specimen]
-        for i, (a, b) in enumerate(((0, 0), (0, 1), (1, 1))):
-            shared = np.einsum("nm,nm->n", moved[:, a], free[:, b])
-            found[i, order] = shared + np.einsum("nm,nm->n", alone[:, a], own[:, b])
-        return found
+                variance[:, i, tests] = shared + np.einsum("rta,ta->rt", alone[:, a::2], own[b::2])
+        return variance
 
     def between(self, columns: ModelColumns, specimen: NDArray[np.int64]) -> FloatArray:
         """Covariance of what the model predicts for all tests of ``columns``, of which ``specimen`` (n,) are the
@@ -255,16 +255,41 @@ class Inverse:
         own = own * (specimen[:, None] == specimen)[:, None, :, None]
         return np.asarray(flat @ self.border[0] @ flat.T + own.reshape(len(flat), -1))
 
-    def dense(self, columns: ModelColumns) -> FloatArray:
-        """The whole matrices in the order of :meth:`ModelColumns.vector`, (r, p + q, p + q)."""
-        r, specimens, _, m = self.across.shape
-        wide = self.across.reshape(r, 4 * specimens, m)
-        own = wide @ self.border @ wide.transpose(0, 2, 1)
-        for k in range(specimens):
-            own[:, 4 * k : 4 * k + 4, 4 * k : 4 * k + 4] += self.own[:, k]
-        side = -wide @ self.border
-        whole = np.block([[own, side], [side.transpose(0, 2, 1), self.border]])
-        numbers = np.arange(whole.shape[1], dtype=float)[None]
-        own, shared = numbers[:, : 4 * specimens].reshape(1, -1, 4), numbers[:, 4 * specimens :]
-        order = columns.vector(own, shared)[0].astype(int)
-        return np.asarray(whole[:, order][:, :, order])
+
+@displayed()
+@dataclass(frozen=True)
+class BlockCholesky:
+    """The inverse Cholesky factor of a normal matrix by blocks, for orthogonal columns.
+
+    ``own`` (r, S, 4, 4) and ``border`` (r, m, m) are its diagonal blocks, ``across`` (r, S, 4, m) what the specimens
+    have of the border, ``right`` the right sides times the factor, ``log_root`` (r,) half the logarithm of the
+    determinant.
+    """
+
+    own: FloatArray
+    border: FloatArray
+    across: FloatArray
+    right: Sides
+    log_root: FloatArray
+
+    def border_of(self, crossed: FloatArray, taken: FloatArray) -> FloatArray:
+        """Products with the border (r, m, k), less what the specimens have ``taken`` of them, times the factor."""
+        return self.border @ (crossed - taken)
+
+
+def block_cholesky(normal: Normal, right: Sides) -> BlockCholesky:
+    """The inverse Cholesky factor of a normal matrix with its prior, and the right sides times it."""
+    own_root = np.linalg.cholesky(normal.own)
+    own = np.linalg.inv(own_root)
+    across = own @ normal.across
+    r, specimens, _, m = across.shape
+    flat = across.reshape(r, 4 * specimens, m)
+    scale = 1.0 / np.sqrt(np.diagonal(normal.border, axis1=1, axis2=2) + 1e-300)
+    schur = (normal.border - flat.transpose(0, 2, 1) @ flat) * scale[:, :, None] * scale[:, None, :]
+    root = np.linalg.cholesky(schur)
+    border = np.linalg.inv(root) * scale[:, None, :]
+    own_right = (own @ right[0][..., None])[..., 0]
+    border_right = np.einsum("rkm,rm->rk", border, right[1] - np.einsum("rsam,rsa->rm", across, own_right))
+    log_root = np.log(np.diagonal(own_root, axis1=2, axis2=3)).sum(axis=(1, 2))
+    log_root = log_root + np.log(np.diagonal(root, axis1=1, axis2=2) / scale).sum(axis=1)
+    return BlockCholesky(own, border, across, (own_right, border_right), log_root)

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from tribo.diagnostics.candidates import ALIKE, Candidate, Named
-from tribo.diagnostics.fit import Linear, ModelFit, begin, scored
+from tribo.diagnostics.fit import Linear, ModelFit, scored, state_at
 from tribo.diagnostics.model import Acting, Setup, Target, added, effect_of, predict, setup
 from tribo.diagnostics.normal_equations import model_columns
 from tribo.diagnostics.observations import NO_FLAT, Observations, conditions_of
@@ -107,10 +107,10 @@ def expected_fit(campaign: Campaign, noise: Noise, law: FloatArray, predictor: P
     )  # fmt: skip
     s = setup(o, predictor or tabled_predictor(patterns))
     s = replace(s, observations=replace(o, log_force=predict(s, law, (), ())))
-    state = begin(s, law, np.zeros((n, 2)), noise)
+    state = state_at(s, law, np.zeros(s.random_effects.count), np.zeros((n, 2)), noise)
     jacobian = Target(s, ()).jacobian(law, s.observations.log_force - state.residual)
     score, weight = scored(s, state)
-    linear = Linear(jacobian, s.random_effects, state.residual, state.at.factor, state.at.precision, weight)
+    linear = Linear(jacobian, s.random_effects, state.residual, state.factor, state.precision, weight)
     return ModelFit(s, (), law, (), noise, state.effects, state.residual, score, linear.inverse, linear)
 
 

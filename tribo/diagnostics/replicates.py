@@ -2,36 +2,142 @@
 
 Replicates keep the design and draw specimens, pattern errors and repeats anew. The law is linear over the little it
 moves from replicate to replicate, so that derivatives are those of the fit; robust weights, noise sizes and random
-effects are estimated for every replicate by the steps of :mod:`tribo.diagnostics.fit`.
+effects are estimated for every replicate by the steps of :mod:`tribo.diagnostics.fit`. Arrays of r replicates have the
+shapes of one campaign behind the r.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tribo.diagnostics.fit import ModelFit
+from tribo.diagnostics.model import Setup
+from tribo.diagnostics.normal_equations import Inverse, ModelColumns, Normal, Sides, Weighted
 from tribo.diagnostics.scatter import (
-    Replicates,
-    Sizes,
-    fitted_sizes,
-    products_of,
-    replicate_weights,
-    replicates_at,
-    sizes_updated,
-    solved_at_once,
+    SIZE_PRIORS,
+    Noise,
+    inverse_noise,
+    log_size_prior,
+    prior_sd,
+    updated_repeats,
+    updated_sizes,
 )
+from tribo.display import displayed
 from tribo.records import FloatArray
 
-STEPS = 4
+ITERATIONS = 4
+# Of the logarithms of the sizes (GAIN, SLOPE: two each; PATTERN): what a contrast explains of the patterns makes their
+# error smaller, and what it explains of a specimen makes the spread of the specimens smaller.
+SIZE_STEPS = np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, -0.7], [-0.7, -0.7, -0.7, -0.7, 0.0]])
+
+
+@displayed()
+@dataclass(frozen=True)
+class ReplicateNoise:
+    """The noise of every replicate: ``repeat`` (r, 2, 2), what the repeats depend on, ``scatter`` (r, k), and sizes of
+    the random ``effects`` (r, 5); with the ``inverse`` (r, 3, n) of the noise of every test and the ``precision``
+    (r, q) of the random effects at these sizes.
+    """
+
+    repeat: FloatArray
+    scatter: FloatArray
+    effects: FloatArray
+    inverse: FloatArray
+    precision: FloatArray
+
+
+def noise_at(s: Setup, repeat: FloatArray, scatter: FloatArray, effects: FloatArray) -> ReplicateNoise:
+    """The noise of every replicate at these sizes."""
+    return ReplicateNoise(repeat, scatter, effects, inverse_noise(s, repeat, scatter), prior_sd(s, effects) ** -2)
+
+
+def fitted_noise(s: Setup, noise: Noise, replicates: int) -> ReplicateNoise:
+    """The noise of a fit, once per replicate."""
+    scatter = np.zeros(s.scatter.shape[1]) if noise.scatter is None else noise.scatter
+    parts = (noise.repeat, scatter, noise.sizes)
+    return noise_at(s, *(np.repeat(part[None], replicates, axis=0) for part in parts))
+
+
+def products_of(left: FloatArray) -> FloatArray:
+    """Static, mixed and sliding products of what is left of every test (r, 2, n), (r, 3, n)."""
+    return np.stack([left[:, 0] ** 2, left[:, 0] * left[:, 1], left[:, 1] ** 2], axis=1)
+
+
+def replicate_weights(noise: ReplicateNoise, left: FloatArray, tail: float) -> FloatArray:
+    """Weight of every test of every replicate under the bivariate t, (r, n)."""
+    distance = np.einsum("ran,ran,a->rn", noise.inverse, products_of(left), [1.0, 2.0, 1.0])
+    return np.asarray((tail + 2.0) / (tail + distance))
+
+
+def log_priors(s: Setup, sizes: FloatArray, steps: FloatArray) -> FloatArray:
+    """Log density of sizes (r, 5) after each of ``steps`` (steps, 5) of their logarithms, (steps, r)."""
+    there = [group for group in range(len(SIZE_PRIORS)) if group in s.group]
+    each = [sum(log_size_prior(g, sizes[:, g] * np.exp(step[g])) for g in there) for step in steps]
+    return np.array(each).reshape(len(steps), -1)
+
+
+def solved_at_once(
+    columns: ModelColumns, precision: FloatArray, residual: FloatArray, noise: ReplicateNoise
+) -> tuple[Inverse, Sides]:
+    """Inverse normal matrices and solutions for the residuals (r, 2, n) at the precision (r, 3, n) of every test; law
+    and mechanisms have next to no prior."""
+    weighted = columns.weighted(precision)
+    known = np.full((len(noise.effects), columns.parameters), 1e-12)
+    prior = columns.sides(np.concatenate([known, noise.precision], axis=1))
+    inverse = weighted.normal.with_prior(*prior).inverse()
+    return inverse, inverse.solution(*weighted.with_residual(residual))
+
+
+@displayed()
+@dataclass(frozen=True)
+class Replicates:
+    """Fitted replicates: ``precision`` (r, 3, n) of every test, robust weight included, as static, mixed, sliding;
+    ``residual`` (r, 2, n) of ln T. ``weighted`` are the model's columns times that precision, and ``normal`` their
+    products without the prior. ``noise`` holds the precision of the random effects, ``group`` (q,) the group of the
+    size of each, and ``log_priors`` (steps, r) the log density of the sizes after each of SIZE_STEPS.
+    """
+
+    precision: FloatArray
+    residual: FloatArray
+    weighted: Weighted
+    normal: Normal
+    noise: ReplicateNoise
+    group: NDArray[np.int64]
+    log_priors: FloatArray
+
+    def one(self, k: int) -> Replicates:
+        """One of them, as a batch of one."""
+
+        def cut(batch: Any) -> Any:  # what is not an array is common to all
+            arrays = {f.name: getattr(batch, f.name) for f in fields(batch)}
+            return replace(batch, **{n: v[k : k + 1] for n, v in arrays.items() if isinstance(v, np.ndarray)})
+
+        return Replicates(
+            self.precision[k : k + 1], self.residual[k : k + 1], cut(self.weighted), cut(self.normal),
+            cut(self.noise), self.group, self.log_priors[:, k : k + 1],
+        )  # fmt: skip
+
+
+def replicates_at(
+    s: Setup, columns: ModelColumns, noise: ReplicateNoise, left: FloatArray, residual: FloatArray, tail: float
+) -> Replicates:
+    """Replicates fitted with the ``columns`` of a model at a given noise; ``left`` (r, 2, n) is what is left of every
+    test and ``residual`` the same with the random effects."""
+    precision = noise.inverse * replicate_weights(noise, left, tail)[:, None]
+    weighted = columns.weighted(precision)
+    priors = log_priors(s, noise.effects, SIZE_STEPS)
+    return Replicates(precision, residual, weighted, weighted.normal, noise, s.group, priors)
 
 
 def as_measured(f: ModelFit) -> Replicates:
     """The fitted campaign itself, as if it were one replicate."""
     left = (f.residual - f.setup.random_effects.on_tests(f.effects)).T[None]
-    sizes = fitted_sizes(f.setup, f.noise, 1)
-    return replicates_at(f.setup, f.linear.columns, sizes, left, f.residual.T[None], f.noise.tail)
+    noise = fitted_noise(f.setup, f.noise, 1)
+    return replicates_at(f.setup, f.linear.columns, noise, left, f.residual.T[None], f.noise.tail)
 
 
 def drawn_residuals(f: ModelFit, rng: np.random.Generator, replicates: int) -> FloatArray:
@@ -59,41 +165,25 @@ def standardised(f: ModelFit) -> FloatArray:
     return np.asarray(left)
 
 
-@dataclass(frozen=True)
-class Refits:
-    """Campaigns fitted again: the noise of each, the coefficients (r, p) of law and mechanisms with their ``variance``
-    (r, p), what is left of every test, (r, 2, n), and the same ``without`` the random effects taken out."""
-
-    sizes: Sizes
-    solution: FloatArray
-    variance: FloatArray
-    left: FloatArray
-    without: FloatArray
-
-
 def refit(f: ModelFit, residual: FloatArray) -> Replicates:
-    """Law, random effects, weights and noise sizes of campaigns that differ from ``f`` by ``residual`` (r, 2, n)."""
-    found = refits(f, residual)
-    return replicates_at(f.setup, f.linear.columns, found.sizes, found.left, found.without, f.noise.tail)
+    """Law, random effects, weights and noise of campaigns that differ from ``f`` by ``residual`` (r, 2, n)."""
+    noise, solution, _, left = refits(f, residual)
+    law = np.tensordot(solution, f.linear.jacobian, axes=(1, 2)).transpose(0, 2, 1)
+    return replicates_at(f.setup, f.linear.columns, noise, left, residual - law, f.noise.tail)
 
 
-def refit_sizes(f: ModelFit, residual: FloatArray) -> Sizes:
-    """The noise alone, estimated in each of these campaigns."""
-    return refits(f, residual).sizes
-
-
-def refits(f: ModelFit, residual: FloatArray) -> Refits:
-    """Each of these campaigns fitted, linear about ``f``."""
+def refits(f: ModelFit, residual: FloatArray) -> tuple[ReplicateNoise, FloatArray, FloatArray, FloatArray]:
+    """Each of these campaigns fitted, linear about ``f``: the noise, the coefficients (r, p) of law and mechanisms with
+    their variances (r, p), and what is left of every test, (r, 2, n)."""
     s, columns, tail = f.setup, f.linear.columns, f.noise.tail
     p = columns.parameters
-    sizes, left = fitted_sizes(s, f.noise, len(residual)), residual
-    for _ in range(STEPS):
-        weight = replicate_weights(sizes, left, tail)
-        inverse, (own, border) = solved_at_once(columns, sizes.inverse * weight[:, None], residual, sizes)
+    noise, left = fitted_noise(s, f.noise, len(residual)), residual
+    for _ in range(ITERATIONS):
+        weight = replicate_weights(noise, left, tail)
+        inverse, (own, border) = solved_at_once(columns, noise.inverse * weight[:, None], residual, noise)
         left = residual - columns.on_tests(own, border)
         squares = weight[:, None] * (products_of(left) + inverse.spread(columns))
         effects, variances = (columns.vector(*sides)[:, p:] for sides in ((own, border), inverse.variances))
-        sizes = sizes_updated(s, sizes, (effects, variances), squares, tail)
-    law = np.tensordot(border[:, :p], columns.border[:, :, :p], axes=(1, 2)).transpose(0, 2, 1)
-    variance = np.diagonal(inverse.border, axis1=1, axis2=2)[:, :p]
-    return Refits(sizes, border[:, :p], variance, left, residual - law)
+        sizes = updated_sizes(s, noise.effects, effects, variances)
+        noise = noise_at(s, *updated_repeats(s, (noise.repeat, noise.scatter), squares, tail), sizes)
+    return noise, border[:, :p], np.diagonal(inverse.border, axis1=1, axis2=2)[:, :p], left

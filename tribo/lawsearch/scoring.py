@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from tribo.diagnostics.fit import Linear, ModelFit, whitened
 from tribo.diagnostics.model import Setup, log_forces
-from tribo.diagnostics.scatter import Replicates
-from tribo.diagnostics.score_statistics import TAKEN_UP, cleared, columns_in, scores
+from tribo.diagnostics.normal_equations import block_cholesky
+from tribo.diagnostics.replicates import Replicates
+from tribo.diagnostics.score_statistics import TAKEN_UP, scores, terms_in
 from tribo.lawsearch.grammar import (
     ADHESION_TERM,
     LOAD_TERM,
@@ -147,7 +148,7 @@ class Projection:
         self.factor = linear.factor * np.sqrt(linear.weight)[:, None, None]
         self.n = len(linear.residual)
         self.specimen = linear.random_effects.specimen
-        absorbed = cleared(linear.normal, linear.right)
+        absorbed = block_cholesky(linear.normal, linear.right)
         specimen = np.tile(self.specimen, 2)
         white = whitened(self.factor, linear.columns.own)
         self.own = (absorbed.own[0, specimen] @ white[:, :, None])[:, :, 0]
@@ -286,4 +287,4 @@ class Grammar:
             spans.append(slice(at, at + column.shape[2]))
             at += column.shape[2]
         freedom = np.array([span.stop - span.start for span in spans])
-        return 0.5 * scores(fitted, columns_in(np.concatenate(columns, axis=2), spans))[0] - (freedom - 1.0)
+        return 0.5 * scores(fitted, terms_in(np.concatenate(columns, axis=2), spans))[0] - (freedom - 1.0)
