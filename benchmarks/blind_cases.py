@@ -260,7 +260,7 @@ def true_corrections(case: Case, s: Setup) -> dict[tuple[str, str], float]:
 def gain_of_the_best(d: Diagnosis, seed: int) -> list[float]:
     """What the mechanism that fits best by chance gains on samples left out: mean log score, standard error."""
     from tribo.diagnostics.candidates import weigh
-    from tribo.diagnostics.gain import gain
+    from tribo.diagnostics.inference import gain
     from tribo.diagnostics.score_statistics import start_effects
 
     found = gain(d.baseline, weigh(start_effects(d.baseline))[0].fit, np.random.default_rng(seed))

@@ -152,7 +152,7 @@ def work(piece: Piece) -> dict[str, Any]:
 def of_clean(case: Case) -> dict[str, Any]:
     """Causes and laws of a campaign with nothing but wrong patterns, and how many corrections hold the truth."""
     from tribo.diagnostics.diagnosis import examine
-    from tribo.diagnostics.intervals import pattern_corrections
+    from tribo.diagnostics.inference import pattern_corrections
     from tribo.lawsearch.diagnosis_with_laws import with_laws
 
     d = examine(make_campaign(case), seed=case.seed)

@@ -18,7 +18,7 @@ from blind.direct import ingested  # isort: skip
 from blind.tribometer import hide  # isort: skip
 
 from tribo.diagnostics.fit import fit
-from tribo.diagnostics.intervals import pattern_corrections
+from tribo.diagnostics.inference import pattern_corrections
 from tribo.diagnostics.model import setup
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor

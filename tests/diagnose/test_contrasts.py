@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tribo.diagnostics.contrasts import Contrast, all_contrasts, numeric_covariates
-from tribo.diagnostics.model import Acting, Setup, setup, start_changes
+from tribo.diagnostics.model import Acting, Setup, added, setup, start_changes
 from tribo.diagnostics.observations import Observations, observe
 from tribo.diagnostics.predictor import tabled_predictor
 from tribo.mechanisms.table import MECHANISMS
@@ -221,7 +221,7 @@ def test_every_candidate_is_a_contrast_at_what_it_changes_and_adhesion_one_at_it
     changes = start_changes(s, s.first_law)
     mechanisms = {(x.acting.mechanism.name, x.acting.choice): x for x in of_kind("mechanism") if x.acting is not None}
     for k, acting in enumerate(changes.acting):
-        column = changes.columns[:, :, k]
+        column = added(changes.courses[k])[:, :, 0]
         if np.ptp(column) > 0:
             assert mechanisms[acting.mechanism.name, acting.choice].columns[:, :, 0] == pytest.approx(column)
     assert one("trend", "both", "tau0").columns[:, :, 0] == pytest.approx(changes.adhesion)

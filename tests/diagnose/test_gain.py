@@ -10,7 +10,7 @@ from blind.tribometer import Design
 from scipy.stats import norm
 
 from tribo.diagnostics.fit import fit
-from tribo.diagnostics.gain import _folds, gain, gain_of_zero
+from tribo.diagnostics.inference import _folds, gain, gain_of_zero
 from tribo.diagnostics.model import Acting, Setup
 from tribo.diagnostics.observations import observe
 from tribo.mechanisms.table import MECHANISMS

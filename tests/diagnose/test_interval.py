@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tribo.diagnostics.fit import ModelFit, fit
-from tribo.diagnostics.intervals import (
+from tribo.diagnostics.inference import (
     DROP_90,
     _averaged,
     _log_freedom,

@@ -13,7 +13,7 @@ from scipy.stats import norm
 from tribo.diagnostics import examine
 from tribo.diagnostics.diagnosis_record import Diagnosis
 from tribo.diagnostics.fit import fit
-from tribo.diagnostics.intervals import pattern_corrections
+from tribo.diagnostics.inference import pattern_corrections
 from tribo.diagnostics.model import Setup, predict, setup
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor

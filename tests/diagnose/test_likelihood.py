@@ -99,7 +99,7 @@ def dense(s: Setup, noise: Noise) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     alone = np.zeros((2 * n, 2 * n))
     for k, own in enumerate(of_tests(s, noise)):
         alone[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = own
-    random = s.random.reshape(2 * n, -1)
+    random = s.random_effects.dense.reshape(2 * n, -1)
     return alone + random @ np.diag(of_effects(s, noise)) @ random.T, alone, random
 
 
@@ -358,9 +358,9 @@ def test_the_noise_is_estimated_from_what_is_left_and_from_how_uncertain_it_is()
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
     solved_inverse, _, columns = step_from(s, state, jacobian, target.bounds)
     after = with_noise_estimated(s, state, columns, weights(s, state), solved_inverse).noise
-    left = residual_of(s) - s.random @ state.effects
+    left = residual_of(s) - s.random_effects.dense @ state.effects
     inverse = whole_inverse(solved_inverse, columns)[0]
-    spread = np.array([c @ inverse @ c.T for c in np.concatenate([jacobian, s.random], axis=2)])
+    spread = np.array([c @ inverse @ c.T for c in np.concatenate([jacobian, s.random_effects.dense], axis=2)])
     square = weights(s, state)[:, None, None] * (left[:, :, None] * left[:, None, :] + spread)
     squares = np.array([square[:, 0, 0], square[:, 0, 1], square[:, 1, 1]])
     assert noise.scatter is not None
@@ -389,7 +389,7 @@ def test_many_replicates_are_weighed_and_solved_as_each_by_dense_matrices() -> N
     distance = np.einsum("ran,nab,rbn->rn", residual, inverse, residual)
     assert weight == pytest.approx(10.0 / (8.0 + distance))
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
-    along = np.concatenate([jacobian, s.random], axis=2).transpose(1, 0, 2).copy()
+    along = np.concatenate([jacobian, s.random_effects.dense], axis=2).transpose(1, 0, 2).copy()
     columns = model_columns(jacobian, s.random_effects)
     precision = sizes.inverse * weight[:, None]
     inverted, (own, border) = solved_at_once(columns, precision, residual, sizes)
@@ -421,7 +421,7 @@ def test_the_normal_matrix_by_blocks_is_the_dense_one() -> None:
     weight = 0.5 + rng.random(s.observations.n)
     inverse = np.linalg.inv(of_tests(s, noise_of(s))) * weight[:, None, None]
     precision = np.array([[inverse[:, 0, 0], inverse[:, 0, 1], inverse[:, 1, 1]]])
-    along = np.concatenate([jacobian, s.random], axis=2)
+    along = np.concatenate([jacobian, s.random_effects.dense], axis=2)
     whole = np.einsum("nak,nab,nbl->kl", along, inverse, along)
     found = columns.weighted(precision)
     normal = found.normal
@@ -451,14 +451,14 @@ def test_the_covariance_of_predictions_is_that_of_the_whole_matrix_and_random_ef
     s, rng = campaign(), np.random.default_rng(7)
     effects = s.random_effects
     values = rng.normal(size=(2, effects.count))
-    assert effects.on_tests(values) == pytest.approx(np.einsum("nak,rk->rna", s.random, values))
+    assert effects.on_tests(values) == pytest.approx(np.einsum("nak,rk->rna", s.random_effects.dense, values))
     target = Target(s, ())
     state = at_the_mode(s, noise_of(s))
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
     inverse, _, columns = step_from(s, state, jacobian, target.bounds)
     rows = np.array([0, 5, 6, 20])
     some = model_columns(np.zeros((len(rows), 2, 4)), effects.take(rows))
-    flat = np.concatenate([np.zeros((len(rows), 2, 4)), s.random[rows]], axis=2).reshape(2 * len(rows), -1)
+    flat = np.concatenate([np.zeros((len(rows), 2, 4)), effects.dense[rows]], axis=2).reshape(2 * len(rows), -1)
     expected = flat @ whole_inverse(inverse, columns)[0] @ flat.T
     assert inverse.between(some, effects.specimen[rows]) == pytest.approx(expected)
     of_tests_alone = np.einsum("nanb->abn", expected.reshape(len(rows), 2, len(rows), 2))  # some specimens have none

@@ -134,7 +134,7 @@ def test_a_specimen_has_a_gain_and_a_slope_alike_in_both_regimes_and_apart() -> 
         assert s.unit[here].tolist() == [1.0] * len(names)
         for column, name in zip(here, names, strict=True):
             expected = ((c.specimen == name) * shape)[:, None] * regimes
-            assert s.random[:, :, column] == pytest.approx(expected)
+            assert s.random_effects.dense[:, :, column] == pytest.approx(expected)
     assert pytest.approx(1.0) == ALIKE_IN_BOTH @ ALIKE_IN_BOTH == APART @ APART
     assert pytest.approx(0.0) == ALIKE_IN_BOTH @ APART
 
@@ -155,8 +155,8 @@ def test_a_pattern_has_an_offset_a_slope_and_a_curve_in_each_regime_of_the_state
     assert len(here) == len(wanted) == 18
     for column, (sample, regime, size, shape) in zip(here, wanted, strict=True):
         assert s.unit[column] == size
-        assert s.random[:, regime, column] == pytest.approx((c.sample == sample) * shape)
-        assert not s.random[:, 1 - regime, column].any()
+        assert s.random_effects.dense[:, regime, column] == pytest.approx((c.sample == sample) * shape)
+        assert not s.random_effects.dense[:, 1 - regime, column].any()
 
 
 def test_repeats_may_depend_on_the_sample_and_on_the_force_the_law_expects() -> None:
@@ -190,8 +190,9 @@ def test_the_tests_of_a_setup_that_are_kept_keep_everything_about_them() -> None
     keep = s.observations.conditions.sample != "B"
     part = s.take(keep)
     assert part.observations.n == keep.sum()
-    for name in ("shares", "random", "log_pressure", "scatter"):
+    for name in ("shares", "log_pressure", "scatter"):
         assert np.array_equal(getattr(part, name), getattr(s, name)[keep])
+    assert np.array_equal(part.random_effects.dense, s.random_effects.dense[keep])
     assert np.array_equal(part.group, s.group)
 
 
@@ -200,7 +201,7 @@ def test_a_form_error_lets_each_effect_be_off_by_a_share_of_itself_per_sample_an
     acting, values = named("suction"), (np.array([8e3]),)
     wider = with_form_error(s, LAW, acting, values, 0.2)
     change = effect_of(s, LAW, acting[0], values[0])
-    further = wider.random[:, :, s.random.shape[2] :]
+    further = wider.random_effects.dense[:, :, s.random_effects.dense.shape[2] :]
     c = s.observations.conditions
     wanted = [
         (sample, regime, shape)

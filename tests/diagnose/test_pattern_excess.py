@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from tribo.diagnostics import examine
-from tribo.diagnostics.intervals import pattern_excess
+from tribo.diagnostics.inference import pattern_excess
 from tribo.wording.verdict_sentences import worded
 
 from .synthetic import hidden
@@ -31,7 +31,7 @@ def test_the_reported_percentages_are_those_by_which_the_patterns_were_moved() -
     f = baseline(3, off(6.0))
     excess = pattern_excess(f)
     assert excess is not None
-    left = f.residual - f.setup.random[:, :, f.setup.group < 4] @ f.effects[f.setup.group < 4]
+    left = f.residual - f.setup.random_effects.dense[:, :, f.setup.group < 4] @ f.effects[f.setup.group < 4]
     for sample, percent in excess.percent.items():
         mean = left[f.setup.observations.conditions.sample == sample].mean(axis=0)
         assert max(abs(mean - [math.log1p(p / 100.0) for p in percent])) < 0.03

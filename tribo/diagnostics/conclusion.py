@@ -12,12 +12,12 @@ from tribo.diagnostics.contrasts import Screen
 from tribo.diagnostics.direct_evidence import Evidence, TraceFindings, stated_evidence
 from tribo.diagnostics.effect_sizes import Effect, Residual, effect_of_contrast, percent, residual_of
 from tribo.diagnostics.fit import ModelFit, residual_on_flat
-from tribo.diagnostics.gain import gain, gain_of_zero
-from tribo.diagnostics.intervals import (
+from tribo.diagnostics.inference import (
     PatternCorrection,
     PatternExcess,
-    Percent,
     estimates,
+    gain,
+    gain_of_zero,
     pattern_corrections,
     pattern_excess,
 )
@@ -184,15 +184,11 @@ def pattern_layers(model: ModelFit) -> list[Layer]:
 
 
 def _pattern_layer(c: PatternCorrection) -> Layer:
-    parameters = {f"at {load:g} N": _estimate(percent) for load, percent in c.at_load.items()}
+    parameters = {f"at {load:g} N": estimate for load, estimate in c.at_load.items()}
     return Layer(
         kind="pattern_correction", name=c.sample, samples=(c.sample,), regimes=(c.regime,), p_adjusted=c.p,
         effect_percent=c.mean.value, low=c.mean.low, high=c.mean.high, parameters=parameters,
     )  # fmt: skip
-
-
-def _estimate(percent: Percent) -> Estimate:
-    return Estimate(percent.value, percent.low, percent.high, "%")
 
 
 def cause_layers(

@@ -14,10 +14,10 @@ import numpy as np
 
 from tribo.diagnostics.contrasts import BEND, Contrast
 from tribo.diagnostics.fit import ModelFit
-from tribo.diagnostics.intervals import NORMAL_90
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray
 
+NORMAL_90 = 1.645  # standard deviations to the ends of a 90 % interval
 ENDS = (0.05, 0.95)  # quantiles of a column between which a change is stated
 
 
@@ -55,10 +55,10 @@ def contrast_percent(inside: FloatArray, outside: FloatArray) -> float:
     return float(percent(inside.mean() - outside.mean()))
 
 
-def interval_percent(value: float, strength: float, factor: float) -> tuple[float, float]:
-    """Ends of the interval of a percentage that differs from zero by ``strength`` standard deviations in ln T."""
+def interval_percent(value: float, strength: float) -> tuple[float, float]:
+    """Ends of the 90 % interval of a percentage that differs from zero by ``strength`` standard deviations in ln T."""
     middle = np.log1p(value / 100.0)
-    half = factor * abs(middle) / max(strength, 1e-9)
+    half = NORMAL_90 * abs(middle) / max(strength, 1e-9)
     low, high = percent(np.array([middle - half, middle + half]))
     return float(low), float(high)
 
@@ -109,7 +109,7 @@ def effect_of_contrast(
         change = (contrast.columns @ coefficients).ravel()
         sign = float(np.sign(change[np.abs(change).argmax()])) if contrast.freedom == 1 else 1.0
         value, between = float(percent(sign * min(size, 5.0))), "extremes"
-    ends = interval_percent(value, strength, NORMAL_90)
+    ends = interval_percent(value, strength)
     return Effect(value, *ends, between, replace(contrast, courses=()), _course(coefficients))
 
 

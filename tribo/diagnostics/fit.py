@@ -7,12 +7,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.diagnostics.model import N_LAW, Acting, RandomEffects, Setup, Target, in_batches, predict
+from tribo.diagnostics.model import N_LAW, Acting, RandomEffects, Setup, Target, predict
 from tribo.diagnostics.normal_equations import Inverse, ModelColumns, Normal, Sides, Weighted, model_columns
 from tribo.diagnostics.scatter import (
     Noise,
@@ -28,6 +28,7 @@ from tribo.records import FloatArray
 
 TRIAL_GAIN, END_GAIN = 0.5, 2e-3  # log likelihood that a step has to earn for another one to be made
 STILL = 0.02  # standard errors of a step below which derivatives are not taken anew
+AT_ONCE = 100  # columns that are written out at the same time
 LENGTHS = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a step that does not worsen the penalised likelihood: the first
 
 
@@ -214,8 +215,10 @@ class Linear:
 
     def size_beyond_law(self, columns: Iterable[FloatArray]) -> FloatArray:
         """Peak-to-peak of each of many columns (n, 2) beyond what law and mechanisms absorb, (k,)."""
-        each = [np.ptp(self.beyond_law(batch), axis=(0, 1)) for batch in in_batches(columns)]
-        return np.concatenate([np.zeros(0), *each])
+        rest, sizes = iter(columns), [np.zeros(0)]
+        while batch := list(islice(rest, AT_ONCE)):
+            sizes.append(np.ptp(self.beyond_law(np.stack(batch, axis=2)), axis=(0, 1)))
+        return np.concatenate(sizes)
 
 
 @displayed()

@@ -1,20 +1,16 @@
-"""The random effects of a campaign: four of each specimen, which its tests alone show, and those that tests share.
-
-Columns along which ln T may change; where one specimen alone shows them, kept without the tests of the others.
-
-The model of a campaign: the flat law, the shares of each pattern, mechanisms on top, and the noise.
+"""The mixed model of a campaign: the flat law, the shares of each pattern, mechanisms on top, and the random effects.
 
 ln T of test i in regime r = ln law + pattern error + specimen gain + specimen slope x ln p + repeat noise (bivariate
 t over the two regimes of one pull). All sizes are estimated from the campaign: gains and slopes of the specimens, one
 factor on the error that the predictor states for its patterns, and repeats that may differ by sample and by force.
+What one specimen alone shows is kept without the tests of the others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +86,6 @@ class RandomEffects:
 
 
 EVERY = -1  # in place of a specimen: all tests
-AT_ONCE = 100  # courses that are written out at the same time
 MOST_PAIRS = 2000  # courses of two specimens that are written out at all
 
 
@@ -110,9 +105,9 @@ class Course:
         """On all tests, (n, 2, d)."""
         if self.specimen == EVERY:
             return self.values
-        found = np.zeros((self.n, *self.values.shape[1:]))
-        found[self.tests] = self.values
-        return found
+        columns = np.zeros((self.n, *self.values.shape[1:]))
+        columns[self.tests] = self.values
+        return columns
 
     @property
     def freedom(self) -> int:
@@ -143,13 +138,6 @@ def added(courses: Iterable[Course]) -> FloatArray:
     for other in others:
         total = total + other.columns
     return total
-
-
-def in_batches(columns: Iterable[FloatArray]) -> Iterator[FloatArray]:
-    """Columns (n, 2) put together, (n, 2, k), AT_ONCE at a time."""
-    rest = iter(columns)
-    while batch := list(islice(rest, AT_ONCE)):
-        yield np.stack(batch, axis=2)
 
 
 N_LAW = 4  # mu static, tau0 static (kPa), mu sliding, tau0 sliding (kPa)
@@ -216,11 +204,6 @@ class Setup:
     scatter: FloatArray
     first_law: FloatArray
 
-    @property
-    def random(self) -> FloatArray:
-        """The whole design of the random effects, (n, 2, q): large where there are many specimens."""
-        return self.random_effects.dense
-
     def take(self, keep: NDArray[np.bool_]) -> Setup:
         """The same for the tests that ``keep`` (n,) marks."""
         return replace(
@@ -261,7 +244,8 @@ def setup(observations: Observations, predictor: Predictor) -> Setup:
             offset, slope, curve = (error[sample][regime] for error in known)
             sized = ((offset, np.ones(o.n)), (slope, log_p), (curve, log_p**2 - np.mean(log_p**2)))
             for size, shape in sized if offset > 0 else ():
-                columns.append(_column((c.sample == sample) * shape, regime))
+                columns.append(np.zeros((o.n, 2)))
+                columns[-1][:, regime] = (c.sample == sample) * shape
                 units.append(size)
                 groups.append(PATTERN)
     shared = np.stack(columns, axis=2) if columns else np.zeros((o.n, 2, 0))
@@ -271,14 +255,9 @@ def setup(observations: Observations, predictor: Predictor) -> Setup:
         np.zeros((o.n, 0)), np.zeros(N_LAW),
     )  # fmt: skip
     law = _first_law(bare)
-    return replace(bare, first_law=law, scatter=_scatter(bare, law))
-
-
-def _scatter(s: Setup, law: FloatArray) -> FloatArray:
-    """One column per sample, and the logarithm of the expected force about its mean."""
-    c = s.observations.conditions
-    log_force = predict(s, law, (), ()).mean(axis=1)
-    return np.column_stack([*((c.sample == name) * 1.0 for name in np.unique(c.sample)), log_force - log_force.mean()])
+    force = predict(bare, law, (), ()).mean(axis=1)
+    scatter = [*((c.sample == name) * 1.0 for name in np.unique(c.sample)), force - force.mean()]
+    return replace(bare, first_law=law, scatter=np.column_stack(scatter))
 
 
 def _first_law(s: Setup) -> FloatArray:
@@ -291,16 +270,10 @@ def _first_law(s: Setup) -> FloatArray:
         weight = np.ones(len(force))
         for _ in range(8):
             root = np.sqrt(weight)
-            found = np.linalg.lstsq(design * root[:, None], root, rcond=None)[0]
-            weight = 1.0 / (1.0 + ((design @ found - 1.0) / 0.15) ** 2)
-        law += [max(float(found[0]), 0.05), float(found[1])]
+            mu, tau0 = fitted = np.linalg.lstsq(design * root[:, None], root, rcond=None)[0]
+            weight = 1.0 / (1.0 + ((design @ fitted - 1.0) / 0.15) ** 2)
+        law += [max(float(mu), 0.05), float(tau0)]
     return np.array(law)
-
-
-def _column(values: FloatArray | NDArray[np.bool_], regime: int) -> FloatArray:
-    column = np.zeros((len(values), 2))
-    column[:, regime] = values
-    return column
 
 
 def log_forces(forces: Forces) -> FloatArray:
@@ -372,31 +345,27 @@ def with_free_columns(s: Setup, columns: FloatArray, coefficients: FloatArray) -
 
 
 def candidates(s: Setup, law: FloatArray) -> list[Acting]:
-    """Every mechanism and choice that could show in the friction forces of this design."""
-    base, conditions = s.base(law), s.observations.conditions
-    found = []
-    for mechanism in MECHANISMS.values():
-        if not mechanism.changes_forces or not mechanism.applies(conditions):
+    """Every mechanism and choice that could show in the friction forces of this design.
+
+    An amplitude that was measured directly is kept within WITHIN_MEASURED of its standard uncertainties.
+    """
+    base, conditions, every = s.base(law), s.observations.conditions, s.observations.measured
+    acting = []
+    for m in MECHANISMS.values():
+        if not m.changes_forces or not m.applies(conditions):
             continue
-        found += [_known(s, Acting(mechanism, str(choice))) for choice in mechanism.choices(base, conditions)]
-    return found
-
-
-def _known(s: Setup, a: Acting) -> Acting:
-    """A candidate with its amplitude as measured directly, where it was."""
-    every = s.observations.measured
-    measured = every.get(f"{a.mechanism.name}:{a.choice}", every.get(a.mechanism.name))
-    if measured is None:
-        return a
-    return replace(a, mechanism=as_measured_directly(a.mechanism, *measured), measured=measured)
-
-
-def as_measured_directly(mechanism: Mechanism, value: float, uncertainty: float) -> Mechanism:
-    """The mechanism with its amplitude kept within WITHIN_MEASURED standard uncertainties of a measured one."""
-    first, reach = mechanism.amplitude, WITHIN_MEASURED * uncertainty
-    low, high = np.clip([value - reach, value + reach], first.low, first.high)
-    amplitude = replace(first, low=float(low), high=float(high), tries=())
-    return replace(mechanism, parameters=(amplitude, *mechanism.parameters[1:]))
+        for choice in map(str, m.choices(base, conditions)):
+            measured = every.get(f"{m.name}:{choice}", every.get(m.name))
+            if measured is None:
+                acting.append(Acting(m, choice))
+                continue
+            first, (value, uncertainty) = m.amplitude, measured
+            reach = WITHIN_MEASURED * uncertainty
+            low, high = np.clip([value - reach, value + reach], first.low, first.high)
+            amplitude = replace(first, low=float(low), high=float(high), tries=())
+            bounded = replace(m, parameters=(amplitude, *m.parameters[1:]))
+            acting.append(Acting(bounded, choice, measured))
+    return acting
 
 
 @displayed()
@@ -415,29 +384,24 @@ class StartChanges:
     every_start: Mapping[str, FloatArray]
     adhesion: FloatArray
 
-    @property
-    def columns(self) -> FloatArray:
-        """The changes of all candidates, (n, 2, k): large where there are many specimens."""
-        return np.concatenate([added(courses) for courses in self.courses], axis=2)
-
 
 def start_changes(s: Setup, law: FloatArray) -> StartChanges:
     """The changes of all candidates on top of the flat law ``law``, mechanisms of a model left out."""
     acting = candidates(s, law)
     before = predict(s, law, (), ())
-    found: dict[tuple[str, str], Course] = {}
+    single: dict[tuple[str, str], Course] = {}
     every = {}
     for a in acting:
         if len(a.mechanism.choosing.parts(a.choice)) > 1:
             continue
         column = effect_of(s, law, a, a.start)
-        found[a.mechanism.name, a.choice] = course(column[:, :, None], s.random_effects)
+        single[a.mechanism.name, a.choice] = course(column[:, :, None], s.random_effects)
         if not a.choice:
             further = [np.array([size, *a.start[1:]]) for size in a.mechanism.amplitude.tries]
             every[a.name] = np.stack([column, *(effect_of(s, law, a, v) for v in further)], axis=2)
     adhesion = np.exp(log_forces(s.base(law).forces(np.zeros(s.observations.n))) - before)
     names = [(a.mechanism.name, a.mechanism.choosing.parts(a.choice)) for a in acting]
-    courses = tuple(tuple(found[name, part] for part in parts) for name, parts in names)
+    courses = tuple(tuple(single[name, part] for part in parts) for name, parts in names)
     return StartChanges(tuple(acting), courses, every, adhesion)
 
 

@@ -168,8 +168,10 @@ def standardised(f: ModelFit) -> FloatArray:
 def refit(f: ModelFit, residual: FloatArray) -> Replicates:
     """Law, random effects, weights and noise of campaigns that differ from ``f`` by ``residual`` (r, 2, n)."""
     noise, solution, _, left = refits(f, residual)
-    law = np.tensordot(solution, f.linear.jacobian, axes=(1, 2)).transpose(0, 2, 1)
-    return replicates_at(f.setup, f.linear.columns, noise, left, residual - law, f.noise.tail)
+    columns = f.linear.columns
+    of_law = columns.border[:, :, : columns.parameters]
+    law = np.tensordot(solution, of_law, axes=(1, 2)).transpose(0, 2, 1)
+    return replicates_at(f.setup, columns, noise, left, residual - law, f.noise.tail)
 
 
 def refits(f: ModelFit, residual: FloatArray) -> tuple[ReplicateNoise, FloatArray, FloatArray, FloatArray]:

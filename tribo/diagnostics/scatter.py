@@ -76,13 +76,13 @@ def whitener(s: Setup, noise: Noise) -> FloatArray:
 
 def log_prior(s: Setup, noise: Noise) -> float:
     """Log density of the sizes, without constants; of those alone that some random effect has."""
-    found = -0.5 * float(np.sum(noise.scatter**2)) / SCATTER_SD**2 if noise.scatter is not None else 0.0
+    density = -0.5 * float(np.sum(noise.scatter**2)) / SCATTER_SD**2 if noise.scatter is not None else 0.0
     for group, size in enumerate(noise.sizes):
         if (s.group == group).any():
-            found += float(log_size_prior(group, size))
+            density += float(log_size_prior(group, size))
     size, worth = REPEAT_PRIOR
     determinant = float(np.linalg.slogdet(noise.repeat)[1])
-    return float(found - 0.5 * worth * (determinant + size**2 * np.trace(np.linalg.inv(noise.repeat))))
+    return float(density - 0.5 * worth * (determinant + size**2 * np.trace(np.linalg.inv(noise.repeat))))
 
 
 def prior_sd(s: Setup, sizes: FloatArray) -> FloatArray:
@@ -95,13 +95,13 @@ def updated_sizes(s: Setup, sizes: FloatArray, effects: FloatArray, variance: Fl
     """Sizes (..., 5) from predicted effects (..., q) and their variances (..., q)."""
     known = 1.0 - variance / prior_sd(s, sizes) ** 2
     squares = (effects / s.unit) ** 2
-    found = sizes.copy()
+    updated = sizes.copy()
     for group, (expected, worth) in enumerate(SIZE_PRIORS):
         here = s.group == group
         if here.any():
             total = squares[..., here].sum(axis=-1) + worth * expected**2
-            found[..., group] = np.sqrt(total / (np.maximum(known[..., here].sum(axis=-1), 0.0) + worth))
-    return found
+            updated[..., group] = np.sqrt(total / (np.maximum(known[..., here].sum(axis=-1), 0.0) + worth))
+    return updated
 
 
 def updated_repeats(
@@ -120,12 +120,18 @@ def updated_repeats(
     rest = 1.0 - np.stack([share[..., 0, :], both[..., 1, :], share[..., 1, :]], axis=-2)
     total = np.sum((both * squares + rest * own) / times, axis=-1)
     size, worth = REPEAT_PRIOR
-    found = (total[..., [[0, 1], [1, 2]]] + worth * size**2 * np.eye(2)) / (s.observations.n + worth)
+    covariance = (total[..., [[0, 1], [1, 2]]] + worth * size**2 * np.eye(2)) / (s.observations.n + worth)
     distances = np.einsum("...an,...an,a->...n", inverse, squares, [1.0, 2.0, 1.0])
-    scatter = _updated_scatter(s, scatter, (distances - 2.0) * share.mean(axis=-2), tail)
+    excess = (distances - 2.0) * share.mean(axis=-2)  # of every test above its expectation
+    information, precision = 4.0 * tail / (tail + 4.0), np.eye(s.scatter.shape[1]) / SCATTER_SD**2
+    normal = information * s.scatter.T @ s.scatter + precision
+    step = np.linalg.solve(normal, (excess @ s.scatter - scatter @ precision)[..., None])[..., 0]
+    scatter = scatter + np.clip(step, -0.5, 0.5)
     common = scatter[..., :-1].mean(axis=-1, keepdims=True)  # of all samples: that is the covariance itself
     scatter = np.concatenate([scatter[..., :-1] - common, scatter[..., -1:]], axis=-1)
-    return _floored(found * np.exp(2.0 * common)[..., None]), scatter
+    values, vectors = np.linalg.eigh(covariance * np.exp(2.0 * common)[..., None])
+    floored = np.maximum(values, SMALLEST_SD**2)  # the nearest covariance without a smaller standard deviation
+    return np.asarray((vectors * floored[..., None, :]) @ np.swapaxes(vectors, -1, -2)), scatter
 
 
 def inverse_noise(s: Setup, repeat: FloatArray, scatter: FloatArray) -> FloatArray:
@@ -135,21 +141,6 @@ def inverse_noise(s: Setup, repeat: FloatArray, scatter: FloatArray) -> FloatArr
     sliding = repeat[..., 1, 1, None] * times + reading[:, 1]
     mixed = repeat[..., 0, 1, None] * times
     return np.stack([sliding, -mixed, static], axis=-2) / (static * sliding - mixed**2)[..., None, :]
-
-
-def _updated_scatter(s: Setup, scatter: FloatArray, excess: FloatArray, tail: float) -> FloatArray:
-    """One scoring step; ``excess`` (..., n) is the weighted squared distance of every test above its expectation."""
-    information = 4.0 * tail / (tail + 4.0)
-    precision = np.eye(s.scatter.shape[1]) / SCATTER_SD**2
-    normal = information * s.scatter.T @ s.scatter + precision
-    step = np.linalg.solve(normal, (excess @ s.scatter - scatter @ precision)[..., None])[..., 0]
-    return np.asarray(scatter + np.clip(step, -0.5, 0.5))
-
-
-def _floored(repeat: FloatArray) -> FloatArray:
-    """The nearest covariance (..., 2, 2) with no standard deviation below SMALLEST_SD."""
-    values, vectors = np.linalg.eigh(repeat)
-    return np.asarray((vectors * np.maximum(values, SMALLEST_SD**2)[..., None, :]) @ np.swapaxes(vectors, -1, -2))
 
 
 def log_size_prior(group: int, size: FloatArray) -> FloatArray:

@@ -259,8 +259,7 @@ def _one_column(
     taken, shared_score = _shared_beyond(products[0], roots)
     spans, pairs = terms.shared.spans, terms.shared.pairs
     first = [span.start for span in spans]
-    every = first == list(range(taken.shape[2]))
-    squares = np.sum((taken if every else taken[:, :, first]) ** 2, axis=1)
+    squares = np.sum(taken[:, :, first] ** 2, axis=1)
     shown = np.array([pair.stop > pair.start for pair in pairs], bool)  # a column of zeros has no products
     score, left, whole = (np.zeros((len(shared_score), len(terms.about_one))) for _ in range(3))
     whole[:, terms.shared_at[shown]] = products[0].information[:, [p.start for p in pairs if p.stop > p.start]]

@@ -11,9 +11,9 @@ import numpy as np
 from scipy.special import erfc
 
 from tribo.diagnostics.contrasts import FORM
+from tribo.diagnostics.effect_sizes import NORMAL_90
 from tribo.diagnostics.fit import ModelFit, fit
-from tribo.diagnostics.gain import gain
-from tribo.diagnostics.intervals import NORMAL_90, estimates, recovered
+from tribo.diagnostics.inference import estimates, gain, recovered
 from tribo.diagnostics.model import Acting, effect_of
 from tribo.diagnostics.planning import PAPER_LAW, TYPICAL, expected_fit
 from tribo.diagnostics.verdict import Estimate, Layer

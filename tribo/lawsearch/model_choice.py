@@ -16,9 +16,9 @@ import numpy as np
 
 from tribo.diagnostics.candidates import PER_PARAMETER, refitted
 from tribo.diagnostics.contrasts import FORM
+from tribo.diagnostics.effect_sizes import NORMAL_90
 from tribo.diagnostics.fit import Linear, ModelFit, fit
-from tribo.diagnostics.gain import gain
-from tribo.diagnostics.intervals import NORMAL_90, estimates, informed_share
+from tribo.diagnostics.inference import estimates, gain, informed_share
 from tribo.diagnostics.model import Acting, Setup, effect_of
 from tribo.diagnostics.verdict import Estimate, Gain
 from tribo.lawsearch.grammar import (

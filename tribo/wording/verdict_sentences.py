@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from tribo.diagnostics.intervals import WITHIN
+from tribo.diagnostics.inference import WITHIN
 from tribo.diagnostics.verdict import AgainstModel, Cause, Estimate, Excluded, Gain, Layer, LayerKind, Misfit, Verdict
 from tribo.diagnostics.without_model import ColumnsTested
 from tribo.vocabulary import OBSERVABLES, in_words, short_label

@@ -1,35 +1,36 @@
-"""Values and intervals of a mechanism's parameters.
+"""What a fit says of a mechanism: parameters with intervals, what patterns differ by, the gain on tests left out.
 
-From the curvature, or by profile likelihood near a bound, and averaged over how wrong the model's patterns may be:
-the predictor states a size for their error, and a campaign of several patterns tells whether it is that large here.
-
-Whether the patterned samples differ from the model by more than the model's own error.
-
-By how much the model is wrong for each patterned sample: the estimated pattern error with its interval.
+Intervals follow from the curvature, or from the profile likelihood near a bound, and are averaged over how wrong the
+model's patterns may be: the predictor states a size for their error, and a campaign of several patterns tells whether
+it is that large here. The gain is a cross-validation by whole samples, specimens or loads.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import gammaln
+from scipy.stats import chi2, norm
 
-from tribo.diagnostics.fit import ModelFit, fit
-from tribo.diagnostics.model import FIXED, N_LAW, PATTERN
+from tribo.diagnostics.effect_sizes import NORMAL_90, rms_percent
+from tribo.diagnostics.fit import ModelFit, fit, fit_without
+from tribo.diagnostics.model import FIXED, N_LAW, PATTERN, Acting, Setup, Target
+from tribo.diagnostics.normal_equations import model_columns
+from tribo.diagnostics.observations import Observations
 from tribo.diagnostics.replicates import drawn_residuals, refits
 from tribo.diagnostics.scatter import Noise, log_size_prior
-from tribo.diagnostics.verdict import Estimate
-from tribo.mechanisms.record import Mechanism
+from tribo.diagnostics.verdict import Estimate, Gain
 from tribo.records import REGIMES, FloatArray
 
-NORMAL_90 = 1.645
 DROP_90 = 0.5 * NORMAL_90**2  # of the log likelihood at the ends of a 90 % interval
 NEAR = 2.0 * NORMAL_90  # standard errors from a bound within which the curvature is not trusted
 REPLICATES, WIDEST = 80, 1.5  # campaigns that show how far estimates scatter; a factor beyond this is their chance
 SMALLEST_SHARE = 1e-6  # of the way to a bound
+RESAMPLES = 400
+MOST_FOLDS = 30  # of whole specimens: where there are more of them, several are left out at a time
+UNKNOWN = 25.0  # variance of ln T: its factor is uncertain by e to the 5
 PATTERN_STEPS = np.linspace(-0.8, 1.2, 6)  # of the logarithm of the pattern error about its estimate, to average over
 
 
@@ -51,7 +52,7 @@ def recovered(f: ModelFit, index: int) -> list[tuple[float, float, float]]:
 
 
 def estimates(f: ModelFit, index: int) -> dict[str, Estimate]:
-    """The same, by the name of the parameter."""
+    """The values and intervals of :func:`recovered`, by the name of the parameter."""
     parameters = f.acting[index].mechanism.parameters
     return {p.name: Estimate(*found, p.unit) for p, found in zip(parameters, recovered(f, index), strict=True)}
 
@@ -124,7 +125,8 @@ def intervals(f: ModelFit, index: int) -> list[tuple[float, float]]:
     )
     if clear:
         return [(float(v - NORMAL_90 * e), float(v + NORMAL_90 * e)) for v, e in zip(values, errors, strict=True)]
-    return [_profile(f, index, k, errors[k]) for k in range(len(parameters))]
+    each = zip(parameters, errors, strict=True)
+    return [(_end(f, index, k, p.low, e), _end(f, index, k, p.high, e)) for k, (p, e) in enumerate(each)]
 
 
 def standard_errors(f: ModelFit, index: int) -> list[float]:
@@ -141,11 +143,6 @@ def informed_share(noise: Noise) -> float:
     (tail + 2) / (tail + 4) (Lange, Little and Taylor, JASA 84, 881, 1989, appendix B).
     """
     return (noise.tail + 2.0) / (noise.tail + 4.0)
-
-
-def _profile(f: ModelFit, index: int, k: int, error: float) -> tuple[float, float]:
-    p = f.acting[index].mechanism.parameters[k]
-    return _end(f, index, k, p.low, error), _end(f, index, k, p.high, error)
 
 
 def _end(f: ModelFit, index: int, k: int, bound: float, error: float) -> float:
@@ -170,16 +167,13 @@ def _end(f: ModelFit, index: int, k: int, bound: float, error: float) -> float:
 def _score_at(f: ModelFit, index: int, k: int, value: float) -> float:
     """Log likelihood with one parameter held at a value and everything but the noise fitted anew."""
     acting, values = list(f.acting), [v.copy() for v in f.values]
-    acting[index] = replace(acting[index], mechanism=_held(acting[index].mechanism, k, value))
+    parameters = list(acting[index].mechanism.parameters)
+    parameters[k] = replace(parameters[k], low=value, high=value)
+    held = replace(acting[index].mechanism, parameters=tuple(parameters))
+    acting[index] = replace(acting[index], mechanism=held)
     values[index][k] = value
     begin = replace(f, acting=tuple(acting), values=tuple(values))
     return fit(f.setup, acting, start=begin, noise=f.noise, iterations=12).score
-
-
-def _held(mechanism: Mechanism, k: int, value: float) -> Mechanism:
-    parameters = list(mechanism.parameters)
-    parameters[k] = replace(parameters[k], low=value, high=value)
-    return replace(mechanism, parameters=tuple(parameters))
 
 
 WITHIN = 1.5  # times the stated error of the model: the range for which docs/blind.md counts false alarms
@@ -213,22 +207,8 @@ def pattern_excess(f: ModelFit) -> PatternExcess | None:
         for name in np.unique(sample)
         if np.any(mean := 100.0 * np.expm1(correction[sample == name].mean(axis=0)))
     }
-    return PatternExcess(f.noise.pattern, _one_sided(ratio), percent)
-
-
-def _one_sided(ratio: float) -> float:
-    from scipy.stats import chi2
-
-    return max(0.5 * float(chi2.sf(max(ratio, 0.0), 1)), 1e-12)
-
-
-@dataclass(frozen=True)
-class Percent:
-    """100 (measured / model - 1) with its 90 % interval."""
-
-    value: float
-    low: float
-    high: float
+    p = max(0.5 * float(chi2.sf(max(ratio, 0.0), 1)), 1e-12)
+    return PatternExcess(f.noise.pattern, p, percent)
 
 
 @dataclass(frozen=True)
@@ -240,8 +220,8 @@ class PatternCorrection:
 
     sample: str
     regime: str
-    mean: Percent
-    at_load: dict[float, Percent]
+    mean: Estimate
+    at_load: dict[float, Estimate]
     p: float
 
 
@@ -249,52 +229,142 @@ def pattern_corrections(f: ModelFit) -> list[PatternCorrection]:
     """The corrections of all patterned samples, static before sliding; none where no sample is patterned.
 
     The estimates are shrunk towards the model by as much as the campaign itself suggests: the size of the pattern error
-    is learnt from all samples together, and the estimates are averaged over how large it may be.
+    is learnt from all samples together, and the estimates are averaged over how large it may be. Of the loads, the
+    lowest, the middle and the highest are given.
     """
     s = f.setup
     patterns = np.flatnonzero(s.group[s.random_effects.of_specimens :] == PATTERN)
     if not len(patterns):
         return []
-    effects, spread = _averaged_pattern_correction(f, patterns)
+    weight, fits = over_pattern_error(f)
+    each = np.array([s.random_effects.parts(g.effects)[1][patterns] for g in fits])
+    effects = weight @ each
+    apart = np.einsum("i,ip,iq->pq", weight, each - effects, each - effects)
+    here = f.linear.columns.parameters + patterns
+    within = [g.inverse.border[0][np.ix_(here, here)] / informed_share(g.noise) for g in fits]
+    spread = np.tensordot(weight, np.array(within), axes=1) + apart
+
+    def estimate(row: FloatArray) -> tuple[float, float]:
+        """Value and standard error of a combination of random effects."""
+        return float(row @ effects), float(np.sqrt(row @ spread @ row)) + 1e-12
+
+    def in_percent(value: float, sd: float) -> Estimate:
+        low, middle, high = (100.0 * float(np.expm1(value + k * NORMAL_90 * sd)) for k in (-1, 0, 1))
+        return Estimate(middle, low, high, "%")
+
     columns = s.random_effects.shared[:, :, patterns]
     sample, load = s.observations.conditions.sample, s.observations.conditions.normal_load_N
     there = [str(name) for name in np.unique(sample) if np.any(columns[sample == name])]
-    found = []
+    corrections = []
     for name in there:
+        loads = load[sample == name]
+        order = np.argsort(loads, kind="stable")
+        three = dict.fromkeys(int(order[k]) for k in (0, len(order) // 2, len(order) - 1))
         for k, regime in enumerate(REGIMES):
             rows = columns[sample == name, k]
-            mean, sd = _estimate(rows.mean(axis=0), effects, spread)
+            mean, sd = estimate(rows.mean(axis=0))
             chance = min(2.0 * float(norm.sf(abs(mean) / sd)) * 2 * len(there), 1.0)
-            at = {
-                float(f"{load[sample == name][i]:.4g}"): _percent(*_estimate(rows[i], effects, spread))
-                for i in _three(load[sample == name])
-            }
-            found.append(PatternCorrection(name, regime, _percent(mean, sd), at, chance))
-    return found
+            at = {float(f"{loads[i]:.4g}"): in_percent(*estimate(rows[i])) for i in three}
+            corrections.append(PatternCorrection(name, regime, in_percent(mean, sd), at, chance))
+    return corrections
 
 
-def _averaged_pattern_correction(f: ModelFit, patterns: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
-    """Shared effects and their covariance over the sizes that the pattern error may have."""
-    weight, fits = over_pattern_error(f)
-    effects = np.array([f.setup.random_effects.parts(g.effects)[1][patterns] for g in fits])
-    mean = weight @ effects
-    apart = np.einsum("i,ip,iq->pq", weight, effects - mean, effects - mean)
-    here = f.linear.columns.parameters + patterns
-    within = [g.inverse.border[0][np.ix_(here, here)] / informed_share(g.noise) for g in fits]
-    return mean, np.tensordot(weight, np.array(within), axes=1) + apart
+def gain(before: ModelFit, after: ModelFit, rng: np.random.Generator) -> Gain | None:
+    """What ``after`` gains over ``before`` on whole samples, specimens or loads left out.
+
+    Both are fitted anew without the held-out tests, noise included. A mechanism whose choice cannot be learned
+    from other specimens (a wrong label, a wrong pattern) has whole loads left out; otherwise whole samples are
+    left out where there are at least four, else whole specimens. Of tests that ``after`` can say nothing about, because
+    it acts on none of the others, it says what ``before`` does.
+    """
+    s = after.setup
+    kind, labels = _folds(s, after.acting)
+    if len(np.unique(labels)) < 2:
+        return None
+    scores = np.zeros((s.observations.n, 2))
+    errors = np.zeros((s.observations.n, 2, 2))
+    for label in np.unique(labels):
+        out = labels == label
+        without = _held_out(before, out)
+        if without is None:
+            continue
+        for k, found in enumerate((without, _held_out(after, out) or without)):
+            scores[out, k], errors[out, k] = found
+    difference = scores[:, 1] - scores[:, 0]
+    rmse_before, rmse_after = (rms_percent(errors[:, k]) for k in range(2))
+    return Gain(
+        held_out=kind,
+        log_score_baseline=float(scores[:, 0].mean()),
+        log_score_extended=float(scores[:, 1].mean()),
+        difference=float(difference.mean()),
+        se=_specimen_bootstrap(difference, s.observations.conditions.specimen, rng),
+        rmse_percent_before=rmse_before,
+        rmse_percent_after=rmse_after,
+    )
 
 
-def _estimate(row: FloatArray, effects: FloatArray, spread: FloatArray) -> tuple[float, float]:
-    """Value and standard error of a combination of random effects."""
-    return float(row @ effects), float(np.sqrt(row @ spread @ row)) + 1e-12
+def _folds(s: Setup, acting: Sequence[Acting]) -> tuple[str, np.ndarray]:
+    c = s.observations.conditions
+    if any(a.mechanism.choosing.held_out == "loads" for a in acting):
+        return "loads", np.round(c.normal_load_N, 4).astype(str)
+    if len(np.unique(c.sample)) >= 4:
+        return "samples", c.sample
+    names, code = np.unique(c.specimen, return_inverse=True)
+    return "specimens", names[code % MOST_FOLDS]
 
 
-def _percent(value: float, sd: float) -> Percent:
-    low, middle, high = (100.0 * float(np.expm1(value + k * NORMAL_90 * sd)) for k in (-1, 0, 1))
-    return Percent(middle, low, high)
+def _held_out(model: ModelFit, out: np.ndarray) -> tuple[FloatArray, FloatArray] | None:
+    """Log density per held-out test and its error in ln T (m, 2), the model fitted to all other tests; None where these
+    leave T unknown."""
+    trained = fit_without(model, out)
+    s = model.setup
+    target, x = Target(s, trained.acting), np.concatenate([trained.law, *trained.values])
+    residual = target.residual(x)
+    error = (residual - s.random_effects.on_tests(trained.effects))[out]
+    jacobian = target.jacobian(x, s.observations.log_force - residual)
+    columns = model_columns(jacobian[out], s.random_effects.take(out))
+    spread = trained.inverse.spread(columns)[0][[[0, 1], [1, 2]]].transpose(2, 0, 1)
+    if np.abs(spread).max() > UNKNOWN:
+        return None
+    reading = s.observations.reading[out][:, :, None] ** 2 * np.eye(2)
+    scale = spread + trained.noise.per_test(s)[out] + reading
+    distance = np.einsum("ni,nij,nj->n", error, np.linalg.inv(scale), error)
+    tail = trained.noise.tail
+    constant = gammaln(tail / 2 + 1) - gammaln(tail / 2) - np.log(np.pi * tail)
+    density = constant - 0.5 * np.linalg.slogdet(scale)[1] - (tail / 2 + 1) * np.log1p(distance / tail)
+    return density, error
 
 
-def _three(load: FloatArray) -> list[int]:
-    """Tests at the lowest, the middle and the highest load."""
-    order = np.argsort(load, kind="stable")
-    return list(dict.fromkeys(int(order[k]) for k in (0, len(order) // 2, len(order) - 1)))
+def gain_of_zero(o: Observations, drifting: bool, rng: np.random.Generator) -> Gain | None:
+    """The same for the force before contact: a load cell at zero against one with an offset, or with a drift.
+
+    Whole specimens are left out; RMSE is in percent of the median sliding force.
+    """
+    hours = o.conditions.elapsed_s / 3600.0
+    usable = np.isfinite(o.zero_N) & (np.isfinite(hours) if drifting else True)
+    zero, hours, specimen = o.zero_N[usable], hours[usable], o.conditions.specimen[usable]
+    if len(np.unique(specimen)) < 2:
+        return None
+    scores, errors = np.zeros((len(zero), 2)), np.zeros((len(zero), 2))
+    for name in np.unique(specimen):
+        out = specimen == name
+        line = np.polyfit(hours[~out], zero[~out], 1) if drifting else np.array([np.median(zero[~out])])
+        for k, polynomial in enumerate((np.zeros(1), line)):
+            spread = max(float(np.sqrt(np.mean((zero - np.polyval(polynomial, hours))[~out] ** 2))), 1e-9)
+            errors[out, k] = zero[out] - np.polyval(polynomial, hours[out])
+            scores[out, k] = -np.log(spread * np.sqrt(2 * np.pi)) - 0.5 * (errors[out, k] / spread) ** 2
+    difference = scores[:, 1] - scores[:, 0]
+    rmse = 100 * np.sqrt(np.mean(errors**2, axis=0)) / float(np.exp(np.median(o.log_force[:, 1])))
+    return Gain(
+        "specimens", float(scores[:, 0].mean()), float(scores[:, 1].mean()), float(difference.mean()),
+        _specimen_bootstrap(difference, specimen, rng), float(rmse[0]), float(rmse[1]),
+    )  # fmt: skip
+
+
+def _specimen_bootstrap(difference: FloatArray, specimen: np.ndarray, rng: np.random.Generator) -> float:
+    """Standard error of the mean difference, whole specimens resampled."""
+    names, code = np.unique(specimen, return_inverse=True)
+    total = np.bincount(code, difference)
+    count = np.bincount(code).astype(float)
+    drawn = rng.integers(0, len(names), (RESAMPLES, len(names)))
+    return float(np.std(total[drawn].sum(axis=1) / count[drawn].sum(axis=1)))
