@@ -20,6 +20,7 @@ from tribo.diagnostics.model import (
     Acting,
     Setup,
     Target,
+    added,
     candidates,
     effect_of,
     predict,
@@ -238,7 +239,7 @@ def test_changes_at_the_start_are_those_of_every_candidate_and_of_every_size_a_f
     found = start_changes(s, LAW)
     before = predict(s, LAW, (), ())
     for k, a in enumerate(found.acting):
-        assert found.columns[:, :, k] == pytest.approx(predict(s, LAW, (a,), (a.start,)) - before)
+        assert added(found.courses[k])[:, :, 0] == pytest.approx(predict(s, LAW, (a,), (a.start,)) - before)
     assert set(found.every_start) == {a.name for a in found.acting if not a.choice}
     tilt = MECHANISMS["tilt"]
     sizes = [tilt.amplitude.start, *tilt.amplitude.tries]
