@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tribo.site.history import CampaignRow, Law, history
+from tribo.site.history import CampaignRow, FittedParameter, history
 from tribo.site.index_page import (
     _range,
     change_points,
@@ -32,7 +32,7 @@ def campaigns(jump: float = 0.0) -> list[CampaignRow]:
     rows = []
     for k in range(12):
         value = 4.8 + rng.normal(0, 0.05) + (jump if k >= 7 else 0.0)
-        laws = (Law("F", "static", "mu", value, value - 0.1, value + 0.1),)
+        laws = (FittedParameter("F", "static", "mu", value, value - 0.1, value + 0.1),)
         rows.append(CampaignRow(f"no {k}", "A & B <x>", "done", (), f"2026-{k + 1:02d}-01", has_report=True, laws=laws))
     return rows
 
@@ -82,7 +82,7 @@ def test_the_page_needs_nothing_from_anywhere_and_is_well_formed() -> None:
 
 def test_every_point_lies_inside_its_panel_whatever_its_interval() -> None:
     rows = campaigns(1.0)
-    wide = Law("F", "static", "mu", 5.0, -1e6, float("nan"))
+    wide = FittedParameter("F", "static", "mu", 5.0, -1e6, float("nan"))
     rows[3] = CampaignRow("wide", "wide", "done", laws=(wide,))
     for y in re.findall(r'(?:cy|y1|y2)="([\d.-]+)"', rendered(rows)):
         assert 0 <= float(y) <= 136
@@ -96,7 +96,8 @@ def test_the_numbers_of_the_figures_stand_in_the_table() -> None:
 
 def test_names_with_quotes_commas_and_line_breaks_come_back_from_the_table() -> None:
     names = ('6" wafer, "old"', "a\nb", "plain")
-    rows = [CampaignRow(name, "", "done", laws=(Law(f"{name},F", "static", "mu", 1.0, 0.9, 1.1),)) for name in names]
+    fits = {name: FittedParameter(f"{name},F", "static", "mu", 1.0, 0.9, 1.1) for name in names}
+    rows = [CampaignRow(name, "", "done", laws=(fits[name],)) for name in names]
     back = list(csv.DictReader(io.StringIO(trend_csv(rows), newline="")))
     assert [(row["campaign"], row["sample"]) for row in back] == [(name, f"{name},F") for name in names]
 
@@ -174,13 +175,13 @@ def test_the_page_is_written_only_where_it_differs(tmp_path: Path) -> None:
 
 
 def test_intervals_of_campaigns_that_agree_are_shown_whole() -> None:
-    laws = [Law("F", "static", "mu", value, value - 0.4, value + 0.4) for value in (2.2361, 2.2362, 2.2363)]
+    laws = [FittedParameter("F", "static", "mu", value, value - 0.4, value + 0.4) for value in (2.2361, 2.2362, 2.2363)]
     assert _range(laws) == pytest.approx((1.8361, 2.6363))
 
 
 def test_one_absurd_interval_does_not_squeeze_the_others() -> None:
-    laws = [Law("F", "static", "mu", 2.0 + k / 10, 1.9, 2.4) for k in range(5)]
-    assert _range([*laws, Law("F", "static", "mu", 2.1, -500.0, 500.0)]) == pytest.approx((1.9, 2.4))
+    laws = [FittedParameter("F", "static", "mu", 2.0 + k / 10, 1.9, 2.4) for k in range(5)]
+    assert _range([*laws, FittedParameter("F", "static", "mu", 2.1, -500.0, 500.0)]) == pytest.approx((1.9, 2.4))
 
 
 @pytest.mark.parametrize(("low", "high"), [(2.2351, 2.2363), (0.0, 140.0), (-0.02, 0.03), (4.7, 9.1)])

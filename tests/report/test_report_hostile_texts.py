@@ -22,7 +22,7 @@ from tribo.report import Provenance
 from tribo.report.drawings import Drawn, svg_text
 from tribo.report.page import html
 from tribo.report.pdf import pdf
-from tribo.site.history import CampaignRow, Law
+from tribo.site.history import CampaignRow, FittedParameter
 from tribo.site.index_page import change_points, page as index_page
 
 TEXTS = (
@@ -159,7 +159,7 @@ def test_the_data_in_the_report_page_are_read_back_as_they_were(hostile: Study) 
 def index_of(texts: Sequence[str]) -> str:
     rows = []
     for k, text in enumerate(texts):
-        laws = tuple(Law(f"{t} sample", "static", "mu", 4.8 + k / 9, 4.7, 5.9) for t in texts)
+        laws = tuple(FittedParameter(f"{t} sample", "static", "mu", 4.8 + k / 9, 4.7, 5.9) for t in texts)
         rows.append(CampaignRow(f"{text} {k}", f"{text} title", "unusable", (text, text), "2026-01-01",
                                 has_report=True, laws=laws, verdict=text, verdict_text=text))  # fmt: skip
     return index_page(rows, change_points({}))

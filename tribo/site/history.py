@@ -1,7 +1,4 @@
-"""Summary of all campaigns of a site: one row per campaign, and the laws of each sample over time.
-
-The laws found in the campaigns of a site, and which of them held in later ones.
-"""
+"""All campaigns of a site: one row each with its fitted parameters, and the laws found and which held in later ones."""
 
 from __future__ import annotations
 
@@ -27,7 +24,7 @@ PARAMETERS = {
 
 
 @dataclass(frozen=True)
-class Law:
+class FittedParameter:
     """One fitted parameter of one sample in one regime, with its 95 % interval; tau0 in kPa."""
 
     sample: str
@@ -36,6 +33,11 @@ class Law:
     value: float
     low: float
     high: float
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """Sample, regime and parameter."""
+        return self.sample, self.regime, self.parameter
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class CampaignRow:
     counts: str = ""
     next_test: str = ""
     has_report: bool = False
-    laws: tuple[Law, ...] = ()
+    laws: tuple[FittedParameter, ...] = ()
     measured_s: float = math.inf  # the same moment in seconds since 1970
 
 
@@ -163,14 +165,14 @@ def _table(path: Path) -> list[dict[str, str]]:
         return []
 
 
-def _laws(fits: Sequence[Mapping[str, str]]) -> list[Law]:
+def _laws(fits: Sequence[Mapping[str, str]]) -> list[FittedParameter]:
     found = []
     for fit in fits:
         for parameter, columns in PARAMETERS.items():
             value, low, high, fit_low, fit_high = (_number(fit.get(column, "")) for column in columns)
             low, high = (low, high) if math.isfinite(low) else (fit_low, fit_high)
             if {"sample", "regime"} <= set(fit) and math.isfinite(value):
-                found.append(Law(fit["sample"], fit["regime"], parameter, value, low, high))
+                found.append(FittedParameter(fit["sample"], fit["regime"], parameter, value, low, high))
     return found
 
 

@@ -1,6 +1,6 @@
-"""What the index page needs to compare any two campaigns of a site in the browser, without a server.
+"""index.html of a site: every campaign with its verdict and state, mu and tau0 of each sample over time, two compared.
 
-mu and tau0 of each sample from campaign to campaign, and where they changed.
+``python -m tribo.site.index_page SITE MARKER`` writes it, and MARKER for the workflow (``-`` for none).
 
 A change point splits the campaigns of a series, in the order in which they were measured, in two runs of different
 mean. Each split is judged by the two-sample t test. The smallest p over all splits and all series accounts for the
@@ -8,10 +8,6 @@ number of comparisons. It is compared with the smallest p under random orders of
 all series, since a campaign moves all of them at once): the single-step method of Westfall and Young (1993) with
 permutations, which needs neither normal scatter nor independent series. Each part found this way is searched for
 further changes.
-
-index.html of a site: every campaign with its verdict and state, and mu and tau0 of each sample over time.
-
-``python -m tribo.site.index_page SITE MARKER`` writes it, and MARKER for the workflow (``-`` for none).
 """
 
 from __future__ import annotations
@@ -36,7 +32,7 @@ from tribo import __version__
 from tribo.errors import unexpected
 from tribo.files import bytes_of
 from tribo.records import FloatArray
-from tribo.site.history import CampaignRow, Law, answers_of, history, laws_csv, laws_in_words
+from tribo.site.history import CampaignRow, FittedParameter, answers_of, history, laws_csv, laws_in_words
 from tribo.site.steps import INDEX, Step, note, read_record
 from tribo.user_text import for_spreadsheet
 
@@ -194,30 +190,6 @@ WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 300.0, 136.0, 44.0, 8.0, 16.0, 18.0
 Key = tuple[str, str, str]  # sample, regime, parameter
 
 
-@dataclass(frozen=True)
-class Point:
-    """One campaign in a panel, in its coordinates; ``text`` is what hovering says."""
-
-    x: float
-    y: float
-    y_low: float
-    y_high: float
-    text: str
-    link: str
-
-
-@dataclass(frozen=True)
-class Panel:
-    """One parameter of one sample over the campaigns: tick labels are (y, text), changes (x, text)."""
-
-    title: str
-    label: str
-    points: tuple[Point, ...]
-    ticks: tuple[tuple[float, str], ...]
-    dates: tuple[str, str]
-    changes: tuple[tuple[float, str], ...]
-
-
 def write_index(site: Path) -> str:
     """Write SITE/current/index.html, trend.csv and laws.csv where they differ from what is there; their SHA-256."""
     from tribo.files import write_text
@@ -241,7 +213,7 @@ def write_index(site: Path) -> str:
 
 def series(rows: Sequence[CampaignRow]) -> dict[Key, list[float]]:
     """Values of each parameter of each sample, one a campaign, NaN where it has none."""
-    laws = [{(law.sample, law.regime, law.parameter): law.value for law in row.laws} for row in rows]
+    laws = [{law.key: law.value for law in row.laws} for row in rows]
     keys = sorted({key for found in laws for key in found}, key=lambda k: (k[0], k[1] != "static", k[2]))
     return {key: [found.get(key, math.nan) for found in laws] for key in keys}
 
@@ -280,7 +252,7 @@ def page(
     from tribo.report.shell import STYLE, WORKING, environment, script_json, style_and_script
 
     templates = environment("tribo.site")
-    by_sample: dict[str, list[Panel]] = {}
+    by_sample: dict[str, list[dict[str, Any]]] = {}
     for key in series(rows):
         by_sample.setdefault(key[0], []).append(panel(key, rows, [c for c in changes if key_of(c.series) == key]))
     longest = max((sum(map(math.isfinite, v)) for v in series(rows).values()), default=0)
@@ -299,13 +271,16 @@ def report_link(name: str) -> str:
     return f"{quote(name)}/report.html"
 
 
-def panel(key: Key, rows: Sequence[CampaignRow], changes: Sequence[Change]) -> Panel:
-    """One parameter of one sample, laid out in WIDTH by HEIGHT."""
+def panel(key: Key, rows: Sequence[CampaignRow], changes: Sequence[Change]) -> dict[str, Any]:
+    """One parameter of one sample over the campaigns, laid out in WIDTH by HEIGHT, as the template takes it.
+
+    Points have a place, the ends of their interval, a text and a link; ticks are (y, text), changes (x, text).
+    """
     sample, regime, parameter = key
     symbol, unit = SYMBOLS[parameter]
     fitted = [k for k, row in enumerate(rows) if row.laws]
     place = {k: at for at, k in enumerate(fitted)}  # campaigns without a fit take no room
-    placed = [(k, row, law) for k, row in enumerate(rows) for law in row.laws if _key(law) == key]
+    placed = [(k, row, law) for k, row in enumerate(rows) for law in row.laws if law.key == key]
     low, high = _range([law for _, _, law in placed])
     step = (WIDTH - LEFT - RIGHT) / len(fitted)
 
@@ -316,29 +291,27 @@ def panel(key: Key, rows: Sequence[CampaignRow], changes: Sequence[Change]) -> P
         share = min(max((value - low) / (high - low), 0.0), 1.0)
         return round(HEIGHT - BOTTOM - share * (HEIGHT - TOP - BOTTOM), 1)
 
-    def end(value: float, law: Law) -> float:
+    def end(value: float, law: FittedParameter) -> float:
         return y(value if math.isfinite(value) else law.value)
 
-    points = tuple(
-        Point(x(k), y(law.value), end(law.low, law), end(law.high, law), _hover(row, law),
-              report_link(row.name) if row.has_report else "")
+    points = [
+        {
+            "x": x(k), "y": y(law.value), "y_low": end(law.low, law), "y_high": end(law.high, law),
+            "text": _hover(row, law), "link": report_link(row.name) if row.has_report else "",
+        }
         for k, row, law in placed
-    )  # fmt: skip
-    return Panel(
-        title=f"{regime} {symbol}{f' in {unit}' if unit else ''}",
-        label=f"{regime} {symbol} of {sample} in {len(points)} campaigns: " + "; ".join(p.text for p in points),
-        points=points,
-        ticks=tuple((y(v), text) for v, text in ticks(low, high)),
-        dates=(rows[fitted[0]].measured, rows[fitted[-1]].measured) if len(fitted) > 1 else ("", ""),
-        changes=tuple((x(c.at, -0.5), f"{_short(c.before)} to {_short(c.after)}") for c in changes),
-    )
+    ]  # fmt: skip
+    return {
+        "title": f"{regime} {symbol}{f' in {unit}' if unit else ''}",
+        "label": f"{regime} {symbol} of {sample} in {len(points)} campaigns: " + "; ".join(p["text"] for p in points),
+        "points": points,
+        "ticks": [(y(v), text) for v, text in ticks(low, high)],
+        "dates": (rows[fitted[0]].measured, rows[fitted[-1]].measured) if len(fitted) > 1 else ("", ""),
+        "changes": [(x(c.at, -0.5), f"{_short(c.before)} to {_short(c.after)}") for c in changes],
+    }
 
 
-def _key(law: Law) -> Key:
-    return law.sample, law.regime, law.parameter
-
-
-def _range(laws: Sequence[Law]) -> tuple[float, float]:
+def _range(laws: Sequence[FittedParameter]) -> tuple[float, float]:
     """Lowest and highest number shown: all values, and every interval but those far wider than most."""
     values = [law.value for law in laws]
     arms = [abs(e - law.value) for law in laws for e in (law.low, law.high) if math.isfinite(e)]
@@ -354,7 +327,7 @@ def ticks(low: float, high: float) -> tuple[tuple[float, str], ...]:
     return tuple((v, f"{v:.{decimals}f}".replace("-", "−")) for v in (low, (low + high) / 2, high))
 
 
-def _hover(row: CampaignRow, law: Law) -> str:
+def _hover(row: CampaignRow, law: FittedParameter) -> str:
     unit = f" {SYMBOLS[law.parameter][1]}".rstrip()
     interval = f" ({_short(law.low)} to {_short(law.high)})" if math.isfinite(law.low) else ""
     return f"{row.name}: {_short(law.value)}{interval}{unit}"

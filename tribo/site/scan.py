@@ -1,7 +1,4 @@
-"""The campaigns in a folder, by the contents of their files, and those still being copied.
-
-Dated copies of a site: the last so many are kept, and ``latest`` points to the newest.
-"""
+"""Folders of a build: the campaigns dropped, by the contents of their files, and the dated copies of the site."""
 
 from __future__ import annotations
 
