@@ -23,15 +23,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from interval_coverage import AREA_M2, STANDARD, Design, campaign, laws
 
 from tribo.fitting import fit_samples, uncertainty_budget
-from tribo.fitting.budget import DEFAULTS, PRESSURE_PA, Budget
+from tribo.fitting.budget import DEFAULTS, PRESSURE_PA, PRIOR_DOF, Budget, partly_pooled
 from tribo.fitting.linear import sample_rows
-from tribo.fitting.partial_pooling import PRIOR_DOF, partly_pooled
 from tribo.records import STANDARD_GRAVITY
 
 NUMBERS = ("mu", "tau0_kPa", "T_N")
 LUCKY = 0.1
 INSTRUMENTS: dict[str, dict[str, float]] = {
-    "defaults": {name: default.value for name, default in DEFAULTS.items()} | {"load_cell_u_N": 0.005},
+    "defaults": {name: value for name, (value, _) in DEFAULTS.items()} | {"load_cell_u_N": 0.005},
     "precise": {
         "load_cell_u_percent": 0.1, "load_cell_u_N": 0.001, "mass_u_g": 0.003, "normal_load_u_percent": 0.1,
         "area_u_percent": 0.3, "wire_angle_u_deg": 0.05,

@@ -1,7 +1,4 @@
-"""The record of a friction law.
-
-The friction laws tribo fits. A new law: its two functions, a line in LAWS, an exact-value test.
-"""
+"""The friction laws tribo fits, in one table. A new law: its two functions, a line in LAWS, an exact-value test."""
 
 from __future__ import annotations
 
@@ -85,6 +82,19 @@ def amontons_gradient(normal_load_N: Any, mu: Any) -> tuple[Any]:
     return (normal_load_N,)
 
 
+def coulomb_intercept(normal_load_N: Any, mu: Any, T0_N: Any) -> Any:
+    """T = mu N + T0. N and T0 in newton, mu dimensionless; regular everywhere.
+
+    The law of :func:`coulomb_adhesion` where the nominal area is not known: T0 stands for tau0 A.
+    """
+    return mu * normal_load_N + T0_N
+
+
+def coulomb_intercept_gradient(normal_load_N: Any, mu: Any, T0_N: Any) -> tuple[Any, Any]:
+    """(dT/dmu, dT/dT0) = (N, 1), in newton and 1."""
+    return normal_load_N, 1.0
+
+
 def coulomb_adhesion(normal_load_N: Any, nominal_area_m2: Any, mu: Any, tau0_Pa: Any) -> Any:
     """T = mu N + tau0 A. N in newton, A nominal area in m2, mu dimensionless, tau0 in pascal.
 
@@ -119,58 +129,11 @@ def three_term_gradient(
     return normal_load_N, area_fraction * nominal_area_m2, nominal_area_m2
 
 
-def pressure_power(
-    normal_load_N: Any, nominal_area_m2: Any, reference_pressure_Pa: Any, mu_ref: Any, n: Any
-) -> Any:
-    """T = mu_ref (p/p_ref)^-n N, p = N/A. N in newton, A in m2, p_ref in pascal, mu_ref and n dimensionless.
-
-    n = 0 is Amontons' law, n = 1/3 a single Hertzian contact (T as N^(2/3)), n = 1 a load-independent T.
-    Singular case: N = 0, where T = 0 for n < 1; the function returns 0 there. N must not be negative.
-    Source: Bowden and Tabor, The Friction and Lubrication of Solids (1950), elastic contacts.
-    """
-    load = np.asarray(normal_load_N, float)
-    ratio = np.where(load > 0, load, 1.0) / (nominal_area_m2 * reference_pressure_Pa)
-    return mu_ref * np.where(load > 0, load * ratio ** (-n), 0.0)
-
-
-def pressure_power_gradient(
-    normal_load_N: Any, nominal_area_m2: Any, reference_pressure_Pa: Any, mu_ref: Any, n: Any
-) -> tuple[Any, Any]:
-    """(dT/dmu_ref, dT/dn) = (T/mu_ref, -T ln(p/p_ref)), in newton; both 0 at N = 0, their limit for n < 1."""
-    load = np.asarray(normal_load_N, float)
-    ratio = np.where(load > 0, load, 1.0) / (nominal_area_m2 * reference_pressure_Pa)
-    unit_force = pressure_power(normal_load_N, nominal_area_m2, reference_pressure_Pa, 1.0, n)
-    return unit_force, -mu_ref * unit_force * np.log(ratio)
-
-
-def pressure_power_adhesion(
-    normal_load_N: Any, nominal_area_m2: Any, reference_pressure_Pa: Any, mu_ref: Any, n: Any, tau0_Pa: Any
-) -> Any:
-    """T = mu_ref (p/p_ref)^-n N + tau0 A: the power law with the adhesion term of Coulomb's.
-
-    Units as in :func:`pressure_power`, tau0 in pascal. Singular case: N = 0, where T = tau0 A for n < 1; at
-    n = 1 the two terms have the same form and only their sum can be determined.
-    """
-    pressed = pressure_power(normal_load_N, nominal_area_m2, reference_pressure_Pa, mu_ref, n)
-    return pressed + tau0_Pa * nominal_area_m2
-
-
-def pressure_power_adhesion_gradient(
-    normal_load_N: Any, nominal_area_m2: Any, reference_pressure_Pa: Any, mu_ref: Any, n: Any, tau0_Pa: Any
-) -> tuple[Any, Any, Any]:
-    """(dT/dmu_ref, dT/dn, dT/dtau0): those of the power law, and A."""
-    by_mu, by_n = pressure_power_gradient(normal_load_N, nominal_area_m2, reference_pressure_Pa, mu_ref, n)
-    return by_mu, by_n, nominal_area_m2
-
-
 _LOAD = Variable("normal_load_N", "N")
 _AREA = Variable("nominal_area_m2", "m^2")
 _AREA_FRACTION = Variable("area_fraction", "")
-_REFERENCE_PRESSURE = Variable("reference_pressure_Pa", "Pa")
 _MU = Parameter("mu", "μ", "", "friction coefficient: slope of T against N", low=0.0)
 _TAU0 = Parameter("tau0_Pa", "τ₀", "Pa", "adhesion per nominal area: T/A at no load, of either sign")
-_MU_REF = Parameter("mu_ref", "μ_ref", "", "T/N at the reference pressure", low=0.0)
-_EXPONENT = Parameter("n", "n", "", "exponent by which T/N falls with pressure", low=-1.0, high=1.0)
 
 LAWS: dict[str, Law] = {
     law.name: law
@@ -178,6 +141,10 @@ LAWS: dict[str, Law] = {
         Law(
             "amontons", "T = μ N", amontons, amontons_gradient,
             (_LOAD,), (_MU,), True, "Amontons, Mémoires de l'Académie royale (1699)",
+        ),
+        Law(
+            "coulomb_intercept", "T = μ N + T₀", coulomb_intercept, coulomb_intercept_gradient,
+            (_LOAD,), (_MU, Parameter("T0_N", "T₀", "N", "force at no load, of either sign")), True, BERARDO,
         ),
         Law(
             "coulomb_adhesion", "T = μ N + τ₀ A", coulomb_adhesion, coulomb_adhesion_gradient,
@@ -193,16 +160,16 @@ LAWS: dict[str, Law] = {
             ),
             True, BERARDO,
         ),
-        Law(
-            "pressure_power", "T = μ_ref (p/p_ref)^-n N", pressure_power, pressure_power_gradient,
-            (_LOAD, _AREA, _REFERENCE_PRESSURE), (_MU_REF, _EXPONENT), False,
-            "Bowden and Tabor, The Friction and Lubrication of Solids (1950)",
-        ),
-        Law(
-            "pressure_power_adhesion", "T = μ_ref (p/p_ref)^-n N + τ₀ A",
-            pressure_power_adhesion, pressure_power_adhesion_gradient,
-            (_LOAD, _AREA, _REFERENCE_PRESSURE), (_MU_REF, _EXPONENT, _TAU0), False,
-            "Bowden and Tabor (1950) with the adhesion term of " + BERARDO,
-        ),
     )
 }  # fmt: skip
+
+
+def law_over_load(nominal_area_m2: float | None) -> Law:
+    """T = mu N + tau0 A; T = mu N + T0 where no nominal area is known."""
+    return LAWS["coulomb_intercept" if nominal_area_m2 is None else "coulomb_adhesion"]
+
+
+def design_over_load(load_N: FloatArray, nominal_area_m2: float | None) -> FloatArray:
+    """Design matrix (n, 2) of :func:`law_over_load` at loads (n,)."""
+    law = law_over_load(nominal_area_m2)
+    return law.design_matrix(load_N) if nominal_area_m2 is None else law.design_matrix(load_N, nominal_area_m2)

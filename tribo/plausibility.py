@@ -136,8 +136,8 @@ class Slip:
     mass: float = 1.0
     area: float = 1.0
 
-    def corrected(self, numbers: Numbers, area_m2: float) -> Numbers:
-        """The numbers as they would be without the slip."""
+    def corrected(self, numbers: Numbers, area_m2: float | None) -> Numbers:
+        """The numbers as they would be without the slip; there is no tau0 without an area."""
         factors = {
             "mu": self.force / self.difference,
             "friction_ratio": self.force / self.load,
@@ -148,7 +148,7 @@ class Slip:
         }
         found = {q: {of: value * factors[q] for of, value in by.items()} for q, by in numbers.items()}
         for of, mu in numbers.get("mu", {}).items():  # the intercept moves where loads move by more than a factor
-            if of in found.get("tau0_kPa", {}):
+            if area_m2 is not None and of in found.get("tau0_kPa", {}):
                 found["tau0_kPa"][of] += factors["tau0_kPa"] * mu * self.offset_N / area_m2 * _KPA
         return found
 
@@ -283,7 +283,7 @@ def _measured(campaign: Campaign, ingested: Ingested | None, fits: Sequence[LawF
     if ingested is not None:
         found["friction_ratio"] = _ratios(ingested)
     if campaign.has_area:
-        found["area_mm2"] = {"the sample": campaign.nominal_area_m2 * _MM2}
+        found["area_mm2"] = {"the sample": campaign.area_m2 * _MM2}
         loads = [t.normal_load_N for t in campaign.tests if t.normal_load_N > 0]
         if loads and campaign.contact in ("", "sled"):
             found["pressure_kPa"] = {
@@ -360,7 +360,7 @@ def _wide_pitches(campaign: Campaign) -> Iterator[Doubt]:
     """Patterns of which the sample would hold hardly one cavity."""
     if not campaign.has_area:
         return
-    side_um = math.sqrt(campaign.nominal_area_m2) * _UM
+    side_um = math.sqrt(campaign.area_m2) * _UM
     most_um = side_um / FEWEST_CAVITIES_ACROSS
     pitches = {p.name: max(p.pitch_m) * _UM for p in campaign.samples.values() if p.pitch_m is not None}
     wide = [f"{pitch:.4g} um ({name})" for name, pitch in pitches.items() if pitch > most_um]

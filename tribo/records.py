@@ -1,11 +1,6 @@
-"""The frozen records of exports and of what is read from a pull, in SI units; names end in the unit.
+"""The frozen records passed between stages, in SI units; names end in the unit.
 
-The frozen records of fitted laws, simulated runs and their comparison, in SI units; names end in the unit.
-
-The frozen records passed between stages, in SI units; names end in the unit.
-
-Those of exports and pulls are in :mod:`tribo.records`, those of laws, runs and comparisons in
-:mod:`tribo.records`; all can be imported from here.
+In the order of the stages: exports and pulls; fitted laws, runs and their comparison; the campaign and its study.
 """
 
 from __future__ import annotations
@@ -19,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.display import displayed
-from tribo.errors import Problem
+from tribo.errors import CampaignError, FitError, Problem
 from tribo.zeroing import DEFAULT, ZeroChoice
 
 if TYPE_CHECKING:
@@ -160,16 +155,23 @@ class Pull:
 
 Regime = Literal["static", "sliding"]
 REGIMES: tuple[Regime, ...] = ("static", "sliding")
-NO_AREA_M2 = 1.0  # stands for a nominal area that is not known: tau0 A in newton is then tau0 itself
+PA_PER_KPA = 1e3
 
 
 @displayed(lambda fit: f"{fit.sample}, {fit.regime}: {fit.in_numbers()}")
 @dataclass(frozen=True)
 class LawFit:
-    """A friction law fitted to one sample in one regime, with the full covariance of its parameters.
+    """A friction law fitted to one sample in one regime, with the covariance of its parameters.
 
-    ``values`` and ``covariance`` follow ``parameters`` (for T = mu N + tau0 A: mu, tau0_Pa). ``dof`` are the
-    degrees of freedom of the t interval (specimens minus one where specimens were combined).
+    ``values`` and ``covariance`` follow ``parameters``: mu and tau0_Pa for T = mu N + tau0 A; mu and T0_N for
+    T = mu N + T0, where no nominal area is known (``nominal_area_m2`` is None).
+
+    The covariance of a fit that a study states is the combined one (GUM): ``type_a``, that of the mean over specimens
+    with ``dof`` degrees of freedom, plus what all pulls share (type B: gain, zero, load, area, angle), which counts as
+    known. ``largest`` holds, for each parameter and for T, the component with the largest share of the variance and
+    that share in percent. ``alone`` is then the fit by the tests of the sample alone (type A), without the scatter of
+    other samples and without the instrument: samples of one campaign are compared by it. A fit that is one by the tests
+    of the sample alone has neither.
     """
 
     sample: str
@@ -183,74 +185,201 @@ class LawFit:
     n_tests: int
     method: str
     chi2_red: float
-    nominal_area_m2: float
+    nominal_area_m2: float | None
     specimens: Mapping[str, FloatArray] = field(default_factory=dict)  # specimen -> its own values
     notes: tuple[str, ...] = ()
     bent: bool = False  # the load means deviate from a straight line beyond chance
+    type_a: FloatArray | None = None
+    largest: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    alone: LawFit | None = None
 
     @property
     def has_area(self) -> bool:
-        """Whether a nominal area is known; without one, tau0_Pa stands for T0 in newton."""
-        return self.nominal_area_m2 != NO_AREA_M2
+        """Whether the nominal area is known, and with it tau0."""
+        return self.nominal_area_m2 is not None
+
+    @property
+    def adhesion(self) -> str:
+        """The name of the adhesion term among the parameters: tau0_Pa, or T0_N where no area is known."""
+        return "tau0_Pa" if self.has_area else "T0_N"
 
     def value(self, parameter: str) -> float:
-        return float(self.values[self.parameters.index(parameter)])
+        """A parameter by its name."""
+        return float(self.values[self._place(parameter)])
 
     def standard_uncertainty(self, parameter: str) -> float:
-        k = self.parameters.index(parameter)
+        """Standard uncertainty (k = 1) of a parameter."""
+        k = self._place(parameter)
         return float(np.sqrt(self.covariance[k, k]))
+
+    def _place(self, parameter: str) -> int:
+        if parameter in self.parameters:
+            return self.parameters.index(parameter)
+        allowed = ", ".join(self.parameters)
+        what = f"the law of {self.sample}, {self.regime}, has no such parameter"
+        raise FitError(Problem("unknown_parameter", what, found=parameter, allowed=allowed))
+
+    @property
+    def mu(self) -> float:
+        """Friction coefficient: the slope of T over N."""
+        return self.value("mu")
+
+    @property
+    def mu_u(self) -> float:
+        """Standard uncertainty of mu."""
+        return self.standard_uncertainty("mu")
+
+    @property
+    def mu_type_a_u(self) -> float:
+        """Standard uncertainty of mu from the specimens and repeats of the sample alone."""
+        return self.by_itself.standard_uncertainty("mu")
+
+    @property
+    def tau0_Pa(self) -> float:
+        """Adhesion per nominal area."""
+        return self.value("tau0_Pa")
+
+    @property
+    def tau0_u_Pa(self) -> float:
+        """Standard uncertainty of tau0."""
+        return self.standard_uncertainty("tau0_Pa")
+
+    @property
+    def tau0_type_a_u_Pa(self) -> float:
+        """Standard uncertainty of tau0 from the specimens and repeats of the sample alone."""
+        return self.by_itself.standard_uncertainty("tau0_Pa")
+
+    @property
+    def T0_N(self) -> float:
+        """Force at no load, tau0 A; without a nominal area the parameter itself."""
+        return self.value(self.adhesion) * self._per_adhesion
+
+    @property
+    def T0_u_N(self) -> float:
+        """Standard uncertainty of T0, with the area as stated."""
+        return self.standard_uncertainty(self.adhesion) * self._per_adhesion
+
+    @property
+    def _per_adhesion(self) -> float:
+        """Newtons of T for each unit of the adhesion term: the area, or 1 for a force."""
+        return 1.0 if self.nominal_area_m2 is None else self.nominal_area_m2
+
+    @property
+    def by_itself(self) -> LawFit:
+        """The fit by the tests of the sample alone."""
+        return self if self.alone is None else self.alone
 
     def in_numbers(self) -> str:
         """Every parameter with its standard uncertainty, in a line."""
         found = ((name, self.value(name), self.standard_uncertainty(name)) for name in self.parameters)
         return ", ".join(f"{name} = {value:.4g} ± {u:.2g}" for name, value, u in found)
 
-    def interval(self, parameter: str, level: float = 0.95) -> tuple[float, float]:
-        """Two-sided t interval at ``level``."""
-        from scipy.special import stdtrit  # quantile of t, without the start of scipy.stats
-
-        half = float(stdtrit(self.dof, 0.5 + level / 2)) * self.standard_uncertainty(parameter)
-        return self.value(parameter) - half, self.value(parameter) + half
-
-    def force_N(self, normal_load_N: float | FloatArray) -> FloatArray:
-        """T = mu N + tau0 A of the fitted law, N in newton (any shape)."""
-        n = np.asarray(normal_load_N, float)
-        return np.asarray(self.value("mu") * n + self.value("tau0_Pa") * self.nominal_area_m2)
-
-    def force_u_N(self, normal_load_N: float | FloatArray) -> FloatArray:
-        """Standard uncertainty of :meth:`force_N`, from the full covariance."""
-        n = np.asarray(normal_load_N, float)
-        a = self.nominal_area_m2
-        c = self.covariance
-        return np.asarray(np.sqrt(c[0, 0] * n**2 + 2 * c[0, 1] * n * a + c[1, 1] * a**2))
-
-
-@displayed(lambda fit: f"{fit.sample}, {fit.regime}: {fit.in_numbers()}")
-@dataclass(frozen=True)
-class CombinedFit(LawFit):
-    """A fitted law with its combined uncertainty (GUM): ``covariance`` is ``type_a`` plus what all pulls share.
-
-    ``type_a`` is the covariance of the mean over specimens and ``dof`` its degrees of freedom; what all pulls share
-    (type B: gain, zero, load, area, angle) counts as known. ``largest`` holds, for mu, tau0_Pa and T, the component
-    with the largest share of the variance and that share in percent.
-    """
-
-    type_a: FloatArray = field(default_factory=lambda: np.zeros((2, 2)))
-    largest: Mapping[str, tuple[str, float]] = field(default_factory=dict)
-
     def effective_dof(self, by: FloatArray) -> float:
-        """Degrees of freedom of a combination ``by`` (2,) of both parameters, by Welch and Satterthwaite (GUM, G.4)."""
+        """Degrees of freedom of a combination ``by`` (k,) of the parameters.
+
+        Of a combined uncertainty by Welch and Satterthwaite (GUM, G.4), type B being known; else ``dof``.
+        """
+        if self.type_a is None:
+            return self.dof
         type_a = float(by @ self.type_a @ by)
         return self.dof * (float(by @ self.covariance @ by) / type_a) ** 2 if type_a > 0 else float("inf")
 
     def interval(self, parameter: str, level: float = 0.95) -> tuple[float, float]:
-        """Two-sided t interval at ``level`` of the combined uncertainty."""
+        """Two-sided t interval of a parameter at ``level``."""
+        from scipy.special import stdtrit  # quantile of t, without the start of scipy.stats
+
+        dof = self.effective_dof(np.eye(len(self.values))[self._place(parameter)])
+        half = float(stdtrit(dof, 0.5 + level / 2)) * self.standard_uncertainty(parameter)
+        return self.value(parameter) - half, self.value(parameter) + half
+
+    def force_N(self, normal_load_N: float | FloatArray) -> FloatArray:
+        """T = mu N + tau0 A (or + T0) of the fitted law in newton; N in newton, any shape."""
+        n = np.asarray(normal_load_N, float)
+        return np.asarray(self.mu * n + self.value(self.adhesion) * self._per_adhesion)
+
+    def force_u_N(self, normal_load_N: float | FloatArray) -> FloatArray:
+        """Standard uncertainty of :meth:`force_N`, from the full covariance."""
+        n = np.asarray(normal_load_N, float)
+        a = self._per_adhesion
+        c = self.covariance
+        return np.asarray(np.sqrt(c[0, 0] * n**2 + 2 * c[0, 1] * n * a + c[1, 1] * a**2))
+
+    def force_half_width_N(self, normal_load_N: float | FloatArray, level: float = 0.95) -> FloatArray:
+        """Half width of the t interval of :meth:`force_N` at ``level``, for loads of shape (n,)."""
         from scipy.special import stdtrit
 
-        k = self.parameters.index(parameter)
-        factor = float(stdtrit(self.effective_dof(np.eye(2)[k]), 0.5 + level / 2))
-        half = factor * self.standard_uncertainty(parameter)
-        return self.value(parameter) - half, self.value(parameter) + half
+        loads = np.atleast_1d(np.asarray(normal_load_N, float))
+        dof = np.array([self.effective_dof(np.array([n, self._per_adhesion])) for n in loads])
+        return np.asarray(stdtrit(dof, 0.5 + level / 2) * self.force_u_N(loads))
+
+
+class Fits(tuple[LawFit, ...]):
+    """The fitted laws of a campaign, by number or by name.
+
+    ``fits[0]`` is the first, ``fits["A", "static"]`` that of a sample in a regime, ``fits["A"]`` both of a sample.
+    """
+
+    def __getitem__(self, which: Any) -> Any:
+        if isinstance(which, int):
+            return super().__getitem__(which)
+        if isinstance(which, slice):
+            return Fits(super().__getitem__(which))
+        sample, regime = which if isinstance(which, tuple) else (which, None)
+        found = Fits(f for f in self if f.sample == sample and regime in (None, f.regime))
+        if found:
+            return found if regime is None else found[0]
+        known = ", ".join(dict.fromkeys(f.sample for f in self)) or "none"
+        asked = sample if regime is None else f"{sample}, {regime}"
+        raise FitError(Problem("unknown_fit", "no such fit", found=asked, allowed=f"{known}; static or sliding"))
+
+    def of(self, sample: str, regime: str) -> LawFit | None:
+        """The fit of a sample in a regime; None where there is none."""
+        return next((f for f in self if f.sample == sample and f.regime == regime), None)
+
+    def table(self) -> pd.DataFrame:
+        """One row per fit, as in fits.csv: combined uncertainties, and those of type A under names of their own.
+
+        ``cov`` is cov(mu, tau0) in kPa; ``*_low`` to ``*_high`` are 95 % intervals. ``*_type_a_*`` are of the specimens
+        and repeats of the sample alone, with ``dof_type_a``. Without a nominal area the columns of tau0 are empty.
+        """
+        import pandas as pd
+
+        return pd.DataFrame([_fit_row(f) for f in self if f.adhesion in f.parameters], columns=FITS_COLUMNS)
+
+    def __repr__(self) -> str:
+        return "\n".join(["Fits:", *(f"  {fit._headline()}" for fit in self)])  # type: ignore[attr-defined]
+
+    def _repr_html_(self) -> str:
+        return str(self.table()[["sample", "regime", "mu", "mu_u", "tau0_kPa", "tau0_u_kPa", "T0_N"]]._repr_html_())
+
+
+FITS_COLUMNS = [
+    "sample", "regime", "mu", "mu_u", "tau0_kPa", "tau0_u_kPa", "cov", "n_specimens", "n_tests", "method",
+    "chi2_red", "law", "mu_low", "mu_high", "tau0_low_kPa", "tau0_high_kPa", "notes", "T0_N", "T0_u_N",
+    "largest_mu", "largest_tau0", "mu_type_a_u", "tau0_type_a_u_kPa", "cov_type_a", "dof_type_a", "mu_type_a_low",
+    "mu_type_a_high", "tau0_type_a_low_kPa", "tau0_type_a_high_kPa", "T0_type_a_u_N",
+]  # fmt: skip
+
+
+def _fit_row(fit: LawFit) -> dict[str, object]:
+    alone = fit.by_itself
+    row: dict[str, object] = {
+        "sample": fit.sample, "regime": fit.regime, "mu": fit.mu, "n_specimens": fit.n_specimens,
+        "n_tests": fit.n_tests, "method": fit.method, "chi2_red": fit.chi2_red, "law": fit.law,
+        "notes": "; ".join(fit.notes), "T0_N": fit.T0_N, "largest_mu": fit.largest.get("mu", ("",))[0],
+        "largest_tau0": fit.largest.get(fit.adhesion, ("",))[0], "dof_type_a": alone.dof,
+    }  # fmt: skip
+    for one, name in ((fit, ""), (alone, "type_a_")):
+        row |= {f"mu_{name}u": one.mu_u, f"T0_{name}u_N": one.T0_u_N}
+        row[f"mu_{name}low"], row[f"mu_{name}high"] = one.interval("mu")
+        if fit.has_area:
+            row[f"tau0_{name}u_kPa"] = one.tau0_u_Pa / PA_PER_KPA
+            row[f"cov_{name}".rstrip("_")] = float(one.covariance[0, 1]) / PA_PER_KPA
+            low, high = one.interval("tau0_Pa")
+            row |= {f"tau0_{name}low_kPa": low / PA_PER_KPA, f"tau0_{name}high_kPa": high / PA_PER_KPA}
+    if fit.has_area:
+        row["tau0_kPa"] = fit.tau0_Pa / PA_PER_KPA
+    return row
 
 
 @displayed(lambda r: f"{r.sample} at {r.pressure_Pa / 1e3:.4g} kPa, seed {r.seed}")
@@ -292,15 +421,11 @@ class ComparisonRow:
     simulated_u_N: float
 
 
-@displayed(lambda c: c.campaign_title)
+@displayed(lambda c: f"{len(c.rows)} forces, calibrated on {c.flat}")
 @dataclass(frozen=True)
 class Comparison:
-    """Comparison of experiment and model: fits of both, and the forces at each measured load."""
+    """Comparison of experiment and model: fits of the model, and the forces of both at each measured load."""
 
-    campaign_title: str
-    nominal_area_m2: float
-    area_fractions: Mapping[str, float]
-    measured: tuple[LawFit, ...]
     simulated: tuple[LawFit, ...]
     rows: tuple[ComparisonRow, ...]
     calibration: Mapping[str, float] = field(default_factory=dict)
@@ -472,7 +597,7 @@ class Campaign:
 
     title: str
     root: Path
-    nominal_area_m2: float
+    nominal_area_m2: float | None
     tests: tuple[Test, ...]
     samples: Mapping[str, Pattern]
     material: str = ""
@@ -495,8 +620,17 @@ class Campaign:
 
     @property
     def has_area(self) -> bool:
-        """Whether a nominal area is known; without one forces are reported, and tau0 A as T0 in newton."""
-        return self.nominal_area_m2 != NO_AREA_M2
+        """Whether the nominal area is stated; without one the adhesion term is a force, T0 in newton."""
+        return self.nominal_area_m2 is not None
+
+    @property
+    def area_m2(self) -> float:
+        """The nominal area, for what cannot do without; a CampaignError where none is stated."""
+        if self.nominal_area_m2 is None:
+            what = "the nominal area is not stated, so there is no pressure"
+            allowed = "nominal_area_mm2 in campaign.toml"
+            raise CampaignError(Problem("no_area", what, file="campaign.toml", allowed=allowed))
+        return self.nominal_area_m2
 
     @property
     def flat_samples(self) -> tuple[str, ...]:
@@ -518,7 +652,7 @@ class Campaign:
 
     def nominal_pressure_Pa(self, normal_load_N: float) -> float:
         """p = N / A with A the nominal area."""
-        return normal_load_N / self.nominal_area_m2
+        return normal_load_N / self.area_m2
 
 
 @displayed(lambda o: f"{o.test_id}: {o.action}")
@@ -612,19 +746,19 @@ class Ingested:
 class Study:
     """One campaign with the results of all stages.
 
-    ``fits`` holds the measured law of every sample and regime (T = mu N + tau0 A, the default weights), ``combined``
-    the same with the combined uncertainty, which is what the report states, ``other_fits`` the same under other weights
-    or laws. ``simulated`` is the ensemble, one row per run: sample, pressure_Pa, normal_load_N (p times the nominal
-    area of the campaign), angle_deg, seed, static_N, sliding_N. ``example_runs`` holds one full force trace of the
-    model per sample. ``budget`` is the uncertainty budget of every fitted number, one row per component. ``power``
-    states the differences this campaign could detect, ``outlying`` the outlying pulls and specimens. ``differences``
-    holds the differences between samples measured on the same specimens, one row per pair of samples, regime and
-    number. ``laws`` compares the candidate laws of every sample by held-out loads, ``dependence`` states how T/N
-    changes with each recorded variable. ``doubts`` are the numbers outside their broad physical bounds.
+    ``fits`` holds the measured law of every sample and regime (T = mu N + tau0 A, the default weights) with its
+    combined uncertainty, which is what the report states, ``other_fits`` the same by the tests of each sample alone
+    under other weights or laws. ``simulated`` is the ensemble, one row per run: sample, pressure_Pa, normal_load_N (p
+    times the nominal area of the campaign), angle_deg, seed, static_N, sliding_N. ``example_runs`` holds one full force
+    trace of the model per sample. ``budget`` is the uncertainty budget of every fitted number, one row per component.
+    ``power`` states the differences this campaign could detect, ``outlying`` the outlying pulls and specimens.
+    ``differences`` holds the differences between samples measured on the same specimens, one row per pair of samples,
+    regime and number. ``laws`` compares the candidate laws of every sample by held-out loads, ``dependence`` states
+    how T/N changes with each recorded variable. ``doubts`` are the numbers outside their broad physical bounds.
     """
 
     ingested: Ingested
-    fits: tuple[LawFit, ...] = ()
+    fits: Fits = field(default_factory=Fits)
     other_fits: tuple[LawFit, ...] = ()
     comparison: Comparison | None = None
     simulated: pd.DataFrame | None = None
@@ -636,26 +770,32 @@ class Study:
     laws: pd.DataFrame | None = None
     dependence: pd.DataFrame | None = None
     notes: tuple[str, ...] = ()
-    combined: tuple[CombinedFit, ...] = ()
     doubts: tuple[Doubt, ...] = ()
     undiagnosed: str = ""  # why there is no diagnosis
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "fits", Fits(self.fits))  # the record is frozen
+
+    @property
+    def combined(self) -> Fits:
+        """The same as ``fits``, which hold the combined uncertainty."""
+        return self.fits
 
 
 __all__ = [
     "CLOSED_TRACK_M",
-    "NO_AREA_M2",
     "REGIMES",
     "STANDARD_GRAVITY",
     "UNCORRECTED",
     "ByHand",
     "Campaign",
-    "CombinedFit",
     "Comparison",
     "ComparisonRow",
     "Correction",
     "Doubt",
     "Evaluated",
     "ExportFormat",
+    "Fits",
     "FloatArray",
     "Ingested",
     "LawFit",

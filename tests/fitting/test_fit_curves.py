@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from other_fits import POWER_LAWS, fit_errors_in_both, fit_power_law, starting_values
 
 from tribo.errors import FitError
-from tribo.fitting import fit_errors_in_both, fit_power_law, fit_samples
-from tribo.fitting.curves import _start
+from tribo.fitting import fit_samples
 from tribo.fitting.linear import sample_rows, weights_of
-from tribo.laws import LAWS
 
 AREA = 55e-6
 LOADS = np.array([0.06, 0.13, 0.26, 0.5, 0.9, 1.4])
@@ -22,7 +21,7 @@ def pulls(
     """Specimens of one law T = 4 (p/10 kPa)^-n N + 12 kPa A; the loads as the bench recorded them."""
     rng = np.random.default_rng(11)
     load = np.tile(np.repeat(LOADS, repeats), specimens)
-    force = LAWS["pressure_power_adhesion"].function(load, AREA, 10e3, 4.0, exponent, 12e3)
+    force = POWER_LAWS["pressure_power_adhesion"].function(load, AREA, 10e3, 4.0, exponent, 12e3)
     return pd.DataFrame(
         {
             "sample": "F",
@@ -107,5 +106,5 @@ def test_forces_that_are_all_zero_are_weighed_alike_and_give_a_law_of_zeros() ->
     np.testing.assert_array_equal(weights_of(rows, AREA, "relative"), 1.0)
     (line,) = fit_samples(table, "static", AREA)
     np.testing.assert_allclose(line.values, 0.0, atol=1e-12)
-    law, load, force = LAWS["pressure_power_adhesion"], rows.load_N, rows.force_N
-    np.testing.assert_array_equal(_start(law, load, force, AREA, 10e3), [1.0, 0.0, 0.0])
+    law, load, force = POWER_LAWS["pressure_power_adhesion"], rows.load_N, rows.force_N
+    np.testing.assert_array_equal(starting_values(law, load, force, AREA, 10e3), [1.0, 0.0, 0.0])

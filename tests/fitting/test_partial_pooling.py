@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from tribo.fitting import fit_samples
+from tribo.fitting.budget import PRIOR_DOF, at_least, partly_pooled
 from tribo.fitting.linear import Rows, sample_rows
-from tribo.fitting.partial_pooling import PRIOR_DOF, at_least, partly_pooled
 from tribo.records import LawFit
 
 AREA = 55e-6

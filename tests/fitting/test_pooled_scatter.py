@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from other_fits import fit_power_law, pool_specimen_scatter
 
 from tribo.errors import FitError
-from tribo.fitting import fit_power_law, fit_samples, pool_specimen_scatter, repeat_scatter
+from tribo.fitting import fit_samples, repeat_scatter
 from tribo.fitting.linear import sample_rows, weights_of
 from tribo.records import LawFit
 

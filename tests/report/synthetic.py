@@ -174,10 +174,8 @@ def compare(
         for fit in fits
         for load in loads
     ]  # fmt: skip
-    return Comparison(
-        campaign.title, AREA_M2, {s: campaign.area_fraction(s) for s in samples}, tuple(fits),
-        tuple(simulated), tuple(rows), {"mu_s_mean": 5.5, "mu_d_mean": 2.9, "F_as_Pa": 23.45e3}, samples[0],
-    )  # fmt: skip
+    calibration = {"mu_s_mean": 5.5, "mu_d_mean": 2.9, "F_as_Pa": 23.45e3}
+    return Comparison(tuple(simulated), tuple(rows), calibration, samples[0])
 
 
 def make_ingested(samples: Sequence[str], n_specimens: int, n_repeats: int, n_samples: int, seed: int) -> Ingested:

@@ -14,7 +14,7 @@ from report.conftest import Written
 from report.synthetic import verdict_of
 from tribo.errors import Problem
 from tribo.mechanisms.table import MECHANISMS
-from tribo.records import CombinedFit, LawFit, SetAside, Study
+from tribo.records import LawFit, SetAside, Study
 from tribo.report.page import html
 from tribo.wording.card import Card, card_law, card_of
 from tribo.wording.terminal import card_text
@@ -162,15 +162,14 @@ def test_another_flat_sample_than_f_is_said(study: Study) -> None:
     assert "The model is calibrated on sample Q (as chosen)." in card_of(other, verdict_of(FOUND)).to_know
 
 
-def combined(fit: LawFit, largest: dict[str, tuple[str, float]]) -> CombinedFit:
-    own = {name: getattr(fit, name) for name in fit.__dataclass_fields__}
-    return CombinedFit(**own | {"covariance": fit.covariance * 100}, type_a=fit.covariance, largest=largest)
+def combined(fit: LawFit, largest: dict[str, tuple[str, float]]) -> LawFit:
+    return replace(fit, covariance=fit.covariance * 100, type_a=fit.covariance, largest=largest, alone=fit)
 
 
 def test_the_uncertainty_of_the_card_is_the_combined_one_with_what_dominates_it(study: Study) -> None:
     largest = {"mu": ("wire angle", 60.4), "tau0_Pa": ("specimens", 48.0), "T": ("wire angle", 50.0)}
     fits = tuple(combined(fit, largest) for fit in study.fits)
-    card = card_of(replace(study, combined=fits), verdict_of(FOUND))
+    card = card_of(replace(study, fits=fits), verdict_of(FOUND))
     alone = card_of(study, verdict_of(FOUND))
     assert card.laws[0].mu.split(" ± ")[1] != alone.laws[0].mu.split(" ± ")[1]
     assert card.laws[0].largest == "μ: wire angle (60 %); τ₀: specimens (48 %)"

@@ -51,7 +51,7 @@ def test_a_change_is_found_with_its_size_and_the_interval_of_both(written: Writt
     assert other["difference_percent"].to_numpy() == pytest.approx([30.0] * 3)
     assert (table.drop(other.index)["difference"] == 0).all()
     fit = first.fits[(first.fits["sample"] == "B") & (first.fits["regime"] == "static")].iloc[0]
-    low, high = ("mu_combined_low", "mu_combined_high") if fit["mu_u_combined"] > 0 else ("mu_low", "mu_high")
+    low, high = "mu_low", "mu_high"
     half = (fit[high] - fit[low]) / 2
     mu = other[other["quantity"] == "mu"].iloc[0]
     assert (mu["difference_high"] - mu["difference_low"]) / 2 == pytest.approx(math.hypot(half, 1.3 * half))

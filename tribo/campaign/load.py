@@ -41,7 +41,7 @@ from tribo.campaign.table import (
 from tribo.errors import CampaignError, Problem
 from tribo.files import LEADS_OUT, found_below, leads_out, paths_below
 from tribo.input_files import hashes_of_reads, unpack
-from tribo.records import NO_AREA_M2, STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
+from tribo.records import STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
 from tribo.temporary import temporary_folder
 from tribo.user_text import did_you_mean, nearest, well_formed
 from tribo.zeroing import DEFAULT, ZeroChoice, zero_choice
@@ -103,7 +103,7 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     if general.nominal_area_mm2 is None and any(row.cells.get("normal_stress_Pa") for row in usable):
         what, allowed = "a load given as normal stress needs the nominal area", "more than 0 mm2"
         raise CampaignError(Problem("no_area", what, file=TOML, column="nominal_area_mm2", allowed=allowed))
-    area_m2 = NO_AREA_M2 if general.nominal_area_mm2 is None else general.nominal_area_mm2 * _MM2
+    area_m2 = None if general.nominal_area_mm2 is None else general.nominal_area_mm2 * _MM2
     problems += _unlisted(root, rows)
     problems += [note for row in usable if (note := _loads_disagree(row, described))]
     tests = tuple(_test(row, described, order, area_m2) for row in usable)

@@ -303,12 +303,11 @@ def _conclude(
     console: Console, study: Study, out: Path, verdict: Verdict | None = None, card: Card | None = None
 ) -> int:
     """Print the results and the tests set aside; return the exit status."""
-    from tribo.report.tables import fits_table
     from tribo.wording.terminal import card_text, summary_text, table2_text, verdict_text
 
     set_aside = study.ingested.set_aside
     doubts = study.ingested.doubts()
-    fits = fits_table(study.fits, study.combined).astype(object)
+    fits = study.fits.table().astype(object)
     record = {
         "out": str(out),
         "tests": len(study.ingested.pulls),

@@ -43,7 +43,7 @@ def ratios(study: Study) -> pd.DataFrame:
 
 def _dof(study: Study, sample: str, row: ComparisonRow) -> float:
     fit = fit_of(study.fits, sample, row.regime)
-    return fit.dof if fit is not None else float("inf")
+    return fit.by_itself.dof if fit is not None else float("inf")
 
 
 def _ratio(row: ComparisonRow, measured_dof: float, simulated_dof: float) -> dict[str, float]:

@@ -132,7 +132,8 @@ def rankings(study: Study) -> list[Ranking]:
     if study.comparison is None:
         return []
     load = common_loads(study)[1]
-    found = [_ranking(study.fits, study.comparison.simulated, regime, load) for regime in REGIMES]
+    fits = [fit.by_itself for fit in study.fits]  # what all pulls share does not order the samples
+    found = [_ranking(fits, study.comparison.simulated, regime, load) for regime in REGIMES]
     return [ranking for ranking in found if len(ranking.measured) > 1]
 
 
@@ -198,11 +199,11 @@ def _direction_ratio(study: Study, names: tuple[str, str, str], regime: Regime, 
 
     assert study.comparison is not None
     pattern, x, y = names
-    measured = [study_lookup.fit_of(study.fits, s, regime) for s in (x, y)]
+    measured = [study.fits.of(s, regime) for s in (x, y)]
     model = [study_lookup.fit_of(study.comparison.simulated, s, regime) for s in (x, y)]
     if any(f is None for f in measured + model):
         return None
-    (fx, fy), (mx, my) = [[f for f in pair if f is not None] for pair in (measured, model)]
+    (fx, fy), (mx, my) = [[f.by_itself for f in pair if f is not None] for pair in (measured, model)]
     ratio = float(fx.force_N(load) / fy.force_N(load))
     if not ratio > 0:
         return None

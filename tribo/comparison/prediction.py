@@ -307,7 +307,7 @@ def predict(
     table = _as_forces(table, campaign)
     return Prediction(
         table,
-        _simulated_fits(table, campaign.nominal_area_m2, weights),
+        _simulated_fits(table, campaign.area_m2, weights),
         _flat_laws(fits, flat),
         _calibration(friction, SimConfig()),
         tuple(example_run(own, model.kept) for own in _by_sample(cells).values()),
@@ -407,7 +407,7 @@ def _measured_samples(campaign: Campaign) -> list[str]:
 
 def _as_forces(table: pd.DataFrame, campaign: Campaign) -> pd.DataFrame:
     """The ensemble in the campaign's own loads: N = p A and T = (T/N) N, and ``stratum``, its turn at the load."""
-    load = table["pressure_Pa"] * campaign.nominal_area_m2
+    load = table["pressure_Pa"] * campaign.area_m2
     return table.assign(
         normal_load_N=load.round(12),
         static_N=table["static_friction"] * load,

@@ -5,28 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from tribo.comparison.prediction import Prediction
-from tribo.records import REGIMES, Comparison, ComparisonRow, Ingested, LawFit, Regime
+from tribo.records import REGIMES, Comparison, ComparisonRow, Ingested, Regime
 
 
-def put_side_by_side(ingested: Ingested, fits: tuple[LawFit, ...], prediction: Prediction) -> Comparison:
-    """The fits of measurement and model, and their forces at each load that was measured."""
-    campaign = ingested.campaign
+def put_side_by_side(ingested: Ingested, prediction: Prediction) -> Comparison:
+    """The fits of the model, and the forces of both at each load that was measured."""
     rows = [
         ComparisonRow(sample, regime, load, mean, u, *prediction.force_N(sample, regime, load))
         for regime in REGIMES
         for sample in prediction.samples
         for load, mean, u in load_means(ingested, sample, regime)
     ]
-    return Comparison(
-        campaign.title,
-        campaign.nominal_area_m2,
-        {s: campaign.area_fraction(s) for s in prediction.samples},
-        fits,
-        prediction.fits,
-        tuple(rows),
-        prediction.calibration,
-        prediction.flat,
-    )
+    return Comparison(prediction.fits, tuple(rows), prediction.calibration, prediction.flat)
 
 
 def load_means(ingested: Ingested, sample: str, regime: Regime) -> list[tuple[float, float, float]]:

@@ -9,7 +9,6 @@ import numpy as np
 from tribo.fitting.linear import levels_of
 from tribo.records import FloatArray, LawFit, Pattern, SetAside, Study
 
-PA_PER_KPA = 1e3
 LOAD_TOLERANCE = 0.02  # loads closer than this (relative) are repeats of one load
 
 
@@ -38,11 +37,6 @@ def is_anisotropic(pattern: Pattern) -> bool:
 def fit_of(fits: Iterable[LawFit], sample: str, regime: str) -> LawFit | None:
     """The fit of one sample in one regime, None where there is none."""
     return next((f for f in fits if f.sample == sample and f.regime == regime), None)
-
-
-def stated_fit(study: Study, sample: str, regime: str) -> LawFit | None:
-    """The measured law with its combined uncertainty, as reports state it; that of the fit where there is no budget."""
-    return fit_of(study.combined, sample, regime) or fit_of(study.fits, sample, regime)
 
 
 def load_levels(normal_load_N: FloatArray, tolerance: float = LOAD_TOLERANCE) -> FloatArray:

@@ -141,7 +141,7 @@ def conditions_of(
     started = _numbers([_seconds(t.started_at) for t in tests])
     return Conditions(
         normal_load_N=_numbers([t.normal_load_N for t in tests]),
-        nominal_area_m2=campaign.nominal_area_m2,
+        nominal_area_m2=campaign.area_m2,
         area_fraction=np.array([p.area_fraction for p in patterns]),
         rim_per_m=np.array([p.rim_per_m for p in patterns]),
         cavity_width_m=np.array([min(p.size_m) if p.size_m else 0.0 for p in patterns]),

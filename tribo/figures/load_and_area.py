@@ -46,7 +46,7 @@ def ratio_numbers(study: Study) -> pd.DataFrame:
         pattern = study.ingested.campaign.samples.get(sample)
         group = "anisotropic" if pattern is not None and study_lookup.is_anisotropic(pattern) else "isotropic"
         for regime in REGIMES:
-            points = _means(pulls, regime, study.ingested.campaign.nominal_area_m2)
+            points = _means(pulls, regime, study.ingested.campaign.area_m2)
             part = pd.concat([points, _curve(study, sample, regime, points)], ignore_index=True)
             frames.append(part.assign(sample_number=number, sample=sample, regime=regime, group=group))
     return pd.concat(frames, ignore_index=True)[RATIO_COLUMNS]
@@ -63,11 +63,12 @@ def _means(pulls: pd.DataFrame, regime: Regime, area_m2: float) -> pd.DataFrame:
 
 
 def _curve(study: Study, sample: str, regime: Regime, points: pd.DataFrame) -> pd.DataFrame:
-    fit = study_lookup.fit_of(study.fits, sample, regime)
+    fit = study.fits.of(sample, regime)
     if fit is None or points.empty:
         return pd.DataFrame(columns=points.columns)
     p_kPa = np.geomspace(0.9 * points["pressure_kPa"].min(), 1.05 * points["pressure_kPa"].max(), CURVE_POINTS)
-    ratio = fit.force_N(p_kPa * 1e3 * fit.nominal_area_m2) / (p_kPa * 1e3 * fit.nominal_area_m2)
+    area_m2 = study.ingested.campaign.area_m2
+    ratio = fit.force_N(p_kPa * 1e3 * area_m2) / (p_kPa * 1e3 * area_m2)
     empty = {"T_over_N_u": np.nan, "n_pulls": pd.NA}
     return pd.DataFrame({"mark": "fit", "pressure_kPa": p_kPa, "T_over_N": ratio, **empty})
 
@@ -169,9 +170,9 @@ def _one_sample(study: Study, sample: str, regime: Regime, pulls: pd.DataFrame) 
         return points
     line = np.linspace(0.0, 1.05 * loads.max(), LINE_POINTS)
     simulated = study.comparison.simulated if study.comparison is not None else ()
-    frames = [points, *_fit_line("fit", study_lookup.fit_of(study.fits, sample, regime), line, band=True)]
+    frames = [points, *_fit_line("fit", study.fits.of(sample, regime), line, band=True)]
     frames += _fit_line("simulated", study_lookup.fit_of(simulated, sample, regime), line)
-    flat = study_lookup.fit_of(study.fits, study_lookup.flat_sample(study), regime)
+    flat = study.fits.of(study_lookup.flat_sample(study), regime)
     if flat is not None:
         forces = flat.force_N(line) * _area_fraction(study, sample)
         frames.append(pd.DataFrame({"mark": "AF prediction", "normal_load_N": line, "T_N": forces}))
@@ -179,14 +180,12 @@ def _one_sample(study: Study, sample: str, regime: Regime, pulls: pd.DataFrame) 
 
 
 def _fit_line(mark: str, fit: LawFit | None, loads_N: FloatArray, band: bool = False) -> list[pd.DataFrame]:
-    from scipy.stats import t
-
     if fit is None:
         return []
     force = fit.force_N(loads_N)
     frame = pd.DataFrame({"mark": mark, "normal_load_N": loads_N, "T_N": force})
     if band:
-        half = t.ppf(0.975, fit.dof) * fit.force_u_N(loads_N)
+        half = fit.force_half_width_N(loads_N)
         frame = frame.assign(T_low_N=force - half, T_high_N=force + half)
     return [frame]
 
@@ -301,9 +300,9 @@ def area_numbers(study: Study) -> pd.DataFrame:
     frames = []
     for regime in REGIMES:
         for parameter in PARAMETERS:
-            measured = _area_points(study, study.combined or study.fits, regime, parameter, "measured", order)
+            measured = _area_points(study, study.fits, regime, parameter, "measured", order)
             model = _area_points(study, simulated, regime, parameter, "simulated", order)
-            flat = study_lookup.fit_of(study.fits, study_lookup.flat_sample(study), regime)
+            flat = study.fits.of(study_lookup.flat_sample(study), regime)
             frames += [measured, model, _line(measured), _prediction(flat, measured, parameter)]
             frames[-2:] = [f.assign(regime=regime, parameter=parameter) for f in frames[-2:]]
     filled = [f for f in frames if not f.empty]

@@ -1,9 +1,4 @@
-"""Which friction law a sample follows: candidates compared by the loads that each was not fitted to.
-
-The paper's three-term law over all samples of a campaign together.
-
-The same law as a linear mixed model, for comparison with the fit of each specimen.
-"""
+"""Other fits of the same tests: the law that held-out loads choose, the three-term law, a mixed model."""
 
 from __future__ import annotations
 
@@ -26,7 +21,7 @@ from tribo.fitting.linear import (
     sample_rows,
     weights_of,
 )
-from tribo.laws import LAWS
+from tribo.laws import LAWS, design_over_load, law_over_load
 from tribo.records import REGIMES, FloatArray, LawFit, Regime
 
 if TYPE_CHECKING:
@@ -80,17 +75,14 @@ def force_N(law: str, a: float, b: float, load_N: FloatArray) -> FloatArray:
     return np.asarray(sum(value * load_N**power for value, power in zip(values, candidate.powers, strict=True)))
 
 
-@dataclass(frozen=True)
-class Fitted:
-    """A candidate fitted: values and standard uncertainties of its parameters, and its force at loads."""
-
-    values: FloatArray
-    u: FloatArray
-    force_N: Callable[[FloatArray], FloatArray]
+Fitted = tuple[FloatArray, FloatArray, Callable[[FloatArray], FloatArray]]
 
 
 def fit_candidate(law: Candidate, load_N: FloatArray, force_N: FloatArray) -> Fitted:
-    """Least squares of the relative deviations (constant relative scatter of T)."""
+    """Values and standard uncertainties of the parameters of a candidate, and its force at loads.
+
+    Least squares of the relative deviations (constant relative scatter of T).
+    """
     if not law.powers:
         return _power(load_N, force_N)
     design = np.column_stack([load_N**power for power in law.powers])
@@ -101,7 +93,7 @@ def fit_candidate(law: Candidate, load_N: FloatArray, force_N: FloatArray) -> Fi
         values, u = _least_squares(design / scale[:, None], force_N / scale)
         expected = np.abs(design @ values)
     powers = np.array(law.powers)
-    return Fitted(values, u, lambda load: (load[:, None] ** powers) @ values)
+    return values, u, lambda load: (load[:, None] ** powers) @ values
 
 
 def _power(load_N: FloatArray, force_N: FloatArray) -> Fitted:
@@ -109,7 +101,7 @@ def _power(load_N: FloatArray, force_N: FloatArray) -> Fitted:
     design = np.column_stack([np.ones(there.sum()), np.log(load_N[there])])
     (log_a, b), (log_a_u, b_u) = _least_squares(design, np.log(force_N[there]))
     a = math.exp(log_a)
-    return Fitted(np.array([a, b]), np.array([a * log_a_u, b_u]), lambda load: a * load**b)
+    return np.array([a, b]), np.array([a * log_a_u, b_u]), lambda load: a * load**b
 
 
 def _least_squares(design: FloatArray, response: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -147,9 +139,9 @@ def _compared(rows: Rows, regime: Regime) -> list[dict[str, object]]:
     chosen = choose({name: found for name, found in squares.items() if name not in excluded})
     found = []
     for law in CANDIDATES:
-        fitted = fit_candidate(law, load, force)
-        a, b = (*fitted.values, math.nan)[:2]
-        a_u, b_u = (*fitted.u, math.nan)[:2]
+        values, u, _ = fit_candidate(law, load, force)
+        a, b = (*values, math.nan)[:2]
+        a_u, b_u = (*u, math.nan)[:2]
         share, se = _root(squares[law.name])
         found.append(
             {"sample": rows.sample, "regime": regime, "law": law.name, "formula": law.formula,
@@ -171,7 +163,8 @@ def _held_out(law: Candidate, load_N: FloatArray, force_N: FloatArray) -> FloatA
     squares = []
     for k in range(load_N.size):
         others = np.arange(load_N.size) != k
-        predicted = float(fit_candidate(law, load_N[others], force_N[others]).force_N(load_N[k : k + 1])[0])
+        _, _, force_at = fit_candidate(law, load_N[others], force_N[others])
+        predicted = float(force_at(load_N[k : k + 1])[0])
         squares.append(math.log(max(predicted / force_N[k], _SMALLEST_SHARE)) ** 2)
     return np.array(squares)
 
@@ -194,8 +187,8 @@ def _rejected(name: str, best: str, load_N: FloatArray, force_N: FloatArray) -> 
     if fixed is None:
         return False
     place, value = fixed
-    fitted = fit_candidate(next(law for law in CANDIDATES if law.name == best), load_N, force_N)
-    return abs(float(fitted.values[place]) - value) > _CONFIDENT * float(fitted.u[place])
+    values, u, _ = fit_candidate(next(law for law in CANDIDATES if law.name == best), load_N, force_N)
+    return abs(float(values[place]) - value) > _CONFIDENT * float(u[place])
 
 
 def choose(squares: dict[str, FloatArray]) -> str:
@@ -214,13 +207,13 @@ def choose(squares: dict[str, FloatArray]) -> str:
     return min(within, key=lambda name: (parameters[name], float(squares[name].mean())))
 
 
-LAW = LAWS["three_term"]
+THREE_TERM = LAWS["three_term"]
 
 
 def fit_three_term(
     table: pd.DataFrame,
     regime: Regime,
-    nominal_area_m2: float,
+    nominal_area_m2: float | None,
     area_fractions: Mapping[str, float],
     *,
     weights: str = "relative",
@@ -236,8 +229,10 @@ def fit_three_term(
     Raises
     ------
     FitError
-        Fewer than two area fractions or four specimens, or tests that cannot fix the law.
+        No nominal area, fewer than two area fractions or four specimens, or tests that cannot fix the law.
     """
+    if nominal_area_m2 is None:
+        raise FitError(Problem("no_area", "a and b are adhesion per area, and no nominal area is known"))
     samples = sample_rows(table, regime)
     used = [rows for rows in samples if rows.sample in area_fractions and len(rows)]
     unknown = [rows.sample for rows in samples if rows.sample not in area_fractions]
@@ -247,8 +242,8 @@ def fit_three_term(
         raise FitError(Problem("too_few_samples", what, allowed="two or more area fractions"))
     design, force, weight, specimen = _stack(used, nominal_area_m2, area_fractions, weights)
     names = np.unique(specimen)
-    if len(names) <= len(LAW.parameters):
-        found, allowed = str(len(names)), f"more than {len(LAW.parameters)}"
+    if len(names) <= len(THREE_TERM.parameters):
+        found, allowed = str(len(names)), f"more than {len(THREE_TERM.parameters)}"
         raise FitError(Problem("too_few_specimens", "too few specimens", found=found, allowed=allowed))
     if weights == "relative":
         weight = _relative_to_the_law(design, force, weight)
@@ -256,8 +251,8 @@ def fit_three_term(
     without = np.array([_without(design, force, weight, specimen == name).values for name in names])
     spread = without - without.mean(axis=0)
     return LawFit(
-        "all", regime, LAW.name, LAW.parameter_names, whole.values,
-        spread.T @ spread * (len(names) - 1) / len(names), float(len(names) - len(LAW.parameters)),
+        "all", regime, THREE_TERM.name, THREE_TERM.parameter_names, whole.values,
+        spread.T @ spread * (len(names) - 1) / len(names), float(len(names) - len(THREE_TERM.parameters)),
         len(names), len(force),
         f"all samples at once, jackknife over {len(names)} specimens; "
         f"weighted least squares, {WEIGHTS[weights]}",
@@ -268,7 +263,7 @@ def fit_three_term(
 def _stack(
     used: list[Rows], area: float, area_fractions: Mapping[str, float], weights: str
 ) -> tuple[FloatArray, FloatArray, FloatArray, np.ndarray]:
-    design = [LAW.design_matrix(rows.load_N, area, area_fractions[rows.sample]) for rows in used]
+    design = [THREE_TERM.design_matrix(rows.load_N, area, area_fractions[rows.sample]) for rows in used]
     weight = [weights_of(rows, area, weights) for rows in used]
     return (
         np.concatenate(design),
@@ -307,13 +302,10 @@ def _misfit_of_samples(used: list[Rows], whole: LinearFit, specimen: np.ndarray)
     return between / within if within > 0 else float("nan")
 
 
-LAW_MIXED = LAWS["coulomb_adhesion"]
-
-
 def mixed_model(
     table: pd.DataFrame,
     regime: Regime,
-    nominal_area_m2: float,
+    nominal_area_m2: float | None,
     *,
     weights: str = "relative",
 ) -> LawFit | None:
@@ -338,13 +330,14 @@ def mixed_model(
         return None
     root = np.sqrt(weights_of(rows, nominal_area_m2, weights))
     scale = np.array([1.0, 1e3])  # tau0 in kPa keeps the random effects of comparable size
-    design = LAW_MIXED.design_matrix(rows.load_N, nominal_area_m2) * scale * root[:, None]
+    design = design_over_load(rows.load_N, nominal_area_m2) * scale * root[:, None]
     found = _reml(rows.force_N * root, design, rows.specimen)
     if found is None:
         return None
     values, covariance, warned = found
+    law = law_over_load(nominal_area_m2)
     return LawFit(
-        rows.sample, regime, LAW_MIXED.name, LAW_MIXED.parameter_names, values * scale,
+        rows.sample, regime, law.name, law.parameter_names, values * scale,
         covariance * np.outer(scale, scale), float("inf"), len(rows.specimens), len(rows),
         f"MixedLM, random mu and tau0 per specimen, REML; {WEIGHTS[weights]}",
         float("nan"), nominal_area_m2, notes=warned,

@@ -1,6 +1,6 @@
-"""Outlying pulls and specimens, found by robust fits. They are reported and never removed.
+"""What is reported beside the fits: other weights and laws, the budget, power, and outlying pulls and specimens.
 
-What is reported beside the fits: other weights and laws, uncertainty budget, power and outlying pulls.
+Outlying pulls and specimens are found by robust fits. They are reported and never removed.
 """
 
 from __future__ import annotations
@@ -14,12 +14,11 @@ import pandas as pd
 
 from tribo.errors import FitError
 from tribo.fitting.alternatives import compared_laws, fit_three_term, mixed_model
-from tribo.fitting.budget import Budget, campaign_budgets
+from tribo.fitting.budget import campaign_budgets
 from tribo.fitting.dependence import dependence
 from tribo.fitting.differences import differences_table, paired_differences, power_of_campaign
 from tribo.fitting.linear import (
     WEIGHTS,
-    RepeatScatter,
     Rows,
     expected_force_N,
     least_squares,
@@ -28,12 +27,54 @@ from tribo.fitting.linear import (
     weights_of,
 )
 from tribo.fitting.samples import fit_samples
-from tribo.laws import LAWS
-from tribo.records import NO_AREA_M2, REGIMES, FloatArray, Ingested, LawFit, Regime
+from tribo.laws import design_over_load
+from tribo.records import REGIMES, FloatArray, Ingested, LawFit, Regime
 
-LAW = LAWS["coulomb_adhesion"]
 FALSE_ALARMS = 0.05  # chance of flagging anything at all in a campaign without outliers, for Gaussian scatter
 _MEDIAN_TO_SD = 1.4826
+
+
+def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> dict[str, Any]:
+    """The results that complete the fits of a study, by the name of their field in ``Study``."""
+    table, area = ingested.table(), ingested.campaign.nominal_area_m2
+    budgets = campaign_budgets(ingested, fits, weights=weights) if area is not None and fits else ()
+    parts = [b.table().assign(sample=b.fit.sample, regime=b.fit.regime) for b in budgets]
+    power: list[str] = []
+    outlying: list[str] = []
+    for regime in REGIMES:
+        if area is not None:
+            with suppress(FitError):
+                power += [p.text() for p in power_of_campaign(table, regime, area, weights=weights)]
+        for look in (outlying_pulls, outlying_specimens):
+            with suppress(FitError):
+                outlying += [found.text() for found in look(table, regime, area)]
+    return {
+        "other_fits": _other_fits(ingested, fits, weights),
+        "budget": pd.concat(parts, ignore_index=True) if parts else None,
+        "power": tuple(power),
+        "outlying": tuple(outlying),
+        "laws": compared_laws(table),
+        "dependence": dependence(ingested),
+        "differences": differences_table(paired) if (paired := paired_differences(fits)) else None,
+    }
+
+
+def _other_fits(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> tuple[LawFit, ...]:
+    """The same law under the other weights, mixed models where they converge, and the three-term law."""
+    table, area = ingested.table(), ingested.campaign.nominal_area_m2
+    fractions = {s: ingested.campaign.area_fraction(s) for s in sorted(set(table["sample"]))}
+    found: list[LawFit] = []
+    for regime in REGIMES:
+        for others in WEIGHTS:
+            if others != weights:
+                with suppress(FitError):  # "repeats" needs repeats, "ratio" loads above zero
+                    found += fit_samples(table, regime, area, weights=others)
+        resolved = {f.sample for f in fits if f.regime == regime and np.isfinite(f.values).all()}
+        mixed = (mixed_model(rows, regime, area) for s, rows in table.groupby("sample") if s in resolved)
+        found += [fit for fit in mixed if fit is not None]
+        with suppress(FitError):
+            found.append(fit_three_term(table, regime, area, fractions))
+    return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -62,7 +103,7 @@ class Outlying:
         )
 
 
-def outlying_pulls(table: pd.DataFrame, regime: Regime, nominal_area_m2: float) -> tuple[Outlying, ...]:
+def outlying_pulls(table: pd.DataFrame, regime: Regime, nominal_area_m2: float | None) -> tuple[Outlying, ...]:
     """Pulls far from the robust line (Tukey's biweight) of their specimen, furthest first.
 
     Deviations are judged against the scatter of repeats as a function of force (:mod:`tribo.fitting.linear`), the
@@ -70,29 +111,36 @@ def outlying_pulls(table: pd.DataFrame, regime: Regime, nominal_area_m2: float) 
     """
     samples = [rows for rows in sample_rows(table, regime) if len(np.unique(rows.load_N)) > 1]
     scatter = repeat_scatter(tuple(samples)) if samples else None
-    lines = [line for rows in samples for line in _robust_lines(rows, scatter, nominal_area_m2)]
+    lines = []
+    for rows in samples:
+        expected = expected_force_N(rows, nominal_area_m2)
+        weight = expected**-2.0 if scatter is None else 1 / scatter.variance(expected)
+        for name in rows.specimens:
+            keep = rows.specimen == name
+            if keep.sum() >= 5 and len(np.unique(rows.load_N[keep])) > 1:
+                lines.append(_robust_line(rows.take(keep), weight[keep], nominal_area_m2))
     if not lines:
         return ()
-    bulk = np.concatenate([line.residual / np.sqrt(1 - line.leverage) for line in lines])
+    bulk = np.concatenate([residual / np.sqrt(1 - leverage) for _, _, residual, leverage in lines])
     scale = _MEDIAN_TO_SD * float(np.median(np.abs(bulk)))
     if scale == 0:
         return ()
-    limit = _limit(len(bulk), float(sum((1 - line.leverage).sum() for line in lines)))
+    limit = _limit(len(bulk), float(sum((1 - leverage).sum() for *_, leverage in lines)))
     found = []
-    for line in lines:
+    for rows, force_N, residual, leverage in lines:
         # a far pull has next to no weight in its line: its residual is that of a pull left out, wider by 1/(1 - h)
-        score = np.abs(line.residual) * np.sqrt(1 - line.leverage) / scale
+        score = np.abs(residual) * np.sqrt(1 - leverage) / scale
         found += [
             Outlying(
-                "pull", str(line.rows.test_id[k]), line.rows.sample, regime,
-                100 * float(line.rows.force_N[k] / line.force_N[k] - 1), float(score[k]), limit,
+                "pull", str(rows.test_id[k]), rows.sample, regime,
+                100 * float(rows.force_N[k] / force_N[k] - 1), float(score[k]), limit,
             )
             for k in np.flatnonzero(score > limit)
         ]  # fmt: skip
     return tuple(sorted(found, key=lambda o: -o.score))
 
 
-def outlying_specimens(table: pd.DataFrame, regime: Regime, nominal_area_m2: float) -> tuple[Outlying, ...]:
+def outlying_specimens(table: pd.DataFrame, regime: Regime, nominal_area_m2: float | None) -> tuple[Outlying, ...]:
     """Specimens whose force deviates from that of the other specimens of their sample, furthest first.
 
     Judged at the lowest and the highest load of the campaign by a robust fit (Huber) of log T on the sample;
@@ -109,34 +157,15 @@ def outlying_specimens(table: pd.DataFrame, regime: Regime, nominal_area_m2: flo
     return tuple(sorted(worst.values(), key=lambda o: -o.score))
 
 
-@dataclass(frozen=True)
-class _Line:
+def _robust_line(
+    rows: Rows, weight: FloatArray, area: float | None
+) -> tuple[Rows, FloatArray, FloatArray, FloatArray]:
     """Robust line of one specimen: its pulls, fitted force, weighted residual and leverage, arrays (n,)."""
-
-    rows: Rows
-    force_N: FloatArray
-    residual: FloatArray
-    leverage: FloatArray
-
-
-def _robust_lines(rows: Rows, scatter: RepeatScatter | None, area: float) -> list[_Line]:
-    expected = expected_force_N(rows, area)
-    weight = expected**-2.0 if scatter is None else 1 / scatter.variance(expected)
-    lines = []
-    for name in rows.specimens:
-        keep = rows.specimen == name
-        own = rows.take(keep)
-        if len(own) >= 5 and len(np.unique(own.load_N)) > 1:
-            lines.append(_robust_line(own, weight[keep], area))
-    return lines
-
-
-def _robust_line(rows: Rows, weight: FloatArray, area: float) -> _Line:
     from statsmodels.robust.norms import TukeyBiweight
     from statsmodels.robust.robust_linear_model import RLM
 
     root = np.sqrt(weight)
-    design = LAW.design_matrix(rows.load_N, area)
+    design = design_over_load(rows.load_N, area)
     plain = least_squares(design, rows.force_N, weight)
     weighted = design * root[:, None]
     leverage = np.einsum("ij,jk,ik->i", weighted, plain.unscaled, weighted)
@@ -146,10 +175,12 @@ def _robust_line(rows: Rows, weight: FloatArray, area: float) -> _Line:
         fit = RLM(rows.force_N * root, weighted * tau0_in_kPa, M=TukeyBiweight()).fit()
         values = np.asarray(fit.params) * tau0_in_kPa
     force = design @ values
-    return _Line(rows, force, (rows.force_N - force) * root, leverage)
+    return rows, force, (rows.force_N - force) * root, leverage
 
 
-def _specimen_forces(table: pd.DataFrame, regime: Regime, area: float) -> tuple[np.ndarray, np.ndarray, FloatArray]:
+def _specimen_forces(
+    table: pd.DataFrame, regime: Regime, area: float | None
+) -> tuple[np.ndarray, np.ndarray, FloatArray]:
     """Names (g,), samples (g,) and fitted forces (g, 2) at the lowest and highest load of the campaign."""
     names, samples, lines = [], [], []
     every = [rows for rows in sample_rows(table, regime) if len(np.unique(rows.load_N)) > 1]
@@ -158,14 +189,14 @@ def _specimen_forces(table: pd.DataFrame, regime: Regime, area: float) -> tuple[
         own = [s for s in rows.specimens if len(np.unique(rows.load_N[rows.specimen == s])) > 1]
         for name in own if len(own) > 2 else []:
             keep = rows.specimen == name
-            design = LAW.design_matrix(rows.load_N[keep], area)
+            design = design_over_load(rows.load_N[keep], area)
             lines.append(least_squares(design, rows.force_N[keep], weight[keep]).values)
             names.append(name)
             samples.append(rows.sample)
     if not lines:
         return np.array([]), np.array([]), np.zeros((0, 2))
     loads = np.concatenate([rows.load_N for rows in every])
-    at = LAW.design_matrix(np.array([loads[loads > 0].min(), loads.max()]), area)
+    at = design_over_load(np.array([loads[loads > 0].min(), loads.max()]), area)
     forces = np.array(lines) @ at.T
     above = (forces > 0).all(axis=1)
     return np.array(names)[above], np.array(samples)[above], forces[above]
@@ -204,59 +235,3 @@ def _limit(looks: int, dof: float) -> float:
     from scipy.stats import t
 
     return float(t.ppf(1 - FALSE_ALARMS / (2 * looks), max(0.37 * dof, 1.0)))
-
-
-def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> dict[str, Any]:
-    """The results that complete the fits of a study, by the name of their field in ``Study``."""
-    table, area = ingested.table(), ingested.campaign.nominal_area_m2
-    has_area = ingested.campaign.has_area  # budget and power are stated at a pressure
-    budgets = budgets_of(ingested, fits, weights)
-    parts = [b.table().assign(sample=b.fit.sample, regime=b.fit.regime) for b in budgets if has_area]
-    power: list[str] = []
-    outlying: list[str] = []
-    for regime in REGIMES:
-        with suppress(FitError):
-            if not has_area:
-                break
-            power += [p.text() for p in power_of_campaign(table, regime, area, weights=weights)]
-        for look in (outlying_pulls, outlying_specimens):
-            with suppress(FitError):
-                outlying += [found.text() for found in look(table, regime, area)]
-    return {
-        "combined": tuple(b.combined() for b in budgets),
-        "other_fits": _other_fits(ingested, fits, weights),
-        "budget": pd.concat(parts, ignore_index=True) if parts else None,
-        "power": tuple(power),
-        "outlying": tuple(outlying),
-        "laws": compared_laws(table),
-        "dependence": dependence(ingested),
-        "differences": differences_table(paired) if (paired := paired_differences(fits)) else None,
-    }
-
-
-def budgets_of(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> tuple[Budget, ...]:
-    """The budget of every fit; without a nominal area, T is judged at the middle load."""
-    if not fits:
-        return ()
-    if ingested.campaign.has_area:
-        return campaign_budgets(ingested, fits, weights=weights)
-    middle = float(np.median([test.normal_load_N for test in ingested.campaign.tests]))
-    return campaign_budgets(ingested, fits, weights=weights, pressure_Pa=middle / NO_AREA_M2)
-
-
-def _other_fits(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> tuple[LawFit, ...]:
-    """The same law under the other weights, mixed models where they converge, and the three-term law."""
-    table, area = ingested.table(), ingested.campaign.nominal_area_m2
-    fractions = {s: ingested.campaign.area_fraction(s) for s in sorted(set(table["sample"]))}
-    found: list[LawFit] = []
-    for regime in REGIMES:
-        for others in WEIGHTS:
-            if others != weights:
-                with suppress(FitError):  # "repeats" needs repeats, "ratio" loads above zero
-                    found += fit_samples(table, regime, area, weights=others)
-        resolved = {f.sample for f in fits if f.regime == regime and np.isfinite(f.values).all()}
-        mixed = (mixed_model(rows, regime, area) for s, rows in table.groupby("sample") if s in resolved)
-        found += [fit for fit in mixed if fit is not None]
-        with suppress(FitError):
-            found.append(fit_three_term(table, regime, area, fractions))
-    return tuple(found)

@@ -1,8 +1,13 @@
-"""Uncertainty budget of a fitted law (GUM, JCGM 100:2008): components, their combination and the largest.
+"""The uncertainty of a fitted law (GUM, JCGM 100:2008): components, their combination and the largest.
 
-The interval of :func:`tribo.fitting.fit_samples` contains the differences between specimens and between pulls
-(type A); in a campaign the scatter of specimens is partly pooled over the samples, against the luck of few specimens
-(:mod:`tribo.fitting.partial_pooling`).
+The interval of :func:`tribo.fitting.fit_samples` contains the differences between specimens and between pulls of one
+sample (type A). Three specimens that agree by chance give an interval that is far too narrow: among the tenth of
+samples whose specimens scatter least, the intervals by t(2) hold the law in two of three cases. The covariance of each
+sample is therefore moved towards the mean of all samples, as if that mean were known from PRIOR_DOF further specimens
+(moderated variances: Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004) 3). A sample that scatters more than the others
+keeps part of its own scatter. One that scatters less gets the mean of all: with few specimens a small scatter is luck
+more often than a quieter pattern, and two thirds of the mean are too little for the luckiest.
+
 Errors common to all pulls, such as those of the load cell or the height of the wire, do not show in repeats.
 They are taken from ``[instrument]`` of campaign.toml or from the stated defaults (type B) and are added here.
 """
@@ -10,41 +15,32 @@ They are taken from ``[instrument]`` of campaign.toml or from the stated default
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tribo.errors import FitError, Problem
 from tribo.fitting.linear import Rows, least_squares, sample_rows, weights_of
-from tribo.fitting.partial_pooling import at_least, partly_pooled
-from tribo.laws import LAWS
-from tribo.records import STANDARD_GRAVITY, CombinedFit, FloatArray, Ingested, LawFit
+from tribo.fitting.samples import ONE_SPECIMEN
+from tribo.laws import design_over_load, law_over_load
+from tribo.records import STANDARD_GRAVITY, Fits, FloatArray, Ingested, LawFit
 
 if TYPE_CHECKING:
     import pandas as pd
 
-LAW = LAWS["coulomb_adhesion"]
 NUMBERS = ("mu", "tau0_kPa", "T_N")
-PRESSURE_PA = 10e3  # where T/A is judged unless asked otherwise: the middle of the paper's 3 to 25 kPa
-
-
-@dataclass(frozen=True)
-class Default:
-    """A standard uncertainty used where campaign.toml gives none, and its source."""
-
-    value: float
-    reason: str
-
-
-DEFAULTS: dict[str, Default] = {
-    "load_cell_u_percent": Default(0.58, "class 1 of ISO 7500-1: limits ±1 %, rectangular distribution"),
-    "load_cell_u_N": Default(0.0, "the zero is measured before each contact"),
-    "mass_u_g": Default(0.03, "balance with a resolution of 0.1 g, rectangular distribution"),
-    "normal_load_u_percent": Default(0.0, "dead weights"),
-    "area_u_percent": Default(1.0, "sides of about 7 mm, each measured by caliper to 0.05 mm"),
-    "wire_angle_deg": Default(0.0, "wire assumed to be horizontal"),
-    "wire_angle_u_deg": Default(0.5, "wire levelled by eye"),
+PRESSURE_PA = 10e3  # where T/A is judged: the middle of the paper's 3 to 25 kPa
+PRIOR_DOF = 4.0  # swept in benchmarks/combined_coverage.py: from 2 to 8 the coverage hardly depends on it
+ROUNDING = 1e-12
+DEFAULTS: dict[str, tuple[float, str]] = {  # used where campaign.toml gives none, and why
+    "load_cell_u_percent": (0.58, "class 1 of ISO 7500-1: limits ±1 %, rectangular distribution"),
+    "load_cell_u_N": (0.0, "the zero is measured before each contact"),
+    "mass_u_g": (0.03, "balance with a resolution of 0.1 g, rectangular distribution"),
+    "normal_load_u_percent": (0.0, "dead weights"),
+    "area_u_percent": (1.0, "sides of about 7 mm, each measured by caliper to 0.05 mm"),
+    "wire_angle_deg": (0.0, "wire assumed to be horizontal"),
+    "wire_angle_u_deg": (0.5, "wire levelled by eye"),
 }
 
 
@@ -61,30 +57,30 @@ class Component:
 
 @dataclass(frozen=True)
 class Budget:
-    """All components of one fitted law and their combination, for the numbers mu, tau0_kPa and T_N.
+    """All components of one fitted law and their combination, for mu, tau0_kPa (T0_N without an area) and T_N.
 
-    ``T_N`` is the friction force at ``pressure_Pa``. ``covariance`` (2, 2) of (mu, tau0_Pa) is that of the
-    fit plus every type B component. The type A rows share out the variance of the fit: what single readings
-    and repeats explain, never more than there is, and the rest to the specimens.
+    ``T_N`` is the friction force at ``load_N``. ``covariance`` (2, 2) of the parameters is that of the fit plus every
+    type B component. The type A rows share out the variance of the fit: what single readings and repeats explain,
+    never more than there is, and the rest to the specimens.
     """
 
     fit: LawFit
     components: tuple[Component, ...]
     covariance: FloatArray
-    pressure_Pa: float = PRESSURE_PA
+    load_N: float
     notes: tuple[str, ...] = ()
 
     def value(self, number: str) -> float:
         """The number itself."""
-        return float(sensitivities(self.fit, self.pressure_Pa)[number] @ self.fit.values)
+        return float(sensitivities(self.fit, self.load_N)[number] @ self.fit.values)
 
     def standard_uncertainty(self, number: str) -> float:
         """Combined standard uncertainty."""
-        return _u(self.covariance, sensitivities(self.fit, self.pressure_Pa)[number])
+        return _u(self.covariance, sensitivities(self.fit, self.load_N)[number])
 
     def effective_dof(self, number: str) -> float:
         """Welch and Satterthwaite (GUM, G.4): type B components have infinitely many."""
-        type_a = _u(self.fit.covariance, sensitivities(self.fit, self.pressure_Pa)[number])
+        type_a = _u(self.fit.covariance, sensitivities(self.fit, self.load_N)[number])
         if type_a == 0:
             return float("inf")
         return self.fit.dof * (self.standard_uncertainty(number) / type_a) ** 4
@@ -104,46 +100,90 @@ class Budget:
         """The component with the largest share in a number."""
         return max(self.components, key=lambda component: component.u[number])
 
-    def combined(self) -> CombinedFit:
+    def combined(self) -> LawFit:
         """The fit with the combined covariance, and the component that dominates each number."""
         largest = {}
-        for number, key in {"mu": "mu", "tau0_kPa": "tau0_Pa", "T_N": "T"}.items():
+        for number in sensitivities(self.fit, self.load_N):
             top = self.dominant(number)
+            key = {"tau0_kPa": "tau0_Pa", "T_N": "T"}.get(number, number)
             largest[key] = (top.name, self.share_pct(top, number))
-        own = {f.name: getattr(self.fit, f.name) for f in fields(self.fit)}
-        return CombinedFit(**own | {"covariance": self.covariance}, type_a=self.fit.covariance, largest=largest)
+        return replace(
+            self.fit, covariance=self.covariance, type_a=self.fit.covariance, largest=largest, alone=self.fit.by_itself
+        )
 
     def table(self) -> pd.DataFrame:
         """One row per component and a last one "combined": type, dof, origin, u_NUMBER, share_pct_NUMBER."""
         import pandas as pd
 
-        combined = {number: self.standard_uncertainty(number) for number in NUMBERS}
+        numbers = tuple(sensitivities(self.fit, self.load_N))
+        combined = {number: self.standard_uncertainty(number) for number in numbers}
         last = Component("combined", "", combined, float("nan"), "")
         return pd.DataFrame(
             {
                 "component": c.name,
                 "type": c.kind,
-                **{f"u_{number}": c.u[number] for number in NUMBERS},
-                **{f"share_pct_{number}": self.share_pct(c, number) for number in NUMBERS},
+                **{f"u_{number}": c.u[number] for number in numbers},
+                **{f"share_pct_{number}": self.share_pct(c, number) for number in numbers},
                 "dof": c.dof,
                 "origin": c.origin,
             }
             for c in (*self.components, last)
         )
 
-    def text(self) -> str:
-        """The largest components, in one sentence."""
-        said = []
-        for number in NUMBERS:
-            top = self.dominant(number)
-            share = self.share_pct(top, number)
-            said.append(f"{label(number, self.pressure_Pa)}, {top.name} ({share:.0f} % of the variance)")
-        return f"{self.fit.sample}, {self.fit.regime}: largest component for {'; for '.join(said)}."
+
+def combined_fits(ingested: Ingested, fits: tuple[LawFit, ...], *, weights: str = "relative") -> Fits:
+    """The fits with their combined uncertainty; those without values as they are.
+
+    Parameters
+    ----------
+    ingested : the campaign with its pulls
+    fits : those of :func:`tribo.fitting.fit_samples`, by the tests of each sample alone
+    weights : the weights of these fits
+    """
+    budgets = campaign_budgets(ingested, fits, weights=weights) if fits else ()
+    combined = {(b.fit.sample, b.fit.regime): b.combined() for b in budgets}
+    return Fits(combined.get((fit.sample, fit.regime), fit) for fit in fits)
 
 
-def label(number: str, pressure_Pa: float) -> str:
-    """A number in words: mu, tau0, T at 10 kPa."""
-    return {"mu": "mu", "tau0_kPa": "tau0", "T_N": f"T at {pressure_Pa / 1e3:g} kPa"}[number]
+def campaign_budgets(
+    ingested: Ingested,
+    fits: tuple[LawFit, ...],
+    *,
+    weights: str = "relative",
+    load_N: float | None = None,
+) -> tuple[Budget, ...]:
+    """Budgets of all ``fits`` that hold values, rise and sampling rate taken from pulls and traces.
+
+    The covariance of specimens is partly pooled over the samples first. T is judged at ``load_N``; where that is not
+    given, at a pressure of 10 kPa, or without a nominal area at the middle load of the campaign.
+    """
+    table, campaign = ingested.table(), ingested.campaign
+    if load_N is None:
+        middle = float(np.median([test.normal_load_N for test in campaign.tests]))
+        load_N = PRESSURE_PA * campaign.area_m2 if campaign.has_area else middle
+    usable = tuple(fit.by_itself for fit in fits if np.isfinite(fit.by_itself.covariance).all())
+    rate = [1 / float(np.median(np.diff(t.time_s))) for t in ingested.traces.values() if len(t.time_s) > 1]
+    stated = campaign.instrument.get("sampling_rate_Hz", float(np.median(rate)) if rate else float("nan"))
+    rises: dict[str, list[float]] = {}
+    for test in campaign.tests:
+        if (pull := ingested.pulls.get(test.test_id)) is not None and np.isfinite(pull.rise_N_per_s):
+            rises.setdefault(test.sample, []).append(pull.rise_N_per_s)
+    rise = {sample: float(np.median(values)) for sample, values in rises.items()}
+    found = []
+    for regime in dict.fromkeys(fit.regime for fit in usable):
+        rows = {r.sample: r for r in sample_rows(table, regime)}
+        own = tuple(fit for fit in usable if fit.regime == regime)
+        for before, after in zip(own, partly_pooled(own, rows), strict=True):
+            fit = replace(after, alone=before)
+            if after is before and len(before.specimens) > 1:  # of a single sample, at least what its repeats explain
+                fit = at_least(fit, _within(rows[fit.sample], fit, weights)[0])
+            found.append(
+                uncertainty_budget(
+                    table, fit, campaign.instrument, weights=weights, sampling_rate_Hz=stated, load_N=load_N,
+                    rise_N_per_s=rise.get(fit.sample, float("nan")),
+                )
+            )  # fmt: skip
+    return tuple(found)
 
 
 def uncertainty_budget(
@@ -154,98 +194,65 @@ def uncertainty_budget(
     weights: str = "relative",
     rise_N_per_s: float = float("nan"),
     sampling_rate_Hz: float = float("nan"),
-    pressure_Pa: float = PRESSURE_PA,
+    load_N: float | None = None,
 ) -> Budget:
     """Budget of one fit of ``fit_samples(table, ..., weights=weights)``.
 
-    ``instrument`` holds the settings of campaign.toml (standard uncertainties, k = 1); what it lacks is taken
-    from :data:`DEFAULTS`. ``rise_N_per_s`` is the slope of the force before the peak and ``sampling_rate_Hz``
-    f_s, together the sampling clip of static friction: a peak between two samples is read low by up to
-    rise/(2 f_s) = k v/(2 f_s), taken as rectangular about zero because it is not corrected.
+    Parameters
+    ----------
+    table : that of ``Ingested.table()``
+    fit : the fitted law; its covariance is the type A part
+    instrument : settings of campaign.toml (standard uncertainties, k = 1); what it lacks is taken from ``DEFAULTS``
+    weights : of the fit
+    rise_N_per_s, sampling_rate_Hz : slope of the force before the peak, and f_s
+        Together the sampling clip of static friction: a peak between two samples is read low by up to
+        rise/(2 f_s) = k v/(2 f_s), taken as rectangular about zero because it is not corrected.
+    load_N : where T is judged; a pressure of 10 kPa where it is not given
 
     Raises
     ------
     FitError
-        The fit is not of the law T = mu N + tau0 A, or holds no values.
+        The fit is not of T over the load, or holds no values.
     """
-    if fit.law != LAW.name or not np.isfinite(fit.covariance).all():
+    law = law_over_load(fit.nominal_area_m2).name
+    if fit.law != law or not np.isfinite(fit.covariance).all():
         found = f"{fit.law}, sample {fit.sample}"
-        raise FitError(Problem("no_budget", "a budget needs a fitted law", found=found, allowed=LAW.name))
+        raise FitError(Problem("no_budget", "a budget needs a fitted law", found=found, allowed=law))
     rows = next(r for r in sample_rows(table, fit.regime) if r.sample == fit.sample)
-    random, notes = _type_a(rows, fit, weights, pressure_Pa)
+    if load_N is None:
+        load_N = PRESSURE_PA * fit.nominal_area_m2 if fit.nominal_area_m2 else float(np.median(rows.load_N))
+    by = sensitivities(fit, load_N)
+    random, notes = _type_a(rows, fit, weights, by)
     changes = _type_b(fit, instrument, rise_N_per_s, sampling_rate_Hz)
     if fit.regime == "static" and not np.isfinite(rise_N_per_s * sampling_rate_Hz):
         notes += ("component sampling clip left out: the rise before the peak or the sampling rate is not known",)
-    by = sensitivities(fit, pressure_Pa)
     shared = tuple(
         Component(name, "B", {k: abs(float(s @ change)) for k, s in by.items()}, float("inf"), origin)
         for name, change, origin in changes
     )
     common = sum((np.outer(change, change) for _, change, _ in changes), np.zeros((2, 2)))
-    return Budget(fit, (*random, *shared), fit.covariance + common, pressure_Pa, notes)
+    return Budget(fit, (*random, *shared), fit.covariance + common, load_N, notes)
 
 
-def campaign_budgets(
-    ingested: Ingested,
-    fits: tuple[LawFit, ...],
-    *,
-    weights: str = "relative",
-    pressure_Pa: float = PRESSURE_PA,
-) -> tuple[Budget, ...]:
-    """Budgets of all ``fits`` that hold values, rise and sampling rate taken from pulls and traces.
-
-    The covariance of specimens is partly pooled over the samples first.
-    """
-    table = ingested.table()
-    fits = _partly_pooled(table, tuple(fit for fit in fits if np.isfinite(fit.covariance).all()), weights)
-    rate = [1 / float(np.median(np.diff(t.time_s))) for t in ingested.traces.values() if len(t.time_s) > 1]
-    instrument = ingested.campaign.instrument
-    stated = instrument.get("sampling_rate_Hz", float(np.median(rate)) if rate else float("nan"))
-    rises: dict[str, list[float]] = {}
-    for test in ingested.campaign.tests:
-        if (pull := ingested.pulls.get(test.test_id)) is not None and np.isfinite(pull.rise_N_per_s):
-            rises.setdefault(test.sample, []).append(pull.rise_N_per_s)
-    rise = {sample: float(np.median(values)) for sample, values in rises.items()}
-    return tuple(
-        uncertainty_budget(
-            table, fit, instrument, weights=weights, sampling_rate_Hz=stated, pressure_Pa=pressure_Pa,
-            rise_N_per_s=rise.get(fit.sample, float("nan")),
-        )
-        for fit in fits
-    )  # fmt: skip
-
-
-def _partly_pooled(table: pd.DataFrame, fits: tuple[LawFit, ...], weights: str) -> tuple[LawFit, ...]:
-    """Of a single sample, the scatter of specimens is at least what its repeats explain."""
-    found: list[LawFit] = []
-    for regime in dict.fromkeys(fit.regime for fit in fits):
-        rows = {r.sample: r for r in sample_rows(table, regime)}
-        own = tuple(fit for fit in fits if fit.regime == regime)
-        for before, fit in zip(own, partly_pooled(own, rows), strict=True):
-            alone = fit is before and len(fit.specimens) > 1
-            found.append(at_least(fit, _within(rows[fit.sample], fit, weights)[0]) if alone else fit)
-    return tuple(found)
-
-
-def sensitivities(fit: LawFit, pressure_Pa: float) -> dict[str, FloatArray]:
-    """Derivatives (2,) of mu, tau0_kPa and T_N by (mu, tau0_Pa)."""
+def sensitivities(fit: LawFit, load_N: float) -> dict[str, FloatArray]:
+    """Derivatives (2,) of mu, tau0_kPa (T0_N without an area) and T_N by the parameters."""
     area = fit.nominal_area_m2
-    return {
-        "mu": np.array([1.0, 0.0]),
-        "tau0_kPa": np.array([0.0, 1e-3]),
-        "T_N": np.array([pressure_Pa * area, area]),
-    }
+    if area is None:
+        return {"mu": np.array([1.0, 0.0]), "T0_N": np.array([0.0, 1.0]), "T_N": np.array([load_N, 1.0])}
+    return {"mu": np.array([1.0, 0.0]), "tau0_kPa": np.array([0.0, 1e-3]), "T_N": np.array([load_N, area])}
 
 
 def _u(covariance: FloatArray, by: FloatArray) -> float:
     return float(np.sqrt(max(float(by @ covariance @ by), 0.0)))
 
 
-def _type_a(rows: Rows, fit: LawFit, weights: str, pressure_Pa: float) -> tuple[tuple[Component, ...], tuple[str, ...]]:
+def _type_a(
+    rows: Rows, fit: LawFit, weights: str, sensitivity: Mapping[str, FloatArray]
+) -> tuple[tuple[Component, ...], tuple[str, ...]]:
     pulls, read, dof = _within(rows, fit, weights)
     u: dict[str, dict[str, float]] = {"specimens": {}, "repeats": {}, "reading": {}}
     capped = False
-    for number, by in sensitivities(fit, pressure_Pa).items():
+    for number, by in sensitivity.items():
         total, repeats, reading = (_u(c, by) ** 2 for c in (fit.covariance, pulls, read))
         capped |= repeats > total
         repeats, reading = min(repeats, total), min(reading, repeats, total)
@@ -266,14 +273,14 @@ def _type_a(rows: Rows, fit: LawFit, weights: str, pressure_Pa: float) -> tuple[
 
 
 def _within(rows: Rows, fit: LawFit, weights: str) -> tuple[FloatArray, FloatArray, int]:
-    """Covariance of (mu, tau0_Pa) that pulls, and that readings alone, would give the mean over specimens."""
+    """Covariance of the parameters that pulls, and that readings alone, would give the mean over specimens."""
     weight = weights_of(rows, fit.nominal_area_m2, weights)
     pulls, reading, dof, count = np.zeros((2, 2)), np.zeros((2, 2)), 0, 0
     for name in rows.specimens:
         own = rows.specimen == name
         if len(np.unique(rows.load_N[own])) < 2:
             continue
-        design = LAW.design_matrix(rows.load_N[own], fit.nominal_area_m2)
+        design = design_over_load(rows.load_N[own], fit.nominal_area_m2)
         line = least_squares(design, rows.force_N[own], weight[own])
         by_pull = line.unscaled @ (design * weight[own, None]).T
         reading += (by_pull * np.nan_to_num(rows.u_N[own]) ** 2) @ by_pull.T
@@ -286,13 +293,17 @@ def _within(rows: Rows, fit: LawFit, weights: str) -> tuple[FloatArray, FloatArr
 def _type_b(
     fit: LawFit, instrument: Mapping[str, float], rise_N_per_s: float, sampling_rate_Hz: float
 ) -> list[tuple[str, FloatArray, str]]:
-    """(name, change (2,) of (mu, tau0_Pa) by one standard uncertainty, origin) of what all pulls share."""
-    mu, tau0_Pa = fit.values
+    """(name, change (2,) of the parameters by one standard uncertainty, origin) of what all pulls share."""
+    mu, adhesion = fit.values
     area = fit.nominal_area_m2
-    settings = {name: float(instrument.get(name, default.value)) for name, default in DEFAULTS.items()}
-    gain, as_adhesion = np.array([mu, tau0_Pa]), np.array([0.0, 1 / area])
+    settings = {name: float(instrument.get(name, value)) for name, (value, _) in DEFAULTS.items()}
+    gain, as_adhesion = np.array([mu, adhesion]), np.array([0.0, 1.0 if area is None else 1 / area])
     mass_N = settings["mass_u_g"] * 1e-3 * STANDARD_GRAVITY
     settings["area_u_percent"] *= fit.has_area
+    angle = np.radians(settings["wire_angle_deg"])
+    # relative change of T by one standard uncertainty of the wire angle: T falls as 1/(cos f + mu sin f)
+    slope = (mu * np.cos(angle) - np.sin(angle)) / (np.cos(angle) + mu * np.sin(angle))
+    wire = float(slope * np.radians(settings["wire_angle_u_deg"]))
     effects = [
         ("load cell, gain", gain * settings["load_cell_u_percent"] / 100, "load_cell_u_percent"),
         ("load cell, offset", as_adhesion * settings["load_cell_u_N"], "load_cell_u_N"),
@@ -302,8 +313,8 @@ def _type_b(
             np.array([mu, 0.0]) * settings["normal_load_u_percent"] / 100,
             "normal_load_u_percent",
         ),
-        ("nominal area", np.array([0.0, tau0_Pa]) * settings["area_u_percent"] / 100, "area_u_percent"),
-        ("wire angle", gain * _wire(mu, settings), "wire_angle_u_deg"),
+        ("nominal area", np.array([0.0, adhesion]) * settings["area_u_percent"] / 100, "area_u_percent"),
+        ("wire angle", gain * wire, "wire_angle_u_deg"),
     ]
     changes = [(name, change, _origin(setting, instrument)) for name, change, setting in effects]
     low_N = rise_N_per_s / (2 * sampling_rate_Hz)
@@ -313,14 +324,99 @@ def _type_b(
     return changes
 
 
-def _wire(mu: float, settings: Mapping[str, float]) -> float:
-    """Relative change of T by one standard uncertainty of the wire angle: T falls as 1/(cos f + mu sin f)."""
-    angle = np.radians(settings["wire_angle_deg"])
-    slope = (mu * np.cos(angle) - np.sin(angle)) / (np.cos(angle) + mu * np.sin(angle))
-    return float(slope * np.radians(settings["wire_angle_u_deg"]))
-
-
 def _origin(setting: str, instrument: Mapping[str, float]) -> str:
     if setting in instrument:
         return f"campaign.toml: {setting} = {instrument[setting]:g}"
-    return f"default {setting} = {DEFAULTS[setting].value:g}: {DEFAULTS[setting].reason}"
+    value, reason = DEFAULTS[setting]
+    return f"default {setting} = {value:g}: {reason}"
+
+
+def partly_pooled(
+    fits: tuple[LawFit, ...], rows: Mapping[str, Rows], prior_dof: float = PRIOR_DOF
+) -> tuple[LawFit, ...]:
+    """The fits of one regime with the covariance of their specimens moved towards the mean of all samples.
+
+    ``fits`` are those of ``fit_samples``, ``rows`` the tests of each sample. What is averaged is the covariance of T at
+    the lowest and at the highest load, relative to the sample's own forces. Where a sample scatters more than it,
+    ``dof`` becomes ``prior_dof`` plus that of the sample, at most that of all specimens together. Where it scatters
+    less, it gets the mean with all degrees of freedom; no covariance is smaller than the mean in any combination of mu
+    and tau0. A sample of one specimen gets the mean of the others, so that its interval applies to the pattern. Samples
+    without values, with a force that is not positive, or without another sample to compare with, keep their own
+    covariance.
+    """
+    shares = {f.sample: s for f in fits if (s := _shares(f, rows[f.sample])) is not None}
+    several = [f for f in fits if f.sample in shares and len(f.specimens) > 1]
+    if not several or len(shares) < 2:
+        return fits
+    freedom = np.array([len(f.specimens) - 1.0 for f in several])
+    covariances = np.array([np.cov(shares[f.sample], rowvar=False) for f in several])
+    mean = np.einsum("s,sij->ij", freedom, covariances) / freedom.sum()
+    most = degrees_of_freedom(several)
+    found = []
+    for fit in fits:
+        if fit.sample not in shares:
+            found.append(fit)
+            continue
+        own = shares[fit.sample]
+        forces = _end_forces(fit, rows[fit.sample])
+        inverse = np.linalg.inv(forces / (forces @ fit.values)[:, None])
+        scatter, dof = _believed(own, mean, prior_dof, most)
+        moved = replace(
+            fit,
+            covariance=inverse @ scatter @ inverse.T / len(own),
+            dof=dof,
+            method=f"{fit.method}; scatter of specimens partly pooled over samples",
+            notes=tuple(note for note in fit.notes if note != ONE_SPECIMEN),
+        )
+        found.append(at_least(moved, inverse @ mean @ inverse.T / len(own)))
+    return tuple(found)
+
+
+def _believed(shares: FloatArray, mean: FloatArray, prior: float, most: float) -> tuple[FloatArray, float]:
+    """The scatter that is taken for the specimens of one sample, and its degrees of freedom."""
+    own = len(shares) - 1.0
+    if own == 0:
+        return mean, min(prior, most)
+    scatter = np.cov(shares, rowvar=False)
+    if np.trace(scatter) < np.trace(mean):
+        return mean, most
+    return (prior * mean + own * scatter) / (prior + own), min(prior + own, most)
+
+
+def _end_forces(fit: LawFit, rows: Rows) -> FloatArray:
+    """(2, 2) that takes the parameters to T at the lowest and the highest load."""
+    loads = rows.load_N[rows.load_N > 0]
+    return design_over_load(np.array([loads.min(), loads.max()]), fit.nominal_area_m2)
+
+
+def _shares(fit: LawFit, rows: Rows) -> FloatArray | None:
+    """T of each specimen at both loads over that of the sample, (G, 2); None where there is nothing to compare."""
+    if not fit.specimens or not np.isfinite(fit.values).all():
+        return None
+    forces = _end_forces(fit, rows)
+    own = forces @ fit.values
+    return np.array(list(fit.specimens.values())) @ forces.T / own if (own > 0).all() else None
+
+
+def at_least(fit: LawFit, floor: FloatArray) -> LawFit:
+    """The fit with a covariance that is in no combination of its parameters smaller than ``floor`` (2, 2).
+
+    A floor without a width in some combination changes nothing.
+    """
+    if not np.linalg.det(floor) > ROUNDING * np.prod(np.diagonal(floor)):
+        return fit
+    root = np.linalg.cholesky(floor)
+    inverse = np.linalg.inv(root)
+    sizes, axes = np.linalg.eigh(inverse @ fit.covariance @ inverse.T)
+    whole = root @ axes
+    return replace(fit, covariance=whole @ np.diag(np.maximum(sizes, 1.0)) @ whole.T)
+
+
+def degrees_of_freedom(fits: list[LawFit]) -> float:
+    """Specimens less samples, samples that share specimens (one pattern pulled two ways) taken as one."""
+    groups: list[set[str]] = []
+    for fit in fits:
+        names = set(fit.specimens)
+        joined = [g for g in groups if g & names]
+        groups = [g for g in groups if not g & names] + [names.union(*joined)]
+    return float(sum(len(g) - 1 for g in groups))

@@ -1,14 +1,12 @@
-"""Difference between two samples measured on the same specimens, such as one pattern pulled along x and along y.
+"""Differences between samples: those on the same specimens, and those that a campaign could have detected.
 
-Properties of a specimen (thickness, cut, glue) affect both of its laws and cancel in their difference. The mean of the
-differences is therefore known better than the difference of two independent means. The scatter of the differences over
-G specimens gives its interval by t(G-1).
+Properties of a specimen (thickness, cut, glue) affect both laws of a sample that is pulled two ways, such as one
+pattern along x and along y, and cancel in their difference. The mean of the differences is therefore known better than
+the difference of two independent means. The scatter of the differences over G specimens gives its interval by t(G-1).
 
-Smallest difference between two samples that a campaign can detect, and the tests needed for a given difference.
-
-Two samples are compared by the two-sided t test of their specimens' means, the power by the noncentral t
-distribution (Cohen, Statistical Power Analysis for the Behavioral Sciences, 1988). The scatter of specimens
-and of repeats is pooled over the samples of the campaign: three specimens are too few to determine it.
+The power to detect a difference between two samples is that of the two-sided t test of their specimens' means, by the
+noncentral t distribution (Cohen, Statistical Power Analysis for the Behavioral Sciences, 1988). The scatter of
+specimens and of repeats is pooled over the samples of the campaign: three specimens are too few to determine it.
 """
 
 from __future__ import annotations
@@ -24,10 +22,10 @@ import numpy as np
 
 from tribo.display import displayed
 from tribo.errors import FitError, Problem
-from tribo.fitting.budget import NUMBERS, PRESSURE_PA, label, sensitivities
+from tribo.fitting.budget import NUMBERS, PRESSURE_PA, sensitivities
 from tribo.fitting.linear import Rows, least_squares, sample_rows, weights_of
 from tribo.fitting.samples import fit_samples
-from tribo.laws import LAWS
+from tribo.laws import design_over_load
 from tribo.records import FloatArray, LawFit, Regime
 
 if TYPE_CHECKING:
@@ -76,26 +74,25 @@ def paired_differences(fits: Iterable[LawFit], *, pressure_Pa: float = PRESSURE_
     """Differences between every two samples that share two specimens or more, by regime and number.
 
     Specimens are the same if their names in tests.csv are. Type B uncertainties that all pulls share (load cell,
-    area) change both samples alike; they scale the difference and are not in its interval.
+    area) change both samples alike; they scale the difference and are not in its interval. ``fits`` are those of a
+    campaign with a nominal area.
     """
     usable = [fit for fit in fits if len(fit.specimens) >= _FEWEST and fit.parameters == ("mu", "tau0_Pa")]
-    return tuple(
-        _difference(one, other, number, pressure_Pa)
-        for one, other in combinations(usable, 2)
-        if one.regime == other.regime and one.sample != other.sample and len(_shared(one, other)) >= _FEWEST
-        for number in NUMBERS
-    )
+    found = []
+    for one, other in combinations(usable, 2):
+        shared = tuple(name for name in one.specimens if name in other.specimens)
+        if one.regime == other.regime and one.sample != other.sample and len(shared) >= _FEWEST:
+            found += [_difference(one, other, number, pressure_Pa, shared) for number in NUMBERS]
+    return tuple(found)
 
 
-def _shared(one: LawFit, other: LawFit) -> tuple[str, ...]:
-    return tuple(name for name in one.specimens if name in other.specimens)
-
-
-def _difference(one: LawFit, other: LawFit, number: str, pressure_Pa: float) -> PairedDifference:
+def _difference(
+    one: LawFit, other: LawFit, number: str, pressure_Pa: float, shared: tuple[str, ...]
+) -> PairedDifference:
     from scipy.stats import t
 
-    shared = _shared(one, other)
-    row = sensitivities(one, pressure_Pa)[number]
+    assert one.nominal_area_m2 is not None
+    row = sensitivities(one, pressure_Pa * one.nominal_area_m2)[number]
     first, second = (np.array([row @ fit.specimens[name] for name in shared]) for fit in (one, other))
     apart = first - second
     mean, dof = float(apart.mean()), float(len(shared) - 1)
@@ -118,20 +115,8 @@ def differences_table(differences: Iterable[PairedDifference]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*columns, "specimens"])
 
 
-LAW = LAWS["coulomb_adhesion"]
 MOST_SPECIMENS = 100
 MOST_REPEATS = 50
-
-
-@dataclass(frozen=True)
-class TwoSidedTest:
-    """A two-sided t test: its level, and the probability with which a difference is to be found."""
-
-    level: float = 0.05
-    power: float = 0.8
-
-
-TEST = TwoSidedTest()
 
 
 @dataclass(frozen=True)
@@ -181,6 +166,11 @@ class Power:
         )
 
 
+def label(number: str, pressure_Pa: float) -> str:
+    """A number in words: mu, tau0, T at 10 kPa."""
+    return {"mu": "mu", "tau0_kPa": "tau0", "T_N": f"T at {pressure_Pa / 1e3:g} kPa"}[number]
+
+
 def power_of_campaign(
     table: pd.DataFrame,
     regime: Regime,
@@ -188,12 +178,13 @@ def power_of_campaign(
     *,
     weights: str = "relative",
     wanted_pct: float = 10.0,
-    test: TwoSidedTest = TEST,
-    pressure_Pa: float = PRESSURE_PA,
+    level: float = 0.05,
+    power: float = 0.8,
 ) -> tuple[Power, ...]:
-    """Power for mu, tau0 and T at ``pressure_Pa`` of the campaign in ``table`` (as for ``fit_samples``).
+    """Power for mu, tau0 and T at 10 kPa of the campaign in ``table`` (as for ``fit_samples``).
 
-    A difference counts as found where the two-sided t ``test`` finds it; ``wanted_pct`` is the one to plan for.
+    A difference counts as found where the two-sided t test at ``level`` finds it with probability ``power``;
+    ``wanted_pct`` is the one to plan for.
 
     Raises
     ------
@@ -209,23 +200,43 @@ def power_of_campaign(
         what = "the scatter between specimens cannot be determined"
         raise FitError(Problem("too_few_specimens", what, allowed="at least one sample with two or more specimens"))
     rows = {r.sample: r for r in sample_rows(table, regime)}
-    within = [_one_pull_covariance(rows[fit.sample], fit, weights) for fit in fits]
-    repeats = float(np.mean([w.repeats for w in within]))
+    covariances, pulls_at_a_load = zip(*(_of_one_pull(rows[fit.sample], fit, weights) for fit in fits), strict=True)
+    repeats = float(np.mean(pulls_at_a_load))
     specimens = float(np.mean([len(fit.specimens) for fit in fits]))
+    dof = np.array([fit.dof for fit in fits])
+    wanted = wanted_pct / 100
     powers = []
-    for number in NUMBERS:
-        scatter = _pooled(fits, within, number, pressure_Pa, repeats)
-        smallest = smallest_difference(scatter.specimen_mean_sd(repeats), specimens, test.level, test.power)
+    for number in NUMBERS:  # T and mu scatter by shares, tau0 by kPa
+        by = [sensitivities(fit, PRESSURE_PA * nominal_area_m2)[number] for fit in fits]
+        size = np.array([abs(float(b @ fit.values)) for b, fit in zip(by, fits, strict=True)])
+        reference = float(size.mean())
+        unit = np.full(len(fits), reference) if number == "tau0_kPa" else size
+        seen = np.array([float(b @ fit.covariance @ b) * len(fit.specimens) for b, fit in zip(by, fits, strict=True)])
+        pulls = np.array([float(b @ covariance @ b) for b, covariance in zip(by, covariances, strict=True)])
+        total = float(dof @ (seen / unit**2) / dof.sum())
+        repeat = float(dof @ (pulls / unit**2) / dof.sum())
+        specimen_sd, repeat_sd = float(np.sqrt(max(total - repeat / repeats, 0.0))), float(np.sqrt(repeat))
+
+        sd = (specimen_sd, repeat_sd)
+        more_specimens = _fewest(
+            range(2, MOST_SPECIMENS + 1), lambda g, sd=sd: _smallest(sd, g, repeats, level, power) <= wanted
+        )
+        more_repeats = _fewest(
+            range(1, MOST_REPEATS + 1), lambda r, sd=sd: _smallest(sd, specimens, r, level, power) <= wanted
+        )
         powers.append(
             Power(
-                regime, number, scatter.reference, specimens, repeats,
-                100 * scatter.specimen_sd, 100 * scatter.repeat_sd, 100 * smallest, wanted_pct,
-                _specimens_needed(scatter, repeats, wanted_pct / 100, test),
-                _repeats_needed(scatter, specimens, wanted_pct / 100, test),
-                test.level, test.power, pressure_Pa,
+                regime, number, reference, specimens, repeats, 100 * specimen_sd, 100 * repeat_sd,
+                100 * _smallest(sd, specimens, repeats, level, power), wanted_pct, more_specimens, more_repeats, level,
+                power, PRESSURE_PA,
             )
         )  # fmt: skip
     return tuple(powers)
+
+
+def _smallest(sd: tuple[float, float], specimens: float, repeats: float, level: float, power: float) -> float:
+    """The smallest difference found, by the scatter of specimens and that of one pull at each load."""
+    return smallest_difference(float(np.sqrt(sd[0] ** 2 + sd[1] ** 2 / repeats)), specimens, level, power)
 
 
 def smallest_difference(sd: float, specimens: float, level: float = 0.05, power: float = 0.8) -> float:
@@ -249,68 +260,22 @@ def _noncentrality(dof: float, level: float, power: float) -> float:
     return float(brentq(lambda shift: float(nct.sf(critical, dof, shift)) - power, 0.0, 10 * critical + 10))
 
 
-@dataclass(frozen=True)
-class _WithinSpecimen:
-    """Mean covariance (2, 2) of one specimen's (mu, tau0_Pa) with one pull per load; mean pulls at a load."""
-
-    covariance: FloatArray
-    repeats: float
-
-
-def _one_pull_covariance(rows: Rows, fit: LawFit, weights: str) -> _WithinSpecimen:
+def _of_one_pull(rows: Rows, fit: LawFit, weights: str) -> tuple[FloatArray, float]:
+    """Mean covariance (2, 2) of one specimen's parameters with one pull per load; mean number of pulls at a load."""
     weight = weights_of(rows, fit.nominal_area_m2, weights)
     covariances, repeats = [], []
     for name in fit.specimens:
         own = rows.specimen == name
-        design = LAW.design_matrix(rows.load_N[own], fit.nominal_area_m2)
+        design = design_over_load(rows.load_N[own], fit.nominal_area_m2)
         line = least_squares(design, rows.force_N[own], weight[own])
         repeats.append(own.sum() / len(np.unique(rows.load_N[own])))
         if line.dof:
             covariances.append(line.covariance * repeats[-1])
     covariance = np.mean(covariances, axis=0) if covariances else np.zeros((2, 2))
-    return _WithinSpecimen(covariance, float(np.mean(repeats)))
+    return covariance, float(np.mean(repeats))
 
 
-@dataclass(frozen=True)
-class _Scatter:
-    reference: float
-    specimen_sd: float
-    repeat_sd: float
-
-    def specimen_mean_sd(self, repeats: float) -> float:
-        """Standard deviation of one specimen's number with ``repeats`` pulls at each load."""
-        return float(np.sqrt(self.specimen_sd**2 + self.repeat_sd**2 / repeats))
-
-
-def _pooled(
-    fits: list[LawFit], within: list[_WithinSpecimen], number: str, pressure_Pa: float, repeats: float
-) -> _Scatter:
-    """Pooled over samples, as shares of the mean |number|: T and mu scatter by shares, tau0 by kPa."""
-    by = [sensitivities(fit, pressure_Pa)[number] for fit in fits]
-    size = np.array([abs(float(b @ fit.values)) for b, fit in zip(by, fits, strict=True)])
-    reference = float(size.mean())
-    unit = np.full(len(fits), reference) if number == "tau0_kPa" else size
-    dof = np.array([fit.dof for fit in fits])
-    seen = np.array([float(b @ fit.covariance @ b) * len(fit.specimens) for b, fit in zip(by, fits, strict=True)])
-    pulls = np.array([float(b @ w.covariance @ b) for b, w in zip(by, within, strict=True)])
-    total = float(dof @ (seen / unit**2) / dof.sum())
-    repeat = float(dof @ (pulls / unit**2) / dof.sum())
-    return _Scatter(reference, float(np.sqrt(max(total - repeat / repeats, 0.0))), float(np.sqrt(repeat)))
-
-
-def _specimens_needed(scatter: _Scatter, repeats: float, wanted: float, test: TwoSidedTest) -> int | None:
-    sd = scatter.specimen_mean_sd(repeats)
-    return _fewest(lambda g: smallest_difference(sd, g, test.level, test.power) <= wanted, range(2, MOST_SPECIMENS + 1))
-
-
-def _repeats_needed(scatter: _Scatter, specimens: float, wanted: float, test: TwoSidedTest) -> int | None:
-    def enough(repeats: int) -> bool:
-        return smallest_difference(scatter.specimen_mean_sd(repeats), specimens, test.level, test.power) <= wanted
-
-    return _fewest(enough, range(1, MOST_REPEATS + 1))
-
-
-def _fewest(enough: Callable[[int], bool], counts: range) -> int | None:
+def _fewest(counts: range, enough: Callable[[int], bool]) -> int | None:
     """The first count that is enough, by bisection: what is enough stays so with more."""
     at = bisect_left(counts, True, key=enough)
     return counts[at] if at < len(counts) else None

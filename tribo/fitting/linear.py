@@ -1,14 +1,7 @@
-"""Loads that scatter but were meant to be one.
+"""Weighted linear least squares of the tests of a sample: rows that a fit may use, their weights, the fit itself.
 
-The rows a fit may use, checked once, as plain arrays.
-
-Weighted linear least squares: the one place where the normal algebra of a fit is done.
-
-Scatter of repeats as a function of force: the variance function Var T = s0^2 + (c T)^2, estimated from repeats.
-
-Weights of the least-squares fit, from an assumption about the scatter of repeats.
-
-The law is always T = mu N + tau0 A. The choices differ in the scatter that is assumed constant over the loads:
+Weights come from an assumption about the scatter of repeats. The law is always T = mu N + tau0 A. The choices differ in
+the scatter that is assumed constant over the loads:
 
 "relative"  the coefficient of variation of T: weights 1/T^2, with T from the fit itself (the default)
 "ratio"     the scatter of T/N: weights 1/N^2, the fit T/N = mu + tau0/p of the paper's Fig. 4
@@ -25,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.errors import FitError, Problem
-from tribo.laws import LAWS
+from tribo.laws import design_over_load
 from tribo.records import FloatArray, Regime
 
 if TYPE_CHECKING:
@@ -177,7 +170,7 @@ def _rank_problem(rows: int, columns: int) -> Problem:
     )
 
 
-_ROUNDS = 20
+_ROUNDS_OF_SCATTER = 20
 _ROUNDING = 1e-24  # relative variance that rounding alone gives
 _TOO_FAR = 1e-3  # a cell of repeats that chance gives so rarely holds an outlier and does not count
 
@@ -209,7 +202,7 @@ def repeat_scatter(samples: tuple[Rows, ...]) -> RepeatScatter | None:
     limit = chi2.isf(_TOO_FAR, dof) / dof
     terms = np.array([0.0, float((dof * variance).sum() / (dof * mean**2).sum())])
     keep = np.ones(len(dof), dtype=bool)
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS_OF_SCATTER):
         expected = terms[0] + terms[1] * mean**2
         keep = variance <= limit * expected
         terms = _not_negative(mean[keep] ** 2, variance[keep], dof[keep] / expected[keep] ** 2)
@@ -248,11 +241,11 @@ WEIGHTS: dict[str, str] = {
     "force": "constant scatter of T",
     "repeats": "scatter of T estimated from repeats",
 }
-_ROUNDS_WEIGHTING = 4  # the weights move the fit by less than its error, and the fit moves the weights by far less
+_ROUNDS_OF_WEIGHTS = 4  # the weights move the fit by less than its error, and the fit moves the weights by far less
 _SMALLEST_SHARE = 0.05  # of the median force: where the fitted force nears zero its weight must not diverge
 
 
-def weights_of(rows: Rows, nominal_area_m2: float, weights: str) -> FloatArray:
+def weights_of(rows: Rows, nominal_area_m2: float | None, weights: str) -> FloatArray:
     """Weights (n,) in 1/N^2, shared by all specimens of a sample so that none gets its own.
 
     Raises
@@ -277,12 +270,12 @@ def weights_of(rows: Rows, nominal_area_m2: float, weights: str) -> FloatArray:
     raise FitError(Problem("unknown_weights", "unknown weights", found=weights, allowed=allowed))
 
 
-def expected_force_N(rows: Rows, nominal_area_m2: float) -> FloatArray:
+def expected_force_N(rows: Rows, nominal_area_m2: float | None) -> FloatArray:
     """Force (n,) of the sample's line at each load, kept above a share of the median force."""
-    design = LAWS["coulomb_adhesion"].design_matrix(rows.load_N, nominal_area_m2)
+    design = design_over_load(rows.load_N, nominal_area_m2)
     floor = _SMALLEST_SHARE * float(np.median(np.abs(rows.force_N))) or 1.0
     expected = np.full(len(rows), floor)
-    for _ in range(_ROUNDS_WEIGHTING):
+    for _ in range(_ROUNDS_OF_WEIGHTS):
         fit = least_squares(design, rows.force_N, expected**-2.0)
         expected = np.maximum(np.abs(design @ fit.values), floor)
     return expected

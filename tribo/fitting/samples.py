@@ -1,6 +1,4 @@
-"""Whether the loads of a sample span enough for a slope.
-
-mu and tau0 of every sample: each specimen fitted first, then the specimens combined.
+"""mu and tau0 of every sample: each specimen fitted first, then the specimens combined.
 
 Pulls of one specimen are not independent of each other: they share the specimen. The scatter that counts for
 another specimen of the same pattern is therefore that of the specimens' own values. With G specimens the
@@ -12,18 +10,178 @@ Zap. Nauchn. Sem. POMI 328 (2005) 5; Ibragimov and Mueller, J. Bus. Econ. Stat. 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tribo.errors import FitError, Problem
 from tribo.fitting.linear import WEIGHTS, LinearFit, Rows, least_squares, sample_rows, weights_of
-from tribo.laws import LAWS
+from tribo.laws import design_over_load, law_over_load
 from tribo.records import REGIMES, FloatArray, LawFit, Regime
 
 if TYPE_CHECKING:
     import pandas as pd
+
+ONE_SPECIMEN = "only one specimen: the interval applies to this specimen, not to the pattern"
+LACK_OF_FIT_LEVEL = 0.01
+
+
+def fit_regimes(table: pd.DataFrame, nominal_area_m2: float | None, *, weights: str = "relative") -> tuple[LawFit, ...]:
+    """The fits of :func:`fit_samples` to static and to sliding friction; a regime that no pull shows has none.
+
+    Raises
+    ------
+    FitError
+        No sample has enough loads for the law.
+    """
+    found: list[LawFit] = []
+    problems: list[Problem] = []
+    for regime in REGIMES:
+        try:
+            found += fit_samples(table, regime, nominal_area_m2, weights=weights)
+        except FitError as why:
+            if np.isfinite(table[f"{regime}_N"]).any():
+                raise
+            problems += why.problems  # a log of steps while sliding has no static peaks, and a law all the same
+    if not found:
+        raise FitError(problems)
+    return tuple(found)
+
+
+def fit_samples(
+    table: pd.DataFrame,
+    regime: Regime,
+    nominal_area_m2: float | None,
+    *,
+    weights: str = "relative",
+    by: str = "specimens",
+) -> tuple[LawFit, ...]:
+    """T = mu N + tau0 A of every sample by its own tests alone, samples in alphabetical order.
+
+    Parameters
+    ----------
+    table : DataFrame
+        As returned by ``Ingested.table()``: sample, specimen, normal_load_N, static_N, sliding_N. Tests
+        without a force (NaN) are left out.
+    regime : "static" or "sliding"
+    nominal_area_m2 : float or None
+        A, in m2. None where it is not known: the law is then T = mu N + T0, T0 in newton.
+    weights : "relative", "ratio", "force" or "repeats"
+        Which scatter is constant over the loads; see :mod:`tribo.fitting.linear`.
+    by : "specimens" or "tests"
+        "tests" pools all pulls as if they were independent; offered for comparison, its intervals are too
+        narrow wherever specimens differ.
+
+    Returns
+    -------
+    tuple of LawFit
+        ``covariance`` of the two parameters is that of the mean over specimens, ``dof`` = G - 1. One specimen:
+        its own covariance, dof = n - 2, and a note. tau0 is never clamped. A sample whose tests do not
+        determine the law, such as at loads too close to each other, has NaN values and a note with the reason.
+        ``chi2_red`` is the reduced chi-squared of the load means about each specimen's line, the variance of a mean
+        taken from its repeats (NaN without repeats).
+
+    Raises
+    ------
+    FitError
+        Missing columns, impossible loads or area, unknown weights, or no sample that can be fitted.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> loads = pd.Series([0.2, 0.5, 1.0] * 3)
+    >>> specimen = pd.Series(["A1"] * 3 + ["A2"] * 3 + ["A3"] * 3)
+    >>> table = pd.DataFrame({"sample": "A", "specimen": specimen, "normal_load_N": loads, "static_N": 2 * loads + 0.1})
+    >>> (fit,) = fit_samples(table, "static", 50e-6)
+    >>> round(fit.mu, 6), round(fit.tau0_Pa, 3), fit.n_specimens
+    (2.0, 2000.0, 3)
+    """
+    if by not in ("specimens", "tests"):
+        what = "unknown way to combine tests"
+        raise FitError(Problem("unknown_nesting", what, found=by, allowed="specimens or tests"))
+    if nominal_area_m2 is not None and not (np.isfinite(nominal_area_m2) and nominal_area_m2 > 0):
+        found = f"{nominal_area_m2:g} m2"
+        raise FitError(Problem("bad_area", "not a possible nominal area", found=found, allowed="more than 0 m2"))
+    samples = sample_rows(table, regime)
+    fits = tuple(_fit_sample(rows, regime, nominal_area_m2, weights, by) for rows in samples)
+    if not any(np.isfinite(fit.values).all() for fit in fits):
+        wanted = "two or more loads for each sample, a factor of two or more apart"
+        reasons = [Problem("too_few_loads", f"sample {f.sample}: {f.notes[-1]}", allowed=wanted) for f in fits]
+        raise FitError(reasons or Problem("no_tests", "the table contains no tests"))
+    return fits
+
+
+def _fit_sample(rows: Rows, regime: Regime, area: float | None, weights: str, by: str) -> LawFit:
+    notes: tuple[str, ...] = ()
+    if rows.n_missing:
+        notes = (f"{rows.n_missing} of {rows.n_missing + len(rows)} tests have no {regime} force",)
+    law = law_over_load(area)
+    empty = LawFit(
+        rows.sample, regime, law.name, law.parameter_names, np.full(2, np.nan), np.full((2, 2), np.nan),
+        0.0, len(rows.specimens), len(rows), "none", float("nan"), area, notes=notes,
+    )  # fmt: skip
+    if weights == "ratio" and not rows.load_N.all():
+        notes += (f"{int((rows.load_N == 0).sum())} tests at zero load left out: T/N is not defined at zero load",)
+        rows = rows.take(rows.load_N > 0)
+        empty = replace(empty, n_tests=len(rows), n_specimens=len(rows.specimens))
+    if len(np.unique(rows.load_N)) < 2:
+        return replace(empty, notes=(*notes, "tests at fewer than two loads: mu and tau0 cannot be separated"))
+    weight = weights_of(rows, area, weights)
+    own: dict[str, LinearFit] = {}
+    for name in rows.specimens:
+        keep = rows.specimen == name
+        if len(np.unique(rows.load_N[keep])) > 1:
+            own[name] = least_squares(design_over_load(rows.load_N[keep], area), rows.force_N[keep], weight[keep])
+    mean, covariance, dof, method, said = _over_specimens(rows, weight, area, {} if by == "tests" else own, by)
+    if too_close := loads_too_close(rows, float(np.sqrt(covariance[0, 0]))):
+        return replace(empty, notes=(*notes, too_close))
+    ratio, bend = lack_of_fit(rows, own)
+    left_out = [name for name in rows.specimens if name not in own]
+    if left_out and own:
+        notes += (f"specimens left out because they were pulled at fewer than two loads: {', '.join(left_out)}",)
+    return replace(
+        empty,
+        values=mean,
+        covariance=covariance,
+        dof=dof,
+        n_specimens=len(own) or len(rows.specimens),
+        method=f"{method}; weighted least squares, {WEIGHTS[weights]}",
+        chi2_red=ratio,
+        specimens={name: fit.values for name, fit in own.items()},
+        notes=(*notes, *said, *bend),
+        bent=bool(bend),
+    )
+
+
+def _over_specimens(
+    rows: Rows, weight: FloatArray, area: float | None, own: dict[str, LinearFit], by: str
+) -> tuple[FloatArray, FloatArray, float, str, tuple[str, ...]]:
+    """Mean over specimens, its covariance and degrees of freedom, the method in words, and notes."""
+    if len(own) > 1:
+        values, covariance = combine(np.array([fit.values for fit in own.values()]))
+        method = f"each specimen fitted, mean of {len(own)} specimens, t({len(own) - 1})"
+        return values, covariance, float(len(own) - 1), method, ()
+    note = ONE_SPECIMEN
+    if own:
+        (fit,) = own.values()
+        method = "one specimen, scatter of its tests"
+    elif by == "tests":
+        fit = least_squares(design_over_load(rows.load_N, area), rows.force_N, weight)
+        note = "tests pooled as if independent: the interval is too narrow if specimens differ"
+        method = "all tests pooled"
+    else:  # every specimen stands at one load
+        index = [np.flatnonzero(rows.specimen == name) for name in rows.specimens]
+        load, force, w = (np.array([a[k].mean() for k in index]) for a in (rows.load_N, rows.force_N, weight))
+        fit = least_squares(design_over_load(load, area), force, w)
+        note = "each specimen was pulled at one load: scatter between specimens and about the line cannot be separated"
+        method = "line through the specimens' means"
+    return fit.values, fit.covariance, float(fit.dof), method, (note,)
+
+
+def combine(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean (k,) over specimens and its covariance (k, k) from their scatter; ``values`` is (G, k), G > 1."""
+    return values.mean(axis=0), np.atleast_2d(np.cov(values, rowvar=False)) / len(values)
 
 
 def loads_too_close(rows: Rows, mu_u: float) -> str:
@@ -38,7 +196,13 @@ def loads_too_close(rows: Rows, mu_u: float) -> str:
     """
     load, force = float(rows.load_N.mean()), float(rows.force_N.mean())
     coefficient = abs(force) / load if load > 0 else math.inf
-    uncertainty = max([u for u in (mu_u, _from_readings(rows)) if math.isfinite(u)], default=0.0)
+    from_readings = math.nan
+    known = np.isfinite(rows.u_N) & (rows.u_N > 0)
+    if np.count_nonzero(known) > 1:
+        weight, loads = rows.u_N[known] ** -2.0, rows.load_N[known]
+        spread = float(weight @ (loads - np.average(loads, weights=weight)) ** 2)
+        from_readings = 1.0 / math.sqrt(spread) if spread > 0 else math.nan
+    uncertainty = max([u for u in (mu_u, from_readings) if math.isfinite(u)], default=0.0)
     if uncertainty <= coefficient:
         return ""
     low, high = rows.load_N.min(), rows.load_N.max()
@@ -49,164 +213,7 @@ def loads_too_close(rows: Rows, mu_u: float) -> str:
     )
 
 
-def _from_readings(rows: Rows) -> float:
-    """Standard uncertainty of the slope from the reading uncertainties of the forces; NaN where they are not known."""
-    known = np.isfinite(rows.u_N) & (rows.u_N > 0)
-    if np.count_nonzero(known) < 2:
-        return math.nan
-    weight, load = rows.u_N[known] ** -2.0, rows.load_N[known]
-    spread = float(weight @ (load - np.average(load, weights=weight)) ** 2)
-    return 1.0 / math.sqrt(spread) if spread > 0 else math.nan
-
-
-LAW = LAWS["coulomb_adhesion"]
-ONE_SPECIMEN = "only one specimen: the interval applies to this specimen, not to the pattern"
-LACK_OF_FIT_LEVEL = 0.01
-
-
-def fit_samples(
-    table: pd.DataFrame,
-    regime: Regime,
-    nominal_area_m2: float,
-    *,
-    weights: str = "relative",
-    by: str = "specimens",
-) -> tuple[LawFit, ...]:
-    """T = mu N + tau0 A of every sample, samples in alphabetical order.
-
-    Parameters
-    ----------
-    table : DataFrame
-        As returned by ``Ingested.table()``: sample, specimen, normal_load_N, static_N, sliding_N. Tests
-        without a force (NaN) are left out.
-    regime : "static" or "sliding"
-    nominal_area_m2 : float
-        A, in m2.
-    weights : "relative", "ratio" or "force"
-        Which scatter is constant over the loads; see :mod:`tribo.fitting.linear`.
-    by : "specimens" or "tests"
-        "tests" pools all pulls as if they were independent; offered for comparison, its intervals are too
-        narrow wherever specimens differ.
-
-    Returns
-    -------
-    tuple of LawFit
-        ``covariance`` of (mu, tau0_Pa) is that of the mean over specimens, ``dof`` = G - 1. One specimen:
-        its own covariance, dof = n - 2, and a note. tau0 is never clamped. A sample whose tests do not
-        determine the law, such as at loads too close to each other, has NaN values and a note with the reason.
-        ``chi2_red`` is the reduced chi-squared of the load means about each specimen's line, the variance of a mean
-        taken from its repeats (NaN without repeats).
-
-    Raises
-    ------
-    FitError
-        Missing columns, impossible loads or area, unknown weights, or no sample that can be fitted.
-    """
-    if by not in ("specimens", "tests"):
-        what = "unknown way to combine tests"
-        raise FitError(Problem("unknown_nesting", what, found=by, allowed="specimens or tests"))
-    if not (np.isfinite(nominal_area_m2) and nominal_area_m2 > 0):
-        found = f"{nominal_area_m2:g} m2"
-        raise FitError(Problem("bad_area", "not a possible nominal area", found=found, allowed="more than 0 m2"))
-    samples = sample_rows(table, regime)
-    fits = tuple(_fit_sample(rows, regime, nominal_area_m2, weights, by) for rows in samples)
-    if not any(np.isfinite(fit.values).all() for fit in fits):
-        wanted = "two or more loads for each sample, a factor of two or more apart"
-        reasons = [Problem("too_few_loads", f"sample {f.sample}: {f.notes[-1]}", allowed=wanted) for f in fits]
-        raise FitError(reasons or Problem("no_tests", "the table contains no tests"))
-    return fits
-
-
-def combine(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean (k,) over specimens and its covariance (k, k) from their scatter; ``values`` is (G, k), G > 1."""
-    return values.mean(axis=0), np.atleast_2d(np.cov(values, rowvar=False)) / len(values)
-
-
-@dataclass(frozen=True)
-class _Part:
-    """Mean, its covariance and degrees of freedom, and how they came about."""
-
-    values: FloatArray
-    covariance: FloatArray
-    dof: float
-    method: str
-    notes: tuple[str, ...] = ()
-
-
-def _fit_sample(rows: Rows, regime: Regime, area: float, weights: str, by: str) -> LawFit:
-    notes: tuple[str, ...] = ()
-    if rows.n_missing:
-        notes = (f"{rows.n_missing} of {rows.n_missing + len(rows)} tests have no {regime} force",)
-    empty = LawFit(
-        rows.sample, regime, LAW.name, LAW.parameter_names, np.full(2, np.nan), np.full((2, 2), np.nan),
-        0.0, len(rows.specimens), len(rows), "none", float("nan"), area, notes=notes,
-    )  # fmt: skip
-    if weights == "ratio" and not rows.load_N.all():
-        notes += (f"{int((rows.load_N == 0).sum())} tests at zero load left out: T/N is not defined at zero load",)
-        rows = rows.take(rows.load_N > 0)
-        empty = replace(empty, n_tests=len(rows), n_specimens=len(rows.specimens))
-    if len(np.unique(rows.load_N)) < 2:
-        return replace(empty, notes=(*notes, "tests at fewer than two loads: mu and tau0 cannot be separated"))
-    weight = weights_of(rows, area, weights)
-    own = {name: _line(rows, weight, rows.specimen == name, area) for name in rows.specimens}
-    usable = {name: fit for name, fit in own.items() if fit is not None}
-    part = _pooled(rows, weight, area) if by == "tests" else _specimens(rows, weight, area, usable)
-    if too_close := loads_too_close(rows, float(np.sqrt(part.covariance[0, 0]))):
-        return replace(empty, notes=(*notes, too_close))
-    ratio, bend = lack_of_fit(rows, weight, usable)
-    left_out = [name for name in own if name not in usable]
-    if left_out and usable:
-        notes += (f"specimens left out because they were pulled at fewer than two loads: {', '.join(left_out)}",)
-    return replace(
-        empty,
-        values=part.values,
-        covariance=part.covariance,
-        dof=part.dof,
-        n_specimens=len(usable) or len(own),
-        method=f"{part.method}; weighted least squares, {WEIGHTS[weights]}",
-        chi2_red=ratio,
-        specimens={name: fit.values for name, fit in usable.items()},
-        notes=(*notes, *part.notes, *bend),
-        bent=bool(bend),
-    )
-
-
-def _line(rows: Rows, weight: FloatArray, keep: np.ndarray, area: float) -> LinearFit | None:
-    """The law of the kept rows, or None where they stand at fewer than two loads."""
-    load = rows.load_N[keep]
-    if len(np.unique(load)) < 2:
-        return None
-    return least_squares(LAW.design_matrix(load, area), rows.force_N[keep], weight[keep])
-
-
-def _specimens(rows: Rows, weight: FloatArray, area: float, own: dict[str, LinearFit]) -> _Part:
-    if not own:
-        return _one_load_each(rows, weight, area)
-    if len(own) == 1:
-        (fit,) = own.values()
-        method = "one specimen, scatter of its tests"
-        return _Part(fit.values, fit.covariance, float(fit.dof), method, (ONE_SPECIMEN,))
-    values, covariance = combine(np.array([fit.values for fit in own.values()]))
-    method = f"each specimen fitted, mean of {len(own)} specimens, t({len(own) - 1})"
-    return _Part(values, covariance, float(len(own) - 1), method)
-
-
-def _one_load_each(rows: Rows, weight: FloatArray, area: float) -> _Part:
-    """Every specimen stands at one load: the line through the specimens' means."""
-    index = [np.flatnonzero(rows.specimen == name) for name in rows.specimens]
-    load, force, w = (np.array([a[k].mean() for k in index]) for a in (rows.load_N, rows.force_N, weight))
-    fit = least_squares(LAW.design_matrix(load, area), force, w)
-    note = "each specimen was pulled at one load: scatter between specimens and about the line cannot be separated"
-    return _Part(fit.values, fit.covariance, float(fit.dof), "line through the specimens' means", (note,))
-
-
-def _pooled(rows: Rows, weight: FloatArray, area: float) -> _Part:
-    fit = least_squares(LAW.design_matrix(rows.load_N, area), rows.force_N, weight)
-    note = "tests pooled as if independent: the interval is too narrow if specimens differ"
-    return _Part(fit.values, fit.covariance, float(fit.dof), "all tests pooled", (note,))
-
-
-def lack_of_fit(rows: Rows, weight: FloatArray, lines: dict[str, LinearFit]) -> tuple[float, tuple[str, ...]]:
+def lack_of_fit(rows: Rows, lines: dict[str, LinearFit]) -> tuple[float, tuple[str, ...]]:
     """Reduced chi-squared of load means about the specimens' lines, and a note where they deviate significantly.
 
     The classical lack-of-fit ratio: weighted mean square of (cell mean - line) over that of the repeats about
@@ -237,25 +244,3 @@ def lack_of_fit(rows: Rows, weight: FloatArray, lines: dict[str, LinearFit]) -> 
         return ratio, ()
     note = f"the load means deviate from a straight line: chi2_red {ratio:.2f}, p = {p:.1g}"
     return ratio, (note,)
-
-
-def fit_regimes(table: pd.DataFrame, nominal_area_m2: float, *, weights: str = "relative") -> tuple[LawFit, ...]:
-    """The fits of :func:`fit_samples` to static and to sliding friction; a regime that no pull shows has none.
-
-    Raises
-    ------
-    FitError
-        No sample has enough loads for the law.
-    """
-    found: list[LawFit] = []
-    problems: list[Problem] = []
-    for regime in REGIMES:
-        try:
-            found += fit_samples(table, regime, nominal_area_m2, weights=weights)
-        except FitError as why:
-            if np.isfinite(table[f"{regime}_N"]).any():
-                raise
-            problems += why.problems  # a log of steps while sliding has no static peaks, and a law all the same
-    if not found:
-        raise FitError(problems)
-    return tuple(found)

@@ -100,7 +100,7 @@ def write_store(
         "title": campaign.title,
         "material": campaign.material,
         "counterface": campaign.counterface,
-        "nominal_area_m2": campaign.nominal_area_m2,
+        "nominal_area_m2": np.nan if campaign.nominal_area_m2 is None else campaign.nominal_area_m2,
         "Conventions": "CF-1.11",
     }
     if provenance is not None:
@@ -111,7 +111,7 @@ def write_store(
     groups = {"/": table.with_coordinates(OF_A_TEST).about(**about), "/tests": table}
     groups["/traces"] = _ragged(study)
     if study.fits:
-        groups["/fits"] = _table(result_tables.fits_table(study.fits, study.combined), "fit")
+        groups["/fits"] = _table(study.fits.table(), "fit")
         groups["/other_fits"] = _table(result_tables.other_fits_table(study), "parameter_row")
     if study.budget is not None:
         groups["/budget"] = _table(study.budget, "budget_row")

@@ -13,10 +13,10 @@ import pandas as pd
 
 from tribo import __version__
 from tribo.comparison import findings, study_lookup
-from tribo.comparison.study_lookup import PA_PER_KPA, all_set_aside
+from tribo.comparison.study_lookup import all_set_aside
 from tribo.diagnostics.verdict import Verdict
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
-from tribo.records import REGIMES, Campaign, Regime, Study
+from tribo.records import PA_PER_KPA, REGIMES, Campaign, Regime, Study
 from tribo.report.campaign_nc import unit_of
 from tribo.report.crate import conditions
 from tribo.report.provenance import Provenance
@@ -153,7 +153,7 @@ def about(campaign: Campaign) -> str:
     stated = campaign.material or campaign.counterface
     parts = [f"{campaign.material or 'sample'} on {campaign.counterface or 'counterface'}"] if stated else []
     if campaign.has_area:
-        parts.append(f"nominal area {campaign.nominal_area_m2 * 1e6:g} mm²")
+        parts.append(f"nominal area {campaign.area_m2 * 1e6:g} mm²")
     if campaign.pull_speed_m_s:
         parts.append(f"pulled at {campaign.pull_speed_m_s * 1e3:g} mm/s")
     return ", ".join(parts)
@@ -199,7 +199,7 @@ def _summary(study: Study) -> dict[str, Any]:
         "model": wording.in_short(agreements, study_lookup.flat_sample(study)),
         "order": [wording.ranking_sentence(r) for r in findings.rankings(study)],
         "directions": wording.direction_sentences(findings.direction_ratios(study)),
-        "correlation": wording.correlation_note(study),
+        "correlation": " ".join(filter(None, (wording.pooling_note(study), wording.correlation_note(study)))),
         "how_to_read": wording.HOW_TO_READ,
     }
 
@@ -211,7 +211,7 @@ def _table2(study: Study) -> dict[str, Any]:
     for regime in REGIMES:
         rows = []
         for sample in study_lookup.sample_numbers(study):
-            fit = study_lookup.stated_fit(study, sample, regime)
+            fit = study.fits.of(sample, regime)
             if fit is not None:
                 model = fit_cells(study_lookup.fit_of(simulated, sample, regime), load)
                 area_fraction = study.ingested.campaign.area_fraction(sample)

@@ -18,13 +18,12 @@ import numpy as np
 
 from tribo.comparison import study_lookup
 from tribo.files import write_text
-from tribo.records import Campaign, Pattern, Study, Test
+from tribo.records import PA_PER_KPA, Campaign, Pattern, Study, Test
 from tribo.report.provenance import Provenance, file_hash
 from tribo.wording.numerals import counted, joined, significant
 
 ONTOLOGY = "https://raw.githubusercontent.com/nick-garabedian/TriboDataFAIR-Ontology/v0.1.1/TriboDataFAIR_Ontology.owl#"
 NOT_RECORDED = "not recorded"
-PA_PER_KPA = 1e3
 
 
 @dataclass(frozen=True)
@@ -91,13 +90,12 @@ def _rig(campaign: Campaign) -> str:
 
 def _contact(campaign: Campaign, tests: list[Test]) -> Iterator[Condition]:
     loads = np.array([t.normal_load_N for t in tests])
-    area = campaign.nominal_area_m2
     yield Condition("Test geometry", GEOMETRIES.get(_rig(campaign), NOT_RECORDED))
     if campaign.has_area:
-        yield Condition("Nominal contact area", f"{area * 1e6:g}", "mm²")
+        yield Condition("Nominal contact area", f"{campaign.area_m2 * 1e6:g}", "mm²")
     yield Condition("Normal load", _range(loads), "N", "NormalLoadSetpoint")
     if campaign.has_area:
-        yield Condition("Nominal pressure", _range(loads / area / PA_PER_KPA), "kPa")
+        yield Condition("Nominal pressure", _range(loads / campaign.area_m2 / PA_PER_KPA), "kPa")
     if campaign.slider_mass_kg:
         yield Condition("Load applied by", "dead weight", term="DeadWeightLoadApplication")
     yield Condition("Lubrication", NOT_RECORDED, term="InterfacialMediumCategory")

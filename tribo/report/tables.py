@@ -6,7 +6,7 @@ The numbers of a diagnosis as CSV: every test beside the models, and every layer
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 
 from tribo.comparison.agreement import ratios
-from tribo.comparison.study_lookup import PA_PER_KPA, all_set_aside
+from tribo.comparison.study_lookup import all_set_aside
 from tribo.files import write_text
-from tribo.records import CombinedFit, LawFit, Pull, SetAside, Study, Test
+from tribo.records import Pull, SetAside, Study, Test
 from tribo.user_text import for_spreadsheet
 from tribo.vocabulary import label_with_unit
 
@@ -25,10 +25,6 @@ if TYPE_CHECKING:
 
 
 FLOAT_FORMAT = "%.8g"
-_PER_AREA = (
-    "tau0_kPa", "tau0_u_kPa", "cov", "tau0_low_kPa", "tau0_high_kPa", "tau0_u_combined_kPa", "cov_combined",
-    "tau0_combined_low_kPa", "tau0_combined_high_kPa",
-)  # fmt: skip
 TESTS_COLUMNS = [
     "test_id", "static_N", "static_u_N", "sliding_N", "sliding_u_N", "rule", "window", "zero_N", "flags",
     "set_aside", "sample", "specimen", "normal_load_N", "peak_s", "onset_s", "window_start_s", "window_end_s",
@@ -43,12 +39,6 @@ TESTS_COLUMNS = [
 RESTARTS_COLUMNS = [
     "test_id", "sample", "specimen", "normal_load_N", "restart", "hold_s", "stop_s", "peak_s", "static_N", "static_u_N",
     "sliding_N", "sliding_u_N",
-]  # fmt: skip
-FITS_COLUMNS = [
-    "sample", "regime", "mu", "mu_u", "tau0_kPa", "tau0_u_kPa", "cov", "n_specimens", "n_tests", "method",
-    "chi2_red", "law", "dof", "mu_low", "mu_high", "tau0_low_kPa", "tau0_high_kPa", "notes", "T0_N", "T0_u_N",
-    "mu_u_combined", "tau0_u_combined_kPa", "cov_combined", "mu_combined_low", "mu_combined_high",
-    "tau0_combined_low_kPa", "tau0_combined_high_kPa", "T0_u_combined_N", "largest_mu", "largest_tau0",
 ]  # fmt: skip
 COMPARISON_COLUMNS = [
     "sample", "regime", "normal_load_N", "measured_N", "measured_u_N", "simulated_N", "simulated_u_N",
@@ -141,66 +131,6 @@ def restarts_table(study: Study) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=RESTARTS_COLUMNS)
 
 
-def fits_table(fits: Iterable[LawFit], combined: Iterable[CombinedFit] = ()) -> pd.DataFrame:
-    """mu and tau0 (kPa) of every fit; ``cov`` is cov(mu, tau0) in kPa, ``*_low`` to ``*_high`` 95 %.
-
-    ``*_u``, ``*_low`` and ``*_high`` are of specimens and repeats alone; those of ``combined`` include the instrument.
-    """
-    by = {(fit.sample, fit.regime): fit for fit in combined}
-    laws = [fit for fit in fits if "tau0_Pa" in fit.parameters]
-    rows = [_fit_row(fit) | _without_area(_combined_cells(by.get((fit.sample, fit.regime))), fit) for fit in laws]
-    return pd.DataFrame(rows, columns=FITS_COLUMNS)
-
-
-def _combined_cells(fit: CombinedFit | None) -> dict[str, object]:
-    if fit is None:
-        return {}
-    low, high = (v / PA_PER_KPA for v in fit.interval("tau0_Pa"))
-    mu_low, mu_high = fit.interval("mu")
-    tau0_u = fit.standard_uncertainty("tau0_Pa")
-    return {
-        "mu_u_combined": fit.standard_uncertainty("mu"), "tau0_u_combined_kPa": tau0_u / PA_PER_KPA,
-        "cov_combined": float(fit.covariance[0, 1]) / PA_PER_KPA, "mu_combined_low": mu_low,
-        "mu_combined_high": mu_high, "tau0_combined_low_kPa": low, "tau0_combined_high_kPa": high,
-        "T0_u_combined_N": tau0_u * fit.nominal_area_m2, "largest_mu": fit.largest["mu"][0],
-        "largest_tau0": fit.largest["tau0_Pa"][0],
-    }  # fmt: skip
-
-
-def _without_area(cells: dict[str, object], fit: LawFit) -> dict[str, object]:
-    return cells if fit.has_area else cells | dict.fromkeys(_PER_AREA, float("nan"))
-
-
-def _fit_row(fit: LawFit) -> dict[str, object]:
-    mu, tau0 = fit.parameters.index("mu"), fit.parameters.index("tau0_Pa")
-    mu_low, mu_high = fit.interval("mu")
-    tau0_low, tau0_high = fit.interval("tau0_Pa")
-    area = fit.nominal_area_m2
-    row = {
-        "sample": fit.sample,
-        "regime": fit.regime,
-        "mu": fit.value("mu"),
-        "mu_u": fit.standard_uncertainty("mu"),
-        "tau0_kPa": fit.value("tau0_Pa") / PA_PER_KPA,
-        "tau0_u_kPa": fit.standard_uncertainty("tau0_Pa") / PA_PER_KPA,
-        "cov": float(fit.covariance[mu, tau0]) / PA_PER_KPA,
-        "n_specimens": fit.n_specimens,
-        "n_tests": fit.n_tests,
-        "method": fit.method,
-        "chi2_red": fit.chi2_red,
-        "law": fit.law,
-        "dof": fit.dof,
-        "mu_low": mu_low,
-        "mu_high": mu_high,
-        "tau0_low_kPa": tau0_low / PA_PER_KPA,
-        "tau0_high_kPa": tau0_high / PA_PER_KPA,
-        "notes": "; ".join(fit.notes),
-        "T0_N": fit.value("tau0_Pa") * area,
-        "T0_u_N": fit.standard_uncertainty("tau0_Pa") * area,
-    }
-    return _without_area(row, fit)
-
-
 def other_fits_table(study: Study) -> pd.DataFrame:
     """The data under other weights or laws, and the model's own fits: one row per parameter, SI units."""
     simulated = study.comparison.simulated if study.comparison is not None else ()
@@ -262,7 +192,7 @@ def write_tables(study: Study, out: Path) -> list[Path]:
     if not (restarts := restarts_table(study)).empty:
         tables["restarts.csv"] = restarts
     if study.fits:
-        tables["fits.csv"] = fits_table(study.fits, study.combined)
+        tables["fits.csv"] = study.fits.table()
         tables["other_fits.csv"] = other_fits_table(study)
     if study.laws is not None and not study.laws.empty:
         tables["laws.csv"] = study.laws

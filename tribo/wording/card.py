@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 
 from tribo.comparison import study_lookup
-from tribo.comparison.study_lookup import PA_PER_KPA, all_set_aside
+from tribo.comparison.study_lookup import all_set_aside
 from tribo.diagnostics.verdict import Verdict
 from tribo.display import displayed
-from tribo.records import REGIMES, CombinedFit, LawFit, Study
+from tribo.records import PA_PER_KPA, REGIMES, LawFit, Study
 from tribo.wording.numerals import counted, joined, loads_in_words, with_uncertainty
 from tribo.wording.part_sentences import name_in_words
 from tribo.wording.study_sentences import bent_laws, friction_sentence, specimens_of, uncertainty_kind
 from tribo.wording.verdict_sentences import meanings, why_next
 
 MOST_REASONS = 3
-NUMBERS = {"mu": "μ", "tau0_Pa": "τ₀"}
+NUMBERS = {"mu": "μ", "tau0_Pa": "τ₀", "T0_N": "T₀"}
 
 
 @dataclass(frozen=True)
@@ -98,33 +98,32 @@ def card_of(study: Study, verdict: Verdict | None) -> Card:
 
 
 def _law(study: Study, sample: str, regime: str) -> LawFit | None:
-    fit = study_lookup.stated_fit(study, sample, regime)
-    return fit if fit is not None and "tau0_Pa" in fit.parameters and np.isfinite(fit.values).all() else None
+    fit = study.fits.of(sample, regime)
+    return fit if fit is not None and np.isfinite(fit.values).all() else None
 
 
 def card_law(fit: LawFit) -> CardLaw:
     """One fit as the card shows it."""
-    unit = PA_PER_KPA if fit.has_area else 1.0  # without an area tau0_Pa stands for T0 in newton
+    unit = PA_PER_KPA if fit.has_area else 1.0
     return CardLaw(
         fit.sample,
         fit.regime,
-        with_uncertainty(fit.value("mu"), fit.standard_uncertainty("mu")),
-        with_uncertainty(fit.value("tau0_Pa") / unit, fit.standard_uncertainty("tau0_Pa") / unit),
+        with_uncertainty(fit.mu, fit.mu_u),
+        with_uncertainty(fit.value(fit.adhesion) / unit, fit.standard_uncertainty(fit.adhesion) / unit),
         _largest(fit),
     )
 
 
 def _largest(fit: LawFit) -> str:
     """ "repeats (60 %)", or "μ: wire angle (52 %); τ₀: specimens (48 %)" where they differ."""
-    if not isinstance(fit, CombinedFit) or not fit.largest:
+    if not fit.largest:
         return ""
-    names = NUMBERS if fit.has_area else NUMBERS | {"tau0_Pa": "T₀"}
-    parts = {key: fit.largest[key] for key in names}
+    parts = {key: fit.largest[key] for key in fit.parameters}
     if len({name for name, _ in parts.values()}) == 1:
         low, high = sorted(round(share) for _, share in parts.values())
         name = next(iter(parts.values()))[0]
         return f"{name} ({low} %)" if low == high else f"{name} ({low} to {high} %)"
-    return "; ".join(f"{names[key]}: {name} ({share:.0f} %)" for key, (name, share) in parts.items())
+    return "; ".join(f"{NUMBERS[key]}: {name} ({share:.0f} %)" for key, (name, share) in parts.items())
 
 
 def _counts(study: Study, used: int, aside: int, specimens: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -10,8 +11,8 @@ import numpy as np
 from tribo.comparison import findings, study_lookup
 from tribo.comparison.findings import Agreement, DirectionRatio, Ranking, Verdict
 from tribo.comparison.oddness import OddPull
-from tribo.comparison.study_lookup import PA_PER_KPA, all_set_aside, shown
-from tribo.records import REGIMES, ByHand, Campaign, LawFit, Pull, Regime, Study, Test
+from tribo.comparison.study_lookup import all_set_aside, shown
+from tribo.records import PA_PER_KPA, REGIMES, ByHand, Campaign, LawFit, Pull, Regime, Study, Test
 from tribo.vocabulary import label_with_unit
 from tribo.wording.numerals import counted, joined, loads_in_words, percent, significant, span, with_uncertainty
 
@@ -54,9 +55,10 @@ def what_was_measured(study: Study) -> str:
     specimens = specimens_of(campaign, tests)
     loads = np.array([t.normal_load_N for t in tests])
     levels = np.unique(study_lookup.load_levels(loads))
-    lowest, highest = (significant(p / campaign.nominal_area_m2 / PA_PER_KPA) for p in (levels[0], levels[-1]))
-    pressures = lowest if lowest == highest else f"{lowest} to {highest}"
-    pressure = f" (nominal pressure {pressures} kPa)" if campaign.has_area else ""
+    pressure = ""
+    if campaign.has_area:
+        lowest, highest = (significant(n / campaign.area_m2 / PA_PER_KPA) for n in (levels[0], levels[-1]))
+        pressure = f" (nominal pressure {lowest if lowest == highest else f'{lowest} to {highest}'} kPa)"
     return (
         f"{counted(len(tests), 'pull')} of {counted(len(specimens), 'specimen')} of "
         f"{counted(len(samples), 'sample')} ({joined(samples)}) at {loads_in_words(levels.tolist())}{pressure}. "
@@ -78,7 +80,7 @@ def _set_aside_clause(aside: int) -> str:
 def flat_law(study: Study) -> list[str]:
     """The measured law of the flat sample, one sentence per regime."""
     flat = study_lookup.flat_sample(study)
-    fits = [(regime, study_lookup.stated_fit(study, flat, regime)) for regime in REGIMES]
+    fits = [(regime, study.fits.of(flat, regime)) for regime in REGIMES]
     return [
         f"The {regime} friction of the flat sample {flat} follows T = μN + {'τ₀A' if fit.has_area else 'T₀'} with "
         f"{_law_values(fit)} "
@@ -90,17 +92,16 @@ def flat_law(study: Study) -> list[str]:
 
 def uncertainty_kind(study: Study) -> str:
     """What stands after ±."""
-    if study.combined:
+    if any(fit.alone is not None for fit in study.fits):
         return "combined standard uncertainty, k = 1: scatter of specimens and repeats, and the instrument"
     return "standard uncertainty, k = 1, of specimens and repeats alone"
 
 
 def _law_values(fit: LawFit) -> str:
-    tau0, tau0_u = (v / PA_PER_KPA for v in (fit.value("tau0_Pa"), fit.standard_uncertainty("tau0_Pa")))
-    mu = with_uncertainty(fit.value("mu"), fit.standard_uncertainty("mu"))
+    mu = with_uncertainty(fit.mu, fit.mu_u)
     if not fit.has_area:
-        return f"μ = {mu} and T₀ = {with_uncertainty(fit.value('tau0_Pa'), fit.standard_uncertainty('tau0_Pa'))} N"
-    return f"μ = {mu} and τ₀ = {with_uncertainty(tau0, tau0_u)} kPa"
+        return f"μ = {mu} and T₀ = {with_uncertainty(fit.T0_N, fit.T0_u_N)} N"
+    return f"μ = {mu} and τ₀ = {with_uncertainty(fit.tau0_Pa / PA_PER_KPA, fit.tau0_u_Pa / PA_PER_KPA)} kPa"
 
 
 def in_short(agreements: Iterable[Agreement], flat: str) -> list[str]:
@@ -219,6 +220,20 @@ def _direction_sentence(group: list[DirectionRatio]) -> str:
         else f"the simulated ratio lies outside the 95 % interval of the measurement at {len(outside)} of them"
     )
     return f"Ratio of {group[0].regime} friction {x} / {y}, measured and simulated: {values}. {seen}; {verdict}."
+
+
+def pooling_note(study: Study) -> str:
+    """Where the scatter of other samples makes an interval narrower than the tests of a sample alone do."""
+    pooled = [fit for fit in study.fits if fit.alone is not None and math.isfinite(fit.mu)]
+    widths = [[high - low for low, high in (f.interval("mu"), f.by_itself.interval("mu"))] for f in pooled]
+    narrower = sum(stated < alone for stated, alone in widths)
+    if not narrower:
+        return ""
+    return (
+        "The scatter of specimens is partly pooled over the samples of the campaign, because few specimens may agree "
+        "by chance; the 95 % interval of μ is thereby narrower than by its own specimens alone in "
+        f"{narrower} of {len(pooled)} fits."
+    )
 
 
 def correlation_note(study: Study) -> str:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from tribo.comparison import findings, study_lookup
-from tribo.comparison.study_lookup import PA_PER_KPA
 from tribo.diagnostics.planning import Finding, Plan
 from tribo.diagnostics.verdict import Verdict
 from tribo.mechanisms.table import mechanism
-from tribo.records import REGIMES, LawFit, Regime, Study
+from tribo.records import PA_PER_KPA, REGIMES, LawFit, Regime, Study
 from tribo.wording import study_sentences as study_words
 from tribo.wording.card import Card
 from tribo.wording.numerals import with_uncertainty
@@ -35,7 +34,7 @@ def _regime_block(study: Study, regime: Regime, load: float) -> str:
     rows = []
     for sample in study_lookup.sample_numbers(study):
         measured, model = (
-            study_lookup.stated_fit(study, sample, regime),
+            study.fits.of(sample, regime),
             study_lookup.fit_of(simulated, sample, regime),
         )
         if measured is not None:
@@ -69,10 +68,10 @@ def fit_cells(fit: LawFit | None, load_N: float) -> tuple[str, str, str]:
     """mu, tau0 in kPa (T0 in newton without an area) and T at a load, with uncertainties; dashes without a fit."""
     if fit is None:
         return "–", "–", "–"
-    unit = PA_PER_KPA if fit.has_area else 1.0  # without an area tau0_Pa stands for T0 in newton
+    unit = PA_PER_KPA if fit.has_area else 1.0
     return (
-        with_uncertainty(fit.value("mu"), fit.standard_uncertainty("mu")),
-        with_uncertainty(fit.value("tau0_Pa") / unit, fit.standard_uncertainty("tau0_Pa") / unit),
+        with_uncertainty(fit.mu, fit.mu_u),
+        with_uncertainty(fit.value(fit.adhesion) / unit, fit.standard_uncertainty(fit.adhesion) / unit),
         with_uncertainty(float(fit.force_N(load_N)), float(fit.force_u_N(load_N))),
     )
 

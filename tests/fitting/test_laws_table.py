@@ -9,10 +9,11 @@ import numpy as np
 import pint
 import pytest
 from hypothesis import given, strategies as st
+from other_fits import POWER_LAWS
 
 from tribo.laws import LAWS, Law
 
-every_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS.keys())
+every_law = pytest.mark.parametrize("law", {**LAWS, **POWER_LAWS}.values(), ids=[*LAWS, *POWER_LAWS])
 
 CONDITIONS = {
     "normal_load_N": np.array([0.06, 0.3, 1.4]),
@@ -20,7 +21,8 @@ CONDITIONS = {
     "area_fraction": np.array([0.95, 0.56, 1.0]),
     "reference_pressure_Pa": 10e3,
 }
-PARAMETERS = {"mu": 4.8, "tau0_Pa": -2.3e3, "a_Pa": 18e3, "b_Pa": 5e3, "mu_ref": 3.1, "n": 0.27}
+PARAMETERS = {"mu": 4.8, "tau0_Pa": -2.3e3, "a_Pa": 18e3, "b_Pa": 5e3, "mu_ref": 3.1, "n": 0.27, "T0_N": 0.12}
+EVERY = {**LAWS, **POWER_LAWS}
 
 
 def conditions(law: Law) -> list[object]:
@@ -64,7 +66,8 @@ def test_twice_the_load_on_twice_the_area_doubles_the_force(law: Law) -> None:
     doubled = {**CONDITIONS}
     doubled["normal_load_N"] = 2 * CONDITIONS["normal_load_N"]
     doubled["nominal_area_m2"] = 2 * CONDITIONS["nominal_area_m2"]
-    twice = law.function(*[doubled[v.name] for v in law.conditions], *parameters(law))
+    values = [2 * PARAMETERS[p.name] if p.unit == "N" else PARAMETERS[p.name] for p in law.parameters]
+    twice = law.function(*[doubled[v.name] for v in law.conditions], *values)
     np.testing.assert_allclose(twice, 2 * law.function(*conditions(law), *parameters(law)), rtol=1e-12)
 
 
@@ -94,13 +97,14 @@ def test_every_public_function_says_its_formula_and_units(law: Law) -> None:
 
 
 def value(name: str, *args: float) -> float:
-    return float(np.asarray(LAWS[name].function(*args)))
+    return float(np.asarray(EVERY[name].function(*args)))
 
 
 @pytest.mark.parametrize(
     ("name", "args", "force"),
     [
         ("amontons", (2.0, 0.5), 1.0),
+        ("coulomb_intercept", (2.0, 0.5, 0.25), 1.25),
         ("coulomb_adhesion", (2.0, 1e-4, 0.5, 1e4), 2.0),
         ("three_term", (2.0, 1e-4, 0.5, 0.5, 1e4, 2e4), 3.5),
         ("pressure_power", (8.0, 1.0, 1.0, 0.5, 1 / 3), 2.0),
@@ -125,7 +129,7 @@ def test_at_full_contact_the_three_term_law_is_coulombs_with_the_summed_adhesion
 
 
 def test_the_power_laws_meet_coulombs_law_at_exponent_zero() -> None:
-    flat: Callable[..., float] = LAWS["pressure_power_adhesion"].function
+    flat: Callable[..., float] = POWER_LAWS["pressure_power_adhesion"].function
     assert flat(0.7, 55e-6, 1e4, 4.8, 0.0, 2e4) == pytest.approx(
         LAWS["coulomb_adhesion"].function(0.7, 55e-6, 4.8, 2e4), rel=1e-14
     )
