@@ -11,7 +11,7 @@ from tribo.berardo2019.table_diagnosis import (
     LEAST_CORRELATION,
     PublishedDiagnosis,
     diagnose_published,
-    look_at,
+    diagnose_reading,
     readings,
 )
 from tribo.berardo2019.table_model import (
@@ -70,7 +70,7 @@ def test_a_table_made_by_the_model_itself_shows_no_misfit() -> None:
         mu_sd=published("experiment")["mu_sd"].to_numpy(), tau0_sd_kPa=published("experiment")["tau0_sd_kPa"].to_numpy()
     )
     table = read_table(made, published("simulation"), design_correlation(even_loads()))
-    assert look_at(table, readings()[0], np.random.default_rng(0)).outcome == "no_misfit"
+    assert diagnose_reading(table, readings()[0], np.random.default_rng(0)).outcome == "no_misfit"
 
 
 @pytest.mark.parametrize("name", ["suction", "contact_area_loss", "cavity_shear_deformation"])
@@ -95,9 +95,9 @@ def test_whether_the_papers_model_fails_hangs_on_the_correlation_and_on_what_the
     whole: PublishedDiagnosis,
 ) -> None:
     """Deviations of three specimens: it fails in every reading. Of the mean: only with a close correlation."""
-    possible = [o for o in whole.outlooks if o.reading.correlation <= LEAST_CORRELATION]
+    possible = [o for o in whole.results if o.reading.correlation <= LEAST_CORRELATION]
     assert all(o.p_misfit < 0.01 for o in possible if o.reading.specimens == 3)
-    of_mean = {(o.reading.model, o.reading.correlation): o.p_misfit for o in whole.outlooks if o.reading.specimens == 1}
+    of_mean = {(o.reading.model, o.reading.correlation): o.p_misfit for o in whole.results if o.reading.specimens == 1}
     for model in ("paper", "tribo"):
         assert of_mean[model, -0.95] < 0.01
         assert of_mean[model, LEAST_CORRELATION] > 0.01
@@ -105,7 +105,7 @@ def test_whether_the_papers_model_fails_hangs_on_the_correlation_and_on_what_the
 
 
 def test_suction_is_excluded_in_every_reading_and_deformed_patterns_are_not(whole: PublishedDiagnosis) -> None:
-    for o in whole.outlooks:
+    for o in whole.results:
         gains = {w.name: w.gain for w in o.weighed}
         assert gains["suction"] < 0.1
         assert gains["cavity_shear_deformation"] > max(gains["suction"], gains["contact_area_loss"]) - 1
@@ -123,7 +123,7 @@ def test_the_verdict_says_what_holds_of_each_guess_and_accounts_for_every_mechan
     assert whole.main.p_misfit > 0.01
     assert (v.verdict, v.gain, v.misfits) == ("no_misfit", None, ())
     told = v.as_dict()["model"]["readings"]
-    assert [r["outcome"] for r in told] == [o.outcome for o in whole.outlooks]
+    assert [r["outcome"] for r in told] == [o.outcome for o in whole.results]
 
 
 @pytest.mark.parametrize("name", list(PUBLISHED_FIGURES))

@@ -1,8 +1,1 @@
-"""The diagnosis of a published table of mu and tau0."""
-
-from __future__ import annotations
-
-
-
-
-
+"""The published tables of Berardo et al. (2019), and the diagnosis of their Table 2."""

@@ -1,43 +1,34 @@
-"""``tribo diagnose --published berardo2019``: what a printed table says about the model, and what it leaves open.
+"""What a printed table says about the model, and what it leaves open: ``tribo diagnose --published berardo2019``.
 
 The three explanations that the authors propose are mechanisms of the library. They are weighed like all others, in
 every reading of what the table leaves open: the correlation of mu and tau0, whether the standard deviations are
 those of a mean, and which simulation is the model.
-
-The deviations of a published table, pattern by pattern, for a law across patterns.
-
-``tribo diagnose --published berardo2019``: the diagnosis of a printed table, in every reading of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from tribo.berardo2019.table_model import (
-    PATTERNS,
     RANGE_PA,
-    Outlook,
-    Reading,
     Table,
     TableFit,
-    TableLook,
-    Weighed,
     candidates_of,
     design_correlation,
+    estimate_of,
     even_loads,
     fit_table,
     friction_at,
     model_covariance,
     predict_table,
     read_table,
-    root_of,
+    upper_limit,
 )
-from tribo.berardo2019.table_verdict import verdict_of
-from tribo.diagnostics.verdict import Gain, Verdict
+from tribo.diagnostics.verdict import Cause, Excluded, Gain, Misfit, NextTest, Outcome, Verdict
 from tribo.lawsearch.across_patterns import AcrossPatterns, Deviations, across_patterns, geometry_of
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import REGIMES, FloatArray
@@ -45,12 +36,75 @@ from tribo.records import REGIMES, FloatArray
 if TYPE_CHECKING:
     import pandas as pd
 
-
 LEAST_CORRELATION = -2.0 * np.sqrt(RANGE_PA[0] * RANGE_PA[1]) / (RANGE_PA[0] + RANGE_PA[1])
 REPLICATES = 4000
-TAKEN_UP = 0.02  # share of a look that must be left once the flat law is free
+TAKEN_UP = 0.02  # share of a contrast that must be left once the flat law is free
 RESAMPLES = 400
+LEVEL = 0.01
+CLOSE = 3.0
+FLOOR = 1e-3  # of T/N: a printed line may reach zero at a load
+PATTERNS = "patterns"  # the flat law is free: a misfit of F is one of the patterned samples together
+REGIME_ROWS = {"static": [0], "sliding": [1], "both": [0, 1]}
 Progress = Callable[[str, int, int], None]
+
+
+class TableContrast(NamedTuple):
+    """A contrast of one sample of the table, or of the patterned ones together: its level, or its course over the
+    load."""
+
+    observable: str  # static, sliding or both
+    sample: str
+    along_load: bool
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One way to read the table: whose simulation is the model, the correlation of mu and tau0, the meaning of sd."""
+
+    model: str
+    correlation: float
+    specimens: int
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class ReadingResult:
+    """What one reading gives: the adjusted p value of every contrast, before and after the best mechanism.
+
+    A contrast is one of a sample, or the name of a mechanism. ``weighed`` are the fits with one mechanism each, the
+    best first.
+    """
+
+    reading: Reading
+    table: Table
+    baseline: TableFit
+    contrasts: Mapping[TableContrast | str, float]
+    weighed: tuple[TableFit, ...]
+    p_library: float
+    contrasts_left: Mapping[TableContrast | str, float]
+
+    @property
+    def p_misfit(self) -> float:
+        """Adjusted p value of the strongest contrast."""
+        return min(self.contrasts.values())
+
+    @property
+    def p_left(self) -> float:
+        """The same for what the best mechanism leaves over."""
+        return min(self.contrasts_left.values())
+
+    @property
+    def outcome(self) -> Outcome:
+        if self.p_misfit >= LEVEL:
+            return "no_misfit"
+        if self.p_library >= LEVEL or self.p_left < LEVEL:
+            return "unknown"
+        return "undetermined" if len(self.near) > 1 else "named"
+
+    @property
+    def near(self) -> tuple[TableFit, ...]:
+        """The best and those that explain about as much."""
+        return tuple(w for w in self.weighed if w.gain > self.weighed[0].gain - CLOSE)
 
 
 def readings() -> list[Reading]:
@@ -70,78 +124,63 @@ def readings() -> list[Reading]:
     ]
 
 
-def look_at(table: Table, reading: Reading, rng: np.random.Generator) -> Outlook:
-    """Fit the baseline, compare its strongest look with chance, weigh every mechanism, examine what remains."""
+def diagnose_reading(table: Table, reading: Reading, rng: np.random.Generator) -> ReadingResult:
+    """Fit the baseline, compare its strongest contrast with chance, weigh every mechanism, examine what remains."""
     baseline = fit_table(table)
-    looks = _screen(baseline, rng)
     weighed = weigh_table(baseline)
-    best = weighed[0]
-    earned = float(np.sqrt(2.0 * max(best.fit.score - baseline.score, 0.0)))
-    left = _screen(_widened(best.fit), rng)
-    return Outlook(
-        reading, table, baseline, looks.adjusted(), tuple(weighed), looks.p_library(earned), left.adjusted()
-    )
+    earned = float(np.sqrt(2.0 * max(weighed[0].score - baseline.score, 0.0)))
+    contrasts, p_library = _screen(baseline, rng, earned)
+    left, _ = _screen(_widened(weighed[0]), rng)
+    return ReadingResult(reading, table, baseline, contrasts, tuple(weighed), p_library, left)
 
 
-def weigh_table(baseline: TableFit) -> list[Weighed]:
+def weigh_table(baseline: TableFit) -> list[TableFit]:
     """Every mechanism that the table can show on top of the baseline, the best choice of each, best first."""
-    found: dict[str, Weighed] = {}
+    found: dict[str, TableFit] = {}
     for acting in candidates_of(baseline.table):
         fitted = fit_table(baseline.table, (acting,), baseline.root)
         gain = fitted.score - baseline.score - (len(acting.mechanism.parameters) - 1)
-        known = found.get(acting.mechanism.name)
+        known = found.get(fitted.name)
         if known is None or gain > known.gain:
-            found[acting.mechanism.name] = Weighed(acting, fitted, float(gain))
+            found[fitted.name] = replace(fitted, gain=float(gain))
     return sorted(found.values(), key=lambda w: -w.gain)
 
 
 def _widened(f: TableFit) -> TableFit:
     """The same fit with its law allowed to be wrong in form by a share of its own effect."""
-    change = np.log(friction_at(f.table, f.law, f.acting, f.parameters) / friction_at(f.table, f.law))
     friction = friction_at(f.table, f.law, f.acting, f.parameters)
+    change = np.log(friction / friction_at(f.table, f.law))
     covariance = f.table.data_covariance + model_covariance(f.table, friction, change)
-    return fit_table(f.table, f.acting, root_of(covariance))
+    return fit_table(f.table, f.acting, np.asarray(np.linalg.cholesky(covariance), float))
 
 
-@dataclass(frozen=True)
-class _Screen:
-    names: tuple[TableLook | str, ...]
-    strength: FloatArray  # (looks,)
-    chance: FloatArray  # (replicates, looks)
-    library: np.ndarray  # which looks are laws
-
-    def adjusted(self) -> dict[TableLook | str, float]:
-        """Chance that the strongest of all looks is at least as strong as each."""
-        most = np.sort(self.chance.max(axis=1))
-        above = len(most) - np.searchsorted(most, self.strength)
-        return {n: float((1 + k) / (1 + len(most))) for n, k in zip(self.names, above, strict=True)}
-
-    def p_library(self, strength: float) -> float:
-        """Chance that some mechanism looks at least this strong."""
-        most = self.chance[:, self.library].max(axis=1)
-        return float((1 + np.sum(most >= strength)) / (1 + len(most)))
-
-
-def _screen(f: TableFit, rng: np.random.Generator) -> _Screen:
-    """Strength of every look, and of the same looks at tables drawn from the fit and fitted again."""
-    names, columns, library = _looks(f)
+def _screen(
+    f: TableFit, rng: np.random.Generator, earned: float = 0.0
+) -> tuple[dict[TableContrast | str, float], float]:
+    """Adjusted p values: the chance that the strongest of all contrasts is at least as strong as each, and that some
+    mechanism is as strong as ``earned``; from tables drawn from the fit and fitted again."""
+    names, columns, library = _contrasts(f)
     white = np.linalg.solve(f.root, columns)
     basis = np.linalg.qr(np.linalg.solve(f.root, _jacobian(f)))[0]
     clear = white - basis @ (basis.T @ white)
     length = np.linalg.norm(clear, axis=0)
     shown = length > TAKEN_UP * np.linalg.norm(white, axis=0)
     clear = clear[:, shown] / length[shown]
-    drawn = rng.normal(size=(REPLICATES, len(f.table.values)))
-    kept = tuple(n for n, s in zip(names, shown, strict=True) if s)
-    return _Screen(kept, np.abs(clear.T @ f.residual), np.abs(drawn @ clear), library[shown])
+    chance = np.abs(rng.normal(size=(REPLICATES, len(f.table.values))) @ clear)
+    most = np.sort(chance.max(axis=1))
+    above = len(most) - np.searchsorted(most, np.abs(clear.T @ f.residual))
+    kept = (n for n, s in zip(names, shown, strict=True) if s)
+    adjusted = {n: float((1 + k) / (1 + len(most))) for n, k in zip(kept, above, strict=True)}
+    some = chance[:, library[shown]].max(axis=1)
+    return adjusted, float((1 + np.sum(some >= earned)) / (1 + len(some)))
 
 
-def _looks(f: TableFit) -> tuple[list[TableLook | str], FloatArray, np.ndarray]:
+def _contrasts(f: TableFit) -> tuple[list[TableContrast | str], FloatArray, np.ndarray]:
     """Offset and slope of ln T of every sample in either regime and in both; every mechanism."""
     table = f.table
     friction = friction_at(table, f.law, f.acting, f.parameters)
     log_p = np.log(table.pressures_Pa) - np.log(table.pressures_Pa).mean()
-    names: list[TableLook | str] = []
+    names: list[TableContrast | str] = []
     columns = []
     for i, sample in enumerate(table.samples):
         for regimes, observable in (((0,), "static"), ((1,), "sliding"), ((0, 1), "both")):
@@ -149,7 +188,7 @@ def _looks(f: TableFit) -> tuple[list[TableLook | str], FloatArray, np.ndarray]:
                 change = np.zeros_like(friction)
                 for r in regimes:
                     change[i, r] = friction[i, r] * shape
-                names.append(TableLook(observable, PATTERNS if sample == "F" else sample, along))
+                names.append(TableContrast(observable, PATTERNS if sample == "F" else sample, along))
                 columns.append((change @ table.line.T).ravel())
     for acting in candidates_of(table):
         if acting not in f.acting:
@@ -176,8 +215,10 @@ def _jacobian(f: TableFit) -> FloatArray:
     return np.column_stack(columns)
 
 
-def gain_on_samples(baseline: TableFit, w: Weighed, rng: np.random.Generator) -> Gain:
+def gain_on_samples(baseline: TableFit, extended: TableFit, rng: np.random.Generator) -> Gain:
     """Log score per number and RMSE of T over the loads on whole samples left out, both models fitted anew."""
+    from scipy.stats import multivariate_normal
+
     table = baseline.table
     patterned = [s for s in table.samples if s != "F"]
     scores, errors = np.zeros((len(patterned), 2)), np.zeros((len(patterned), 2))
@@ -185,9 +226,13 @@ def gain_on_samples(baseline: TableFit, w: Weighed, rng: np.random.Generator) ->
         place = table.samples.index(sample)
         out = np.zeros(len(table.values), bool)
         out[4 * place : 4 * place + 4] = True
-        for k, acting in enumerate(((), (w.acting,))):
+        for k, acting in enumerate(((), extended.acting)):
             f = fit_table(table, acting, baseline.root, keep=~out)
-            scores[i, k], errors[i, k] = _held_out(f, out, place)
+            jacobian = _jacobian(f)[out]
+            spread = (f.root @ f.root.T)[np.ix_(out, out)] + jacobian @ f.covariance @ jacobian.T
+            scores[i, k] = multivariate_normal.logpdf(table.values[out], f.predicted[out], spread)
+            measured, modelled = (np.maximum(table.friction(x)[place], 0.05) for x in (table.values, f.predicted))
+            errors[i, k] = np.sqrt(np.mean(np.log(measured / modelled) ** 2))
     difference = (scores[:, 1] - scores[:, 0]) / 4
     drawn = rng.integers(0, len(patterned), (RESAMPLES, len(patterned)))
     rmse = 100 * np.sqrt(np.mean(errors**2, axis=0))
@@ -195,20 +240,6 @@ def gain_on_samples(baseline: TableFit, w: Weighed, rng: np.random.Generator) ->
         "samples", float(scores[:, 0].mean() / 4), float(scores[:, 1].mean() / 4), float(difference.mean()),
         float(np.std(difference[drawn].mean(axis=1))), float(rmse[0]), float(rmse[1]),
     )  # fmt: skip
-
-
-def _held_out(f: TableFit, out: np.ndarray, place: int) -> tuple[float, float]:
-    from scipy.stats import multivariate_normal
-
-    jacobian = _jacobian(f)[out]
-    spread = (f.root @ f.root.T)[np.ix_(out, out)] + jacobian @ f.covariance @ jacobian.T
-    density = float(multivariate_normal.logpdf(f.table.values[out], f.predicted[out], spread))
-    measured = f.table.friction(f.table.values)[place]
-    modelled = f.table.friction(f.predicted)[place]
-    return density, float(np.sqrt(np.mean(np.log(np.maximum(measured, 0.05) / np.maximum(modelled, 0.05)) ** 2)))
-
-
-FLOOR = 1e-3  # of T/N: a printed line may reach zero at a load
 
 
 def table_deviations(table: Table) -> Deviations:
@@ -230,16 +261,111 @@ def table_deviations(table: Table) -> Deviations:
 
 
 @dataclass(frozen=True)
+class OverLoads:
+    """Measured less modelled T in percent of the model, the least and the most of both ends of the pressures (kPa)."""
+
+    low: float
+    high: float
+    pressures_kPa: tuple[float, float]
+
+
+def verdict_of(results: Sequence[ReadingResult], gain: Gain) -> Verdict:
+    """The verdict on the first reading, which shows all of them."""
+    main = results[0]
+    named = main.outcome in ("named", "undetermined")
+    return Verdict(
+        verdict=main.outcome,
+        misfits=tuple(misfits(main)),
+        causes=tuple(_cause(w, main) for w in main.near) if named else (),
+        excluded=tuple(exclusions(main, {w.name for w in main.near} if named else set())),
+        gain=gain if main.outcome != "no_misfit" else None,
+        next_test=_next_test(),
+        model={"shares_from": "the numerical column of Table 2", "readings": [reading_record(o) for o in results]},
+        shows=(tuple(results), gain),
+    )
+
+
+def reading_record(o: ReadingResult) -> dict[str, object]:
+    """One reading in plain values: what was assumed, and what came out."""
+    return {
+        "model": o.reading.model, "correlation": o.reading.correlation, "correlation_is": o.reading.why,
+        "standard_deviations_of": "a mean" if o.reading.specimens == 1 else f"{o.reading.specimens} specimens",
+        "outcome": o.outcome, "p_misfit": o.p_misfit, "best": o.weighed[0].name, "gain_of_best": o.weighed[0].gain,
+        "p_left": o.p_left,
+    }  # fmt: skip
+
+
+def misfits(result: ReadingResult) -> list[Misfit]:
+    """Samples whose friction differs from the model beyond chance, the most certain first."""
+    found: list[Misfit] = []
+    pressures = result.table.pressures_kPa
+    for contrast, p in sorted(result.contrasts.items(), key=lambda item: item[1]):
+        if p >= LEVEL or not isinstance(contrast, TableContrast):
+            continue
+        low, high = _ratio_percent(result, contrast.sample, contrast.observable)
+        sample = "" if contrast.sample == PATTERNS else contrast.sample
+        column = "normal_load_N" if contrast.along_load else "sample"
+        over = OverLoads(low, high, (float(pressures[0]), float(pressures[-1])))
+        found.append(Misfit(contrast.observable, sample, column, (low + high) / 2, p, shows=over))
+    once = {(m.sample, m.observable): m for m in reversed(found)}
+    return [m for m in found if once[m.sample, m.observable] is m]
+
+
+def _ratio_percent(result: ReadingResult, sample: str, observable: str) -> tuple[float, float]:
+    """Measured less modelled T in percent of the model: the mean at either end of the loads, lowest first."""
+    table = result.table
+    picked = [k for k, s in enumerate(table.samples) if s == sample or (sample == PATTERNS and s != "F")]
+    rows = REGIME_ROWS[observable]
+    flat = table.values.reshape(-1, 4)[table.samples.index("F")]
+    ratio = np.log(table.friction(table.values) / friction_at(table, flat))[np.ix_(picked, rows)]
+    ends = 100.0 * np.expm1(ratio[..., [0, -1]].mean(axis=(0, 1)))
+    return float(ends.min()), float(ends.max())
+
+
+def _cause(w: TableFit, main: ReadingResult) -> Cause:
+    gains = np.array([n.gain for n in main.near])
+    share = float(np.exp(w.gain - gains.max()) / np.exp(gains - gains.max()).sum())
+    return Cause(w.name, share, estimate_of(w))
+
+
+def exclusions(main: ReadingResult, shown: set[str]) -> list[Excluded]:
+    """Every mechanism that is not among the causes, and why, in the first reading."""
+    best = main.weighed[0]
+    found = []
+    for name, m in MECHANISMS.items():
+        weighed = next((w for w in main.weighed if w.name == name), None)
+        if name in shown or (not shown and weighed is best):
+            continue
+        if m.in_table.missing:
+            found.append(Excluded(name, "not printed"))
+        elif m.in_table.barred:
+            found.append(Excluded(name, "contradicted"))
+        elif weighed is None:
+            found.append(Excluded(name, "not varied"))
+        elif m.amplitude.low == 0.0 and float(weighed.parameters[0][0]) < 1e-3 * m.amplitude.start:
+            found.append(Excluded(name, "wrong sign", shows=upper_limit(main.baseline, name)))
+        else:
+            found.append(Excluded(name, "explains less", best.gain - weighed.gain))
+    return found
+
+
+def _next_test() -> NextTest | None:
+    """The bench test that a mechanism of the library proposes."""
+    test = next((m.in_table.next_test for m in MECHANISMS.values() if m.in_table.next_test is not None), None)
+    return NextTest("at the bench", test.separates, test.design, shows=test) if test is not None else None
+
+
+@dataclass(frozen=True)
 class PublishedDiagnosis:
     """The verdict on a printed table, with every reading of it; the first is the one the verdict speaks of."""
 
     source: str
     verdict: Verdict
-    outlooks: tuple[Outlook, ...]
+    results: tuple[ReadingResult, ...]
 
     @property
-    def main(self) -> Outlook:
-        return self.outlooks[0]
+    def main(self) -> ReadingResult:
+        return self.results[0]
 
 
 def diagnose_published(
@@ -253,9 +379,19 @@ def diagnose_published(
 
     Parameters
     ----------
-    table2 : as :func:`tribo.berardo2019.published_tables.load_table2` gives it
-    own : the same table simulated anew: sample, regime, mu, tau0_kPa
-    seed : of the simulated tables that stand for chance
+    table2 : DataFrame
+        As :func:`tribo.berardo2019.published_tables.load_table2` gives it.
+    own : DataFrame
+        The same table simulated anew: sample, regime, mu, tau0_kPa.
+    seed : int
+        Of the simulated tables that stand for chance.
+    progress : callable, optional
+        Called with a stage, the readings done and the readings there are.
+
+    Returns
+    -------
+    PublishedDiagnosis
+        The verdict on the first reading, and what every reading gives.
     """
     measured = table2[table2["source"] == "experiment"]
     models = {"paper": table2[table2["source"] == "simulation"], "tribo": own}
@@ -264,7 +400,7 @@ def diagnose_published(
         if progress is not None:
             progress("reading the table", k, len(readings()))
         table = read_table(measured, models[reading.model], reading.correlation, reading.specimens)
-        found.append(look_at(table, reading, np.random.default_rng(seed)))
+        found.append(diagnose_reading(table, reading, np.random.default_rng(seed)))
     rng = np.random.default_rng(seed)
     gain = gain_on_samples(found[0].baseline, found[0].weighed[0], rng)
     return PublishedDiagnosis("berardo2019", verdict_of(found, gain), tuple(found))

@@ -7,25 +7,24 @@ statement is repeated for others. The model is that of :mod:`tribo.diagnostics.m
     (mu, tau0) of a sample = line through [m mu_F p + a tau0_F] x mechanism x error of the simulation + error of the fit
 
 with the flat law free (four numbers), the shares m and a from a simulated table, the errors normal.
-
-Readings of a published table, and what each gives: records and estimates.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tribo.diagnostics.contrasts import FORM
 from tribo.diagnostics.model import Acting
 from tribo.diagnostics.predictor import error_sizes
-from tribo.diagnostics.verdict import Estimate, Outcome
-from tribo.mechanisms.record import Base, Conditions
+from tribo.diagnostics.verdict import Estimate
+from tribo.mechanisms.record import Base, Conditions, Mechanism
 from tribo.mechanisms.table import MECHANISMS
-from tribo.records import REGIMES, FloatArray, Pattern
+from tribo.records import REGIMES, FloatArray
 from tribo.springblock.lattice import PAPER_PATTERNS
 
 if TYPE_CHECKING:
@@ -35,9 +34,7 @@ if TYPE_CHECKING:
 RANGE_PA = (3e3, 25e3)  # Berardo 2019, Model parameters
 N_LOADS = 12
 NOMINAL_AREA_M2 = 55e-6  # 140 g make 25 kPa
-REPLICATES = 4000
-PER_PARAMETER = 1.0
-WORDS = {"static": "static friction", "sliding": "sliding friction"}
+NORMAL_90 = 1.645
 
 
 @dataclass(frozen=True)
@@ -69,7 +66,10 @@ class Table:
 
 @dataclass(frozen=True)
 class TableFit:
-    """A model fitted to a table. ``law`` = (mu, tau0 kPa) static, then sliding, of the flat sample."""
+    """A model fitted to a table. ``law`` = (mu, tau0 kPa) static, then sliding, of the flat sample.
+
+    ``gain`` is the log likelihood that its mechanism earns over the fit without any, net of its freedom.
+    """
 
     table: Table
     acting: tuple[Acting, ...]
@@ -78,6 +78,16 @@ class TableFit:
     covariance: FloatArray  # of law and parameters
     root: FloatArray  # lower Cholesky factor of the covariance of the values
     predicted: FloatArray
+    gain: float = 0.0
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The first that acts."""
+        return self.acting[0].mechanism
+
+    @property
+    def name(self) -> str:
+        return self.mechanism.name
 
     @property
     def residual(self) -> FloatArray:
@@ -134,7 +144,7 @@ def read_table(
 
 def _conditions(samples: Sequence[str], loads_Pa: FloatArray) -> Conditions:
     """Every sample at every load, samples first; speed, hold and environment are the same."""
-    patterns = [_pattern(s) for s in samples]
+    patterns = [PAPER_PATTERNS[s if s in PAPER_PATTERNS else s[:-1]] for s in samples]
     n, m = len(samples), len(loads_Pa)
 
     def each(values: list[float]) -> FloatArray:
@@ -152,10 +162,6 @@ def _conditions(samples: Sequence[str], loads_Pa: FloatArray) -> Conditions:
         temperature_C=unknown, humidity_pct=unknown, clip_N=np.zeros(n * m),
         pattern=np.repeat(np.array([p.name for p in patterns], str), m),
     )  # fmt: skip
-
-
-def _pattern(sample: str) -> Pattern:
-    return PAPER_PATTERNS[sample if sample in PAPER_PATTERNS else sample[:-1]]
 
 
 def predict_table(
@@ -196,8 +202,6 @@ def model_covariance(table: Table, friction: FloatArray, acting_change: FloatArr
 
     ``acting_change`` (samples, regimes, loads), the change of ln T by mechanisms, adds their error of form.
     """
-    from tribo.diagnostics.contrasts import FORM
-
     log_p = np.log(table.pressures_Pa / np.sqrt(np.prod(RANGE_PA)))
     size = len(table.values)
     error = error_sizes()["total"]
@@ -214,11 +218,6 @@ def model_covariance(table: Table, friction: FloatArray, acting_change: FloatArr
     return total
 
 
-def root_of(covariance: FloatArray) -> FloatArray:
-    """Lower Cholesky factor."""
-    return np.asarray(np.linalg.cholesky(covariance), float)
-
-
 def fit_table(
     table: Table, acting: Sequence[Acting] = (), root: FloatArray | None = None, keep: np.ndarray | None = None
 ) -> TableFit:
@@ -227,9 +226,9 @@ def fit_table(
 
     law0 = table.values.reshape(-1, 4)[table.samples.index("F")]
     own = model_covariance(table, friction_at(table, law0))
-    factor = root_of(table.data_covariance + own) if root is None else root
+    factor = np.linalg.cholesky(table.data_covariance + own) if root is None else root
     kept = np.ones(len(table.values), bool) if keep is None else keep
-    part = root_of((factor @ factor.T)[np.ix_(kept, kept)])
+    part = np.linalg.cholesky((factor @ factor.T)[np.ix_(kept, kept)])
     sizes = [len(a.mechanism.parameters) for a in acting]
     low = np.concatenate([np.array([0.01, -50.0] * 2), *(a.mechanism.bounds()[0] for a in acting)])
     high = np.concatenate([np.array([50.0, 200.0] * 2), *(a.mechanism.bounds()[1] for a in acting)])
@@ -244,7 +243,8 @@ def fit_table(
     best = min(found, key=lambda f: float(f.cost))
     x, inverse = best.x, np.linalg.pinv(best.jac.T @ best.jac, rcond=1e-14)
     predicted = predict_table(table, x[:4], acting, _split(x, sizes))
-    return TableFit(table, tuple(acting), x[:4], tuple(_split(x, sizes)), inverse, factor, predicted)
+    root = np.asarray(factor, float)
+    return TableFit(table, tuple(acting), x[:4], tuple(_split(x, sizes)), inverse, root, predicted)
 
 
 def _starts(acting: Sequence[Acting]) -> list[list[FloatArray]]:
@@ -275,117 +275,35 @@ def candidates_of(table: Table) -> list[Acting]:
     return found
 
 
-def fit_fixed(baseline: TableFit, acting: Acting, amplitude: float) -> TableFit:
-    """The flat law fitted anew with one mechanism held at an amplitude, its further parameters at their start."""
-    from scipy.optimize import least_squares
-
-    table, values = baseline.table, acting.mechanism.start()
-    values[0] = amplitude
-
-    def whitened(x: FloatArray) -> FloatArray:
-        return np.asarray(np.linalg.solve(baseline.root, table.values - predict_table(table, x, (acting,), (values,))))
-
-    found = least_squares(whitened, baseline.law)
-    predicted = predict_table(table, found.x, (acting,), (values,))
-    inverse = np.linalg.pinv(found.jac.T @ found.jac)
-    return TableFit(table, (acting,), found.x, (values,), inverse, baseline.root, predicted)
-
-
-LEVEL = 0.01
-CLOSE = 3.0
-PATTERNS = "patterns"  # the flat law is free: a misfit of F is one of the patterned samples together
-
-
-class TableLook(NamedTuple):
-    """A look at one sample of the table, or at the patterned ones together: its level, or its course over the load."""
-
-    observable: str  # static, sliding or both
-    sample: str
-    along_load: bool
-
-
-@dataclass(frozen=True)
-class Reading:
-    """One way to read the table: whose simulation is the model, the correlation of mu and tau0, the meaning of sd."""
-
-    model: str
-    correlation: float
-    specimens: int
-    why: str = ""
-
-
-@dataclass(frozen=True)
-class Weighed:
-    """A mechanism fitted to the table; ``gain`` is the log likelihood it earns net of its freedom."""
-
-    acting: Acting
-    fit: TableFit
-    gain: float
-
-    @property
-    def name(self) -> str:
-        return self.acting.mechanism.name
-
-
-@dataclass(frozen=True)
-class Outlook:
-    """What one reading gives: the adjusted p value of every look at the table, before and after the best mechanism.
-
-    A look is one at a sample, or the name of a mechanism.
-    """
-
-    reading: Reading
-    table: Table
-    baseline: TableFit
-    looks: Mapping[TableLook | str, float]
-    weighed: tuple[Weighed, ...]
-    p_library: float
-    looks_left: Mapping[TableLook | str, float]
-
-    @property
-    def p_misfit(self) -> float:
-        """Adjusted p value of the strongest look."""
-        return min(self.looks.values())
-
-    @property
-    def p_left(self) -> float:
-        """The same for what the best mechanism leaves over."""
-        return min(self.looks_left.values())
-
-    @property
-    def outcome(self) -> Outcome:
-        if self.p_misfit >= LEVEL:
-            return "no_misfit"
-        if self.p_library >= LEVEL or self.p_left < LEVEL:
-            return "unknown"
-        return "undetermined" if len(self.near) > 1 else "named"
-
-    @property
-    def near(self) -> tuple[Weighed, ...]:
-        """The best and those that explain about as much."""
-        return tuple(w for w in self.weighed if w.gain > self.weighed[0].gain - CLOSE)
-
-
-def estimate_of(w: Weighed) -> dict[str, Estimate]:
+def estimate_of(f: TableFit) -> dict[str, Estimate]:
     """Parameters with 90 % intervals, kept inside their bounds."""
     found = {}
-    for k, p in enumerate(w.acting.mechanism.parameters):
-        half = 1.645 * float(np.sqrt(max(w.fit.covariance[4 + k, 4 + k], 0.0)))
-        value = float(w.fit.parameters[0][k])
+    for k, p in enumerate(f.mechanism.parameters):
+        half = NORMAL_90 * float(np.sqrt(max(f.covariance[4 + k, 4 + k], 0.0)))
+        value = float(f.parameters[0][k])
         found[p.name] = Estimate(value, max(value - half, p.low), min(value + half, p.high), p.unit)
     return found
 
 
 def upper_limit(baseline: TableFit, name: str, drop: float = 1.353) -> float:
-    """Largest amplitude within ``drop`` of the best log likelihood (95 % one-sided), the flat law fitted anew."""
-    from scipy.optimize import brentq
+    """Largest amplitude within ``drop`` of the best log likelihood (95 % one-sided), the flat law fitted anew and
+    further parameters at their start."""
+    from scipy.optimize import brentq, least_squares
 
-    acting = Acting(MECHANISMS[name])
+    table, acting = baseline.table, Acting(MECHANISMS[name])
     p = acting.mechanism.amplitude
-    best = fit_table(baseline.table, (acting,), baseline.root)
+    best = fit_table(table, (acting,), baseline.root)
 
     def excess(value: float) -> float:
-        return best.score - fit_fixed(baseline, acting, value).score - drop
+        values = acting.mechanism.start()
+        values[0] = value
+
+        def whitened(x: FloatArray) -> FloatArray:
+            left = table.values - predict_table(table, x, (acting,), (values,))
+            return np.asarray(np.linalg.solve(baseline.root, left))
+
+        left = whitened(least_squares(whitened, baseline.law).x)
+        return best.score - float(-0.5 * left @ left) - drop
 
     start = float(best.parameters[0][0])
     return p.high if excess(p.high) < 0 else float(brentq(excess, start, p.high, xtol=1e-4 * p.start))

@@ -1,6 +1,7 @@
-"""Running-in: whether friction at the beginning of a long slide differs from that of its second half.
+"""What single records show without a model: running-in along a long slide, and an offset between strokes.
 
-Strokes in both directions: the offset of the force between them, which no friction makes.
+Running-in is a difference of friction at the beginning of a slide from that of its second half. Strokes in both
+directions show the offset of the force, which no friction makes.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from tribo.records import CLOSED_TRACK_M, FloatArray, Ingested, Pull, Test, Trac
 
 BLOCKS = 20  # of equal distance; the first is compared with those of the second half
 _FEWEST_IN_BLOCK = 5
+CERTAIN = 5.0  # standard errors, as for other evidence from traces
+_FEWEST = 3  # pairs of strokes
 
 
 @dataclass(frozen=True)
@@ -86,13 +89,10 @@ def _travel(test: Test, trace: Trace) -> FloatArray | None:
     return None
 
 
-CERTAIN = 5.0  # standard errors, as for other evidence from traces
-_FEWEST = 3
-
 
 @dataclass(frozen=True)
 class StrokeOffset:
-    """The ``offset`` of the force in N with its 90 % interval: half of what parts the two directions.
+    """The ``offset`` of the force in N with its 90 % interval: half of what separates the two directions.
 
     ``percent`` is that of the mean sliding force. ``strokes`` counts those forward and those backward.
     """

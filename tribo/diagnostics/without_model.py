@@ -1,13 +1,11 @@
-"""The law of every sample alone as layers of a verdict: the baseline of a diagnosis without the spring-block model.
-
-The diagnosis of a study without the spring-block model; its baseline is the law of every sample alone.
-"""
+"""The diagnosis of a study without the spring-block model; its baseline is the law of every sample alone."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, Literal
 
 import numpy as np
@@ -21,7 +19,7 @@ from tribo.diagnostics.column_search import (
     regime_tests,
     search_columns,
 )
-from tribo.diagnostics.verdict import Cause, Estimate, Excluded, Layer, Misfit, NextTest, Outcome, Verdict
+from tribo.diagnostics.verdict import Cause, Estimate, Excluded, Layer, Misfit, NextTest, Verdict
 from tribo.diagnostics.within_records import RunningIn, StrokeOffset, running_in, stroke_offset
 from tribo.mechanisms.record import ALONG_RECORDS, STROKES_APART
 from tribo.mechanisms.table import MECHANISMS
@@ -30,57 +28,14 @@ from tribo.vocabulary import label_with_unit
 
 UNITS = {"constant": ("N", ""), "linear": ("", "N"), "three_term": ("", "N")}
 NAMES = {"constant": ("T0",), "proportional": ("mu",), "hertz": ("a",), "linear": ("mu", "T0"), "power": ("a", "b")}
-
-
-def law_layers(study: Study) -> list[Layer]:
-    """One layer per sample and regime: the law chosen for it, or the mean of T/N where the loads determine none."""
-    table = study.laws
-    chosen = {} if table is None else {(row["sample"], row["regime"]): row for row in _rows(table) if row["chosen"]}
-    found = []
-    for sample, regime, ratio, loads in _measured(study):
-        row = chosen.get((sample, regime))
-        found.append(_of_law(row, _line(table, row), loads) if row else _of_mean(sample, regime, ratio))
-    return found
-
-
-def _rows(table: Any) -> list[dict[str, Any]]:
-    return [{str(k): v for k, v in row.items()} for row in table.to_dict("records")]
-
-
-def _line(table: Any, row: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
-    """The straight line fitted to the same sample and regime."""
-    if row is None:
-        return None
-    same = (r for r in _rows(table) if (r["sample"], r["regime"], r["law"]) == (row["sample"], row["regime"], "linear"))
-    return next(same, None)
-
-
-def _measured(study: Study) -> Iterator[tuple[str, str, np.ndarray, np.ndarray]]:
-    """Sample, regime, T/N of its tests and their loads."""
-    table = study.ingested.table()
-    for sample in dict.fromkeys(table["sample"]):
-        for regime in REGIMES:
-            part = table[(table["sample"] == sample) & np.isfinite(table[f"{regime}_N"]) & (table["normal_load_N"] > 0)]
-            if len(part):
-                load = part["normal_load_N"].to_numpy(float)
-                yield str(sample), regime, part[f"{regime}_N"].to_numpy(float) / load, load
-
-
-def _of_law(row: Mapping[str, Any], line: Mapping[str, Any] | None, loads: np.ndarray) -> Layer:
-    sample, regime = str(row["sample"]), str(row["regime"])
-    names = NAMES.get(row["law"], ("a", "b"))
-    units = UNITS.get(row["law"], ("", ""))
-    parameters = {
-        name: _estimate(row[key], row[f"{key}_u"], unit, row["loads"] - row["parameters"])
-        for name, key, unit in zip(names, ("a", "b"), units, strict=False)
-        if math.isfinite(row[key])
-    }
-    has_constant = row["law"] in ("power", "linear", "constant", "three_term", "hertz") and line is not None
-    return Layer(
-        kind="baseline", name="normal_load_N", samples=(sample,), regimes=(regime,), p_adjusted=float("nan"),
-        effect_percent=float("nan"), low=float("nan"), high=float("nan"), parameters=parameters,
-        formula=str(row["formula"]), shows=_constant_part(line, loads) if has_constant else None,
-    )  # fmt: skip
+WITH_CONSTANT = ("power", "linear", "constant", "three_term", "hertz")  # laws whose T need not vanish with the load
+BASELINE = "the law of each sample alone"
+SHOWN_BY = {shown: m.name for m in MECHANISMS.values() for shown in m.without_model}
+ANY_COLUMN = next(m.name for m in MECHANISMS.values() if m.any_column)
+RUNNING_IN, OFFSET = SHOWN_BY[ALONG_RECORDS], SHOWN_BY[STROKES_APART]
+MECHANISMS_OF_COLUMNS = {k: name for k, name in SHOWN_BY.items() if k not in (ALONG_RECORDS, STROKES_APART)}
+Shown = tuple[list[Layer], list[Cause], list[Misfit]]
+SERIES = ("run_order", "specimen_run", "started_at", "date")  # columns that no one can vary
 
 
 @dataclass(frozen=True)
@@ -92,6 +47,47 @@ class ConstantPart:
     load_N: float
 
 
+def law_layers(study: Study) -> list[Layer]:
+    """One layer per sample and regime: the law chosen for it, or the mean of T/N where the loads determine none."""
+    rows = [] if study.laws is None else [{str(k): v for k, v in r.items()} for r in study.laws.to_dict("records")]
+    chosen = {(row["sample"], row["regime"]): row for row in rows if row["chosen"]}
+    lines = {(row["sample"], row["regime"]): row for row in reversed(rows) if row["law"] == "linear"}
+    table = study.ingested.table()
+    found = []
+    for sample, regime in product(dict.fromkeys(table["sample"]), REGIMES):
+        part = table[(table["sample"] == sample) & np.isfinite(table[f"{regime}_N"]) & (table["normal_load_N"] > 0)]
+        if not len(part):
+            continue
+        loads, row = part["normal_load_N"].to_numpy(float), chosen.get((sample, regime))
+        constant = None
+        if row is not None:
+            formula, parameters = str(row["formula"]), _parameters(row)
+            if row["law"] in WITH_CONSTANT and (sample, regime) in lines:
+                constant = _constant_part(lines[sample, regime], loads)
+        else:
+            ratio = part[f"{regime}_N"].to_numpy(float) / loads
+            u = float(ratio.std(ddof=1) / math.sqrt(ratio.size)) if ratio.size > 1 else float("nan")
+            formula, parameters = "T = μ N", {"T/N": _estimate(float(ratio.mean()), u, "", ratio.size - 1)}
+        found.append(
+            Layer(
+                kind="baseline", name="normal_load_N", samples=(str(sample),), regimes=(regime,),
+                p_adjusted=float("nan"), effect_percent=float("nan"), low=float("nan"), high=float("nan"),
+                parameters=parameters, formula=formula, shows=constant,
+            )
+        )  # fmt: skip
+    return found
+
+
+def _parameters(row: Mapping[str, Any]) -> dict[str, Estimate]:
+    """The parameters of a law with a row of the table of laws."""
+    names, units = NAMES.get(row["law"], ("a", "b")), UNITS.get(row["law"], ("", ""))
+    return {
+        name: _estimate(row[key], row[f"{key}_u"], unit, row["loads"] - row["parameters"])
+        for name, key, unit in zip(names, ("a", "b"), units, strict=False)
+        if math.isfinite(row[key])
+    }
+
+
 def _constant_part(line: Mapping[str, Any], loads: np.ndarray) -> ConstantPart:
     constant = _estimate(line["b"], line["b_u"], "N", line["loads"] - 2)
     middle = float(np.median(loads))
@@ -99,28 +95,10 @@ def _constant_part(line: Mapping[str, Any], loads: np.ndarray) -> ConstantPart:
     return ConstantPart(constant, float(share), middle)
 
 
-def _of_mean(sample: str, regime: str, ratio: np.ndarray) -> Layer:
-    u = float(ratio.std(ddof=1) / math.sqrt(ratio.size)) if ratio.size > 1 else float("nan")
-    mean = _estimate(float(ratio.mean()), u, "", ratio.size - 1)
-    return Layer(
-        kind="baseline", name="normal_load_N", samples=(sample,), regimes=(regime,), p_adjusted=float("nan"),
-        effect_percent=float("nan"), low=float("nan"), high=float("nan"), parameters={"T/N": mean}, formula="T = μ N",
-    )  # fmt: skip
-
-
 def _estimate(value: float, u: float, unit: str, dof: int) -> Estimate:
     """A value with its 90 % interval by Student's t."""
     half = float(t_distribution.ppf(0.95, max(dof, 1))) * u
     return Estimate(float(value), float(value - half), float(value + half), unit)
-
-
-BASELINE = "the law of each sample alone"
-
-SHOWN_BY = {shown: m.name for m in MECHANISMS.values() for shown in m.without_model}
-ANY_COLUMN = next(m.name for m in MECHANISMS.values() if m.any_column)
-RUNNING_IN, OFFSET = SHOWN_BY[ALONG_RECORDS], SHOWN_BY[STROKES_APART]
-MECHANISMS_OF_COLUMNS = {k: name for k, name in SHOWN_BY.items() if k not in (ALONG_RECORDS, STROKES_APART)}
-SERIES = ("run_order", "specimen_run", "started_at", "date")  # columns that no one can vary
 
 
 def name_of_column(column: str) -> str:
@@ -151,116 +129,91 @@ def diagnose_without_model(study: Study, *, seed: int = 0, level: float = 0.01) 
         Chance of naming anything where nothing is there.
     """
     rng = np.random.default_rng(seed)
-    points = [t for regime in REGIMES if (t := regime_tests(study.ingested, regime)).n]
-    enough = [t for t in points if t.enough]
+    tests = [t for regime in REGIMES if (t := regime_tests(study.ingested, regime)).n]
+    enough = [t for t in tests if t.enough]
     found = [search_columns(t, len(enough), level, rng) for t in enough]
+    effects = [f for s in found for f in s.follows]
     records = [r for r in running_in(study.ingested) if r.p < level]
-    apart = stroke_offset(study.ingested)
-    layers = [*law_layers(study), *_column_layers(found), *_record_layers(records), *_offset_layers(apart)]
-    causes = [*_column_causes(found), *_record_causes(records), *_offset_causes(apart)]
-    inseparable = _inseparable(study, found)
-    tied = ((f.name, *f.alike) for s in found for f in s.follows if f.alike)
-    equivalent = tuple(dict.fromkeys(tuple(map(name_of_column, names)) for names in tied))
-    outcome: Outcome = "named" if causes else "no_misfit"
+    offset = stroke_offset(study.ingested)
+    shown = [_of_columns(effects), _of_records(records), _of_strokes(offset)]
+    causes = [cause for _, each, _ in shown for cause in each]
+    tied = ((f.name, *f.alike) for f in effects if f.alike)
     return Verdict(
-        verdict=outcome,
-        misfits=tuple(_misfits(found, records)),
+        verdict="named" if causes else "no_misfit",
+        misfits=tuple(misfit for _, _, each in shown for misfit in each),
         causes=tuple(causes),
-        equivalent=equivalent,
-        not_testable=(*_not_testable(found), *inseparable),
-        layers=tuple(layers),
+        equivalent=tuple(dict.fromkeys(tuple(map(name_of_column, names)) for names in tied)),
+        not_testable=(*_not_testable(found), *_inseparable(study, found)),
+        layers=(*law_layers(study), *(layer for each, _, _ in shown for layer in each)),
         set_aside=study.ingested.set_aside,
         next_test=_next_test(found),
         model={"baseline": BASELINE},
-        shows=_tested(points, found),
+        shows=_tested(tests, found),
     )
 
 
-def _tested(points: list[RegimeTests], found: list[SearchedColumns]) -> ColumnsTested:
-    if found or not points:
+def _tested(tests: list[RegimeTests], found: list[SearchedColumns]) -> ColumnsTested:
+    if found or not tests:
         columns = tuple(sorted({name for s in found for name in s.columns}))
         return ColumnsTested(columns, "" if found else "no tests")
-    if not any(t.columns or t.only_with_load for t in points):
+    if not any(t.columns or t.only_with_load for t in tests):
         return ColumnsTested((), "no column varies")
-    needed = max(FEWEST_TESTS, 2 * points[-1].law.shape[1])
-    return ColumnsTested((), "too few tests", max(t.n for t in points), needed)
+    needed = max(FEWEST_TESTS, 2 * tests[-1].law.shape[1])
+    return ColumnsTested((), "too few tests", max(t.n for t in tests), needed)
 
 
-def _column_layers(found: list[SearchedColumns]) -> list[Layer]:
-    return [
+def _of_columns(effects: Sequence[ColumnEffect]) -> Shown:
+    """One cause per column, with its size in every regime in which it is beyond chance."""
+    layers = [
         Layer(
             kind="cause", name=name_of_column(f.name), samples=(), regimes=(f.regime,), p_adjusted=f.p,
             effect_percent=f.change_percent, low=f.low_percent, high=f.high_percent,
             tied_with=tuple(map(name_of_column, f.alike)), shows=(f,),
         )
-        for s in found for f in s.follows
+        for f in effects
     ]  # fmt: skip
+    causes = []
+    for name in dict.fromkeys(f.name for f in effects):
+        own = tuple(f for f in effects if f.name == name)
+        sizes = {
+            f"change of {f.regime} T": Estimate(f.change_percent, f.low_percent, f.high_percent, "%") for f in own
+        }
+        causes.append(Cause(name_of_column(name), 1.0, sizes, shows=own))
+    return layers, causes, [Misfit(f.regime, "", f.name, f.change_percent, f.p, shows=(f,)) for f in effects]
 
 
-def _column_causes(found: list[SearchedColumns]) -> list[Cause]:
-    """One cause per column, with its size in every regime in which it is beyond chance."""
-    each: dict[str, list[ColumnEffect]] = {}
-    for s in found:
-        for f in s.follows:
-            each.setdefault(f.name, []).append(f)
-    return [
-        Cause(
-            name_of_column(alike[0].name), 1.0, {f"change of {f.regime} T": _size(f) for f in alike},
-            shows=tuple(alike),
-        )
-        for alike in each.values()
-    ]  # fmt: skip
-
-
-def _size(f: ColumnEffect) -> Estimate:
-    return Estimate(f.change_percent, f.low_percent, f.high_percent, "%")
-
-
-def _misfits(found: list[SearchedColumns], records: list[RunningIn]) -> list[Misfit]:
-    all_found = [f for s in found for f in s.follows]
-    misfits = [Misfit(f.regime, "", f.name, f.change_percent, f.p, shows=(f,)) for f in all_found]
+def _of_records(records: Sequence[RunningIn]) -> Shown:
+    """Running-in: a layer and a misfit per sample, one cause."""
+    layers, misfits = [], []
     for sample in dict.fromkeys(r.sample for r in records):
-        part = [r for r in records if r.sample == sample]
+        part = tuple(r for r in records if r.sample == sample)
+        size, p = _middle(part), min(r.p for r in part)
         strongest = max(part, key=lambda r: abs(r.first_percent))
-        misfits.append(Misfit("sliding", sample, "distance", strongest.first_percent, min(r.p for r in part),
-                              shows=tuple(part)))  # fmt: skip
-    return misfits
-
-
-def _record_layers(records: list[RunningIn]) -> list[Layer]:
-    found = []
-    for sample in dict.fromkeys(r.sample for r in records):
-        part = [r for r in records if r.sample == sample]
-        changes = [r.first_percent for r in part]
-        p = min(r.p for r in part)
-        found.append(
-            Layer(kind="cause", name=RUNNING_IN, samples=(sample,), regimes=("sliding",), p_adjusted=p,
-                  effect_percent=float(np.median(changes)), low=min(changes), high=max(changes),
-                  shows=tuple(part))
+        layers.append(
+            Layer(
+                kind="cause", name=RUNNING_IN, samples=(sample,), regimes=("sliding",), p_adjusted=p,
+                effect_percent=size.value, low=size.low, high=size.high, shows=part,
+            )
         )  # fmt: skip
-    return found
+        misfits.append(Misfit("sliding", sample, "distance", strongest.first_percent, p, shows=part))
+    sizes = {"first twentieth over second half": _middle(records)} if records else {}
+    return layers, [Cause(RUNNING_IN, 1.0, sizes, shows=tuple(records))] if records else [], misfits
 
 
-def _record_causes(records: list[RunningIn]) -> list[Cause]:
-    if not records:
-        return []
+def _middle(records: Sequence[RunningIn]) -> Estimate:
+    """The median over records, and their range."""
     changes = [r.first_percent for r in records]
-    size = Estimate(float(np.median(changes)), min(changes), max(changes), "%")
-    return [Cause(RUNNING_IN, 1.0, {"first twentieth over second half": size}, shows=tuple(records))]
+    return Estimate(float(np.median(changes)), min(changes), max(changes), "%")
 
 
-def _offset_layers(apart: StrokeOffset | None) -> list[Layer]:
-    if apart is None or not apart.certain:
-        return []
-    return [Layer(kind="cause", name=OFFSET, samples=(), regimes=(), p_adjusted=apart.p,
-                  effect_percent=apart.percent, low=apart.low_percent, high=apart.high_percent,
-                  parameters={"F0": apart.offset}, shows=(apart,))]  # fmt: skip
-
-
-def _offset_causes(apart: StrokeOffset | None) -> list[Cause]:
-    if apart is None or not apart.certain:
-        return []
-    return [Cause(OFFSET, 1.0, {"F0": apart.offset}, shows=(apart,))]
+def _of_strokes(offset: StrokeOffset | None) -> Shown:
+    if offset is None or not offset.certain:
+        return [], [], []
+    layer = Layer(
+        kind="cause", name=OFFSET, samples=(), regimes=(), p_adjusted=offset.p, effect_percent=offset.percent,
+        low=offset.low_percent, high=offset.high_percent, parameters={"F0": offset.offset}, shows=(offset,),
+    )  # fmt: skip
+    return [layer], [Cause(OFFSET, 1.0, {"F0": offset.offset}, shows=(offset,))], []
 
 
 def _inseparable(study: Study, found: list[SearchedColumns]) -> list[Excluded]:

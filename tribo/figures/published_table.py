@@ -17,8 +17,7 @@ from tribo.figures.misfit import mechanism_label
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
-    from tribo.berardo2019.table_diagnosis import PublishedDiagnosis
-    from tribo.berardo2019.table_model import Outlook
+    from tribo.berardo2019.table_diagnosis import PublishedDiagnosis, ReadingResult
 
 RATIO_COLUMNS = [
     "sample", "regime", "pressure_kPa", "measured_over_model", "low", "high", "low_independent", "high_independent",
@@ -42,7 +41,7 @@ def ratio_numbers(d: PublishedDiagnosis) -> pd.DataFrame:
     from tribo.berardo2019.table_model import friction_at
 
     main = d.main
-    table, best = main.table, main.weighed[0].fit
+    table, best = main.table, main.weighed[0]
     flat = table.values.reshape(-1, 4)[table.samples.index("F")]
     model = friction_at(table, flat)
     measured = table.friction(table.values)
@@ -60,9 +59,9 @@ def ratio_numbers(d: PublishedDiagnosis) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=RATIO_COLUMNS)
 
 
-def _relative_u(outlook: Outlook, correlation: float | None) -> np.ndarray:
+def _relative_u(result: ReadingResult, correlation: float | None) -> np.ndarray:
     """Standard uncertainty of measured T over T, (samples, regimes, loads); ``correlation`` None as in the reading."""
-    table = outlook.table
+    table = result.table
     blocks = table.data_covariance.reshape(len(table.samples) * 2, 2, -1, 2)
     cov = np.array([blocks[k, :, k, :] for k in range(len(blocks))])
     if correlation is not None:
@@ -118,12 +117,12 @@ def reading_numbers(d: PublishedDiagnosis) -> pd.DataFrame:
     from tribo.berardo2019.table_model import estimate_of
 
     rows = []
-    for k, o in enumerate(d.outlooks):
+    for k, o in enumerate(d.results):
         r = o.reading
         for w in o.weighed:
             name, e = next(iter(estimate_of(w).items()))
             known = (k, r.model, r.correlation, r.specimens, o.outcome, o.p_misfit, o.p_left)
-            guess = w.acting.mechanism.in_table.guess
+            guess = w.mechanism.in_table.guess
             rows.append((*known, w.name, guess, w.gain, name, e.value, e.low, e.high, e.unit))
     return pd.DataFrame(rows, columns=READING_COLUMNS)
 

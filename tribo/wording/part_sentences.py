@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from tribo.berardo2019.table_verdict import OverLoads
+from tribo.berardo2019.table_diagnosis import OverLoads
 from tribo.diagnostics.column_search import ColumnEffect
 from tribo.diagnostics.direct_evidence import Evidence
 from tribo.diagnostics.effect_sizes import Effect

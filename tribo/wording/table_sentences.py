@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tribo.berardo2019.table_model import LEVEL, Outlook, TableLook, Weighed, estimate_of, upper_limit
+from tribo.berardo2019.table_diagnosis import LEVEL, ReadingResult, TableContrast
+from tribo.berardo2019.table_model import TableFit, estimate_of, upper_limit
 from tribo.diagnostics.verdict import Gain, Verdict
 from tribo.mechanisms.record import Readings
 from tribo.mechanisms.table import MECHANISMS
@@ -28,14 +29,14 @@ def published_evidence(v: Verdict) -> str:
     return " ".join([*_guesses(outlooks), _extension(outlooks[0], outlooks[0].weighed[0], gain)])
 
 
-def _look(look: TableLook | str) -> str:
-    if isinstance(look, str):
-        return look
-    what = "friction" if look.observable == "both" else OBSERVABLES[look.observable]
-    return f"{what} of {look.sample}{' against load' if look.along_load else ''}"
+def _contrast(contrast: TableContrast | str) -> str:
+    if isinstance(contrast, str):
+        return contrast
+    what = "friction" if contrast.observable == "both" else OBSERVABLES[contrast.observable]
+    return f"{what} of {contrast.sample}{' against load' if contrast.along_load else ''}"
 
 
-def _against_the_model(outlooks: Sequence[Outlook]) -> str:
+def _against_the_model(outlooks: Sequence[ReadingResult]) -> str:
     """Whether the model of the paper fails, and on what that depends."""
     possible = [o for o in outlooks if o.reading.correlation < -LEAST_ALIKE]
     free = [o for o in outlooks if o.reading.correlation == 0.0 and o.reading.specimens == 1]
@@ -57,7 +58,7 @@ def _against_the_model(outlooks: Sequence[Outlook]) -> str:
     return text
 
 
-def _guesses(outlooks: Sequence[Outlook]) -> list[str]:
+def _guesses(outlooks: Sequence[ReadingResult]) -> list[str]:
     """What the numbers say of each explanation that the authors propose, and of errors of the instrument instead."""
     possible = [o for o in outlooks if o.reading.correlation < -LEAST_ALIKE]
     found = [
@@ -68,19 +69,19 @@ def _guesses(outlooks: Sequence[Outlook]) -> list[str]:
     return [*found, _adhesion_along_y(outlooks[0]), *_instrument_instead(possible)]
 
 
-def _readings_of(name: str, main: Outlook, outlooks: Sequence[Outlook]) -> Readings:
+def _readings_of(name: str, main: ReadingResult, outlooks: Sequence[ReadingResult]) -> Readings:
     weighed = [next(w for w in o.weighed if w.name == name) for o in outlooks]
     return Readings(
         gains=tuple(w.gain for w in weighed),
-        sizes=tuple(float(w.fit.parameters[0][0]) for w in weighed),
+        sizes=tuple(float(w.parameters[0][0]) for w in weighed),
         limit=lambda: upper_limit(main.baseline, name),
         flat_traction_Pa=_flat_traction_Pa(main),
     )
 
 
-def _instrument_instead(outlooks: Sequence[Outlook]) -> list[str]:
+def _instrument_instead(outlooks: Sequence[ReadingResult]) -> list[str]:
     """In how many readings another mechanism explains more than the authors' explanations."""
-    best = [o.weighed[0].acting.mechanism for o in outlooks]
+    best = [o.weighed[0].mechanism for o in outlooks]
     ahead = [m.in_words for m in best if not m.in_table.guess]
     if not ahead:
         return []
@@ -88,7 +89,7 @@ def _instrument_instead(outlooks: Sequence[Outlook]) -> list[str]:
     return [f"In {len(ahead)} of these readings {names} explains more; nothing printed in the paper rules it out."]
 
 
-def _adhesion_along_y(outlook: Outlook) -> str:
+def _adhesion_along_y(outlook: ReadingResult) -> str:
     """The adhesion of S across its long cavities, from the table itself."""
     table = outlook.table
     i = table.samples.index("Sy")
@@ -101,30 +102,30 @@ def _adhesion_along_y(outlook: Outlook) -> str:
     )
 
 
-def _flat_traction_Pa(outlook: Outlook) -> float:
+def _flat_traction_Pa(outlook: ReadingResult) -> float:
     """Static traction of the flat sample at 10 kPa by the calibrated law."""
     law = outlook.table.values.reshape(-1, 4)[outlook.table.samples.index("F")]
     return float(law[0] * 10e3 + law[1] * 1e3)
 
 
-def _extension(main: Outlook, best: Weighed, gain: Gain) -> str:
+def _extension(main: ReadingResult, best: TableFit, gain: Gain) -> str:
     """How much the best extended model explains, in the table and on samples left out, and what remains."""
     name, e = next(iter(estimate_of(best).items()))
-    before, after = -2 * main.baseline.score, -2 * best.fit.score
+    before, after = -2 * main.baseline.score, -2 * best.score
     clear = gain.difference > 2 * gain.se
     text = (
-        f"The best extension is {best.acting.mechanism.in_words}, {name} = {e.value:.2g} {e.unit}".rstrip()
+        f"The best extension is {best.mechanism.in_words}, {name} = {e.value:.2g} {e.unit}".rstrip()
         + f" (90 % interval {e.low:.2g} to {e.high:.2g}): chi-squared of the {len(main.table.values)} numbers falls "
         f"from {before:.0f} to {after:.0f}. On whole samples left out of the fit its gain is {gain.difference:+.2f} +- "
         f"{gain.se:.2f} in log score per number, which {'is clear' if clear else 'may be chance'}."
     )
-    strongest = min(main.looks_left, key=lambda look: main.looks_left[look])
+    strongest = min(main.contrasts_left, key=lambda contrast: main.contrasts_left[contrast])
     if main.p_left < LEVEL:
         text += (
-            f" A misfit remains ({_look(strongest)}, adjusted p {p_text(main.p_left)}): no single law of the library "
-            "is sufficient."
+            f" A misfit remains ({_contrast(strongest)}, adjusted p {p_text(main.p_left)}): no single law of the "
+            "library is sufficient."
         )
-    rivals = [w.acting.mechanism.in_words for w in main.near if w is not best]
+    rivals = [w.mechanism.in_words for w in main.near if w is not best]
     if rivals:
         text += f" About as well explained by: {', '.join(rivals)}."
     return text
