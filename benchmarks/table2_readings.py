@@ -17,8 +17,9 @@ import numpy as np
 
 from tribo.records import FloatArray, Run
 from tribo.springblock.config import PAPER_SAMPLES, SimConfig
-from tribo.springblock.ensemble import Angles, Progress, Work, run_stored, stratified_design
+from tribo.springblock.ensemble import Angles, Progress, Work, stratified_design
 from tribo.springblock.ensemble_laws import WEIGHTS, resampled_laws
+from tribo.springblock.kept_runs import run_stored
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -32,7 +32,7 @@ from torture_processes import REPORT, differing, ensemble, finished, quick_repor
 from tribo.cache.kept_results import Shelf, fingerprint
 from tribo.errors import TriboError
 from tribo.springblock import SimConfig, simulate, stratified_design
-from tribo.springblock.ensemble import run_stored
+from tribo.springblock.kept_runs import run_stored
 
 PROCESSOR_S, WALL_S = 20, 120.0
 SAME, MADE_AGAIN, REFUSED, DIFFERENT, CRASHED = range(5)
@@ -70,7 +70,7 @@ def store_outcome(path: Path, design: list[SimConfig], runs: dict[SimConfig, Any
     """What continuing a damaged store comes to; runs made again are looked up."""
     made = []
 
-    def look_up(config: SimConfig) -> Any:
+    def look_up(config: SimConfig, threads: int) -> Any:
         made.append(config)
         return runs[config]
 

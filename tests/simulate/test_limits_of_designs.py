@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from tribo.errors import SimulationError
-from tribo.springblock import ensemble as resume
+from tribo.springblock import ensemble, run_stored
 from tribo.springblock.config import SimConfig
 from tribo.springblock.design_file import read_design, runs_of_design
 
@@ -62,18 +62,16 @@ def test_a_design_that_is_a_pipe_or_not_utf8_is_refused(tmp_path: Path) -> None:
 def test_a_scheduler_that_goes_away_is_a_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: type[BaseException]
 ) -> None:
-    class Client:
-        def map(self, function: object, items: list[object], pure: bool) -> list[Any]:
-            return [type("Future", (), {"key": k})() for k, _ in enumerate(items)]
-
-    def gone(futures: object, with_results: bool) -> Iterator[None]:
-        raise error
-        yield
+    class Pool:
+        def submit(self, function: object, *given: object) -> concurrent.futures.Future[object]:
+            future: concurrent.futures.Future[object] = concurrent.futures.Future()
+            future.set_exception(error())
+            return future
 
     @contextmanager
-    def client(address: str) -> Iterator[tuple[Any, Any]]:
-        yield Client(), gone
+    def workers(jobs: int, address: str) -> Iterator[Any]:
+        yield Pool()
 
-    monkeypatch.setattr(resume, "_client", client)
+    monkeypatch.setattr(ensemble, "_executor", workers)
     with pytest.raises(SimulationError, match="the dask scheduler stopped answering"):
-        resume.run_stored([SimConfig()], tmp_path / "runs.nc", 1, "tcp://host:1")
+        run_stored([SimConfig()], tmp_path / "runs.nc", 1, "tcp://host:1")

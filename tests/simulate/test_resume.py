@@ -25,7 +25,8 @@ from tribo.cli import main
 from tribo.errors import SimulationError
 from tribo.records import Run
 from tribo.springblock import SimConfig, run_ensemble, stratified_design
-from tribo.springblock.ensemble import Work, read_stored, run_stored, varied_columns
+from tribo.springblock.ensemble import Work
+from tribo.springblock.kept_runs import read_stored, run_stored, varied_columns
 
 SMALL = SimConfig(blocks=(40, 40), dt_s=1e-7, rest_tolerance=1e-2)
 RESULTS = ["static_friction", "sliding_friction", "peak_s", "window_end_s"]
@@ -61,7 +62,7 @@ def test_stored_ensemble_is_the_ensemble(tmp_path: Path):
 def test_a_second_start_computes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """All rows are there, so no run is made."""
     first = run_stored(design(1), tmp_path / "e.h5")
-    monkeypatch.setattr("tribo.springblock.ensemble.simulate", lambda config: pytest.fail("ran again"))
+    monkeypatch.setattr("tribo.springblock.ensemble.simulate", lambda config, threads: pytest.fail("ran again"))
     pd.testing.assert_frame_equal(run_stored(design(1), tmp_path / "e.h5"), first, check_exact=True)
 
 
@@ -86,33 +87,41 @@ def falsify_one_result(file: h5py.File) -> None:
     file["static_friction"][1] = 9.9
 
 
-def mark_a_run_done_that_is_not(file: h5py.File) -> None:
-    for name in ("static_friction", "sliding_friction"):
-        file[name][1] = float("nan")
-    file["checksum"][1] = 0
+def mark_a_run_not_done(file: h5py.File) -> None:
+    file["done"][1] = 0
 
 
 def move_a_result_to_another_run(file: h5py.File) -> None:
-    for name in ("static_friction", "sliding_friction", "peak_s", "checksum"):
+    for name in ("static_friction", "sliding_friction", "peak_s"):
         file[name][1] = file[name][0]
 
 
+def change_the_time_step(file: h5py.File) -> None:
+    file.attrs.modify("dt_s", 2e-7)
+
+
+def change_the_angles(file: h5py.File) -> None:
+    file["angle_deg"].write_direct(np.ones(4))
+
+
 @pytest.mark.parametrize(
-    "change", [falsify_one_result, mark_a_run_done_that_is_not, move_a_result_to_another_run], ids=lambda f: f.__name__
+    "change",
+    [falsify_one_result, mark_a_run_not_done, move_a_result_to_another_run, change_the_time_step, change_the_angles],
+    ids=lambda f: f.__name__,
 )
-def test_a_run_that_differs_from_its_checksum_is_not_read_and_is_computed_again(
+def test_a_file_that_differs_from_its_checksum_is_not_read_and_is_made_again(
     tmp_path: Path, change: Callable[[h5py.File], None]
 ):
-    """The other rows stay; a warning names the file; the whole is then as it was."""
+    """Reading it is an error; a start that continues it makes all runs again, and the whole is as it was."""
     first = run_stored(design(1), tmp_path / "e.h5")
     edited(tmp_path / "e.h5", change)
-    with pytest.warns(DamagedResultWarning, match="1 of 4 runs differ"):
-        table = read_stored(tmp_path / "e.h5")
-    assert table["done"].tolist() == [True, False, True, True]
-    assert table.loc[1, ["static_friction", "sliding_friction", "normal_load_N"]].isna().all()
-    with pytest.warns(DamagedResultWarning, match="1 of 4 runs differ"):
+    with pytest.raises(SimulationError, match="differs from its checksum"):
+        read_stored(tmp_path / "e.h5")
+    with pytest.warns(DamagedResultWarning, match="all runs are computed again"):
         again = run_stored(design(1), tmp_path / "e.h5")
     pd.testing.assert_frame_equal(again, first, check_exact=True)
+    with h5py.File(tmp_path / "e.h5") as file:
+        assert file.attrs["dt_s"] == 1e-7
 
 
 def test_a_store_of_another_version_is_not_continued(tmp_path: Path):
@@ -123,21 +132,8 @@ def test_a_store_of_another_version_is_not_continued(tmp_path: Path):
         run_stored(design(1), tmp_path / "e.h5")
 
 
-def test_a_store_with_a_damaged_description_is_made_again(tmp_path: Path):
-    """An attribute or an input that is not that of the design leaves no doubt that the file was changed."""
-    first = run_stored(design(1), tmp_path / "e.h5")
-    time_step, angles = ("dt_s", 2e-7), np.ones(4)
-    for change in (lambda file: file.attrs.modify(*time_step), lambda file: file["angle_deg"].write_direct(angles)):
-        edited(tmp_path / "e.h5", change)
-        with pytest.warns(DamagedResultWarning, match="all runs are computed again"):
-            again = run_stored(design(1), tmp_path / "e.h5")
-        pd.testing.assert_frame_equal(again, first, check_exact=True)
-        with h5py.File(tmp_path / "e.h5") as file:
-            assert file.attrs["dt_s"] == 1e-7
-
-
 def test_no_flipped_bit_of_a_store_gives_another_number_in_silence(tmp_path: Path):
-    """A table with a flipped bit is the same, has runs marked as not done, or is refused."""
+    """A table with a flipped bit is the same, or is refused."""
     path = tmp_path / "e.h5"
     expected = run_stored(design(1), path)
     intact = path.read_bytes()
@@ -152,14 +148,14 @@ def test_no_flipped_bit_of_a_store_gives_another_number_in_silence(tmp_path: Pat
                 table = read_stored(path)
             except SimulationError:
                 continue
-        pd.testing.assert_frame_equal(table[table["done"]], expected[table["done"]], check_exact=True)
+        pd.testing.assert_frame_equal(table, expected, check_exact=True)
 
 
 HOLDING = """
 import sys, time
 sys.path.insert(0, {folder!r})
 from test_resume import design
-from tribo.springblock.ensemble import run_stored
+from tribo.springblock.kept_runs import run_stored
 run_stored(design(1), {store!r}, jobs=1, progress=lambda done, total: (print(done, flush=True), time.sleep(60)))
 """
 
@@ -204,7 +200,8 @@ KILLED = """
 import sys
 sys.path.insert(0, {folder!r})
 from test_resume import design
-from tribo.springblock.ensemble import run_stored
+from tribo.springblock import kept_runs, run_stored
+kept_runs.WRITE_EVERY_S = 0.0
 run_stored(design(20), {store!r}, jobs=2, progress=lambda done, total: print(done, flush=True))
 """
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.springblock.config import PAPER_PRESSURES_PA, PAPER_SAMPLES, SimConfig
-from tribo.springblock.ensemble import Angles, Progress, run_ensemble, run_stored, stratified_design
+from tribo.springblock.ensemble import Angles, Progress, run_ensemble, stratified_design
 from tribo.springblock.ensemble_laws import fitted
+from tribo.springblock.kept_runs import run_stored
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,7 +45,7 @@ def table2(
     ----------
     design : the runs, those of :func:`table2_design` by default
     weights : as for :func:`tribo.springblock.simulated_law`
-    path, scheduler : as for :func:`tribo.springblock.ensemble.run_stored`; without a path nothing is kept
+    path, scheduler : as for :func:`tribo.springblock.run_stored`; without a path nothing is kept
     published : the published table (columns sample, regime, source, mu, tau0_kPa); adds the deviations
 
     Returns

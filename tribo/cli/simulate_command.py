@@ -96,7 +96,7 @@ def simulate(
     from tribo.cache.own_folder import check_file, only_writer_of
     from tribo.mechanisms_in_model import columns_from, parse_given, parse_with
     from tribo.springblock.design_file import asked_runs, described_by_options, read_design, together
-    from tribo.springblock.ensemble import continues, run_stored
+    from tribo.springblock.kept_runs import fault_of, run_stored
     from tribo.springblock.results_file import ENSEMBLE, ONE_RUN, kind_of
     from tribo.springblock.run import simulate as run_model
 
@@ -124,7 +124,7 @@ def simulate(
             _one_run(console, run, out)
     else:
         work = _work(added)
-        if force and out.exists() and not continues(runs, out, work):
+        if force and out.exists() and fault_of(runs, out, work) is not None:
             out.unlink()
         with console.progress() as progress:
             ran = run_stored(

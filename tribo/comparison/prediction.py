@@ -11,7 +11,6 @@ from __future__ import annotations
 import hashlib
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
 SOURCES = ("springblock", "laws", "records")  # packages whose sources decide a run
 SUFFIX = ".nc"
 WAIT_S = 86400.0  # for another process that runs the same cell: its runs are then there
-CELLS_AWAY = 16  # cells given to a scheduler at once
 
 
 @dataclass(frozen=True)
@@ -106,48 +104,17 @@ def run_cells(
     import pandas as pd
 
     from tribo.springblock import run_ensemble
+    from tribo.springblock.kept_runs import fault_of, run_all_stored
 
-    total = sum(len(cell.configs) for cell in cells)
     if kept is None:
         return run_ensemble([config for cell in cells for config in cell.configs], jobs, progress)
-    done_of = {cell.name: 0 for cell in cells}
-    progress(0, total)
-
-    def run(cell: Cell) -> pd.DataFrame:
-        def count(done: int, _: int) -> None:
-            done_of[cell.name] = done
-            progress(sum(done_of.values()), total)
-
-        return _run_stored(cell, kept, threads, scheduler, count)
-
-    at_once = max(1, jobs // max(1, min(len(cell.configs) for cell in cells)))
-    threads = -(-jobs // at_once)
-    if scheduler is not None:  # the work is elsewhere: keep its workers busy
-        at_once = CELLS_AWAY
-    if at_once == 1:
-        tables = [run(cell) for cell in cells]
-    else:
-        with ThreadPoolExecutor(at_once) as pool:
-            tables = list(pool.map(run, cells))
-    return pd.concat(tables, ignore_index=True)
-
-
-def _run_stored(
-    cell: Cell, kept: Path, threads: int, scheduler: str | None, progress: Callable[[int, int], None]
-) -> pd.DataFrame:
-    """The runs of one cell, from its file as far as it holds them; one that is damaged or unreadable is replaced."""
-    from tribo.springblock.ensemble import fault_of, read_stored, run_stored
-
-    path = cell.path(kept)
     kept.mkdir(parents=True, exist_ok=True)
-    if path.exists():
-        if (fault := fault_of(cell.configs, path)) is not None:
+    stores = [(cell.configs, cell.path(kept)) for cell in cells]
+    for configs, path in stores:
+        if path.exists() and (fault := fault_of(configs, path)) is not None:
             warnings.warn(f"{path}: {fault.what}; these simulations are made again", DamagedResultWarning, stacklevel=2)
             path.unlink(missing_ok=True)
-        elif (table := read_stored(path))["done"].all():  # finished: nothing to wait for or to check once more
-            progress(len(table), len(table))
-            return table
-    return run_stored(cell.configs, path, threads, scheduler, progress, wait_s=WAIT_S)
+    return pd.concat(run_all_stored(stores, jobs, scheduler, progress, wait_s=WAIT_S), ignore_index=True)
 
 
 def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | None:
@@ -163,7 +130,7 @@ def kept_runs(kept: Path, patterns: Mapping[str, Pattern]) -> pd.DataFrame | Non
     import pandas as pd
 
     from tribo.springblock import read_stored
-    from tribo.springblock.ensemble import UNREADABLE
+    from tribo.springblock.kept_runs import UNREADABLE
 
     found = []
     for path in found_in(kept, f"*@*{SUFFIX}"):

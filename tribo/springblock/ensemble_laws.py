@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.records import FloatArray
-from tribo.springblock.ensemble import varied_columns
+from tribo.springblock.kept_runs import varied_columns
 
 if TYPE_CHECKING:
     import pandas as pd

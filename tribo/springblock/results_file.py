@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -88,18 +89,18 @@ def write_run(run: Run, path: str | Path) -> Path:
         "engine": run.engine,
         **attributes(run.parameters),
     }
-    return _write(Path(path), "time", columns, about)
+    return write_columns(Path(path), "time", columns, about)
 
 
 def write_ensemble(table: pd.DataFrame, path: str | Path, parameters: Mapping[str, Any] | None = None) -> Path:
     """Write the table of an ensemble: one variable per column, one entry per run."""
     columns: dict[str, Column] = {"run": (np.arange(len(table)), {"units": "1"})}
     columns |= {name: (table[name].to_numpy(), {"units": unit_of(name)}) for name in map(str, table.columns)}
-    return _write(Path(path), "run", columns, {"title": ENSEMBLE, **attributes(parameters or {})})
+    return write_columns(Path(path), "run", columns, {"title": ENSEMBLE, **attributes(parameters or {})})
 
 
-def _write(path: Path, dimension: str, columns: Mapping[str, Column], about: Mapping[str, Any]) -> Path:
-    """Columns of equal length along one of them. Written without xarray, which takes a second to import."""
+def write_columns(path: Path, dimension: str, columns: Mapping[str, Column], about: Mapping[str, Any]) -> Path:
+    """Columns of equal length along one of them, with a checksum of all. xarray would take a second to import."""
     import h5py
 
     with whole_hdf5(path) as held, h5py.File(held, "w") as file:
@@ -113,7 +114,20 @@ def _write(path: Path, dimension: str, columns: Mapping[str, Column], about: Map
                 column.make_scale(name)
             else:
                 column.dims[0].attach_scale(file[dimension])
+        file.attrs["checksum"] = checksum_of(file)
     return path
+
+
+def checksum_of(file: Any) -> str:
+    """SHA-256 of every attribute and column of an open file, the checksum itself left out."""
+    digest = hashlib.sha256()
+    for name in sorted(set(file.attrs) - {"checksum"}):
+        digest.update(f"{name} {np.asarray(file.attrs[name]).tolist()!r}\n".encode())
+    for name in sorted(file):
+        values = file[name][:]
+        content = repr(values.tolist()).encode() if values.dtype.kind == "O" else values.tobytes()
+        digest.update(f"{name} {values.dtype} {file[name].attrs['units']}\n".encode() + content)
+    return digest.hexdigest()
 
 
 def kind_of(path: Path) -> str:

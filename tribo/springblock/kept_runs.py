@@ -1,0 +1,240 @@
+"""Runs kept in HDF5 files, each of one design; an ensemble that was stopped goes on where its file ends.
+
+A file is always written whole: every :data:`WRITE_EVERY_S` while its runs are made, and once more when they end or are
+interrupted. It bears a checksum of all it holds, and the hashes of its design and of the sources that made it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tribo.cache.kept_results import DamagedResultWarning, sources
+from tribo.cache.own_folder import only_writer_of
+from tribo.display import exact_text
+from tribo.errors import Problem, SimulationError
+from tribo.springblock.config import SimConfig
+from tribo.springblock.ensemble import FRICTION, RESULTS, Progress, Work, check_all, finished_runs
+from tribo.springblock.results_file import ENSEMBLE, attributes, checksum_of, unit_of, write_columns
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+INPUTS = {"sample": "1", "pressure_Pa": "Pa", "angle_deg": "degree", "seed": "1"}
+OF_THE_SAMPLE = {"pattern", "cavity", "cavity_size_m", "cavity_pitch_m", "cavity_staggered"}
+DONE = "done"
+WRITE_EVERY_S = 2.0
+UNREADABLE = (OSError, KeyError, ValueError, TypeError, RuntimeError, MemoryError, AttributeError, IndexError)
+
+
+def run_stored(
+    design: Sequence[SimConfig],
+    path: str | Path,
+    jobs: int = 2,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    work: Work = FRICTION,
+    wait_s: float = 0.0,
+) -> pd.DataFrame:
+    """Compute the runs of a design that ``path`` does not hold yet, and return all of them.
+
+    One process at a time writes the file. Where it is damaged, all runs are computed again, and a warning says so.
+
+    Parameters
+    ----------
+    design
+        Configurations, in any order that stays the same between starts.
+    path
+        The HDF5 file; made if absent, continued if it holds exactly this design.
+    jobs
+        Threads on this machine.
+    scheduler
+        Address of a dask.distributed scheduler; its workers then make the runs (optional dependency).
+    progress
+        Called with the runs done, earlier starts included, and their total.
+    work
+        How a run is made and what is kept of it, static and sliding friction with their times by default.
+    wait_s
+        How long to wait for another process that writes the file, in s.
+
+    Returns
+    -------
+    DataFrame
+        One row per run: sample, pressure_Pa, angle_deg, seed, what varies in the design, what is kept of a run, done.
+
+    Raises
+    ------
+    SimulationError
+        An impossible configuration, a file of another design or version, or no dask or no scheduler where one is given.
+    BusyError
+        Another process writes the file.
+    """
+    return run_all_stored([(design, Path(path))], jobs, scheduler, progress, work, wait_s)[0]
+
+
+def run_all_stored(
+    stores: Sequence[tuple[Sequence[SimConfig], Path]],
+    jobs: int = 2,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    work: Work = FRICTION,
+    wait_s: float = 0.0,
+) -> list[pd.DataFrame]:
+    """As :func:`run_stored`, for several designs in files of their own, whose runs are made side by side."""
+    check_all(config for design, _ in stores for config in design)
+    with ExitStack() as held:
+        rows = {path: _rows_of(design, path, work) for design, path in stores}
+        for design, path in sorted(stores, key=lambda store: store[1]):  # so that no two processes wait for each other
+            if len(rows[path]) < len(design):
+                held.enter_context(only_writer_of(path, wait_s))
+                rows[path] = _rows_of(design, path, work)  # another process may have made them meanwhile
+        missing = [(path, k) for design, path in stores for k in range(len(design)) if k not in rows[path]]
+        finished, total = sum(map(len, rows.values())), sum(len(design) for design, _ in stores)
+        if progress is not None:
+            progress(finished, total)
+        designs = {path: design for design, path in stores}
+        written = dict.fromkeys(designs, time.monotonic())
+        unwritten: set[Path] = set()
+        try:
+            for place, row in finished_runs([designs[path][k] for path, k in missing], jobs, scheduler, work):
+                path, k = missing[place]
+                rows[path][k] = row
+                unwritten.add(path)
+                if len(rows[path]) == len(designs[path]) or time.monotonic() >= written[path] + WRITE_EVERY_S:
+                    _write(designs[path], path, work, rows[path])
+                    written[path] = time.monotonic()
+                    unwritten.remove(path)
+                finished += 1
+                if progress is not None:
+                    progress(finished, total)
+        finally:
+            for path in unwritten:
+                _write(designs[path], path, work, rows[path])
+        return [read_stored(path) for _, path in stores]
+
+
+def _rows_of(design: Sequence[SimConfig], path: Path, work: Work) -> dict[int, Mapping[str, Any]]:
+    """The results that a file of these runs holds, by place; none where it is absent or damaged."""
+    fault = fault_of(design, path, work) if path.exists() else None
+    if fault is not None and fault.kind != "damaged_store":
+        raise SimulationError(fault)
+    if fault is not None:
+        warnings.warn(f"{path}: the file is damaged; all runs are computed again", DamagedResultWarning, stacklevel=3)
+    if fault is not None or not path.exists():
+        return {}
+    table = read_stored(path)
+    return {int(k): table.loc[k, list(work.units)].to_dict() for k in np.flatnonzero(table[DONE])}
+
+
+def read_stored(path: str | Path) -> pd.DataFrame:
+    """The table of a stored ensemble, finished or not.
+
+    ``done`` tells which rows hold results; the results of the others are NaN.
+
+    Raises
+    ------
+    SimulationError
+        This is no stored ensemble, or it differs from its checksum.
+    """
+    import h5py
+    import pandas as pd
+
+    path = Path(path)
+    try:
+        with h5py.File(path) as file:
+            intact = file.attrs["checksum"] == checksum_of(file)
+            columns = {str(name): file[name][:] for name in file.attrs["columns"]}
+        texts = {name: np.array([t.decode() for t in c], object) for name, c in columns.items() if c.dtype == object}
+    except UNREADABLE as why:
+        raise SimulationError(_no_store(path, why)) from why
+    if not intact:
+        raise SimulationError(Problem("damaged_store", "it differs from its checksum", file=str(path)))
+    return pd.DataFrame({**columns, **texts, DONE: columns[DONE].astype(bool)})
+
+
+def _no_store(path: Path, why: BaseException) -> Problem:
+    what = f"cannot be read as HDF5 with runs and their checksum: {why}"
+    return Problem("not_a_store", what, file=str(path), allowed="a new file, or --force to replace this one")
+
+
+def fault_of(design: Sequence[SimConfig], path: Path, work: Work = FRICTION) -> Problem | None:
+    """Why ``path`` is no intact file of exactly these runs, finished or not; None where it is."""
+    import h5py
+
+    place, allowed = str(path), "a new file, or --force to replace this one"
+    try:
+        with h5py.File(path) as file:
+            made_from = file.attrs["design"], file.attrs["sources"]
+            intact = file.attrs.get("checksum") == checksum_of(file)
+    except UNREADABLE as why:
+        return _no_store(path, why)
+    if made_from[0] != fingerprint(design, work):
+        return Problem("other_design", "it holds runs of a different design", file=place, allowed=allowed)
+    if made_from[1] != sources(*work.rooms):
+        what = "it holds runs of another version of tribo or of its libraries, and is not continued"
+        return Problem("other_version", what, file=place, allowed=allowed)
+    return None if intact else Problem("damaged_store", "it differs from its checksum", file=place)
+
+
+def fingerprint(design: Iterable[SimConfig], work: Work = FRICTION) -> str:
+    """Hash of every field of every configuration, in order, and of what is done with them."""
+    digest = hashlib.sha256(repr((list(work.units), work.label)).encode())
+    for config in design:
+        digest.update(exact_text(config).encode())
+    return digest.hexdigest()
+
+
+def _write(design: Sequence[SimConfig], path: Path, work: Work, rows: Mapping[int, Mapping[str, Any]]) -> None:
+    """The design and the results that are there, as one file."""
+    given = {name: [getattr(config, name) for config in design] for name in INPUTS} | _varied_parameters(design)
+    done = np.array([k in rows for k in range(len(design))], np.uint8)
+    results = {
+        name: np.array([rows[k][name] if k in rows else np.nan for k in range(len(design))]) for name in work.units
+    }
+    columns = {"run": np.arange(len(design)), **{n: _as_stored(v) for n, v in given.items()}, **results, DONE: done}
+    units = {**INPUTS, **work.units}
+    about = {
+        "title": f"{ENSEMBLE}, one entry per run",
+        "columns": [name for name in columns if name != "run"],
+        "results": list(work.units),
+        "design": fingerprint(design, work),
+        "sources": sources(*work.rooms),
+        **attributes(_shared_parameters(design)),
+    }
+    write_columns(path, "run", {n: (v, {"units": units.get(n) or unit_of(n)}) for n, v in columns.items()}, about)
+
+
+def varied_columns(table: pd.DataFrame) -> list[str]:
+    """The columns of a stored ensemble that hold parameters the design varies beside its inputs."""
+    return [str(name) for name in table.columns if name not in {*INPUTS, *RESULTS, DONE}]
+
+
+def _as_stored(values: Any) -> Any:
+    """Numbers as they are; everything else as text."""
+    return np.array(values) if all(np.isscalar(v) for v in values) else np.array([str(v) for v in values])
+
+
+def _varied_parameters(design: Sequence[SimConfig]) -> dict[str, Any]:
+    """The parameters, beside the inputs, that differ between runs; those that follow from the sample are left out."""
+    all_parameters = [config.parameters() for config in design]
+    names = {name: None for parameters in all_parameters for name in parameters}
+    shared = _shared_parameters(design)
+    return {
+        name: [p.get(name, "") for p in all_parameters]
+        for name in names
+        if name not in shared and name not in INPUTS and name not in OF_THE_SAMPLE
+    }
+
+
+def _shared_parameters(design: Sequence[SimConfig]) -> dict[str, Any]:
+    """The parameters all runs have in common."""
+    all_parameters = [config.parameters() for config in design]
+    first = all_parameters[0] if all_parameters else {}
+    return {name: value for name, value in first.items() if all(p.get(name) == value for p in all_parameters)}
