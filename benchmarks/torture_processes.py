@@ -33,8 +33,7 @@ from faults.commands import small_lattice
 from faults.remembered import RememberedPages
 from faults.trial import TIMES, run_command
 from forked_starts import stand_in_for_python, start_here
-
-from tribo.mechanisms_in_model.sled import SledDesign, SledLaw, write_campaign
+from support.sled import SledDesign, SledLaw, write_campaign
 
 TOML = (
     '[campaign]\ntitle = "torture"\nnominal_area_mm2 = 55.0\nslider_mass_g = 1.5\n'

@@ -84,7 +84,7 @@ def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
 @pytest.fixture(scope="session")
 def small_campaign(once: Once) -> Path:
     """A campaign of 24 pulls of the virtual tribometer: samples F and B, three specimens, two loads, two repeats."""
-    from tribo.mechanisms_in_model.sled import SledDesign, SledLaw, write_campaign
+    from support.sled import SledDesign, SledLaw, write_campaign
 
     laws = {"F": SledLaw(4.8, 23e3, 2.9, 12e3), "B": SledLaw(3.6, 10e3, 2.9, 6e3)}
     toml = (

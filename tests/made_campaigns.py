@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-
-from tribo.mechanisms_in_model.sled import EXPORTERS, SledDesign, SledLaw, SledTribometer, write_campaign
+from support.sled import EXPORTERS, SledDesign, SledLaw, SledTribometer, write_campaign
 
 DIALECTS = ("bluehill", "testxpert", "testsuite", "delimited")
 PATTERNS = """

@@ -6,8 +6,7 @@ import runpy
 from pathlib import Path
 
 import numpy as np
-
-from tribo.mechanisms_in_model.sled import SledDesign, SledLaw, SledTribometer, write_campaign
+from support.sled import SledDesign, SledLaw, SledTribometer, write_campaign
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "data" / "example"
 LAW = {"F": SledLaw(5.0, 20e3, 3.0, 10e3)}

@@ -5,7 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from tribo.mechanisms_in_model.sled import SledDesign, SledLaw, write_campaign
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+
+from support.sled import SledDesign, SledLaw, write_campaign
 
 # mu and tau0 (kPa) measured by Berardo et al. 2019, Table 2, columns "fit T/N = mu + tau0/p"
 MEASURED = {

@@ -61,7 +61,7 @@ class Place:
 
 def write_inputs(root: Path) -> Place:
     """Campaign, folder of campaigns and design below ``root``; the same bytes every time."""
-    from tribo.mechanisms_in_model.sled import SledDesign, SledLaw, write_campaign
+    from support.sled import SledDesign, SledLaw, write_campaign
 
     place = Place(root.resolve())
     laws = {"F": SledLaw(4.8, 23e3, 2.9, 12e3), "B": SledLaw(3.6, 10e3, 2.9, 6e3)}

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from made_campaigns import DESIGN, DIALECTS, LAWS, MadeCampaign, write_made
 from other_fits import fit_power_law
+from support.sled import SledLaw
 
 from tribo.campaign import load_campaign
 from tribo.fitting import campaign_budgets, fit_samples, fit_three_term, power_of_campaign
-from tribo.mechanisms_in_model.sled import SledLaw
 from tribo.records import Ingested, LawFit, Regime
 from tribo.stages import ingest
 

@@ -9,10 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import tribo
 from tribo import stages
 from tribo.campaign import load_campaign
+from tribo.cli import main
 from tribo.errors import CampaignError, TraceError
 from tribo.ingestion.overrides import apply_overrides
 from tribo.records import Ingested, Pull
@@ -223,3 +225,15 @@ def test_a_pull_is_made_in_one_module_only() -> None:
         if changed:
             makers.add(module.relative_to(PACKAGE).as_posix())
     assert makers == {"traces/evaluation.py"}
+
+
+def test_the_old_name_of_a_rule_is_taken_and_the_new_one_said_once(tmp_path: Path) -> None:
+    found = ingested(tmp_path / "c", strokes(), {"T1": "#*"}, normal_load_N=4.5)
+    with pytest.warns(FutureWarning, match="now called first_peak") as said:
+        again = stages.ingest(found.campaign, rule="seed")
+    assert len(said) == 1
+    assert {pull.rule for pull in again.pulls.values()} == {"first_peak"}
+    result = CliRunner().invoke(main, ["ingest", str(tmp_path / "c"), "-o", str(tmp_path / "o"), "--rule", "seed"])
+    assert result.exit_code == 0
+    assert result.stderr.count("--rule seed is now called first_peak") == 1
+    assert "seed" not in (tmp_path / "o" / "tests.csv").read_text()

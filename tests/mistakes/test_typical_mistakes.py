@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 from on_the_command_line import digest, run
+from support.sled import SledDesign, SledLaw, write_campaign
 
 from mistakes.cases import MISTAKES
 from mistakes.slips import Mistake, each_row, workbook
 from tribo import stages
 from tribo.campaign import load_campaign
 from tribo.errors import CampaignError
-from tribo.mechanisms_in_model.sled import SledDesign, SledLaw, write_campaign
 from tribo.report.page import html
 
 MOST_LINES = 6

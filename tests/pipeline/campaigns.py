@@ -6,7 +6,7 @@ import os
 import time
 from pathlib import Path
 
-from tribo.mechanisms_in_model.sled import SledDesign, SledLaw, write_campaign
+from support.sled import SledDesign, SledLaw, write_campaign
 
 TOML = (
     '[campaign]\ntitle = "{title}"\nnominal_area_mm2 = 55.0\nslider_mass_g = 1.5\n'

@@ -54,8 +54,8 @@ def ingest_campaign(campaign: Campaign, rule: str, jobs: int, progress: Progress
     set_aside = list(campaign.set_aside)
     tests: list[Test] = []
     inputs = dict(campaign.inputs)
-    read = partial(read_hashed, campaign.root, stated_columns(campaign), rule)
-    rows: Iterator[tuple[Outcomes, Mapping[str, str]]] = map(read, campaign.tests)
+    read = partial(read_row, campaign.root, stated_columns(campaign), rule)
+    rows: Iterator[tuple[Outcomes, dict[str, str]]] = map(read, campaign.tests)
     if jobs > 1 and len(campaign.tests) >= FEWEST_FOR_PROCESSES and may_fork():
         read(campaign.tests[0])  # what it imports is then in every process
         rows = each(read, campaign.tests, jobs, CHUNK)
@@ -87,19 +87,15 @@ def stated_columns(campaign: Campaign) -> ColumnsFor:
     return partial(columns_of, general=campaign.columns, by_file=campaign.columns_by_file)
 
 
-def read_hashed(root: Path, columns: ColumnsFor, rule: str, test: Test) -> tuple[Outcomes, Mapping[str, str]]:
-    """:func:`read_row`, and the SHA-256 of the bytes of every file that was read, by its path in the campaign."""
-    with hashes_of_reads() as found:
-        outcomes = read_row(root, columns, rule, test)
-    return outcomes, {Path(p).relative_to(root).as_posix(): digest for p, digest in found.items()}
+def read_row(
+    root: Path, columns: ColumnsFor, rule: str, test: Test, by_hand: Override | None = None
+) -> tuple[Outcomes, dict[str, str]]:
+    """The tests of a row of tests.csv with their outcomes, and the SHA-256 of every file read for them, by its path.
 
-
-def read_row(root: Path, columns: ColumnsFor, rule: str, test: Test, by_hand: Override | None = None) -> Outcomes:
-    """The tests of a row of tests.csv: usually one, or one per pull if the row selects pulls of its export.
-
-    ``PATH#2/3`` is the third pull of the second table, ``PATH#2/*`` every pull of it, ``PATH#*`` every pull of every
-    table; if a row selects several, each becomes a separate test called ``ID#2/3``. A row without a load uses the
-    normal force recorded in the export. A test that cannot be read is set aside with its problems.
+    Usually a row is one test, or one per pull if it selects pulls of its export: ``PATH#2/3`` is the third pull of the
+    second table, ``PATH#2/*`` every pull of it, ``PATH#*`` every pull of every table; if it selects several, each
+    becomes a separate test called ``ID#2/3``. A row without a load uses the normal force recorded in the export. A test
+    that cannot be read is set aside with its problems.
     """
     from tribo.traces import PullOptions, evaluate
 
@@ -107,27 +103,27 @@ def read_row(root: Path, columns: ColumnsFor, rule: str, test: Test, by_hand: Ov
     if by_hand is not None:
         options = replace(options, peak_s=by_hand.peak_s, window_s=by_hand.window_s)
     outcomes: list[tuple[Test, Outcome]] = []
-    try:
-        if test.evaluated is not None:
-            return ((test, (None, evaluate(None, options))),)
-        export, choice = split_choice(test.file)
-        if names_pulls(choice):
-            measured = list(_chosen(root / export, choice, columns(test.file), test, options).values())
-        else:
-            trace = _whole(root / test.file, columns(test.file), test.correction, test.test_id, test.file)
-            measured = [(trace, options)]
-        for trace, own in measured:
-            one = own.test or test
-            try:
-                pull = evaluate(trace, own)
-                outcomes.append((_with_load(one, pull.recorded_load_N), (trace, pull)))
-            except TraceError as why:
-                outcomes.append((one, _set_aside(one, why.problems)))
-    except TriboError as why:
-        return ((test, _set_aside(test, why.problems)),)
-    except Exception as why:  # one export must not cost the others
-        return ((test, _set_aside(test, [unexpected(why, "this export cannot be evaluated", test.file)])),)
-    return tuple(outcomes)
+    measured: list[tuple[Trace | None, PullOptions]] = [(None, options)]
+    with hashes_of_reads() as read:
+        try:
+            export, choice = split_choice(test.file)
+            if names_pulls(choice):
+                measured = [*_chosen(root / export, choice, columns(test.file), test, options).values()]
+            elif test.evaluated is None:
+                trace = _whole(root / test.file, columns(test.file), test.correction, test.test_id, test.file)
+                measured = [(trace, options)]
+            for one, own in measured:
+                this = own.test or test
+                try:
+                    pull = evaluate(one, own)
+                    outcomes.append((this if one is None else _with_load(this, pull.recorded_load_N), (one, pull)))
+                except TraceError as why:
+                    outcomes.append((this, _set_aside(this, why.problems)))
+        except TriboError as why:
+            outcomes = [(test, _set_aside(test, why.problems))]
+        except Exception as why:  # one export must not cost the others
+            outcomes = [(test, _set_aside(test, [unexpected(why, "this export cannot be evaluated", test.file)]))]
+    return tuple(outcomes), {Path(p).relative_to(root).as_posix(): digest for p, digest in read.items()}
 
 
 def read_pull(

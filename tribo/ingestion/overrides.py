@@ -53,10 +53,11 @@ def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
     if not pulls:
         raise CampaignError(Problem("no_usable_test", "all tests are excluded", file=path.name))
     tests = {t.test_id: t for t in ingested.campaign.tests}
-    columns, problems = stated_columns(ingested.campaign), []
+    columns = stated_columns(ingested.campaign)
+    problems: list[Problem] = []
     for o in known:
         if o.action == "move":
-            ((_, outcome),) = read_row(ingested.campaign.root, columns, rule, tests[o.test_id], o)
+            ((_, outcome),), _ = read_row(ingested.campaign.root, columns, rule, tests[o.test_id], o)
             if isinstance(outcome, SetAside):
                 problems += outcome.problems
             else:

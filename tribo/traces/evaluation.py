@@ -133,7 +133,8 @@ def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
             pull = _with_doubt_of_zero(pull, signal, course)
         window = course.contact
         if not options.begins and math.isfinite(pull.window_s[0]):
-            window = tuple(int(k) for k in np.searchsorted(trace.time_s, pull.window_s))
+            first, last = np.searchsorted(trace.time_s, pull.window_s)
+            window = int(first), int(last)
         if load is not None and not options.begins:
             load_zero = load_zero or chosen_zero(test.load_zero, trace.time_s, load, course, trace.file)
         load_N, load_u_N = load_level(trace, load_zero, window)
