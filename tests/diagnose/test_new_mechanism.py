@@ -86,7 +86,7 @@ def test_it_is_weighed_and_recovered(toy: Mechanism, examined: Diagnosis) -> Non
     assert best.values[0] == pytest.approx(SIZE, abs=0.05)
 
 
-def test_the_verdict_names_it_and_words_it_by_what_its_record_says(examined: Diagnosis) -> None:
+def test_the_verdict_names_it_and_words_it_by_what_its_record_says(toy: Mechanism, examined: Diagnosis) -> None:
     v = worded(examined.verdict)
     assert v.verdict == "named"
     assert [c.mechanism for c in v.causes] == [NAME]

@@ -163,7 +163,8 @@ def _either(names: Sequence[str]) -> str:
 
 
 def _columns(law: Layer) -> str:
-    return joined([in_words(name) for name in law.name.split(" and ")])
+    found = getattr(law.shows, "law", None)
+    return joined([in_words(name) for name in (found.columns if found is not None else (law.name,))])
 
 
 def _seen_in_traces(v: Verdict) -> str:
