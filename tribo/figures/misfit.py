@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 BEND = "bend"  # the square of ln N: whether T(N) bends
 LOGARITHMIC = ("normal_load_N", "speed_mm_s", "hold_s")
+LOGARITHMIC_AXES = tuple(map(axis_label, LOGARITHMIC))
 MOST_LABEL = 16
 
 

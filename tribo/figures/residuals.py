@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 from tribo.diagnostics.effect_sizes import percent
 from tribo.diagnostics.model import PATTERN
 from tribo.figures import style
-from tribo.figures.misfit import LOGARITHMIC, Covariate, covariate
+from tribo.figures.misfit import LOGARITHMIC, LOGARITHMIC_AXES, Covariate, covariate
 from tribo.records import REGIMES, FloatArray
 
 if TYPE_CHECKING:
@@ -82,10 +82,9 @@ def _panel(d: Diagnosis, contrast: Contrast, p: float) -> Panel | None:
     here = np.ones(len(c.sample), bool)
     name = contrast.covariate
     if contrast.acting is not None:
-        needs = contrast.acting.mechanism.needs
-        name = _column_of(contrast.acting.choice) or {"speed_m_s": "speed_mm_s", "elapsed_s": "started_at"}.get(
-            needs[0] if needs else "", needs[0] if needs else "normal_load_N"
-        )
+        acting, needs = contrast.acting, contrast.acting.mechanism.needs
+        needed = needs[0] if needs else "normal_load_N"
+        name = acting.mechanism.column(acting.choice) if acting.choice else RECORDED.get(needed, needed)
     of_pattern = ("area_fraction", "rim_per_m", "elongation", "tau0", "clip_N")
     if contrast.kind in ("sample", "specimen") or name in of_pattern:
         name = "normal_load_N"
@@ -99,13 +98,6 @@ def _panel(d: Diagnosis, contrast: Contrast, p: float) -> Panel | None:
         return Panel(contrast, covariate(d.baseline.setup, name), here, p)
     except KeyError:
         return None
-
-
-def _column_of(choice: str) -> str:
-    """The column that a choice of a mechanism speaks of; a wrong label or pattern is read by load."""
-    if " behaves as " in choice or " swapped with " in choice:
-        return "specimen"
-    return choice.split(" is ")[0] if choice else ""
 
 
 def _rows(d: Diagnosis, k: int, panel: Panel, residual: FloatArray) -> list[dict[str, Any]]:
@@ -254,7 +246,7 @@ def _residual_axis(ax: Axes, part: pd.DataFrame, names: pd.DataFrame | None) -> 
             for label in ax.get_xticklabels():
                 label.set(rotation=40, ha="right", rotation_mode="anchor", fontsize=6.5)
         ax.set_xlim(-0.6, float(names["x"].max()) + 0.6)
-    elif str(first["axis"]).split(" (")[0] in ("Normal load N", "Speed", "Hold"):
+    elif str(first["axis"]) in LOGARITHMIC_AXES:
         ax.set_xscale("log")
         style.plain_log_axis(ax.xaxis, tests["x"])
 
@@ -327,7 +319,8 @@ def _names(d: Diagnosis) -> list[str]:
         layers = [layer for layer in d.verdict.layers if layer.kind == "cause"]
         sizes = {layer.name: abs(layer.effect_percent) for layer in layers}
         acting = max((alike[0] for alike in d.named.causes), key=lambda c: sizes.get(c.name, 0.0)).acting
-        followed = acting.mechanism.column(acting.choice).split(", ")
+        m = acting.mechanism
+        followed = [m.column(acting.choice)] if acting.choice or m.choosing.column else list(m.needs)
     else:
         followed = [m.covariate for m in d.verdict.misfits[:1]]
     if any(name in BY_SAMPLE for name in followed):
@@ -387,7 +380,7 @@ def _finding_axis(ax: Axes, part: pd.DataFrame, named: bool) -> None:
             for label in ax.get_xticklabels():
                 label.set(rotation=90, fontsize=6)
         ax.set_xlim(-0.6, float(names["x"].max()) + 0.6)
-    elif axis.split(" (")[0] in ("Normal load N", "Speed", "Hold"):
+    elif axis in LOGARITHMIC_AXES:
         ax.set_xscale("log")
         style.plain_log_axis(ax.xaxis, tests["x"])
         ax.tick_params(axis="x", labelsize=6.5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -142,7 +143,7 @@ def planned_law_sentence(p: PlannedLaw) -> str:
     )
 
 
-def law_test(parting: Parting, law: WrittenLaw, other: WrittenLaw, design: Mapping[str, object]) -> str:
+def law_test(parting: Parting, law: WrittenLaw, other: WrittenLaw, design: Mapping[str, Any]) -> str:
     """The test that parts two laws, without the number of its pulls."""
     words = " and ".join(dict.fromkeys(map(in_words, law.columns)))
     days = [s.level for s in law.shapes if s.kind == "level" and s.column == "date"]  # no day comes back
@@ -160,7 +161,7 @@ def law_test(parting: Parting, law: WrittenLaw, other: WrittenLaw, design: Mappi
     if parting == "samples":
         return f"{vary} on sample {design['sample']} alone, at one load"
     if parting == "terms":
-        low, high = design["normal_load_N"]  # type: ignore[misc]
+        low, high = design["normal_load_N"]
         return f"{vary} at {low:.3g} N and at {high:.3g} N alone"
     if parting == "regimes":
         regime = next(r for r in (law.regime, other.regime) if r != BOTH)
@@ -170,7 +171,7 @@ def law_test(parting: Parting, law: WrittenLaw, other: WrittenLaw, design: Mappi
         return vary if days else f"Pull at the corners of the ranges of {words}"
     column = law.columns[0]
     factor, unit = _readable(column)
-    return f"Pull at {in_words(column)} = {factor * float(str(design[column])):.4g} {unit}".rstrip()
+    return f"Pull at {in_words(column)} = {factor * design[column]:.4g} {unit}".rstrip()
 
 
 def across_sentence(found: AcrossPatterns) -> str:

@@ -325,7 +325,8 @@ def next_test_sentence(t: NextTest) -> str:
         varied = [v.text for name in t.separates if (v := mechanism(name).variation) is not None]
         return f"Vary {' and '.join(varied)} in random order: {pulls} pulls of the flat sample."
     if t.kind == "part laws":
-        return f"{law_test(*t.shows, design)}: {pulls} pulls."
+        difference, law, other = t.shows
+        return f"{law_test(difference, law, other, design)}: {pulls} pulls."
     if t.kind == "part columns":
         varied_one = next((name for name in t.separates if name not in SERIES), "")
         others = _listed([in_words(name) for name in t.separates if name != varied_one])
