@@ -11,6 +11,8 @@ from typing import Any
 import pytest
 
 import tribo
+from tribo.mechanisms.table import MECHANISMS
+from tribo.wording.numerals import sentence_case
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 PACKAGES = sorted(file.parent.name for file in Path(tribo.__file__).parent.glob("*/__init__.py"))
@@ -75,3 +77,19 @@ def test_every_page_is_in_the_table_of_contents() -> None:
     listed = re.findall(r"^[a-z][\w/-]+$", (DOCS / "index.md").read_text(encoding="utf-8"), re.MULTILINE)
     pages = {str(page.relative_to(DOCS).with_suffix("")) for page in DOCS.rglob("*.md")} - {"index"}
     assert sorted(pages) == sorted(listed)
+
+
+def test_every_mechanism_has_its_section_under_the_name_that_the_report_uses() -> None:
+    page = (DOCS / "reference" / "mechanisms.md").read_text(encoding="utf-8")
+    sections = dict(part.split("\n", 1) for part in re.split(r"^### ", page, flags=re.MULTILINE)[1:])
+    assert sections.keys() == {sentence_case(m.in_words) for m in MECHANISMS.values()}
+    for m in MECHANISMS.values():
+        said = sections[sentence_case(m.in_words)]
+        assert f"`{m.name}" in said
+        for question in ("What it is:", "How it shows:", "What confuses it:", "Which test parts it:"):
+            assert said.count(question) == 1, (m.name, question)
+
+
+def test_a_search_for_the_words_of_an_identifier_finds_its_section() -> None:
+    page = (DOCS / "reference" / "mechanisms.md").read_text(encoding="utf-8")
+    assert "cavity shear deformation" in page

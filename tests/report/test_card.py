@@ -12,13 +12,14 @@ import pytest
 
 from report.conftest import Written
 from report.synthetic import verdict_of
+from tribo.diagnostics.verdict import Cause, Estimate
 from tribo.errors import Problem
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import LawFit, SetAside, Study
 from tribo.report.page import html
 from tribo.wording.card import Card, card_law, card_of
 from tribo.wording.terminal import card_text
-from tribo.wording.verdict_sentences import why_next
+from tribo.wording.verdict_sentences import why_next, worded
 
 LAYER: dict[str, Any] = {
     "kind": "cause", "name": "suction", "samples": ["B", "C"], "regimes": ["static"], "p_adjusted": 1e-9,
@@ -86,6 +87,18 @@ def test_causes_that_cannot_be_told_apart_are_not_called_identified(study: Study
         "Suction under the cavities or an error of the normal load (this campaign cannot tell which) changes"
     )
     assert any("each of these equally well" in sentence for sentence in card.to_know)
+
+
+def test_a_cause_that_the_traces_show_stands_in_the_finding_beside_those_of_the_forces() -> None:
+    """The offset of series 17 was missing on the card, which named the causes with a layer alone."""
+    offset = Cause(
+        "load_cell_offset", 1.0, {"F_0": Estimate(0.006, 0.005, 0.007, "N")},
+        shows=MECHANISMS["load_cell_offset"].evidence,
+    )  # fmt: skip
+    found = verdict_of(FOUND)
+    both = worded(replace(found, causes=(offset, *found.causes), next_test=None))
+    said = "; in addition, an offset of the load cell (F 0 = 0.00600 N (90 % interval 0.00500 to 0.00700))"
+    assert said in both.sentence
 
 
 def test_laws_that_a_test_would_part_are_called_by_their_column() -> None:

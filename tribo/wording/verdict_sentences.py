@@ -14,6 +14,7 @@ from typing import Any
 from tribo.diagnostics.inference import WITHIN
 from tribo.diagnostics.verdict import AgainstModel, Cause, Estimate, Excluded, Gain, Layer, LayerKind, Misfit, Verdict
 from tribo.diagnostics.without_model import ColumnsTested
+from tribo.mechanisms.record import TraceEvidence
 from tribo.vocabulary import OBSERVABLES, in_words, short_label
 from tribo.wording.law_sentences import across_sentence, held_sentence, tied_laws
 from tribo.wording.numerals import joined, p_text, sentence_case, significant
@@ -139,6 +140,7 @@ def _caused(v: Verdict, layers: Sequence[Layer]) -> str:
         subject = f"{sentence_case(_either(names))} (this campaign cannot tell which) changes"
     most = f", most in {first.at}" if first.at else ""
     also = [f"{_either(_alternatives(v, layer))} ({size_in_words(layer)})" for layer in others]
+    also += [f"{name_in_words(c.mechanism)} ({_parameters(c)})" for c in v.causes if isinstance(c.shows, TraceEvidence)]
     also += [f"a change with {_columns(law)} ({size_in_words(law)})" for law in of_kind(v, "law")]
     added = f"; in addition, {joined(also)}" if also else ""
     rest = v.verdict == "partly" and not v.shows.within_chance
@@ -170,16 +172,21 @@ def _columns(law: Layer) -> str:
 def _seen_in_traces(v: Verdict) -> str:
     """A cause without a layer, one that the traces show besides the forces, with the size of its parameter."""
     cause = v.causes[0]
+    ties = next((names for names in v.equivalent if cause.mechanism in names), ())
+    others = [name_in_words(name) for name in ties if name != cause.mechanism]
+    or_else = f"; {joined(others)} would explain the data equally well" if others else ""
+    size = f": {_parameters(cause)}" if cause.parameters else ""
+    return f"{sentence_case(meaning_in_words(cause.mechanism))} ({name_in_words(cause.mechanism)}){size}{or_else}."
+
+
+def _parameters(cause: Cause) -> str:
+    """ "F 0 = 0.00600 N (90 % interval 0.00500 to 0.00700)"."""
     sizes = [
         f"{name.replace('_', ' ')} = {significant(e.value)} {e.unit}".rstrip()
         + f" (90 % interval {significant(e.low)} to {significant(e.high)})"
         for name, e in cause.parameters.items()
     ]
-    ties = next((names for names in v.equivalent if cause.mechanism in names), ())
-    others = [name_in_words(name) for name in ties if name != cause.mechanism]
-    or_else = f"; {joined(others)} would explain the data equally well" if others else ""
-    size = f": {joined(sizes)}" if sizes else ""
-    return f"{sentence_case(meaning_in_words(cause.mechanism))} ({name_in_words(cause.mechanism)}){size}{or_else}."
+    return joined(sizes)
 
 
 def _unknown(v: Verdict) -> str:
