@@ -61,7 +61,7 @@ def ingest(console: Console, campaign: Path, out: Output, dry_run: bool, **optio
 
     Determines the static peak and the mean sliding force of each pull. Writes tests.csv and campaign.nc.
     """
-    return _walk(console, campaign, out, "ingest", dry_run, **options)
+    return _run_stages(console, campaign, out, "ingest", dry_run, **options)
 
 
 @click.command()
@@ -75,7 +75,7 @@ def fit(console: Console, campaign: Path, out: Output, dry_run: bool, **options:
 
     Writes fits.csv, with the uncertainties of both parameters, in addition to the files of tribo ingest.
     """
-    return _walk(console, campaign, out, "fit", dry_run, **options)
+    return _run_stages(console, campaign, out, "fit", dry_run, **options)
 
 
 @click.command()
@@ -131,7 +131,7 @@ def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **opti
     The model is calibrated on the flat sample alone. Writes comparison.csv and the figures in addition to the files
     of tribo fit.
     """
-    return _walk(console, campaign, out, "compare", dry_run, **options)
+    return _run_stages(console, campaign, out, "compare", dry_run, **options)
 
 
 @click.command()
@@ -233,7 +233,7 @@ def report(console: Console, campaign: Path, out: Output, dry_run: bool, **optio
     Runs ingest, fit, compare and diagnose on CAMPAIGN. Writes their files, report.html, report.pdf and
     ro-crate-metadata.json.
     """
-    return _walk(console, campaign, out, "report", dry_run, **options)
+    return _run_stages(console, campaign, out, "report", dry_run, **options)
 
 
 @click.command()
@@ -245,12 +245,14 @@ def demo(console: Console, out: Output, **options: Any) -> int:
     """Write the report on the bundled example."""
     from tribo.files import data_dir
 
-    status = _walk(console, data_dir() / "example", out, "report", False, **options)
+    status = _run_stages(console, data_dir() / "example", out, "report", False, **options)
     console.say(f"open {out.path / 'report.html'}")
     return status
 
 
-def _walk(console: Console, path: Path, out: Output, until: Until, dry_run: bool, columns: str, **options: Any) -> int:
+def _run_stages(
+    console: Console, path: Path, out: Output, until: Until, dry_run: bool, columns: str, **options: Any
+) -> int:
     """Run the stages up to ``until`` on one campaign and write their results."""
     from tribo import stages
     from tribo.cache.kept_results import Shelf
@@ -368,7 +370,7 @@ def discover(
 ) -> int:
     """Search for the law of what no mechanism explains.
 
-    All laws of a small grammar are tried: a recorded column, the shape of its course, what it acts on, in which regime
+    All laws of a small grammar are tried: a recorded column, the shape of its effect, what it acts on, in which regime
     and on which samples, and products of two columns. A law is written only if it is beyond what the best of all laws
     reaches by chance. Writes law-1.toml and further laws, laws.csv and discovery.json.
     """

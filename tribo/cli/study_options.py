@@ -91,9 +91,8 @@ def with_reading_options(campaign: Campaign, columns: str, stated: dict[str, flo
 CAMPAIGN = click.argument("campaign", type=GivenPath())
 OUT = output_options()
 RUNS = click.option("--runs", type=click.IntRange(min=2), default=4, show_default=True, help="Simulations per load.")
-SCHEDULER = click.option("--scheduler", help="Address of a dask scheduler; its workers run the simulations.")
+SCHEDULER = click.option("--scheduler", metavar="ADDRESS", help="Address of a dask scheduler for the simulations.")
 DRY_RUN = click.option("--dry-run", is_flag=True, help="Check everything and list the steps, without results.")
-
 
 
 def _rule(context: click.Context, parameter: click.Parameter, given: str) -> str:
@@ -106,8 +105,8 @@ def _rule(context: click.Context, parameter: click.Parameter, given: str) -> str
 
 
 RULE = click.option(
-    "--rule", default="first_peak", show_default=True, callback=_rule,
-    help="Rule by which static and sliding force are determined.",
+    "--rule", default="first_peak", show_default=True, callback=_rule, metavar="NAME",
+    help="Rule by which static and sliding force are determined; --rule ? lists all of them.",
 )  # fmt: skip
 WEIGHTS = click.option(
     "--weights",
@@ -167,23 +166,14 @@ NO_MODEL = click.option(
 
 
 def fit_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    for option in (
-        reading_options,
-        *ZEROS,
-        OVERRIDES,
-        RULE,
-        WEIGHTS,
-    ):
+    """Add what decides readings and fits to a command; the help lists the options in this order."""
+    for option in reversed((RULE, WEIGHTS, *ZEROS, OVERRIDES, reading_options)):
         function = option(function)
     return function
 
 
 def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    for option in (
-        FLAT,
-        NO_MODEL,
-        RUNS,
-        SCHEDULER,
-    ):
+    """Add what decides the runs of the spring-block model to a command."""
+    for option in reversed((FLAT, NO_MODEL, RUNS, SCHEDULER)):
         function = option(function)
     return function
