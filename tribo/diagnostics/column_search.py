@@ -1,6 +1,4 @@
-"""The tests of one regime as columns: ln T, the law of every sample alone, and every other recorded column.
-
-Which recorded columns friction follows beside the law of every sample alone, against chance.
+"""Which recorded columns friction follows beside the law of every sample alone, against chance.
 
 ln T of a test is the law of its sample, the gain of its specimen, and scatter. Each column is tested by the F
 statistic of what it explains beyond the law. The strongest of all columns is compared with the strongest in campaigns
@@ -10,7 +8,8 @@ made from the fitted law, whose specimens are drawn and whose scatter is resampl
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +28,13 @@ LOGARITHMIC = ("speed_mm_s", "hold_s")
 NUMBERS = ("hold_s", "temperature_C", "humidity_pct", "run_order", "specimen_run", "repeat")
 _LOAD_BY_ANOTHER_NAME = ("nominal_load_N",)
 LEFT_OVER = 0.02  # share of a column's variance beyond the laws of the samples below which it cannot be told from load
+REPLICATES = 200
+MOST_FOUND = 6
+ALIKE = 0.9  # share of the effect of a column that another one reproduces, from which on they cannot be told apart
+TAIL = 8.0  # degrees of freedom of the scatter, whose outliers count less
+_VARIANCES = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # of specimen gains over that of repeats
+_ROUNDS = 4
+_NOTHING_LEFT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -138,26 +144,19 @@ def _columns(tests: list[Test], pulls: list[Pull]) -> Iterator[Column]:
         values = np.array([np.nan if (v := getattr(t, name)) is None else float(v) for t in tests])
         yield from _of_numbers(name, values)
     yield from _of_names("operator", [t.operator for t in tests])
-    yield from _of_names("direction", [_direction(t, p) for t, p in zip(tests, pulls, strict=True)])
+    strokes = [next((way for way in ("forward", "backward") if way in p.flags), "") for p in pulls]
+    yield from _of_names("direction", [t.direction or way for t, way in zip(tests, strokes, strict=True)])
     yield from _of_names("date", [t.started_at[:10] for t in tests])
     for name in sorted({c for t in tests for c in t.covariates} - set(_LOAD_BY_ANOTHER_NAME)):
         cells = [str(t.covariates.get(name, "")) for t in tests]
-        numbers = np.array([_number(cell) for cell in cells])
+        numbers = np.full(len(cells), np.nan)
+        for k, cell in enumerate(cells):
+            with suppress(ValueError):
+                numbers[k] = float(cell.replace(",", "."))
         if np.isfinite(numbers).any():
             yield from _of_numbers(name, numbers)
         else:
             yield from _of_names(name, cells)
-
-
-def _direction(test: Test, pull: Pull) -> str:
-    return test.direction or next((way for way in ("forward", "backward") if way in pull.flags), "")
-
-
-def _number(cell: str) -> float:
-    try:
-        return float(cell.replace(",", "."))
-    except ValueError:
-        return float("nan")
 
 
 def _of_numbers(name: str, values: FloatArray) -> Iterator[Column]:
@@ -175,12 +174,8 @@ def _of_numbers(name: str, values: FloatArray) -> Iterator[Column]:
     groups = [k for k in range(1, len(edges) + 1) if (there & (code == k)).any()]
     if len(groups) > 1:
         parts = [values[there & (code == k)] for k in (0, *groups)]
-        levels = tuple(_span(part) for part in parts)
+        levels = tuple(f"{x.min():.3g} to {x.max():.3g}" if np.ptp(x) else f"{x.min():.3g}" for x in parts)
         yield Column(name, "course", np.column_stack([code == k for k in groups]).astype(float), low, high, levels)
-
-
-def _span(values: FloatArray) -> str:
-    return f"{values.min():.3g} to {values.max():.3g}" if np.ptp(values) else f"{values.min():.3g}"
 
 
 def _of_names(name: str, cells: list[str]) -> Iterator[Column]:
@@ -189,15 +184,6 @@ def _of_names(name: str, cells: list[str]) -> Iterator[Column]:
         column = np.array(cells, str)
         levels = np.column_stack([column == n for n in names[1:]]).astype(float)
         yield Column(name, "names", levels, levels=tuple(names))
-
-
-REPLICATES = 200
-MOST_FOUND = 6
-ALIKE = 0.9  # share of the effect of a column that another one reproduces, from which on they cannot be told apart
-TAIL = 8.0  # degrees of freedom of the scatter, whose outliers count less
-_VARIANCES = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # of specimen gains over that of repeats
-_ROUNDS = 4
-_NOTHING_LEFT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -220,44 +206,76 @@ class ColumnEffect:
 
 @dataclass(frozen=True)
 class SearchedColumns:
-    """What was found in one regime; ``columns`` are all that were tested, the others vary ``only_with_load``.
+    """What was found in one regime; ``columns`` are all that were tested, the others vary ``only_with_load``."""
 
-    ``scatter_percent`` is the standard deviation of a repeat.
-    """
-
-    regime: Regime
     follows: tuple[ColumnEffect, ...]
     columns: tuple[str, ...]
     only_with_load: tuple[str, ...]
-    p_strongest: float
-    scatter_percent: float
-    n: int
 
 
 @dataclass(frozen=True)
-class _Weighed:
-    """The tests weighed for one spread of the specimens: what whitens them, and the law's orthonormal basis."""
+class _Whitening:
+    """One spread of the gains of specimens: how it whitens the tests, and the law's orthonormal ``basis`` (n, p).
 
-    share: FloatArray  # (specimens,) of a specimen's mean that is taken off
-    basis: FloatArray  # (n, p)
+    ``groups`` (n, specimens) says which test is of which specimen, ``share`` (specimens,) how much of the mean of a
+    specimen is taken off.
+    """
+
+    groups: FloatArray
+    share: FloatArray
+    basis: FloatArray
     log_det: float
+
+    @classmethod
+    def of(cls, design: FloatArray, groups: FloatArray, variance: float) -> _Whitening:
+        size = np.sum(groups**2, axis=0)
+        share = (1.0 - 1.0 / np.sqrt(1.0 + variance * size)) / size
+        u, s, _ = np.linalg.svd(_without_means(design, groups, share), full_matrices=False)
+        kept = s > 1e-9 * s.max()
+        log_det = float(np.sum(np.log1p(variance * size)) + 2.0 * np.sum(np.log(s[kept])))
+        return cls(groups, share, u[:, kept], log_det)
+
+    def left(self, values: FloatArray) -> FloatArray:
+        """Whitened values (n, ...) less what the law takes up of them."""
+        white = _without_means(values, self.groups, self.share)
+        return np.asarray(white - self.basis @ (self.basis.T @ white))
+
+    def score(self, square: FloatArray) -> FloatArray:
+        """Restricted log likelihood of what is left, by its sum of squares."""
+        dof = len(self.basis) - self.basis.shape[1]
+        return np.asarray(-0.5 * (dof * np.log(np.maximum(square, 1e-300)) + self.log_det))
+
+
+def _without_means(values: FloatArray, groups: FloatArray, share: FloatArray) -> FloatArray:
+    """Values (n, ...) with a share of the mean of each specimen taken off."""
+    if not share.any():
+        return values
+    means = groups.T @ values
+    return np.asarray(values - groups @ (means * (share if values.ndim == 1 else share[:, None])))
 
 
 @dataclass(frozen=True)
 class _Fitted:
-    """A law fitted by restricted likelihood: weights of outlying tests, basis, what is left, its variance."""
+    """A law fitted by restricted likelihood: square roots (n,) of the weights of outlying tests, the whitening of every
+    spread of the specimens and which is the likeliest, what is ``left`` (n,) with it, and its variance."""
 
     tested: RegimeTests
-    root: FloatArray  # (n,) square roots of the weights
-    weighed: tuple[_Weighed, ...]
+    root: FloatArray
+    whitenings: tuple[_Whitening, ...]
     at: int
-    left: FloatArray  # (n,) whitened
+    left: FloatArray
     variance: float
-    groups: FloatArray = field(repr=False)  # (n, specimens)
 
     @property
     def dof(self) -> int:
-        return self.tested.n - self.weighed[self.at].basis.shape[1]
+        return self.tested.n - self.whitenings[self.at].basis.shape[1]
+
+    def basis(self, c: Column, at: int) -> FloatArray:
+        """Orthonormal basis of a column beyond the law, (n, d); columns that the law takes up have none."""
+        w, values = self.whitenings[at], c.columns * self.root[:, None]
+        u, s, _ = np.linalg.svd(w.left(values), full_matrices=False)
+        scale = float(np.sqrt(np.sum(_without_means(values, w.groups, w.share) ** 2)))
+        return np.asarray(u[:, s > 1e-6 * max(scale, 1e-300)])
 
 
 def search_columns(t: RegimeTests, regimes: int, level: float, rng: np.random.Generator) -> SearchedColumns:
@@ -266,7 +284,6 @@ def search_columns(t: RegimeTests, regimes: int, level: float, rng: np.random.Ge
     ``regimes`` is the number of regimes that are searched; p values are adjusted for it.
     """
     taken: list[Column] = []
-    p_first = 1.0
     while len(taken) < MOST_FOUND:
         fitted = _fit(t, taken)
         others = [c for c in t.columns if c.name not in {k.name for k in taken}]
@@ -274,9 +291,7 @@ def search_columns(t: RegimeTests, regimes: int, level: float, rng: np.random.Ge
         if not chances:
             break
         best = min(chances, key=lambda k: chances[k])
-        p = min(chances[best] * regimes, 1.0)
-        p_first = p if not taken else p_first
-        if p >= level:
+        if min(chances[best] * regimes, 1.0) >= level:
             break
         taken.append(others[best])
     found = []
@@ -287,8 +302,7 @@ def search_columns(t: RegimeTests, regimes: int, level: float, rng: np.random.Ge
         if p < level:
             found.append(_described(beside, _first_alike(beside, column), p))
     names = tuple(dict.fromkeys(c.name for c in t.columns))
-    scatter = 100.0 * float(np.expm1(np.sqrt(_fit(t, taken).variance)))
-    return SearchedColumns(t.regime, tuple(found), names, t.only_with_load, p_first, scatter, t.n)
+    return SearchedColumns(tuple(found), names, t.only_with_load)
 
 
 def _fit(t: RegimeTests, taken: Sequence[Column]) -> _Fitted:
@@ -300,40 +314,15 @@ def _fit(t: RegimeTests, taken: Sequence[Column]) -> _Fitted:
     root = np.ones(t.n)
     for _ in range(_ROUNDS):
         scaled = groups * root[:, None]
-        weighed = [_weigh(design * root[:, None], scaled, v) for v in (_VARIANCES if within else _VARIANCES[:1])]
-        scores, lefts = zip(*(_restricted(w, _whiten(root * t.log_force, scaled, w.share), t.n) for w in weighed),
-                            strict=True)  # fmt: skip
-        at = int(np.argmax(scores))
+        spreads = _VARIANCES if within else _VARIANCES[:1]
+        whitenings = tuple(_Whitening.of(design * root[:, None], scaled, v) for v in spreads)
+        lefts = [w.left(root * t.log_force) for w in whitenings]
+        at = int(np.argmax([w.score(left @ left) for w, left in zip(whitenings, lefts, strict=True)]))
         left = lefts[at]
-        variance = float(left @ left) / max(t.n - weighed[at].basis.shape[1], 1)
+        variance = float(left @ left) / max(t.n - whitenings[at].basis.shape[1], 1)
         standard = (left / root) ** 2 / max(variance, _NOTHING_LEFT**2)
         root = np.sqrt((TAIL + 1.0) / (TAIL + standard))
-    return _Fitted(t, root, tuple(weighed), at, left, max(variance, _NOTHING_LEFT**2), scaled)
-
-
-def _weigh(design: FloatArray, groups: FloatArray, variance: float) -> _Weighed:
-    size = np.sum(groups**2, axis=0)
-    share = (1.0 - 1.0 / np.sqrt(1.0 + variance * size)) / size
-    white = _whiten(design, groups, share)
-    u, s, _ = np.linalg.svd(white, full_matrices=False)
-    kept = s > 1e-9 * s.max()
-    log_det = float(np.sum(np.log1p(variance * size)) + 2.0 * np.sum(np.log(s[kept])))
-    return _Weighed(share, u[:, kept], log_det)
-
-
-def _whiten(values: FloatArray, groups: FloatArray, share: FloatArray) -> FloatArray:
-    """Values (n, ...) with a share of the mean of each specimen taken off."""
-    if not share.any():
-        return values
-    means = groups.T @ values
-    return np.asarray(values - groups @ (means * (share if values.ndim == 1 else share[:, None])))
-
-
-def _restricted(w: _Weighed, values: FloatArray, n: int) -> tuple[float, FloatArray]:
-    """Restricted log likelihood, and what is left."""
-    left = values - w.basis @ (w.basis.T @ values)
-    dof = n - w.basis.shape[1]
-    return -0.5 * (dof * np.log(max(float(left @ left), 1e-300)) + w.log_det), left
+    return _Fitted(t, root, whitenings, at, left, max(variance, _NOTHING_LEFT**2))
 
 
 def _chances(f: _Fitted, columns: Sequence[Column], rng: np.random.Generator) -> dict[int, float]:
@@ -341,7 +330,7 @@ def _chances(f: _Fitted, columns: Sequence[Column], rng: np.random.Generator) ->
 
     Columns that the law takes up are left out.
     """
-    bases = {k: b for k, c in enumerate(columns) if (b := _base(f, c, f.at)).shape[1]}
+    bases = {k: b for k, c in enumerate(columns) if (b := f.basis(c, f.at)).shape[1]}
     if not bases or f.dof < 3:
         return {}
     strength = _strengths(f.left[:, None], list(bases.values()), f.dof)[0]
@@ -349,16 +338,6 @@ def _chances(f: _Fitted, columns: Sequence[Column], rng: np.random.Generator) ->
     # the strongest first: equal p values keep that order
     found = {k: share_beyond(chance, float(s)) for k, s in zip(bases, strength, strict=True)}
     return dict(sorted(found.items(), key=lambda item: -float(strength[list(bases).index(item[0])])))
-
-
-def _base(f: _Fitted, c: Column, at: int) -> FloatArray:
-    """Orthonormal basis of a column beyond the law, (n, d); columns that the law takes up have none."""
-    w = f.weighed[at]
-    white = _whiten(c.columns * f.root[:, None], f.groups, w.share)
-    left = white - w.basis @ (w.basis.T @ white)
-    u, s, _ = np.linalg.svd(left, full_matrices=False)
-    scale = float(np.sqrt(np.sum(white**2)))
-    return np.asarray(u[:, s > 1e-6 * max(scale, 1e-300)])
 
 
 def _strengths(left: FloatArray, bases: Sequence[FloatArray], dof: int) -> FloatArray:
@@ -378,27 +357,21 @@ def _by_chance(f: _Fitted, columns: Sequence[Column], rng: np.random.Generator) 
     n = f.tested.n
     drawn = f.left[rng.integers(0, n, (n, REPLICATES))] * np.sqrt(n / max(f.dof, 1))
     spread = np.sqrt(_VARIANCES[f.at] * f.variance)
-    drawn = drawn + f.groups @ rng.normal(0.0, spread, (f.groups.shape[1], REPLICATES)) if spread else drawn
-    scores, lefts = [], []
-    for w in f.weighed:
-        white = _whiten(drawn, f.groups, w.share)
-        left = white - w.basis @ (w.basis.T @ white)
-        dof = n - w.basis.shape[1]
-        scores.append(-0.5 * (dof * np.log(np.maximum(np.sum(left**2, axis=0), 1e-300)) + w.log_det))
-        lefts.append(left)
+    groups = f.whitenings[f.at].groups
+    drawn = drawn + groups @ rng.normal(0.0, spread, (groups.shape[1], REPLICATES)) if spread else drawn
+    lefts = [w.left(drawn) for w in f.whitenings]
+    scores = [w.score(np.sum(left**2, axis=0)) for w, left in zip(f.whitenings, lefts, strict=True)]
     chosen = np.argmax(scores, axis=0)
     strongest = np.zeros(REPLICATES)
     for at in np.unique(chosen):
-        bases = [b for c in columns if (b := _base(f, c, int(at))).shape[1]]
+        bases = [b for c in columns if (b := f.basis(c, int(at))).shape[1]]
         strongest[chosen == at] = _strengths(lefts[at][:, chosen == at], bases, f.dof).max(axis=1)
     return strongest
 
 
 def _described(f: _Fitted, column: Column, p: float) -> ColumnEffect:
     """The size of a column's effect with its interval, and what reproduces it."""
-    w = f.weighed[f.at]
-    white = _whiten(column.columns * f.root[:, None], f.groups, w.share)
-    white = white - w.basis @ (w.basis.T @ white)
+    white = f.whitenings[f.at].left(column.columns * f.root[:, None])
     inverse = np.linalg.pinv(white.T @ white)
     size = inverse @ (white.T @ f.left)
     dof = max(f.dof - len(size), 1)
@@ -408,8 +381,16 @@ def _described(f: _Fitted, column: Column, p: float) -> ColumnEffect:
     value = float(contrast @ size)
     half = float(t_distribution.ppf(0.95, dof) * np.sqrt(variance * contrast @ inverse @ contrast))
     low, middle, high = (100.0 * float(np.expm1(value + k * half)) for k in (-1, 0, 1))
-    alike = _alike(f, column, white @ size)
-    return ColumnEffect(column.name, column.kind, f.tested.regime, p, middle, low, high, where, alike)
+    effect = white @ size
+    alike: list[str] = []
+    length = float(effect @ effect)
+    for other in f.tested.columns:
+        if other.name == column.name or length == 0.0:
+            continue
+        if float(np.sum((f.basis(other, f.at).T @ effect) ** 2)) > ALIKE * length:
+            alike.append(other.name)
+    names = tuple(dict.fromkeys(alike))
+    return ColumnEffect(column.name, column.kind, f.tested.regime, p, middle, low, high, where, names)
 
 
 def _first_alike(f: _Fitted, column: Column) -> Column:
@@ -428,15 +409,3 @@ def _ends(column: Column, size: FloatArray) -> tuple[FloatArray, FloatArray, tup
     heights = levels @ size
     first, last = int(np.argmin(heights)), int(np.argmax(heights))
     return levels[first], levels[last], (column.levels[first], column.levels[last])
-
-
-def _alike(f: _Fitted, column: Column, effect: FloatArray) -> tuple[str, ...]:
-    """Other columns that reproduce the effect of this one."""
-    found = []
-    length = float(effect @ effect)
-    for other in f.tested.columns:
-        if other.name != column.name and length > 0:
-            base = _base(f, other, f.at)
-            if float(np.sum((base.T @ effect) ** 2)) > ALIKE * length:
-                found.append(other.name)
-    return tuple(dict.fromkeys(found))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from scipy.special import erfc
+from scipy.special import erfc, ndtri
 
 from tribo.diagnostics.contrasts import FORM
 from tribo.diagnostics.effect_sizes import NORMAL_90
@@ -73,18 +73,12 @@ def validate_law(model: ModelFit, law: WrittenLaw, earlier: Mapping[str, Estimat
         for e, e0 in zip(found, before, strict=True)
     )
     parameters = tuple(zip(names, found, before, strict=True))
-    if beyond > sure(tried) and alike:
+    by_chance = float(-ndtri(0.005 / tried))  # standard errors that one of the laws exceeds in 1 % (Bonferroni)
+    if beyond > by_chance and alike:
         return Validation("held", found[0], a0, None, parameters)
     if max(abs(e0.value) / _error(e) for e, e0 in zip(found, before, strict=True)) < SHOWS:
         return Validation("cannot be told", found[0], a0, None, parameters)
     return Validation("not held", found[0], a0, None, parameters)
-
-
-def sure(tried: int) -> float:
-    """Standard errors that one of so many laws exceeds by chance in 1 % of campaigns (Bonferroni)."""
-    from scipy.special import ndtri
-
-    return float(-ndtri(0.005 / tried))
 
 
 def _error(e: Estimate) -> float:
@@ -147,7 +141,12 @@ def validate_laws(model: ModelFit, known: Sequence[KnownLaw], rng: np.random.Gen
     layers: list[Layer] = []
     replaced: dict[str, float] = {}
     taken: set[str] = set()
-    for k in sorted(known, key=lambda k: -_strength(answers[k.name])):
+
+    def strength(k: KnownLaw) -> float:  # how surely it held, in half widths of its interval
+        found = answers[k.name].found
+        return abs(found.value) / max(found.high - found.low, 1e-12) if found is not None else 0.0
+
+    for k in sorted(known, key=strength, reverse=True):
         if answers[k.name].answer != "held" or taken & set(k.law.columns):
             continue
         if layers and validate_law(model, k.law, k.parameters, len(known)).answer != "held":
@@ -163,11 +162,21 @@ def validate_laws(model: ModelFit, known: Sequence[KnownLaw], rng: np.random.Gen
     return ValidatedLaws(model, tuple((k, answers[k.name]) for k in known), tuple(layers), replaced)
 
 
-def _strength(held: Validation) -> float:
-    """How surely it held, in half widths of its interval."""
-    if held.found is None:
-        return 0.0
-    return abs(held.found.value) / max(held.found.high - held.found.low, 1e-12)
+def law_layer(
+    law: WrittenLaw,
+    model: ModelFit,
+    parameters: Mapping[str, Estimate],
+    effect_percent: tuple[float, float, float],
+) -> Layer:
+    """A law that ``model`` holds as a layer, without its evidence."""
+    c = model.setup.observations.conditions
+    samples = tuple(sorted({str(name) for name, w in zip(c.sample, law.weight(c), strict=True) if w != 0}))
+    return Layer(
+        kind="law", name=" and ".join(law.columns), samples=samples,
+        regimes=tuple(REGIMES) if law.regime == BOTH else (law.regime,), p_adjusted=float("nan"),
+        effect_percent=effect_percent[0], low=effect_percent[1], high=effect_percent[2], parameters=parameters,
+        formula=law.formula(),
+    )  # fmt: skip
 
 
 def _layer(known: KnownLaw, model: ModelFit, after: ModelFit, rng: np.random.Generator) -> Layer:
@@ -221,20 +230,3 @@ def plan_law(campaign: Campaign, law: WrittenLaw, parameters: Mapping[str, Estim
     strength = float(np.sqrt(np.sum(left**2)))
     needed = int(np.ceil(n * (SHOWS / max(strength, 1e-6)) ** 2))
     return PlannedLaw(formula, strength, needed, n)
-
-
-def law_layer(
-    law: WrittenLaw,
-    model: ModelFit,
-    parameters: Mapping[str, Estimate],
-    effect_percent: tuple[float, float, float],
-) -> Layer:
-    """A law that ``model`` validate_law as a layer, without its evidence."""
-    c = model.setup.observations.conditions
-    samples = tuple(sorted({str(name) for name, w in zip(c.sample, law.weight(c), strict=True) if w != 0}))
-    return Layer(
-        kind="law", name=" and ".join(law.columns), samples=samples,
-        regimes=tuple(REGIMES) if law.regime == BOTH else (law.regime,), p_adjusted=float("nan"),
-        effect_percent=effect_percent[0], low=effect_percent[1], high=effect_percent[2], parameters=parameters,
-        formula=law.formula(),
-    )  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 
 from tribo.diagnostics.verdict import Estimate
 from tribo.lawsearch.across_patterns import AcrossPatterns, LawsAcross, formula
-from tribo.lawsearch.diagnosis_with_laws import CERTAIN, Parting
+from tribo.lawsearch.diagnosis_with_laws import CERTAIN, Difference
 from tribo.lawsearch.grammar import ALL, BOTH, CAVITY_SHARE, ELONGATION, FLAT, PATTERNED, RIM, Shape, T, WrittenLaw
 from tribo.lawsearch.known_laws import SHOWS, PlannedLaw, Untested, Validation
 from tribo.lawsearch.model_choice import FoundLaw
@@ -143,31 +143,31 @@ def planned_law_sentence(p: PlannedLaw) -> str:
     )
 
 
-def law_test(parting: Parting, law: WrittenLaw, other: WrittenLaw, design: Mapping[str, Any]) -> str:
+def law_test(difference: Difference, law: WrittenLaw, other: WrittenLaw, design: Mapping[str, Any]) -> str:
     """The test that parts two laws, without the number of its pulls."""
     words = " and ".join(dict.fromkeys(map(in_words, law.columns)))
     days = [s.level for s in law.shapes if s.kind == "level" and s.column == "date"]  # no day comes back
     found_out = f"Find out what differed on {' and '.join(days)}, and pull with it and without it"
     vary = found_out if days else f"Vary {words}"
-    if parting == "pressures":
+    if difference == "pressures":
         return (
             "Pull patterned samples and the flat one at equal contact pressures, with loads in proportion to the "
             "contact area"
         )
-    if parting == "columns":
+    if difference == "columns":
         apart = set(law.columns) ^ set(other.columns)
         varied = dict.fromkeys(in_words(name) for name in (*law.columns, *other.columns) if name in apart)
         return f"Vary {' and '.join(varied)} independently of each other and of all other conditions"
-    if parting == "samples":
+    if difference == "samples":
         return f"{vary} on sample {design['sample']} alone, at one load"
-    if parting == "terms":
+    if difference == "terms":
         low, high = design["normal_load_N"]
         return f"{vary} at {low:.3g} N and at {high:.3g} N alone"
-    if parting == "regimes":
+    if difference == "regimes":
         regime = next(r for r in (law.regime, other.regime) if r != BOTH)
         again = vary if days else f"Repeat pulls at the lowest and the highest value of {words}"
         return f"{again} ({regime} friction decides)"
-    if parting == "corners":
+    if difference == "corners":
         return vary if days else f"Pull at the corners of the ranges of {words}"
     column = law.columns[0]
     factor, unit = _readable(column)
