@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 import re
 from importlib import import_module
 from pathlib import Path
@@ -65,6 +66,15 @@ def documented() -> list[Any]:
 def test_a_public_name_has_an_entry_in_the_reference(name: str) -> None:
     wanted = object_of(name)
     assert any(here is wanted for here in documented())
+
+
+@pytest.mark.parametrize("name", [n for n in tribo.__all__ if ">>>" in (getattr(tribo, n).__doc__ or "")])
+def test_the_example_of_a_public_name_gives_what_it_says(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(DOCS.parent)
+    examples = doctest.DocTestFinder(recurse=False).find(getattr(tribo, name), name, globs={"tribo": tribo})
+    results = [doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(example) for example in examples]
+    assert sum(result.attempted for result in results)
+    assert not sum(result.failed for result in results)
 
 
 @pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda page: str(page.relative_to(DOCS)))

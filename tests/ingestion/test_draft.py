@@ -13,7 +13,7 @@ from on_the_command_line import run
 
 from tribo import stages
 from tribo.campaign import load_campaign
-from tribo.drafting.draft import name_pattern, proposed_patterns, read_names, started_at
+from tribo.drafting.draft import columns_in_name, name_expression, proposed_patterns, started_at
 from tribo.errors import CampaignError
 
 NAMES = "{sample}_{normal_load_N}N_{speed_rpm}RPM_{repeat}"
@@ -55,21 +55,21 @@ def rows_of(folder: Path) -> list[dict[str, str]]:
     ],
 )  # fmt: skip
 def test_a_pattern_reads_columns_of_tests_from_a_name(pattern: str, name: str, fields: dict[str, str]) -> None:
-    assert name_pattern(pattern).fields(name) == fields
+    assert columns_in_name(name, [pattern]) == fields
 
 
 @pytest.mark.parametrize("pattern", ["no field", "{sample}_{sample}"])
 def test_a_pattern_without_a_field_or_with_one_twice_is_refused(pattern: str) -> None:
     with pytest.raises(CampaignError, match="at least one field"):
-        name_pattern(pattern)
+        name_expression(pattern)
 
 
 def test_a_pattern_is_proposed_where_none_is_given() -> None:
     names = ["PPS_60N_200RPM_1", "PPS_100N_200RPM_2", "PTFE_60N_200RPM_1", "notes"]
     (pattern,) = proposed_patterns(names)
-    assert pattern.text == NAMES
-    assert list(read_names(names, [pattern])) == names[:3]
-    assert [p.text for p in proposed_patterns(["1rps0-3N", "1rps5N"])] == ["{speed_rps}rps{normal_load_N}N"]
+    assert pattern == NAMES
+    assert [name for name in names if columns_in_name(name, [pattern])] == names[:3]
+    assert proposed_patterns(["1rps0-3N", "1rps5N"]) == ("{speed_rps}rps{normal_load_N}N",)
     assert proposed_patterns(["alpha", "beta"]) == ()
 
 

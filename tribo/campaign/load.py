@@ -80,7 +80,7 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     --------
     >>> campaign = tribo.load_campaign("data/example")
     >>> campaign.tests[0].normal_load_N, campaign.samples["F"].cavity
-    (0.505042475, 'none')
+    (0.25987622499999996, 'none')
     """
     root = Path(folder)
     links = (TOML, *TABLES, RAW)

@@ -116,13 +116,13 @@ def _from_exports(raw: Path, stated: Stated) -> Draft:
 
 
 def _stated(options: dict[str, Any]) -> Stated:
-    from tribo.drafting.draft import Stated, name_pattern
+    from tribo.drafting.draft import Stated
     from tribo.readers import columns_from_text
     from tribo.records import UNCORRECTED
 
     return Stated(
-        patterns=tuple(name_pattern(text) for text in options["names"]),
-        records=name_pattern(options["records"]) if options["records"] else None,
+        patterns=tuple(options["names"]),
+        records=options["records"],
         columns=columns_from_text(options["columns"]) if options["columns"] else {},
         correction=corrected(UNCORRECTED, options["stated"]),
         filled=columns_from_text(options["fill"]) if options["fill"] else {},

@@ -1,19 +1,22 @@
-"""What the names of files say about tests, by a pattern such as "{sample}_{normal_load_N}N", given or proposed.
+"""A campaign drafted from the exports at hand: what their names, headers and columns say, and what they do not.
 
-A campaign drafted from the exports at hand: what their names, headers and columns say, and what they do not.
+Names of files are read by a pattern such as "{sample}_{normal_load_N}N", given or proposed.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from tribo.campaign.rows import Columns
+from tribo.campaign.table import LOADS
 from tribo.errors import CampaignError, Problem, ReadError, TriboError
 from tribo.files import found_below
 from tribo.records import Correction, Test, Trace
@@ -45,126 +48,6 @@ _NUMBERS = re.compile(r"[A-Za-z]{0,4}(?:\d+(?:[.,-]\d+)?[A-Za-z]{0,4})+")
 _FEWEST_FITTING = 2
 _REPEATS = {"", "r", "rep", "run", "test", "t", "no", "stroke"}
 _SEPARATOR = re.compile(r"[_ ]+")
-
-
-@dataclass(frozen=True)
-class NamePattern:
-    """A pattern of file names: its text, and the expression that its fields are read by."""
-
-    text: str
-    expression: re.Pattern[str]
-
-    def fields(self, name: str) -> dict[str, str] | None:
-        """Columns of tests.csv by what a name says, None where the pattern does not fit it."""
-        found = self.expression.fullmatch(name)
-        return None if found is None else dict(map(as_column, found.groupdict().items()))
-
-
-def name_pattern(text: str) -> NamePattern:
-    """The pattern of a text: ``{column}`` for what is read, ``[text]`` for text that may be missing.
-
-    Raises
-    ------
-    CampaignError
-        bad_names: it has no field, or one field twice.
-    """
-    fields = [name for name, _ in _FIELD.findall(text) if name]
-    if not fields or len(set(fields)) < len(fields):
-        what = "a pattern of names needs at least one field, each once"
-        allowed = '{column} where a value is read, [text] for what may be missing: "{sample}_{normal_load_N}N_{repeat}"'
-        raise CampaignError(Problem("bad_names", what, found=text, allowed=allowed))
-    parts, at = [], 0
-    for place in _FIELD.finditer(text):
-        parts.append(re.escape(text[at : place.start()]))
-        name, optional = place.groups()
-        parts.append(f"(?P<{name}>{_kind(name)})" if name else f"(?:{re.escape(optional)})?")
-        at = place.end()
-    return NamePattern(text, re.compile("".join(parts) + re.escape(text[at:])))
-
-
-def _kind(field: str) -> str:
-    """A number where the field ends in a unit or counts, else text up to the next literal."""
-    if field in ("repeat", "run_order", "specimen_run", "cycle"):
-        return r"\d+"
-    return _NUMBER if "_" in field and field not in _TEXTS else ".+?"
-
-
-def as_column(field: tuple[str, str]) -> tuple[str, str]:
-    """(column of tests.csv, text) of a field and its text: numbers with a point, in the unit of the column."""
-    name, text = field
-    if _kind(name) != _NUMBER:
-        return name, text
-    sign, digits = ("-", text[1:]) if text.startswith("-") else ("", text.lstrip("+"))
-    number = sign + re.sub(r"[,p-]", ".", digits)  # 0-3 and 0p3 are 0.3 in names that may hold no point
-    if name in _CONVERTED:
-        column, factor = _CONVERTED[name]
-        return column, f"{float(number) * factor:.10g}"
-    return name, number
-
-
-def read_names(names: Iterable[str], patterns: Sequence[NamePattern]) -> dict[str, dict[str, str]]:
-    """What each name says by the first pattern that fits it; names that none fits are left out."""
-    found = {}
-    for name in names:
-        read = next((fields for p in patterns if (fields := p.fields(name)) is not None), None)
-        if read is not None:
-            found[name] = read
-    return found
-
-
-def proposed_patterns(names: Sequence[str]) -> tuple[NamePattern, ...]:
-    """Patterns that together fit the names, the most frequent first; nothing where names say nothing.
-
-    Parts between ``_`` or blanks: a number with a unit is its quantity, a number at the end the repeat, the first other
-    part that is no number the sample; everything else stays as it is.
-    """
-    shapes: dict[str, int] = {}
-    for name in names:
-        shape = _shape(name)
-        shapes[shape] = shapes.get(shape, 0) + 1
-    ordered = sorted(shapes, key=lambda shape: -shapes[shape])
-    fewest = min(_FEWEST_FITTING, len(names))  # a pattern that only one of many names fits says nothing
-    told = [shape for shape in ordered if "{" in shape and shape != "{sample}" and shapes[shape] >= fewest]
-    return tuple(map(name_pattern, told))
-
-
-def _shape(name: str) -> str:
-    parts = _SEPARATOR.split(name)
-    between = [*_SEPARATOR.findall(name), ""]
-    taken: set[str] = set()
-    shaped = []
-    for k, part in enumerate(parts):
-        shaped.append(_shape_of_part(part, k == len(parts) - 1 and k > 0, taken) + between[k])
-    return "".join(shaped)
-
-
-def _shape_of_part(part: str, is_last: bool, taken: set[str]) -> str:
-    part = re.sub(r"[{}\[\]]", "", part)
-    if part.isdigit():
-        return _field("repeat", part, taken) if is_last else part
-    if _NUMBERS.fullmatch(part):
-        return _NUMBERS_IN_PART.sub(lambda found: _shape_of_number(found, is_last, taken), part)
-    return _field("sample", part, taken) if part else ""
-
-
-def _shape_of_number(found: re.Match[str], is_last: bool, taken: set[str]) -> str:
-    """A number with what stands before and behind it: 60N, 200RPM, k168, v42."""
-    prefix, number, unit = found.groups()
-    field = _UNITS.get(unit) or _UNITS.get(unit.lower(), "") if unit else ""
-    if not field and is_last and not unit and prefix.lower() in _REPEATS:
-        field = "repeat"
-    field = field or (f"{prefix.lower()}_number" if prefix else "")
-    return f"{prefix}{_field(field, number, taken) if field else number}{unit}"
-
-
-def _field(name: str, text: str, taken: set[str]) -> str:
-    """The field, or the text itself where the field is already in the pattern."""
-    if name in taken:
-        return text
-    taken.add(name)
-    return f"{{{name}}}"
-
-
 _NOT_LOOKED_AT = (".", "~$", "Thumbs.db")
 _NAMES_OR_UNITS = {
     "missing_column", "missing_unit", "unknown_unit", "ambiguous_unit", "ambiguous_mark", "names_do_not_fit",
@@ -187,7 +70,6 @@ _HEADERS = (  # words of a header, quantity, column of tests.csv, its unit in SI
     (re.compile(r"(?:test|sliding|pull(?:ing)?|crosshead|linear)? ?(?:speed|velocity)|(?:prüf)?geschwindigkeit|vitesse",
      re.I), "speed", "speed_mm_s", 1e3),
 )  # fmt: skip
-_LOADS = ("normal_load_N", "mass_g", "normal_stress_Pa")
 _FEWEST_ROWS = 8
 _BOTH_SIGNS = 0.2  # share of the larger side from which a force takes both signs, above noise and a small offset
 
@@ -212,26 +94,13 @@ class Draft:
 
 @dataclass(frozen=True)
 class Stated:
-    """What a user states for all exports of a draft."""
+    """What a user states for all exports of a draft; patterns are those of names of files and of heads of records."""
 
-    patterns: tuple[NamePattern, ...] = ()
-    records: NamePattern | None = None
+    patterns: tuple[str, ...] = ()
+    records: str = ""
     columns: Columns = field(default_factory=dict)
     correction: Correction = field(default_factory=Correction)
     filled: Mapping[str, str] = field(default_factory=dict)  # columns of tests.csv with one value for all tests
-
-
-@dataclass(frozen=True)
-class _Looked:
-    """One export: its records, or why it cannot be read and what to give."""
-
-    file: str
-    records: tuple[Trace, ...] = ()
-    problems: tuple[Problem, ...] = ()
-
-    @property
-    def needs_columns(self) -> bool:
-        return bool(self.problems) and all(p.kind in _NAMES_OR_UNITS for p in self.problems)
 
 
 def exports_in(raw: Path) -> dict[str, Path]:
@@ -260,73 +129,71 @@ def draft_campaign(raw: Path, stated: Stated) -> Draft:
     Raises
     ------
     CampaignError
-        The folder holds no files, or none that could be an export.
+        The folder holds no files, or none that could be an export; or a pattern of names is none.
     """
-    looked = [_look(name, path, stated) for name, path in exports_in(raw).items()]
-    readable = [one for one in looked if one.records]
-    used = readable or [one for one in looked if one.needs_columns]
-    draft = Draft()
-    draft.not_read = [f"{one.file}: {_first(one.problems)}" for one in looked if one not in used]
+    from tribo.readers import read_blocks
+
+    for pattern in (*stated.patterns, *([stated.records] if stated.records else [])):
+        name_expression(pattern)
+    records: dict[str, tuple[Trace, ...]] = {}  # of the exports that can be read
+    refused: dict[str, tuple[Problem, ...]] = {}
+    for name, path in exports_in(raw).items():
+        try:
+            blocks = read_blocks(path, columns=stated.columns, correction=stated.correction, name=name, file=name)
+        except TriboError as why:
+            refused[name] = why.problems
+            continue
+        if found := tuple(r for r in blocks if r.time_s.size >= _FEWEST_ROWS):
+            records[name] = found
+        else:
+            refused[name] = (Problem("short", "no record of more than a few rows", name),)
+    used = dict(records)
+    if not used:  # a draft says how to read those that lack names or units
+        used = {name: () for name, problems in refused.items() if all(p.kind in _NAMES_OR_UNITS for p in problems)}
     if not used:
-        raise CampaignError([p for one in looked for p in one.problems[:1]])
+        raise CampaignError([problems[0] for problems in refused.values() if problems[0].kind != "short"])
+    draft = Draft(not_read=[f"{name}: {problems[0].what}" for name, problems in refused.items() if name not in used])
     named = _named(used, stated.patterns, draft)
-    for one in used:
-        draft.rows += [_filled(row, stated.filled) for row in _rows_of(one, named.get(one.file, {}), stated)]
+    for name, found in used.items():
+        for row in _rows_of(name, found, named.get(name, {}), stated):
+            draft.rows.append(row | {column: value for column, value in stated.filled.items() if not row.get(column)})
     _choose_records(draft.rows)
     _number_rows(draft.rows, raw.stem)
+    for what in dict.fromkeys(f"{p.what}; give: {p.allowed}" for name in used for p in refused.get(name, ())):
+        draft.missing.append(what)
     _say_what_is_missing(draft, used, speed_given=stated.correction.speed_m_s is not None)
-    _signs(draft, readable)
+    _signs(draft, records)
     return draft
 
 
-def _look(name: str, path: Path, stated: Stated) -> _Looked:
-    from tribo.readers import read_blocks
-
-    try:
-        records = read_blocks(path, columns=stated.columns, correction=stated.correction, name=name, file=name)
-        return _Looked(name, tuple(r for r in records if r.time_s.size >= _FEWEST_ROWS))
-    except TriboError as why:
-        return _Looked(name, problems=why.problems)
-
-
-def _first(problems: Sequence[Problem]) -> str:
-    return problems[0].what if problems else "no record of more than a few rows"
-
-
-def _named(used: Sequence[_Looked], patterns: tuple[NamePattern, ...], draft: Draft) -> dict[str, dict[str, str]]:
+def _named(used: Iterable[str], patterns: tuple[str, ...], draft: Draft) -> dict[str, dict[str, str]]:
     """What the names of files say, and a note on the patterns used and on names that none fits."""
-    stems = {one.file: _stem(one.file) for one in used}
+    # the name without folder and suffixes; a point between digits is no suffix
+    stems = {file: re.sub(r"(?:\.[A-Za-z]\w{0,5})+$", "", file.rpartition("/")[2]) for file in used}
     chosen = patterns or proposed_patterns(list(stems.values()))
-    read = read_names(stems.values(), chosen)
+    read = {file: columns_in_name(stem, chosen) for file, stem in stems.items()}
     for pattern in chosen:
-        n = sum(pattern.fields(stem) is not None for stem in stems.values())
+        n = sum(columns_in_name(stem, [pattern]) is not None for stem in stems.values())
         how = "as given" if patterns else "proposed; give --names to read them otherwise"
-        draft.found.append(f'names "{pattern.text}" ({how}): fits {n} of {len(stems)} files')
-    unfit = [file for file, stem in stems.items() if stem not in read]
+        draft.found.append(f'names "{pattern}" ({how}): fits {n} of {len(stems)} files')
+    unfit = [file for file, columns in read.items() if columns is None]
     if unfit and chosen:
         draft.missing.append(f"names that no pattern fits: {_listed(unfit)}")
-    return {file: read[stem] for file, stem in stems.items() if stem in read}
+    return {file: columns for file, columns in read.items() if columns is not None}
 
 
-def _stem(file: str) -> str:
-    """The name of a file without folder and suffixes; a point between digits is no suffix."""
-    return re.sub(r"(?:\.[A-Za-z]\w{0,5})+$", "", file.rpartition("/")[2])
-
-
-def _rows_of(one: _Looked, named: Mapping[str, str], stated: Stated) -> list[dict[str, str]]:
+def _rows_of(name: str, records: Sequence[Trace], named: Mapping[str, str], stated: Stated) -> Iterator[dict[str, str]]:
     """One row for each record of an export; strokes in both directions share a row, as they share one zero."""
-    file = f"raw/{one.file}"
-    if len(one.records) < 2:
-        return [_row(file, named, one.records[0] if one.records else None, stated)]
-    signs = {math.copysign(1.0, _level(record)) for record in one.records}
-    if len(signs) == 2 and stated.records is None:
-        return [_row(f"{file}#*", named, one.records[0], stated)]
-    return [_row(f"{file}#{k}", named, record, stated) for k, record in enumerate(one.records, start=1)]
-
-
-def _level(record: Trace) -> float:
-    """Mean force of the second half, N."""
-    return float(np.mean(record.force_N[record.force_N.size // 2 :]))
+    file = f"raw/{name}"
+    # mean force of the second half
+    signs = {math.copysign(1.0, float(np.mean(r.force_N[r.force_N.size // 2 :]))) for r in records}
+    if len(records) < 2:
+        yield _row(file, named, records[0] if records else None, stated)
+    elif len(signs) == 2 and not stated.records:
+        yield _row(f"{file}#*", named, records[0], stated)
+    else:
+        for k, record in enumerate(records, start=1):
+            yield _row(f"{file}#{k}", named, record, stated)
 
 
 def _row(file: str, named: Mapping[str, str], record: Trace | None, stated: Stated) -> dict[str, str]:
@@ -334,17 +201,18 @@ def _row(file: str, named: Mapping[str, str], record: Trace | None, stated: Stat
     if record is None:
         return row
     label = str(record.metadata.get("record", ""))
-    if stated.records is not None and (fields := stated.records.fields(label)) is not None:
-        row |= fields
+    in_label = columns_in_name(label, [stated.records]) if stated.records else None
+    if in_label is not None:
+        row |= in_label
     elif label:
         row["record"] = label
     if has_load(record) and "normal_load_N" in row:
         row["nominal_load_N"] = row.pop("normal_load_N")  # the recorded load is used, as the row gives none
-    recorded = {**_in_header(record.metadata), **_recorded(record)}
-    if "normal_load_N" in recorded and not has_load(record) and not any(row.get(key) for key in _LOADS):
-        row["normal_load_N"] = recorded["normal_load_N"]
-    if "speed_mm_s" in recorded:
-        row.setdefault("speed_mm_s", recorded["speed_mm_s"])
+    stated_in_header = _in_header(record.metadata)
+    if "normal_load_N" in stated_in_header and not has_load(record) and not any(row.get(key) for key in LOADS):
+        row["normal_load_N"] = stated_in_header["normal_load_N"]
+    if speed := _recorded_speed_mm_s(record) or stated_in_header.get("speed_mm_s", ""):
+        row.setdefault("speed_mm_s", speed)
     if started := started_at(record.metadata):
         row.setdefault("started_at", started)
     return row
@@ -356,14 +224,14 @@ def has_load(record: Trace) -> bool:
     return load is not None and bool(np.any(load != 0))
 
 
-def _recorded(record: Trace) -> dict[str, str]:
-    """The speed as a column of a record holds it: its median while there is any."""
-    found = {}
+def _recorded_speed_mm_s(record: Trace) -> str:
+    """The median of a recorded speed while there is any; "" without one."""
     speed = record.columns.get("speed_m_s")
-    if speed is not None and np.abs(speed).max() > 0:
-        size = np.abs(speed)
-        found["speed_mm_s"] = f"{np.median(size[size >= 0.5 * size.max()]) * 1e3:.3g}"
-    return {key: text for key, text in found.items() if float(text) > 0}
+    if speed is None or not np.abs(speed).max() > 0:
+        return ""
+    size = np.abs(speed)
+    text = f"{np.median(size[size >= 0.5 * size.max()]) * 1e3:.3g}"
+    return text if float(text) > 0 else ""
 
 
 def _in_header(metadata: Mapping[str, str]) -> dict[str, str]:
@@ -387,28 +255,21 @@ def started_at(metadata: Mapping[str, str]) -> str:
     for key, value in lines:
         for expression in _DATES:
             found = expression.search(f"{key}:{value}") or expression.search(f"{key} {value}")
-            if found:
-                parts = found.groupdict()
-                month = parts.get("m") or str(_month(parts.get("month") or ""))
-                date = f"{int(parts['y']):04d}-{int(month):02d}-{int(parts['d']):02d}"
-                if 1 <= int(month) <= 12 and 1 <= int(parts["d"]) <= 31:
-                    clock = parts.get("clock")
-                    return f"{date}T{clock:0>{5 if clock.count(':') == 1 else 8}}" if clock else date
+            if not found:
+                continue
+            parts = found.groupdict()
+            word = (parts.get("month") or "").lower()
+            month = int(parts.get("m") or (_MONTHS.index(word) + 1 if word in _MONTHS else 0))
+            if 1 <= month <= 12 and 1 <= int(parts["d"]) <= 31:
+                date = f"{int(parts['y']):04d}-{month:02d}-{int(parts['d']):02d}"
+                clock = parts.get("clock")
+                return f"{date}T{clock:0>{5 if clock.count(':') == 1 else 8}}" if clock else date
     return ""
-
-
-def _month(word: str) -> int:
-    return _MONTHS.index(word.lower()) + 1 if word.lower() in _MONTHS else 0
-
-
-def _filled(row: dict[str, str], given: Mapping[str, str]) -> dict[str, str]:
-    """A row with the given values in the columns that it leaves empty."""
-    return row | {column: value for column, value in given.items() if not row.get(column)}
 
 
 def _choose_records(rows: Sequence[dict[str, str]]) -> None:
     """Beside rows with a load, a row that leaves it to its export names the record: raw/a.csv#1."""
-    loaded = [any(row.get(key) for key in _LOADS) for row in rows]
+    loaded = [any(row.get(key) for key in LOADS) for row in rows]
     if any(loaded):
         for row, there in zip(rows, loaded, strict=True):
             if not there and "#" not in row["file"] and "nominal_load_N" in row:
@@ -426,15 +287,12 @@ def _number_rows(rows: Sequence[dict[str, str]], sample: str) -> None:
             row["run_order"] = str(k)
 
 
-def _say_what_is_missing(draft: Draft, used: Sequence[_Looked], speed_given: bool) -> None:
-    refused = [one for one in used if one.problems]
-    for what in dict.fromkeys(f"{p.what}; give: {p.allowed}" for one in refused for p in one.problems):
-        draft.missing.append(what)
-    recorded = {f"raw/{one.file}" for one in used if any(map(has_load, one.records))}
+def _say_what_is_missing(draft: Draft, used: Mapping[str, Sequence[Trace]], speed_given: bool) -> None:
+    recorded = {f"raw/{name}" for name, records in used.items() if any(map(has_load, records))}
     with_load = [r for r in draft.rows if r["file"].partition("#")[0] in recorded]
     if with_load:
         draft.found.append(f"the normal force is recorded for {len(with_load)} of {len(draft.rows)} rows and is used")
-    without = [r["file"] for r in draft.rows if r not in with_load and not any(r.get(c) for c in _LOADS)]
+    without = [r["file"] for r in draft.rows if r not in with_load and not any(r.get(c) for c in LOADS)]
     if without:
         draft.missing.append(
             f"the load of {len(without)} rows: normal_load_N or mass_g in tests.csv ({_listed(without)})"
@@ -447,13 +305,13 @@ def _say_what_is_missing(draft: Draft, used: Sequence[_Looked], speed_given: boo
             draft.found.append(f"{what} of {n} of {len(draft.rows)} rows")
 
 
-def _signs(draft: Draft, readable: Sequence[_Looked]) -> None:
+def _signs(draft: Draft, readable: Mapping[str, Sequence[Trace]]) -> None:
     """Note whether the friction force is negative in every record, or takes both signs within one."""
-    records = [record for one in readable for record in one.records]
+    records = [record for found in readable.values() for record in found]
     draft.negative = bool(records) and all(map(_is_negative, records))
     if draft.negative:
         draft.found.append("the friction force is negative in every record: sign = -1 was written")
-    mixed = [one.file for one in readable if len(one.records) == 1 and _takes_both_signs(one.records[0])]
+    mixed = [name for name, found in readable.items() if len(found) == 1 and _takes_both_signs(found[0])]
     if mixed and all(map(_positive_over_rest, records)):
         draft.zero = "at rest"
         draft.found.append(
@@ -498,3 +356,96 @@ def _positive_over_rest(record: Trace) -> bool:
 def _listed(names: Iterable[str]) -> str:
     names = list(names)
     return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+
+
+@lru_cache
+def name_expression(pattern: str) -> re.Pattern[str]:
+    """The expression of a pattern: ``{column}`` for what is read, ``[text]`` for text that may be missing.
+
+    Raises
+    ------
+    CampaignError
+        bad_names: it has no field, or one field twice.
+    """
+    names = [name for name, _ in _FIELD.findall(pattern) if name]
+    if not names or len(set(names)) < len(names):
+        what = "a pattern of names needs at least one field, each once"
+        allowed = '{column} where a value is read, [text] for what may be missing: "{sample}_{normal_load_N}N_{repeat}"'
+        raise CampaignError(Problem("bad_names", what, found=pattern, allowed=allowed))
+    parts, at = [], 0
+    for mark in _FIELD.finditer(pattern):
+        name, optional = mark.groups()
+        parts.append(re.escape(pattern[at : mark.start()]))
+        parts.append(f"(?P<{name}>{_kind(name)})" if name else f"(?:{re.escape(optional)})?")
+        at = mark.end()
+    return re.compile("".join(parts) + re.escape(pattern[at:]))
+
+
+def columns_in_name(name: str, patterns: Sequence[str]) -> dict[str, str] | None:
+    """Columns of tests.csv by what a name says, by the first pattern that fits it; None where none does."""
+    found = next(filter(None, (name_expression(pattern).fullmatch(name) for pattern in patterns)), None)
+    return None if found is None else dict(as_column(*one) for one in found.groupdict().items())
+
+
+def _kind(field: str) -> str:
+    """A number where the field ends in a unit or counts, else text up to the next literal."""
+    if field in ("repeat", "run_order", "specimen_run", "cycle"):
+        return r"\d+"
+    return _NUMBER if "_" in field and field not in _TEXTS else ".+?"
+
+
+def as_column(name: str, text: str) -> tuple[str, str]:
+    """(column of tests.csv, text) of a field and its text: numbers with a point, in the unit of the column."""
+    if _kind(name) != _NUMBER:
+        return name, text
+    sign, digits = ("-", text[1:]) if text.startswith("-") else ("", text.lstrip("+"))
+    number = sign + re.sub(r"[,p-]", ".", digits)  # 0-3 and 0p3 are 0.3 in names that may hold no point
+    column, factor = _CONVERTED.get(name, (name, None))
+    return column, number if factor is None else f"{float(number) * factor:.10g}"
+
+
+def proposed_patterns(names: Sequence[str]) -> tuple[str, ...]:
+    """Patterns that together fit the names, the most frequent first; nothing where names say nothing.
+
+    Parts between ``_`` or blanks: a number with a unit is its quantity, a number at the end the repeat, the first other
+    part that is no number the sample; everything else stays as it is.
+    """
+    shapes = Counter(map(_shape, names))
+    ordered = sorted(shapes, key=lambda shape: -shapes[shape])
+    fewest = min(_FEWEST_FITTING, len(names))  # a pattern that only one of many names fits says nothing
+    return tuple(shape for shape in ordered if "{" in shape and shape != "{sample}" and shapes[shape] >= fewest)
+
+
+def _shape(name: str) -> str:
+    parts = _SEPARATOR.split(name)
+    between = [*_SEPARATOR.findall(name), ""]
+    taken: set[str] = set()
+    last = len(parts) - 1
+    return "".join(_shape_of_part(part, 0 < k == last, taken) + between[k] for k, part in enumerate(parts))
+
+
+def _shape_of_part(part: str, is_last: bool, taken: set[str]) -> str:
+    part = re.sub(r"[{}\[\]]", "", part)
+    if part.isdigit():
+        return _field("repeat", part, taken) if is_last else part
+    if _NUMBERS.fullmatch(part):
+        return _NUMBERS_IN_PART.sub(lambda found: _shape_of_number(found, is_last, taken), part)
+    return _field("sample", part, taken) if part else ""
+
+
+def _shape_of_number(found: re.Match[str], is_last: bool, taken: set[str]) -> str:
+    """A number with what stands before and behind it: 60N, 200RPM, k168, v42."""
+    prefix, number, unit = found.groups()
+    field = _UNITS.get(unit) or _UNITS.get(unit.lower(), "") if unit else ""
+    if not field and is_last and not unit and prefix.lower() in _REPEATS:
+        field = "repeat"
+    field = field or (f"{prefix.lower()}_number" if prefix else "")
+    return f"{prefix}{_field(field, number, taken) if field else number}{unit}"
+
+
+def _field(name: str, text: str, taken: set[str]) -> str:
+    """The field, or the text itself where the field is already in the pattern."""
+    if name in taken:
+        return text
+    taken.add(name)
+    return f"{{{name}}}"

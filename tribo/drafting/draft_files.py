@@ -27,50 +27,34 @@ title = {title}
 {columns}
 # One table for each sample. cavity = "none" is a surface without a pattern of cavities.
 {patterns}"""
+_NO_AREA = "# FILL IN nominal_area_mm2 =   # area of the sample face"
 
 
 def texts(folder: Path, draft: Draft, stated: Stated, area_mm2: float | None) -> dict[Path, str]:
     """The two files of a campaign by their paths."""
-    return {
-        folder / TOML: _campaign_toml(folder.resolve().name, draft, stated, area_mm2),
-        folder / TABLES[0]: _tests_csv(draft),
-    }
-
-
-def _campaign_toml(name: str, draft: Draft, stated: Stated, area_mm2: float | None) -> str:
-    area = (
-        "# FILL IN nominal_area_mm2 =   # area of the sample face"
-        if area_mm2 is None
-        else f"nominal_area_mm2 = {area_mm2:g}"
-    )
-    return _TOML.format(
-        title=json.dumps(name, ensure_ascii=False),
-        area=area,
-        stated="".join(f"{key} = {value:g}\n" for key, value in _corrections(draft, stated).items())
-        + (f"zero = {json.dumps(draft.zero)}\n" if draft.zero else ""),
-        columns=_columns(stated),
-        patterns="\n".join(f'[patterns.{json.dumps(s, ensure_ascii=False)}]\ncavity = "none"\n' for s in draft.samples),
-    )
-
-
-def _corrections(draft: Draft, stated: Stated) -> dict[str, float]:
-    given, found = stated.correction, {}
+    given, keys = stated.correction, {}
     if draft.negative or given.sign < 0:
-        found["sign"] = given.sign * (-1.0 if draft.negative else 1.0)
+        keys["sign"] = f"{given.sign * (-1.0 if draft.negative else 1.0):g}"
     if given.gain != UNCORRECTED.gain:
-        found["gain"] = given.gain
+        keys["gain"] = f"{given.gain:g}"
     if given.lever_arm_m is not None:
-        found["lever_arm_mm"] = given.lever_arm_m * 1e3
+        keys["lever_arm_mm"] = f"{given.lever_arm_m * 1e3:g}"
     if given.sampling_rate_Hz is not None:
-        found["sampling_rate_Hz"] = given.sampling_rate_Hz
+        keys["sampling_rate_Hz"] = f"{given.sampling_rate_Hz:g}"
     if given.speed_m_s is not None:
-        found["pull_speed_mm_s"] = given.speed_m_s * 1e3
-    return found
-
-
-def _columns(stated: Stated) -> str:
-    lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in stated.columns.items()]
-    return "[columns]\n" + "".join(lines) if lines else ""
+        keys["pull_speed_mm_s"] = f"{given.speed_m_s * 1e3:g}"
+    if draft.zero:
+        keys["zero"] = json.dumps(draft.zero)
+    columns = [f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in stated.columns.items()]
+    samples = [json.dumps(sample, ensure_ascii=False) for sample in draft.samples]
+    toml = _TOML.format(
+        title=json.dumps(folder.resolve().name, ensure_ascii=False),
+        area=_NO_AREA if area_mm2 is None else f"nominal_area_mm2 = {area_mm2:g}",
+        stated="".join(f"{key} = {text}\n" for key, text in keys.items()),
+        columns="".join(["[columns]\n", *columns]) if columns else "",
+        patterns="\n".join(f'[patterns.{sample}]\ncavity = "none"\n' for sample in samples),
+    )
+    return {folder / TOML: toml, folder / TABLES[0]: _tests_csv(draft)}
 
 
 def _tests_csv(draft: Draft) -> str:
@@ -94,7 +78,12 @@ def write_draft(folder: Path, contents: Mapping[Path, str], raw: Path | None) ->
     CampaignError
         A file of the campaign, or one in raw/ of the same name as an export, already exists. Nothing is written.
     """
-    copies = {} if raw is None else _copies(folder / RAW, raw)
+    copies: dict[Path, Path] = {}  # where each export goes, unless they are in raw/ already
+    if raw is not None:
+        base, target = raw if raw.is_dir() else raw.parent, folder / RAW
+        files = [p for p in found_below(raw) if p.is_file()] if raw.is_dir() else [raw]
+        if target.resolve() not in (base.resolve(), *base.resolve().parents):
+            copies = {target / p.relative_to(base): p for p in files}
     there = [path for path in (*contents, *copies) if path.exists()]
     if there:
         what = "this file already exists and is not overwritten"
@@ -106,11 +95,3 @@ def write_draft(folder: Path, contents: Mapping[Path, str], raw: Path | None) ->
     for path, text in contents.items():
         write_new(path, text)
     return (*contents, *copies)
-
-
-def _copies(target: Path, raw: Path) -> dict[Path, Path]:
-    """Where each export is copied to; nothing where they are in raw/ of the campaign already."""
-    base = raw if raw.is_dir() else raw.parent
-    files = [p for p in found_below(raw) if p.is_file()] if raw.is_dir() else [raw]
-    inside = target.resolve() in (base.resolve(), *base.resolve().parents)
-    return {} if inside else {target / p.relative_to(base): p for p in files}

@@ -21,6 +21,10 @@ from tribo.records import Correction, FloatArray
 _BASELINE_SHARE = 0.05  # of the largest force: a pull that starts above it has no zero phase
 _FLAT_TOP = 5  # equal samples at an extreme in a row
 _UNEVEN = 0.2  # spread of the time steps over their median
+_MISSING = {
+    "normal force": "no normal load in the file: give it in tests.csv",
+    "displacement": "no displacement",
+}
 _MARKS = {"\t": "tab", " ": "blanks", "": "nothing", ",": "comma", ";": "semicolon", "|": "bar"}
 
 
@@ -92,10 +96,13 @@ class Inspection:
         """All of it as text."""
         lines = [self.file]
         if self.family:
-            marks = f"{_MARKS.get(self.delimiter, self.delimiter)!s} between cells, decimal {_mark(self.decimal)}"
+            mark = "comma" if self.decimal == "," else "point"
+            marks = f"{_MARKS.get(self.delimiter, self.delimiter)} between cells, decimal {mark}"
             lines.append(f"  format    {self.family_text} ({self.family})")
             lines.append(f"  encoding  {self.encoding}, {marks}, {self.header_rows} header rows")
-        lines += [f"  column    {_column_in_words(c)}" for c in self.columns]
+        for c in self.columns:
+            unit, why = f" [{c.unit}]" if c.unit else "", f" -> {c.quantity} ({c.reason})" if c.quantity else ""
+            lines.append(f'  column    {c.position} "{c.name}"{unit}{why}')
         lines += [f"  table     {_table_in_words(t)}" for t in self.tables[:12]]
         if len(self.tables) > 12:
             lines.append(f"  table     and {len(self.tables) - 12} more")
@@ -118,9 +125,25 @@ def inspect_export(
 ) -> Inspection:
     """Description of an export: family, encoding, columns and why, units, tables, time base, doubts.
 
-    Never raises because of the contents of the file: for an export that cannot be read, ``problems`` states why.
-    Only the beginning of a large file is checked; a doubt then says so. ``columns`` and ``correction``
-    as in :func:`tribo.readers.read_export`.
+    Nothing is raised. Only the beginning of a large file is checked; a doubt then says so.
+
+    Parameters
+    ----------
+    path : Path
+        The export, or ``PATH.zip/ENTRY``.
+    columns, correction : optional
+        As in :func:`tribo.readers.read_export`.
+
+    Returns
+    -------
+    Inspection
+        Of an export that cannot be read, ``problems`` states why.
+
+    Examples
+    --------
+    >>> seen = tribo.inspect_export("data/example/raw/T001.csv")
+    >>> seen.family, seen.tables[0].rows, [column.quantity for column in seen.columns]
+    ('bluehill', 400, ['time', 'displacement', 'friction force'])
     """
     path = Path(path)
     file = str(path)
@@ -207,7 +230,7 @@ def _read(file: str, readings: list[Reading], others: list[str], footer: list[st
         other_tables=tuple(others),
         metadata=layout.metadata,
         signs=_signs(parts),
-        missing=_missing(first),
+        missing=tuple(_MISSING[quantity] for quantity in _MISSING if quantity not in first.arrays),
         doubts=tuple(doubts),
         problems=tuple(problem for problem in findings if problem.kind in FATAL),
     )
@@ -255,15 +278,6 @@ def _signs(parts: list[Reading]) -> tuple[str, ...]:
         found.append("the friction force changes sign between tables: strokes in opposite directions")
     elif max(means) < 0:
         found.append("the friction force is negative")
-    return tuple(found)
-
-
-def _missing(reading: Reading) -> tuple[str, ...]:
-    found = []
-    if "normal force" not in reading.arrays:
-        found.append("no normal load in the file: give it in tests.csv")
-    if "displacement" not in reading.arrays:
-        found.append("no displacement")
     return tuple(found)
 
 
@@ -318,15 +332,6 @@ def _flat_top(force: FloatArray) -> tuple[int, int] | None:
     runs = np.split(at_top, np.flatnonzero(np.diff(at_top) > 1) + 1)
     longest = max(runs, key=len)
     return (int(longest[0]), len(longest)) if len(longest) >= _FLAT_TOP and np.ptp(force) else None
-
-
-def _mark(decimal: str) -> str:
-    return "comma" if decimal == "," else "point"
-
-
-def _column_in_words(column: ColumnSeen) -> str:
-    name = f'{column.position} "{column.name}"{f" [{column.unit}]" if column.unit else ""}'
-    return f"{name} -> {column.quantity} ({column.reason})" if column.quantity else name
 
 
 def _table_in_words(table: TableSeen) -> str:

@@ -86,6 +86,12 @@ def read_export(
         bom_only, header_only, not_an_export, missing_column, missing_unit, unknown_unit, truncated_mid_row,
         wrong_number_of_cells, text_in_numbers, two_decimal_marks, nan_gap, time_goes_back, scale_jump,
         several_tables.
+
+    Examples
+    --------
+    >>> trace = tribo.read_export("data/example/raw/T001.csv")
+    >>> trace.name, trace.source.family, trace.force_N.size, trace.source.columns["friction force"]
+    ('T001', 'bluehill', 400, 'Load [N]')
     """
     path = Path(path)
     chosen = None if path.exists() else _CHOICE.fullmatch(path.name)
