@@ -29,7 +29,7 @@ from unittest.mock import patch
 
 from torture_processes import REPORT, differing, ensemble, finished, quick_reports, results, run, zipped_campaign
 
-from tribo.cache.kept_results import Shelf, fingerprint
+from tribo.cache.kept_results import fingerprint, kept_or_made
 from tribo.errors import TriboError
 from tribo.springblock import SimConfig, simulate, stratified_design
 from tribo.springblock.kept_runs import run_stored
@@ -60,7 +60,7 @@ def kept_outcome(path: Path, key: str, expected: str) -> int:
     with warnings.catch_warnings(), patch("tribo.cache.kept_results.fingerprint", lambda *_: key):
         warnings.simplefilter("ignore")
         try:
-            found = Shelf(path.parent).take(path.stem, None, again)
+            found = kept_or_made(path.parent, path.stem, None, again)
         except MadeAgainError:
             return MADE_AGAIN
     return SAME if fingerprint(found) == expected else DIFFERENT
@@ -122,7 +122,7 @@ def flip_kept(kept: Path, work: Path, flips: int, rng: random.Random) -> Counter
         assert found is not None
         key = found[1].decode()
         with patch("tribo.cache.kept_results.fingerprint", lambda *_, key=key: key):
-            expected = fingerprint(Shelf(kept).take(intact.stem, None, dict))
+            expected = fingerprint(kept_or_made(kept, intact.stem, None, dict))
         (work / intact.name).write_bytes(flipped(content, rng))
         outcomes[in_child(kept_outcome, work / intact.name, key, expected)] += 1
     return outcomes

@@ -15,7 +15,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
 GROUND = {
     "display", "errors", "user_text", "input_files", "units", "zeroing", "records", "files", "temporary",
-    "forked", "laws", "vocabulary",
+    "forked", "laws", "vocabulary", "outputs",
 }  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
     ("user_text", set()),
@@ -23,10 +23,11 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("errors", {"display"}),
     ("units", {"errors"}),
     ("zeroing", {"display"}),
-    ("records", {"display", "errors", "zeroing"}),
+    ("files", {"errors"}),
+    ("outputs", {"files", "user_text"}),
+    ("records", {"outputs", "display", "errors", "zeroing"}),
     ("laws", {"records", "display"}),
     ("vocabulary", set()),
-    ("files", {"errors"}),
     ("temporary", {"files", "errors"}),
     ("forked", set()),
     ("input_files", {"errors", "files"}),

@@ -1,18 +1,13 @@
-"""Files and folders read whole: where the system refuses, the error names the path, and nothing is left out in silence.
+"""Files read whole, written whole, and links that lead out of their folder.
 
-``Path.glob`` and ``Path.rglob`` leave out folders that they may not list, and an error of ``Path.read_text`` while it
-reads names no file; the package uses the functions of this module in their place. Results are written by
-:mod:`tribo.files`.
+Where the system refuses to read, the error names the path, and nothing is left out in silence: ``Path.glob`` and
+``Path.rglob`` leave out folders that they may not list, and an error of ``Path.read_text`` while it reads names no
+file; the package uses the functions of this module in their place.
 
-Links in a folder: those that lead out of it are never followed.
-
-Files that are whole or absent: written under a temporary name, then renamed.
-
-HDF5 files that are whole or absent, also where the disk is full.
-
-The HDF5 library can neither close nor abandon a file that it failed to write to: what it does then ranges from a second
-error to the end of the process. It therefore writes to a file object that keeps the first error of the operating
-system to itself until the library has closed the file.
+A file is written under a temporary name, then renamed, and so whole or absent. The same holds for HDF5 files. Their
+library can neither close nor abandon a file that it failed to write to: what it does then ranges from a second error to
+the end of the process. It therefore writes to a file object that keeps the first error of the operating system to
+itself until the library has closed the file.
 """
 
 from __future__ import annotations

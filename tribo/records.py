@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tribo.display import displayed
 from tribo.errors import CampaignError, FitError, Problem
+from tribo.outputs import product
 from tribo.zeroing import DEFAULT, ZeroChoice
 
 if TYPE_CHECKING:
@@ -344,21 +345,14 @@ class Fits(tuple[LawFit, ...]):
         """
         import pandas as pd
 
-        return pd.DataFrame([_fit_row(f) for f in self if f.adhesion in f.parameters], columns=FITS_COLUMNS)
+        rows = [_fit_row(f) for f in self if f.adhesion in f.parameters]
+        return pd.DataFrame(rows, columns=product("fits.csv").column_names)
 
     def __repr__(self) -> str:
         return "\n".join(["Fits:", *(f"  {fit._headline()}" for fit in self)])  # type: ignore[attr-defined]
 
     def _repr_html_(self) -> str:
         return str(self.table()[["sample", "regime", "mu", "mu_u", "tau0_kPa", "tau0_u_kPa", "T0_N"]]._repr_html_())
-
-
-FITS_COLUMNS = [
-    "sample", "regime", "mu", "mu_u", "tau0_kPa", "tau0_u_kPa", "cov", "n_specimens", "n_tests", "method",
-    "chi2_red", "law", "mu_low", "mu_high", "tau0_low_kPa", "tau0_high_kPa", "notes", "T0_N", "T0_u_N",
-    "largest_mu", "largest_tau0", "mu_type_a_u", "tau0_type_a_u_kPa", "cov_type_a", "dof_type_a", "mu_type_a_low",
-    "mu_type_a_high", "tau0_type_a_low_kPa", "tau0_type_a_high_kPa", "T0_type_a_u_N",
-]  # fmt: skip
 
 
 def _fit_row(fit: LawFit) -> dict[str, object]:

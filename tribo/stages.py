@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from tribo.cache.kept_results import Shelf
+from tribo.cache.kept_results import kept_or_made
 from tribo.campaign.load import required_flat_sample, with_flat_sample, with_zeros
 from tribo.display import displayed
 from tribo.errors import FitError
@@ -268,7 +268,7 @@ def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
     from tribo.fitting.assessment import assessment
 
     made_from = (walked.ingested, walked.fits, options.weights)
-    looks = Shelf(options.kept).take("assessment", made_from, lambda: assessment(*made_from), ASSESSED_BY)
+    looks = kept_or_made(options.kept, "assessment", made_from, lambda: assessment(*made_from), ASSESSED_BY)
     return replace(walked, **looks)
 
 
@@ -340,7 +340,7 @@ def diagnose(
         return with_simulation(examined, seed=seed, jobs=jobs, progress=progress).without_columns()
 
     made_from = (ingested, seed, predictor, pattern_table.record(), known)
-    diagnosed: Diagnosis = Shelf(kept).take("diagnosis", made_from, found, DIAGNOSED_BY)
+    diagnosed: Diagnosis = kept_or_made(kept, "diagnosis", made_from, found, DIAGNOSED_BY)
     return replace(diagnosed, verdict=worded(diagnosed.verdict))
 
 
@@ -365,7 +365,7 @@ def diagnosis_without_model(study: Study, *, seed: int = 0, kept: Path | None = 
     def diagnosed() -> DiagnosisWithoutModel:
         return DiagnosisWithoutModel(diagnose_without_model(study, seed=seed))
 
-    found: DiagnosisWithoutModel = Shelf(kept).take("alone", made_from, diagnosed, DIAGNOSED_BY)
+    found: DiagnosisWithoutModel = kept_or_made(kept, "alone", made_from, diagnosed, DIAGNOSED_BY)
     return DiagnosisWithoutModel(worded(found.verdict))
 
 

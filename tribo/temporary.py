@@ -1,6 +1,9 @@
-"""Folders for temporary files: removed at their end, or by the next start where the process was killed.
+"""Folders of this user alone: for temporary files, and for code that is loaded at the next start.
 
-Folders that no one else can write to, for files that are executed or unpickled when they are loaded.
+A folder for temporary files is made by tempfile, with a file in it that filelock holds for as long as the folder is in
+use. ``tempfile.TemporaryDirectory`` alone would leave the folder of a killed process for ever, and that of another
+program that was killed; here the next start of tribo removes both. By hand stays also the choice of the place:
+tempfile tries a folder with a file, which stays where a kill falls on it.
 """
 
 from __future__ import annotations
@@ -10,15 +13,9 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-
-try:
-    import fcntl
-except ImportError:  # Windows: leftovers of killed processes stay there
-    fcntl = None  # type: ignore[assignment]
 
 PREFIX = "tribo-files-"
 IN_USE = "in-use"  # locked for as long as the folder is in use; the system unlocks it when a process ends, however
@@ -35,50 +32,38 @@ def temporary_folder() -> Iterator[Path]:
     OSError
         There is no place for temporary files, or it cannot be written to.
     """
-    held = held_folder(PREFIX)
-    try:
-        yield held.folder
-    finally:
-        held.release()
+    with temporary_folder_of_child() as (folder, _):
+        yield folder
 
 
 @contextmanager
-def temporary_folder_of_child() -> Iterator[tuple[Path, int]]:
+def temporary_folder_of_child(prefix: str = PREFIX) -> Iterator[tuple[Path, int]]:
     """The same folder for a child process, with a descriptor: the folder is in use as long as a process has it open.
 
-    It is for temporary files of other programs, which leave them there when they are killed.
+    It is for temporary files of other programs, which leave them there when they are killed. No error of the removal
+    is raised.
     """
-    held = held_folder(PREFIX)
-    try:
-        yield held.folder, held.lock
-    finally:
-        held.release()
+    from filelock import FileLock
 
-
-@dataclass(frozen=True)
-class Held:
-    """A temporary folder that is in use until it is released; ``lock`` is the descriptor that says so."""
-
-    folder: Path
-    lock: int
-
-    def release(self) -> None:
-        """Remove the folder. No error of the removal is raised."""
-        _remove(self.folder.parent)
-        os.close(self.lock)
-
-
-def held_folder(prefix: str) -> Held:
-    """The same folder until it is released."""
     clear_abandoned(place_of_temporary_files(), prefix)
-    holder, lock = _made(prefix)
-    held = Held(holder / FILES, lock)
+    descriptors: list[int] = []
+    while not descriptors:
+        holder = Path(tempfile.mkdtemp(prefix=prefix))
+        lock = FileLock(holder / IN_USE, mode=0o600, thread_local=False, on_acquired=descriptors.append)
+        try:
+            lock.acquire()
+        except FileNotFoundError:  # another start took it for an abandoned one
+            continue
+        except BaseException:
+            with suppress(OSError):  # the first error is the one to report
+                holder.rmdir()
+            raise
     try:
-        held.folder.mkdir(mode=_OWNER_ONLY)
-    except BaseException:
-        held.release()
-        raise
-    return held
+        (holder / FILES).mkdir(mode=_OWNER_ONLY)
+        yield holder / FILES, descriptors[0]
+    finally:
+        _remove(holder)
+        lock.release()
 
 
 def place_of_temporary_files() -> Path:
@@ -91,47 +76,17 @@ def place_of_temporary_files() -> Path:
     return Path(tempfile.gettempdir())
 
 
-def _made(prefix: str) -> tuple[Path, int]:
-    """A new folder with a locked file in it."""
-    while True:
-        holder = Path(tempfile.mkdtemp(prefix=prefix))
-        try:
-            lock = os.open(holder / IN_USE, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
-        except FileNotFoundError:  # another start took it for an abandoned one
-            continue
-        except BaseException:
-            with suppress(OSError):  # the first error is the one to report
-                holder.rmdir()
-            raise
-        if fcntl is not None:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-        return holder, lock
-
-
 def clear_abandoned(place: Path, prefix: str) -> None:
-    """Remove the folders of this user in ``place`` that no process uses any more."""
-    for holder in place.glob(f"{prefix}*") if fcntl is not None else ():
-        with suppress(OSError):  # of another user, or another start was faster
-            if _is_own(holder):
-                _remove_abandoned(holder)
+    """Remove the folders of this user in ``place`` that no process uses any more; on Windows they stay there."""
+    from filelock import FileLock, Timeout
 
-
-def _is_own(holder: Path) -> bool:
-    found = holder.lstat()
-    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and stat.S_IMODE(found.st_mode) == _OWNER_ONLY
-
-
-def _remove_abandoned(holder: Path) -> None:
-    try:
-        lock = os.open(holder / IN_USE, os.O_RDWR | os.O_NOFOLLOW)
-    except FileNotFoundError:  # killed before it held anything
-        holder.rmdir()
-        return
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        _remove(holder)
-    finally:
-        os.close(lock)
+    for holder in place.glob(f"{prefix}*") if hasattr(os, "getuid") else ():
+        with suppress(OSError, Timeout):  # of another user, in use, or another start was faster
+            found = holder.lstat()
+            own = found.st_uid == os.getuid() and stat.S_IMODE(found.st_mode) == _OWNER_ONLY
+            if stat.S_ISDIR(found.st_mode) and own:
+                with FileLock(holder / IN_USE, timeout=0, mode=0o600):
+                    _remove(holder)
 
 
 def _remove(holder: Path) -> None:
@@ -156,7 +111,7 @@ def private_folder(candidates: Iterable[Path], prefix: str) -> Path:
     """
     for wanted in candidates:
         try:
-            folder = _made_private_folder(wanted)
+            folder = _made(wanted)
             if is_private(folder) and _writable(folder):
                 return folder
         except OSError:
@@ -164,7 +119,7 @@ def private_folder(candidates: Iterable[Path], prefix: str) -> Path:
     return _fresh(prefix)
 
 
-def _made_private_folder(wanted: Path) -> Path:
+def _made(wanted: Path) -> Path:
     """The folder, with no links left above it that someone could let point elsewhere later."""
     wanted.parent.mkdir(mode=_OWNER_ONLY, parents=True, exist_ok=True)
     folder = Path(os.path.realpath(wanted.parent)) / wanted.name
@@ -210,11 +165,8 @@ def _writable(folder: Path) -> bool:
 
 
 def _fresh(prefix: str) -> Path:
-    held = held_folder(prefix)
-    atexit.register(_release, held.release, os.getpid())
-    return held.folder
-
-
-def _release(release: Callable[[], None], maker: int) -> None:
-    if os.getpid() == maker:  # a forked process leaves the folder to the one that made it
-        release()
+    held = ExitStack()
+    folder, _ = held.enter_context(temporary_folder_of_child(prefix))
+    maker = os.getpid()
+    atexit.register(lambda: held.close() if os.getpid() == maker else None)  # a forked process leaves it to its maker
+    return folder

@@ -2,6 +2,7 @@
 
 ``{tribo-commands}``: every command with its options. ``{tribo-csv} FUNCTION``: a table that a function of tribo
 returns. ``{tribo-register} NAME``: the entries of a table of the program (laws, mechanisms, rules, readers).
+``{tribo-outputs}``: the files that tribo writes.
 """
 
 from __future__ import annotations
@@ -74,6 +75,22 @@ class Register(Written):
         yield from _rows(["name", *fields], ([key, *(getattr(e, f) for f in fields)] for key, e in entries.items()))
 
 
+class Outputs(Written):
+    """The files of a folder of results, or with the argument ``columns`` the columns of its tables."""
+
+    optional_arguments = 1
+
+    def text(self) -> Iterator[str]:
+        from tribo.outputs import PRODUCTS
+
+        for product in PRODUCTS:
+            if not self.arguments:
+                yield from (f"`{product.name}`", f": {product.text}", "")
+            elif product.columns:
+                yield from (f"### {product.name} (stage {product.stage})", "")
+                yield from _rows(["column", "unit", "text"], ((c.name, c.unit or "", c.text) for c in product.columns))
+
+
 def _rows(names: Sequence[str], rows: Iterable[Iterable[object]]) -> Iterator[str]:
     yield f"| {' | '.join(names)} |"
     yield f"|{'---|' * len(names)}"
@@ -94,4 +111,5 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.add_directive("tribo-commands", Commands)
     app.add_directive("tribo-csv", Table)
     app.add_directive("tribo-register", Register)
+    app.add_directive("tribo-outputs", Outputs)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tribo.comparison.prediction import Cell, cell_name, cells_of, remove_strangers, run_cells
+from tribo.comparison.prediction import Cell, cell_name, cells_of, remove_other_runs, run_cells
 from tribo.springblock import SimConfig
 
 DESIGN = [
@@ -44,12 +44,12 @@ def test_progress_counts_every_run_up_to_all(cells: tuple[Cell, ...], tmp_path: 
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
 
 
-def test_other_seeds_have_other_files_and_strangers_are_removed(cells: tuple[Cell, ...], tmp_path: Path) -> None:
+def test_other_seeds_have_other_files_and_those_of_others_are_removed(cells: tuple[Cell, ...], tmp_path: Path) -> None:
     others = cells_of([config.with_(seed=config.seed + 10) for config in DESIGN[:2]])
     run_cells(cells, tmp_path)
     run_cells(others, tmp_path)
     assert len(list(tmp_path.glob("*.nc"))) == 5
-    remove_strangers(cells, tmp_path)
+    remove_other_runs(cells, tmp_path)
     assert sorted(tmp_path.glob("*.nc")) == sorted(c.path(tmp_path) for c in cells)
 
 

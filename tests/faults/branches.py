@@ -22,7 +22,6 @@ from pathlib import Path
 
 from faults.file_operations import Fault, Operation, real_os_open
 from faults.trial import SLOW_S, Bench, Orders, Outcome, be_child
-from tribo.cache import own_folder as lock
 
 NEW_MOUNTS, PRIVATE = 0x20000, 0x44000  # CLONE_NEWNS; MS_REC | MS_PRIVATE
 OF_OPENING = os.O_CREAT | os.O_EXCL | os.O_TRUNC
@@ -85,12 +84,9 @@ def _open_below(root: Path) -> dict[int, str]:
 
 
 def _fork_with_locks() -> int:
-    """A fork that keeps the locks of tribo, as the same command would; workers of a command let them go."""
-    held = set(lock._WORKERS_LET_GO)
-    lock._WORKERS_LET_GO.clear()
-    child = os.fork()
-    lock._WORKERS_LET_GO.update(held)
-    return child
+    """A fork that keeps the locks of tribo, as the same command would: it passes by the hooks of Python, by which the
+    workers of a command let them go."""
+    return int(_LIBC.fork())
 
 
 def _reopen(below: dict[int, str]) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from tribo.cache.own_folder import PRODUCTS, own_folder
+from tribo.cache.own_folder import foreign_files
 from tribo.cli import main
 
 HOLDER = "from pathlib import Path\nfrom tribo.cache.own_folder import own_folder\nwith own_folder(Path({out!r})):\n    print('holding', flush=True)\n    input()\n"  # noqa: E501
@@ -35,10 +35,17 @@ def test_a_second_command_into_one_folder_ends_with_status_75(
     assert f"process {first.pid} on " in problem["found"]
 
 
-def test_every_file_of_results_is_known_as_one(small_campaign: Path, tmp_path: Path) -> None:
-    with own_folder(tmp_path / "out"):
-        pass
+@pytest.mark.parametrize("name", ["card.json", "diagnosis.csv", "layers.csv", "law-1.toml", "figures/a.svg"])
+def test_a_users_own_file_of_the_name_of_a_product_is_not_replaced(
+    small_campaign: Path, tmp_path: Path, name: str
+) -> None:
     said = CliRunner().invoke(main, ["fit", str(small_campaign), "-o", str(tmp_path / "out")])
     assert said.exit_code == 0
-    record = json.loads((tmp_path / "out" / "provenance.json").read_text())
-    assert {name for name in record["outputs"] if "/" not in name} <= PRODUCTS
+    own = tmp_path / "out" / name
+    own.parent.mkdir(exist_ok=True)
+    own.write_text("not from tribo")
+    assert foreign_files(tmp_path / "out") == [name]
+    again = CliRunner().invoke(main, ["fit", str(small_campaign), "-o", str(tmp_path / "out")])
+    assert again.exit_code == 1
+    assert name in again.output
+    assert own.read_text() == "not from tribo"

@@ -8,10 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tribo.cache.kept_results import Shelf
 from tribo.records import Study
 from tribo.report import drawings
-from tribo.report.drawing_choices import Drawing
 from tribo.report.drawings import Drawn, draw_all, inline_svg
 
 
@@ -26,28 +24,28 @@ class Kept:
 @pytest.fixture(scope="module")
 def kept(measured: Study, tmp_path_factory: pytest.TempPathFactory) -> Kept:
     folder = tmp_path_factory.mktemp("kept")
-    return Kept(draw_all(measured, drawing=Drawing(keep=Shelf(folder).take)), folder)
+    return Kept(draw_all(measured, kept=folder), folder)
 
 
 def test_a_kept_figure_is_not_drawn_again_unless_its_numbers_change(
     measured: Study, kept: Kept, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first, keep = kept.figures, Shelf(kept.folder).take
+    first = kept.figures
     drawn = []
-    noted = lambda record, numbers, origin: drawn.append(record.name) or ("", ())  # noqa: E731
-    monkeypatch.setattr(drawings, "_svg_and_series", noted)
+    noted = lambda record, numbers, origin: drawn.append(record.name) or ("", [])  # noqa: E731
+    monkeypatch.setattr(drawings, "_svg_and_points", noted)
     monkeypatch.setattr(drawings, "figure_files", lambda svg, title, origin: {})
-    again = draw_all(measured, drawing=Drawing(keep=keep))
+    again = draw_all(measured, kept=kept.folder)
     assert drawn == []
     assert {n: f.files["svg"] for n, f in again.items()} == {n: f.files["svg"] for n, f in first.items()}
     ingested = measured.ingested
     pulls = {**ingested.pulls, "T0001": replace(ingested.pulls["T0001"], static_N=9.0)}
-    draw_all(replace(measured, ingested=replace(ingested, pulls=pulls)), drawing=Drawing(keep=keep))
+    draw_all(replace(measured, ingested=replace(ingested, pulls=pulls)), kept=kept.folder)
     assert set(drawn) == {"fig4", "fig6", "dependence", "forces"}  # no other one shows the static force of a pull
 
 
 def test_several_processes_draw_the_same_bytes(measured: Study, kept: Kept) -> None:
-    one, two = kept.figures, draw_all(measured, drawing=Drawing(jobs=2))
+    one, two = kept.figures, draw_all(measured, jobs=2)
     assert list(one) == list(two)
     assert all(one[name].files == two[name].files for name in one)
 

@@ -11,8 +11,8 @@ import pytest
 
 from tribo.errors import Problem
 from tribo.records import Study
-from tribo.report.drawings import Series
-from tribo.report.pulls import figure_data, trace_data, trace_picture
+from tribo.report.pulls import trace_data, trace_picture
+from tribo.report.shell import script_json
 
 
 def unpacked(record: dict[str, object]) -> np.ndarray:
@@ -60,7 +60,7 @@ def test_every_doubt_about_a_sample_is_shown_at_its_time(study: Study) -> None:
 
 
 def test_no_name_can_end_the_script_element() -> None:
-    series = Series("</script><script>alert(1)", "x", "y", np.zeros((1, 2)), np.zeros((1, 2)))
-    text = figure_data({"fig": [series]})
+    series = {"name": "</script><script>alert(1)", "place": [0.0, 0.0]}
+    text = script_json({"fig": [series]})
     assert "<" not in text
-    assert json.loads(text)["fig"][0]["name"] == series.name
+    assert json.loads(text)["fig"][0]["name"] == series["name"]

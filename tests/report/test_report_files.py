@@ -14,9 +14,10 @@ import xarray as xr
 
 from report.conftest import PROVENANCE, Written
 from tribo.files import whole_file, write_text
+from tribo.outputs import unit_of
 from tribo.records import Study
 from tribo.report import gather_provenance, write_report, write_until
-from tribo.report.campaign_nc import unit_of, write_store
+from tribo.report.campaign_nc import write_store
 
 FIGURES = ["agreement", *(f"fig{k}" for k in range(3, 9))]
 

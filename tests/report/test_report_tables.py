@@ -12,9 +12,10 @@ import pytest
 
 from tribo.comparison.study_lookup import all_set_aside
 from tribo.errors import Problem
+from tribo.outputs import csv_text
 from tribo.records import SetAside, Study
 from tribo.report import tables as result_tables
-from tribo.report.tables import to_csv, write_tables
+from tribo.report.tables import write_tables
 
 CONTRACT = {
     "tests.csv": "test_id, static_N, static_u_N, sliding_N, sliding_u_N, rule, window, zero_N, flags, set_aside",
@@ -90,7 +91,7 @@ def test_a_study_without_fits_has_only_its_tests(study: Study, tmp_path: Path) -
 
 
 def test_a_number_that_is_none_is_an_empty_cell() -> None:
-    text = to_csv(pd.DataFrame({"a": [1.5, np.nan, np.inf, -0.0], "b": ["x", "", None, "y"]}))
+    text = csv_text(pd.DataFrame({"a": [1.5, np.nan, np.inf, -0.0], "b": ["x", "", None, "y"]}))
     assert text == "a,b\n1.5,x\n,\n,\n0,y\n"
     assert pd.read_csv(io.StringIO(text)).shape == (4, 2)
 

@@ -17,11 +17,11 @@ from tribo import stages
 from tribo.campaign import load_campaign
 from tribo.figures.catalogue import FIGURES, FRICTION_FIGURES
 from tribo.figures.style import house_style
+from tribo.outputs import csv_text
 from tribo.records import Study
 from tribo.report import tables as result_tables
 from tribo.report.campaign_nc import write_store
 from tribo.report.drawings import draw_all, svg_text
-from tribo.report.tables import to_csv
 from tribo.user_text import for_spreadsheet, from_spreadsheet
 
 IDS = ("001", "1", "1.0", "1e5", "01", "+1", "1e05", "nan", "inf", "None", "True", "-0")
@@ -60,7 +60,7 @@ def test_twelve_ids_that_look_like_numbers_stay_twelve_texts_in_campaign_nc(stud
 
 
 def test_twelve_ids_that_look_like_numbers_stay_twelve_texts_in_the_csv(study: Study) -> None:
-    rows = list(csv.DictReader(io.StringIO(to_csv(result_tables.tests_table(study)))))
+    rows = list(csv.DictReader(io.StringIO(csv_text(result_tables.tests_table(study)))))
     assert tuple(row["test_id"] for row in rows[: len(IDS)]) == IDS
     assert {row["'=2+3"] for row in rows} == {"'@x"}
 
@@ -75,7 +75,7 @@ def test_decisions_by_hand_are_joined_to_ids_as_text(study: Study, tmp_path: Pat
 
 
 def test_a_cell_that_a_spreadsheet_would_take_for_a_formula_is_escaped_and_read_back() -> None:
-    said = to_csv(pd.DataFrame({"name": NAMES, "value": np.linspace(-1.5, 1.5, len(NAMES))}))
+    said = csv_text(pd.DataFrame({"name": NAMES, "value": np.linspace(-1.5, 1.5, len(NAMES))}))
     rows = list(csv.DictReader(io.StringIO(said)))
     assert [from_spreadsheet(row["name"]) for row in rows] == list(NAMES)
     assert rows[0]["value"] == "-1.5"

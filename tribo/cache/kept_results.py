@@ -15,7 +15,7 @@ import json
 import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import lru_cache
 from importlib import import_module, metadata
 from pathlib import Path
@@ -24,7 +24,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from tribo.files import PATTERN_SHARES, bytes_of, data_dir, found_below, found_in
+from tribo.files import PATTERN_SHARES, bytes_of, data_dir, found_below, found_in, write_bytes
 
 T = TypeVar("T")
 
@@ -37,40 +37,35 @@ LIBRARIES = ("numpy", "scipy", "pandas", "statsmodels", "numba", "odrpack")
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
-@dataclass(frozen=True)
-class Shelf:
-    """A folder of kept results; without a folder nothing is kept and everything is made."""
+def kept_or_made(
+    folder: Path | None, name: str, made_from: object, make: Callable[[], T], code: Iterable[str] = ()
+) -> T:
+    """The result kept as ``name`` if it was made from exactly this; else that of ``make``, which is then kept.
 
-    folder: Path | None = None
-
-    def take(self, name: str, made_from: object, make: Callable[[], T], rooms: Iterable[str] = ()) -> T:
-        """The result kept as ``name`` if it was made from exactly this; else that of ``make``, which is then kept.
-
-        Parameters
-        ----------
-        name : file name without its ending
-        made_from : every value the result depends on (records, arrays, tables, plain values)
-        make : computes the result: records of tribo, arrays, tables and plain values, in any nesting
-        rooms : packages of tribo whose sources decide the result
-        """
-        if self.folder is None:
-            return make()
-        key = fingerprint(made_from, sources(*rooms))
-        path = self.folder / f"{name}.json"
-        kept = _read(path, key)
-        if kept is not None:
-            return cast(T, decoded(kept["result"]))
-        result = make()
-        try:
-            text = json.dumps(encoded(result))
-        except TypeError as why:  # a result in hand is worth more than keeping it
-            warnings.warn(f"{name} is not kept: {why}", RuntimeWarning, stacklevel=2)
-            return result
-        from tribo.files import write_bytes
-
-        body = b'"result": ' + text.encode() + b"}\n"
-        write_bytes(path, _head(key, body) + body)
+    Parameters
+    ----------
+    folder : folder of kept results; None keeps nothing
+    name : file name without its ending
+    made_from : every value the result depends on (records, arrays, tables, plain values)
+    make : computes the result: records of tribo, arrays, tables and plain values, in any nesting
+    code : packages and modules of tribo whose sources decide the result
+    """
+    if folder is None:
+        return make()
+    key = fingerprint(made_from, sources(*code))
+    path = folder / f"{name}.json"
+    kept = _read(path, key)
+    if kept is not None:
+        return cast(T, decoded(kept["result"]))
+    result = make()
+    try:
+        text = json.dumps(encoded(result))
+    except TypeError as why:  # a result in hand is worth more than keeping it
+        warnings.warn(f"{name} is not kept: {why}", RuntimeWarning, stacklevel=2)
         return result
+    body = b'"result": ' + text.encode() + b"}\n"
+    write_bytes(path, _head(key, body) + body)
+    return result
 
 
 def _head(key: str, body: bytes) -> bytes:
@@ -102,11 +97,11 @@ def _read(path: Path, key: str) -> dict[str, Any] | None:
 
 
 @lru_cache(maxsize=32)
-def sources(*rooms: str) -> str:
+def sources(*code: str) -> str:
     """SHA-256 over the sources of packages or modules of tribo and the versions of the libraries they compute with."""
     digest = hashlib.sha256()
-    for room in sorted(rooms):
-        folder = _PACKAGE / room
+    for place in sorted(code):
+        folder = _PACKAGE / place
         for source in found_below(folder, "*.py") if folder.is_dir() else [folder.with_suffix(".py")]:
             digest.update(f"{source.relative_to(_PACKAGE)}\0".encode() + bytes_of(source))
     for library in LIBRARIES:

@@ -1,13 +1,12 @@
-"""One writer at a time, held by the operating system: a killed process leaves no lock behind.
+"""Folders and files of results that tribo may write to, each held by one writer.
 
-The lock file names the process that holds it, so that a second process can say whom it waits for.
+Results are never written into a campaign, and never among files that others have written: a folder of results is known
+by its provenance.json; one whose run has not ended, or was killed, by a mark in it. A folder that holds anything else
+is refused, unless the user insists. What counts as a file of tribo is stated in :mod:`tribo.outputs`.
 
-Folders and files of results that tribo may write to: never a campaign, and nothing that others have written.
-
-A folder of results is known by its provenance.json; one whose run has not ended, or was killed, by a mark in it. A
-folder that holds anything else is refused, unless the user insists.
-
-A file that a command was told to write: never in a campaign, and never in place of another kind of file.
+Locks are those of the operating system, taken by filelock: a killed process leaves none behind, and a forked worker
+does not hold that of its parent. By hand stay the name of the holder in the lock file, so that a second process can say
+whom it waits for, the removal of the file, and the sharing of a folder, which filelock offers with a database only.
 """
 
 from __future__ import annotations
@@ -19,18 +18,19 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from glob import escape
 from pathlib import Path
 
 from tribo.errors import CampaignError, Problem, TriboError, naming
 from tribo.files import found_in, text_of
+from tribo.outputs import FIGURES, is_product
 
 POLL_S = 0.2
 WAIT = "this one stops (use --wait SECONDS to wait for the other one)"
 BUSY = f"another process is writing here; {WAIT}"
-_WORKERS_LET_GO: set[int] = set()  # descriptors that a forked worker closes: it must not outlive its parent's lock
+MOMENT_S = 30.0  # for a holder that is about to give its name, or to let go
 
 
 class BusyError(TriboError):
@@ -46,7 +46,8 @@ def only_writer(
     Parameters
     ----------
     wait_s : how long to wait for another holder
-    shared : let others in that also ask for a shared lock
+    shared : let others in that also ask for a shared lock. Each holds a file of its own beside ``path``, and ``path``
+        only while it makes that file; a writer that does not share needs all of them.
     lasting : leave the file there afterwards; otherwise it is removed by its last holder
     busy : what to say where another process holds it; ``found`` is filled in with the name of that process
 
@@ -56,85 +57,60 @@ def only_writer(
         Another process holds it, and still does after ``wait_s`` seconds.
     """
     said = busy or Problem("busy", BUSY, file=str(path.parent))
-    descriptor = _taken(path, time.monotonic() + wait_s, shared, said)
-    _WORKERS_LET_GO.add(descriptor)
-    try:
-        with naming(path):
-            os.ftruncate(descriptor, 0)
-            os.pwrite(descriptor, _holder().encode(), 0)
+    until = time.monotonic() + wait_s
+    own = path.with_name(f"{path.name}.{os.getpid()}.lock")
+    with ExitStack() as held:
+        if shared:
+            with _held(path, until, said, named=False):
+                descriptor = held.enter_context(_held(own, until, said))
+        else:
+            descriptor = held.enter_context(_held(path, until, said, lasting=lasting))
+            for other in found_in(path.parent, f"{escape(path.name)}.*.lock"):
+                with _held(other, until, said):
+                    pass
         yield descriptor
-    finally:
-        if not lasting and _alone(descriptor):
-            path.unlink(missing_ok=True)
-        _WORKERS_LET_GO.discard(descriptor)
-        os.close(descriptor)
 
 
-def _taken(path: Path, until: float, shared: bool, busy: Problem) -> int:
-    """A descriptor of the lock file with the lock held. The file may have been removed while this one waited."""
-    import fcntl
+@contextmanager
+def _held(path: Path, until: float, busy: Problem, *, lasting: bool = False, named: bool = True) -> Iterator[int]:
+    """A lock file held, with the name of this process in it; one without a name is held for a moment only."""
+    from filelock import FileLock, Timeout
 
+    descriptors: list[int] = []
+    lock = FileLock(path, timeout=0, mode=0o644, thread_local=False, on_acquired=descriptors.append)
     while True:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+            lock.acquire()
+            break
         except FileNotFoundError:  # its last holder removed the folder in between
             continue
-        try:
-            fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
-            if _is_at(descriptor, path):
-                return descriptor
-        except BlockingIOError:
-            if time.monotonic() >= until:
-                os.close(descriptor)
-                raise BusyError(replace(busy, found=_found(path))) from None
+        except Timeout:
+            holder = _holder_in(path)
+            if time.monotonic() >= until + (0 if holder else MOMENT_S):
+                raise BusyError(replace(busy, found=holder or "unknown")) from None
             time.sleep(POLL_S)
-        except BaseException:
-            os.close(descriptor)
-            raise
-        os.close(descriptor)
-
-
-def _is_at(descriptor: int, path: Path) -> bool:
     try:
-        return os.path.samestat(os.fstat(descriptor), path.stat())
-    except FileNotFoundError:
-        return False
+        with naming(path):
+            os.ftruncate(descriptors[-1], 0)
+            if named:
+                started = time.strftime("%Y-%m-%d %H:%M:%S", time.gmtime())
+                command = shlex.join(["tribo", *sys.argv[1:]])
+                holder = f"process {os.getpid()} on {socket.gethostname()}, since {started} UTC: {command}"
+                os.write(descriptors[-1], holder.encode())
+        yield descriptors[-1]
+    finally:
+        if not lasting:
+            with suppress(OSError):  # Windows removes it with its last descriptor
+                path.unlink()
+        lock.release()
 
 
-def _alone(descriptor: int) -> bool:
-    """Whether no other process shares the lock."""
-    import fcntl
-
+def _holder_in(path: Path) -> str:
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return text_of(path, errors="replace")
     except OSError:
-        return False
-    return True
-
-
-def _holder() -> str:
-    started = time.strftime("%Y-%m-%d %H:%M:%S", time.gmtime())
-    command = shlex.join(["tribo", *sys.argv[1:]])
-    return f"process {os.getpid()} on {socket.gethostname()}, since {started} UTC: {command}"
-
-
-def _found(path: Path) -> str:
-    """The holder of a lock, by what it has written into the lock file."""
-    try:
-        return text_of(path, errors="replace") or "unknown"
-    except OSError:
-        return "unknown"
-
-
-def _let_go() -> None:
-    for descriptor in _WORKERS_LET_GO:
-        os.close(descriptor)
-    _WORKERS_LET_GO.clear()
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_let_go)
+        return ""
 
 
 LOCK = ".tribo.lock"
@@ -142,14 +118,7 @@ MARK = ".tribo.unfinished"
 STATE = ".tribo"  # of a site: records of steps, logs, the lock
 RECORD = "provenance.json"
 KEPT = "kept"
-FIGURES = "figures"
 CAMPAIGN_FILE = "campaign.toml"
-PRODUCTS = frozenset({
-    "tests.csv", "fits.csv", "other_fits.csv", "budget.csv", "differences.csv", "comparison.csv", "campaign.nc",
-    "verdict.json", "laws.csv", "dependence.csv", "restarts.csv", "discovery.json", "report.html", "report.pdf",
-    "ro-crate-metadata.json", "compare.html", "compare.csv",
-})  # fmt: skip
-PULL_PAGES = "pulls-*.html"  # of reports of many pulls
 OF_SYSTEMS = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 LEFTOVERS = (".part", ".lock")  # endings of hidden files that a killed process leaves
 MOST_NAMED = 5
@@ -294,10 +263,9 @@ def foreign_files(out: Path) -> list[str]:
         return []
     written = recorded_outputs(out)
     if written is not None:
-        figures = [f"{FIGURES}/{p.name}" for p in (out / FIGURES).iterdir()] if (out / FIGURES).is_dir() else []
-        pages = [path.name for path in found_in(out, PULL_PAGES)]
-        there = {*(name for name in PRODUCTS if (out / name).exists()), *figures, *pages}
-        return sorted(name for name in there - written if not is_leftover(name.rpartition("/")[2]))
+        there = {path.name for path in found_in(out, "*") if path.name != RECORD and is_product(path.name)}
+        there |= {f"{FIGURES}/{path.name}" for path in found_in(out / FIGURES, "*") if not is_leftover(path.name)}
+        return sorted(there - written)
     return sorted(path.name for path in out.iterdir() if not (_of_system(path) or _holds_kept_results(path)))
 
 

@@ -168,10 +168,9 @@ def diagnose(
     if campaign is None:
         return _diagnose_published(console, out, options["seed"])
     from tribo import stages
-    from tribo.cache.kept_results import Shelf
     from tribo.campaign import open_campaign
     from tribo.report import write_until
-    from tribo.report.drawing_choices import Drawing
+    from tribo.report.write import Drawing
     from tribo.wording.card import card_of
     from tribo.wording.terminal import card_text, verdict_text
 
@@ -184,7 +183,7 @@ def diagnose(
         study = stages.study(stated_so, chosen, until=until, progress=progress)
         with stages.naming_set_aside(study.ingested):
             found = _diagnosis(study, chosen, progress)
-        drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
+        drawing = Drawing(progress, chosen.jobs, chosen.kept)
         verdict = found.verdict
         card = card_of(stages.with_fits(study), verdict)
         write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found, card)
@@ -255,10 +254,9 @@ def _run_stages(
 ) -> int:
     """Run the stages up to ``until`` on one campaign and write their results."""
     from tribo import stages
-    from tribo.cache.kept_results import Shelf
     from tribo.campaign import open_campaign
     from tribo.report import write_until
-    from tribo.report.drawing_choices import Drawing
+    from tribo.report.write import Drawing
     from tribo.wording.card import card_of
 
     stated = options.pop("stated")
@@ -268,7 +266,7 @@ def _run_stages(
     with out.taken(path), open_campaign(path) as described, console.progress() as progress:
         study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
         study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
-        drawing = Drawing(progress, chosen.jobs, Shelf(chosen.kept).take)
+        drawing = Drawing(progress, chosen.jobs, chosen.kept)
         verdict = found.verdict if found else None
         card = card_of(study, verdict) if until == "report" else None
         write_until(study, out.path, until, drawing, provenance_of_run(study, path, chosen), found, card)
@@ -388,11 +386,11 @@ def discover(
         with stages.naming_set_aside(study.ingested):
             if law is not None:
                 held = validate_on_campaign(study.ingested, law, seed=chosen.seed)
-                written = write_validation(held, out.path, record)
+                said, text = write_validation(held, out.path, record)
             else:
                 found = discover_on_campaign(study.ingested, seed=chosen.seed, progress=progress)
-                written = write_discovery(found, study.ingested.campaign.title, out.path, record)
-    console.result(written.record, written.text)
+                said, text = write_discovery(found, study.ingested.campaign.title, out.path, record)
+    console.result(said, text)
     return console.status_after(study.ingested.set_aside)
 
 

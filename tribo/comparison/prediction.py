@@ -18,7 +18,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from tribo.cache.kept_results import DamagedResultWarning, Shelf, sources
+from tribo.cache.kept_results import DamagedResultWarning, kept_or_made, sources
 from tribo.errors import CampaignError, FitError, Problem, SimulationError, failed_by_system, naming
 from tribo.files import found_in
 from tribo.records import REGIMES, Campaign, FloatArray, LawFit, Pattern, Regime, Run
@@ -176,7 +176,7 @@ def example_run(cells: Sequence[Cell], kept: Path | None = None) -> Run:
 
     config = example_config(cells)
     name = f"example-{quote(config.sample, safe='')}"
-    return Shelf(kept).take(name, config, lambda: simulate(config), SOURCES)
+    return kept_or_made(kept, name, config, lambda: simulate(config), SOURCES)
 
 
 def example_config(cells: Sequence[Cell]) -> SimConfig:
@@ -185,7 +185,7 @@ def example_config(cells: Sequence[Cell]) -> SimConfig:
     return configs[len(configs) // 2]
 
 
-def remove_strangers(cells: Iterable[Cell], kept: Path) -> None:
+def remove_other_runs(cells: Iterable[Cell], kept: Path) -> None:
     """Delete kept runs that belong to none of the cells: other samples, loads, laws or sources."""
     ours = {cell.path(kept) for cell in cells}
     for path in found_in(kept, f"*@*{SUFFIX}"):
@@ -266,7 +266,7 @@ def predict(
 
     friction, cells = calibrated_cells(campaign, fits, flat, model, progress)
     if model.kept is not None:
-        remove_strangers(cells, model.kept)
+        remove_other_runs(cells, model.kept)
     table = run_cells(
         cells, model.kept, model.jobs, model.scheduler,
         lambda done, total: progress("simulating the samples", done, total),
@@ -306,7 +306,7 @@ def calibrated_cells(
             progress=lambda done, total: progress("calibrating on the flat sample", done, total),
         )  # fmt: skip
 
-    friction = Shelf(model.kept).take("calibration", (wanted, pressures, model.seed), calibration, SOURCES)
+    friction = kept_or_made(model.kept, "calibration", (wanted, pressures, model.seed), calibration, SOURCES)
     samples = {s: campaign.samples[s] for s in _measured_samples(campaign)}
     design = stratified_design(samples, pressures, model.runs, model.seed, SimConfig(friction=friction))
     return friction, cells_of(design)
@@ -329,7 +329,7 @@ def run_named_cells(
     """
     _, cells = calibrated_cells(campaign, fits, flat, model, progress)
     if model.kept is not None:
-        remove_strangers(cells, model.kept)  # what a diagnosis finds kept is then of this calibration
+        remove_other_runs(cells, model.kept)  # what a diagnosis finds kept is then of this calibration
     chosen = tuple(c for c in cells if only in ("", c.sample, sample_as_word(c.sample), c.name))
     if not chosen and only != "calibration":
         allowed = ", ".join(["calibration", *dict.fromkeys(c.sample for c in cells), *(c.name for c in cells)])

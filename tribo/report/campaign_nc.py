@@ -8,18 +8,20 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
+from tribo import outputs
 from tribo.errors import failed_by_system
 from tribo.files import whole_hdf5
+from tribo.outputs import unit_of
 from tribo.records import Study, Trace
-from tribo.report import tables as result_tables
 from tribo.report.provenance import Provenance
+from tribo.report.tables import covariates, tables_of
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -27,46 +29,10 @@ if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
 
 Variable = tuple[str, np.ndarray, Mapping[str, Any]]  # dimension, values along it, attributes
-
-# How the end of a column name says its unit; the longest ending wins.
-UNIT_ENDINGS = {
-    "_N_per_s": "N/s", "_N_per_m": "N/m", "_m_s": "m/s", "_u_kPa": "kPa", "_kPa": "kPa", "_Pa": "Pa",
-    "_N": "N",
-    "_u_N": "N", "_s": "s", "_m": "m", "_kg": "kg", "_deg": "degree", "_C": "degC", "_pct": "percent",
-    "_percent": "percent",
-}  # fmt: skip
+Group = tuple[dict[str, Variable], dict[str, Any]]  # variables by name, and attributes of the group
 OF_DIAGNOSIS = ("/residuals", "/extended_runs")  # groups that a diagnosis rewrites or leaves out as a whole
 OF_A_TEST = ("test_id", "sample", "specimen", "normal_load_N")  # what identifies a test in the dataset at the root
 _PLAIN_NUMBER = re.compile(r"-?(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d{1,2})?")  # 001 is a name
-UNITLESS = {"mu": "1", "mu_u": "1", "ratio": "1", "ratio_low": "1", "ratio_high": "1", "cov": "kPa"}
-
-
-@dataclass(frozen=True)
-class Group:
-    """A group of the file: variables of one dimension each, by name, and attributes of the group."""
-
-    variables: Mapping[str, Variable]
-    attributes: Mapping[str, Any] = field(default_factory=dict)
-
-    def about(self, **more: Any) -> Group:
-        """The same with more attributes."""
-        return replace(self, attributes={**self.attributes, **more})
-
-    def with_coordinates(self, names: tuple[str, ...]) -> Group:
-        """The same with these variables as coordinates of all others (CF conventions 5)."""
-        coordinates = {"coordinates": " ".join(names)}
-        return replace(self, variables={
-            name: (dimension, values, attributes if name in names else {**attributes, **coordinates})
-            for name, (dimension, values, attributes) in self.variables.items()
-        })  # fmt: skip
-
-
-def unit_of(column: str) -> str | None:
-    """Unit of a column by the house rule that the unit ends the name; None where it has none."""
-    if column in UNITLESS:
-        return UNITLESS[column]
-    endings = [e for e in UNIT_ENDINGS if column.endswith(e)]
-    return UNIT_ENDINGS[max(endings, key=len)] if endings else None
 
 
 def _units(column: str) -> dict[str, str]:
@@ -80,6 +46,7 @@ def write_store(
     provenance: Provenance | None = None,
     diagnosis: Diagnosis | None = None,
     keep_earlier: bool = False,
+    tables: Mapping[str, pd.DataFrame] | None = None,
 ) -> Path:
     """Write out/campaign.nc, with the groups tests, fits, comparison, simulated and traces.
 
@@ -106,28 +73,29 @@ def write_store(
     if provenance is not None:
         about |= {"source": provenance.origin, "history": f"{provenance.started_at} {provenance.command}".strip()}
         about["provenance"] = json.dumps(provenance.as_record(), ensure_ascii=False, default=str)
-    tests, own = result_tables.tests_table(study), result_tables.covariates(study)
-    table = _table(tests, "test", own)
-    groups = {"/": table.with_coordinates(OF_A_TEST).about(**about), "/tests": table}
-    groups["/traces"] = _ragged(study)
-    if study.fits:
-        groups["/fits"] = _table(study.fits.table(), "fit")
-        groups["/other_fits"] = _table(result_tables.other_fits_table(study), "parameter_row")
-    if study.budget is not None:
-        groups["/budget"] = _table(study.budget, "budget_row")
+    tables = tables_of(study, diagnosis) if tables is None else tables
+    groups: dict[str, Group] = {
+        f"/{p.group}": (_table(tables[p.name], p.row, covariates(study) if p.open_ended else ()), {})
+        for p in outputs.PRODUCTS
+        if p.group and p.name in tables
+    }
+    coordinates = {"coordinates": " ".join(OF_A_TEST)}  # CF conventions 5
+    groups["/"] = {
+        name: (dimension, values, attributes if name in OF_A_TEST else {**attributes, **coordinates})
+        for name, (dimension, values, attributes) in groups["/tests"][0].items()
+    }, about
+    groups["/traces"] = _ragged(study), {"featureType": "timeSeries"}
     if study.comparison is not None:
-        compared = _table(result_tables.comparison_table(study), "comparison_row")
-        groups["/comparison"] = compared.about(flat=study.comparison.flat)
+        groups["/comparison"] = groups["/comparison"][0], {"flat": study.comparison.flat}
     if study.simulated is not None:
-        groups["/simulated"] = _table(study.simulated, "run")
-    if diagnosis is not None:
-        groups |= _diagnosed(diagnosis)
-    path = out / "campaign.nc"
+        groups["/simulated"] = _table(study.simulated, "run"), {}
+    if diagnosis is not None and diagnosis.simulated is not None:
+        mechanisms = {"mechanisms": ", ".join(diagnosis.simulated.mechanisms)}
+        groups["/extended_runs"] = _table(diagnosis.simulated.table, "pair"), mechanisms
     if keep_earlier:
         renewed = OF_DIAGNOSIS if diagnosis is not None else ()
-        groups = {name: group for name, group in _earlier(path).items() if name not in renewed} | groups
-    _write(path, groups)
-    return path
+        groups = {name: group for name, group in _earlier(out / "campaign.nc").items() if name not in renewed} | groups
+    return outputs.write(out, "campaign.nc", partial(_write, groups=groups))
 
 
 def _write(path: Path, groups: Mapping[str, Group]) -> None:
@@ -142,12 +110,13 @@ def _write(path: Path, groups: Mapping[str, Group]) -> None:
 
 def _fill(place: h5netcdf.Group, group: Group) -> None:
     """Dimensions, variables and attributes of one group; NaN is the missing value of every floating-point number."""
-    place.dimensions = dict(sorted((dimension, len(values)) for dimension, values, _ in group.variables.values()))
-    for name, (dimension, values, attributes) in sorted(group.variables.items()):
+    variables, about = group
+    place.dimensions = dict(sorted((dimension, len(values)) for dimension, values, _ in variables.values()))
+    for name, (dimension, values, attributes) in sorted(variables.items()):
         missing = np.nan if values.dtype.kind == "f" else None
         variable = place.create_variable(name, (dimension,), _stored_type(values), values, fillvalue=missing)
         variable.attrs.update(sorted(attributes.items()))
-    place.attrs.update(sorted(group.attributes.items()))
+    place.attrs.update(sorted(about.items()))
 
 
 def _stored_type(values: np.ndarray) -> Any:
@@ -170,25 +139,14 @@ def _earlier(path: Path) -> dict[str, Group]:
 
 
 def _read(place: h5netcdf.Group) -> Group:
-    variables = {
+    variables: dict[str, Variable] = {
         name: (variable.dimensions[0], variable[...], {k: v for k, v in variable.attrs.items() if k != "_FillValue"})
         for name, variable in place.variables.items()
     }
-    return Group(variables, dict(place.attrs.items()))
+    return variables, dict(place.attrs.items())
 
 
-def _diagnosed(diagnosis: Diagnosis) -> dict[str, Group]:
-    from tribo.diagnostics import residual_table
-
-    residuals, runs = OF_DIAGNOSIS
-    groups = {residuals: _table(residual_table(diagnosis), "residual_row")}
-    if diagnosis.simulated is not None:
-        pairs = _table(diagnosis.simulated.table, "pair")
-        groups[runs] = pairs.about(mechanisms=", ".join(diagnosis.simulated.mechanisms))
-    return groups
-
-
-def _table(frame: pd.DataFrame, dimension: str, covariates: Iterable[str] = ()) -> Group:
+def _table(frame: pd.DataFrame, dimension: str, covariates: Iterable[str] = ()) -> dict[str, Variable]:
     """A table as variables of one dimension; texts of ``covariates`` become numbers where all are written as such."""
     variables: dict[str, Variable] = {}
     for name in frame.columns:
@@ -198,7 +156,7 @@ def _table(frame: pd.DataFrame, dimension: str, covariates: Iterable[str] = ()) 
             safe, number = f"{stem}_{number}", number + 1
         values = _values(frame[name], as_numbers=name in covariates)
         variables[safe] = (dimension, values, _units(str(name)))
-    return Group(variables)
+    return variables
 
 
 def _values(column: pd.Series, as_numbers: bool = False) -> np.ndarray:
@@ -215,7 +173,7 @@ def _values(column: pd.Series, as_numbers: bool = False) -> np.ndarray:
     return column.fillna("").astype(str).to_numpy(object)
 
 
-def _ragged(study: Study) -> Group:
+def _ragged(study: Study) -> dict[str, Variable]:
     traces = study.ingested.traces
     sizes = np.array([len(t.time_s) for t in traces.values()], np.int64)
     names = list(dict.fromkeys(name for t in traces.values() for name in t.columns))
@@ -231,7 +189,7 @@ def _ragged(study: Study) -> Group:
         "row_size": ("trace", sizes, {"sample_dimension": "sample"}),
         "row_start": ("trace", starts, {}),
     }
-    return Group({**per_test, **variables}, {"featureType": "timeSeries"})
+    return {**per_test, **variables}
 
 
 def _joined(traces: Mapping[str, Trace], name: str) -> np.ndarray:

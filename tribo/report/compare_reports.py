@@ -21,9 +21,9 @@ import pandas as pd
 
 from tribo.display import displayed
 from tribo.errors import CampaignError, Problem, failed_by_system
-from tribo.files import bytes_of, text_of, write_text
-from tribo.report.provenance import Provenance, read_record, settle_outputs, write_provenance
-from tribo.report.tables import to_csv
+from tribo.files import bytes_of, text_of
+from tribo.outputs import product
+from tribo.report.provenance import Provenance, write_results
 from tribo.wording.numerals import significant
 
 SHOWN = ("finding", "agreement", "fig4", "fig6", "fig7", "fig8", "misfit", "evidence", "dependence")
@@ -147,10 +147,6 @@ def fitted(fit: dict[Any, Any]) -> Fitted:
     )
 
 
-COLUMNS = [
-    "sample", "regime", "quantity", "unit", "first", "first_low", "first_high", "second", "second_low", "second_high",
-    "difference", "difference_low", "difference_high", "difference_percent", "distinct",
-]  # fmt: skip
 QUANTITIES = {"mu": ("μ", "1"), "tau0_kPa": ("τ₀", "kPa"), "T_N": ("T", "N")}
 
 
@@ -173,7 +169,7 @@ def differences(first: Reported, second: Reported) -> pd.DataFrame:
         for other in second.fits.to_dict("records"):
             if (one["sample"], one["regime"]) == (other["sample"], other["regime"]):
                 rows += list(_rows(one, other, load, (first.area_m2, second.area_m2)))
-    return pd.DataFrame(rows, columns=COLUMNS)
+    return pd.DataFrame(rows, columns=product("compare.csv").column_names)
 
 
 def _rows(one: dict[Any, Any], other: dict[Any, Any], load_N: float, areas: tuple[float, float]) -> Iterator[Any]:
@@ -219,13 +215,11 @@ def sentences(table: pd.DataFrame, load_N: float) -> list[str]:
 
 def write_comparison(folders: tuple[Path, Path], out: Path, provenance: Provenance) -> tuple[pd.DataFrame, list[str]]:
     """Write out/compare.html and compare.csv, and provenance.json; returns the table and its sentences."""
-    before = read_record(out)
     first, second = (read_reported(folder) for folder in folders)
     table, load = differences(first, second), common_load_N(first, second)
     said = sentences(table, load)
     page = _page((first, second), table, said, out)
-    written = [write_text(out / "compare.csv", to_csv(table)), write_text(out / "compare.html", page)]
-    write_provenance(provenance, out, settle_outputs(out, before, provenance, written, complete=True))
+    write_results({"compare.csv": table, "compare.html": page}, out, provenance, "compare-reports")
     return table, said
 
 

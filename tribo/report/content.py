@@ -16,8 +16,8 @@ from tribo.comparison import findings, study_lookup
 from tribo.comparison.study_lookup import all_set_aside
 from tribo.diagnostics.verdict import Verdict
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES
+from tribo.outputs import unit_of
 from tribo.records import PA_PER_KPA, REGIMES, Campaign, Regime, Study
-from tribo.report.campaign_nc import unit_of
 from tribo.report.crate import conditions
 from tribo.report.provenance import Provenance
 from tribo.report.pulls import pull_cards

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from tribo.comparison import study_lookup
-from tribo.files import write_text
 from tribo.records import PA_PER_KPA, Campaign, Pattern, Study, Test
 from tribo.report.provenance import Provenance, file_hash
 from tribo.wording.numerals import counted, joined, significant
@@ -158,17 +157,11 @@ MEDIA_TYPES = {
 UNDATED = "1970-01-01"
 
 
-def write_crate(study: Study, out: Path, provenance: Provenance, written: Iterable[Path]) -> Path:
-    """Write out/ro-crate-metadata.json over the files ``written``: their types and hashes, and how they were made.
+def crate_text(study: Study, out: Path, provenance: Provenance, written: Iterable[Path]) -> str:
+    """ro-crate-metadata.json over the files ``written``: their types and hashes, and how they were made.
 
     It includes the tribosystem as required by ASTM G115, with terms of the TriboDataFAIR ontology where they exist.
     """
-    record = crate_record(study, out, provenance, written)
-    return write_text(out / FILE, json.dumps(record, indent=1, ensure_ascii=False) + "\n")
-
-
-def crate_record(study: Study, out: Path, provenance: Provenance, written: Iterable[Path]) -> dict[str, Any]:
-    """The crate as JSON-LD."""
     from rocrate.model.contextentity import ContextEntity
     from rocrate.rocrate import ROCrate
 
@@ -210,7 +203,7 @@ def crate_record(study: Study, out: Path, provenance: Provenance, written: Itera
     source["about"] = system
     record: dict[str, Any] = crate.metadata.generate()
     record["@graph"] = sorted(record["@graph"], key=lambda e: (e["@id"] not in (FILE, "./"), str(e["@id"])))
-    return record
+    return json.dumps(record, indent=1, ensure_ascii=False) + "\n"
 
 
 def _file_properties(path: Path) -> dict[str, Any]:

@@ -1,8 +1,7 @@
-"""Positions of the points of a drawn figure, so that the page can show their values on hovering.
+"""Figures to files: SVG, PDF, PNG and the plotted numbers as CSV, the same bytes for the same study.
 
-Pages set by typst with the fonts it brings along, so that the same words give the same bytes everywhere.
-
-Figures to files: SVG, PDF, PNG and the plotted numbers as CSV, the same bytes for the same study.
+The PDF and the PNG are set by typst with the fonts it brings along, so that they are the same everywhere. Each figure
+also has the positions of its points, so that the page can show their values on hovering.
 """
 
 from __future__ import annotations
@@ -13,9 +12,8 @@ import re
 import struct
 import textwrap
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from datetime import datetime
 from functools import partial
 from importlib import metadata
 from pathlib import Path
@@ -27,125 +25,32 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from tribo.cache.kept_results import kept_or_made
 from tribo.errors import Problem, unexpected
 from tribo.figures.catalogue import DIAGNOSIS_FIGURES, FIGURES, FRICTION_FIGURES
 from tribo.figures.style import FigureOf, as_svg, house_style
 from tribo.files import write_bytes, write_text
 from tribo.forked import each
+from tribo.outputs import csv_text, write
 from tribo.records import FloatArray, Study
-from tribo.report.drawing_choices import DRAWING, Drawing, Keep
-from tribo.report.tables import to_csv
 from tribo.temporary import temporary_folder
 from tribo.user_text import printable
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
 
-
-POINTS_PER_INCH = 72.0
-MOST_POINTS = 60  # of a line without marks: it is read off by eye, not point by point
-MARKS = frozenset("os^DvPX<>*hpd.")  # the caps of error bars are marks too, but no points
-
-
-@dataclass(frozen=True)
-class Series:
-    """Points of one kind in one panel: (n, 2) on the page in points from the top left, and (n, 2) in their units."""
-
-    name: str
-    x: str
-    y: str
-    place: FloatArray
-    value: FloatArray
-
-
-def series_of(figure: Figure) -> list[Series]:
-    """The points of every line and scatter of a settled figure."""
-    height = figure.get_size_inches()[1] * POINTS_PER_INCH
-    scale = POINTS_PER_INCH / figure.dpi
-    labels: dict[str, str] = {}
-    found = []
-    for ax in figure.axes:
-        x, y = ax.get_xlabel() or labels.get("x", "x"), ax.get_ylabel() or labels.get("y", "y")
-        labels |= {"x": x, "y": y}
-        for name, xy, transform in _points(ax):
-            finite = np.isfinite(xy).all(axis=1)
-            if finite.any():
-                place = transform.transform(xy[finite]) * scale
-                place[:, 1] = height - place[:, 1]
-                found.append(Series(_joined(ax, name), x, y, place, xy[finite]))
-    return found
-
-
-def _joined(ax: Axes, name: str) -> str:
-    parts = (ax.get_title(loc="left"), "" if name.startswith("_") else name)
-    return ", ".join(part for part in parts if part)
-
-
-def _points(ax: Axes) -> Iterator[tuple[str, FloatArray, Any]]:
-    for line in ax.lines:
-        xy = np.asarray(line.get_xydata(), float)
-        marked = str(line.get_marker()) in MARKS
-        if len(xy) and (marked or (line.get_linestyle() == "-" and len(xy) > 2)):
-            step = 1 if marked else max(1, len(xy) // MOST_POINTS)
-            yield str(line.get_label()), xy[::step], line.get_transform()
-    for scatter in ax.collections:
-        offsets: FloatArray = np.ma.filled(np.ma.asarray(scatter.get_offsets(), float), np.nan)
-        if len(offsets) > 1:
-            yield str(scatter.get_label()), offsets, scatter.get_offset_transform()
-
-
+OF_STRAIGHT_LINES = ("fig4", "fig6", "fig7", "fig8")  # without the model, "forces" shows the law chosen by the data
+STAGE = "drawing figures"
+DRAWN_BY = ("figures", "report/drawings")
+SET_BY = ("report/drawings",)
 PNG_DPI = 300.0
 FIGURE_PAGE = """#set page(width: auto, height: auto, margin: 0pt, fill: white)
 #set document(title: sys.inputs.title, description: sys.inputs.origin, date: none)
 #image("figure.svg")
 """
-
-
-def figure_files(svg: bytes, title: str, origin: str) -> dict[str, bytes]:
-    """A figure given as SVG, as PDF (vectors, lettering as outlines) and as PNG of 300 dots per inch."""
-    import typst
-
-    with temporary_folder() as folder:
-        write_bytes(folder / "figure.svg", svg)
-        write_text(folder / "page.typ", FIGURE_PAGE)
-        compiler: Any = typst.Compiler(root=folder, ignore_system_fonts=True)
-        inputs = {"title": title, "origin": origin}
-        pdf = compiler.compile(folder / "page.typ", format="pdf", sys_inputs=inputs)
-        png = compiler.compile(folder / "page.typ", format="png", ppi=PNG_DPI, sys_inputs=inputs)
-    return {"pdf": bytes(pdf), "png": with_text(bytes(png), {"Title": title, "Description": origin})}
-
-
-def document(source: str, files: Mapping[str, bytes], made_at: datetime | None) -> bytes:
-    """A PDF of a typst source and the files it reads; ``made_at`` stands in it as its date of creation."""
-    import typst
-
-    with temporary_folder() as folder:
-        for name, content in files.items():
-            write_bytes(folder / name, content)
-        write_text(folder / "document.typ", source)
-        compiler: Any = typst.Compiler(root=folder, ignore_system_fonts=True)
-        return bytes(compiler.compile(folder / "document.typ", format="pdf", timestamp=made_at))
-
-
-def with_text(png: bytes, texts: Mapping[str, str]) -> bytes:
-    """A PNG with lines of text in it (iTXt, PNG specification 11.3.3.4), put before its picture data."""
-    at = png.index(b"IDAT") - 4
-    chunks = b"".join(
-        _chunk(b"iTXt", key.encode("latin-1") + b"\0\0\0\0\0" + text.encode("utf-8"))
-        for key, text in texts.items()
-        if text
-    )
-    return png[:at] + chunks + png[at:]
-
-
-def _chunk(kind: bytes, content: bytes) -> bytes:
-    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
-
-
-OF_STRAIGHT_LINES = ("fig4", "fig6", "fig7", "fig8")  # without the model, "forces" shows the law chosen by the data
-STAGE = "drawing figures"
-DRAWN_BY = ("figures", "report/drawings")
-SET_BY = ("report/drawings",)
+POINTS_PER_INCH = 72.0
+MOST_POINTS = 60  # of a line without marks: it is read off by eye, not point by point
+MARKS = frozenset("os^DvPX<>*hpd.")  # the caps of error bars are marks too, but no points
 THEME = {
     "#ffffff": "var(--paper)",
     "#000000": "currentColor",
@@ -161,15 +66,19 @@ _ALIKE = re.compile(
 _PLACE = re.compile(r' x="([^"]*)" y="([^"]*)" style="[^"]*"/>\s*')
 
 
+Numbers = pd.DataFrame | Problem
+Progress = Callable[[str, int, int], None]
+
+
 @dataclass(frozen=True)
 class Drawn:
-    """A figure as drawn: its words, its files by ending, and the positions of its points for hovering."""
+    """A figure as drawn: its words, its files by ending, and its points for hovering (:func:`points_of`)."""
 
     name: str
     title: str
     caption: str
     files: dict[str, bytes]
-    series: list[Series] = field(default_factory=list)
+    series: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def svg(self) -> str:
@@ -181,16 +90,18 @@ def write_figures(
     out: Path,
     diagnosis: Diagnosis | None = None,
     origin: str = "",
-    drawing: Drawing = DRAWING,
+    progress: Progress | None = None,
+    jobs: int = 1,
+    kept: Path | None = None,
 ) -> dict[str, Drawn]:
     """Write out/figures/NAME.svg, .pdf, .png and .csv of every figure there are numbers for, and return them.
 
-    ``origin`` is written to the metadata of every file and states its source.
+    Parameters as of :func:`draw_all`.
     """
-    drawn = draw_all(study, diagnosis, origin, drawing)
+    drawn = draw_all(study, diagnosis, origin, progress, jobs, kept)
     for figure in drawn.values():
         for ending, content in figure.files.items():
-            write_bytes(out / "figures" / f"{figure.name}.{ending}", content)
+            write(out, f"figures/{figure.name}.{ending}", content)
     return drawn
 
 
@@ -198,33 +109,31 @@ def draw_all(
     study: Study | None,
     diagnosis: Diagnosis | None = None,
     origin: str = "",
-    drawing: Drawing = DRAWING,
+    progress: Progress | None = None,
+    jobs: int = 1,
+    kept: Path | None = None,
 ) -> dict[str, Drawn]:
-    """Every figure there are numbers for, by name, those of the study before those of the diagnosis; no files."""
+    """Every figure there are numbers for, by name, those of the study before those of the diagnosis; no files.
+
+    Parameters
+    ----------
+    origin : written to the metadata of every file; states its source
+    progress : told of every figure
+    jobs : number of processes that draw
+    kept : folder of kept results, where a figure whose numbers have not changed is taken from
+    """
     todo = list(_with_numbers(study, diagnosis))
     found = {}
-    for done, figure in enumerate(each(partial(_drawn_or_said, origin, drawing.keep), todo, drawing.jobs), start=1):
+    for done, figure in enumerate(each(partial(_drawn_or_said, origin, kept), todo, jobs), start=1):
         # not in the other processes: typst keeps threads of its own, which do not survive a fork
-        rest = _other_files(figure, origin, drawing.keep)
-        found[figure.name] = replace(figure, files={**figure.files, **rest})
-        if drawing.progress is not None:
-            drawing.progress(STAGE, done, len(todo))
+        made_from = (figure.svg, figure.title, origin, metadata.version("typst"))
+        rest = partial(_other_files, figure, origin)
+        texts = kept_or_made(kept, f"figure-{figure.name}-files", made_from, rest, SET_BY)
+        files = {ending: base64.b64decode(text) for ending, text in texts.items()}
+        found[figure.name] = replace(figure, files={**figure.files, **files})
+        if progress is not None:
+            progress(STAGE, done, len(todo))
     return found
-
-
-def _other_files(figure: Drawn, origin: str, keep: Keep) -> dict[str, bytes]:
-    """The PDF and the PNG of a figure; what is kept of them is text."""
-
-    def made() -> dict[str, str]:
-        files = figure_files(figure.files["svg"], figure.title, origin)
-        return {ending: base64.b64encode(content).decode("ascii") for ending, content in files.items()}
-
-    made_from = (figure.svg, figure.title, origin, metadata.version("typst"))
-    kept = keep(f"figure-{figure.name}-files", made_from, made, SET_BY)
-    return {ending: base64.b64decode(text) for ending, text in kept.items()}
-
-
-Numbers = pd.DataFrame | Problem
 
 
 def _with_numbers(study: Study | None, diagnosis: Diagnosis | None) -> Iterator[tuple[str, Numbers]]:
@@ -245,51 +154,116 @@ def _with_numbers(study: Study | None, diagnosis: Diagnosis | None) -> Iterator[
                 yield name, numbers
 
 
-def _record_of(name: str) -> FigureOf[Any]:
-    return next(table[name] for table in (FIGURES, FRICTION_FIGURES, DIAGNOSIS_FIGURES) if name in table)
-
-
-def _drawn_or_said(origin: str, keep: Keep, todo: tuple[str, Numbers]) -> Drawn:
+def _drawn_or_said(origin: str, kept: Path | None, todo: tuple[str, Numbers]) -> Drawn:
     """A figure, or in its place the sentence that says why it is not there."""
     name, numbers = todo
+    record = next(table[name] for table in (FIGURES, FRICTION_FIGURES, DIAGNOSIS_FIGURES) if name in table)
     if isinstance(numbers, Problem):
-        return _said_instead(name, numbers, pd.DataFrame(), origin)
+        return _said_instead(record, numbers, pd.DataFrame(), origin)
+    made_from = (numbers, record.title, origin, matplotlib.__version__)
     try:
-        return _draw(origin, keep, name, numbers)
+        svg, series = kept_or_made(
+            kept, f"figure-{name}", made_from, lambda: _svg_and_points(record, numbers, origin), DRAWN_BY
+        )
     except OSError:
         raise
     except Exception as why:  # one figure must not cost the others
-        return _said_instead(name, unexpected(why, "this figure cannot be drawn", name), numbers, origin)
+        return _said_instead(record, unexpected(why, "this figure cannot be drawn", name), numbers, origin)
+    csv = csv_text(numbers).encode("utf-8")
+    return Drawn(name, record.title, record.caption, {"csv": csv, "svg": svg.encode("utf-8")}, series)
 
 
-def _said_instead(name: str, why: Problem, numbers: pd.DataFrame, origin: str) -> Drawn:
+def _said_instead(record: FigureOf[Any], why: Problem, numbers: pd.DataFrame, origin: str) -> Drawn:
     logging.getLogger("tribo").error("%s", printable(str(why)))
     with house_style():
         figure = Figure(figsize=(5.0, 1.0))
         figure.text(0.02, 0.5, "\n".join(textwrap.wrap(str(why), 90)), va="center")
-    title = _record_of(name).title
-    files = {"csv": to_csv(numbers).encode("utf-8"), "svg": svg_text(figure, title, origin).encode("utf-8")}
-    return Drawn(name, title, str(why), files)
+    svg = svg_text(figure, record.title, origin).encode("utf-8")
+    return Drawn(record.name, record.title, str(why), {"csv": csv_text(numbers).encode("utf-8"), "svg": svg})
 
 
-def _draw(origin: str, keep: Keep, name: str, numbers: pd.DataFrame) -> Drawn:
-    record = _record_of(name)
-    made_from = (numbers, record.title, origin, matplotlib.__version__)
-    svg, series = keep(f"figure-{name}", made_from, lambda: _svg_and_series(record, numbers, origin), DRAWN_BY)
-    csv = to_csv(numbers).encode("utf-8")
-    return Drawn(name, record.title, record.caption, {"csv": csv, "svg": svg.encode("utf-8")}, list(series))
-
-
-def _svg_and_series(record: FigureOf[Any], numbers: pd.DataFrame, origin: str) -> tuple[str, tuple[Series, ...]]:
+def _svg_and_points(record: FigureOf[Any], numbers: pd.DataFrame, origin: str) -> tuple[str, list[dict[str, Any]]]:
     figure = record.draw(numbers)
-    svg = svg_text(figure, record.title, origin)
-    return svg, tuple(series_of(figure))
+    svg = svg_text(figure, record.title, origin)  # settles the layout
+    return svg, points_of(figure)
 
 
 def svg_text(figure: Figure, title: str = "", origin: str = "") -> str:
     """A figure as SVG without a date and without random names; its layout is settled on the way."""
     about = {"Creator": "tribo", "Title": title, "Description": origin}
     return as_svg(figure, {name: text for name, text in about.items() if text})
+
+
+def points_of(figure: Figure) -> list[dict[str, Any]]:
+    """The points of every line and scatter of a settled figure: its name, the labels of its axes, the places of the
+    points on the page in points from the top left (x, y, x, y, ...), and their values in the units of the axes."""
+    height = figure.get_size_inches()[1] * POINTS_PER_INCH
+    scale = POINTS_PER_INCH / figure.dpi
+    labels: dict[str, str] = {}
+    found = []
+    for ax in figure.axes:
+        x, y = ax.get_xlabel() or labels.get("x", "x"), ax.get_ylabel() or labels.get("y", "y")
+        labels |= {"x": x, "y": y}
+        for name, xy, transform in _points(ax):
+            finite = np.isfinite(xy).all(axis=1)
+            if finite.any():
+                place = transform.transform(xy[finite]) * scale
+                place[:, 1] = height - place[:, 1]
+                parts = (ax.get_title(loc="left"), "" if name.startswith("_") else name)
+                found.append({
+                    "name": ", ".join(part for part in parts if part), "x": x, "y": y,
+                    "place": [float(f"{v:.1f}") for v in place.ravel()],
+                    "value": [float(f"{v:.4g}") for v in xy[finite].ravel()],
+                })  # fmt: skip
+    return found
+
+
+def _points(ax: Axes) -> Iterator[tuple[str, FloatArray, Any]]:
+    for line in ax.lines:
+        xy = np.asarray(line.get_xydata(), float)
+        marked = str(line.get_marker()) in MARKS
+        if len(xy) and (marked or (line.get_linestyle() == "-" and len(xy) > 2)):
+            step = 1 if marked else max(1, len(xy) // MOST_POINTS)
+            yield str(line.get_label()), xy[::step], line.get_transform()
+    for scatter in ax.collections:
+        offsets: FloatArray = np.ma.filled(np.ma.asarray(scatter.get_offsets(), float), np.nan)
+        if len(offsets) > 1:
+            yield str(scatter.get_label()), offsets, scatter.get_offset_transform()
+
+
+def _other_files(figure: Drawn, origin: str) -> dict[str, str]:
+    """The PDF and the PNG of a figure as text, which is what can be kept."""
+    files = figure_files(figure.files["svg"], figure.title, origin)
+    return {ending: base64.b64encode(content).decode("ascii") for ending, content in files.items()}
+
+
+def figure_files(svg: bytes, title: str, origin: str) -> dict[str, bytes]:
+    """A figure given as SVG, as PDF (vectors, lettering as outlines) and as PNG of 300 dots per inch."""
+    import typst
+
+    with temporary_folder() as folder:
+        write_bytes(folder / "figure.svg", svg)
+        write_text(folder / "page.typ", FIGURE_PAGE)
+        compiler: Any = typst.Compiler(root=folder, ignore_system_fonts=True)
+        inputs = {"title": title, "origin": origin}
+        pdf = compiler.compile(folder / "page.typ", format="pdf", sys_inputs=inputs)
+        png = compiler.compile(folder / "page.typ", format="png", ppi=PNG_DPI, sys_inputs=inputs)
+    return {"pdf": bytes(pdf), "png": with_text(bytes(png), {"Title": title, "Description": origin})}
+
+
+def with_text(png: bytes, texts: Mapping[str, str]) -> bytes:
+    """A PNG with lines of text in it (iTXt, PNG specification 11.3.3.4), put before its picture data."""
+    at = png.index(b"IDAT") - 4
+    chunks = b"".join(
+        _chunk(b"iTXt", key.encode("latin-1") + b"\0\0\0\0\0" + text.encode("utf-8"))
+        for key, text in texts.items()
+        if text
+    )
+    return png[:at] + chunks + png[at:]
+
+
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 
 
 def inline_svg(svg: str, name: str, label: str) -> str:

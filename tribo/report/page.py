@@ -16,8 +16,8 @@ from tribo.records import Study
 from tribo.report.content import content, figure_numbers, figure_places
 from tribo.report.drawings import Drawn, draw_all, inline_svg
 from tribo.report.provenance import Provenance
-from tribo.report.pulls import PullCard, figure_data, on_pages, trace_data
-from tribo.report.shell import STYLE, WORKING, environment, style_and_script
+from tribo.report.pulls import PullCard, on_pages, trace_data
+from tribo.report.shell import STYLE, WORKING, environment, script_json, style_and_script
 from tribo.wording.study_sentences import flags_in_words
 
 PAGE = "report.html"
@@ -63,7 +63,7 @@ def pages_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str,
                 number=number,
                 pulls=len(said["cards"]),
                 report_key=_key(said),
-                figure_data=figure_data({n: figure.series for n, figure in shown.items()}),
+                figure_data=script_json({n: figure.series for n, figure in shown.items()}),
                 trace_data=trace_data(said["study"], [card.test_id for card in cards]),
                 **style_and_script(environment(), [STYLE], [*WORKING, "pulls.js"]),
             )

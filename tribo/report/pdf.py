@@ -10,11 +10,13 @@ from typing import Any
 
 from tribo.comparison.findings import LoadRatio
 from tribo.diagnostics.verdict import Verdict
+from tribo.files import write_bytes, write_text
 from tribo.records import Study
 from tribo.report.content import BudgetTable, content, figure_numbers, figure_places
-from tribo.report.drawings import Drawn, document, draw_all
+from tribo.report.drawings import Drawn, draw_all
 from tribo.report.provenance import Provenance
 from tribo.report.pulls import PullCard
+from tribo.temporary import temporary_folder
 from tribo.wording.card import Card
 from tribo.wording.numerals import ratio_text, significant, unbroken
 
@@ -44,12 +46,19 @@ def pdf(
 
 def pdf_of(said: Mapping[str, Any], figures: Mapping[str, Drawn], origin: str) -> bytes:
     """The document with the given content (:func:`tribo.report.content.content`) and figures."""
+    import typst
+
     record = record_of(said, figures)
     record["origin"] = origin
     pictures = {f"{name}.svg": figure.files["svg"] for name, figure in figures.items()}
     template = (files("tribo.report.paper") / "templates" / TEMPLATE).read_text(encoding="utf-8")
     data = json.dumps(record, ensure_ascii=False).encode("utf-8")
-    return document(template, {"data.json": data, **pictures}, _last_day(said["study"]))
+    with temporary_folder() as folder:
+        for name, content in {"data.json": data, **pictures}.items():
+            write_bytes(folder / name, content)
+        write_text(folder / "document.typ", template)
+        compiler: Any = typst.Compiler(root=folder, ignore_system_fonts=True)
+        return bytes(compiler.compile(folder / "document.typ", format="pdf", timestamp=_last_day(said["study"])))
 
 
 def _last_day(study: Study) -> datetime:

@@ -14,7 +14,8 @@ from typing import Any
 
 from tribo.display import displayed
 from tribo.errors import naming
-from tribo.files import leads_out, paths_below, text_of, write_text
+from tribo.files import leads_out, paths_below, text_of
+from tribo.outputs import product, write as write_output
 from tribo.records import Study
 from tribo.user_text import well_formed
 
@@ -162,7 +163,7 @@ def write_provenance(provenance: Provenance, out: Path, outputs: Mapping[str, st
         record["overrides"] = {**provenance.overrides, "file": _from(out, provenance.overrides["file"])}
     record["origin"] = provenance.origin
     record["outputs"] = dict(sorted((outputs or {}).items()))
-    return write_text(out / FILE, json.dumps(record, indent=1, ensure_ascii=False, default=str) + "\n")
+    return write_output(out, FILE, json.dumps(record, indent=1, ensure_ascii=False, default=str) + "\n")
 
 
 def _from(out: Path, place: str) -> str:
@@ -204,6 +205,16 @@ def _is_whole(record: Mapping[str, Any]) -> bool:
     )
 
 
+def write_results(contents: Mapping[str, Any], out: Path, provenance: Provenance, stage: str) -> None:
+    """All files of a command by name, and provenance.json with the hash of each; files of an earlier run are removed.
+
+    ``contents`` and ``stage`` are those of :func:`tribo.outputs.write`.
+    """
+    before = read_record(out)
+    written = [write_output(out, name, content, stage) for name, content in contents.items()]
+    write_provenance(provenance, out, settle_outputs(out, before, provenance, written, complete=True))
+
+
 def settle_outputs(
     out: Path, before: Mapping[str, Any] | None, provenance: Provenance, written: Iterable[Path], complete: bool
 ) -> dict[str, str]:
@@ -211,9 +222,16 @@ def settle_outputs(
 
     An earlier file stays where its run had the same inputs and choices and this run did not write everything itself
     (``complete``). A file that someone changed since is never removed.
+
+    Raises
+    ------
+    LookupError
+        A file was written that :mod:`tribo.outputs` does not state.
     """
     stands = before is not None and not complete and same_origin(before, provenance)
     outputs = {path.relative_to(out).as_posix(): file_hash(path) for path in written}
+    for name in outputs:
+        product(name)
     for name, digest in (before or {}).get("outputs", {}).items():
         path = out / name
         if name in outputs or not path.resolve().is_relative_to(out.resolve()) or not path.is_file():

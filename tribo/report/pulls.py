@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,6 @@ from tribo.comparison import study_lookup
 from tribo.comparison.oddness import ODD_SCORE, OddPull, oddness, standings
 from tribo.figures.one_pull import thin_trace
 from tribo.records import ByHand, FloatArray, Pull, Study, Test, Trace
-from tribo.report.drawings import Series
 from tribo.report.shell import script_json
 from tribo.wording.numerals import significant, with_uncertainty
 from tribo.wording.study_sentences import by_hand_sentence, flags_in_words, odd_sentence
@@ -212,22 +211,3 @@ def _marks(pull: Pull) -> dict[str, Any]:
 
 def _short(value: float) -> float | None:
     return float(f"{value:.6g}") if math.isfinite(value) else None
-
-
-def figure_data(series: Mapping[str, Iterable[Series]]) -> Markup:
-    """JSON by figure name of the points someone may hover over: place on the page in points, and values."""
-    return script_json(
-        {
-            name: [
-                {
-                    "name": s.name,
-                    "x": s.x,
-                    "y": s.y,
-                    "place": [float(f"{v:.1f}") for v in s.place.ravel()],
-                    "value": [float(f"{v:.4g}") for v in s.value.ravel()],
-                }
-                for s in found
-            ]
-            for name, found in series.items()
-        }
-    )

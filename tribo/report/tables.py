@@ -1,62 +1,65 @@
-"""The tables of a study as data frames and CSV files. Units end the column names; NaN is an empty cell.
+"""The tables of a study and of its diagnosis as data frames. Units end the column names; NaN is an empty cell.
 
-The numbers of a diagnosis as CSV: every test beside the models, and every layer and misfit with its percentages.
+What tables there are, with their columns in order, is stated in :mod:`tribo.outputs`, which calls the functions of this
+module: each takes a study and its diagnosis, and gives None where there is nothing to write.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pandas as pd
 
+from tribo import outputs
 from tribo.comparison.agreement import ratios
 from tribo.comparison.study_lookup import all_set_aside
-from tribo.files import write_text
 from tribo.records import Pull, SetAside, Study, Test
-from tribo.user_text import for_spreadsheet
 from tribo.vocabulary import label_with_unit
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
 
-
-FLOAT_FORMAT = "%.8g"
-TESTS_COLUMNS = [
-    "test_id", "static_N", "static_u_N", "sliding_N", "sliding_u_N", "rule", "window", "zero_N", "flags",
-    "set_aside", "sample", "specimen", "normal_load_N", "peak_s", "onset_s", "window_start_s", "window_end_s",
-    "zero_u_N", "rise_N_per_s", "rise_stiffness_N_per_m", "stick_slip_amplitude_N", "stick_slip_period_s", "noise_N",
-    "drift_N_per_s", "direction", "speed_m_s", "hold_s", "repeat", "run_order", "specimen_run", "started_at",
-    "temperature_C", "humidity_pct", "operator", "file", "doubts", "zero_rule", "first_maximum_N", "highest_N",
-    "first_drop_N", "recorded_load_N", "recorded_load_u_N", "regime", "cycles", "stick_peak_N", "stick_peak_u_N",
-    "stick_trough_N", "stick_trough_u_N", "stick_drop_N", "stick_drop_u_N", "stick_period_s", "stick_period_u_s",
-    "loading_N_per_s", "loading_u_N_per_s", "stuck_share", "stuck_share_u", "restarts", "restart_N", "restart_u_N",
-    "restart_hold_s",
-]  # fmt: skip
-RESTARTS_COLUMNS = [
-    "test_id", "sample", "specimen", "normal_load_N", "restart", "hold_s", "stop_s", "peak_s", "static_N", "static_u_N",
-    "sliding_N", "sliding_u_N",
-]  # fmt: skip
-COMPARISON_COLUMNS = [
-    "sample", "regime", "normal_load_N", "measured_N", "measured_u_N", "simulated_N", "simulated_u_N",
-    "ratio", "ratio_low", "ratio_high",
-]  # fmt: skip
-_READINGS = [
-    "static_N", "static_u_N", "sliding_N", "sliding_u_N", "rule", "zero_N", "peak_s", "onset_s", "zero_u_N",
-    "rise_N_per_s", "rise_stiffness_N_per_m", "stick_slip_amplitude_N", "stick_slip_period_s", "noise_N",
-    "drift_N_per_s", "zero_rule", "first_maximum_N", "highest_N", "first_drop_N", "recorded_load_N",
-    "recorded_load_u_N",
-]  # fmt: skip
-_CONDITIONS = [
-    "sample", "specimen", "normal_load_N", "direction", "speed_m_s", "hold_s", "repeat", "run_order",
-    "specimen_run", "started_at", "temperature_C", "humidity_pct", "operator", "file",
-]  # fmt: skip
+_OF_TEST = {field.name for field in fields(Test)}
+_OF_PULL = {field.name for field in fields(Pull)} - {"flags", "restarts"}
 
 
-def tests_table(study: Study) -> pd.DataFrame:
+def tables_of(study: Study, diagnosis: Diagnosis | None = None) -> dict[str, pd.DataFrame]:
+    """Every table that there is for a study, by the name of its file."""
+    made = {p.name: p.table(study, diagnosis) for p in outputs.PRODUCTS if p.writer}
+    return {name: table for name, table in made.items() if table is not None}
+
+
+def write_tables(
+    study: Study, out: Path, diagnosis: Diagnosis | None = None, tables: Mapping[str, pd.DataFrame] | None = None
+) -> list[Path]:
+    """Write every table that there is for a study as CSV.
+
+    Parameters
+    ----------
+    study : Study
+        The results of all stages that were run.
+    out : Path
+        Folder of results.
+    diagnosis : Diagnosis, optional
+        The diagnosis of the study.
+    tables : mapping of str to DataFrame, optional
+        The tables of :func:`tables_of` where they are at hand.
+
+    Returns
+    -------
+    list of Path
+        tests.csv, and restarts, fits, other_fits, laws, dependence, budget, differences, comparison, diagnosis and
+        layers as far as the study went.
+    """
+    made = tables_of(study, diagnosis) if tables is None else tables
+    return [outputs.write(out, name, table) for name, table in made.items()]
+
+
+def tests_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame:  # noqa: PT028  (no test)
     """One row per test in the order of the campaign, used or set aside; its own covariates come last."""
     ingested = study.ingested
     aside = all_set_aside(study)
@@ -71,13 +74,13 @@ def tests_table(study: Study) -> pd.DataFrame:
     ]
     placed += [(_faulty_row(fault), {"test_id": fault.test_id, "set_aside": fault.reason}) for fault in aside.values()]
     rows = [row for _, row in sorted(placed, key=lambda item: math.inf if item[0] is None else item[0])]
-    return pd.DataFrame(rows, columns=[*TESTS_COLUMNS, *covariates(study)])
+    return pd.DataFrame(rows, columns=[*outputs.product("tests.csv").column_names, *covariates(study)])
 
 
 def covariates(study: Study) -> list[str]:
     """Columns of tests.csv that tribo does not know and keeps as they are."""
     found = dict.fromkeys(name for t in study.ingested.campaign.tests for name in t.covariates)
-    return [name for name in found if name not in TESTS_COLUMNS]
+    return [name for name in found if name not in outputs.product("tests.csv").column_names]
 
 
 def _faulty_row(fault: SetAside) -> int | None:
@@ -86,12 +89,16 @@ def _faulty_row(fault: SetAside) -> int | None:
 
 
 def _test_row(test: Test, pull: Pull | None, fault: SetAside | None) -> dict[str, object]:
-    row: dict[str, object] = {**test.covariates, "test_id": test.test_id}
-    row |= {name: getattr(test, name) for name in _CONDITIONS}
+    """A column is what the test, and then what the pull, holds under its name; a few are put together here."""
+    row: dict[str, object] = {**test.covariates}
+    for name in outputs.product("tests.csv").column_names:
+        if name in _OF_TEST:
+            row[name] = getattr(test, name)
+        elif name in _OF_PULL and pull is not None:
+            row[name] = getattr(pull, name)
     row["set_aside"] = fault.reason if fault is not None else ""
     if pull is not None:
         start, end = pull.window_s
-        row |= {name: getattr(pull, name) for name in _READINGS}
         row |= {"window": f"{start:.6g}:{end:.6g}", "window_start_s": start, "window_end_s": end}
         row["flags"] = ";".join(pull.flags)
         row |= _oscillation_cells(pull) | _restart_cells(pull)
@@ -119,20 +126,27 @@ def _restart_cells(pull: Pull) -> dict[str, object]:
     return {"restarts": len(pull.restarts), **found}
 
 
-def restarts_table(study: Study) -> pd.DataFrame:
-    """One row per restart after a stop of the drive, with the time it stood still."""
-    pulls = study.ingested.pulls
+def restarts_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
+    """One row per restart after a stop of the drive, with the time it stood still; None where there is none."""
+    pulls, names = study.ingested.pulls, outputs.product("restarts.csv").column_names
     rows = [
-        {name: getattr(test, name) for name in RESTARTS_COLUMNS[:4]} | {"restart": number} | vars(restart)
+        {name: getattr(test, name) for name in names[:4]} | {"restart": number} | vars(restart)
         for test in study.ingested.campaign.tests
         if test.test_id in pulls
         for number, restart in enumerate(pulls[test.test_id].restarts, start=1)
     ]
-    return pd.DataFrame(rows, columns=RESTARTS_COLUMNS)
+    return pd.DataFrame(rows, columns=names) if rows else None
 
 
-def other_fits_table(study: Study) -> pd.DataFrame:
+def fits_of_study(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
+    """mu and tau0 (kPa) of every fit (:meth:`tribo.records.Fits.table`)."""
+    return study.fits.table() if study.fits else None
+
+
+def other_fits_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
     """The data under other weights or laws, and the model's own fits: one row per parameter, SI units."""
+    if not study.fits:
+        return None
     simulated = study.comparison.simulated if study.comparison is not None else ()
     labelled = [("measured", f) for f in study.other_fits] + [("simulated", f) for f in simulated]
     rows = [
@@ -154,77 +168,51 @@ def other_fits_table(study: Study) -> pd.DataFrame:
         for source, f in labelled
         for name in f.parameters
     ]
-    columns = ["source", "sample", "regime", "law", "method", "parameter", "value", "u", "low", "high"]
-    return pd.DataFrame(rows, columns=[*columns, "dof", "n_specimens", "n_tests", "chi2_red"])
+    return pd.DataFrame(rows, columns=outputs.product("other_fits.csv").column_names)
 
 
-def comparison_table(study: Study) -> pd.DataFrame:
+def laws_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
+    return study.laws if study.laws is not None and not study.laws.empty else None
+
+
+def dependence_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
+    """The dependences with the labels of the variables that cannot be separated."""
+    if study.dependence is None or study.dependence.empty:
+        return None
+    others = [", ".join(map(label_with_unit, names)) for names in study.dependence["inseparable_from"]]
+    return study.dependence.assign(inseparable_from=others)
+
+
+def budget_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
+    return study.budget
+
+
+def differences_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
+    return study.differences
+
+
+def comparison_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
     """Measured and simulated force at each load; ``ratio`` is measured over simulated, with 95 %."""
     if study.comparison is None:
-        return pd.DataFrame(columns=COMPARISON_COLUMNS)
-    rows = pd.DataFrame([vars(row) for row in study.comparison.rows], columns=COMPARISON_COLUMNS[:7])
+        return None
+    names = outputs.product("comparison.csv").column_names
+    rows = pd.DataFrame([vars(row) for row in study.comparison.rows], columns=names[:7])
     beside = ratios(study).drop(columns="sample_number")
     return rows.merge(beside, on=["sample", "regime", "normal_load_N"], how="left", validate="1:1")
 
 
-def to_csv(table: pd.DataFrame) -> str:
-    """CSV text, the same for the same table on every machine; texts that a spreadsheet would take for formulas escaped.
-
-    See :func:`tribo.user_text.for_spreadsheet`.
-    """
-    table = table.rename(columns=lambda name: for_spreadsheet(str(name)))
-    for name in table.select_dtypes(exclude="number"):
-        table[name] = [for_spreadsheet(cell) if isinstance(cell, str) else cell for cell in table[name]]
-    for name in table.select_dtypes("float"):
-        table[name] = table[name].replace(-0.0, 0.0).where(np.isfinite(table[name]) | table[name].isna(), np.nan)
-    return str(table.to_csv(index=False, float_format=FLOAT_FORMAT, lineterminator="\n"))
-
-
-def _dependence_table(table: pd.DataFrame) -> pd.DataFrame:
-    """The dependences with the labels of the variables that cannot be separated."""
-    others = [", ".join(map(label_with_unit, names)) for names in table["inseparable_from"]]
-    return table.assign(inseparable_from=others)
-
-
-def write_tables(study: Study, out: Path) -> list[Path]:
-    """tests.csv, and fits, other_fits, budget, differences and comparison as far as the study went."""
-    tables = {"tests.csv": tests_table(study)}
-    if not (restarts := restarts_table(study)).empty:
-        tables["restarts.csv"] = restarts
-    if study.fits:
-        tables["fits.csv"] = study.fits.table()
-        tables["other_fits.csv"] = other_fits_table(study)
-    if study.laws is not None and not study.laws.empty:
-        tables["laws.csv"] = study.laws
-    if study.dependence is not None and not study.dependence.empty:
-        tables["dependence.csv"] = _dependence_table(study.dependence)
-    if study.budget is not None:
-        tables["budget.csv"] = study.budget
-    if study.differences is not None:
-        tables["differences.csv"] = study.differences
-    if study.comparison is not None:
-        tables["comparison.csv"] = comparison_table(study)
-    return [write_text(out / name, to_csv(table)) for name, table in tables.items()]
-
-
-LAYERS_COLUMNS = [
-    "kind", "name", "samples", "regimes", "effect_percent", "low", "high", "p_adjusted", "at", "tied_with", "formula",
-    "log_score_gain", "log_score_gain_se", "rmse_percent_before", "rmse_percent_after",
-]  # fmt: skip
-
-
-def write_diagnosis_tables(diagnosis: Diagnosis, out: Path) -> list[Path]:
-    """OUT/diagnosis.csv, one row per test and regime, and OUT/layers.csv, one row per layer and misfit."""
+def residuals_table(_: Study | None, diagnosis: Diagnosis | None) -> pd.DataFrame | None:
+    """One row per test and regime beside the models of the diagnosis."""
     from tribo.diagnostics import residual_table
 
-    tables = {"diagnosis.csv": residual_table(diagnosis), "layers.csv": layers_table(diagnosis.verdict.as_dict())}
-    return [write_text(out / name, to_csv(table)) for name, table in tables.items()]
+    return residual_table(diagnosis) if diagnosis is not None else None
 
 
-def layers_table(verdict: Mapping[str, Any]) -> pd.DataFrame:
+def layers_table(_: Study | None, diagnosis: Diagnosis | None) -> pd.DataFrame | None:
     """Pattern corrections, causes, laws, remainders, misfits and the gain of the verdict, with their percentages."""
-    import pandas as pd
-
+    if diagnosis is None:
+        return None
+    verdict: Mapping[str, Any] = diagnosis.verdict.as_dict()
     rows = [_of_layer(layer) for layer in verdict["layers"]] + [_of_misfit(m) for m in verdict["misfits"]]
     if verdict["gain"]:
         rows.append({"kind": "gain", "name": verdict["gain"]["held_out"], **_gain(verdict["gain"])})
@@ -234,7 +222,7 @@ def layers_table(verdict: Mapping[str, Any]) -> pd.DataFrame:
             {"kind": "rms", "name": name, "effect_percent": simulated[f"rms_percent_{name}"]}
             for name in ("before", "law", "simulated")
         ]
-    return pd.DataFrame(rows, columns=LAYERS_COLUMNS)
+    return pd.DataFrame(rows, columns=outputs.product("layers.csv").column_names)
 
 
 def _of_layer(layer: Mapping[str, Any]) -> dict[str, Any]:

@@ -14,11 +14,11 @@ from tribo.display import displayed
 from tribo.errors import CampaignError, Problem
 from tribo.files import bytes_of, found_below, leads_out
 from tribo.input_files import opened_zip, pieces
+from tribo.outputs import is_product, product
 from tribo.report.provenance import DESCRIBED_IN, FILE, RAW, file_hash, input_names, read_record
 from tribo.user_text import well_formed
 
 ORIGIN = "inputs SHA-256 "  # begins what determines the numbers of a file, to the end of its origin
-BEAR_THEIR_ORIGIN = (".svg", ".nc")
 KEPT = "kept"  # intermediate results, each checked against its own hash whenever it is used
 
 
@@ -100,7 +100,7 @@ def of_other_runs(out: Path, record: Mapping[str, Any]) -> Iterator[str]:
     _, start, rest = str(record.get("origin", "")).partition(ORIGIN)
     for name in record["outputs"] if start else ():
         path = out / name
-        if path.suffix in BEAR_THEIR_ORIGIN and path.is_file():
+        if is_product(name) and path.suffix in product(name).origin_in and path.is_file():
             text = unescape(bytes_of(path).decode("utf-8", "replace"))
             if any(not part.startswith(rest) for part in text.split(ORIGIN)[1:]):
                 yield name

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tribo import outputs
 from tribo.cache.own_folder import own_folder
-from tribo.files import write_bytes, write_text
 from tribo.records import Study
 from tribo.report.campaign_nc import write_store
-from tribo.report.drawing_choices import DRAWING, Drawing, Progress
 from tribo.report.provenance import (
     Provenance,
     file_hash,
@@ -21,11 +20,26 @@ from tribo.report.provenance import (
     settle_outputs,
     write_provenance,
 )
-from tribo.report.tables import write_tables
+from tribo.report.tables import tables_of, write_tables
+
+Progress = Callable[[str, int, int], None]
 
 if TYPE_CHECKING:
     from tribo.diagnostics.diagnosis_record import Diagnosis, DiagnosisWithoutModel
     from tribo.wording.card import Card
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """How figures are drawn: where the progress is reported, in how many processes, and the folder of kept results
+    from which a figure is taken whose numbers have not changed."""
+
+    progress: Progress | None = None
+    jobs: int = 1
+    kept: Path | None = None
+
+
+DRAWING = Drawing()
 
 
 def write_until(
@@ -52,39 +66,41 @@ def write_until(
 
         diagnosis = replace(diagnosis, verdict=worded(diagnosis.verdict))
     verdict = diagnosis.verdict if diagnosis is not None else None
+    modelled = _with_model(diagnosis)
+    tables = tables_of(study, modelled)
     keep_earlier = before is not None and until != "report" and same_origin(before, made_by) and _is_as_recorded(
         out / "campaign.nc", before
     )
-    modelled = _with_model(diagnosis)
-    written = [*write_tables(study, out), write_store(study, out, made_by, modelled, keep_earlier)]
+    written = write_tables(study, out, tables=tables)
+    written.append(write_store(study, out, made_by, modelled, keep_earlier, tables))
     if verdict is not None:
-        from tribo.report.verdict_file import write_verdict
+        written.append(outputs.write(out, "verdict.json", verdict.as_dict()))
+    if modelled is not None and modelled.laws is not None:
+        from tribo.report.without_study import law_texts
 
-        written.append(write_verdict(verdict.as_dict(), out))
-    if modelled is not None:
-        written += _write_diagnosed(modelled, study.ingested.campaign.title, out)
+        laws = law_texts(modelled.laws, study.ingested.campaign.title)
+        written += [outputs.write(out, name, text) for name, text in laws.items()]
     if until in ("compare", "report") or diagnosis is not None:
         from tribo.report.drawings import write_figures
 
         shown = study if until in ("compare", "report") else None
-        drawn = write_figures(shown, out, modelled, made_by.origin, drawing)
+        drawn = write_figures(shown, out, modelled, made_by.origin, drawing.progress, drawing.jobs, drawing.kept)
         written += [out / "figures" / f"{f.name}.{ending}" for f in drawn.values() for ending in f.files]
     if card is not None or until == "report":
-        from tribo.report.verdict_file import write_card
         from tribo.wording.card import card_of
 
         card = card or card_of(study, verdict)
-        written.append(write_card(card.as_dict(), out))
+        written.append(outputs.write(out, "card.json", card.as_dict()))
     if until == "report":
         from tribo.report.content import content
-        from tribo.report.crate import write_crate
+        from tribo.report.crate import crate_text
         from tribo.report.page import pages_of
         from tribo.report.pdf import pdf_of
 
         said = content(study, made_by, verdict, card)
-        written += [write_text(out / name, page) for name, page in pages_of(said, drawn).items()]
-        written.append(write_bytes(out / "report.pdf", pdf_of(said, drawn, made_by.origin)))
-        written.append(write_crate(study, out, made_by, written))
+        written += [outputs.write(out, name, page) for name, page in pages_of(said, drawn).items()]
+        written.append(outputs.write(out, "report.pdf", pdf_of(said, drawn, made_by.origin)))
+        written.append(outputs.write(out, "ro-crate-metadata.json", crate_text(study, out, made_by, written)))
     write_provenance(made_by, out, settle_outputs(out, before, made_by, written, complete=until == "report"))
 
 
@@ -96,18 +112,14 @@ def _with_model(diagnosis: Diagnosis | DiagnosisWithoutModel | None) -> Diagnosi
     return diagnosis if isinstance(diagnosis, Diagnosis) else None
 
 
-def _write_diagnosed(diagnosis: Diagnosis, title: str, out: Path) -> list[Path]:
-    """The tables of a diagnosis, and the laws that were found, if any."""
-    from tribo.report.tables import write_diagnosis_tables
-    from tribo.report.without_study import law_texts
-
-    laws = law_texts(diagnosis.laws, title) if diagnosis.laws is not None else {}
-    return [*(write_text(out / name, text) for name, text in laws.items()), *write_diagnosis_tables(diagnosis, out)]
-
-
 def _is_as_recorded(path: Path, record: Mapping[str, Any]) -> bool:
     """Whether a file of an earlier run is still what that run wrote."""
     return path.is_file() and record["outputs"].get(path.name) == file_hash(path)
+
+
+def write_verdict(verdict: Mapping[str, Any], out: Path) -> Path:
+    """Write out/verdict.json from a verdict in the form of its schema."""
+    return outputs.write(out, "verdict.json", verdict)
 
 
 def write_report(

@@ -14,10 +14,10 @@ import pytest
 
 from tribo.cache.kept_results import (
     DamagedResultWarning,
-    Shelf,
     decoded,
     encoded,
     fingerprint,
+    kept_or_made,
     package_sources,
     sources,
 )
@@ -29,21 +29,21 @@ FIT = LawFit(
 )  # fmt: skip
 
 
-def counted(shelf: Shelf, made_from: object) -> tuple[object, int]:
-    """What the shelf gives, and how often it had to be made."""
+def counted(folder: Path | None, made_from: object) -> tuple[object, int]:
+    """What is kept or made, and how often it had to be made."""
     made = []
 
     def make() -> object:
         made.append(1)
         return {"fit": FIT, "of": (1, float("nan"), None, True)}
 
-    return shelf.take("result", made_from, make, ("laws",)), len(made)
+    return kept_or_made(folder, "result", made_from, make, ("laws",)), len(made)
 
 
 def test_the_same_inputs_give_the_kept_result_and_others_a_new_one(tmp_path: Path) -> None:
-    shelf = Shelf(tmp_path)
+    folder = tmp_path
     keys = ([FIT, 1], [FIT, 1], [replace(FIT, dof=3.0), 1], [FIT, 1])
-    assert [counted(shelf, key)[1] for key in keys] == [1, 0, 1, 1]
+    assert [counted(folder, key)[1] for key in keys] == [1, 0, 1, 1]
 
 
 def test_one_changed_number_in_an_array_is_another_input() -> None:
@@ -89,22 +89,22 @@ def test_records_arrays_and_tables_come_back_equal_through_json() -> None:
 def test_a_damaged_file_is_made_anew_and_said(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "result.json").write_bytes(content)
     with pytest.warns(DamagedResultWarning, match=r"result\.json: this kept result is damaged"):
-        assert counted(Shelf(tmp_path), 1)[1] == 1
-    assert counted(Shelf(tmp_path), 1)[1] == 0
+        assert counted(tmp_path, 1)[1] == 1
+    assert counted(tmp_path, 1)[1] == 0
 
 
 def test_a_file_that_cannot_be_read_is_made_anew_and_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def failing(self: Path) -> bytes:
         raise OSError(errno.EIO, "Input/output error", str(self))
 
-    counted(Shelf(tmp_path), 1)
+    counted(tmp_path, 1)
     monkeypatch.setattr(Path, "read_bytes", failing)
     with pytest.warns(DamagedResultWarning, match=r"result\.json: .* cannot be read \(Input/output error\)"):
-        assert counted(Shelf(tmp_path), 1)[1] == 1
+        assert counted(tmp_path, 1)[1] == 1
 
 
 def test_every_flipped_bit_of_a_kept_file_is_noticed(tmp_path: Path) -> None:
-    expected = fingerprint(counted(Shelf(tmp_path), 1)[0])
+    expected = fingerprint(counted(tmp_path, 1)[0])
     path = tmp_path / "result.json"
     intact = path.read_bytes()
     rng = np.random.default_rng(5)
@@ -114,17 +114,17 @@ def test_every_flipped_bit_of_a_kept_file_is_noticed(tmp_path: Path) -> None:
         path.write_bytes(bytes(damaged))
         with warnings.catch_warnings(record=True):
             warnings.simplefilter("always")
-            result, made = counted(Shelf(tmp_path), 1)
+            result, made = counted(tmp_path, 1)
         assert made == 1, place
         assert fingerprint(result) == expected
 
 
 def test_a_result_of_other_sources_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shelf = Shelf(tmp_path)
+    folder = tmp_path
     made = []
     for text in ("before the edit", "before the edit", "after it"):
-        monkeypatch.setattr("tribo.cache.kept_results.sources", lambda *rooms, text=text: text)
-        made.append(counted(shelf, 1)[1])
+        monkeypatch.setattr("tribo.cache.kept_results.sources", lambda *code, text=text: text)
+        made.append(counted(folder, 1)[1])
     assert made == [1, 0, 1]
 
 
@@ -142,12 +142,12 @@ def test_nothing_but_records_of_tribo_is_ever_constructed(place: str) -> None:
 def test_what_cannot_be_kept_is_given_all_the_same_and_said_aloud(tmp_path: Path) -> None:
     thing = object()
     with pytest.warns(RuntimeWarning, match="x is not kept: a object cannot be kept"):
-        assert Shelf(tmp_path).take("x", 1, lambda: thing) is thing
+        assert kept_or_made(tmp_path, "x", 1, lambda: thing) is thing
     assert list(tmp_path.iterdir()) == []
 
 
 def test_without_a_folder_everything_is_made() -> None:
-    assert [counted(Shelf(), 1)[1] for _ in range(2)] == [1, 1]
+    assert [counted(None, 1)[1] for _ in range(2)] == [1, 1]
 
 
 def test_the_digest_of_the_package_changes_with_any_of_its_files(
