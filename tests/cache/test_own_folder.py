@@ -12,15 +12,15 @@ from pathlib import Path
 
 import pytest
 
-from tribo.cache.own_folder import RECORD, Access, BusyError, own_folder, recorded_outputs
+from tribo.cache.own_folder import RECORD, BusyError, own_folder, recorded_outputs
 from tribo.errors import CampaignError
 
 HOLDER = """
 import sys, time
 from pathlib import Path
-from tribo.cache.own_folder import Access, own_folder
+from tribo.cache.own_folder import own_folder
 out = Path({out!r})
-with own_folder(out, (), Access(shared={shared})):
+with own_folder(out, shared={shared}):
     (out / "kept").mkdir(exist_ok=True)
     (out / "kept" / ".diagnosis.json.12.part").write_text("half")
     (out / "tests.csv").write_text("half a study")
@@ -70,7 +70,7 @@ def test_a_second_writer_is_told_the_first_one(tmp_path: Path) -> None:
 def test_a_second_writer_waits_as_long_as_it_is_told_to(tmp_path: Path) -> None:
     first = holder(tmp_path / "out")
     threading.Timer(0.5, first.kill).start()
-    with own_folder(tmp_path / "out", (), Access(wait_s=60)):
+    with own_folder(tmp_path / "out", wait_s=60):
         first.communicate()
         assert first.returncode == -signal.SIGKILL
 
@@ -79,7 +79,7 @@ def test_those_who_share_a_folder_do_not_wait_for_each_other_but_keep_others_out
     first = holder(tmp_path / "out", shared=True)
     (tmp_path / "out" / "tests.csv").unlink()
     try:
-        with own_folder(tmp_path / "out", (), Access(shared=True)):
+        with own_folder(tmp_path / "out", shared=True):
             pass
         with pytest.raises(BusyError), own_folder(tmp_path / "out"):
             pass
@@ -107,7 +107,7 @@ def test_forked_workers_do_not_hold_the_lock_of_a_killed_writer(tmp_path: Path) 
     process.wait()
     process.stdout.close()
     try:
-        with own_folder(tmp_path / "out", (), Access(wait_s=20.0)):  # the worker may just be letting go
+        with own_folder(tmp_path / "out", wait_s=20.0):  # the worker may just be letting go
             pass
     finally:
         os.kill(worker, signal.SIGKILL)

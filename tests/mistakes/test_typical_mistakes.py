@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from on_the_command_line import digest, run
+from report.laid_out import html
 from support.sled import SledDesign, SledLaw, write_campaign
 
 from mistakes.cases import MISTAKES
@@ -15,7 +16,6 @@ from mistakes.slips import Mistake, each_row, workbook
 from tribo import stages
 from tribo.campaign import load_campaign
 from tribo.errors import CampaignError
-from tribo.report.page import html
 
 MOST_LINES = 6
 TOML = """\

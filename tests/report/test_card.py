@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from report.conftest import Written
+from report.laid_out import html
 from report.synthetic import verdict_of
 from tribo.diagnostics.verdict import Cause, Estimate
 from tribo.errors import Problem
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import LawFit, SetAside, Study
-from tribo.report.page import html
 from tribo.wording.card import Card, card_law, card_of
 from tribo.wording.terminal import card_text
 from tribo.wording.verdict_sentences import why_next, worded

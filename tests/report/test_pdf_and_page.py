@@ -19,7 +19,7 @@ from report.test_report_uncertainty import components
 from tribo.records import Study
 from tribo.report import Provenance
 from tribo.report.content import content
-from tribo.report.page import page_of
+from tribo.report.page import PAGE, pages_of
 from tribo.report.pdf import record_of
 
 SAID = {"td", "th", "p", "li", "dd", "dt", "caption", "h1", "h2", "h3", "summary"}
@@ -98,8 +98,8 @@ def whole(study: Study) -> dict[str, Any]:
 
 def test_whatever_the_page_says_stands_in_the_pdf(whole: dict[str, Any]) -> None:
     page = Said()
-    page.feed(page_of(whole, {}))
-    template = (files("tribo.report.paper") / "templates" / "report.typ").read_text(encoding="utf-8")
+    page.feed(pages_of(whole, {})[PAGE])
+    template = (files("tribo.report") / "templates" / "report.typ").read_text(encoding="utf-8")
     record = json.loads(json.dumps(record_of(whole, {})))
     said = plain(" | ".join([*strings(record), template]))
     assert len(page.texts) > 250
@@ -112,5 +112,5 @@ def test_whatever_the_page_says_stands_in_the_pdf(whole: dict[str, Any]) -> None
 
 
 def test_the_template_uses_every_part_of_the_record(whole: dict[str, Any]) -> None:
-    template = (files("tribo.report.paper") / "templates" / "report.typ").read_text(encoding="utf-8")
+    template = (files("tribo.report") / "templates" / "report.typ").read_text(encoding="utf-8")
     assert [name for name in record_of(whole, {}) if f"data.{name}" not in template] == []

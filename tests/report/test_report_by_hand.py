@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import pytest
 
+from report.laid_out import html
 from tribo.records import ByHand, Override, SetAside, Study
-from tribo.report.page import html
 from tribo.report.pulls import pull_cards
 from tribo.wording.study_sentences import by_hand_sentence
 

@@ -8,11 +8,11 @@ from typing import Any, get_args
 
 import pytest
 
+from report.laid_out import html
 from report.synthetic import verdict_of
 from tribo.diagnostics.verdict import Outcome
 from tribo.records import Study
 from tribo.report import write_verdict
-from tribo.report.page import html
 from tribo.wording.verdict_sentences import verdict_in_words
 
 NAMED: dict[str, Any] = {

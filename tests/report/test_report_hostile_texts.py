@@ -15,13 +15,12 @@ from xml.etree import ElementTree
 
 import pytest
 
+from report.laid_out import html, pdf
 from report.synthetic import make_study
 from tribo.figures.catalogue import FIGURES
 from tribo.records import SetAside, Study
 from tribo.report import Provenance
 from tribo.report.drawings import Drawn, svg_text
-from tribo.report.page import html
-from tribo.report.pdf import pdf
 from tribo.site.history import CampaignRow, FittedParameter
 from tribo.site.index_page import change_points, page as index_page
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from report.laid_out import html
 from tribo.comparison.oddness import odd_pulls
 from tribo.records import Study
-from tribo.report.page import html
 from tribo.wording import study_sentences as wording
 
 

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from report.conftest import Written
+from report.laid_out import html
 from tribo.records import Study
 from tribo.report.content import content
-from tribo.report.page import html, pages_of
+from tribo.report.page import pages_of
 from tribo.report.pulls import trace_picture
 
 VOID = {"meta", "br", "link", "img", "hr", "input"}

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from report.conftest import PROVENANCE, Written
+from report.laid_out import pdf
 from tribo.records import Study
 from tribo.report.drawings import Drawn, draw_all, with_text
-from tribo.report.pdf import pdf
 
 
 @pytest.fixture(scope="module")

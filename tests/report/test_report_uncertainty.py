@@ -8,9 +8,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from report.laid_out import html
 from tribo.records import Study
 from tribo.report.content import budget_origins, budget_tables, paired_sentences
-from tribo.report.page import html
 from tribo.report.tables import write_tables
 
 
@@ -34,11 +34,11 @@ def budgeted(study: Study) -> Study:
 
 def test_the_largest_component_is_named_for_each_sample(budgeted: Study) -> None:
     (table,) = budget_tables(budgeted)
-    assert table.components == ("specimens", "wire angle")
-    assert [row[0] for row in table.rows] == ["F", "A"]
-    assert [table.components[k] for k in table.largest] == ["wire angle", "specimens"]
+    assert table["components"] == ["specimens", "wire angle"]
+    assert [row[0] for row in table["rows"]] == ["F", "A"]
+    assert [table["components"][k] for k in table["largest"]] == ["wire angle", "specimens"]
     expected = "Largest contribution to the uncertainty of the static force: wire angle for F; specimens for A."
-    assert table.sentence == expected
+    assert table["sentence"] == expected
 
 
 def test_type_b_components_say_what_they_rest_on(budgeted: Study) -> None:

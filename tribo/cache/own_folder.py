@@ -19,7 +19,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from glob import escape
 from pathlib import Path
 
@@ -125,21 +125,10 @@ MOST_NAMED = 5
 FORCE = "a new or empty folder, an earlier output folder of tribo, or --force to write here all the same"
 
 
-@dataclass(frozen=True)
-class Access:
-    """How a folder is taken: ``force`` also where others have written, ``wait_s`` for another process at most that
-    long, ``shared`` with others that only add kept results."""
-
-    force: bool = False
-    wait_s: float = 0.0
-    shared: bool = False
-
-
-ACCESS = Access()
-
-
 @contextmanager
-def own_folder(out: Path, inputs: Sequence[Path] = (), access: Access = ACCESS) -> Iterator[Path]:
+def own_folder(
+    out: Path, inputs: Sequence[Path] = (), *, force: bool = False, wait_s: float = 0.0, shared: bool = False
+) -> Iterator[Path]:
     """Hold a folder of results as its only writer, made where it is absent; leftovers of killed writers are removed.
 
     Until the work has ended without an error the folder bears a mark, by which the next start knows it as tribo's.
@@ -148,6 +137,9 @@ def own_folder(out: Path, inputs: Sequence[Path] = (), access: Access = ACCESS) 
     ----------
     out : the folder of results
     inputs : campaigns and other folders that are read, which the folder must not be, hold or lie in
+    force : take it also where others have written
+    wait_s : how long to wait for another process
+    shared : take it together with others that only add kept results
 
     Raises
     ------
@@ -156,14 +148,14 @@ def own_folder(out: Path, inputs: Sequence[Path] = (), access: Access = ACCESS) 
     BusyError
         Another process writes into it.
     """
-    check_folder(out, inputs, access.force)
+    check_folder(out, inputs, force)
     made = not out.exists()
     try:
-        with only_writer(out / LOCK, access.wait_s, shared=access.shared):
-            if access.shared:
+        with only_writer(out / LOCK, wait_s, shared=shared):
+            if shared:
                 yield out
                 return
-            check_folder(out, inputs, access.force)  # once more: another process may have been first
+            check_folder(out, inputs, force)  # once more: another process may have been first
             clear_leftovers(out)
             (out / MARK).touch()
             yield out

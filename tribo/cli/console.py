@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tribo.cache.kept_results import DamagedResultWarning
-from tribo.cache.own_folder import KEPT, Access, BusyError, check_folder, own_folder
+from tribo.cache.own_folder import KEPT, BusyError, check_folder, own_folder
 from tribo.errors import Problem, TriboError, failed_by_system, of_the_system, system_problem, unexpected
 from tribo.records import Doubt, SetAside
 from tribo.user_text import nearest, printable
@@ -250,7 +250,7 @@ class Output:
 
     def taken(self, *inputs: Path, shared: bool = False) -> AbstractContextManager[Path]:
         """The folder, held as its only writer; or ``shared`` with others that only add kept results."""
-        return own_folder(self.path, inputs, Access(self.force, self.wait_s, shared))
+        return own_folder(self.path, inputs, force=self.force, wait_s=self.wait_s, shared=shared)
 
 
 def output_options(default: str | None = None) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

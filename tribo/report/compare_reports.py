@@ -1,6 +1,6 @@
-"""A written report as another one sees it: its card, its fits with their intervals, its loads and its figures.
+"""Two written reports side by side: their cards, and the difference of every number that both have, with its interval.
 
-Two reports side by side: their cards, and the difference of every number that both have, with its interval.
+A report is read from its folder of results: its card, its fits with their intervals, its loads and its figures.
 """
 
 from __future__ import annotations

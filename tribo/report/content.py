@@ -1,11 +1,7 @@
-"""Sources of the uncertainty of the fitted forces, and differences between samples on the same specimens.
-
-The content of a report in its order: made once, then laid out as a page (page.py) and as a PDF (pdf.py).
-"""
+"""The content of a report in its order: made once, then laid out as a page (page.py) and as a PDF (pdf.py)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,79 +23,6 @@ from tribo.wording.numerals import joined, significant
 from tribo.wording.terminal import fit_cells
 from tribo.wording.verdict_sentences import verdict_in_words
 
-SUM = "combined"
-
-
-@dataclass(frozen=True)
-class BudgetTable:
-    """Shares (percent of the variance of T) of one regime: one row per sample, one column per component."""
-
-    regime: Regime
-    components: tuple[str, ...]
-    rows: tuple[tuple[str, tuple[str, ...], str], ...]  # sample, shares, combined u(T) in newton
-    largest: tuple[int, ...]  # of each row
-    sentence: str
-
-
-def budget_tables(study: Study) -> list[BudgetTable]:
-    """The budget of T in both regimes, components that never matter (below half a percent everywhere) left out."""
-    if study.budget is None or study.budget.empty:
-        return []
-    order = study_lookup.sample_numbers(study)
-    parts = [(r, study.budget[study.budget["regime"] == r]) for r in REGIMES]
-    return [_budget_table(regime, part, list(order)) for regime, part in parts if not part.empty]
-
-
-def _budget_table(regime: Regime, part: pd.DataFrame, order: list[str]) -> BudgetTable:
-    shares = part.pivot(index="sample", columns="component", values="share_pct_T_N").drop(columns=SUM).fillna(0.0)
-    shares = shares.loc[[s for s in order if s in shares.index]]
-    named = [c for c in dict.fromkeys(part["component"]) if c in shares.columns and shares[c].max() >= 0.5]
-    combined = part[part["component"] == SUM].set_index("sample")["u_T_N"]
-    rows = tuple(
-        (str(s), tuple(f"{v:.0f}" for v in row), significant(float(combined[s]), 2))
-        for s, row in zip(shares.index, shares[named].to_numpy(), strict=True)
-    )
-    largest = shares[named].to_numpy().argmax(axis=1) if named else []
-    return BudgetTable(
-        regime, tuple(named), rows, tuple(int(k) for k in largest), _dominant(regime, shares.index, named, largest)
-    )
-
-
-def _dominant(regime: Regime, samples: pd.Index, components: list[str], largest: list[int]) -> str:
-    """The largest component of each sample, in one sentence."""
-    groups: dict[str, list[str]] = {}
-    for sample, k in zip(samples, largest, strict=bool(components)):
-        groups.setdefault(components[k], []).append(str(sample))
-    clauses = [f"{component} for {joined(names)}" for component, names in groups.items()]
-    return f"Largest contribution to the uncertainty of the {regime} force: {'; '.join(clauses)}." if clauses else ""
-
-
-def budget_origins(study: Study) -> list[tuple[str, str]]:
-    """Each type B component with what its size rests on, where that is the same for every fit."""
-    if study.budget is None or study.budget.empty:
-        return []
-    type_b = study.budget[study.budget["type"] == "B"]
-    origins = type_b.groupby("component", sort=False)["origin"].unique()
-    return [(str(c), str(found[0]) if len(found) == 1 else "differs between samples") for c, found in origins.items()]
-
-
-def paired_sentences(study: Study) -> list[str]:
-    """Difference in force between samples measured on the same specimens, one sentence per pair."""
-    if study.differences is None:
-        return []
-    return [_paired_sentence(row) for _, row in study.differences.iterrows() if row["number"] == "T_N"]
-
-
-def _paired_sentence(row: pd.Series) -> str:
-    pair = f"{row['sample']} minus {row['other']}, measured on the same {len(row['specimens'].split(';'))} specimens"
-    return (
-        f"{row['regime'].capitalize()} friction at {significant(row['pressure_Pa'] / PA_PER_KPA)} kPa, {pair}: "
-        f"{significant(row['difference'])} ± {significant(row['u'], 2)} N (95 %: {significant(row['low'])} to "
-        f"{significant(row['high'])} N). With different specimens the uncertainty "
-        f"would be ± {significant(row['unpaired_u'], 2)} N."
-    )
-
-
 # the first that there is shows what the card says
 LEAD_FIGURES = ("finding", "agreement", "forces", "fig4", "dependence")
 MISFIT_FIGURES = ("misfit", "residuals")
@@ -115,6 +38,7 @@ CALIBRATED = {  # of a block of the model: name and unit
     "blocks_y": ("Number of blocks along y", "1"),
     "dt_s": ("Time step", "s"),
 }
+SUM = "combined"  # the component of budget.csv that is the sum of all
 VERDICT_MARKS = {"agrees": "=", "model too high": "▲", "model too low": "▼", "inconclusive": "?"}
 
 
@@ -209,59 +133,47 @@ def _table2(study: Study) -> dict[str, Any]:
     load = findings.common_loads(study)[1]
     regimes = []
     for regime in REGIMES:
-        rows = []
+        rows: list[tuple[Any, ...]] = []
         for sample in study_lookup.sample_numbers(study):
             fit = study.fits.of(sample, regime)
             if fit is not None:
                 model = fit_cells(study_lookup.fit_of(simulated, sample, regime), load)
                 area_fraction = study.ingested.campaign.area_fraction(sample)
                 rows.append((sample, area_fraction, fit_cells(fit, load), model, fit))
-        regimes.append((regime, rows))
-    return {
-        "load_N": load,
-        "regimes": [(r, rows) for r, rows in regimes if rows],
-        "simulated": bool(simulated),
-    }
+        if rows:
+            regimes.append((regime, rows))
+    return {"load_N": load, "regimes": regimes, "simulated": bool(simulated)}
 
 
 def _agreement_tables(study: Study) -> list[dict[str, Any]]:
-    agreements = findings.agreements(study)
-    return [table for regime in REGIMES if (table := _agreement_table(agreements, regime))]
-
-
-def _agreement_table(agreements: list[findings.Agreement], regime: Regime) -> dict[str, Any]:
-    """Ratios of one regime: one row per sample, one column per load level, and the sentence of each sample."""
-    part = [a for a in agreements if a.regime == regime]
-    if not part:
-        return {}
-    every_load = np.array([load.normal_load_N for a in part for load in a.loads])
-    levels = study_lookup.load_levels(every_load)
-    level_of = dict(zip(every_load.tolist(), levels.tolist(), strict=True))
-    columns = sorted(set(levels.tolist()))
-    rows = [
-        (a, [next((x for x in a.loads if level_of[x.normal_load_N] == level), None) for level in columns]) for a in part
-    ]
-    sentences = [(a.sample, wording.agreement_sentence(a)) for a in part]
-    return {"regime": regime, "loads": columns, "rows": rows, "sentences": sentences, "marks": VERDICT_MARKS}
+    """Ratios of each regime: one row per sample, one column per load level, and the sentence of each sample."""
+    tables = []
+    for regime in REGIMES:
+        part = [a for a in findings.agreements(study) if a.regime == regime]
+        if not part:
+            continue
+        every_load = np.array([load.normal_load_N for a in part for load in a.loads])
+        levels = study_lookup.load_levels(every_load)
+        level_of = dict(zip(every_load.tolist(), levels.tolist(), strict=True))
+        columns = sorted(set(levels.tolist()))
+        rows = [
+            (a, [next((x for x in a.loads if level_of[x.normal_load_N] == level), None) for level in columns])
+            for a in part
+        ]
+        sentences = [(a.sample, wording.agreement_sentence(a)) for a in part]
+        tables.append(
+            {"regime": regime, "loads": columns, "rows": rows, "sentences": sentences, "marks": VERDICT_MARKS}
+        )
+    return tables
 
 
 def _calibration(study: Study) -> list[tuple[str, str, str]]:
-    """Name, value and unit of every calibrated parameter."""
-    if study.comparison is None:
-        return []
-    found = study.comparison.calibration
-    return [
-        (words, f"{float(value):.5g}".replace("-", "−"), unit)
-        for name, value in found.items()
-        for words, unit in [_named(name)]
-    ]
-
-
-def _named(parameter: str) -> tuple[str, str]:
-    """A calibrated parameter in words and its unit; one without words says its unit at the end of its name."""
-    if parameter in CALIBRATED:
-        return CALIBRATED[parameter]
-    return parameter.replace("_", " "), unit_of(parameter) or "1"
+    """Name, value and unit of every calibrated parameter; one without words says its unit at the end of its name."""
+    rows = []
+    for name, value in study.comparison.calibration.items() if study.comparison is not None else ():
+        words, unit = CALIBRATED.get(name, (name.replace("_", " "), unit_of(name) or "1"))
+        rows.append((words, f"{float(value):.5g}".replace("-", "−"), unit))
+    return rows
 
 
 def _flag_counts(study: Study) -> list[tuple[str, int, list[str]]]:
@@ -272,3 +184,57 @@ def _flag_counts(study: Study) -> list[tuple[str, int, list[str]]]:
             found.setdefault(flag, []).append(test_id)
     counts = ((wording.flags_in_words([flag]), len(tests), tests) for flag, tests in found.items())
     return sorted(counts, key=lambda x: (-x[1], x[0]))
+
+
+def budget_tables(study: Study) -> list[dict[str, Any]]:
+    """The budget of T in both regimes: shares (percent of the variance) by ``components``, a row for each sample with
+    the combined u(T) in newton, ``largest`` of each row; components below half a percent everywhere are left out."""
+    if study.budget is None or study.budget.empty:
+        return []
+    order = study_lookup.sample_numbers(study)
+    parts = [(r, study.budget[study.budget["regime"] == r]) for r in REGIMES]
+    return [_budget_table(regime, part, list(order)) for regime, part in parts if not part.empty]
+
+
+def _budget_table(regime: Regime, part: pd.DataFrame, order: list[str]) -> dict[str, Any]:
+    shares = part.pivot(index="sample", columns="component", values="share_pct_T_N").drop(columns=SUM).fillna(0.0)
+    shares = shares.loc[[s for s in order if s in shares.index]]
+    named = [c for c in dict.fromkeys(part["component"]) if c in shares.columns and shares[c].max() >= 0.5]
+    combined = part[part["component"] == SUM].set_index("sample")["u_T_N"]
+    rows = [
+        (str(s), [f"{v:.0f}" for v in row], significant(float(combined[s]), 2))
+        for s, row in zip(shares.index, shares[named].to_numpy(), strict=True)
+    ]
+    largest = [int(k) for k in shares[named].to_numpy().argmax(axis=1)] if named else []
+    groups: dict[str, list[str]] = {}
+    for (sample, _, _), k in zip(rows, largest, strict=bool(named)):
+        groups.setdefault(named[k], []).append(sample)
+    clauses = [f"{component} for {joined(names)}" for component, names in groups.items()]
+    said = f"Largest contribution to the uncertainty of the {regime} force: {'; '.join(clauses)}." if clauses else ""
+    return {"regime": regime, "components": named, "rows": rows, "largest": largest, "sentence": said}
+
+
+def budget_origins(study: Study) -> list[tuple[str, str]]:
+    """Each type B component with what its size rests on, where that is the same for every fit."""
+    if study.budget is None or study.budget.empty:
+        return []
+    type_b = study.budget[study.budget["type"] == "B"]
+    origins = type_b.groupby("component", sort=False)["origin"].unique()
+    return [(str(c), str(found[0]) if len(found) == 1 else "differs between samples") for c, found in origins.items()]
+
+
+def paired_sentences(study: Study) -> list[str]:
+    """Difference in force between samples measured on the same specimens, one sentence per pair."""
+    if study.differences is None:
+        return []
+    return [_paired_sentence(row) for _, row in study.differences.iterrows() if row["number"] == "T_N"]
+
+
+def _paired_sentence(row: pd.Series) -> str:
+    pair = f"{row['sample']} minus {row['other']}, measured on the same {len(row['specimens'].split(';'))} specimens"
+    return (
+        f"{row['regime'].capitalize()} friction at {significant(row['pressure_Pa'] / PA_PER_KPA)} kPa, {pair}: "
+        f"{significant(row['difference'])} ± {significant(row['u'], 2)} N (95 %: {significant(row['low'])} to "
+        f"{significant(row['high'])} N). With different specimens the uncertainty "
+        f"would be ± {significant(row['unpaired_u'], 2)} N."
+    )

@@ -1,9 +1,9 @@
-"""The tribosystem of a campaign: the conditions that ASTM G115 requires with a friction coefficient.
+"""The tribosystem of a campaign, and ro-crate-metadata.json, which describes a study for machines.
 
-Where the TriboDataFAIR ontology (Garabedian et al. 2022, Scientific Data 9, 315) has a term, it is given with the
-condition. A condition that the campaign does not record is stated as not recorded and never guessed.
-
-ro-crate-metadata.json: a study described for machines, after RO-Crate and its profile for the run of a process.
+The tribosystem are the conditions that ASTM G115 requires with a friction coefficient. Where the TriboDataFAIR ontology
+(Garabedian et al. 2022, Scientific Data 9, 315) has a term, it is given with the condition. A condition that the
+campaign does not record is stated as not recorded and never guessed. The crate follows RO-Crate and its profile for the
+run of a process.
 """
 
 from __future__ import annotations

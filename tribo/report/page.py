@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
 from markupsafe import Markup, escape
 
 from tribo import __version__
-from tribo.diagnostics.verdict import Verdict
 from tribo.figures.catalogue import TITLES
-from tribo.records import Study
-from tribo.report.content import content, figure_numbers, figure_places
-from tribo.report.drawings import Drawn, draw_all, inline_svg
-from tribo.report.provenance import Provenance
+from tribo.report.content import figure_numbers, figure_places
+from tribo.report.drawings import Drawn, inline_svg
 from tribo.report.pulls import PullCard, on_pages, trace_data
 from tribo.report.shell import STYLE, WORKING, environment, script_json, style_and_script
 from tribo.wording.study_sentences import flags_in_words
@@ -23,30 +19,18 @@ from tribo.wording.study_sentences import flags_in_words
 PAGE = "report.html"
 
 
-def html(
-    study: Study,
-    provenance: Provenance | None = None,
-    drawn: Mapping[str, Drawn] | None = None,
-    verdict: Verdict | None = None,
-) -> str:
-    """The page as text: the same bytes for the same study, provenance and verdict.
-
-    ``drawn`` are the figures by name where they are at hand already, ``verdict`` the worded one of the
-    diagnosis.
-    """
-    return page_of(content(study, provenance, verdict), draw_all(study) if drawn is None else drawn)
-
-
-def page_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> str:
-    """The page with the given content (:func:`tribo.report.content.content`) and figures."""
-    return pages_of(said, figures)[PAGE]
-
-
 def pages_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str, str]:
-    """The page by its file name, and further pages of pulls where there are more than one page holds."""
+    """The page by its file name, and further pages of pulls where there are more than one page holds.
+
+    ``said`` is the content (:func:`tribo.report.content.content`), ``figures`` are those drawn, by name. The pages are
+    the same bytes for the same content and figures.
+    """
     numbers = figure_numbers(list(figures))
     places = {k: [_shown(figures[n], numbers[n]) for n in names] for k, names in figure_places(list(figures)).items()}
     each = on_pages(said["cards"])
+    campaign = said["campaign"]  # tells this report from others, for what a browser remembers of it
+    told = [campaign.title, *sorted(campaign.inputs.values()), *sorted(card.test_id for card in said["cards"])]
+    report_key = sha256("\0".join(told).encode("utf-8", errors="backslashreplace")).hexdigest()[:16]
     names = [PAGE, *(f"pulls-{k}.html" for k in range(2, len(each) + 1))]
     pages = {}
     for number, (name, cards) in enumerate(zip(names, each, strict=True), start=1):
@@ -62,7 +46,7 @@ def pages_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str,
                 pages=names,
                 number=number,
                 pulls=len(said["cards"]),
-                report_key=_key(said),
+                report_key=report_key,
                 figure_data=script_json({n: figure.series for n, figure in shown.items()}),
                 trace_data=trace_data(said["study"], [card.test_id for card in cards]),
                 **style_and_script(environment(), [STYLE], [*WORKING, "pulls.js"]),
@@ -81,13 +65,6 @@ def compared_page(columns: Sequence[Any], rows: Sequence[Any], said: Sequence[st
     )  # fmt: skip
 
 
-def _key(said: Mapping[str, Any]) -> str:
-    """What tells this campaign from others, for what a browser remembers of its report."""
-    campaign = said["campaign"]
-    told = [campaign.title, *sorted(campaign.inputs.values()), *sorted(card.test_id for card in said["cards"])]
-    return sha256("\0".join(told).encode("utf-8", errors="backslashreplace")).hexdigest()[:16]
-
-
 def _filters(cards: list[PullCard]) -> list[tuple[str, str, list[tuple[str, str]]]]:
     """What pulls can be filtered by: attribute of a card, label, and values with their texts."""
     flags = sorted({flag for card in cards for flag in card.flags})
@@ -103,17 +80,9 @@ def _filters(cards: list[PullCard]) -> list[tuple[str, str, list[tuple[str, str]
     ]
 
 
-@dataclass(frozen=True)
-class ShownFigure:
+def _shown(figure: Drawn, number: int) -> dict[str, Any]:
     """A figure as the page shows it."""
-
-    number: int
-    name: str
-    title: str
-    caption: str
-    svg: Markup
-
-
-def _shown(figure: Drawn, number: int) -> ShownFigure:
     picture = Markup(inline_svg(figure.svg, figure.name, str(escape(f"{figure.title}. {figure.caption}"))))
-    return ShownFigure(number, figure.name, figure.title, figure.caption, picture)
+    return {
+        "number": number, "name": figure.name, "title": figure.title, "caption": figure.caption, "svg": picture,
+    }  # fmt: skip

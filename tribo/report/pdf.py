@@ -9,12 +9,10 @@ from importlib.resources import files
 from typing import Any
 
 from tribo.comparison.findings import LoadRatio
-from tribo.diagnostics.verdict import Verdict
 from tribo.files import write_bytes, write_text
 from tribo.records import Study
-from tribo.report.content import BudgetTable, content, figure_numbers, figure_places
-from tribo.report.drawings import Drawn, draw_all
-from tribo.report.provenance import Provenance
+from tribo.report.content import figure_numbers, figure_places
+from tribo.report.drawings import Drawn
 from tribo.report.pulls import PullCard
 from tribo.temporary import temporary_folder
 from tribo.wording.card import Card
@@ -29,29 +27,18 @@ FRICTION = {
 NOT_OF_THE_INPUTS = ("Command", "Started")  # differ from run to run, which the bytes of the PDF must not
 
 
-def pdf(
-    study: Study,
-    provenance: Provenance | None = None,
-    drawn: Mapping[str, Drawn] | None = None,
-    verdict: Verdict | None = None,
-) -> bytes:
-    """The document. Its date is that of the last test, or none if no test has a time.
-
-    The command and the time of the run are left to provenance.json, so that two runs over the same inputs with the
-    same choices give the same bytes.
-    """
-    figures = draw_all(study) if drawn is None else drawn
-    return pdf_of(content(study, provenance, verdict), figures, provenance.origin if provenance is not None else "")
-
-
 def pdf_of(said: Mapping[str, Any], figures: Mapping[str, Drawn], origin: str) -> bytes:
-    """The document with the given content (:func:`tribo.report.content.content`) and figures."""
+    """The document with the given content (:func:`tribo.report.content.content`) and figures.
+
+    Its date is that of the last test, or none if no test has a time. The command and the time of the run are left to
+    provenance.json, so that two runs over the same inputs with the same choices give the same bytes.
+    """
     import typst
 
     record = record_of(said, figures)
     record["origin"] = origin
     pictures = {f"{name}.svg": figure.files["svg"] for name, figure in figures.items()}
-    template = (files("tribo.report.paper") / "templates" / TEMPLATE).read_text(encoding="utf-8")
+    template = (files("tribo.report") / "templates" / TEMPLATE).read_text(encoding="utf-8")
     data = json.dumps(record, ensure_ascii=False).encode("utf-8")
     with temporary_folder() as folder:
         for name, content in {"data.json": data, **pictures}.items():
@@ -102,7 +89,14 @@ def record_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str
         "how_to_read": summary["how_to_read"],
         "order": summary["order"],
         "directions": summary["directions"],
-        "budget": [_budget(table) for table in said["budget"]],
+        "budget": [
+            {
+                "title": _title(table["regime"]), "sentence": table["sentence"],
+                "head": ["Sample", *table["components"], "u(T), combined (N)"],
+                "rows": [[sample, *shares, combined] for sample, shares, combined in table["rows"]],
+            }
+            for table in said["budget"]
+        ],
         "budget_origins": said["budget_origins"],
         "power": study.power,
         "outlying": study.outlying,
@@ -163,13 +157,6 @@ def _ratio(cell: LoadRatio | None, marks: Mapping[str, str]) -> str:
     if cell is None:
         return "–"
     return f"{marks[cell.verdict]} {cell.ratio:.2f} ({ratio_text(cell.low)}–{ratio_text(cell.high)})"
-
-
-def _budget(table: BudgetTable) -> dict[str, Any]:
-    """Shares of one regime, and the sentence about the largest."""
-    rows = [[sample, *shares, combined] for sample, shares, combined in table.rows]
-    head = ["Sample", *table.components, "u(T), combined (N)"]
-    return {"title": _title(table.regime), "sentence": table.sentence, "head": head, "rows": rows}
 
 
 def _diagnosis_tables(verdict: Mapping[str, Any] | None) -> dict[str, list[Any]]:

@@ -1,7 +1,5 @@
-"""Every pull of a campaign as a card of the page: a small picture of its trace and its results.
-
-Data for the script of the page: thinned traces with their results, and the points of the figures.
-"""
+"""Every pull of a campaign as the page shows it: a card with its results and a small picture of its trace, and the
+thinned trace with its readings for the script of the page."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from markupsafe import Markup
 
 from tribo.wording.numerals import ratio_text, significant, unbroken
 
-OWN = "tribo.report.html"
+OWN = "tribo.report"
 STYLE = "style.css"
 WORKING = ("helpers.js", "reading.js")  # scripts of every page; all scripts are joined in one function, in this order
 

@@ -58,27 +58,56 @@ class Verification:
         return "\n".join([f"{compared}: {len(lines)} difference{'' if len(lines) == 1 else 's'}", *lines, *ended])
 
 
-def verify(out: Path, campaign: Path | None = None) -> Verification:
+def verify(out: Path | str, campaign: Path | str | None = None) -> Verification:
     """Compare the files of a study with the hashes in its provenance.json.
 
     Parameters
     ----------
-    out : folder that a command wrote
-    campaign : folder or .zip of the campaign, if it has been moved
+    out : Path or str
+        Folder of results that a command or :func:`tribo.write_report` wrote.
+    campaign : Path or str, optional
+        Folder or .zip of the campaign, if it has been moved since.
+
+    Returns
+    -------
+    Verification
+        ``unchanged`` is true where every input and output is as recorded and the run has ended; ``differences`` name
+        each file that was changed, added or removed, or that another run made.
 
     Raises
     ------
     CampaignError
         There is no provenance.json in ``out``, or it lists no outputs; or the .zip of the campaign is refused
         (:func:`tribo.input_files.opened_zip`).
+    OSError
+        A file is there and cannot be read.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import tribo
+    >>> from tribo.report import write_until
+    >>> study = tribo.study(tribo.load_campaign(tribo.data_dir() / "example"), until="ingest")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     out = Path(folder) / "out"
+    ...     write_until(study, out, "ingest")
+    ...     before = tribo.verify(out)
+    ...     (out / "tests.csv").unlink()
+    ...     after = tribo.verify(out)
+    >>> before.unchanged
+    True
+    >>> [(found.status, found.file) for found in after.differences]
+    [('missing', 'tests.csv')]
     """
+    out = Path(out)
     record = read_record(out)
     if record is None:
         what = "this folder holds no record of inputs and outputs"
         if (out / FILE).is_file():
             what = "the record of inputs and outputs is damaged"
         raise CampaignError(Problem("no_provenance", what, file=str(out / FILE), allowed="an output folder of tribo"))
-    place = campaign or out / record["campaign"]
+    place = Path(campaign) if campaign is not None else out / record["campaign"]
     recorded = dict(record["inputs"])
     found = dict(_input_hashes(place, recorded))
     overrides = record.get("overrides") or {}

@@ -132,12 +132,41 @@ def write_report(
 ) -> None:
     """All of OUT: tables, campaign.nc, figures, verdict.json where there is a diagnosis, page, PDF and crate.
 
+    Parameters
+    ----------
+    study : Study
+        The results of all stages (:func:`tribo.study`).
+    out : Path or str
+        Folder of results, made where it is absent.
+    progress : callable, optional
+        Told the stage, the number of figures drawn so far, and the number of all.
+    provenance : Provenance, optional
+        How the study was made; gathered from its campaign if it is left out.
+    diagnosis : Diagnosis or DiagnosisWithoutModel, optional
+        The diagnosis of the study (:func:`tribo.diagnose`).
+    jobs : int
+        Number of processes that draw figures.
+
     Raises
     ------
     CampaignError
         ``out`` is, holds or lies in a campaign, or holds files that tribo has not written.
     BusyError
         Another process writes into it.
+    OSError
+        A file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import tribo
+    >>> study = tribo.study(tribo.load_campaign(tribo.data_dir() / "example"), until="fit")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     tribo.write_report(study, Path(folder) / "out")
+    ...     unchanged = tribo.verify(Path(folder) / "out").unchanged
+    >>> unchanged
+    True
     """
     with own_folder(Path(out), (study.ingested.campaign.root,)) as folder:
         write_until(study, folder, "report", Drawing(progress, jobs), provenance, diagnosis)
