@@ -25,8 +25,7 @@ from run_lines import read_rows, work_off
 import numpy as np  # after blind_cases, which says how many threads it may use  # isort: skip
 from blind.hidden_laws import FORMS, Hidden, as_ingested, hide_law  # isort: skip
 
-from tribo.diagnostics.diagnosis import examine
-from tribo.diagnostics.diagnosis_record import Diagnosis
+from tribo.diagnostics.diagnosis import Diagnosis, examine
 from tribo.lawsearch.diagnosis_with_laws import explained
 from tribo.lawsearch.grammar import WrittenLaw
 from tribo.lawsearch.model_choice import forms_in_reach, without_refuted_causes

@@ -60,7 +60,7 @@ MAY_IMPORT["cli"] = BELOW | {"stages", "dry_run", "site"}
 MAY_IMPORT["__main__"] = {"cli"}
 MAY_IMPORT["__init__"] = set()
 # Records that hold a record of a room above them: its type is known to the type checker alone.
-TYPED = {"diagnosis_record": {"lawsearch"}}
+TYPED = {"diagnosis": {"lawsearch"}}
 ROOMS = sorted(p for p in PACKAGE.rglob("*.py"))
 
 

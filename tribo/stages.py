@@ -24,7 +24,7 @@ from tribo.records import (
 if TYPE_CHECKING:
     from tribo.comparison.prediction import Cell, ModelRuns
     from tribo.diagnostics import Diagnosis
-    from tribo.diagnostics.diagnosis_record import DiagnosisWithoutModel
+    from tribo.diagnostics.diagnosis import DiagnosisWithoutModel
     from tribo.diagnostics.predictor import Predictor
 
 Progress = Callable[[str, int, int], None]
@@ -356,7 +356,7 @@ def diagnosis_without_model(study: Study, *, seed: int = 0, kept: Path | None = 
     ``study`` holds the laws of its samples (:func:`assess`), as that of :func:`study` does where the spring-block model
     was not run.
     """
-    from tribo.diagnostics.diagnosis_record import DiagnosisWithoutModel
+    from tribo.diagnostics.diagnosis import DiagnosisWithoutModel
     from tribo.diagnostics.without_model import diagnose_without_model
     from tribo.wording.verdict_sentences import worded
 

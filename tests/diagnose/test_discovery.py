@@ -11,8 +11,7 @@ import pytest
 
 from tribo.cache.kept_results import decoded, encoded
 from tribo.diagnostics.candidates import refitted
-from tribo.diagnostics.diagnosis import examine
-from tribo.diagnostics.diagnosis_record import Diagnosis
+from tribo.diagnostics.diagnosis import Diagnosis, examine
 from tribo.diagnostics.model import Acting, Setup
 from tribo.diagnostics.replicates import drawn_residuals, refit
 from tribo.diagnostics.verdict import Cause, Estimate

@@ -103,8 +103,8 @@ def test_every_estimate_that_was_made_is_counted() -> None:
     o = observe(hidden(("load_cell_drift", 1.0)))
     rng = np.random.default_rng(1)
     evidence = direct_evidence(replace(o, zero_slope_N_per_s=rng.normal(0.0, 0.0005, o.n)))
-    assert evidence["load_cell_offset"].contrasts == 1
-    assert evidence["load_cell_drift"].contrasts == 3
+    assert evidence["load_cell_offset"].estimates == 1
+    assert evidence["load_cell_drift"].estimates == 3
 
 
 def test_a_drift_includes_the_offset_that_it_leaves() -> None:
@@ -183,7 +183,7 @@ def test_a_drift_by_the_clock_and_one_by_the_hours_at_the_bench_are_told_apart()
         assert found.value == pytest.approx(0.02, rel=0.02)
         assert found.change == pytest.approx(0.02 * np.ptp(hours), rel=0.02)
         assert found.certain
-        assert found.contrasts == 2
+        assert found.estimates == 2
 
 
 def test_a_drift_needs_ten_zeros_and_a_clock() -> None:

@@ -11,7 +11,7 @@ from blind.tribometer import Design, hide
 from scipy.stats import norm
 
 from tribo.diagnostics import examine
-from tribo.diagnostics.diagnosis_record import Diagnosis
+from tribo.diagnostics.diagnosis import Diagnosis
 from tribo.diagnostics.fit import fit
 from tribo.diagnostics.inference import pattern_corrections
 from tribo.diagnostics.model import Setup, predict, setup

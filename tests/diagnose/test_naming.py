@@ -15,8 +15,8 @@ from tribo.diagnostics.candidates import (
     IN_COMMON,
     PER_PARAMETER,
     TIED,
-    Candidate,
-    Layers,
+    CauseCandidate,
+    Named,
     best_beyond_chance,
     judged,
     sort_rivals,
@@ -27,9 +27,9 @@ from tribo.diagnostics.model import Acting
 from tribo.mechanisms.table import MECHANISMS
 
 
-def candidate(gain: float, raw: float | None = None, name: str = "suction") -> Candidate:
+def candidate(gain: float, raw: float | None = None, name: str = "suction") -> CauseCandidate:
     fit: Any = None
-    return Candidate(Acting(MECHANISMS[name]), fit, gain, gain if raw is None else raw)
+    return CauseCandidate(Acting(MECHANISMS[name]), fit, gain, gain if raw is None else raw)
 
 
 def screened(chance: list[float], library: list[float]) -> Screen:
@@ -97,8 +97,8 @@ def test_of_wrong_labels_those_whose_whole_effect_explains_most_are_fitted() -> 
 
 
 def sorted_by(
-    monkeypatch: pytest.MonkeyPatch, best: Candidate, others: dict[float, Candidate]
-) -> tuple[list[Candidate], list[Candidate]]:
+    monkeypatch: pytest.MonkeyPatch, best: CauseCandidate, others: dict[float, CauseCandidate]
+) -> tuple[list[CauseCandidate], list[CauseCandidate]]:
     """Those alike and the rivals, where each other candidate has a cosine with the best."""
     cosines = {id(c): cosine for cosine, c in others.items()}
     monkeypatch.setattr(rivals, "_likeness", lambda start, b, near: np.array([cosines[id(c)] for c in near]))
@@ -194,7 +194,8 @@ def test_a_chi_squared_value_beyond_the_numbers_is_a_deviate_by_its_root() -> No
 def layered(*names: str) -> Any:
     """Layers of one cause each, on a model that is the tuple of what acts in it."""
     causes = tuple((candidate(10.0, name=name),) for name in names)
-    return Layers(tuple(names), causes)  # type: ignore[arg-type]
+    left: Any = SimpleNamespace(p=np.array([0.001]))
+    return Named(tuple(names), left, causes)  # type: ignore[arg-type]
 
 
 def test_each_cause_but_the_last_is_picked_again_beside_all_others(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -204,14 +205,14 @@ def test_each_cause_but_the_last_is_picked_again_beside_all_others(monkeypatch: 
         beside.append(tuple(a.mechanism.name for a in acting))
         return beside[-1]
 
-    def weighed_beside(alone: tuple[str, ...], barred: Any) -> list[Candidate]:
+    def weighed(alone: tuple[str, ...], barred: Any) -> list[CauseCandidate]:
         return [candidate(12.0, name="tilt" if len(beside) == 1 else "temperature")]
 
     monkeypatch.setattr(naming, "refitted", refitted)
-    monkeypatch.setattr(naming, "weigh_beside", weighed_beside)
+    monkeypatch.setattr(naming, "start_effects", lambda model: model)
+    monkeypatch.setattr(naming, "weigh", weighed)
     monkeypatch.setattr(naming, "sort_rivals", lambda model, best, ranked: ((best,), ()))
-    rules: Any = SimpleNamespace(excluded=())
-    found = naming._picked_again(layered("suction", "run_in", "humidity"), rules)
+    found = naming._picked_again(layered("suction", "run_in", "humidity"), ())
     assert [[c.acting.name for c in alike] for alike in found.causes] == [["tilt"], ["temperature"], ["humidity"]]
     assert beside == [("run_in", "humidity"), ("tilt", "humidity")]
 
@@ -229,20 +230,18 @@ def test_of_several_causes_the_newest_is_left_out_where_its_own_column_is_still_
 
     left: Any = SimpleNamespace(p=np.array([0.001]))
     monkeypatch.setattr(naming, "weigh", lambda *_: [])
-    monkeypatch.setattr(naming, "weigh_beside", lambda *_: [])
+    monkeypatch.setattr(naming, "start_effects", lambda model: model)
     monkeypatch.setattr(naming, "_grown", grown)
-    monkeypatch.setattr(naming, "_screen_left", lambda *_: left)
     monkeypatch.setattr(naming, "_misfit_in_own_column", lambda cause, *_: cause.acting.name == "run_in")
     monkeypatch.setattr(naming, "_picked_again", lambda layers, *_: layers)
     monkeypatch.setattr(naming, "_standing", lambda layers, *_: layers)
-    rules: Any = SimpleNamespace(excluded=(), level=0.01)
-    found = naming.name_causes(start, left, rules)
+    found = naming.name_causes(start, left, (), 0.01, lambda model: left)
     assert [[c.acting.name for c in alike] for alike in found.causes] == [["suction"]]
     assert offered == [set(), set(), {"run_in"}]
     assert found.wrong_in_form == ("run_in",)
 
 
-def chosen_of(monkeypatch: pytest.MonkeyPatch, best: Candidate | None, strength: float | None) -> str:
+def chosen_of(monkeypatch: pytest.MonkeyPatch, best: CauseCandidate | None, strength: float | None) -> str:
     """Which layer is added where a mechanism and a free course of a column, of this strength, are beyond chance."""
     contrast: Any = SimpleNamespace(columns=np.ones((4, 2)))
     other = None if strength is None else naming.Remainder(contrast, strength, np.zeros(1), 0.1, 0.001)
@@ -254,7 +253,7 @@ def chosen_of(monkeypatch: pytest.MonkeyPatch, best: Candidate | None, strength:
     setup: Any = SimpleNamespace(observations=SimpleNamespace(flat="F"))
     model: Any = SimpleNamespace(setup=setup, acting=())
     seen: Any = None
-    grown = naming._grown(Layers(model), [], seen, 0.01)
+    grown = naming._grown(Named(model, seen), [], 0.01)
     if grown is None:
         return "neither"
     assert len(grown.causes) + len(grown.remainders) == 1

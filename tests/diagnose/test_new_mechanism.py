@@ -9,7 +9,7 @@ import pytest
 
 from tribo.diagnostics import examine, plan_design
 from tribo.diagnostics.candidates import weigh
-from tribo.diagnostics.diagnosis_record import Diagnosis
+from tribo.diagnostics.diagnosis import Diagnosis
 from tribo.diagnostics.score_statistics import start_effects
 from tribo.mechanisms.record import (
     Base,

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tribo.diagnostics.candidates import Candidate, weigh
+from tribo.diagnostics.candidates import CauseCandidate, weigh
 from tribo.diagnostics.model import Acting, candidates, effect_of
 from tribo.diagnostics.observations import enough, observe
 from tribo.diagnostics.planning import next_test
@@ -33,7 +33,7 @@ def with_measured(name: str, value: float, uncertainty: float) -> Ingested:
     return replace(c, campaign=replace(c.campaign, measured={name: (value, uncertainty)}))
 
 
-def ranked(ingested: Ingested) -> dict[str, Candidate]:
+def ranked(ingested: Ingested) -> dict[str, CauseCandidate]:
     others = {a.name for a in candidates(setup_of(ingested), LAW)} - PAIR
     return {c.name: c for c in weigh(start_effects(baseline(ingested)), others)}
 

@@ -8,10 +8,16 @@ import numpy as np
 import pytest
 
 from tribo.diagnostics import examine, residual_table, with_simulation
-from tribo.diagnostics.diagnosis_record import Diagnosis, SimulatedExtension
+from tribo.diagnostics.diagnosis import Diagnosis
 from tribo.diagnostics.model import effect_of
 from tribo.diagnostics.predictor import flat_law
-from tribo.diagnostics.simulated_extension import MOST_LOADS, local_friction, representatives, residual_percent
+from tribo.diagnostics.simulated_extension import (
+    MOST_LOADS,
+    SimulatedExtension,
+    local_friction,
+    representatives,
+    residual_percent,
+)
 from tribo.springblock import SimConfig, simulate
 from tribo.wording.verdict_sentences import worded
 

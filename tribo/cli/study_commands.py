@@ -42,7 +42,7 @@ from tribo.errors import FitError, TriboError, unexpected
 
 if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
-    from tribo.diagnostics.diagnosis_record import DiagnosisWithoutModel
+    from tribo.diagnostics.diagnosis import DiagnosisWithoutModel
     from tribo.diagnostics.verdict import Verdict
     from tribo.dry_run import Until as DryUntil
     from tribo.records import Campaign, Study

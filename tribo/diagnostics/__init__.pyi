@@ -1,7 +1,7 @@
-from .diagnosis import examine as examine
-from .diagnosis_record import (
+from .diagnosis import (
     Diagnosis as Diagnosis,
     contrast_table as contrast_table,
+    examine as examine,
     misfit_map as misfit_map,
     residual_table as residual_table,
     weighing_table as weighing_table,

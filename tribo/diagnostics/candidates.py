@@ -1,35 +1,41 @@
-"""Weighing the mechanisms: each is fitted on top of a model, and its freedom is penalised.
+"""What explains a screened campaign: candidates are weighed, told apart, and added in layers while a misfit remains.
 
-Which mechanisms explain a campaign about equally: those the design cannot distinguish, and distinct rivals.
-
-What explains a screened campaign: layers that are added one after the other while a misfit remains.
-
-A layer is a mechanism, or, where a recorded column explains far more than any mechanism, a free course of that column.
-A mechanism stays only while it is beyond chance beside all other layers.
+Each mechanism is fitted on top of a model, and its freedom is penalised. Those that the design cannot distinguish are
+tied; distinct ones that explain about as much are rivals. A layer is a mechanism, or, where a recorded column explains
+far more than any mechanism, a free course of that column. A mechanism stays only while it is beyond chance beside all
+other layers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tribo.diagnostics.contrasts import Contrast, Progress, Screen, screen_left
+from tribo.diagnostics.contrasts import Contrast, Screen
 from tribo.diagnostics.fit import ModelFit, fit
-from tribo.diagnostics.model import Acting, Setup, Target, with_free_columns
+from tribo.diagnostics.model import Acting, Target, with_free_columns
 from tribo.diagnostics.score_statistics import StartEffects, start_effects
 from tribo.display import displayed
 from tribo.records import FloatArray
 
 PER_PARAMETER = 1.0  # log likelihood that a further parameter has to earn
 CHOICES_FITTED = 4  # of a mechanism with many choices, how many are fitted in full
+MAX_LAYERS = 8
 IN_REACH, CLOSE_BY = 0.5, 3.0  # share of the best first gain, less so much, from which a mechanism is fitted to the end
+# Log likelihood, at least and as a share of what the best gains, by which two mechanisms must differ to be told apart.
+# If the one is at work, the difference has the expected value D = gain (1 - cosine^2) and the variance 2 D: the other
+# one is ahead by 3 in at most 0.7 % of campaigns, whatever D is.
+TIED = (3.0, 0.08)
+ALIKE = float(np.sqrt(1.0 - 2.0 * TIED[1]))  # cosine above which not even a strong effect tells two mechanisms apart
+CLOSE = 3.0  # log likelihood within which a mechanism that can be told apart explains about equally
+IN_COMMON = 0.5  # share of its effect that a mechanism must have in common with one it is tied to
 
 
 @displayed()
 @dataclass(frozen=True)
-class Candidate:
+class CauseCandidate:
     """A mechanism fitted on top of a model; ``gain`` is the log likelihood it earns net of its freedom, ``raw``
     the same before the choices it had are paid for."""
 
@@ -52,11 +58,7 @@ class Candidate:
         return float(np.sqrt(2.0 * max(self.raw, 0.0)))
 
 
-def weigh_beside(model: ModelFit, excluded: Collection[str]) -> list[Candidate]:
-    return weigh(start_effects(model), excluded)
-
-
-def weigh(start: StartEffects, excluded: Collection[str] = ()) -> list[Candidate]:
+def weigh(start: StartEffects, excluded: Collection[str] = ()) -> list[CauseCandidate]:
     """Every mechanism that is not excluded, added to a model; the best choice of each, best first.
 
     All are tried, and those within reach of the best are fitted to the end.
@@ -65,14 +67,19 @@ def weigh(start: StartEffects, excluded: Collection[str] = ()) -> list[Candidate
     for k, acting in enumerate(start.acting):
         if acting.name not in excluded and acting not in start.model.acting:
             groups.setdefault(acting.mechanism.name, []).append(k)
-    tried: dict[str, Candidate] = {}
+    tried: dict[str, CauseCandidate] = {}
     for group in groups.values():
-        short = [_candidate(start.model, acting, len(group)) for acting in _most_promising(start, group)]
-        tried |= {c.name: c for c in sorted(short, key=lambda c: c.gain)}
-    best = max((c.gain for c in tried.values()), default=0.0)
-    hopeful = IN_REACH * best - CLOSE_BY
-    found = [_to_the_end(start.model, c) if c.gain > hopeful else c for c in tried.values()]
-    return sorted(found, key=lambda c: -c.gain)
+        trials = []
+        for acting in _most_promising(start, group):
+            trial = refitted(start.model, (*start.model.acting, acting), to_the_end=False)
+            trials.append(judged(start.model, trial, float(np.log(len(group)))))
+        tried |= {c.name: c for c in sorted(trials, key=lambda c: c.gain)}
+    hopeful = IN_REACH * max((c.gain for c in tried.values()), default=0.0) - CLOSE_BY
+    fitted = [
+        judged(start.model, refitted(c.fit, c.fit.acting), c.raw - c.gain) if c.gain > hopeful else c
+        for c in tried.values()
+    ]
+    return sorted(fitted, key=lambda c: -c.gain)
 
 
 def _most_promising(start: StartEffects, group: list[int]) -> list[Acting]:
@@ -89,22 +96,12 @@ def _most_promising(start: StartEffects, group: list[int]) -> list[Acting]:
     return [acting[i] for i in np.argsort(-rank)[:CHOICES_FITTED]]
 
 
-def _candidate(start: ModelFit, acting: Acting, choices: int) -> Candidate:
-    fitted = refitted(start, (*start.acting, acting), to_the_end=False)
-    return judged(start, fitted, float(np.log(choices)))
-
-
-def _to_the_end(start: ModelFit, c: Candidate) -> Candidate:
-    """A candidate that was only tried, fitted until nothing changes any more."""
-    return judged(start, refitted(c.fit, c.fit.acting), c.raw - c.gain)
-
-
 def refitted(f: ModelFit, acting: Sequence[Acting], to_the_end: bool = True) -> ModelFit:
     """The same campaign with these mechanisms, from where a fit has got to."""
     return fit(f.setup, acting, start=f, to_the_end=to_the_end)
 
 
-def judged(start: ModelFit, fitted: ModelFit, choosing: float) -> Candidate:
+def judged(start: ModelFit, fitted: ModelFit, choosing: float) -> CauseCandidate:
     """What a fit earns beyond ``start``, a direct measurement included: its parameters and the choosing, in log
     likelihood, are paid for."""
     acting = fitted.acting[-1]
@@ -113,21 +110,12 @@ def judged(start: ModelFit, fitted: ModelFit, choosing: float) -> Candidate:
     sd = acting.mechanism.choosing.all_or_nothing_sd
     if sd is not None:
         raw -= 0.5 * ((fitted.values[-1][0] - acting.mechanism.amplitude.start) / sd) ** 2
-    return Candidate(acting, fitted, float(raw - choosing), float(raw))
-
-
-# Log likelihood, at least and as a share of what the best gains, by which two mechanisms must differ to be told apart.
-# If the one is at work, the difference has the expected value D = gain (1 - cosine^2) and the variance 2 D: the other
-# one is ahead by 3 in at most 0.7 % of campaigns, whatever D is.
-TIED = (3.0, 0.08)
-ALIKE = float(np.sqrt(1.0 - 2.0 * TIED[1]))  # cosine above which not even a strong effect tells two mechanisms apart
-CLOSE = 3.0  # log likelihood within which a mechanism that can be told apart explains about equally
-IN_COMMON = 0.5  # share of its effect that a mechanism must have in common with one it is tied to
+    return CauseCandidate(acting, fitted, float(raw - choosing), float(raw))
 
 
 def sort_rivals(
-    start: ModelFit, best: Candidate, ranked: Sequence[Candidate]
-) -> tuple[tuple[Candidate, ...], tuple[Candidate, ...]]:
+    start: ModelFit, best: CauseCandidate, ranked: Sequence[CauseCandidate]
+) -> tuple[tuple[CauseCandidate, ...], tuple[CauseCandidate, ...]]:
     """Those that the design cannot distinguish from the best, and distinct ones that explain about as much.
 
     What explains about as much does so whether or not the choices a mechanism had are paid for.
@@ -139,15 +127,12 @@ def sort_rivals(
     cosine = np.maximum(_likeness(start, best, near), 0.0)
     told = (best.gain * (1.0 - cosine**2) > 2.0 * tied) | (cosine**2 < IN_COMMON)
     alike = [c for c, apart in zip(near, told, strict=True) if not apart and c.gain > best.gain - tied]
-    rivals = [c for c, apart in zip(near, told, strict=True) if apart and _about_equal(c, best)]
+    rivals = [c for c, apart in zip(near, told, strict=True) if apart and c.gain > best.gain - CLOSE]
+    rivals = [c for c in rivals if c.raw > best.raw - CLOSE]
     return (best, *alike), tuple(rivals)
 
 
-def _about_equal(c: Candidate, best: Candidate) -> bool:
-    return c.gain > best.gain - CLOSE and c.raw > best.raw - CLOSE
-
-
-def _likeness(start: ModelFit, best: Candidate, others: Sequence[Candidate]) -> FloatArray:
+def _likeness(start: ModelFit, best: CauseCandidate, others: Sequence[CauseCandidate]) -> FloatArray:
     """Cosine between what ``best`` changes in the fitted ln T and what each other changes, (others,).
 
     Every model has its own flat law fitted, so what the flat law can absorb is already removed; the sample error
@@ -162,7 +147,7 @@ def _likeness(start: ModelFit, best: Candidate, others: Sequence[Candidate]) -> 
     return np.asarray((left[:, 1:].T @ left[:, 0]) / (length[1:] * length[0]))
 
 
-def weights_of(candidates: Sequence[Candidate]) -> FloatArray:
+def weights_of(candidates: Sequence[CauseCandidate]) -> FloatArray:
     """Shares of candidates by likelihood, adding to one; the likelihood is trusted as far as the laws are.
 
     Between laws that may each be wrong in form, a large log likelihood parts less than it seems: differences
@@ -172,9 +157,6 @@ def weights_of(candidates: Sequence[Candidate]) -> FloatArray:
     unit = max(1.0, TIED[1] * gains.max() / CLOSE)
     share = np.exp((gains - gains.max()) / unit)
     return np.asarray(share / share.sum())
-
-
-MAX_LAYERS = 8
 
 
 @displayed()
@@ -195,80 +177,61 @@ class Remainder:
 class Named:
     """What explains the campaign: one set of candidates per cause, the best first in each.
 
-    ``model`` is fitted with the causes and without the remainders. ``rivals`` are distinct mechanisms that explain the
-    last cause about equally; ``remainders`` are what follows a column and no mechanism. ``left`` is the screen of what
-    remains after all layers and ``p_left`` its adjusted p value. ``wrong_in_form`` are mechanisms that were left out
-    because a misfit remained in the very column they depend on.
+    ``model`` is fitted with the causes; ``left`` is the screen of what remains after all layers. ``rivals`` are
+    distinct mechanisms that explain the last cause about equally; ``remainders`` are what follows a column and no
+    mechanism. ``wrong_in_form`` are mechanisms that were left out because a misfit remained in the very column they
+    depend on, ``weighed`` all that were weighed for the first cause.
     """
 
     model: ModelFit
-    causes: tuple[tuple[Candidate, ...], ...]
-    rivals: tuple[Candidate, ...]
-    weighed: tuple[Candidate, ...]
     left: Screen
-    p_left: float
+    causes: tuple[tuple[CauseCandidate, ...], ...] = ()
+    rivals: tuple[CauseCandidate, ...] = ()
     remainders: tuple[Remainder, ...] = ()
     wrong_in_form: tuple[str, ...] = ()
+    weighed: tuple[CauseCandidate, ...] = ()
+
+    @property
+    def p_left(self) -> float:
+        """Adjusted p value of what remains."""
+        return float(self.left.p.min())
 
 
-@displayed()
-@dataclass(frozen=True)
-class Rules:
-    """How layers are decided on: mechanisms that are ``excluded``, the ``level``, and the simulated campaigns."""
+def name_causes(
+    start: StartEffects, first: Screen, excluded: Collection[str], level: float, screen_of: Callable[[ModelFit], Screen]
+) -> Named:
+    """Add layers while a misfit remains, then keep the mechanisms that stand beside the others.
 
-    excluded: Collection[str]
-    level: float
-    replicates: int
-    rng: np.random.Generator
-    progress: Progress | None = None
-
-
-@displayed()
-@dataclass(frozen=True)
-class Layers:
-    """The layers so far, and the model fitted with them. ``wrong_in_form`` are mechanisms that left a misfit in the
-    very column they depend on."""
-
-    model: ModelFit
-    causes: tuple[tuple[Candidate, ...], ...] = ()
-    rivals: tuple[Candidate, ...] = ()
-    remainders: tuple[Remainder, ...] = ()
-    wrong_in_form: frozenset[str] = field(default_factory=frozenset)
-
-
-def name_causes(start: StartEffects, first: Screen, rules: Rules) -> Named:
-    """Add layers while a misfit remains, then keep the mechanisms that stand beside the others."""
-    layers, seen = Layers(start.model), first
-    weighed: tuple[Candidate, ...] = ()
+    ``first`` is the screen of the model without mechanisms and ``screen_of`` that of what a model leaves. The model of
+    the result is fitted without the remainders.
+    """
+    named = Named(start.model, first)
+    weighed: tuple[CauseCandidate, ...] = ()
     for _ in range(MAX_LAYERS):
-        if seen.p.min() >= rules.level:
+        if named.p_left >= level:
             break
-        barred = {*rules.excluded, *layers.wrong_in_form}
-        fresh = layers.model is start.model
-        ranked = weigh(start, barred) if fresh else weigh_beside(layers.model, barred)
+        barred = {*excluded, *named.wrong_in_form}
+        ranked = weigh(start if named.model is start.model else start_effects(named.model), barred)
         weighed = weighed or tuple(ranked)
-        grown = _grown(layers, ranked, seen, rules.level)
+        grown = _grown(named, ranked, level)
         if grown is None:
             break
-        left = _screen_left(grown.model, rules)
-        if len(grown.causes) > len(layers.causes) and _misfit_in_own_column(grown.causes[-1][0], left, rules.level):
-            layers = replace(layers, wrong_in_form=layers.wrong_in_form | {grown.causes[-1][0].name})
+        left = screen_of(grown.model)
+        newest = grown.causes[-1][0] if len(grown.causes) > len(named.causes) else None
+        if newest is not None and _misfit_in_own_column(newest, left, level):
+            named = replace(named, wrong_in_form=tuple(sorted({*named.wrong_in_form, newest.name})))
         else:
-            layers, seen = grown, left
-    settled = _standing(_picked_again(layers, rules), first, rules.level)
-    if settled is not layers:
-        seen = _screen_left(settled.model, rules)
-    model = _without_remainders(settled, start.model.setup)
-    left_p = float(seen.p.min())
-    wrong = tuple(sorted(settled.wrong_in_form))
-    return Named(model, settled.causes, settled.rivals, weighed, seen, left_p, settled.remainders, wrong)
+            named = replace(grown, left=left)
+    standing = _standing(_picked_again(named, excluded), first, level)
+    if standing is not named:
+        named = replace(standing, left=screen_of(standing.model))
+    if named.remainders:
+        model = fit(start.model.setup, named.model.acting, start=named.model)
+        named = replace(named, model=model)
+    return replace(named, weighed=weighed)
 
 
-def _screen_left(model: ModelFit, rules: Rules) -> Screen:
-    return screen_left(model, replicates=rules.replicates, rng=rules.rng, progress=rules.progress)
-
-
-def best_beyond_chance(ranked: Sequence[Candidate], seen: Screen, level: float) -> Candidate | None:
+def best_beyond_chance(ranked: Sequence[CauseCandidate], seen: Screen, level: float) -> CauseCandidate | None:
     """The first of those that chance does not make as strong; what is within chance explains no misfit."""
     return next((c for c in ranked if seen.p_library(c.strength) < level), None)
 
@@ -284,21 +247,21 @@ def strongest_beside_mechanisms(seen: Screen, level: float, flat: str) -> Remain
     return None
 
 
-def _grown(layers: Layers, ranked: Sequence[Candidate], seen: Screen, level: float) -> Layers | None:
+def _grown(named: Named, ranked: Sequence[CauseCandidate], level: float) -> Named | None:
     """One layer more: the best mechanism, unless a free course of a column explains far more; None without either."""
-    best = best_beyond_chance(ranked, seen, level)
-    other = strongest_beside_mechanisms(seen, level, layers.model.setup.observations.flat)
+    best = best_beyond_chance(ranked, named.left, level)
+    other = strongest_beside_mechanisms(named.left, level, named.model.setup.observations.flat)
     if best is not None and (other is None or best.raw > 0.5 * other.strength**2 - CLOSE):
-        alike, rivals = sort_rivals(layers.model, best, ranked)
-        return replace(layers, model=best.fit, causes=(*layers.causes, alike), rivals=rivals)
+        alike, rivals = sort_rivals(named.model, best, ranked)
+        return replace(named, model=best.fit, causes=(*named.causes, alike), rivals=rivals)
     if other is None:
         return None
-    wider = with_free_columns(layers.model.setup, other.contrast.columns, other.coefficients)
-    model = fit(wider, layers.model.acting, start=layers.model)
-    return replace(layers, model=model, remainders=(*layers.remainders, other))
+    wider = with_free_columns(named.model.setup, other.contrast.columns, other.coefficients)
+    model = fit(wider, named.model.acting, start=named.model)
+    return replace(named, model=model, remainders=(*named.remainders, other))
 
 
-def _misfit_in_own_column(cause: Candidate, left: Screen, level: float) -> bool:
+def _misfit_in_own_column(cause: CauseCandidate, left: Screen, level: float) -> bool:
     """Whether what is left follows the column of a mechanism that was to explain it: its form is wrong.
 
     One name of a column of several may leave another one.
@@ -312,30 +275,26 @@ def _misfit_in_own_column(cause: Candidate, left: Screen, level: float) -> bool:
     )
 
 
-def _picked_again(layers: Layers, rules: Rules) -> Layers:
+def _picked_again(named: Named, excluded: Collection[str]) -> Named:
     """Each cause but the last was picked before the later ones were known: pick it again beside them."""
-    for k in range(len(layers.causes) - 1):
-        acting = [alike[0].acting for alike in layers.causes]
-        alone = refitted(layers.model, [a for j, a in enumerate(acting) if j != k])
-        ranked = weigh_beside(alone, {*rules.excluded, *layers.wrong_in_form})
+    for k in range(len(named.causes) - 1):
+        acting = [alike[0].acting for alike in named.causes]
+        alone = refitted(named.model, [a for j, a in enumerate(acting) if j != k])
+        ranked = weigh(start_effects(alone), {*excluded, *named.wrong_in_form})
         if not ranked:
             continue
         alike, others = sort_rivals(alone, ranked[0], ranked)
-        causes = (*layers.causes[:k], alike, *layers.causes[k + 1 :])
-        layers = replace(layers, model=ranked[0].fit, causes=causes, rivals=(*layers.rivals, *others))
-    return layers
+        causes = (*named.causes[:k], alike, *named.causes[k + 1 :])
+        named = replace(named, model=ranked[0].fit, causes=causes, rivals=(*named.rivals, *others))
+    return named
 
 
-def _standing(layers: Layers, first: Screen, level: float) -> Layers:
+def _standing(named: Named, first: Screen, level: float) -> Named:
     """The causes that are still beyond chance when all other layers are there."""
-    for alike in layers.causes if len(layers.causes) + len(layers.remainders) > 1 else ():
-        others = [a[0].acting for a in layers.causes if a is not alike]
-        without = refitted(layers.model, others)
+    for alike in named.causes if len(named.causes) + len(named.remainders) > 1 else ():
+        others = [a[0].acting for a in named.causes if a is not alike]
+        without = refitted(named.model, others)
         beside = judged(without, refitted(without, [*others, alike[0].acting]), 0.0)
         if first.p_library(beside.strength) >= level:
-            layers = replace(layers, model=without, causes=tuple(a for a in layers.causes if a is not alike))
-    return layers
-
-
-def _without_remainders(layers: Layers, s: Setup) -> ModelFit:
-    return fit(s, layers.model.acting, start=layers.model) if layers.remainders else layers.model
+            named = replace(named, model=without, causes=tuple(a for a in named.causes if a is not alike))
+    return named

@@ -1,23 +1,67 @@
-"""The diagnosis of a campaign: whether the model fails beyond chance, and which mechanism explains it."""
+"""The diagnosis of a campaign: whether the model fails beyond chance, and which mechanism explains it.
+
+A :class:`Diagnosis` holds the verdict with everything that it rests on, for figures and tables.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from tribo.diagnostics.candidates import Rules, name_causes
-from tribo.diagnostics.conclusion import Findings, conclude, exclusions
-from tribo.diagnostics.contrasts import Progress, all_contrasts, screen
-from tribo.diagnostics.diagnosis_record import Diagnosis
-from tribo.diagnostics.direct_evidence import trace_findings
-from tribo.diagnostics.fit import fit
+from tribo.diagnostics.candidates import Named, name_causes, weights_of
+from tribo.diagnostics.conclusion import conclude, exclusions
+from tribo.diagnostics.contrasts import Progress, Screen, all_contrasts, screen, screen_left
+from tribo.diagnostics.direct_evidence import certain_evidence, direct_evidence
+from tribo.diagnostics.effect_sizes import percent
+from tribo.diagnostics.fit import ModelFit, fit, residual_on_flat
 from tribo.diagnostics.model import setup
 from tribo.diagnostics.observations import enough, observe
 from tribo.diagnostics.predictor import Predictor, tabled_predictor
 from tribo.diagnostics.score_statistics import start_effects
-from tribo.records import Ingested
+from tribo.diagnostics.verdict import Verdict
+from tribo.display import displayed
+from tribo.records import REGIMES, Ingested
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tribo.diagnostics.simulated_extension import SimulatedExtension
+    from tribo.lawsearch.search import Discovery
 
 REPLICATES = 120
 REPLICATES_LEFT = 60
+
+
+@displayed()
+@dataclass(frozen=True)
+class DiagnosisWithoutModel:
+    """A verdict without the spring-block model: what friction varies with beside the law of each sample."""
+
+    verdict: Verdict
+
+
+@displayed(lambda d: d.verdict.verdict)
+@dataclass(frozen=True)
+class Diagnosis:
+    """A verdict with what it rests on, for figures and tables.
+
+    ``simulated`` is the extended model run in the simulator itself, where that was asked for and possible; ``laws`` is
+    the search for the laws of what the causes leave, where something was left.
+    """
+
+    verdict: Verdict
+    baseline: ModelFit
+    screened: Screen
+    named: Named | None
+    simulated: SimulatedExtension | None = None
+    laws: Discovery | None = None
+
+    def without_columns(self) -> Diagnosis:
+        """The same without the columns of the contrasts, which nothing needs once the verdict stands."""
+        named = self.named and replace(self.named, left=self.named.left.without_columns())
+        return replace(self, screened=self.screened.without_columns(), named=named)
 
 
 def examine(
@@ -65,11 +109,104 @@ def examine(
     effects = start_effects(baseline)
     contrasts = all_contrasts(s, effects.changes)
     screened = screen(baseline, contrasts, replicates=replicates[0], rng=rng, progress=progress)
-    evidence = trace_findings(observations)
-    barred = exclusions(observations.conditions, evidence.found, effects.absorbed)
+    evidence = direct_evidence(observations)
+    barred = exclusions(observations.conditions, evidence, effects.absorbed)
     named = None
     if screened.p.min() < level:
-        rules = Rules([e.mechanism for e in barred], level, replicates[1], rng, progress)
-        named = name_causes(effects, screened, rules)
-    verdict = conclude(Findings(effects, screened, evidence, barred, named, level), rng)
+
+        def screen_of(model: ModelFit) -> Screen:
+            return screen_left(model, replicates=replicates[1], rng=rng, progress=progress)
+
+        named = name_causes(effects, screened, [e.mechanism for e in barred], level, screen_of)
+    verdict = conclude(effects, screened, certain_evidence(evidence), barred, named, level, rng)
     return Diagnosis(verdict, baseline, screened, named)
+
+
+def residual_table(d: Diagnosis) -> pd.DataFrame:
+    """One row a test and regime: the measurement, the models, and their differences.
+
+    Columns: test_id, sample, specimen, regime, normal_load_N, run_order, specimen_run, temperature_C,
+    humidity_pct, speed_m_s, hold_s, measured_N, baseline_N, calibrated_N, extended_N, residual_percent,
+    residual_calibrated_percent and residual_extended_percent: 100 (measured / modelled - 1). The baseline is fitted to
+    all samples, calibrated_N is the model calibrated on the flat sample alone. Without a named mechanism the extended
+    columns repeat the baseline. Where the extended model was run in the simulator itself, simulated_N is what it says.
+    """
+    import pandas as pd
+
+    o = d.baseline.setup.observations
+    c = o.conditions
+    extended = d.named.model if d.named is not None and d.named.causes else d.baseline
+    on_flat = residual_on_flat(d.baseline)
+    parts = []
+    for k, regime in enumerate(REGIMES):
+        measured, before, after = o.log_force[:, k], d.baseline.predicted[:, k], extended.predicted[:, k]
+        simulated = {} if d.simulated is None else {"simulated_N": np.exp(d.simulated.log_force[:, k])}
+        parts.append(
+            pd.DataFrame(
+                {
+                    "test_id": o.test_ids, "sample": c.sample, "specimen": c.specimen, "regime": regime,
+                    "normal_load_N": c.normal_load_N, "run_order": c.run_order, "specimen_run": c.specimen_run,
+                    "temperature_C": c.temperature_C, "humidity_pct": c.humidity_pct, "speed_m_s": c.speed_m_s,
+                    "hold_s": c.hold_s, "measured_N": np.exp(measured), "baseline_N": np.exp(before),
+                    "calibrated_N": np.exp(measured - on_flat[:, k]), "extended_N": np.exp(after),
+                    "residual_percent": percent(measured - before),
+                    "residual_calibrated_percent": percent(on_flat[:, k]),
+                    "residual_extended_percent": percent(measured - after),
+                }
+                | simulated
+            )
+        )  # fmt: skip
+    return pd.concat(parts, ignore_index=True)
+
+
+def misfit_map(d: Diagnosis) -> pd.DataFrame:
+    """Sample by load by regime: mean residual in percent, its standard error and the number of tests."""
+    import pandas as pd
+
+    rows = residual_table(d)
+    rows["load"] = rows["normal_load_N"].round(5)
+    groups = rows.groupby(["regime", "sample", "load"])
+    found = [
+        {
+            "regime": regime, "sample": sample, "normal_load_N": load, "n_tests": len(cell),
+            "residual_percent": cell["residual_percent"].mean(),
+            "residual_u_percent": cell["residual_percent"].std(ddof=1) / np.sqrt(len(cell)),
+            "residual_extended_percent": cell["residual_extended_percent"].mean(),
+        }
+        for (regime, sample, load), cell in groups
+    ]  # fmt: skip
+    return pd.DataFrame(found)
+
+
+def contrast_table(d: Diagnosis) -> pd.DataFrame:
+    """Every contrast at the baseline: its strength in standard deviations, adjusted p and peak-to-peak size."""
+    import pandas as pd
+
+    s = d.screened
+    rows = [
+        {
+            "kind": c.kind, "observable": c.observable, "covariate": c.title, "sample": c.sample,
+            "choice": c.acting.choice if c.acting else "", "strength": strength,
+            "p_adjusted": s.p_adjusted(float(strength)), "peak_to_peak_percent": float(percent(min(size, 5.0))),
+        }
+        for c, strength, size in zip(s.contrasts, s.strength, s.size, strict=True)
+    ]  # fmt: skip
+    return pd.DataFrame(rows).sort_values("strength", ascending=False, ignore_index=True)
+
+
+def weighing_table(d: Diagnosis) -> pd.DataFrame:
+    """Every mechanism that was weighed for the first cause: log likelihood gained, share, amplitude."""
+    import pandas as pd
+
+    if d.named is None or not d.named.weighed:
+        return pd.DataFrame(columns=["mechanism", "choice", "gain", "weight", "parameter", "value", "unit"])
+    weighed = d.named.weighed
+    rows = [
+        {
+            "mechanism": c.name, "choice": c.acting.choice, "gain": c.gain, "weight": weight,
+            "parameter": c.acting.mechanism.amplitude.name, "value": float(c.values[0]),
+            "unit": c.acting.mechanism.amplitude.unit,
+        }
+        for c, weight in zip(weighed, weights_of(weighed), strict=True)
+    ]  # fmt: skip
+    return pd.DataFrame(rows)

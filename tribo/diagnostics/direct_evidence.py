@@ -24,7 +24,7 @@ LEAST_P = 1e-12  # no estimate has a tail that is known further out
 class Evidence:
     """An estimate with its standard error, and whether it is certain and large enough to matter.
 
-    ``looks`` is the number of estimates from which this one was chosen.
+    ``estimates`` is the number of estimates from which this one was chosen.
     """
 
     value: float
@@ -32,7 +32,7 @@ class Evidence:
     certain: bool
     unit: str
     change: float = 0.0  # over the whole series, N or relative
-    looks: int = 1
+    estimates: int = 1
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -40,25 +40,10 @@ class Evidence:
         half = 1.645 * self.standard_error
         return self.value - half, self.value + half
 
-    def p_adjusted(self, looks: int) -> float:
-        """Two-sided p value of the estimate over its standard error (normal), Bonferroni over ``looks``."""
+    def p_adjusted(self, estimates: int) -> float:
+        """Two-sided p value of the estimate over its standard error (normal), Bonferroni over ``estimates``."""
         p = float(erfc(abs(self.value) / max(self.standard_error, 1e-300) / np.sqrt(2.0)))
-        return min(max(looks * p, LEAST_P), 1.0)
-
-
-@dataclass(frozen=True)
-class TraceFindings:
-    """All estimates from the traces by mechanism, and those that are certain, each with its adjusted p value."""
-
-    found: Mapping[str, Evidence]
-    certain: Mapping[str, tuple[Evidence, float]]
-
-
-def trace_findings(o: Observations) -> TraceFindings:
-    """What the traces show by themselves; p values are adjusted for every estimate that was made."""
-    found = direct_evidence(o)
-    looks = sum(e.looks for e in found.values())
-    return TraceFindings(found, {name: (e, e.p_adjusted(looks)) for name, e in certain_evidence(found).items()})
+        return min(max(estimates * p, LEAST_P), 1.0)
 
 
 def direct_evidence(o: Observations) -> dict[str, Evidence]:
@@ -72,11 +57,13 @@ def stated_evidence() -> dict[str, TraceEvidence]:
     return {name: m.evidence for name, m in MECHANISMS.items() if m.evidence is not None}
 
 
-def certain_evidence(evidence: Mapping[str, Evidence]) -> dict[str, Evidence]:
-    """What is certain, without evidence that another one includes (a drift includes the offset that it leaves)."""
+def certain_evidence(evidence: Mapping[str, Evidence]) -> dict[str, tuple[Evidence, float]]:
+    """What is certain, without evidence that another one includes (a drift includes the offset that it leaves), each
+    with its p value, adjusted for every estimate that was made."""
+    made = sum(e.estimates for e in evidence.values())
     certain = {name: e for name, e in evidence.items() if e.certain}
     included = {other for name in certain for other in stated_evidence()[name].contains}
-    return {name: e for name, e in certain.items() if name not in included}
+    return {name: (e, e.p_adjusted(made)) for name, e in certain.items() if name not in included}
 
 
 def zero_offset(o: Observations) -> Evidence | None:
@@ -94,7 +81,7 @@ def zero_drift(o: Observations) -> Evidence | None:
     best = max(across, key=lambda e: abs(e.value) / e.standard_error, default=None)
     found = [e for e in (best, within) if e is not None]
     chosen = next((e for e in found if e.certain), found[0] if found else None)
-    return chosen and replace(chosen, looks=len(across) + (within is not None))
+    return chosen and replace(chosen, estimates=len(across) + (within is not None))
 
 
 def _drifts_across(o: Observations) -> list[Evidence]:

@@ -1,8 +1,6 @@
-"""Percentages of a diagnosis: all are 100 (measured / model - 1), with their sign, made here from ln(measured / model).
+"""The size of a contrast as a signed percentage: 100 (measured / model - 1), made here from ln(measured / model).
 
 A change is that of measured / model from one end of a column to the other, as a ratio less one.
-
-The size of a contrast, as a signed percentage: 100 (measured / model - 1), or the change of that ratio.
 """
 
 from __future__ import annotations
@@ -13,7 +11,6 @@ from typing import Literal
 import numpy as np
 
 from tribo.diagnostics.contrasts import BEND, Contrast
-from tribo.diagnostics.fit import ModelFit
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray
 
@@ -66,20 +63,8 @@ def interval_percent(value: float, strength: float) -> tuple[float, float]:
 SHARES = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (0.5, 0.5), "drop": (1.0, -1.0)}
 
 
-@dataclass(frozen=True)
-class Residual:
-    """ln(measured / model) of every test (n, 2), with the conditions of the tests."""
-
-    log_ratio: FloatArray
-    conditions: Conditions
-
-
-def residual_of(model: ModelFit) -> Residual:
-    """What a model leaves."""
-    return Residual(model.residual, model.setup.observations.conditions)
-
-
 Between = Literal["mean", "bend", "ends", "groups", "extremes"]
+Run = Literal["rising", "falling", "hump", "hollow"]
 
 
 @dataclass(frozen=True)
@@ -94,45 +79,46 @@ class Effect:
     high: float
     between: Between
     contrast: Contrast
-    course: Literal["rising", "falling", "hump", "hollow"]
+    course: Run
 
 
 def effect_of_contrast(
-    contrast: Contrast, residual: Residual, coefficients: FloatArray, size: float, strength: float
+    contrast: Contrast,
+    log_ratio: FloatArray,
+    conditions: Conditions,
+    coefficients: FloatArray,
+    size: float,
+    strength: float,
 ) -> Effect:
-    """The size of a contrast; ``size`` is its peak-to-peak effect in ln T, stated where no straight line gives it.
+    """The size of a contrast in ``log_ratio`` (n, 2), the ln(measured / model) of every test under its conditions.
+
+    ``size`` is its peak-to-peak effect in ln T, stated where no straight line gives it.
 
     That of a mechanism has the sign of its largest change; that of several columns has none.
     """
-    value, between = _signed(contrast, residual)
+    value, between = _signed(contrast, log_ratio, conditions)
     if not np.isfinite(value):
         change = (contrast.columns @ coefficients).ravel()
         sign = float(np.sign(change[np.abs(change).argmax()])) if contrast.freedom == 1 else 1.0
         value, between = float(percent(sign * min(size, 5.0))), "extremes"
-    ends = interval_percent(value, strength)
-    return Effect(value, *ends, between, replace(contrast, courses=()), _course(coefficients))
-
-
-def _course(coefficients: FloatArray) -> Literal["rising", "falling", "hump", "hollow"]:
-    """The run of the means of groups; that of the first is zero."""
-    steps = np.diff(np.concatenate([[0.0], coefficients]))
-    if np.all(steps > 0):
-        return "rising"
-    if np.all(steps < 0):
-        return "falling"
+    steps = np.diff(np.concatenate([[0.0], coefficients]))  # between the means of groups; that of the first is zero
     middle = coefficients[:-1].mean() if len(coefficients) > 1 else coefficients[0]
-    return "hump" if middle > 0.5 * coefficients[-1] else "hollow"
+    course: Run = "hump" if middle > 0.5 * coefficients[-1] else "hollow"
+    if np.all(steps > 0) or np.all(steps < 0):
+        course = "rising" if np.all(steps > 0) else "falling"
+    ends = interval_percent(value, strength)
+    return Effect(value, *ends, between, replace(contrast, courses=()), course)
 
 
-def _signed(contrast: Contrast, residual: Residual) -> tuple[float, Between]:
+def _signed(contrast: Contrast, log_ratio: FloatArray, conditions: Conditions) -> tuple[float, Between]:
     weight = np.array(SHARES[contrast.observable])
-    y, x = residual.log_ratio @ weight, contrast.columns[:, int(weight[0] == 0.0), 0]
-    sample = residual.conditions.sample
+    y, x = log_ratio @ weight, contrast.columns[:, int(weight[0] == 0.0), 0]
+    sample = conditions.sample
     here = sample == contrast.sample if contrast.kind == "sample" else np.ones(len(y), bool)
     if contrast.kind == "sample" and contrast.covariate == "sample":
         return mean_percent(y[here]), "mean"
     if contrast.kind == "sample" and contrast.detail == BEND:
-        line = np.log(residual.conditions.normal_load_N[here])
+        line = np.log(conditions.normal_load_N[here])
         return bend_percent(x[here], line, y[here]), "bend"
     if contrast.kind in ("sample", "trend") and np.ptp(x[here]) > 0:
         return change_percent(x[here], y[here]), "ends"

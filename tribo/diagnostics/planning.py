@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tribo.diagnostics.candidates import ALIKE, Candidate, Named
+from tribo.diagnostics.candidates import ALIKE, CauseCandidate, Named
 from tribo.diagnostics.fit import Linear, ModelFit, scored, state_at
 from tribo.diagnostics.model import Acting, Setup, Target, added, effect_of, predict, setup
 from tribo.diagnostics.normal_equations import model_columns
@@ -175,7 +175,7 @@ def next_test_of(
     return next_test([best, *others])
 
 
-def next_test(tied: Sequence[Candidate]) -> NextTest | None:
+def next_test(tied: Sequence[CauseCandidate]) -> NextTest | None:
     """The test with the most expected bits per hour between the two best of ``tied``; None for fewer than two."""
     if len(tied) < 2:
         return None
@@ -213,7 +213,7 @@ def bits(distance2: float) -> float:
     return float(np.clip(1.0 - lost, 0.0, 1.0))
 
 
-def _direct(first: Candidate, second: Candidate) -> list[NextTest]:
+def _direct(first: CauseCandidate, second: CauseCandidate) -> list[NextTest]:
     """Measuring the amplitude of one of the two: it is there, or it is not."""
     found = []
     for candidate in (first, second):
@@ -228,7 +228,7 @@ def _direct(first: Candidate, second: Candidate) -> list[NextTest]:
     return found
 
 
-def _without(first: Candidate, second: Candidate) -> list[NextTest]:
+def _without(first: CauseCandidate, second: CauseCandidate) -> list[NextTest]:
     """Repeating pulls of the most affected sample with one of the two removed (cavities vented, wire lowered)."""
     found = []
     for candidate in (first, second):
@@ -250,7 +250,7 @@ def _test_ids(f: ModelFit, rows: np.ndarray) -> list[str]:
     return [str(name) for name in f.setup.observations.test_ids[rows]]
 
 
-def _loads(first: Candidate, second: Candidate) -> list[NextTest]:
+def _loads(first: CauseCandidate, second: CauseCandidate) -> list[NextTest]:
     """More pulls of one sample at one load, also half the lowest and twice the highest measured."""
     conditions = first.fit.setup.observations.conditions
     loads = np.unique(np.round(conditions.normal_load_N, 5))
@@ -268,7 +268,7 @@ def _loads(first: Candidate, second: Candidate) -> list[NextTest]:
 
 
 def _named(
-    kind: NextKind, first: Candidate, second: Candidate, design: Mapping[str, Any], information: float
+    kind: NextKind, first: CauseCandidate, second: CauseCandidate, design: Mapping[str, Any], information: float
 ) -> NextTest:
     return NextTest(kind, (first.name, second.name), design, information)
 

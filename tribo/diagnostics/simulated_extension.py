@@ -10,17 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribo.diagnostics.diagnosis_record import Diagnosis, NotSimulated, SimulatedExtension
+from tribo.diagnostics.diagnosis import Diagnosis
 from tribo.diagnostics.effect_sizes import rms_percent
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.model import effect_of
 from tribo.diagnostics.predictor import flat_law
 from tribo.diagnostics.verdict import CERTAIN_CAUSES
+from tribo.display import displayed
 from tribo.errors import SimulationError
 from tribo.mechanisms.record import Conditions, Values
 from tribo.mechanisms_in_model.extended_run import simulate_pair
@@ -39,6 +40,41 @@ LONG_PEAKS = 2.2  # length of a run in peak times
 MOST_CHANGE = 1.2  # of ln T; beyond it hardly any force was there before, and a ratio says nothing
 Progress = Callable[[str, int, int], None]
 STAGE = "simulating the extended model"
+
+
+@displayed(lambda s: ", ".join(s.mechanisms))
+@dataclass(frozen=True)
+class SimulatedExtension:
+    """What the spring-block model itself gives with the named mechanisms in it.
+
+    ``log_force`` (n, 2) is ln T of every test by the extended model with the simulated effect, ``change`` (n, 2) that
+    effect and ``quick`` (n, 2) the effect by the laws. ``table`` has one row a pair of runs. ``ratio`` is the simulated
+    over the quick effect, least squares over the pairs, with its standard error.
+    """
+
+    mechanisms: tuple[str, ...]
+    log_force: FloatArray
+    change: FloatArray
+    quick: FloatArray
+    table: pd.DataFrame
+    ratio: float
+    ratio_u: float
+
+    @property
+    def off_percent(self) -> float:
+        """Root mean square of simulated less quick effect over the pairs, percent of T."""
+        left = self.table[["simulated_static", "simulated_sliding"]].to_numpy()
+        right = self.table[["quick_static", "quick_sliding"]].to_numpy()
+        return float(100 * np.sqrt(np.mean((left - right) ** 2)))
+
+
+@displayed(lambda s: ", ".join(s.mechanisms))
+@dataclass(frozen=True)
+class NotSimulated:
+    """Named mechanisms that could not be simulated, and why."""
+
+    mechanisms: tuple[str, ...]
+    reason: str
 
 
 def simulate_extension(

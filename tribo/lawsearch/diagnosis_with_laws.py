@@ -10,8 +10,7 @@ import numpy as np
 
 from tribo.diagnostics.conclusion import pattern_layers
 from tribo.diagnostics.contrasts import Screen, screen_left
-from tribo.diagnostics.diagnosis import examine
-from tribo.diagnostics.diagnosis_record import Diagnosis
+from tribo.diagnostics.diagnosis import Diagnosis, examine
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.planning import HOURS_PER_PULL, PULLS, first_test_of
 from tribo.diagnostics.verdict import CERTAIN_CAUSES, Excluded, Layer, Misfit, NextTest, Outcome, Verdict

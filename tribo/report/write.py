@@ -25,7 +25,7 @@ from tribo.report.tables import tables_of, write_tables
 Progress = Callable[[str, int, int], None]
 
 if TYPE_CHECKING:
-    from tribo.diagnostics.diagnosis_record import Diagnosis, DiagnosisWithoutModel
+    from tribo.diagnostics.diagnosis import Diagnosis, DiagnosisWithoutModel
     from tribo.wording.card import Card
 
 
@@ -107,7 +107,7 @@ def write_until(
 def _with_model(diagnosis: Diagnosis | DiagnosisWithoutModel | None) -> Diagnosis | None:
     if diagnosis is None:
         return None
-    from tribo.diagnostics.diagnosis_record import Diagnosis
+    from tribo.diagnostics.diagnosis import Diagnosis
 
     return diagnosis if isinstance(diagnosis, Diagnosis) else None
 
