@@ -78,7 +78,7 @@ def assumed_errors() -> Mapping[str, ErrorSize]:
 
     samples = [s for s in Design.samples if s != "F"]
     p = tabled_predictor({s: pattern_of(s) for s in Design.samples})
-    return {s: ErrorSize(p.offset[s], p.slope[s], p.curve[s]) for s in samples}
+    return {s: ErrorSize(p.error[s].offset, p.error[s].slope, p.error[s].curve) for s in samples}
 
 
 def design_for(*names: str, **changes: Any) -> Design:

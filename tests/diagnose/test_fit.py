@@ -79,4 +79,4 @@ def test_a_pattern_that_was_never_simulated_lies_between_its_neighbours_and_is_l
     new = Pattern("D", "circle", (12e-6, 12e-6), (18e-6, 18e-6))
     p = tabled_predictor({**PATTERNS, "D": new})
     assert p.shares["C"][1] < p.shares["D"][1] < p.shares["A"][1]
-    assert p.offset["D"][0] > p.offset["B"][0] > p.offset["F"][0] == 0.0
+    assert p.error["D"].offset[0] > p.error["B"].offset[0] > p.error["F"].offset[0] == 0.0

@@ -73,7 +73,7 @@ def off_by(factor: float) -> ModelFit:
     f = fitted("edge_adhesion", ("edge_adhesion", 1.0))
     o = f.setup.observations
     off = sum(
-        sign * factor * np.array(f.setup.predictor.offset[sample]) * (o.conditions.sample == sample)[:, None]
+        sign * factor * np.array(f.setup.predictor.error[sample].offset) * (o.conditions.sample == sample)[:, None]
         for sample, sign in (("A", 1), ("B", -1), ("C", 1))
     )
     return fit(replace(f.setup, observations=replace(o, log_force=o.log_force + off)), f.acting)

@@ -147,10 +147,10 @@ def test_a_pattern_has_an_offset_a_slope_and_a_curve_in_each_regime_of_the_state
     c, p = s.observations.conditions, s.log_pressure
     shapes = (np.ones_like(p), p, p**2 - np.mean(p**2))
     wanted = [
-        (sample, regime, known[sample][regime], shape)
+        (sample, regime, getattr(s.predictor.error[sample], known)[regime], shape)
         for sample in ("A", "B", "C")
         for regime in (0, 1)
-        for known, shape in zip((s.predictor.offset, s.predictor.slope, s.predictor.curve), shapes, strict=True)
+        for known, shape in zip(("offset", "slope", "curve"), shapes, strict=True)
     ]
     here = np.flatnonzero(s.group == PATTERN)
     assert len(here) == len(wanted) == 18

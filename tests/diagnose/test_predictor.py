@@ -12,6 +12,7 @@ import pytest
 
 from tribo.diagnostics import predictor as module, predictor as pattern_table
 from tribo.diagnostics.predictor import (
+    NO_ERROR,
     Predictor,
     error_sizes,
     flat_law,
@@ -112,16 +113,16 @@ def test_a_pattern_of_ones_own_is_trusted_as_a_tabulated_one_once_it_is_simulate
     patterns = {**PATTERNS, "W": wide}
     interpolation = error_sizes()["interpolation"]
     table, own = tabled_predictor(patterns), simulated_predictor(patterns, simulated, "F", AREA_M2)
-    assert table.offset["W"] == pytest.approx(np.hypot(TOTAL.offset, interpolation.offset))
-    assert table.slope["W"] == pytest.approx(np.hypot(TOTAL.slope, interpolation.slope))
-    assert table.curve["W"] == pytest.approx(np.hypot(TOTAL.curve, interpolation.curve))
-    assert (own.offset["W"], own.slope["W"], own.curve["W"]) == (TOTAL.offset, TOTAL.slope, TOTAL.curve)
+    assert table.error["W"].offset == pytest.approx(np.hypot(TOTAL.offset, interpolation.offset))
+    assert table.error["W"].slope == pytest.approx(np.hypot(TOTAL.slope, interpolation.slope))
+    assert table.error["W"].curve == pytest.approx(np.hypot(TOTAL.curve, interpolation.curve))
+    assert own.error["W"] == TOTAL
 
 
 def test_a_flat_sample_carries_no_error_and_a_tabulated_pattern_that_of_the_file() -> None:
     p = tabled_predictor(PATTERNS)
-    assert (p.offset["F"], p.slope["F"], p.curve["F"]) == ((0.0, 0.0),) * 3
-    assert (p.offset["B"], p.slope["B"], p.curve["B"]) == (TOTAL.offset, TOTAL.slope, TOTAL.curve)
+    assert p.error["F"] == NO_ERROR
+    assert p.error["B"] == TOTAL
 
 
 def test_lengths_may_differ_from_the_table_by_two_percent_and_no_more() -> None:
@@ -147,14 +148,15 @@ def test_a_pattern_with_less_contact_than_any_simulated_keeps_the_efficiency_of_
 def test_a_pattern_known_by_its_area_fraction_alone_is_interpolated() -> None:
     p = tabled_predictor({"Q": Pattern("Q", "rectangle", measured_area_fraction=0.8)})
     assert p.shares["Q"][1] < 1.0
-    assert p.offset["Q"][0] > TOTAL.offset[0]
+    assert p.error["Q"].offset[0] > TOTAL.offset[0]
 
 
 def test_the_error_of_the_model_is_scaled_as_a_whole_and_nothing_else() -> None:
     p = tabled_predictor(PATTERNS)
     double = p.scaled(2.0)
-    for sizes, doubled in ((p.offset, double.offset), (p.slope, double.slope), (p.curve, double.curve)):
-        assert {s: tuple(2 * v for v in size) for s, size in sizes.items()} == dict(doubled)
+    for sample, error in p.error.items():
+        for size in ("offset", "slope", "curve"):
+            assert getattr(double.error[sample], size) == tuple(2 * v for v in getattr(error, size))
     assert double.shares == p.shares
     with pytest.raises(ValueError, match="allowed is a factor of 0 or more"):
         p.scaled(-1.0)

@@ -31,7 +31,7 @@ def baseline(seed: int, design: Design) -> ModelFit:
 def off(pattern_error: float, **changes: object) -> Design:
     """A design whose patterns are off by so many times what the diagnosis assumes."""
     p = tabled_predictor(PATTERNS)
-    sizes = {s: ErrorSize(p.offset[s], p.slope[s], p.curve[s]) for s in PATTERNS if s != "F"}
+    sizes = {s: ErrorSize(e.offset, e.slope, e.curve) for s, e in p.error.items() if s != "F"}
     return replace(SMALL, pattern_error=pattern_error, error_sizes=sizes, **changes)  # type: ignore[arg-type]
 
 

@@ -240,8 +240,8 @@ def setup(observations: Observations, predictor: Predictor) -> Setup:
     units, groups = [1.0] * (len(kinds) * len(names)), [group for _, group in kinds] * len(names)
     for sample in np.unique(c.sample):
         for regime in (0, 1):
-            known = (predictor.offset, predictor.slope, predictor.curve)
-            offset, slope, curve = (error[sample][regime] for error in known)
+            error = predictor.error[sample]
+            offset, slope, curve = (size[regime] for size in (error.offset, error.slope, error.curve))
             sized = ((offset, np.ones(o.n)), (slope, log_p), (curve, log_p**2 - np.mean(log_p**2)))
             for size, shape in sized if offset > 0 else ():
                 columns.append(np.zeros((o.n, 2)))

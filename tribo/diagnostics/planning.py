@@ -1,27 +1,28 @@
-"""Before anything is measured: which mechanisms a design would find, from which size, and which it confuses.
-
-Which further test best distinguishes mechanisms that explain a campaign about equally, per hour at the bench.
+"""What to measure: which mechanisms a design would find, from which size, and which it confuses; and which further test
+best distinguishes mechanisms that explain a campaign about equally, per hour at the bench.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from tribo.diagnostics.candidates import ALIKE, CauseCandidate, Named
 from tribo.diagnostics.fit import Linear, ModelFit, scored, state_at
-from tribo.diagnostics.model import Acting, Setup, Target, added, effect_of, predict, setup
+from tribo.diagnostics.model import Target, added, effect_of, predict, setup
 from tribo.diagnostics.normal_equations import model_columns
 from tribo.diagnostics.observations import NO_FLAT, Observations, conditions_of
 from tribo.diagnostics.predictor import Predictor, tabled_predictor
 from tribo.diagnostics.scatter import Noise
-from tribo.diagnostics.score_statistics import StartEffects, start_effects
-from tribo.diagnostics.verdict import Misfit, NextKind, NextTest, Outcome
+from tribo.diagnostics.score_statistics import start_effects
+from tribo.diagnostics.verdict import Misfit, NextTest, Outcome
 from tribo.display import displayed
-from tribo.mechanisms.record import Conditions
+from tribo.mechanisms.record import Conditions, Mechanism
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray
 
@@ -29,6 +30,11 @@ PAPER_LAW = np.array([4.78, 23.44, 2.879, 11.89])  # mu and tau0 in kPa of the f
 TYPICAL = Noise(repeat=np.diag([0.09**2, 0.07**2]), specimen=np.array([0.05, 0.05]))
 FOUND = 3.6  # strength that chance reaches in one campaign of a hundred, over all contrasts
 NINE_IN_TEN = FOUND + 1.28
+HOURS_PER_PULL = 7.0 / 60.0
+PULLS = 18
+
+
+WhyNot = Literal["", "absorbed", "not varied", "in the trace"]
 
 
 @dataclass(frozen=True)
@@ -45,7 +51,7 @@ class Finding:
     unit: str
     effect_percent: float
     confused_with: tuple[str, ...]
-    why: Literal["", "absorbed", "not varied", "in the trace"]
+    why: WhyNot
     separates: str
 
 
@@ -74,22 +80,63 @@ def plan_design(
     campaign : Campaign
         The planned tests with the conditions under which they will be made.
     noise : Noise
-        Expected standard deviations of ln T: repeats (2, 2), gains and slopes of specimens (2,).
+        Expected scatter of ln T: the covariance of repeats (2, 2), static first, and the standard deviations of gains
+        and slopes of specimens (2,).
     law : array (4,)
-        Expected flat law: mu and tau0 in kPa, static then sliding.
+        Expected law of the flat sample: mu and tau0 in kPa, static then sliding.
+    predictor : Predictor, optional
+        Shares of the flat law per sample; those tabulated from simulations by default.
+
+    Returns
+    -------
+    Plan
+        ``findings``, one a mechanism, the easiest to find first, and ``tied``, the sets that the design confuses.
+
+    Raises
+    ------
+    KeyError
+        ``predictor`` lacks a sample of the campaign.
+
+    Examples
+    --------
+    >>> plan = tribo.plan_design(tribo.load_campaign("data/example"))
+    >>> easiest = plan.findings[0]
+    >>> easiest.effect_percent < 20  # change of T that is found nine times in ten
+    True
     """
     f = expected_fit(campaign, noise, law, predictor)
     effects = start_effects(f)
-    first = _one_each(effects)
-    acting = [effects.acting[k] for k in first]
-    columns = np.concatenate([added(effects.changes.courses[k]) for k in first], axis=2)
+    first: dict[str, int] = {}  # choice of every mechanism, and every column
+    for k, a in enumerate(effects.acting):
+        first.setdefault(a.name, k)
+    acting = [effects.acting[k] for k in first.values()]
+    columns = np.concatenate([added(effects.changes.courses[k]) for k in first.values()], axis=2)
     left = f.linear.cleared(columns)[0]
-    size = np.sqrt(np.sum(left**2, axis=0))
-    cosine = (left.T @ left) / np.maximum(size[:, None] * size[None, :], 1e-12)
-    shown = f.linear.beyond_law(columns)
-    order = np.argsort(-size / np.maximum(np.ptp(shown, axis=(0, 1)), 1e-12))
-    found = [_finding(k, acting, shown, size, cosine, effects.absorbed) for k in order]
-    return Plan(f.setup.observations.n, (*found, *_not_applying(f.setup)))
+    length = np.sqrt(np.sum(left**2, axis=0))
+    cosine = (left.T @ left) / np.maximum(length[:, None] * length[None, :], 1e-12)
+    size = np.ptp(f.linear.beyond_law(columns), axis=(0, 1))
+    findings = []
+    for k in np.argsort(-length / np.maximum(size, 1e-12)):
+        name, m = acting[k].name, acting[k].mechanism
+        if name in effects.absorbed:
+            findings.append(_not_found(name, m, "absorbed"))
+            continue
+        times = NINE_IN_TEN / max(float(length[k]), 1e-12)
+        alike = [acting[j].name for j in np.flatnonzero(np.abs(cosine[k]) >= ALIKE) if j != k]
+        alike = [other for other in alike if other not in effects.absorbed]
+        percent = 100.0 * float(np.expm1(min(times * float(size[k]), 5.0)))
+        amplitude = times * m.amplitude.start
+        findings.append(Finding(name, amplitude, m.amplitude.unit, percent, tuple(alike), "", m.separates))
+    for m in MECHANISMS.values():
+        if not m.applies(f.setup.observations.conditions):
+            findings.append(_not_found(m.name, m, "not varied"))
+        elif not m.changes_forces:
+            findings.append(_not_found(m.name, m, "in the trace"))
+    return Plan(f.setup.observations.n, tuple(findings))
+
+
+def _not_found(name: str, m: Mechanism, why: WhyNot) -> Finding:
+    return Finding(name, math.nan, m.amplitude.unit, math.nan, (), why, m.separates)
 
 
 def expected_fit(campaign: Campaign, noise: Noise, law: FloatArray, predictor: Predictor | None) -> ModelFit:
@@ -114,50 +161,6 @@ def expected_fit(campaign: Campaign, noise: Noise, law: FloatArray, predictor: P
     return ModelFit(s, (), law, (), noise, state.effects, state.residual, score, linear.inverse, linear)
 
 
-def _one_each(effects: StartEffects) -> list[int]:
-    """The first choice of every mechanism, and every column."""
-    seen: dict[str, int] = {}
-    for k, a in enumerate(effects.acting):
-        seen.setdefault(a.name, k)
-    return list(seen.values())
-
-
-def _finding(
-    k: int,
-    acting: list[Acting],
-    columns: FloatArray,
-    size: FloatArray,
-    cosine: FloatArray,
-    hidden: frozenset[str],
-) -> Finding:
-    a = acting[k]
-    m = a.mechanism
-    if a.name in hidden:
-        return Finding(a.name, float("nan"), m.amplitude.unit, float("nan"), (), "absorbed", m.separates)
-    times = NINE_IN_TEN / max(float(size[k]), 1e-12)
-    alike = [
-        acting[j].name for j in np.flatnonzero(np.abs(cosine[k]) >= ALIKE) if j != k and acting[j].name not in hidden
-    ]
-    percent = 100.0 * float(np.expm1(min(times * float(np.ptp(columns[:, :, k])), 5.0)))
-    return Finding(a.name, times * m.amplitude.start, m.amplitude.unit, percent, tuple(alike), "", m.separates)
-
-
-def _not_applying(s: Setup) -> list[Finding]:
-    """Mechanisms whose columns this design does not vary, or that do not show in the friction forces."""
-    found = []
-    for m in MECHANISMS.values():
-        varied = m.applies(s.observations.conditions)
-        if varied and m.changes_forces:
-            continue
-        why: Literal["in the trace", "not varied"] = "in the trace" if varied else "not varied"
-        found.append(Finding(m.name, float("nan"), m.amplitude.unit, float("nan"), (), why, m.separates))
-    return found
-
-
-HOURS_PER_PULL = 7.0 / 60.0
-PULLS = 18
-
-
 def next_test_of(
     named: Named | None, outcome: Outcome, misfits: Sequence[Misfit], conditions: Conditions
 ) -> NextTest | None:
@@ -176,13 +179,51 @@ def next_test_of(
 
 
 def next_test(tied: Sequence[CauseCandidate]) -> NextTest | None:
-    """The test with the most expected bits per hour between the two best of ``tied``; None for fewer than two."""
+    """The test with the most expected bits per hour between the two best of ``tied``; None for fewer than two.
+
+    Options: the amplitude of one of the two is measured; pulls of the most affected sample are repeated with one of
+    the two removed (cavities vented, wire lowered); more pulls are made of one sample at one load, also half the lowest
+    and twice the highest measured.
+    """
     if len(tied) < 2:
         return None
     first, second = tied[0], tied[1]
-    options = [*_direct(first, second), *_without(first, second), *_loads(first, second)]
-    best = max(options, key=lambda option: option.expected_bits / float(option.design["hours"]))
-    return best
+    separates = first.name, second.name
+    options = []
+    for candidate in (first, second):
+        acting, m = candidate.acting, candidate.acting.mechanism.measurement
+        if m is not None and acting.measured is None:
+            size = acting.mechanism.amplitude
+            measured = ":".join(filter(None, (acting.mechanism.name, acting.choice)))
+            design: dict[str, Any] = {"measure": measured, "parameter": size.name, "unit": size.unit}
+            design |= {"uncertainty": m.uncertainty, "hours": m.hours}
+            distance2 = float(((candidate.values[0] - size.zero) / m.uncertainty) ** 2)
+            options.append(NextTest("measure", separates, design, bits(distance2)))
+    for candidate in (first, second):
+        f = candidate.fit
+        if not candidate.acting.mechanism.removed_by:
+            continue
+        change = effect_of(f.setup, f.law, candidate.acting, candidate.values)
+        sample = f.setup.observations.conditions.sample
+        strongest = max(set(sample.tolist()), key=lambda name: np.abs(change[sample == name]).mean())
+        rows = np.flatnonzero(sample == strongest)
+        rows = rows[np.argsort(-np.abs(change[rows]).sum(axis=1))][:PULLS]
+        test_ids = [str(name) for name in f.setup.observations.test_ids[rows]]
+        design = {"without": candidate.acting.mechanism.name, "sample": strongest, "repeat_tests": test_ids}
+        design |= {"pulls": len(rows), "hours": 1.0 + len(rows) * HOURS_PER_PULL}
+        options.append(NextTest("remove", separates, design, bits(_distance2(f, change[rows], rows))))
+    conditions = first.fit.setup.observations.conditions
+    loads = np.unique(np.round(conditions.normal_load_N, 5))
+    for name in np.unique(conditions.sample):
+        rows = np.resize(np.flatnonzero(conditions.sample == name), PULLS)
+        for load in (loads[0] / 2, loads[0], loads[-1], loads[-1] * 2):
+            difference = _predicted_at(first.fit, rows, load) - _predicted_at(second.fit, rows, load)
+            design = {"sample": str(name), "normal_load_N": float(load), "pulls": PULLS}
+            design["hours"] = PULLS * HOURS_PER_PULL
+            options.append(
+                NextTest("pull further", separates, design, bits(_distance2(first.fit, difference, rows)))
+            )
+    return max(options, key=lambda option: option.expected_bits / float(option.design["hours"]))
 
 
 def first_test_of(covariate: str) -> NextTest:
@@ -213,66 +254,6 @@ def bits(distance2: float) -> float:
     return float(np.clip(1.0 - lost, 0.0, 1.0))
 
 
-def _direct(first: CauseCandidate, second: CauseCandidate) -> list[NextTest]:
-    """Measuring the amplitude of one of the two: it is there, or it is not."""
-    found = []
-    for candidate in (first, second):
-        m = candidate.acting.mechanism.measurement
-        if m is not None and candidate.acting.measured is None:
-            acting, size = candidate.acting, candidate.acting.mechanism.amplitude
-            information = bits(float(((candidate.values[0] - size.zero) / m.uncertainty) ** 2))
-            measured = ":".join(filter(None, (acting.mechanism.name, acting.choice)))
-            design = {"measure": measured, "parameter": size.name, "unit": size.unit, "uncertainty": m.uncertainty}
-            design["hours"] = m.hours
-            found.append(_named("measure", first, second, design, information))
-    return found
-
-
-def _without(first: CauseCandidate, second: CauseCandidate) -> list[NextTest]:
-    """Repeating pulls of the most affected sample with one of the two removed (cavities vented, wire lowered)."""
-    found = []
-    for candidate in (first, second):
-        m, f = candidate.acting.mechanism, candidate.fit
-        if not m.removed_by:
-            continue
-        change = effect_of(f.setup, f.law, candidate.acting, candidate.values)
-        conditions = f.setup.observations.conditions
-        strongest = max(set(conditions.sample.tolist()), key=lambda n: np.abs(change[conditions.sample == n]).mean())
-        rows = np.flatnonzero(conditions.sample == strongest)
-        rows = rows[np.argsort(-np.abs(change[rows]).sum(axis=1))][:PULLS]
-        design = {"without": m.name, "sample": strongest, "repeat_tests": _test_ids(f, rows), "pulls": len(rows)}
-        design["hours"] = 1.0 + len(rows) * HOURS_PER_PULL
-        found.append(_named("remove", first, second, design, bits(_distance2(f, change[rows], rows))))
-    return found
-
-
-def _test_ids(f: ModelFit, rows: np.ndarray) -> list[str]:
-    return [str(name) for name in f.setup.observations.test_ids[rows]]
-
-
-def _loads(first: CauseCandidate, second: CauseCandidate) -> list[NextTest]:
-    """More pulls of one sample at one load, also half the lowest and twice the highest measured."""
-    conditions = first.fit.setup.observations.conditions
-    loads = np.unique(np.round(conditions.normal_load_N, 5))
-    found = []
-    for sample in np.unique(conditions.sample):
-        rows = np.resize(np.flatnonzero(conditions.sample == sample), PULLS)
-        for load in (loads[0] / 2, loads[0], loads[-1], loads[-1] * 2):
-            difference = _predicted_at(first.fit, rows, load) - _predicted_at(second.fit, rows, load)
-            design = {"sample": str(sample), "normal_load_N": float(load), "pulls": PULLS}
-            design["hours"] = PULLS * HOURS_PER_PULL
-            found.append(
-                _named("pull further", first, second, design, bits(_distance2(first.fit, difference, rows)))
-            )
-    return found
-
-
-def _named(
-    kind: NextKind, first: CauseCandidate, second: CauseCandidate, design: Mapping[str, Any], information: float
-) -> NextTest:
-    return NextTest(kind, (first.name, second.name), design, information)
-
-
 def _predicted_at(f: ModelFit, rows: np.ndarray, load_N: float) -> FloatArray:
     """ln T of the tests ``rows`` had they been made under another load."""
     s = f.setup
@@ -284,8 +265,6 @@ def _predicted_at(f: ModelFit, rows: np.ndarray, load_N: float) -> FloatArray:
 
 def _distance2(f: ModelFit, difference: FloatArray, rows: np.ndarray) -> float:
     """Squared difference of two predictions in units of the noise of further pulls on the same specimens."""
-    from scipy.linalg import block_diag
-
     s = f.setup
     noise = block_diag(*f.noise.per_test(s)[rows])
     effects = s.random_effects.take(rows)

@@ -1,12 +1,9 @@
-"""The bundled record of what the spring-block model makes of known patterns, and of how wrong it may be.
-
-``data/pattern_shares`` says how both files were made; docs/results/model-error.md says what the numbers mean.
-
-The quick predictor: what the spring-block model makes of a pattern, as shares of the flat law.
+"""The quick predictor: what the spring-block model makes of a pattern, as shares of the flat law, and its error.
 
 The thresholds of all blocks scale together, so the model's law of a pattern is that of the flat sample times
-four numbers: T = (m mu) N + (a tau0) A in each regime. They come from the bundled table of simulated patterns
-(:mod:`tribo.diagnostics.predictor`) or from an ensemble of the campaign's own.
+four numbers: T = (m mu) N + (a tau0) A in each regime. They come from the bundled table of simulated patterns or from
+an ensemble of the campaign's own. ``data/pattern_shares`` says how its files were made; docs/results/model-error.md
+says what the numbers mean.
 """
 
 from __future__ import annotations
@@ -58,14 +55,17 @@ class ErrorSize:
 
     def with_(self, other: ErrorSize) -> ErrorSize:
         """Both errors at once, independent of each other."""
-        return ErrorSize(
-            _both(self.offset, other.offset), _both(self.slope, other.slope), _both(self.curve, other.curve)
-        )
 
+        def both(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
+            static, sliding = ((x * x + y * y) ** 0.5 for x, y in zip(a, b, strict=True))
+            return static, sliding
 
-def _both(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
-    static, sliding = ((x * x + y * y) ** 0.5 for x, y in zip(a, b, strict=True))
-    return static, sliding
+        return ErrorSize(both(self.offset, other.offset), both(self.slope, other.slope), both(self.curve, other.curve))
+
+    def scaled(self, factor: float) -> ErrorSize:
+        """The error ``factor`` times as large."""
+        offset, slope, curve = ((factor * v[0], factor * v[1]) for v in (self.offset, self.slope, self.curve))
+        return ErrorSize(offset, slope, curve)
 
 
 NO_ERROR = ErrorSize((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
@@ -75,8 +75,17 @@ NO_ERROR = ErrorSize((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
 def simulated_patterns() -> tuple[TabledPattern, ...]:
     """The patterns of ``laws.csv``, without the flat sample."""
     rows = _rows("laws.csv")
-    samples = dict.fromkeys(row["sample"] for row in rows if row["cavity"] != "none")
-    return tuple(_tabled([row for row in rows if row["sample"] == s]) for s in samples)
+    patterns = []
+    for sample in dict.fromkeys(row["sample"] for row in rows if row["cavity"] != "none"):
+        own = [row for row in rows if row["sample"] == sample]
+        row = own[0]
+        size_x, size_y, pitch_x, pitch_y = (
+            float(row[f"{name}_{axis}_um"]) * UM for name in ("size", "pitch") for axis in ("x", "y")
+        )
+        name = sample.removesuffix(row["direction"])
+        pattern = Pattern(name, row["cavity"], (size_x, size_y), (pitch_x, pitch_y), row["staggered"] == "1")
+        patterns.append(TabledPattern(sample, pattern, row["direction"], _four(own, LAW), _four(own, SHARES)))
+    return tuple(patterns)
 
 
 @cache
@@ -109,16 +118,6 @@ def _rows(name: str) -> list[dict[str, str]]:
         return list(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
-def _tabled(rows: list[dict[str, str]]) -> TabledPattern:
-    row = rows[0]
-    size_x, size_y, pitch_x, pitch_y = (
-        float(row[f"{name}_{axis}_um"]) * UM for name in ("size", "pitch") for axis in ("x", "y")
-    )
-    name = row["sample"].removesuffix(row["direction"])
-    pattern = Pattern(name, row["cavity"], (size_x, size_y), (pitch_x, pitch_y), row["staggered"] == "1")
-    return TabledPattern(row["sample"], pattern, row["direction"], _four(rows, LAW), _four(rows, SHARES))
-
-
 def _four(rows: list[dict[str, str]], columns: tuple[str, str]) -> Law:
     by_regime = {row["regime"]: row for row in rows}
     a, b, c, d = (float(by_regime[regime][name]) for regime in REGIMES for name in columns)
@@ -132,16 +131,13 @@ ALIKE = 0.02  # by which the lengths of a pattern may differ from those of a sim
 @displayed()
 @dataclass(frozen=True)
 class Predictor:
-    """Shares of the flat law per sample and the model's own error, as standard deviations of ln T.
+    """Shares of the flat law per sample and the model's own ``error``; a flat sample has none.
 
-    ``offset``, ``slope`` (per e-fold of pressure) and ``curve`` (per squared e-fold) hold (static, sliding) per
-    sample; a flat sample has none.
+    ``source`` says where the shares come from.
     """
 
     shares: Mapping[str, Law]
-    offset: Mapping[str, tuple[float, float]]
-    slope: Mapping[str, tuple[float, float]]
-    curve: Mapping[str, tuple[float, float]]
+    error: Mapping[str, ErrorSize]
     source: str
 
     def scaled(self, factor: float) -> Predictor:
@@ -154,9 +150,7 @@ class Predictor:
         """
         if not factor >= 0.0:
             raise ValueError(f"the error of the model is scaled by {factor}, allowed is a factor of 0 or more")
-        sizes = (self.offset, self.slope, self.curve)
-        offset, slope, curve = ({s: (factor * v[0], factor * v[1]) for s, v in size.items()} for size in sizes)
-        return replace(self, offset=offset, slope=slope, curve=curve)
+        return replace(self, error={sample: error.scaled(factor) for sample, error in self.error.items()})
 
     def table(self, samples: FloatArray | np.ndarray) -> FloatArray:
         """Shares of every test, shape (n, 4)."""
@@ -209,24 +203,16 @@ def _law_of_runs(rows: pd.DataFrame, area_m2: float) -> FloatArray:
 def _with_error(
     patterns: Mapping[str, Pattern], shares: Mapping[str, Law], source: str, simulated: Collection[str] = ()
 ) -> Predictor:
-    error = {name: _error(name, pattern, name in simulated) for name, pattern in patterns.items()}
-    return Predictor(
-        shares={**shares, "flat": (1.0, 1.0, 1.0, 1.0)},
-        offset={name: e.offset for name, e in error.items()},
-        slope={name: e.slope for name, e in error.items()},
-        curve={name: e.curve for name, e in error.items()},
-        source=source,
-    )
-
-
-def _error(name: str, pattern: Pattern, simulated: bool) -> ErrorSize:
-    """None for a flat sample, that of the model for a pattern that was simulated, more for one that is interpolated."""
-    if pattern.area_fraction == 1.0:
-        return NO_ERROR
-    known = error_sizes()
-    if simulated or _simulated_as(name, pattern) is not None:
-        return known["total"]
-    return known["total"].with_(known["interpolation"])
+    """With that of the model for a pattern that was simulated, more for one that is interpolated."""
+    known, error = error_sizes(), {}
+    for name, pattern in patterns.items():
+        if pattern.area_fraction == 1.0:
+            error[name] = NO_ERROR
+        elif name in simulated or _simulated_as(name, pattern) is not None:
+            error[name] = known["total"]
+        else:
+            error[name] = known["total"].with_(known["interpolation"])
+    return Predictor({**shares, "flat": (1.0, 1.0, 1.0, 1.0)}, error, source)
 
 
 def _shares(name: str, pattern: Pattern) -> Law:
