@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
-from made_campaigns import DIALECTS, MadeCampaign, write_made
 from on_the_command_line import run
+from support.campaigns import DIALECTS, MadeCampaign, small, write_made
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
@@ -84,16 +84,8 @@ def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
 @pytest.fixture(scope="session")
 def small_campaign(once: Once) -> Path:
     """A campaign of 24 pulls of the virtual tribometer: samples F and B, three specimens, two loads, two repeats."""
-    from support.sled import SledDesign, SledLaw, write_campaign
-
-    laws = {"F": SledLaw(4.8, 23e3, 2.9, 12e3), "B": SledLaw(3.6, 10e3, 2.9, 6e3)}
-    toml = (
-        '[campaign]\ntitle = "small"\nnominal_area_mm2 = 55.0\nslider_mass_g = 1.5\n'
-        '[patterns.F]\ncavity = "none"\n'
-        '[patterns.B]\ncavity = "circle"\ndiameter_um = 10.0\npitch_um = [15.0, 15.0]\n'
-    )
-    design = SledDesign(laws, masses_g=(25.0, 138.5))
-    return once("small", lambda folder: write_campaign(folder / "campaign", design, toml, seed=7)) / "campaign"
+    made = once("small", lambda folder: small(folder / "campaign", 7, title="small", specimens=3, repeats=2))
+    return made / "campaign"
 
 
 @pytest.fixture(scope="session")

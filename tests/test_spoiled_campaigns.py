@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from made_campaigns import DIALECTS, MadeCampaign
+from support.campaigns import DIALECTS, MadeCampaign
 
 from tribo.campaign import load_campaign
 from tribo.stages import ingest

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from made_campaigns import DIALECTS, MadeCampaign
+from support.campaigns import DIALECTS, MadeCampaign, written
 
 from tribo.campaign import load_campaign, open_campaign, write_template
 from tribo.errors import CampaignError, Problem
@@ -50,8 +50,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def write(folder: Path, rows: list[str], toml: str = TOML, header: str = HEADER) -> None:
-    (folder / "campaign.toml").write_text(toml)
-    (folder / "tests.csv").write_text("\n".join([header, *rows]) + "\n")
+    written(folder, toml, [header, *rows])
 
 
 def faults_of_a_row(folder: Path, row: str, header: str = HEADER) -> list[Problem]:

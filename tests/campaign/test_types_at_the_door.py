@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from support.campaigns import written
 
 from tribo.campaign import load_campaign
 from tribo.campaign.table import order_of, parsed
@@ -18,12 +19,7 @@ IDS = ("001", "1", "1.0", "1e5", "01", "+1", "1e05", "nan", "inf", "None", "True
 
 
 def write(folder: Path, rows: list[str], toml: str = TOML, header: str = HEADER) -> Path:
-    (folder / "raw").mkdir(exist_ok=True)
-    for k in range(1, 20):
-        (folder / "raw" / f"{k}.csv").write_text("1,2\n3,4\n5,6\n")
-    (folder / "campaign.toml").write_text(toml)
-    (folder / "tests.csv").write_text("\n".join([header, *rows]) + "\n")
-    return folder
+    return written(folder, toml, [header, *rows], {f"{k}.csv": "1,2\n3,4\n5,6\n" for k in range(1, 20)})
 
 
 def row(k: int, **cells: object) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
+from support.campaigns import FLAT_TOML, written
 
 from tribo.campaign import load_campaign
 from tribo.campaign.load import with_zeros
@@ -19,18 +20,15 @@ RATE = 50.0
 
 def campaign(folder: Path, of_campaign: str = "", of_test: str = "") -> Path:
     """Three pulls whose force before contact is 0.4 N; the second has a zero of its own."""
-    (folder / "raw").mkdir(parents=True)
+    exports = {}
     for k in range(3):
         noise = 0.01 * np.random.default_rng(k).standard_normal(900)
         force = np.concatenate([np.full(150, 0.4), np.linspace(0.4, 3.4, 50), np.full(700, 2.4)]) + noise
         rows = (f"{t:.2f},{f:.4f}" for t, f in zip(np.arange(900) / RATE, force, strict=True))
-        (folder / "raw" / f"T{k}.csv").write_text("\n".join(["time [s],force [N]", *rows]) + "\n")
+        exports[f"T{k}.csv"] = "\n".join(["time [s],force [N]", *rows]) + "\n"
     tests = [f"T{k},raw/T{k}.csv,F,F1,{k + 1},{of_test if k == 1 else ''}" for k in range(3)]
     header = "test_id,file,sample,specimen,normal_load_N,zero"
-    (folder / "tests.csv").write_text("\n".join([header, *tests]) + "\n")
-    table = '[campaign]\ntitle = "zeros"\nnominal_area_mm2 = 55.0\n'
-    (folder / "campaign.toml").write_text(f'{table}{of_campaign}\n[patterns.F]\ncavity = "none"\n')
-    return folder
+    return written(folder, FLAT_TOML.format(title="zeros", more=of_campaign), [header, *tests], exports)
 
 
 def zeros(folder: Path, out: Path, *options: str) -> list[float]:

@@ -7,17 +7,6 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-CAMPAIGN_TOML = """[campaign]
-title = "small"
-nominal_area_mm2 = 55.0
-slider_mass_g = 1.5
-[patterns.F]
-cavity = "none"
-[patterns.B]
-cavity = "circle"
-diameter_um = 10.0
-pitch_um = [15.0, 15.0]
-"""
 DESIGN_TOML = """samples = ["F", "B"]
 pressures_kPa = [20.0]
 repeats = 2
@@ -61,12 +50,10 @@ class Place:
 
 def write_inputs(root: Path) -> Place:
     """Campaign, folder of campaigns and design below ``root``; the same bytes every time."""
-    from support.sled import SledDesign, SledLaw, write_campaign
+    from support.campaigns import small
 
     place = Place(root.resolve())
-    laws = {"F": SledLaw(4.8, 23e3, 2.9, 12e3), "B": SledLaw(3.6, 10e3, 2.9, 6e3)}
-    design = SledDesign(laws, masses_g=(25.0, 138.5), specimens=3, repeats=1)
-    write_campaign(place.campaign, design, CAMPAIGN_TOML, seed=7)
+    small(place.campaign, 7, title="small", specimens=3)
     shutil.copytree(place.campaign, place.drop / "monday")
     place.design.parent.mkdir(parents=True)
     place.design.write_text(DESIGN_TOML, encoding="utf-8")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 import pytest
-from made_campaigns import MadeCampaign
+from support.campaigns import MadeCampaign
 
 from tribo import stages
 from tribo.campaign import load_campaign

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_campaigns import DESIGN, DIALECTS, LAWS, MadeCampaign, write_made
 from other_fits import fit_power_law
+from support.campaigns import DESIGN, DIALECTS, LAWS, MadeCampaign, write_made
 from support.sled import SledLaw
 
 from tribo.campaign import load_campaign

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from support.campaigns import written
 
 import tribo
 from tribo import stages
@@ -66,17 +67,15 @@ def with_a_stop() -> np.ndarray:
 
 def ingested(folder: Path, record: np.ndarray, choices: dict[str, str], stated: str = "", **cells: object) -> Ingested:
     """A campaign of one export: a test for each choice of it, with what its row and campaign.toml state."""
-    (folder / "raw").mkdir(parents=True, exist_ok=True)
+    exports = {}
     rows = "\n".join("\t".join(f"{v:.6f}" for v in row) for row in record)
     columns = {"normal_load_N": "", **cells}
     lines = [",".join(["test_id", "file", "sample", *columns])]
     for k, (test_id, choice) in enumerate(choices.items()):
-        (folder / "raw" / f"{k}.txt").write_text(f"Time [s]\tFriction [N]\tNormal force [N]\n{rows}\n")
+        exports[f"{k}.txt"] = f"Time [s]\tFriction [N]\tNormal force [N]\n{rows}\n"
         stated_cells = (f'"{v}"' if v != "" else "" for v in columns.values())
         lines.append(",".join([test_id, f"raw/{k}.txt{choice}", "F", *stated_cells]))
-    (folder / "campaign.toml").write_text(TOML.format(stated=stated))
-    (folder / "tests.csv").write_text("\n".join(lines) + "\n")
-    return stages.ingest(load_campaign(folder))
+    return stages.ingest(load_campaign(written(folder, TOML.format(stated=stated), lines, exports)))
 
 
 def by_choice(folder: Path, record: np.ndarray, stated: str = "", **cells: object) -> list[Pull]:

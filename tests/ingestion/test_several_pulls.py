@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from support.campaigns import written
 
 from tribo import stages
 from tribo.campaign import load_campaign
@@ -54,13 +55,11 @@ def umt_text(table: np.ndarray) -> str:
 
 
 def write_campaign(root: Path, rows: list[str], header: str = HEADER) -> Campaign:
-    (root / "raw").mkdir(exist_ok=True)
+    exports = {}
     for k, scale in enumerate((0.98, 1.0, 1.02)):
         table = strokes((1.0, 2.0, 4.0), 4, scale, 0.15, seed=k)
-        (root / "raw" / f"F{k + 1}.csv").write_text(umt_text(table))
-    (root / "campaign.toml").write_text(TOML)
-    (root / "tests.csv").write_text("\n".join([header, *rows]) + "\n")
-    return load_campaign(root)
+        exports[f"F{k + 1}.csv"] = umt_text(table)
+    return load_campaign(written(root, TOML, [header, *rows], exports))
 
 
 @pytest.fixture(scope="module")

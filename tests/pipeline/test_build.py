@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from support.campaigns import SMALL_TOML, small
 
-from pipeline.campaigns import TOML, small
 from pipeline.quick_starts import quick_starts
 
 pytest.importorskip("snakemake")
@@ -282,7 +282,7 @@ def test_an_unusable_campaign_is_named_and_keeps_no_other_back(tmp_path: Path) -
     lab = Lab(tmp_path / "drop", tmp_path / "site")
     folder = lab.drop / "broken"
     folder.mkdir(parents=True)
-    (folder / "campaign.toml").write_text(TOML.format(title="x"))
+    (folder / "campaign.toml").write_text(SMALL_TOML.format(title="x"))
     (folder / "tests.csv").write_text("test_id,file,sample,mass_g\nT1,raw/T1.csv,F,5\n")
     first = lab.build()
     assert (first.status, first.said["status"]) == (3, {"broken": "unusable"})

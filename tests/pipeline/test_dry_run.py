@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from support.campaigns import age, small
 
-from pipeline.campaigns import age, small
 from tribo.cli import main
 
 pytest.importorskip("snakemake")

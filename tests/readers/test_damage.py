@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
-from made_campaigns import DIALECTS as MADE_DIALECTS, MadeCampaign
+from support.campaigns import DIALECTS as MADE_DIALECTS, MadeCampaign
 
 from tribo.errors import Problem, ReadError
 from tribo.readers import read_export

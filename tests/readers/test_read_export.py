@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings, strategies as st
-from made_campaigns import MadeCampaign
+from support.campaigns import MadeCampaign
 
 from tribo.errors import ReadError
 from tribo.readers import READERS, columns_from_text, inspect_export, read_export

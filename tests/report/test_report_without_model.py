@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
+from support.campaigns import written
 
 from tribo.cli import main
 
@@ -17,7 +18,7 @@ RATE = 50.0
 
 def write(folder: Path, loads: tuple[float, ...], area: str = "") -> Path:
     """Twelve pulls of a flat sample and their runs; the seventh record slides from its first sample."""
-    (folder / "raw").mkdir(parents=True)
+    exports = {}
     rows = ["test_id,file,sample,specimen,normal_load_N,run_order"]
     for k in range(12):
         load = loads[k % len(loads)]
@@ -27,11 +28,10 @@ def write(folder: Path, loads: tuple[float, ...], area: str = "") -> Path:
             600 + sum(map(len, rest))
         )
         lines = (f"{t:.2f},{f:.5f}" for t, f in zip(np.arange(force.size) / RATE, force, strict=True))
-        (folder / "raw" / f"T{k}.csv").write_text("\n".join(["time [s],force [N]", *lines]) + "\n")
+        exports[f"T{k}.csv"] = "\n".join(["time [s],force [N]", *lines]) + "\n"
         rows.append(f"T{k},raw/T{k}.csv,F,F{k % 3},{load},{k}")
-    (folder / "tests.csv").write_text("\n".join(rows) + "\n")
-    (folder / "campaign.toml").write_text(f'[campaign]\ntitle = "flat"\n{area}\n[patterns.F]\ncavity = "none"\n')
-    return folder
+    toml = f'[campaign]\ntitle = "flat"\n{area}\n[patterns.F]\ncavity = "none"\n'
+    return written(folder, toml, rows, exports)
 
 
 def report(folder: Path, out: Path, *options: str) -> str:

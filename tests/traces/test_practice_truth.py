@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from made_campaigns import DIALECTS, MadeCampaign
+from support.campaigns import DIALECTS, MadeCampaign
 
 from tribo import read_pull
 from tribo.errors import TriboError

@@ -1,14 +1,52 @@
-"""Whole campaigns of the virtual tribometer in four dialects, with the forces and the law they were made with."""
+"""The one builder of test campaigns: rows and exports as given, or pulls of the virtual sled with their truth."""
 
 from __future__ import annotations
 
+import os
+import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+
 from support.sled import EXPORTERS, SledDesign, SledLaw, SledTribometer, write_campaign
+
+FLAT_TOML = '[campaign]\ntitle = "{title}"\nnominal_area_mm2 = 55.0\n{more}\n[patterns.F]\ncavity = "none"\n'
+SMALL_TOML = (
+    '[campaign]\ntitle = "{title}"\nnominal_area_mm2 = 55.0\nslider_mass_g = 1.5\n'
+    '[patterns.F]\ncavity = "none"\n'
+    '[patterns.B]\ncavity = "circle"\ndiameter_um = 10.0\npitch_um = [15.0, 15.0]\n'
+)
+SMALL_LAWS = {"F": SledLaw(4.8, 23e3, 2.9, 12e3), "B": SledLaw(3.6, 10e3, 2.9, 6e3)}
+
+
+def written(folder: Path, toml: str, rows: Sequence[str], exports: Mapping[str, str] | None = None) -> Path:
+    """A campaign with these texts: ``rows`` are the lines of tests.csv with its header, ``exports`` texts by name."""
+    (folder / "raw").mkdir(parents=True, exist_ok=True)
+    (folder / "campaign.toml").write_text(toml, encoding="utf-8")
+    (folder / "tests.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    for name, text in (exports or {}).items():
+        (folder / "raw" / name).write_text(text, encoding="utf-8")
+    return folder
+
+
+def small(folder: Path, seed: int, samples: str = "FB", title: str = "", **design: object) -> Path:
+    """Pulls of the virtual sled at two loads, by default once with each of two specimens of F and B."""
+    laws = {s: SMALL_LAWS[s] for s in samples}
+    chosen = SledDesign(laws, **{"masses_g": (25.0, 138.5), "specimens": 2, "repeats": 1, **design})  # type: ignore[arg-type]
+    write_campaign(folder, chosen, SMALL_TOML.format(title=title or folder.name), seed=seed)
+    return folder
+
+
+def age(path: Path, seconds: float = 3600.0) -> None:
+    """Let a file, or all files of a folder, have been written that long ago."""
+    then = time.time() - seconds
+    for file in [path, *path.rglob("*")]:
+        os.utime(file, (then, then))
+
 
 DIALECTS = ("bluehill", "testxpert", "testsuite", "delimited")
 PATTERNS = """
