@@ -1,10 +1,8 @@
-"""Broad bounds of friction tests by material class, each with its source; campaign.toml may replace any of them.
+"""Numbers of a campaign outside their broad physical bounds, each a doubt with the slip that may explain it.
 
-A bound is wide on purpose: published values lie well inside it, and slips of a unit (a factor of 10 to 1000) outside.
-
-Slips of a unit that would bring implausible numbers back into their bounds.
-
-Every number of a campaign that lies outside its broad physical bounds, as a doubt with the likely slip.
+The bounds stand here by material class, each with its source; campaign.toml may replace any of them. A bound is wide on
+purpose: published values lie well inside it, and slips of a unit (a factor of 10 to 1000) outside. A slip is likely
+where it alone brings every number back into its bounds.
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tribo.records import STANDARD_GRAVITY, Campaign, Doubt, Ingested, LawFit, Pattern
+from tribo.records import STANDARD_GRAVITY, Campaign, Doubt, Ingested, LawFit
 
 
 @dataclass(frozen=True)
@@ -247,7 +245,7 @@ _FORCES = (
 )
 
 
-_MM2, _KPA_DOUBTS, _MM, _UM, _KELVIN = 1e6, 1e-3, 1e3, 1e6, 273.15
+_MM2, _MM, _UM = 1e6, 1e3, 1e6
 _TABLE, _TOML = "tests.csv", "campaign.toml"
 _COVERAGE = 2.0  # standard uncertainties by which a fitted number must lie outside
 _MOST_SHOWN = 3
@@ -279,7 +277,7 @@ def _measured(campaign: Campaign, ingested: Ingested | None, fits: Sequence[LawF
         of = f"{fit.sample}, {fit.regime}"
         found["mu"] |= _if_resolved(fit, "mu", of, bound_of("mu", campaign), 1.0)
         if fit.has_area:
-            found["tau0_kPa"] |= _if_resolved(fit, "tau0_Pa", of, bound_of("tau0_kPa", campaign), _KPA_DOUBTS)
+            found["tau0_kPa"] |= _if_resolved(fit, "tau0_Pa", of, bound_of("tau0_kPa", campaign), _KPA)
     if ingested is not None:
         found["friction_ratio"] = _ratios(ingested)
     if campaign.has_area:
@@ -287,17 +285,20 @@ def _measured(campaign: Campaign, ingested: Ingested | None, fits: Sequence[LawF
         loads = [t.normal_load_N for t in campaign.tests if t.normal_load_N > 0]
         if loads and campaign.contact in ("", "sled"):
             found["pressure_kPa"] = {
-                name: campaign.nominal_pressure_Pa(load) * _KPA_DOUBTS
+                name: campaign.nominal_pressure_Pa(load) * _KPA
                 for name, load in (("the smallest load", min(loads)), ("the largest load", max(loads)))
             }
     return {q: by for q, by in found.items() if by}
 
 
 def _if_resolved(fit: LawFit, parameter: str, of: str, bound: Bound, unit: float) -> dict[str, float]:
-    """A fitted number; the bound itself where its uncertainty reaches back to it."""
+    """A fitted number; the bound itself where its uncertainty by specimens and repeats reaches back to it.
+
+    The combined uncertainty holds that of the loads, which is what a slip would have spoiled.
+    """
     if parameter not in fit.parameters or not math.isfinite(fit.value(parameter)):
         return {}
-    value, u = fit.value(parameter) * unit, fit.standard_uncertainty(parameter) * unit
+    value, u = fit.value(parameter) * unit, fit.by_itself.standard_uncertainty(parameter) * unit
     nearest = min(max(value, bound.low), bound.high)
     reach = _COVERAGE * u if math.isfinite(u) else 0.0
     return {of: nearest if abs(value - nearest) <= reach else value}
@@ -342,18 +343,14 @@ def _stated(campaign: Campaign) -> Iterator[Doubt]:
         ("humidity_pct", damp, lambda v: ""),
     )
     for quantity, by, slip in rules:
-        question = next((slip(v) for v in by.values() if not _plausible(campaign, quantity, v)), "")
+        bound = bound_of(quantity, campaign)
+        question = next((slip(v) for v in by.values() if not bound.low <= v <= bound.high), "")
         if doubt := _outside(campaign, quantity, by, _PLACES[quantity], f"{question}?" if question else ""):
             yield doubt
     if damp and 0 < max(damp.values()) <= 1:
         found = f"at most {max(damp.values()):g}"
         fraction = "humidity_pct looks like a fraction: multiply by 100?"
         yield Doubt("humidity_pct", _NAMES["humidity_pct"], found, "1 to 100", _PLACES["humidity_pct"], fraction)
-
-
-def _plausible(campaign: Campaign, quantity: str, value: float) -> bool:
-    bound = bound_of(quantity, campaign)
-    return bound.low <= value <= bound.high
 
 
 def _wide_pitches(campaign: Campaign) -> Iterator[Doubt]:
@@ -380,20 +377,13 @@ def _geometry(campaign: Campaign) -> Iterator[Doubt]:
             allowed = f"{SMALLEST_CAVITY_UM:g} um or more"
             slip = "the lengths look like millimetres: multiply by 1000?"
             yield Doubt("size_um", f"cavity of pattern {name}", f"{size:.4g} um", allowed, place, slip)
-        yield from _area_fraction(pattern, place)
-
-
-def _area_fraction(pattern: Pattern, place: str) -> Iterator[Doubt]:
-    measured = pattern.measured_area_fraction
-    if measured is None:
-        return
-    nominal = replace(pattern, measured_area_fraction=None).area_fraction
-    if abs(measured - nominal) <= MOST_OFF_AREA_FRACTION:
-        return
-    cavities = abs(1 - measured - nominal) <= MOST_OFF_AREA_FRACTION
-    slip = f"it looks like the fraction of the cavities: 1 - {measured:g} = {1 - measured:.3g}?" if cavities else ""
-    name, found = f"area_fraction of pattern {pattern.name}", f"{measured:g}"
-    yield Doubt("area_fraction", name, found, f"about {nominal:.2g}, from its size and pitch", place, slip)
+        measured, nominal = pattern.measured_area_fraction, replace(pattern, measured_area_fraction=None).area_fraction
+        if measured is None or abs(measured - nominal) <= MOST_OFF_AREA_FRACTION:
+            continue
+        cavities = abs(1 - measured - nominal) <= MOST_OFF_AREA_FRACTION
+        slip = f"it looks like the fraction of the cavities: 1 - {measured:g} = {1 - measured:.3g}?" if cavities else ""
+        about, of = f"about {nominal:.2g}, from its size and pitch", f"area_fraction of pattern {pattern.name}"
+        yield Doubt("area_fraction", of, f"{measured:g}", about, place, slip)
 
 
 def _load_span(campaign: Campaign) -> Iterator[Doubt]:

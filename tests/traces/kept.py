@@ -19,8 +19,7 @@ from kept_numbers import scatter, write
 from tribo import read_pull
 from tribo.errors import TraceError
 from tribo.records import Pull, Test, Trace
-from tribo.traces import RULES, pieces_of, read_pulls
-from tribo.traces.oscillation import stick_slip_cycles
+from tribo.traces import RULES, oscillation_of, pieces_of, read_pulls
 from tribo.zeroing import zero_choice
 
 from .synthetic import Shape, with_samples
@@ -152,8 +151,7 @@ def others() -> dict[str, Any]:
         for k, pull in enumerate(read_pulls(record), start=1):
             found[f"{name}, pull {k}"] = numbers(pull)
     for name, trace in cycles():
-        c = stick_slip_cycles(trace)
-        found[name] = [c.period_s, c.drop_N, c.mean_loading_N_per_s, *c.peak_s[:3], *c.trough_N[:3]]
+        found[name] = asdict(oscillation_of(trace.time_s, trace.force_N))
     return found
 
 

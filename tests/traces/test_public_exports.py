@@ -11,8 +11,7 @@ from in_one_test import in_one_test
 from tribo import read_pull
 from tribo.readers import read_blocks, read_export
 from tribo.records import Trace
-from tribo.traces import load_of, pieces_of, read_pulls, split_pulls
-from tribo.traces.oscillation import stick_slip_cycles
+from tribo.traces import load_of, oscillation_of, pieces_of, read_pulls, split_pulls
 
 GF = 9.80665e-3
 PAPER_SLIDER_N = 0.0307 * 9.80665
@@ -93,13 +92,13 @@ def paper(exports: Path, name: str) -> Trace:
 
 
 def test_paper_on_paper_sticks_slips_and_loads_at_k_v(exports: Path) -> None:
-    cycles = stick_slip_cycles(paper(exports, "k168Nm_v42"))
-    assert cycles.peak_N.size == pytest.approx(226, rel=0.05)
-    assert cycles.peak_N.mean() / PAPER_SLIDER_N == pytest.approx(0.323, abs=0.003)
-    assert cycles.peak_N.std() / PAPER_SLIDER_N == pytest.approx(0.045, abs=0.002)
-    assert cycles.trough_N.mean() / PAPER_SLIDER_N == pytest.approx(0.284, abs=0.002)
-    slope = cycles.mean_loading_N_per_s / PAPER_SLIDER_N
-    assert slope == pytest.approx(0.0237, abs=0.0003)
-    assert slope == pytest.approx(168 * 42e-6 / PAPER_SLIDER_N, rel=0.03)
-    faster = stick_slip_cycles(paper(exports, "k168Nm_v1100")).mean_loading_N_per_s
-    assert faster / cycles.mean_loading_N_per_s == pytest.approx(1100 / 42, rel=0.05)
+    slow, fast = (
+        oscillation_of(trace.time_s, trace.force_N)
+        for trace in (paper(exports, "k168Nm_v42"), paper(exports, "k168Nm_v1100"))
+    )
+    assert slow.cycles == pytest.approx(226, rel=0.05)
+    assert slow.peak_N / PAPER_SLIDER_N == pytest.approx(0.323, abs=0.004)
+    assert slow.trough_N / PAPER_SLIDER_N == pytest.approx(0.284, abs=0.004)
+    assert slow.loading_N_per_s / PAPER_SLIDER_N == pytest.approx(0.0237, abs=0.0004)
+    assert slow.loading_N_per_s == pytest.approx(168 * 42e-6, rel=0.03)
+    assert fast.loading_N_per_s / slow.loading_N_per_s == pytest.approx(1100 / 42, rel=0.05)

@@ -11,7 +11,7 @@ import pytest
 from tribo.errors import TraceError
 from tribo.records import Trace
 from tribo.traces import load_of, pieces_of, read_pulls, split_pulls
-from tribo.traces.evaluation import _slides_at_once as slides_at_once
+from tribo.traces.evaluation import _starts_sliding as starts_sliding
 from tribo.traces.phases import reversals, steps
 
 from .synthetic import Shape
@@ -185,4 +185,4 @@ def test_a_piece_slides_at_once_where_it_climbs_little_for_the_swing_of_its_seco
     """From 1 N to a top at 30 % of the piece; with a climb of 1.2 N it begins below half of its maximum."""
     k = np.arange(400)
     force = 1.0 + climb * np.exp(-(((k - 120) / 30) ** 2)) + swing * np.where(k % 40 < 20, 1.0, -1.0) * (k >= 200)
-    assert slides_at_once(force) == at_once
+    assert starts_sliding(force) == at_once

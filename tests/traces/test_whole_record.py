@@ -14,7 +14,7 @@ from tribo.records import Pull, Test, Trace
 from tribo.traces.evaluation import drive_of
 from tribo.traces.oscillation import oscillation_of
 from tribo.traces.phases import _drive_stops, _moving
-from tribo.traces.sliding import settled
+from tribo.traces.sliding import transient_end
 from tribo.traces.zero import _level
 from tribo.zeroing import zero_choice
 
@@ -285,7 +285,7 @@ def test_where_sliding_before_a_stop_drifts_the_steadiest_slide_after_it_counts(
 @pytest.mark.parametrize("size", [12, 15, 17, 19, 20, 23, 41])
 def test_a_force_has_settled_within_the_first_half_of_its_samples(size: int) -> None:
     force = 1.0 + np.exp(-np.arange(size) / (size / 6))
-    assert 0 < settled(force) <= size // 2 + 1
+    assert 0 < transient_end(force) <= size // 2 + 1
 
 
 def rotary_slide(length_m: float) -> Pull:

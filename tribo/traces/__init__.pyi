@@ -4,11 +4,7 @@ from .evaluation import (
     pieces_of as pieces_of,
     read_pulls as read_pulls,
 )
-from .oscillation import (
-    StickSlip as StickSlip,
-    oscillation_of as oscillation_of,
-    stick_slip_cycles as stick_slip_cycles,
-)
+from .oscillation import oscillation_of as oscillation_of
 from .phases import split_pulls as split_pulls
 from .rules import RULES as RULES, Rule as Rule
 from .zero import load_of as load_of

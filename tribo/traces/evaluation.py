@@ -17,13 +17,22 @@ import numpy as np
 
 from tribo.errors import Problem, TraceError
 from tribo.records import STANDARD_GRAVITY, Evaluated, FloatArray, Phase, Pull, Restart, Test, Trace
-from tribo.traces.loading import Zero, climb_of, starting_level
+from tribo.traces.loading import Zero, loading_of, starting_level
 from tribo.traces.oscillation import oscillation_of
-from tribo.traces.peak import Apex, Motion, find_apex, in_motion, left_open_N, near, static_readings, within_samples
+from tribo.traces.peak import (
+    Apex,
+    Motion,
+    find_apex,
+    in_motion,
+    left_open_N,
+    static_readings,
+    with_peak_near,
+    within_samples,
+)
 from tribo.traces.phases import Course, course_of, directions_of, piece_of, split_pulls
 from tribo.traces.rules import DEFAULT_RULE, Rule, named_rule
 from tribo.traces.signal import Signal, line, median_of_three, signal_of, steady
-from tribo.traces.sliding import Sliding, settled, slides_on_closed_track, sliding_over, window_between
+from tribo.traces.sliding import Sliding, slides_on_closed_track, sliding_over, transient_end, window_between
 from tribo.traces.zero import BEFORE_CONTACT, chosen_zero, disagreement_N, load_level, stated_zeros
 
 GIVEN = "given"  # the rule of forces that were evaluated elsewhere
@@ -116,12 +125,12 @@ def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
         signal = signal_of(trace)
         if options.begins:
             whole = (0, signal.time_s.size)
-            course = Course(whole, whole[1], (), (), options.begins == "step" and _slides_at_once(trace.force_N))
+            course = Course(whole, whole[1], (), (), options.begins == "step" and _starts_sliding(trace.force_N))
         else:
             course = course_of(trace, signal)
             zero = zero or chosen_zero(test.zero, signal.time_s, signal.force_N, course, trace.file)
             if zero is None and test.zero.kind == "before contact":  # as stated, whatever the force looks like
-                course = replace(course, slides_at_once=False)
+                course = replace(course, starts_sliding=False)
         pull = _first_motion(trace, signal, course, zero, options, rule)
         if zero and zero.drifts:
             pull = replace(pull, flags=(*pull.flags, "zero_uncertain"))
@@ -256,7 +265,7 @@ def _evaluated_elsewhere(test_id: str, forces: Evaluated) -> Pull:
     )  # fmt: skip
 
 
-def _slides_at_once(force_N: FloatArray) -> bool:
+def _starts_sliding(force_N: FloatArray) -> bool:
     """Whether a piece begins near the force it keeps: above half its maximum, and climbing little for its swing."""
     force = median_of_three(force_N)
     start, top = starting_level(force), float(force.max())
@@ -269,7 +278,7 @@ def _first_motion(
     """The first stretch of motion of a record: from rest to its peak and sliding, or sliding from its first sample."""
     samples = signal.time_s.size
     start, end = course.pieces[0]
-    sliding = course.slides_at_once and options.peak_s is None
+    sliding = course.starts_sliding and options.peak_s is None
     if sliding and end - start >= min(_FEWEST, samples):
         return _sliding(signal, (start, end), zero, options)
     piece = signal
@@ -296,16 +305,16 @@ def _from_rest(
     window_s: tuple[float, float] | None = None,
 ) -> Pull:
     """Static peak and sliding mean of a pull; each uncertainty holds a slow wander since the zero was read."""
-    climb = climb_of(signal, zero)
+    loading = loading_of(signal, zero)
     if peak_s is not None:
-        climb = near(climb, peak_s)
-    static = find_apex(climb)
-    motion = in_motion(climb, static, test.speed_m_s if test else None)
+        loading = with_peak_near(loading, peak_s)
+    static = find_apex(loading)
+    motion = in_motion(loading, static, test.speed_m_s if test else None)
     readings = static.force_N, math.nan, math.nan
     if peak_s is None:
         motion = replace(motion, apex=within_samples(motion, static))
         static = within_samples(motion, rule.static(motion, rule.parameters))
-        readings = static_readings(motion, climb.end)
+        readings = static_readings(motion, loading.end)
     window = rule.sliding(motion, rule.parameters) if window_s is None else window_between(motion.time_s, *window_s)
     sliding = sliding_over(motion, window)
     level, mean = motion.zero, sliding.mean
@@ -387,7 +396,7 @@ def _sliding(signal: Signal, span: tuple[int, int], zero: Zero | None, options: 
         what = f"only {last - first} data points of sliding"
         raise TraceError(Problem("too_short", what, allowed=f"{_FEWEST} data points or more"))
     force = signal.force_N[first:last]
-    start, speed = first + settled(force), options.test.speed_m_s if options.test else None
+    start, speed = first + transient_end(force), options.test.speed_m_s if options.test else None
     if not options.begins:
         start = max(start, first + int(_LEFT_OUT * force.size))
         if speed and slides_on_closed_track(speed * signal.time_s, span):
@@ -540,7 +549,7 @@ def _phases(pull: Pull, signal: Signal, course: Course) -> tuple[Phase, ...]:
     begin, end = float(time[course.contact[0]]), float(time[min(course.end, last)])
     stops = [(float(time[a]), float(time[b])) for a, b in course.stops]
     found = []
-    if course.touches_later:
+    if course.begins_before_contact:
         found += [Phase("approach", float(time[0]), begin), Phase("contact", begin, begin)]
     until = stops[0][0] if stops else end
     if math.isfinite(pull.peak_s):

@@ -61,7 +61,7 @@ class Rise:
 
 
 @dataclass(frozen=True)
-class Climb:
+class Loading:
     """A pull as far as its first maximum; forces of ``signal`` are counted from ``zero``, ``smooth_N`` suits the rise.
 
     ``depart`` is the index of the first sample below the loading line, at most ``lag`` samples after the line ended,
@@ -87,7 +87,7 @@ class Climb:
         return float(np.median(self.signal.smooth_N[(self.top + self.end) // 2 : self.end]))
 
 
-def climb_of(signal: Signal, zero: Zero | None = None) -> Climb:
+def loading_of(signal: Signal, zero: Zero | None = None) -> Loading:
     """Follow a pull up to its first maximum, above a ``zero`` that is known, else above the force before the rise.
 
     Raises
@@ -110,7 +110,7 @@ def climb_of(signal: Signal, zero: Zero | None = None) -> Climb:
     return _to_first_maximum(zeroed, known, rise, signal.noise_N / math.sqrt(width))
 
 
-def _to_first_maximum(signal: Signal, zero: Zero, rise: Rise, noise: float) -> Climb:
+def _to_first_maximum(signal: Signal, zero: Zero, rise: Rise, noise: float) -> Loading:
     """The climb along the loading line and beyond it; ``noise`` is that of the smoothed force."""
     time, smooth = signal.time_s, signal.smooth_N
     margin = max(5.0 * noise, 0.02 * float(smooth[rise.last]))
@@ -121,7 +121,7 @@ def _to_first_maximum(signal: Signal, zero: Zero, rise: Rise, noise: float) -> C
     if end - top < 3 and end == smooth.size:
         raise TraceError([*_no_pull(signal, 0.0, None), *signal.problems])
     reach = min(margin / per_sample, smooth.size) if per_sample > 0 else 0
-    return Climb(signal, zero, rise, depart, math.ceil(reach) + 2, top, end)
+    return Loading(signal, zero, rise, depart, math.ceil(reach) + 2, top, end)
 
 
 def _no_pull(signal: Signal, start: float, rise: Rise | None) -> list[Problem]:
@@ -149,7 +149,7 @@ def first_rise(signal: Signal, start: float) -> Rise | None:
     """The first climb through a quarter to three quarters of the first maximum-like level, or None without one.
 
     That level is the highest force before the first clear fall; where the force climbs on without one, what it reaches
-    when it leaves the pace of the first climb. ``start`` is the force the trace begins at.
+    when it leaves the pace of the first loading. ``start`` is the force the trace begins at.
     """
     time_s, smooth, noise = signal.time_s, signal.smooth_N, signal.noise_N
     full = float(smooth.max()) - start
@@ -227,8 +227,8 @@ def zero_before(signal: Signal, rise: Rise) -> Zero:
     time_s, force, noise = signal.time_s, signal.force_N, signal.noise_N
     level = float(np.median(force[: max(_FEWEST_FOR_ZERO, rise.first // 4)]))
     contact = rise.reaches(level)
-    climb = float(time_s[rise.last]) - contact
-    lasts = (int(np.searchsorted(time_s, contact - toe * climb)) for toe in _TOES)
+    climb_s = float(time_s[rise.last]) - contact
+    lasts = (int(np.searchsorted(time_s, contact - toe * climb_s)) for toe in _TOES)
     last = next((n for n in lasts if n >= _FEWEST_FOR_ZERO), 0)
     slope, middle, level = line(time_s[:last], force[:last]) if last else (math.inf, 0.0, 0.0)
     by_noise = 3.0 * noise * math.sqrt(12.0 / last) / max(time_s[last - 1] - time_s[0], 1e-300) if last else 0.0

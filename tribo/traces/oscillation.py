@@ -1,19 +1,13 @@
-"""Stick-slip as a result: peaks, troughs, drop, period, loading slope and share of time stuck; the regime named.
-
-Stick-slip cycle by cycle: force at the end of each stick and each slip, and the loading rate.
-"""
+"""Stick-slip as a result: peaks, troughs, drop, period, loading slope and share of time stuck; the regime named."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from tribo.display import displayed
-from tribo.errors import Problem, TraceError
-from tribo.records import FloatArray, Oscillation, Trace
+from tribo.records import FloatArray, Oscillation
 from tribo.traces.phases import turning_points
 from tribo.traces.signal import condense, line, noise_of, sample_noise
 
@@ -52,8 +46,12 @@ def oscillation_of(
     stick-slip, one that rises for half of it an inertial oscillation. ``drive_N_per_s`` is k v, where stiffness and
     speed are known: a slider that sticks is loaded at this rate. ``free_period_s`` is 2 pi sqrt(m/k).
     """
-    time, force = fine = _calm(time_s, force_N)
-    least = _smallest_drop(force) if smallest_drop_N is None else smallest_drop_N
+    from scipy.ndimage import median_filter, uniform_filter1d
+
+    # impulses of one or two samples are taken out by a median, which leaves slips as they are
+    calm = np.asarray(median_filter(force_N, _MEDIAN_SAMPLES, mode="nearest"), float)
+    least = _smallest_drop(calm) if smallest_drop_N is None else smallest_drop_N
+    time, force = time_s, calm
     peaks, troughs = turning_points(force, least)
     if peaks.size > _FEWEST:
         factor = int(np.median(np.diff(peaks))) // _PER_CYCLE
@@ -63,33 +61,40 @@ def oscillation_of(
     if peaks.size <= _FEWEST:
         return Oscillation("steady" if _is_steady(force_N) else "irregular", int(max(peaks.size - 1, 0)))
     troughs = np.array([a + int(np.argmin(force[a:b])) for a, b in pairwise(peaks)])
-    found = _measured(time, force, peaks, troughs, (drive_N_per_s, free_period_s))
-    stuck = _stuck(*fine, np.searchsorted(fine[0], time[peaks]), found.loading_N_per_s)
+    periods, spent = np.diff(time[peaks]), time[peaks[1:]] - time[troughs]
+    loading, loading_u = _loading(time, force, troughs, peaks[1:], spent)
+    peak, trough, drop = (_median(v) for v in (force[peaks], force[troughs], force[peaks[:-1]] - force[troughs]))
+    fine = np.searchsorted(time_s, time[peaks])
+    pace = uniform_filter1d(np.gradient(calm, time_s), max(3, int(np.median(np.diff(fine))) // _PER_CYCLE))
+    stuck = np.array([(pace[a:b] > _OF_LOADING * loading).mean() for a, b in pairwise(fine)])
+    swing, rising = drop[0] / max(abs(float(force.mean())), 1e-300), float(spent.sum() / periods.sum())
+    scatter = float(periods.std() / periods.mean())
+    period = _median(periods)
+    regime = _regime(swing, rising, scatter, period[0], loading, drive_N_per_s, free_period_s)
     if not (drive_N_per_s > 0 or free_period_s > 0):
-        found = replace(found, regime=_without_rig(found.regime, np.diff(time[peaks]), float(stuck.mean())))
-    return replace(found, stuck_share=float(stuck.mean()), stuck_share_u=float(stuck.std(ddof=1) / stuck.size**0.5))
+        # waves that do not repeat are no oscillation, and a slider that sticks does so for most of the time
+        wave = regime == "inertial oscillation" and scatter > _REPEATS
+        regime = "irregular" if wave or (regime == "stick-slip" and float(stuck.mean()) < _OF_TIME) else regime
+    return Oscillation(
+        regime, int(periods.size), *peak, *trough, *drop, *period, loading, loading_u,
+        float(stuck.mean()), float(stuck.std(ddof=1) / stuck.size**0.5),
+    )  # fmt: skip
 
 
 def _smallest_drop(force: FloatArray) -> float:
     """The least fall that counts as a slip, by the range of the force over ten cycles and by its noise."""
+
+    def spread(part: FloatArray) -> float:
+        low, high = np.percentile(part, (1.0, 99.0))
+        return float(high - low)
+
     felt = _NOISE * noise_of(force)
-    peaks, _ = turning_points(force, max(_FIRST_LOOK * _range(force), felt))
+    first_look = max(_FIRST_LOOK * spread(force), felt)
+    peaks, _ = turning_points(force, first_look)
     if peaks.size < 2 * _CYCLES_ABOUT:
-        return max(_FIRST_LOOK * _range(force), felt)
+        return first_look
     about = peaks[::_CYCLES_ABOUT]
-    return max(SMALLEST_DROP * float(np.median([_range(force[a:b]) for a, b in pairwise(about)])), felt)
-
-
-def _range(force: FloatArray) -> float:
-    low, high = np.percentile(force, (1.0, 99.0))
-    return float(high - low)
-
-
-def _calm(time_s: FloatArray, force_N: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The force with impulses of one or two samples taken out by a median, which leaves slips as they are."""
-    from scipy.ndimage import median_filter
-
-    return time_s, np.asarray(median_filter(force_N, _MEDIAN_SAMPLES, mode="nearest"), float)
+    return max(SMALLEST_DROP * float(np.median([spread(force[a:b]) for a, b in pairwise(about)])), felt)
 
 
 def _is_steady(force_N: FloatArray) -> bool:
@@ -99,29 +104,10 @@ def _is_steady(force_N: FloatArray) -> bool:
     return spread < max(5.0 * noise, 0.1 * level)
 
 
-def _measured(
-    time: FloatArray, force: FloatArray, peaks: np.ndarray, troughs: np.ndarray, rig: tuple[float, float]
-) -> Oscillation:
-    periods = np.diff(time[peaks])
-    slopes = np.array([_slope(time, force, a, b) for a, b in zip(troughs, peaks[1:], strict=True)])
-    spent = time[peaks[1:]] - time[troughs]
-    rising = float(spent.sum() / periods.sum())
-    loading, loading_u = _weighted(slopes, spent)
-    peak, trough, drop = (_median(v) for v in (force[peaks], force[troughs], force[peaks[:-1]] - force[troughs]))
-    period = _median(periods)
-    swing = drop[0] / max(abs(float(force.mean())), 1e-300)
-    scatter = float(periods.std() / periods.mean())
-    return Oscillation(
-        _regime(swing, rising, scatter, period[0], loading, rig), int(periods.size), *peak, *trough, *drop, *period,
-        loading, loading_u,
-    )  # fmt: skip
-
-
 def _regime(
-    swing: float, rising: float, scatter: float, period_s: float, loading: float, rig: tuple[float, float]
+    swing: float, rising: float, scatter: float, period_s: float, loading: float, drive: float, free_s: float
 ) -> str:
     """Name of the regime; ``swing`` is the drop over the mean, ``rising`` the share of time with a rising force."""
-    drive, free_s = rig
     if swing < _FELT:
         return "steady"
     if scatter > _IRREGULAR:
@@ -133,124 +119,24 @@ def _regime(
     return "stick-slip" if rising > _STICKS else "inertial oscillation"
 
 
-def _without_rig(regime: str, periods: FloatArray, stuck: float) -> str:
-    """The regime where neither drive nor free period is known: waves that do not repeat are no oscillation, and a
-    slider that sticks does so for most of the time."""
-    scatter = float(periods.std() / periods.mean())
-    wave = regime == "inertial oscillation" and scatter > _REPEATS
-    return "irregular" if wave or (regime == "stick-slip" and stuck < _OF_TIME) else regime
-
-
-def _slope(time: FloatArray, force: FloatArray, trough: int, peak: int) -> float:
-    """Slope of a loading, without its beginning and its very end."""
-    first, last = (trough + round(share * (peak - trough)) for share in _LOADING)
-    return line(time[first : last + 1], force[first : last + 1])[0] if last > first else math.nan
-
-
-def _weighted(slopes: FloatArray, spent: FloatArray) -> tuple[float, float]:
-    """Mean of the slopes weighted by the time spent, and its standard uncertainty."""
+def _loading(
+    time: FloatArray, force: FloatArray, troughs: np.ndarray, peaks: np.ndarray, spent: FloatArray
+) -> tuple[float, float]:
+    """Mean slope of the loadings without their beginnings and very ends, by the time spent; standard uncertainty."""
+    slopes = []
+    for trough, peak in zip(troughs, peaks, strict=True):
+        first, last = (trough + round(share * (peak - trough)) for share in _LOADING)
+        slopes.append(line(time[first : last + 1], force[first : last + 1])[0] if last > first else math.nan)
     known = np.isfinite(slopes)
     if not known.any():
         return math.nan, math.nan
-    values, weights = slopes[known], spent[known] / spent[known].sum()
+    values, weights = np.array(slopes)[known], spent[known] / spent[known].sum()
     mean = float(weights @ values)
     return mean, math.sqrt(float(weights**2 @ (values - mean) ** 2))
 
 
-def _stuck(time: FloatArray, force: FloatArray, peaks: np.ndarray, loading: float) -> FloatArray:
-    """Share of each cycle in which the force rises at half the loading slope or more: the slider is stuck."""
-    from scipy.ndimage import uniform_filter1d
-
-    width = max(3, int(np.median(np.diff(peaks))) // _PER_CYCLE)
-    pace = uniform_filter1d(np.gradient(force, time), width)
-    return np.array([(pace[a:b] > _OF_LOADING * loading).mean() for a, b in pairwise(peaks)])
-
-
 def _median(values: FloatArray) -> tuple[float, float]:
+    """The median and its standard uncertainty."""
     middle = float(np.median(values))
     spread = _MAD * float(np.median(np.abs(values - middle)))
     return middle, _MEDIAN_U * spread / math.sqrt(values.size)
-
-
-_FEWEST_PEAKS = 3
-_PER_PERIOD = 50  # averages per cycle, enough for its shape and free of impulses
-_LOADING_SHARE = (0.5, 0.95)  # share of a loading in which its slope is taken: after the slip has rung down and crept
-_SPIKE_SAMPLES = 5  # width of the median filter; impulses of up to two samples are taken out
-
-
-@displayed()
-@dataclass(frozen=True)
-class StickSlip:
-    """Stick-slip cycles: K sticks that end at ``peak_s`` with ``peak_N``, and K - 1 slips and loadings between them.
-
-    ``trough_N`` is the lowest force between two peaks, ``loading_N_per_s`` the slope of the loading that follows it.
-    For a spring of stiffness k pulled at speed v while the slider sticks it is k v.
-    """
-
-    peak_s: FloatArray
-    peak_N: FloatArray
-    trough_s: FloatArray
-    trough_N: FloatArray
-    loading_N_per_s: FloatArray
-
-    @property
-    def period_s(self) -> float:
-        """Median time from one peak to the next."""
-        return float(np.median(np.diff(self.peak_s)))
-
-    @property
-    def drop_N(self) -> float:
-        """Median force lost in a slip."""
-        return float(np.median(self.peak_N[:-1] - self.trough_N))
-
-    @property
-    def mean_loading_N_per_s(self) -> float:
-        """Loading slope averaged over the time spent loading."""
-        spent = self.peak_s[1:] - self.trough_s
-        known = np.isfinite(self.loading_N_per_s)
-        return float(np.average(self.loading_N_per_s[known], weights=spent[known]))
-
-
-def stick_slip_cycles(trace: Trace, *, smallest_drop: float = 0.05) -> StickSlip:
-    """Find every stick and slip of a trace.
-
-    A peak is a stick if the force falls after it by at least ``smallest_drop`` times the range of the force (from its
-    1st to its 99th percentile). Spikes are removed by a median filter; a first search gives the length of a cycle,
-    the second works on averages over a fiftieth of it.
-
-    Raises
-    ------
-    TraceError
-        ``no_stick_slip``: fewer than three such peaks.
-    """
-    low, high = np.percentile(trace.force_N, (1.0, 99.0))
-    drop = smallest_drop * float(high - low)
-    time, force = trace.time_s, _without_impulses(trace.force_N)
-    peaks = _peaks(force, drop)
-    if peaks.size >= _FEWEST_PEAKS:
-        average = int(np.diff(peaks).mean()) // _PER_PERIOD
-        time, force = condense(time, average), _without_impulses(condense(trace.force_N, average))
-        peaks = _peaks(force, drop)
-    if peaks.size < _FEWEST_PEAKS:
-        what = f"the force shows fewer than {_FEWEST_PEAKS} stick-slip cycles with a force drop of {drop:.3g} N or more"
-        raise TraceError(Problem("no_stick_slip", what, trace.file or None, found=str(peaks.size)))
-    troughs = np.array([a + int(np.argmin(force[a:b])) for a, b in pairwise(peaks)])
-    slopes = [_loading_slope(time, force, a, b) for a, b in zip(troughs, peaks[1:], strict=True)]
-    return StickSlip(time[peaks], force[peaks], time[troughs], force[troughs], np.array(slopes))
-
-
-def _without_impulses(force: FloatArray) -> FloatArray:
-    from scipy.ndimage import median_filter
-
-    return np.asarray(median_filter(force, _SPIKE_SAMPLES, mode="nearest"))
-
-
-def _peaks(force: FloatArray, drop: float) -> FloatArray:
-    from scipy.signal import find_peaks
-
-    return np.asarray(find_peaks(force, prominence=drop)[0])
-
-
-def _loading_slope(time_s: FloatArray, force: FloatArray, trough: int, peak: int) -> float:
-    start, end = (trough + round(share * (peak - trough)) for share in _LOADING_SHARE)
-    return line(time_s[start : end + 1], force[start : end + 1])[0] if end > start else float("nan")

@@ -13,7 +13,7 @@ import numpy as np
 
 from tribo.errors import Problem
 from tribo.records import FloatArray
-from tribo.traces.loading import Climb, Rise, Zero
+from tribo.traces.loading import Loading, Rise, Zero
 from tribo.traces.signal import condense
 
 FEWEST_SAMPLES = 4
@@ -65,17 +65,17 @@ class Apex:
         return self.chi2_red < _FITS
 
 
-def find_apex(climb: Climb) -> Apex:
+def find_apex(loading: Loading) -> Apex:
     """The static peak of a pull: a sharp apex where the shape is one, else the top of a rounded one.
 
     The apex is looked for where the loading line ends and, if that fits badly, at the first maximum.
     """
-    held = slice(climb.end)
-    time_s, force, smooth = climb.signal.time_s[held], climb.signal.force_N[held], climb.signal.smooth_N[held]
-    depart, peak, noise = climb.depart, climb.top, climb.signal.noise_N
-    long = max(depart - climb.rise.first, 2 * FEWEST_SAMPLES)
-    length = _fall_length(smooth, peak, climb.level_N, 2 * FEWEST_SAMPLES, max(long, 3 * FEWEST_SAMPLES))
-    low, high = min(depart, peak + 1) - climb.lag, min(depart, peak + 1) + 2
+    held = slice(loading.end)
+    time_s, force, smooth = loading.signal.time_s[held], loading.signal.force_N[held], loading.signal.smooth_N[held]
+    depart, peak, noise = loading.depart, loading.top, loading.signal.noise_N
+    long = max(depart - loading.rise.first, 2 * FEWEST_SAMPLES)
+    length = _fall_length(smooth, peak, loading.level_N, 2 * FEWEST_SAMPLES, max(long, 3 * FEWEST_SAMPLES))
+    low, high = min(depart, peak + 1) - loading.lag, min(depart, peak + 1) + 2
     candidates = [_resolved(time_s, force, (max(low - long, 0), low, high, high + length), noise)]
     if not (candidates[0] and candidates[0].fits) and not low <= peak < high:
         around = (max(peak - long, 0), peak - 2, peak + 2, peak + length)
@@ -90,11 +90,11 @@ def find_apex(climb: Climb) -> Apex:
     return rounded
 
 
-def near(climb: Climb, peak_s: float) -> Climb:
-    """The climb of a pull whose static peak a person saw: it is looked for within two samples of that time."""
-    time = climb.signal.time_s
+def with_peak_near(loading: Loading, peak_s: float) -> Loading:
+    """The loading of a pull whose static peak a person saw: it is looked for within two samples of that time."""
+    time = loading.signal.time_s
     top = min(max(int(np.searchsorted(time, peak_s)), FEWEST_SAMPLES), time.size - FEWEST_SAMPLES - 1)
-    return replace(climb, depart=top, lag=2, top=top, end=max(climb.end, top + FEWEST_SAMPLES))
+    return replace(loading, depart=top, lag=2, top=top, end=max(loading.end, top + FEWEST_SAMPLES))
 
 
 def _fall_length(smooth: FloatArray, peak: int, level: float, shortest: int, longest: int) -> int:
@@ -334,17 +334,17 @@ class Motion:
     problems: tuple[Problem, ...]
 
 
-def in_motion(climb: Climb, apex: Apex, speed_m_s: float | None = None) -> Motion:
+def in_motion(loading: Loading, apex: Apex, speed_m_s: float | None = None) -> Motion:
     """A pull once it moves: how far it has come, always counted forward, and between which samples it slides."""
-    signal, onset_s, x = climb.signal, climb.onset_s, climb.signal.displacement_m
+    signal, onset_s, x = loading.signal, loading.onset_s, loading.signal.displacement_m
     travel = None if speed_m_s is None else np.asarray(speed_m_s * (signal.time_s - onset_s))
     if x is not None:
         away = x - float(np.interp(onset_s, signal.time_s, x))
         travel = np.asarray(np.where(away[-1] < 0, -1.0, 1.0) * away)
     first = int(np.searchsorted(signal.time_s, apex.time_s, side="right"))
     return Motion(
-        signal.time_s, signal.force_N, signal.smooth_N, travel, climb.zero, climb.rise, onset_s, apex,
-        (first, climb.end), signal.noise_N, signal.problems,
+        signal.time_s, signal.force_N, signal.smooth_N, travel, loading.zero, loading.rise, onset_s, apex,
+        (first, loading.end), signal.noise_N, signal.problems,
     )  # fmt: skip
 
 

@@ -55,17 +55,17 @@ class Course:
 
     ``contact`` is the range in which the bodies touch, ``stops`` the (stop, restart) of the drive within it, ``end``
     where the drive stops for good or contact ends. ``rests`` are the ranges in which nothing pulls: the drive stands
-    still, or the bodies are apart. ``slides_at_once`` says that the record has no start from rest.
+    still, or the bodies are apart. ``starts_sliding`` says that the record has no start from rest.
     """
 
     contact: Range
     end: int
     stops: tuple[Range, ...]
     rests: tuple[Range, ...]
-    slides_at_once: bool
+    starts_sliding: bool
 
     @property
-    def touches_later(self) -> bool:
+    def begins_before_contact(self) -> bool:
         """Whether the record begins before contact, by its load."""
         return self.contact[0] > 0
 

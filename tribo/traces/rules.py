@@ -12,7 +12,7 @@ import numpy as np
 from tribo.display import displayed
 from tribo.errors import Problem, TraceError
 from tribo.traces.peak import Apex, Motion, rounded_apex
-from tribo.traces.sliding import Window, settled, slides_on_closed_track
+from tribo.traces.sliding import Window, slides_on_closed_track, transient_end
 from tribo.user_text import did_you_mean
 
 Parameters = Mapping[str, float]
@@ -75,7 +75,7 @@ def once_stabilised(motion: Motion, parameters: Parameters) -> Window:
     first, end = motion.sliding
     if slides_on_closed_track(motion.travel_m, (first, end)):
         return first + (end - first) // 2, end
-    return first + settled(motion.force_N[first:end]), end
+    return first + transient_end(motion.force_N[first:end]), end
 
 
 def stabilised_length(motion: Motion, parameters: Parameters) -> Window:

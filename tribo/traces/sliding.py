@@ -82,7 +82,7 @@ def slides_on_closed_track(travel_m: FloatArray | None, sliding: Window) -> bool
     return travel_m is not None and end - first > 1 and abs(float(travel_m[end - 1] - travel_m[first])) > CLOSED_TRACK_M
 
 
-def settled(force: FloatArray) -> int:
+def transient_end(force: FloatArray) -> int:
     """Index from which a force that relaxes towards a steady level has stabilised.
 
     The marginal standard error rule on batches of five (MSER-5, White 1997, Simulation 69): leave out the

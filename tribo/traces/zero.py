@@ -11,7 +11,7 @@ from tribo.records import FloatArray, Trace
 from tribo.traces.loading import Zero, first_rise, starting_level, zero_before
 from tribo.traces.phases import Course, Range, course_of
 from tribo.traces.signal import Signal, signal_of, steady, wander
-from tribo.traces.sliding import settled
+from tribo.traces.sliding import transient_end
 from tribo.zeroing import ZeroChoice
 
 BEFORE_CONTACT = "before contact"
@@ -45,7 +45,7 @@ def chosen_zero(choice: ZeroChoice, time_s: FloatArray, values: FloatArray, cour
         ranges = sorted({*(r for r in course.rests if r not in course.stops), *unpulled})
         problem = _none_there("rest", file, '"before contact", "none", a number, or [from, to] in seconds')
         return _level(time_s, values, ranges[-1] if ranges else (0, 0), "at rest", problem)
-    if course.touches_later:
+    if course.begins_before_contact:
         problem = _none_there("part before contact", file)
         return _level(time_s, values, (0, course.contact[0]), BEFORE_CONTACT, problem)
     return None
@@ -89,7 +89,7 @@ def _level(time_s: FloatArray, values: FloatArray, span: Range, rule: str, probl
     if last - first < _FEWEST:
         raise TraceError(problem)
     if rule == "at rest":
-        first += settled(values[first:last])
+        first += transient_end(values[first:last])
     part = values[first:last]
     mean_u, _, noise = wander(part, float(time_s[last - 1] - time_s[first]))
     edges = max(part.size // 5, 1)
