@@ -96,7 +96,7 @@ def _right(d: Diagnosis, hidden: Hidden, name: str, factor: float) -> list[bool]
             changed = constant.change(getattr(module, constant.name), factor) if constant is not None else None
             stack.enter_context(patch.object(module, constant.name if constant is not None else "", changed))
         model, _, _ = without_refuted_causes(explained(d))
-        _, (form, *_) = forms_in_reach(model, Grammar.of(model))
+        _, (form, *_) = forms_in_reach(model, Grammar(model))
     return [*_judged(form.best, d, hidden), len(model.acting) == 0]
 
 

@@ -61,7 +61,7 @@ def test_a_law_that_lowers_friction_has_a_negative_size_and_interval() -> None:
 
 def test_a_law_of_the_pressure_alone_acts_on_several_patterns_or_on_none() -> None:
     model = baseline(made(nothing, seed=3))
-    grammar = Grammar.of(model, ())
+    grammar = Grammar(model, ())
     shapes, groups = grammar.courses.shapes, grammar.scopes
     net = grammar.net(Projection(model.linear, model.linear.residual[None]))[0].reshape(len(groups), len(shapes))
     allowed = {
@@ -205,7 +205,7 @@ def test_the_best_law_by_the_fitted_noise_is_among_those_scored_anew() -> None:
     model = baseline(made(nothing, seed=7))
     rng = np.random.default_rng(3)
     drawn = drawn_residuals(model, rng, 1)
-    laws = Grammar.of(model, ())
+    laws = Grammar(model, ())
     nets = laws.net(Projection(model.linear, drawn.transpose(0, 2, 1)))
     every = np.arange(laws.size)
     made_again = refit(model, drawn)

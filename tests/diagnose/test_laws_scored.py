@@ -25,7 +25,7 @@ def conditions(model: ModelFit) -> Conditions:
 
 
 def test_laws_scored_together_score_as_each_does_alone(model: ModelFit) -> None:
-    laws = Grammar.of(model, ())
+    laws = Grammar(model, ())
     together = laws.net(Projection(model.linear, model.linear.residual[None]))[0]
     one_column = np.flatnonzero(~np.isin(np.arange(laws.size) % len(laws.courses.shapes), laws.courses.two))
     some = one_column[:: len(one_column) // 60]
@@ -37,7 +37,7 @@ def test_laws_scored_together_score_as_each_does_alone(model: ModelFit) -> None:
 
 
 def test_a_wave_gains_what_its_sine_and_cosine_gain_together(model: ModelFit) -> None:
-    laws = Grammar.of(model, ())
+    laws = Grammar(model, ())
     first = int(laws.courses.two[0])
     gain = Projection(model.linear, model.linear.residual[None]).gains(laws.courses, laws.acts)[0, 0, first]
     left, residual = model.linear.cleared(np.stack([laws.courses.column(first)] * 2, axis=1))

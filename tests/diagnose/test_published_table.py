@@ -95,9 +95,9 @@ def test_whether_the_papers_model_fails_hangs_on_the_correlation_and_on_what_the
     whole: PublishedDiagnosis,
 ) -> None:
     """Deviations of three specimens: it fails in every reading. Of the mean: only with a close correlation."""
-    possible = [o for o in whole.results if o.reading.correlation <= LEAST_CORRELATION]
-    assert all(o.p_misfit < 0.01 for o in possible if o.reading.specimens == 3)
-    of_mean = {(o.reading.model, o.reading.correlation): o.p_misfit for o in whole.results if o.reading.specimens == 1}
+    possible = [o for o in whole.results if o.correlation <= LEAST_CORRELATION]
+    assert all(o.p_misfit < 0.01 for o in possible if o.specimens == 3)
+    of_mean = {(o.model, o.correlation): o.p_misfit for o in whole.results if o.specimens == 1}
     for model in ("paper", "tribo"):
         assert of_mean[model, -0.95] < 0.01
         assert of_mean[model, LEAST_CORRELATION] > 0.01

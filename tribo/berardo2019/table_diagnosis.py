@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tribo.berardo2019.table_model import (
     RANGE_PA,
-    Table,
+    PublishedTable,
     TableFit,
     candidates_of,
     design_correlation,
@@ -44,39 +44,27 @@ LEVEL = 0.01
 CLOSE = 3.0
 FLOOR = 1e-3  # of T/N: a printed line may reach zero at a load
 PATTERNS = "patterns"  # the flat law is free: a misfit of F is one of the patterned samples together
+TableContrast = tuple[str, str, bool]  # observable (static, sliding, both), sample, whether over the load
 REGIME_ROWS = {"static": [0], "sliding": [1], "both": [0, 1]}
 Progress = Callable[[str, int, int], None]
 
 
-class TableContrast(NamedTuple):
-    """A contrast of one sample of the table, or of the patterned ones together: its level, or its course over the
-    load."""
-
-    observable: str  # static, sliding or both
-    sample: str
-    along_load: bool
-
-
 @dataclass(frozen=True)
-class Reading:
-    """One way to read the table: whose simulation is the model, the correlation of mu and tau0, the meaning of sd."""
+class TableReading:
+    """One way to read the table, and what it gives.
+
+    It is read by whose simulation is the ``model``, the ``correlation`` of mu and tau0 and ``why`` that one, and the
+    meaning of the standard deviations: of a mean (1), or of so many ``specimens``. It gives the adjusted p value of
+    every contrast, before and after the best mechanism. A contrast is one of a sample, or of the patterned ones
+    together: its level, or its course over the load; or the name of a mechanism. ``weighed`` are the fits with one
+    mechanism each, the best first.
+    """
 
     model: str
     correlation: float
     specimens: int
-    why: str = ""
-
-
-@dataclass(frozen=True)
-class ReadingResult:
-    """What one reading gives: the adjusted p value of every contrast, before and after the best mechanism.
-
-    A contrast is one of a sample, or the name of a mechanism. ``weighed`` are the fits with one mechanism each, the
-    best first.
-    """
-
-    reading: Reading
-    table: Table
+    why: str
+    table: PublishedTable
     baseline: TableFit
     contrasts: Mapping[TableContrast | str, float]
     weighed: tuple[TableFit, ...]
@@ -107,8 +95,9 @@ class ReadingResult:
         return tuple(w for w in self.weighed if w.gain > self.weighed[0].gain - CLOSE)
 
 
-def readings() -> list[Reading]:
-    """The paper's own column under even loads first; then the other correlations, means of three, our simulation."""
+def readings() -> list[tuple[str, float, int, str]]:
+    """Model, correlation, specimens and why, as of :class:`TableReading`: the paper's own column under even loads
+    first; then the other correlations, means of three, our simulation."""
     even = design_correlation(even_loads())
     correlations = {
         even: "loads evenly over the range",
@@ -117,21 +106,23 @@ def readings() -> list[Reading]:
         0.0: "independent, as no line fit gives",
     }
     return [
-        Reading(model, correlation, specimens, why)
+        (model, correlation, specimens, why)
         for model in ("paper", "tribo")
         for specimens in (1, 3)
         for correlation, why in correlations.items()
     ]
 
 
-def diagnose_reading(table: Table, reading: Reading, rng: np.random.Generator) -> ReadingResult:
+def diagnose_reading(
+    table: PublishedTable, reading: tuple[str, float, int, str], rng: np.random.Generator
+) -> TableReading:
     """Fit the baseline, compare its strongest contrast with chance, weigh every mechanism, examine what remains."""
     baseline = fit_table(table)
     weighed = weigh_table(baseline)
     earned = float(np.sqrt(2.0 * max(weighed[0].score - baseline.score, 0.0)))
     contrasts, p_library = _screen(baseline, rng, earned)
     left, _ = _screen(_widened(weighed[0]), rng)
-    return ReadingResult(reading, table, baseline, contrasts, tuple(weighed), p_library, left)
+    return TableReading(*reading, table, baseline, contrasts, tuple(weighed), p_library, left)
 
 
 def weigh_table(baseline: TableFit) -> list[TableFit]:
@@ -188,7 +179,7 @@ def _contrasts(f: TableFit) -> tuple[list[TableContrast | str], FloatArray, np.n
                 change = np.zeros_like(friction)
                 for r in regimes:
                     change[i, r] = friction[i, r] * shape
-                names.append(TableContrast(observable, PATTERNS if sample == "F" else sample, along))
+                names.append((observable, PATTERNS if sample == "F" else sample, along))
                 columns.append((change @ table.line.T).ravel())
     for acting in candidates_of(table):
         if acting not in f.acting:
@@ -242,7 +233,7 @@ def gain_on_samples(baseline: TableFit, extended: TableFit, rng: np.random.Gener
     )  # fmt: skip
 
 
-def table_deviations(table: Table) -> Deviations:
+def table_deviations(table: PublishedTable) -> Deviations:
     """What the printed lines are over the model calibrated on the printed flat sample, at the loads of the table."""
     flat = table.samples.index("F")
     law = table.values.reshape(-1, 2 * len(REGIMES))[flat]
@@ -269,7 +260,7 @@ class OverLoads:
     pressures_kPa: tuple[float, float]
 
 
-def verdict_of(results: Sequence[ReadingResult], gain: Gain) -> Verdict:
+def verdict_of(results: Sequence[TableReading], gain: Gain) -> Verdict:
     """The verdict on the first reading, which shows all of them."""
     main = results[0]
     named = main.outcome in ("named", "undetermined")
@@ -285,33 +276,34 @@ def verdict_of(results: Sequence[ReadingResult], gain: Gain) -> Verdict:
     )
 
 
-def reading_record(o: ReadingResult) -> dict[str, object]:
+def reading_record(o: TableReading) -> dict[str, object]:
     """One reading in plain values: what was assumed, and what came out."""
     return {
-        "model": o.reading.model, "correlation": o.reading.correlation, "correlation_is": o.reading.why,
-        "standard_deviations_of": "a mean" if o.reading.specimens == 1 else f"{o.reading.specimens} specimens",
+        "model": o.model, "correlation": o.correlation, "correlation_is": o.why,
+        "standard_deviations_of": "a mean" if o.specimens == 1 else f"{o.specimens} specimens",
         "outcome": o.outcome, "p_misfit": o.p_misfit, "best": o.weighed[0].name, "gain_of_best": o.weighed[0].gain,
         "p_left": o.p_left,
     }  # fmt: skip
 
 
-def misfits(result: ReadingResult) -> list[Misfit]:
+def misfits(result: TableReading) -> list[Misfit]:
     """Samples whose friction differs from the model beyond chance, the most certain first."""
     found: list[Misfit] = []
     pressures = result.table.pressures_kPa
     for contrast, p in sorted(result.contrasts.items(), key=lambda item: item[1]):
-        if p >= LEVEL or not isinstance(contrast, TableContrast):
+        if p >= LEVEL or isinstance(contrast, str):
             continue
-        low, high = _ratio_percent(result, contrast.sample, contrast.observable)
-        sample = "" if contrast.sample == PATTERNS else contrast.sample
-        column = "normal_load_N" if contrast.along_load else "sample"
+        observable, where, along_load = contrast
+        low, high = _ratio_percent(result, where, observable)
+        sample = "" if where == PATTERNS else where
+        column = "normal_load_N" if along_load else "sample"
         over = OverLoads(low, high, (float(pressures[0]), float(pressures[-1])))
-        found.append(Misfit(contrast.observable, sample, column, (low + high) / 2, p, shows=over))
+        found.append(Misfit(observable, sample, column, (low + high) / 2, p, shows=over))
     once = {(m.sample, m.observable): m for m in reversed(found)}
     return [m for m in found if once[m.sample, m.observable] is m]
 
 
-def _ratio_percent(result: ReadingResult, sample: str, observable: str) -> tuple[float, float]:
+def _ratio_percent(result: TableReading, sample: str, observable: str) -> tuple[float, float]:
     """Measured less modelled T in percent of the model: the mean at either end of the loads, lowest first."""
     table = result.table
     picked = [k for k, s in enumerate(table.samples) if s == sample or (sample == PATTERNS and s != "F")]
@@ -322,13 +314,13 @@ def _ratio_percent(result: ReadingResult, sample: str, observable: str) -> tuple
     return float(ends.min()), float(ends.max())
 
 
-def _cause(w: TableFit, main: ReadingResult) -> Cause:
+def _cause(w: TableFit, main: TableReading) -> Cause:
     gains = np.array([n.gain for n in main.near])
     share = float(np.exp(w.gain - gains.max()) / np.exp(gains - gains.max()).sum())
     return Cause(w.name, share, estimate_of(w))
 
 
-def exclusions(main: ReadingResult, shown: set[str]) -> list[Excluded]:
+def exclusions(main: TableReading, shown: set[str]) -> list[Excluded]:
     """Every mechanism that is not among the causes, and why, in the first reading."""
     best = main.weighed[0]
     found = []
@@ -361,10 +353,10 @@ class PublishedDiagnosis:
 
     source: str
     verdict: Verdict
-    results: tuple[ReadingResult, ...]
+    results: tuple[TableReading, ...]
 
     @property
-    def main(self) -> ReadingResult:
+    def main(self) -> TableReading:
         return self.results[0]
 
 
@@ -396,11 +388,11 @@ def diagnose_published(
     measured = table2[table2["source"] == "experiment"]
     models = {"paper": table2[table2["source"] == "simulation"], "tribo": own}
     found = []
-    for k, reading in enumerate(readings()):
+    for k, (model, correlation, specimens, why) in enumerate(readings()):
         if progress is not None:
             progress("reading the table", k, len(readings()))
-        table = read_table(measured, models[reading.model], reading.correlation, reading.specimens)
-        found.append(diagnose_reading(table, reading, np.random.default_rng(seed)))
+        table = read_table(measured, models[model], correlation, specimens)
+        found.append(diagnose_reading(table, (model, correlation, specimens, why), np.random.default_rng(seed)))
     rng = np.random.default_rng(seed)
     gain = gain_on_samples(found[0].baseline, found[0].weighed[0], rng)
     return PublishedDiagnosis("berardo2019", verdict_of(found, gain), tuple(found))

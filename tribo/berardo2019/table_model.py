@@ -38,7 +38,7 @@ NORMAL_90 = 1.645
 
 
 @dataclass(frozen=True)
-class Table:
+class PublishedTable:
     """A published table as the diagnosis uses it: rows are samples, then regimes; (mu, tau0 in kPa) of each.
 
     ``values`` and the covariance have 2 x regimes x samples entries in the order sample, regime, (mu, tau0);
@@ -71,7 +71,7 @@ class TableFit:
     ``gain`` is the log likelihood that its mechanism earns over the fit without any, net of its freedom.
     """
 
-    table: Table
+    table: PublishedTable
     acting: tuple[Acting, ...]
     law: FloatArray
     parameters: tuple[FloatArray, ...]
@@ -113,7 +113,7 @@ def even_loads() -> FloatArray:
 
 def read_table(
     measured: pd.DataFrame, simulated: pd.DataFrame, correlation: float, specimens: int = 1
-) -> Table:
+) -> PublishedTable:
     """The table of a paper against a simulated one.
 
     Parameters
@@ -135,7 +135,7 @@ def read_table(
     model = simulated.set_index(["sample", "regime"])[["mu", "tau0_kPa"]]
     laws = np.array([[model.loc[(s, r)].to_numpy(float) for r in REGIMES] for s in samples]).reshape(-1, 4)
     design = np.column_stack([np.ones(N_LOADS), 1e3 / loads])
-    return Table(
+    return PublishedTable(
         samples, loads, _conditions(samples, loads), laws / laws[samples.index("F")],
         np.array([rows.loc[key, ["mu", "tau0_kPa"]].to_numpy(float) for key in order]).ravel(),
         covariance, np.linalg.pinv(design),
@@ -165,14 +165,14 @@ def _conditions(samples: Sequence[str], loads_Pa: FloatArray) -> Conditions:
 
 
 def predict_table(
-    table: Table, law: FloatArray, acting: Sequence[Acting] = (), parameters: Sequence[FloatArray] = ()
+    table: PublishedTable, law: FloatArray, acting: Sequence[Acting] = (), parameters: Sequence[FloatArray] = ()
 ) -> FloatArray:
     """(mu, tau0) of every sample and regime: the line through the model's T/N at the loads."""
     return np.asarray(friction_at(table, law, acting, parameters) @ table.line.T).ravel()
 
 
 def friction_at(
-    table: Table, law: FloatArray, acting: Sequence[Acting] = (), parameters: Sequence[FloatArray] = ()
+    table: PublishedTable, law: FloatArray, acting: Sequence[Acting] = (), parameters: Sequence[FloatArray] = ()
 ) -> FloatArray:
     """T/N of the model, (samples, regimes, loads). Several mechanisms multiply their changes."""
     c = table.conditions
@@ -187,7 +187,7 @@ def friction_at(
     return np.asarray(np.swapaxes(shaped, 0, 1))
 
 
-def _base(table: Table, law: FloatArray) -> Base:
+def _base(table: PublishedTable, law: FloatArray) -> Base:
     flat = np.array([law[0], law[1] * 1e3 * NOMINAL_AREA_M2, law[2], law[3] * 1e3 * NOMINAL_AREA_M2])
     rows = table.shares * flat
     by_sample = {
@@ -197,10 +197,10 @@ def _base(table: Table, law: FloatArray) -> Base:
     return Base(spread[:, 0], spread[:, 1], spread[:, 2], spread[:, 3], by_sample=by_sample, flat="F")
 
 
-def model_covariance(table: Table, friction: FloatArray, acting_change: FloatArray | None = None) -> FloatArray:
+def model_covariance(table: PublishedTable, friction: FloatArray, change: FloatArray | None = None) -> FloatArray:
     """Covariance of (mu, tau0) by the simulation's own error: offset and slope in ln T of each pattern and regime.
 
-    ``acting_change`` (samples, regimes, loads), the change of ln T by mechanisms, adds their error of form.
+    ``change`` (samples, regimes, loads), the change of ln T by mechanisms, adds their error of form.
     """
     log_p = np.log(table.pressures_Pa / np.sqrt(np.prod(RANGE_PA)))
     size = len(table.values)
@@ -209,8 +209,8 @@ def model_covariance(table: Table, friction: FloatArray, acting_change: FloatArr
     for i, sample in enumerate(table.samples):
         for r in range(len(REGIMES)):
             shapes = [] if sample == "F" else [np.full_like(log_p, error.offset[r]), error.slope[r] * log_p]
-            if acting_change is not None:
-                shapes += [FORM * acting_change[i, r], FORM * acting_change[i, r] * log_p]
+            if change is not None:
+                shapes += [FORM * change[i, r], FORM * change[i, r] * log_p]
             at = slice(2 * (2 * i + r), 2 * (2 * i + r) + 2)
             for shape in shapes:
                 moved = table.line @ (friction[i, r] * shape)
@@ -219,7 +219,7 @@ def model_covariance(table: Table, friction: FloatArray, acting_change: FloatArr
 
 
 def fit_table(
-    table: Table, acting: Sequence[Acting] = (), root: FloatArray | None = None, keep: np.ndarray | None = None
+    table: PublishedTable, acting: Sequence[Acting] = (), root: FloatArray | None = None, keep: np.ndarray | None = None
 ) -> TableFit:
     """Flat law and mechanisms by least squares in units of the errors; ``keep`` picks the values that count."""
     from scipy.optimize import least_squares
@@ -264,7 +264,7 @@ def _split(x: FloatArray, sizes: Sequence[int]) -> list[FloatArray]:
     return list(np.split(x[4:], np.cumsum(sizes)[:-1])) if sizes else []
 
 
-def candidates_of(table: Table) -> list[Acting]:
+def candidates_of(table: PublishedTable) -> list[Acting]:
     """Every mechanism and choice that could show in a table of means."""
     base = _base(table, table.values.reshape(-1, 4)[table.samples.index("F")])
     found = []

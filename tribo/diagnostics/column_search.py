@@ -38,7 +38,7 @@ _NOTHING_LEFT = 1e-9
 
 
 @dataclass(frozen=True)
-class Column:
+class Regressor:
     """One way to follow a recorded column: ``columns`` (n, d) beside the law, and where its values run from and to.
 
     ``kind`` is trend, course (groups of a number) or names. ``levels`` are the names of groups, the first being the
@@ -67,7 +67,7 @@ class RegimeTests:
     load_N: FloatArray
     log_force: FloatArray
     law: FloatArray
-    columns: tuple[Column, ...]
+    columns: tuple[Regressor, ...]
     only_with_load: tuple[str, ...]
 
     @property
@@ -138,7 +138,7 @@ def _beyond(law: FloatArray, columns: FloatArray) -> float:
     return float(np.sum(left**2) / max(float(np.sum(centred**2)), 1e-300))
 
 
-def _columns(tests: list[Test], pulls: list[Pull]) -> Iterator[Column]:
+def _columns(tests: list[Test], pulls: list[Pull]) -> Iterator[Regressor]:
     yield from _of_numbers("speed_mm_s", np.array([1e3 * t.speed_m_s if t.speed_m_s else np.nan for t in tests]))
     for name in NUMBERS:
         values = np.array([np.nan if (v := getattr(t, name)) is None else float(v) for t in tests])
@@ -159,7 +159,7 @@ def _columns(tests: list[Test], pulls: list[Pull]) -> Iterator[Column]:
             yield from _of_names(name, cells)
 
 
-def _of_numbers(name: str, values: FloatArray) -> Iterator[Column]:
+def _of_numbers(name: str, values: FloatArray) -> Iterator[Regressor]:
     """A trend, and the course over up to four groups; tests without a value lie at the mean."""
     there = np.isfinite(values) & ((values > 0) | (name not in LOGARITHMIC))
     if there.mean() < PRESENT or np.ptp(values[there]) <= 1e-9 * np.abs(values[there]).max():
@@ -167,7 +167,7 @@ def _of_numbers(name: str, values: FloatArray) -> Iterator[Column]:
     low, high = float(values[there].min()), float(values[there].max())
     filled = np.where(there, values, values[there].mean())
     along = np.log(filled) if name in LOGARITHMIC else filled
-    yield Column(name, "trend", ((along - along.mean()) / np.ptp(along))[:, None], low, high)
+    yield Regressor(name, "trend", ((along - along.mean()) / np.ptp(along))[:, None], low, high)
     distinct = np.unique(values[there])
     edges = distinct[1:] if len(distinct) <= BINS else np.unique(np.quantile(values[there], np.arange(1, BINS) / BINS))
     code = np.searchsorted(edges, filled, side="right")
@@ -175,15 +175,15 @@ def _of_numbers(name: str, values: FloatArray) -> Iterator[Column]:
     if len(groups) > 1:
         parts = [values[there & (code == k)] for k in (0, *groups)]
         levels = tuple(f"{x.min():.3g} to {x.max():.3g}" if np.ptp(x) else f"{x.min():.3g}" for x in parts)
-        yield Column(name, "course", np.column_stack([code == k for k in groups]).astype(float), low, high, levels)
+        yield Regressor(name, "course", np.column_stack([code == k for k in groups]).astype(float), low, high, levels)
 
 
-def _of_names(name: str, cells: list[str]) -> Iterator[Column]:
+def _of_names(name: str, cells: list[str]) -> Iterator[Regressor]:
     names = sorted(set(cells) - {""})
     if 1 < len(names) <= min(MOST_NAMES, len(cells) // 3) and sum(map(bool, cells)) >= PRESENT * len(cells):
         column = np.array(cells, str)
         levels = np.column_stack([column == n for n in names[1:]]).astype(float)
-        yield Column(name, "names", levels, levels=tuple(names))
+        yield Regressor(name, "names", levels, levels=tuple(names))
 
 
 @dataclass(frozen=True)
@@ -204,40 +204,38 @@ class ColumnEffect:
     alike: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class SearchedColumns:
-    """What was found in one regime; ``columns`` are all that were tested, the others vary ``only_with_load``."""
-
-    follows: tuple[ColumnEffect, ...]
-    columns: tuple[str, ...]
-    only_with_load: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class _Whitening:
+class Whitening:
     """One spread of the gains of specimens: how it whitens the tests, and the law's orthonormal ``basis`` (n, p).
 
-    ``groups`` (n, specimens) says which test is of which specimen, ``share`` (specimens,) how much of the mean of a
-    specimen is taken off.
+    Parameters
+    ----------
+    design : array (n, p)
+        The law and the columns beside it.
+    groups : array (n, specimens)
+        Which test is of which specimen.
+    variance : float
+        Of the gains of specimens over that of repeats.
     """
 
-    groups: FloatArray
-    share: FloatArray
-    basis: FloatArray
-    log_det: float
-
-    @classmethod
-    def of(cls, design: FloatArray, groups: FloatArray, variance: float) -> _Whitening:
+    def __init__(self, design: FloatArray, groups: FloatArray, variance: float) -> None:
         size = np.sum(groups**2, axis=0)
-        share = (1.0 - 1.0 / np.sqrt(1.0 + variance * size)) / size
-        u, s, _ = np.linalg.svd(_without_means(design, groups, share), full_matrices=False)
+        self.groups = groups
+        self.share = (1.0 - 1.0 / np.sqrt(1.0 + variance * size)) / size  # of the mean of a specimen, taken off
+        u, s, _ = np.linalg.svd(self.white(design), full_matrices=False)
         kept = s > 1e-9 * s.max()
-        log_det = float(np.sum(np.log1p(variance * size)) + 2.0 * np.sum(np.log(s[kept])))
-        return cls(groups, share, u[:, kept], log_det)
+        self.basis: FloatArray = u[:, kept]
+        self.log_det = float(np.sum(np.log1p(variance * size)) + 2.0 * np.sum(np.log(s[kept])))
+
+    def white(self, values: FloatArray) -> FloatArray:
+        """Values (n, ...) with a share of the mean of each specimen taken off."""
+        if not self.share.any():
+            return values
+        means = self.groups.T @ values
+        return np.asarray(values - self.groups @ (means * (self.share if values.ndim == 1 else self.share[:, None])))
 
     def left(self, values: FloatArray) -> FloatArray:
         """Whitened values (n, ...) less what the law takes up of them."""
-        white = _without_means(values, self.groups, self.share)
+        white = self.white(values)
         return np.asarray(white - self.basis @ (self.basis.T @ white))
 
     def score(self, square: FloatArray) -> FloatArray:
@@ -246,46 +244,57 @@ class _Whitening:
         return np.asarray(-0.5 * (dof * np.log(np.maximum(square, 1e-300)) + self.log_det))
 
 
-def _without_means(values: FloatArray, groups: FloatArray, share: FloatArray) -> FloatArray:
-    """Values (n, ...) with a share of the mean of each specimen taken off."""
-    if not share.any():
-        return values
-    means = groups.T @ values
-    return np.asarray(values - groups @ (means * (share if values.ndim == 1 else share[:, None])))
+class ColumnFit:
+    """The law of every sample with some columns, by restricted maximum likelihood in the spread of the specimens.
 
+    Attributes
+    ----------
+    root : array (n,)
+        Square roots of the weights of outlying tests, by what is left.
+    whitenings : tuple of Whitening
+        Of every spread of the specimens; ``at`` is the likeliest.
+    left : array (n,)
+        What is left with it, whitened; ``variance`` is its variance.
+    """
 
-@dataclass(frozen=True)
-class _Fitted:
-    """A law fitted by restricted likelihood: square roots (n,) of the weights of outlying tests, the whitening of every
-    spread of the specimens and which is the likeliest, what is ``left`` (n,) with it, and its variance."""
-
-    tested: RegimeTests
-    root: FloatArray
-    whitenings: tuple[_Whitening, ...]
-    at: int
-    left: FloatArray
-    variance: float
+    def __init__(self, tested: RegimeTests, taken: Sequence[Regressor]) -> None:
+        self.tested = tested
+        design = np.column_stack([tested.law, *(c.columns for c in taken)])
+        names = np.unique(tested.specimen)
+        groups = (tested.specimen[:, None] == names[None]).astype(float)
+        spreads = _VARIANCES if len(names) > len(np.unique(tested.sample)) else _VARIANCES[:1]
+        root = np.ones(tested.n)
+        for _ in range(_ROUNDS):
+            self.whitenings = tuple(Whitening(design * root[:, None], groups * root[:, None], v) for v in spreads)
+            lefts = [w.left(root * tested.log_force) for w in self.whitenings]
+            self.at = int(np.argmax([w.score(left @ left) for w, left in zip(self.whitenings, lefts, strict=True)]))
+            self.left = lefts[self.at]
+            variance = float(self.left @ self.left) / max(self.dof, 1)
+            self.variance = max(variance, _NOTHING_LEFT**2)
+            standard = (self.left / root) ** 2 / self.variance
+            root = np.sqrt((TAIL + 1.0) / (TAIL + standard))
+        self.root = root
 
     @property
     def dof(self) -> int:
         return self.tested.n - self.whitenings[self.at].basis.shape[1]
 
-    def basis(self, c: Column, at: int) -> FloatArray:
+    def basis(self, c: Regressor, at: int) -> FloatArray:
         """Orthonormal basis of a column beyond the law, (n, d); columns that the law takes up have none."""
         w, values = self.whitenings[at], c.columns * self.root[:, None]
         u, s, _ = np.linalg.svd(w.left(values), full_matrices=False)
-        scale = float(np.sqrt(np.sum(_without_means(values, w.groups, w.share) ** 2)))
+        scale = float(np.sqrt(np.sum(w.white(values) ** 2)))
         return np.asarray(u[:, s > 1e-6 * max(scale, 1e-300)])
 
 
-def search_columns(t: RegimeTests, regimes: int, level: float, rng: np.random.Generator) -> SearchedColumns:
+def search_columns(t: RegimeTests, regimes: int, level: float, rng: np.random.Generator) -> list[ColumnEffect]:
     """The columns that friction follows beyond chance, the strongest first, each beside the others.
 
     ``regimes`` is the number of regimes that are searched; p values are adjusted for it.
     """
-    taken: list[Column] = []
+    taken: list[Regressor] = []
     while len(taken) < MOST_FOUND:
-        fitted = _fit(t, taken)
+        fitted = ColumnFit(t, taken)
         others = [c for c in t.columns if c.name not in {k.name for k in taken}]
         chances = _chances(fitted, others, rng)
         if not chances:
@@ -296,36 +305,15 @@ def search_columns(t: RegimeTests, regimes: int, level: float, rng: np.random.Ge
         taken.append(others[best])
     found = []
     for column in taken:
-        beside = _fit(t, [c for c in taken if c is not column])
+        beside = ColumnFit(t, [c for c in taken if c is not column])
         rivals = [c for c in t.columns if c.name not in {k.name for k in taken}]
         p = min(_chances(beside, [column, *rivals], rng).get(0, 1.0) * regimes, 1.0)
         if p < level:
             found.append(_described(beside, _first_alike(beside, column), p))
-    names = tuple(dict.fromkeys(c.name for c in t.columns))
-    return SearchedColumns(tuple(found), names, t.only_with_load)
+    return found
 
 
-def _fit(t: RegimeTests, taken: Sequence[Column]) -> _Fitted:
-    """The law with the columns taken, by restricted maximum likelihood in the spread of the specimens."""
-    design = np.column_stack([t.law, *(c.columns for c in taken)])
-    names = np.unique(t.specimen)
-    groups = (t.specimen[:, None] == names[None]).astype(float)
-    within = len(names) > len(np.unique(t.sample))
-    root = np.ones(t.n)
-    for _ in range(_ROUNDS):
-        scaled = groups * root[:, None]
-        spreads = _VARIANCES if within else _VARIANCES[:1]
-        whitenings = tuple(_Whitening.of(design * root[:, None], scaled, v) for v in spreads)
-        lefts = [w.left(root * t.log_force) for w in whitenings]
-        at = int(np.argmax([w.score(left @ left) for w, left in zip(whitenings, lefts, strict=True)]))
-        left = lefts[at]
-        variance = float(left @ left) / max(t.n - whitenings[at].basis.shape[1], 1)
-        standard = (left / root) ** 2 / max(variance, _NOTHING_LEFT**2)
-        root = np.sqrt((TAIL + 1.0) / (TAIL + standard))
-    return _Fitted(t, root, whitenings, at, left, max(variance, _NOTHING_LEFT**2))
-
-
-def _chances(f: _Fitted, columns: Sequence[Column], rng: np.random.Generator) -> dict[int, float]:
+def _chances(f: ColumnFit, columns: Sequence[Regressor], rng: np.random.Generator) -> dict[int, float]:
     """By place in the list: the chance that one of all columns is as strong as this one with nothing hidden.
 
     Columns that the law takes up are left out.
@@ -352,7 +340,7 @@ def _strengths(left: FloatArray, bases: Sequence[FloatArray], dof: int) -> Float
     return np.column_stack(found)
 
 
-def _by_chance(f: _Fitted, columns: Sequence[Column], rng: np.random.Generator) -> FloatArray:
+def _by_chance(f: ColumnFit, columns: Sequence[Regressor], rng: np.random.Generator) -> FloatArray:
     """The strongest column in every campaign that the fitted law makes, (replicates,)."""
     n = f.tested.n
     drawn = f.left[rng.integers(0, n, (n, REPLICATES))] * np.sqrt(n / max(f.dof, 1))
@@ -369,7 +357,7 @@ def _by_chance(f: _Fitted, columns: Sequence[Column], rng: np.random.Generator) 
     return strongest
 
 
-def _described(f: _Fitted, column: Column, p: float) -> ColumnEffect:
+def _described(f: ColumnFit, column: Regressor, p: float) -> ColumnEffect:
     """The size of a column's effect with its interval, and what reproduces it."""
     white = f.whitenings[f.at].left(column.columns * f.root[:, None])
     inverse = np.linalg.pinv(white.T @ white)
@@ -393,7 +381,7 @@ def _described(f: _Fitted, column: Column, p: float) -> ColumnEffect:
     return ColumnEffect(column.name, column.kind, f.tested.regime, p, middle, low, high, where, names)
 
 
-def _first_alike(f: _Fitted, column: Column) -> Column:
+def _first_alike(f: ColumnFit, column: Regressor) -> Regressor:
     """Of the columns that this design cannot tell apart, the first: the same one in both regimes."""
     alike = {column.name, *_described(f, column, 1.0).alike}
     first = next(c.name for c in f.tested.columns if c.name in alike)
@@ -401,7 +389,7 @@ def _first_alike(f: _Fitted, column: Column) -> Column:
     return same[0] if same else column
 
 
-def _ends(column: Column, size: FloatArray) -> tuple[FloatArray, FloatArray, tuple[str, str]]:
+def _ends(column: Regressor, size: FloatArray) -> tuple[FloatArray, FloatArray, tuple[str, str]]:
     """Between which levels the change is stated: the ends of a trend, else the lowest and the highest level."""
     if column.kind == "trend":
         return np.zeros(1), np.ones(1), (f"{column.low:.3g}", f"{column.high:.3g}")

@@ -15,7 +15,6 @@ from tribo.diagnostics.column_search import (
     FEWEST_TESTS,
     ColumnEffect,
     RegimeTests,
-    SearchedColumns,
     regime_tests,
     search_columns,
 )
@@ -131,8 +130,7 @@ def diagnose_without_model(study: Study, *, seed: int = 0, level: float = 0.01) 
     rng = np.random.default_rng(seed)
     tests = [t for regime in REGIMES if (t := regime_tests(study.ingested, regime)).n]
     enough = [t for t in tests if t.enough]
-    found = [search_columns(t, len(enough), level, rng) for t in enough]
-    effects = [f for s in found for f in s.follows]
+    effects = [f for t in enough for f in search_columns(t, len(enough), level, rng)]
     records = [r for r in running_in(study.ingested) if r.p < level]
     offset = stroke_offset(study.ingested)
     shown = [_of_columns(effects), _of_records(records), _of_strokes(offset)]
@@ -143,19 +141,19 @@ def diagnose_without_model(study: Study, *, seed: int = 0, level: float = 0.01) 
         misfits=tuple(misfit for _, _, each in shown for misfit in each),
         causes=tuple(causes),
         equivalent=tuple(dict.fromkeys(tuple(map(name_of_column, names)) for names in tied)),
-        not_testable=(*_not_testable(found), *_inseparable(study, found)),
+        not_testable=(*_not_testable(enough), *_inseparable(study, enough)),
         layers=(*law_layers(study), *(layer for each, _, _ in shown for layer in each)),
         set_aside=study.ingested.set_aside,
-        next_test=_next_test(found),
+        next_test=_next_test(enough, effects),
         model={"baseline": BASELINE},
-        shows=_tested(tests, found),
+        shows=_tested(tests, enough),
     )
 
 
-def _tested(tests: list[RegimeTests], found: list[SearchedColumns]) -> ColumnsTested:
-    if found or not tests:
-        columns = tuple(sorted({name for s in found for name in s.columns}))
-        return ColumnsTested(columns, "" if found else "no tests")
+def _tested(tests: list[RegimeTests], enough: list[RegimeTests]) -> ColumnsTested:
+    if enough or not tests:
+        columns = tuple(sorted({c.name for t in enough for c in t.columns}))
+        return ColumnsTested(columns, "" if enough else "no tests")
     if not any(t.columns or t.only_with_load for t in tests):
         return ColumnsTested((), "no column varies")
     needed = max(FEWEST_TESTS, 2 * tests[-1].law.shape[1])
@@ -216,7 +214,7 @@ def _of_strokes(offset: StrokeOffset | None) -> Shown:
     return [layer], [Cause(OFFSET, 1.0, {"F0": offset.offset}, shows=(offset,))], []
 
 
-def _inseparable(study: Study, found: list[SearchedColumns]) -> list[Excluded]:
+def _inseparable(study: Study, enough: list[RegimeTests]) -> list[Excluded]:
     """Columns that vary only together with the load, and pairs of columns that vary together."""
     pairs: dict[tuple[str, str], list[str]] = {}
     table = study.dependence
@@ -228,7 +226,7 @@ def _inseparable(study: Study, found: list[SearchedColumns]) -> list[Excluded]:
             samples = pairs.setdefault((one, two), [])
             if row["sample"] not in samples:
                 samples.append(str(row["sample"]))
-    said = [Excluded(name_of_column(name), "only with the load", shows=name) for name in _only_with_load(found)]
+    said = [Excluded(name_of_column(name), "only with the load", shows=name) for name in _only_with_load(enough)]
     together = (
         Excluded(f"{label_with_unit(a)} or {label_with_unit(b)}", "vary together", shows=(a, b, tuple(samples)))
         for (a, b), samples in pairs.items()
@@ -236,25 +234,25 @@ def _inseparable(study: Study, found: list[SearchedColumns]) -> list[Excluded]:
     return [*said, *together]
 
 
-def _only_with_load(found: list[SearchedColumns]) -> list[str]:
-    return sorted({name for s in found for name in s.only_with_load})
+def _only_with_load(enough: list[RegimeTests]) -> list[str]:
+    return sorted({name for t in enough for name in t.only_with_load})
 
 
-def _not_testable(found: list[SearchedColumns]) -> list[Excluded]:
+def _not_testable(enough: list[RegimeTests]) -> list[Excluded]:
     """Mechanisms whose column does not vary, or was not recorded."""
-    there = {name for s in found for name in (*s.columns, *s.only_with_load)}
+    there = {name for t in enough for name in (*(c.name for c in t.columns), *t.only_with_load)}
     return [
         Excluded(mechanism, "not varied", shows=column)
         for column, mechanism in MECHANISMS_OF_COLUMNS.items()
-        if found and column not in there
+        if enough and column not in there
     ]
 
 
-def _next_test(found: list[SearchedColumns]) -> NextTest | None:
-    if columns := _only_with_load(found):
+def _next_test(enough: list[RegimeTests], effects: Sequence[ColumnEffect]) -> NextTest | None:
+    if columns := _only_with_load(enough):
         design: dict[str, Any] = {"loads": 4, "repeats": 3, "order": "random", "pulls": 12, "hours": 1.4}
         return NextTest("part from load", (*columns, "normal_load_N"), design)
-    tied = next((f for s in found for f in s.follows if f.alike), None)
+    tied = next((f for f in effects if f.alike), None)
     if tied is None:
         return None
     return NextTest("part columns", (tied.name, *tied.alike), {"covariate": tied.name, "pulls": 12, "hours": 1.4})

@@ -17,7 +17,7 @@ from tribo.figures.misfit import mechanism_label
 from tribo.records import REGIMES
 
 if TYPE_CHECKING:
-    from tribo.berardo2019.table_diagnosis import PublishedDiagnosis, ReadingResult
+    from tribo.berardo2019.table_diagnosis import PublishedDiagnosis, TableReading
 
 RATIO_COLUMNS = [
     "sample", "regime", "pressure_kPa", "measured_over_model", "low", "high", "low_independent", "high_independent",
@@ -59,7 +59,7 @@ def ratio_numbers(d: PublishedDiagnosis) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=RATIO_COLUMNS)
 
 
-def _relative_u(result: ReadingResult, correlation: float | None) -> np.ndarray:
+def _relative_u(result: TableReading, correlation: float | None) -> np.ndarray:
     """Standard uncertainty of measured T over T, (samples, regimes, loads); ``correlation`` None as in the reading."""
     table = result.table
     blocks = table.data_covariance.reshape(len(table.samples) * 2, 2, -1, 2)
@@ -118,10 +118,9 @@ def reading_numbers(d: PublishedDiagnosis) -> pd.DataFrame:
 
     rows = []
     for k, o in enumerate(d.results):
-        r = o.reading
         for w in o.weighed:
             name, e = next(iter(estimate_of(w).items()))
-            known = (k, r.model, r.correlation, r.specimens, o.outcome, o.p_misfit, o.p_left)
+            known = (k, o.model, o.correlation, o.specimens, o.outcome, o.p_misfit, o.p_left)
             guess = w.mechanism.in_table.guess
             rows.append((*known, w.name, guess, w.gain, name, e.value, e.low, e.high, e.unit))
     return pd.DataFrame(rows, columns=READING_COLUMNS)

@@ -33,7 +33,7 @@ from tribo.lawsearch.grammar import (
     refined_shapes,
     shapes_of,
 )
-from tribo.lawsearch.scoring import Courses, Grammar, Projection, acts_of, courses_of, effects_of, terms_of
+from tribo.lawsearch.scoring import Courses, Grammar, Projection, acts_of, effects_of, terms_of
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray
 
@@ -163,7 +163,7 @@ def choose_form(
     parameters = estimates(after, len(after.acting) - 1) | _place_and_width(form)
     wider = 1.0
     if form.best.shapes[0].kind != "wave":  # the interval of the amplitude over that of the linear model
-        one = courses_of([(form.best.shapes, 0.0)], background.conditions)
+        one = Courses([(form.best.shapes, 0.0)], background.conditions)
         own, _ = background.products(one.first, form.scope)
         a = parameters["a"]
         wider = max((a.high - a.low) / (2.0 * NORMAL_90) * float(np.sqrt(own[0] * background.informed)), 1.0)
@@ -251,14 +251,14 @@ def _on_fine_grid(at: Background, grammar: Grammar, g: int, shapes: tuple[Shape,
     scope, c = grammar.scopes[g], at.conditions
     acts = acts_of(at.effects(scope), at.setup)
     grid = fine_products(shapes) if len(shapes) > 1 else [(s,) for s in fine_shapes(shapes[0], c)]
-    courses = courses_of([(s, 0.0) for s in grid], c)
+    courses = Courses([(s, 0.0) for s in grid], c)
     gains = at.projected.gains(courses, acts)[0, 0]
     mean = float(gains.max() + np.log(np.mean(np.exp(gains - gains.max()))))
     further = sum((s.kind in PLACED) + (s.kind in WIDE) + (s.kind == "wave") for s in courses.shapes[0])
     evidence = mean - float(grammar.scope_cost[g]) - (cost if len(shapes) > 1 else 0.0) - PER_PARAMETER * further
     finer = refined_shapes(courses.shapes[int(gains.argmax())][0], c) if len(shapes) == 1 else []
     if finer:
-        courses = courses_of([((s,), 0.0) for s in finer], c)
+        courses = Courses([((s,), 0.0) for s in finer], c)
         gains = at.projected.gains(courses, acts)[0, 0]
     return Form(scope, courses, gains, evidence)
 
@@ -400,7 +400,7 @@ def _laws_instead(model: ModelFit, together: Sequence[Acting]) -> tuple[float, b
         return None
     changes = [effect_of(model.setup, model.law, a, model.values[model.acting.index(a)]) for a in together]
     without = refitted(model, [a for a in model.acting if a not in together])
-    background, forms = forms_in_reach(without, Grammar.of(without, shapes=shapes))
+    background, forms = forms_in_reach(without, Grammar(without, shapes=shapes))
     gained = background.projected.joint_gain(np.stack(changes, axis=2))
     ties = tuple(form.best for form in forms if form.evidence > gained - CLOSE)
     return forms[0].evidence - gained, set(forms[0].best.columns) <= columns, ties

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -33,19 +33,42 @@ Index = NDArray[np.int64]
 Acts = tuple[tuple[Index, FloatArray, FloatArray], ...]
 
 
-@dataclass(frozen=True)
 class Courses:
-    """The courses of many shapes over the tests of a campaign.
+    """The courses of many shapes over the tests of a campaign, those that do not vary left out.
 
-    ``first`` (n, k) are those of each of ``shapes`` (k,); ``second`` (n, w) are the further columns of those at ``two``
-    (w,), which are waves. ``cost`` (k,) is what the choice of each costs in log likelihood.
+    Attributes
+    ----------
+    shapes : tuple of k tuples of Shape
+    cost : array (k,)
+        What the choice of each costs in log likelihood.
+    first : array (n, k)
+        Their courses; of waves the first of two columns.
+    second : array (n, w)
+        The second columns of those at ``two`` (w,).
     """
 
-    shapes: tuple[tuple[Shape, ...], ...]
-    cost: FloatArray
-    first: FloatArray
-    second: FloatArray
-    two: Index
+    def __init__(self, priced: Sequence[tuple[tuple[Shape, ...], float]], c: Conditions) -> None:
+        of_shape: dict[Shape, FloatArray] = {}
+        shapes: list[tuple[Shape, ...]] = []
+        cost, first, second, two = [], [], [], []
+        for shape, price in priced:
+            course = np.ones((len(c.sample), 1))
+            for s in shape:
+                if s not in of_shape:
+                    of_shape[s] = s.of(c)
+                course = course * of_shape[s]
+            if np.ptp(course) < 1e-9:
+                continue
+            if course.shape[1] > 1:
+                two.append(len(shapes))
+                second.append(course[:, 1])
+            shapes.append(shape)
+            cost.append(price)
+            first.append(course[:, 0])
+        none = np.zeros((len(c.sample), 0))
+        self.shapes, self.cost, self.two = tuple(shapes), np.array(cost), np.array(two, int)
+        self.first = np.column_stack(first) if first else none
+        self.second = np.column_stack(second) if second else none
 
     @cached_property
     def by_form(self) -> tuple[Index, Index, Index]:
@@ -61,32 +84,6 @@ class Courses:
         """The course of one shape, (n, 1) or (n, 2)."""
         further = self.second[:, self.two == k]
         return np.column_stack([self.first[:, k], further])
-
-
-def courses_of(priced: Sequence[tuple[tuple[Shape, ...], float]], c: Conditions) -> Courses:
-    """The courses of shapes, those that do not vary left out."""
-    of_shape: dict[Shape, FloatArray] = {}
-    shapes: list[tuple[Shape, ...]] = []
-    cost, first, second, two = [], [], [], []
-    for shape, price in priced:
-        course = np.ones((len(c.sample), 1))
-        for s in shape:
-            if s not in of_shape:
-                of_shape[s] = s.of(c)
-            course = course * of_shape[s]
-        if np.ptp(course) < 1e-9:
-            continue
-        if course.shape[1] > 1:
-            two.append(len(shapes))
-            second.append(course[:, 1])
-        shapes.append(shape)
-        cost.append(price)
-        first.append(course[:, 0])
-    n = len(c.sample)
-    return Courses(
-        tuple(shapes), np.array(cost), np.column_stack(first) if first else np.zeros((n, 0)),
-        np.column_stack(second) if second else np.zeros((n, 0)), np.array(two, int),
-    )  # fmt: skip
 
 
 def terms_of(model: ModelFit) -> dict[str, FloatArray]:
@@ -232,33 +229,33 @@ class Projection:
         return float(0.5 * pull @ np.linalg.lstsq(own, pull, rcond=1e-9)[0])
 
 
-@dataclass(frozen=True)
 class Grammar:
     """All laws of a campaign: every one of the scopes with every one of the courses.
 
     ``scope_cost`` (scopes,) is what the choice of each costs in log likelihood, ``effects`` (scopes, n, 2) how it acts.
     A law has an index: that of its scope times the number of courses, plus that of its course.
+
+    Parameters
+    ----------
+    model : ModelFit
+        The fitted campaign.
+    without : collection of str
+        Columns that are left out.
+    shapes : list of (shapes, cost), optional
+        These alone in place of all that the campaign allows.
     """
 
-    courses: Courses
-    scopes: tuple[WrittenLaw, ...]
-    scope_cost: FloatArray
-    effects: FloatArray
-    acts: Acts
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         model: ModelFit,
         without: Collection[str] = (),
         shapes: Sequence[tuple[tuple[Shape, ...], float]] | None = None,
-    ) -> Grammar:
-        """The laws of a fitted campaign: of all columns but those ``without``, or of these ``shapes`` alone."""
+    ) -> None:
         c = model.setup.observations.conditions
-        scopes, cost = scopes_of(c)
-        effects = effects_of(scopes, c, terms_of(model))
-        courses = courses_of(shapes_of(c, without) if shapes is None else shapes, c)
-        return cls(courses, scopes, cost, effects, acts_of(effects, model.setup))
+        self.courses = Courses(shapes_of(c, without) if shapes is None else shapes, c)
+        self.scopes, self.scope_cost = scopes_of(c)
+        self.effects = effects_of(self.scopes, c, terms_of(model))
+        self.acts = acts_of(self.effects, model.setup)
 
     @property
     def size(self) -> int:

@@ -82,7 +82,7 @@ def discover_laws(
         model = allowed_wrong_form(model)
     while len(found) < MOST_LAWS:
         used = {*without, *(name for law in found for name in law.law.columns)}
-        grammar = Grammar.of(model, used)
+        grammar = Grammar(model, used)
         if not grammar.courses.shapes:
             break
         scored = _scored(model, grammar)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tribo.berardo2019.table_diagnosis import LEVEL, ReadingResult, TableContrast
+from tribo.berardo2019.table_diagnosis import LEVEL, TableContrast, TableReading
 from tribo.berardo2019.table_model import TableFit, estimate_of, upper_limit
 from tribo.diagnostics.verdict import Gain, Verdict
 from tribo.mechanisms.record import Readings
@@ -32,20 +32,21 @@ def published_evidence(v: Verdict) -> str:
 def _contrast(contrast: TableContrast | str) -> str:
     if isinstance(contrast, str):
         return contrast
-    what = "friction" if contrast.observable == "both" else OBSERVABLES[contrast.observable]
-    return f"{what} of {contrast.sample}{' against load' if contrast.along_load else ''}"
+    observable, sample, along_load = contrast
+    what = "friction" if observable == "both" else OBSERVABLES[observable]
+    return f"{what} of {sample}{' against load' if along_load else ''}"
 
 
-def _against_the_model(outlooks: Sequence[ReadingResult]) -> str:
+def _against_the_model(outlooks: Sequence[TableReading]) -> str:
     """Whether the model of the paper fails, and on what that depends."""
-    possible = [o for o in outlooks if o.reading.correlation < -LEAST_ALIKE]
-    free = [o for o in outlooks if o.reading.correlation == 0.0 and o.reading.specimens == 1]
+    possible = [o for o in outlooks if o.correlation < -LEAST_ALIKE]
+    free = [o for o in outlooks if o.correlation == 0.0 and o.specimens == 1]
     failing = sum(o.p_misfit < LEVEL for o in possible)
     main = outlooks[0]
     verb = "differs" if main.p_misfit < LEVEL else "does not differ"
     text = (
         f"The model calibrated on the flat sample {verb} from Table 2 beyond chance: adjusted p "
-        f"{p_text(main.p_misfit)} for a correlation of mu and tau0 of {main.reading.correlation:.2f}, "
+        f"{p_text(main.p_misfit)} for a correlation of mu and tau0 of {main.correlation:.2f}, "
         "which loads spread evenly over 3 to 25 "
         f"kPa would give. It differs beyond chance in {failing} of {len(possible)} readings with a correlation that is "
         "possible for a line fit over these loads."
@@ -58,9 +59,9 @@ def _against_the_model(outlooks: Sequence[ReadingResult]) -> str:
     return text
 
 
-def _guesses(outlooks: Sequence[ReadingResult]) -> list[str]:
+def _guesses(outlooks: Sequence[TableReading]) -> list[str]:
     """What the numbers say of each explanation that the authors propose, and of errors of the instrument instead."""
-    possible = [o for o in outlooks if o.reading.correlation < -LEAST_ALIKE]
+    possible = [o for o in outlooks if o.correlation < -LEAST_ALIKE]
     found = [
         m.in_table.finding(_readings_of(name, outlooks[0], possible))
         for name, m in MECHANISMS.items()
@@ -69,7 +70,7 @@ def _guesses(outlooks: Sequence[ReadingResult]) -> list[str]:
     return [*found, _adhesion_along_y(outlooks[0]), *_instrument_instead(possible)]
 
 
-def _readings_of(name: str, main: ReadingResult, outlooks: Sequence[ReadingResult]) -> Readings:
+def _readings_of(name: str, main: TableReading, outlooks: Sequence[TableReading]) -> Readings:
     weighed = [next(w for w in o.weighed if w.name == name) for o in outlooks]
     return Readings(
         gains=tuple(w.gain for w in weighed),
@@ -79,7 +80,7 @@ def _readings_of(name: str, main: ReadingResult, outlooks: Sequence[ReadingResul
     )
 
 
-def _instrument_instead(outlooks: Sequence[ReadingResult]) -> list[str]:
+def _instrument_instead(outlooks: Sequence[TableReading]) -> list[str]:
     """In how many readings another mechanism explains more than the authors' explanations."""
     best = [o.weighed[0].mechanism for o in outlooks]
     ahead = [m.in_words for m in best if not m.in_table.guess]
@@ -89,7 +90,7 @@ def _instrument_instead(outlooks: Sequence[ReadingResult]) -> list[str]:
     return [f"In {len(ahead)} of these readings {names} explains more; nothing printed in the paper rules it out."]
 
 
-def _adhesion_along_y(outlook: ReadingResult) -> str:
+def _adhesion_along_y(outlook: TableReading) -> str:
     """The adhesion of S across its long cavities, from the table itself."""
     table = outlook.table
     i = table.samples.index("Sy")
@@ -102,13 +103,13 @@ def _adhesion_along_y(outlook: ReadingResult) -> str:
     )
 
 
-def _flat_traction_Pa(outlook: ReadingResult) -> float:
+def _flat_traction_Pa(outlook: TableReading) -> float:
     """Static traction of the flat sample at 10 kPa by the calibrated law."""
     law = outlook.table.values.reshape(-1, 4)[outlook.table.samples.index("F")]
     return float(law[0] * 10e3 + law[1] * 1e3)
 
 
-def _extension(main: ReadingResult, best: TableFit, gain: Gain) -> str:
+def _extension(main: TableReading, best: TableFit, gain: Gain) -> str:
     """How much the best extended model explains, in the table and on samples left out, and what remains."""
     name, e = next(iter(estimate_of(best).items()))
     before, after = -2 * main.baseline.score, -2 * best.score
