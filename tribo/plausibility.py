@@ -251,17 +251,13 @@ _COVERAGE = 2.0  # standard uncertainties by which a fitted number must lie outs
 _MOST_SHOWN = 3
 
 
-def doubts_of(
-    campaign: Campaign, ingested: Ingested | None = None, fits: Sequence[LawFit] = ()
-) -> tuple[Doubt, ...]:
+def doubts_of(campaign: Campaign, ingested: Ingested | None = None, fits: Sequence[LawFit] = ()) -> tuple[Doubt, ...]:
     """Doubts about the numbers of a campaign: those stated, and the measured and fitted ones where they are given."""
     if ingested is not None:
         campaign = ingested.campaign
     numbers = _measured(campaign, ingested, fits)
     slip = likely_slips(campaign, numbers)
-    found = [
-        doubt for q, by in numbers.items() if (doubt := _outside(campaign, q, by, _PLACES[q], slip)) is not None
-    ]
+    found = [doubt for q, by in numbers.items() if (doubt := _outside(campaign, q, by, _PLACES[q], slip)) is not None]
     if not slip:  # one that explains the loads or the area explains these as well
         found += [*_wide_pitches(campaign), *_load_span(campaign)]
     return (*found, *_stated(campaign), *_geometry(campaign))

@@ -1,6 +1,7 @@
-"""How a record runs, by its channels: when the bodies touch, when the drive moves, where it stops and goes on.
+"""The phases of a record, by its channels and its force, and where a record of several pulls is cut.
 
-Records of several pulls: strokes in both directions, steps of load or speed; split and brought to one sign.
+:func:`course_of` tells when the bodies touch, when the drive moves, stops and goes on; :func:`split_pulls` cuts a
+record at reversals of the force and at steps of load or speed.
 """
 
 from __future__ import annotations
@@ -47,6 +48,12 @@ _RETURNS = 0.02  # share of the later part of a record that lies below the force
 _UNPULLED = 0.3  # share of the usual force below which a record begins with nothing pulled
 _NEAR = 0.1  # share of its swing below the lowest later force from which on a record begins at rest
 _FELT = 12.0  # a friction force is at least this many times the noise
+_REVERSED = 0.25  # share of its swing by which a force passes the middle before its direction counts as reversed
+_OF_SPAN = 0.2  # a step is at least this share of the span of its channel,
+_OF_LEVEL = 0.05  # this share of its level,
+_OF_NOISE = 6.0  # and this many times the noise of the difference
+_FRAGMENT = 0.2  # share of the median piece below which a piece is what a cut left over
+_MIDDLE = (0.3, 0.7)  # share of a stroke in which its force is taken to tell its direction and zero
 
 
 @dataclass(frozen=True)
@@ -253,25 +260,12 @@ def _returns(signal: Signal, span: Range) -> bool:
     later = force[force.size // 4 :]
     if np.median(later) < 0:
         later, start = -later, -start
-    later = later[: _tail(later)]
+    high = np.flatnonzero(later > _FALLEN * float(np.median(later)))
+    later = later[: int(high[-1]) + 1] if high.size else later  # without a tail in which the force has fallen for good
     felt = float(np.median(later)) > _FELT * max(signal.noise_N, noise_of(later))
     low, high = np.quantile(later, (_RETURNS, 1.0 - _RETURNS))
     in_range = start >= low - _NEAR * (high - low) - 2.0 * signal.noise_N
     return bool(felt and in_range and start > _UNPULLED * float(np.median(later)))
-
-
-def _tail(force: FloatArray) -> int:
-    """Samples before a tail in which the force has fallen for good."""
-    high = np.flatnonzero(force > _FALLEN * float(np.median(force)))
-    return int(high[-1]) + 1 if high.size else int(force.size)
-
-
-_REVERSED = 0.25  # share of its swing by which a force passes the middle before its direction counts as reversed
-_OF_SPAN = 0.2  # a step is at least this share of the span of its channel,
-_OF_LEVEL = 0.05  # this share of its level,
-_OF_NOISE = 6.0  # and this many times the noise of the difference
-_FRAGMENT = 0.2  # share of the median piece below which a piece is what a cut left over
-_MIDDLE = (0.3, 0.7)  # share of a stroke in which its force is taken to tell its direction and zero
 
 
 def split_pulls(trace: Trace) -> tuple[Trace, ...]:
@@ -362,30 +356,25 @@ def between(passages: Sequence[tuple[int, int]], samples: int) -> list[tuple[int
 
 
 def _steps_over(values: FloatArray, width: int, least: float, sharp: bool) -> list[tuple[int, int]]:
-    """Steps of one stretch as means over ``width`` samples show them; a ``sharp`` one is a cut, a ramp is left out."""
+    """Steps of one stretch as means over ``width`` samples show them; a ``sharp`` one is a cut, a ramp is left out.
+
+    The means before and after each sample are compared; at the ends the first and last mean are repeated.
+    """
     if values.size < 4 * width:
         return []
-    before, after = _means_beside(values, width)
+    total = np.concatenate(([0.0], np.cumsum(values)))
+    means = (total[width:] - total[:-width]) / width
+    index = np.arange(values.size)
+    before, after = means[np.clip(index - width, 0, means.size - 1)], means[np.clip(index, 0, means.size - 1)]
     jump = np.abs(after - before)
     noise = max(sample_noise(values) * math.sqrt(2.0 / width), float(np.median(jump)))
     over = np.concatenate(([False], jump > max(least, _OF_NOISE * noise), [False]))
     edges = np.flatnonzero(np.diff(over))
-    passages = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    return [_cut(jump, a, b) if sharp and b - a <= 2 * width else (a, b) for a, b in passages]
-
-
-def _means_beside(values: FloatArray, width: int) -> tuple[FloatArray, FloatArray]:
-    """Means of the ``width`` samples before and from each sample on; the ends repeat the first and last mean."""
-    total = np.concatenate(([0.0], np.cumsum(values)))
-    means = (total[width:] - total[:-width]) / width
-    index = np.arange(values.size)
-    return means[np.clip(index - width, 0, means.size - 1)], means[np.clip(index, 0, means.size - 1)]
-
-
-def _cut(jump: FloatArray, start: int, end: int) -> tuple[int, int]:
-    """A passage of no length where the step is steepest."""
-    at = start + int(np.argmax(jump[start:end]))
-    return at, at
+    found = []
+    for a, b in ((int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)):
+        steepest = a + int(np.argmax(jump[a:b]))
+        found.append((steepest, steepest) if sharp and b - a <= 2 * width else (a, b))
+    return found
 
 
 def directions_of(

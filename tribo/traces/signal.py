@@ -1,6 +1,6 @@
-"""What samples say: their noise, smoother forms of them, a line through them, a mean with its uncertainty.
+"""The signal of a trace, checked before friction is determined: faults, spikes, noise.
 
-The signal of a trace, checked before friction is determined: faults, spikes, noise.
+Before it what all steps use of samples: their noise, smoother forms, a line through them, a mean with its uncertainty.
 """
 
 from __future__ import annotations
@@ -18,6 +18,21 @@ from tribo.records import FloatArray, Trace
 BLOCKS = 16  # blocks a window is cut into; enough for a variogram, few enough to be longer than the correlation
 _SLOPE_U = 0.35  # standard uncertainty of a variogram's slope over BLOCKS blocks, as a share of level over mean lag
 _MEDIAN_TO_SD = 1.4826  # of a normal distribution
+MINIMUM_SAMPLES = 20
+SPIKE_OVER_NOISE = 8.0
+SPIKE_OVER_NEIGHBOURS = 3.0
+SPIKE_RETURN = 0.5
+SPIKE_WIDTHS = (1, 2, 3)
+_NEIGHBOURS = 4
+_MOST_LISTED = 20
+_MOST_IMPULSES = 20  # more of them belong to the signal, as slips or as its own noise, where they stay within its range
+_CHANCE_OF_FLAT_TOP = 1e-4
+_SHORTEST_FLAT_TOP = 4
+_SHORTEST_STANDSTILL = 20
+_NO_NOISE = 1e-4  # noise over range below which a trace was never measured, and may stand still
+_AT_ZERO = 0.2  # share of the range below which a force may stand still: nothing pulls
+_SMOOTHED = 2000  # samples averaged before levels are searched: none up to this many, then this part of the trace
+_COARSE = 0.5  # share of equal neighbours from which on a resolution is too coarse to tell clipping
 
 
 def sample_noise(values: FloatArray) -> float:
@@ -46,13 +61,6 @@ def line(time_s: FloatArray, force_N: FloatArray) -> tuple[float, float, float]:
     away = time_s - t
     spread = float(away @ away)
     return (float(away @ force_N) / spread if spread > 0 else 0.0), t, float(force_N.mean())
-
-
-def block_means(values: FloatArray, blocks: int = BLOCKS) -> FloatArray:
-    """Means of ``blocks`` consecutive equal blocks (fewer where there are fewer samples); a remainder is left out."""
-    length = max(1, values.size // blocks)
-    count = values.size // length
-    return np.asarray(np.add.reduce(values[: count * length].reshape(count, length), axis=1) / length)
 
 
 def condense(values: FloatArray, factor: int) -> FloatArray:
@@ -95,7 +103,7 @@ def wander(values: FloatArray, duration_s: float) -> tuple[float, float, float]:
     that explains all the variance not due to white noise, so that it is never zero by chance.
     """
     noise = sample_noise(values)
-    means = block_means(values)
+    means = condense(values, max(1, values.size // BLOCKS))  # of BLOCKS blocks; fewer where there are fewer samples
     count = means.size
     if count < 4:
         spread = float(values.std(ddof=1)) / math.sqrt(values.size) if values.size > 1 else math.nan
@@ -159,23 +167,6 @@ def steady(time_s: FloatArray, force: FloatArray) -> Steady:
     return Steady(float(force.mean()), mean_u, line(time_s, force)[0], noise)
 
 
-MINIMUM_SAMPLES = 20
-SPIKE_OVER_NOISE = 8.0
-SPIKE_OVER_NEIGHBOURS = 3.0
-SPIKE_RETURN = 0.5
-SPIKE_WIDTHS = (1, 2, 3)
-_NEIGHBOURS = 4
-_MOST_LISTED = 20
-_MOST_IMPULSES = 20  # more of them belong to the signal, as slips or as its own noise, where they stay within its range
-_CHANCE_OF_FLAT_TOP = 1e-4
-_SHORTEST_FLAT_TOP = 4
-_SHORTEST_STANDSTILL = 20
-_NO_NOISE = 1e-4  # noise over range below which a trace was never measured, and may stand still
-_AT_ZERO = 0.2  # share of the range below which a force may stand still: nothing pulls
-_SMOOTHED = 2000  # samples averaged before levels are searched: none up to this many, then this part of the trace
-_COARSE = 0.5  # share of equal neighbours from which on a resolution is too coarse to tell clipping
-
-
 @dataclass(frozen=True)
 class Signal:
     """Force against time that can be read; arrays (n,) share the trace's samples.
@@ -224,11 +215,6 @@ def signal_of(trace: Trace) -> Signal:
     return Signal(time, force, calm, smooth, displacement, noise, fault, problems, trace.file, impulsive)
 
 
-def file_row(trace: Trace, index: int) -> int:
-    """Line of the export (from 1) that sample ``index`` stands on, if the reader recorded it."""
-    return trace.first_row + index
-
-
 def unreadable(trace: Trace) -> list[Problem]:
     """Faults that leave no signal to read: too few samples, gaps, numbers that are none, time running back."""
     n = trace.force_N.size
@@ -241,12 +227,14 @@ def unreadable(trace: Trace) -> list[Problem]:
             finite = np.isfinite(values)
             at = int(np.argmin(finite))
             what = f"{int(n - finite.sum())} values of the {name} are missing"
-            problems.append(Problem("nan_gap", what, trace.file, file_row(trace, at), name))
+            problems.append(Problem("nan_gap", what, trace.file, trace.first_row + at, name))
     back = np.diff(trace.time_s) < 0
     if back.any():
         at = int(np.argmax(back)) + 1
         found = f"{trace.time_s[at]:g} s after {trace.time_s[at - 1]:g} s"
-        problems.append(Problem("time_goes_back", "the time decreases", trace.file, file_row(trace, at), "time", found))
+        problems.append(
+            Problem("time_goes_back", "the time decreases", trace.file, trace.first_row + at, "time", found)
+        )
     if not problems and trace.time_s[0] == trace.time_s[-1]:
         problems.append(Problem("time_stands_still", "all times are the same", trace.file or None, column="time"))
     return problems
@@ -308,7 +296,7 @@ def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ..
             "spike",
             f"a spike at {trace.time_s[k]:.6g} s; this data point is left out",
             trace.file or None,
-            file_row(trace, int(k)),
+            trace.first_row + int(k),
             "force",
             f"{trace.force_N[k]:.6g} N",
         )
@@ -316,7 +304,7 @@ def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ..
     ]
     if at.size > _MOST_LISTED:
         what = f"{at.size - _MOST_LISTED} more spikes; these data points are left out"
-        problems.append(Problem("spike", what, trace.file or None, file_row(trace, int(at[_MOST_LISTED])), "force"))
+        problems.append(Problem("spike", what, trace.file or None, trace.first_row + int(at[_MOST_LISTED]), "force"))
     return tuple(problems)
 
 
@@ -355,7 +343,7 @@ def recorder_fault(trace: Trace, force: FloatArray) -> Problem | None:
     else:
         return None
     found = f"{trace.force_N[first]:.6g} N"
-    return Problem(kind, what, trace.file or None, file_row(trace, first), "force", found)
+    return Problem(kind, what, trace.file or None, trace.first_row + first, "force", found)
 
 
 def flat_top(force: FloatArray) -> tuple[int, int] | None:
