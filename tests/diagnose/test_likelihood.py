@@ -15,8 +15,8 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from tribo.diagnostics.fit import (
+    FitState,
     Linear,
-    State,
     penalised,
     scored,
     solved,
@@ -121,13 +121,13 @@ def whole_inverse(inverse: Inverse, columns: ModelColumns) -> np.ndarray:
     order = columns.vector(own, shared)[0].astype(int)
     return np.asarray(whole[:, order][:, :, order])
 
-def step_from(s: Setup, state: State, jacobian: np.ndarray, bounds: Any) -> tuple[Inverse, np.ndarray, ModelColumns]:
+def step_from(s: Setup, state: FitState, jacobian: np.ndarray, bounds: Any) -> tuple[Inverse, np.ndarray, ModelColumns]:
     """One step of a fit: the inverse of the normal matrix, the solution, and the columns of the model."""
     columns = model_columns(jacobian, s.random_effects)
     return *solved(state, columns, weights(s, state), bounds), columns
 
 
-def at_the_mode(s: Setup, noise: Noise) -> State:
+def at_the_mode(s: Setup, noise: Noise) -> FitState:
     """The random effects that are most likely given the tests."""
     residual = residual_of(s)
     whole, _, random = dense(s, noise)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tribo.diagnostics.model import EVERY, Course, Setup, Target, added, course
+from tribo.diagnostics.model import EVERY, EffectCourse, Setup, Target, added, course
 from tribo.diagnostics.normal_equations import model_columns
 from tribo.diagnostics.replicates import SIZE_STEPS, Replicates, fitted_noise, replicates_at
 from tribo.diagnostics.scatter import Noise, log_size_prior
@@ -107,7 +107,7 @@ def test_a_campaign_of_two_replicates_is_scored_one_by_one() -> None:
     assert found[0] == pytest.approx(scores(replicate, ready, steps=AS_FITTED)[0][0])
 
 
-def local_courses(s: Setup) -> list[Course]:
+def local_courses(s: Setup) -> list[EffectCourse]:
     """Columns that one specimen each shows, two of them on the first."""
     effects, rng = s.random_effects, np.random.default_rng(9)
     found = []

@@ -1,11 +1,11 @@
-"""Contrasts of the residuals: by mechanism, covariate, shape, sample, specimen and period.
-
-How strongly each contrast is followed, and how strongly by chance: the maximum over all contrasts, simulated.
+"""Contrasts of the residuals, by mechanism, covariate, shape, sample, specimen and period, and their screen: how
+strongly each is followed, and how strongly by chance, the maximum over all contrasts being simulated.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.model import (
     MOST_PAIRS,
     Acting,
-    Course,
+    EffectCourse,
     Setup,
     StartChanges,
     added,
@@ -29,6 +29,10 @@ from tribo.diagnostics.score_statistics import Terms, scores, terms_of
 from tribo.display import displayed
 from tribo.records import FloatArray
 
+Progress = Callable[[str, int, int], None]
+AT_ONCE = 20  # replicates, after which it is asked whether they suffice
+FEWEST = 40
+FORM = 0.12  # by how much of its own effect a law may be wrong in form, sample by sample
 OBSERVABLES = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (1.0, 1.0), "drop": (1.0, -1.0)}
 BINS = 6
 TENTHS = 10
@@ -50,7 +54,7 @@ class Contrast:
     observable: str
     covariate: str
     sample: str
-    courses: tuple[Course, ...]
+    courses: tuple[EffectCourse, ...]
     acting: Acting | None = None
     detail: str = ""
 
@@ -89,23 +93,20 @@ class Contrast:
 
 def all_contrasts(s: Setup, changes: StartChanges) -> list[Contrast]:
     """Every contrast that this design allows, ``changes`` being those of the candidates."""
-    recorded = [*_covariates(s), *_levels(s), *_samples(s), *_specimens(s), *_periods(s), *_blocks(s)]
-    contrasts = [*_mechanisms(s, changes), *recorded]
+    mechanisms = zip(changes.acting, changes.courses, strict=True)
+    contrasts = [Contrast("mechanism", "both", acting.name, "", courses, acting) for acting, courses in mechanisms]
+    adhesion = course(changes.adhesion[:, :, None], s.random_effects)
+    contrasts.append(Contrast("trend", "both", "tau0", "", (adhesion,)))
+    contrasts += [*_of_columns(s), *_of_samples(s), *_of_specimens(s), *_of_series(s)]
     return [contrast for contrast in contrasts if all(c.shows for c in contrast.courses)]
-
-
-def _mechanisms(s: Setup, changes: StartChanges) -> Iterator[Contrast]:
-    for acting, courses in zip(changes.acting, changes.courses, strict=True):
-        yield Contrast("mechanism", "both", acting.name, "", courses, acting)
-    yield Contrast("trend", "both", "tau0", "", _course(s, changes.adhesion[:, :, None]))
-
-
-def _course(s: Setup, columns: FloatArray) -> tuple[Course]:
-    return (course(columns, s.random_effects),)
 
 
 def numeric_covariates(s: Setup) -> dict[str, FloatArray]:
     """Recorded numbers a residual may follow, standardised; only those that vary and are complete."""
+
+    def log(values: FloatArray) -> FloatArray:
+        return np.log(np.where(values > 0, values, np.nan))
+
     c = s.observations.conditions
     numbers = {
         "run_order": c.run_order,
@@ -114,120 +115,91 @@ def numeric_covariates(s: Setup) -> dict[str, FloatArray]:
         "time of day": s.observations.clock_h,
         "temperature_C": c.temperature_C,
         "humidity_pct": c.humidity_pct,
-        "speed_mm_s": _log(c.speed_m_s),
-        "hold_s": _log(c.hold_s),
+        "speed_mm_s": log(c.speed_m_s),
+        "hold_s": log(c.hold_s),
     }
     for name, column in c.columns.items():
-        numbers.setdefault(name, _maybe_numbers(column))
+        with suppress(ValueError):
+            numbers.setdefault(name, np.asarray(column, float))
     return {n: (v - v.mean()) / v.std() for n, v in numbers.items() if np.isfinite(v).all() and v.std() > 1e-9}
 
 
-def _log(values: FloatArray) -> FloatArray:
-    return np.log(np.where(values > 0, values, np.nan))
+def _contrast(
+    s: Setup, kind: str, observable: str, covariate: str, values: FloatArray, sample: str = "", detail: str = ""
+) -> Contrast:
+    """The contrast of an observable along columns (n, d) of all tests."""
+    along = course(_in_regimes(values, observable), s.random_effects)
+    return Contrast(kind, observable, covariate, sample, (along,), detail=detail)
 
 
-def _maybe_numbers(column: np.ndarray) -> FloatArray:
-    try:
-        return np.asarray(column, float)
-    except ValueError:
-        return np.full(len(column), np.nan)
-
-
-def _spread(values: FloatArray, observable: str) -> FloatArray:
+def _in_regimes(values: FloatArray, observable: str) -> FloatArray:
     """Columns (n, d) onto the two regimes, (n, 2, d)."""
     return values[:, None, :] * np.array(OBSERVABLES[observable])[None, :, None]
 
 
-def _covariates(s: Setup) -> Iterator[Contrast]:
+def _of_columns(s: Setup) -> Iterator[Contrast]:
+    """Trends and groups of every recorded number, up to BINS of alike size; of text columns one gain per name."""
     for name, values in numeric_covariates(s).items():
         for observable in OBSERVABLES:
-            yield Contrast("trend", observable, name, "", _course(s, _spread(values[:, None], observable)))
-        bins = _bins(values)
-        if bins.shape[1] > 1:
-            for observable in ("static", "sliding", "both"):
-                yield Contrast("shape", observable, name, "", _course(s, _spread(bins, observable)))
-
-
-def _bins(values: FloatArray) -> FloatArray:
-    """Indicator columns of up to BINS groups of alike size, less one."""
-    distinct = np.unique(values)
-    edges = distinct[1:] if len(distinct) <= BINS else np.unique(np.quantile(values, np.arange(1, BINS) / BINS))
-    code = np.searchsorted(edges, values, side="right")
-    return np.column_stack([code == k for k in range(1, len(edges) + 1)]).astype(float)
-
-
-def _levels(s: Setup) -> Iterator[Contrast]:
-    """Text columns: one gain per name."""
+            yield _contrast(s, "trend", observable, name, values[:, None])
+        distinct = np.unique(values)
+        edges = distinct[1:] if len(distinct) <= BINS else np.unique(np.quantile(values, np.arange(1, BINS) / BINS))
+        code = np.searchsorted(edges, values, side="right")
+        groups = np.column_stack([code == k for k in range(1, len(edges) + 1)]).astype(float)  # the first is zero
+        for observable in ("static", "sliding", "both") if len(edges) > 1 else ():
+            yield _contrast(s, "shape", observable, name, groups)
     for name, column in s.observations.conditions.columns.items():
         names = np.unique(column)
         if 1 < len(names) <= min(s.observations.n // 8, MOST_LEVELS):
             levels = np.column_stack([column == level for level in names[1:]]).astype(float)
             for observable in ("static", "sliding", "both"):
-                yield Contrast("level", observable, name, "", _course(s, _spread(levels, observable)))
+                yield _contrast(s, "level", observable, name, levels)
 
 
-def _samples(s: Setup) -> Iterator[Contrast]:
+def _of_samples(s: Setup) -> Iterator[Contrast]:
     """Each sample's offset, its slope and its curve against ln p."""
     c, p = s.observations.conditions, s.log_pressure
-    shapes = {"offset": np.ones_like(p), "slope": p, "curve": p**2 - np.mean(p**2)}
+    shapes = (("sample", "", np.ones_like(p)), ("normal_load_N", "", p), ("normal_load_N", BEND, p**2 - np.mean(p**2)))
     for sample in np.unique(c.sample):
         here = (c.sample == sample).astype(float)
         for observable in OBSERVABLES:
-            for name, shape in shapes.items():
-                covariate, detail = "sample" if name == "offset" else "normal_load_N", BEND if name == "curve" else ""
-                columns = _spread((here * shape)[:, None], observable)
-                yield Contrast("sample", observable, covariate, str(sample), _course(s, columns), detail=detail)
+            for covariate, detail, shape in shapes:
+                yield _contrast(s, "sample", observable, covariate, (here * shape)[:, None], str(sample), detail)
 
 
-def _specimens(s: Setup) -> Iterator[Contrast]:
+def _of_specimens(s: Setup) -> Iterator[Contrast]:
     """Each specimen's offset against its siblings, and its slope against ln p."""
     c = s.observations.conditions
     for number, tests in enumerate(s.random_effects.tests_of):
         name, where = f"specimen {c.specimen[tests[0]]}", "/".join(sorted(set(c.sample[tests])))
         ones, load = np.ones((len(tests), 1)), s.log_pressure[tests, None]
-        seen = [(observable, "", ones) for observable in ("static", "sliding", "both")]
-        for observable, detail, shape in (*seen, ("both", BY_LOAD, load)):
-            along = Course(s.observations.n, number, tests, _spread(shape, observable))
+        offsets = [(observable, "", ones) for observable in ("static", "sliding", "both")]
+        for observable, detail, shape in (*offsets, ("both", BY_LOAD, load)):
+            along = EffectCourse(s.observations.n, number, tests, _in_regimes(shape, observable))
             yield Contrast("specimen", observable, name, where, (along,), detail=detail)
 
 
-def _periods(s: Setup) -> Iterator[Contrast]:
-    """Harmonics of the run order, and of the day."""
-    c = s.observations.conditions
-    if np.isfinite(c.run_order).all() and len(np.unique(c.run_order)) > 3 * BINS:
-        rank = np.argsort(np.argsort(c.run_order)) / s.observations.n
-        for k in range(1, min(CYCLES, s.observations.n // 4) + 1):
-            wave = _course(s, _spread(_wave(k * rank), "both"))
-            yield Contrast("period", "both", "run_order", "", wave, detail=f"period {s.observations.n / k:.3g}")
-    hours = s.observations.clock_h
-    if np.isfinite(hours).all() and np.ptp(hours) > 2:
-        for k in (1, 2, 3):
-            yield Contrast("period", "both", "time of day", "", _course(s, _spread(_wave(k * hours / 24.0), "both")))
-
-
-def _blocks(s: Setup) -> Iterator[Contrast]:
-    """Stretches of the series in which something else may have been mounted: runs of successive tenths, up to half."""
-    order = s.observations.conditions.run_order
-    if not np.isfinite(order).all() or s.observations.n < 3 * TENTHS:
-        return
+def _of_series(s: Setup) -> Iterator[Contrast]:
+    """Harmonics of the run order and of the day, and stretches of the series in which something else may have been
+    mounted: runs of successive tenths, up to half."""
+    n, order, hours = s.observations.n, s.observations.conditions.run_order, s.observations.clock_h
+    ordered = bool(np.isfinite(order).all())
     rank = np.argsort(np.argsort(order))
-    tenth = (rank * TENTHS) // s.observations.n
-    for first in range(TENTHS):
+    waves = []
+    if ordered and len(np.unique(order)) > 3 * BINS:
+        turns = rank / n
+        waves += [("run_order", f"period {n / k:.3g}", k * turns) for k in range(1, min(CYCLES, n // 4) + 1)]
+    if np.isfinite(hours).all() and np.ptp(hours) > 2:
+        waves += [("time of day", "", k * hours / 24.0) for k in (1, 2, 3)]
+    for covariate, detail, turns in waves:
+        wave = np.column_stack([np.sin(2 * np.pi * turns), np.cos(2 * np.pi * turns)])
+        yield _contrast(s, "period", "both", covariate, wave, detail=detail)
+    tenth = (rank * TENTHS) // n
+    for first in range(TENTHS) if ordered and n >= 3 * TENTHS else ():
         for last in range(first + 1, min(first + TENTHS // 2, TENTHS)):
             inside = ((tenth >= first) & (tenth <= last)).astype(float)
             where = f"from {order[inside > 0].min():.0f} to {order[inside > 0].max():.0f}"
-            along = _course(s, _spread(inside[:, None], "both"))
-            yield Contrast("block", "both", "run_order", "", along, detail=where)
-
-
-def _wave(turns: FloatArray) -> FloatArray:
-    return np.column_stack([np.sin(2 * np.pi * turns), np.cos(2 * np.pi * turns)])
-
-
-Progress = Callable[[str, int, int], None]
-AT_ONCE = 20  # replicates, after which it is asked whether they suffice
-FEWEST = 40
-FORM = 0.12  # by how much of its own effect a law may be wrong in form, sample by sample
+            yield _contrast(s, "block", "both", "run_order", inside[:, None], detail=where)
 
 
 @displayed()
@@ -288,37 +260,29 @@ def screen(
 
     Replicates end once the strongest contrast is clearly within chance, or clearly beyond it.
     """
-    whole = np.array([contrast.about_one for contrast in contrasts])
-    ready = terms_of([contrast.courses for contrast in contrasts], whole, f.setup.observations.n)
-    strengths, found = strengths_of(as_measured(f), ready)
-    strength, coefficients = strengths[0], [c[0] for c in found]
+    about_one = np.array([contrast.about_one for contrast in contrasts])
+    terms = terms_of([contrast.courses for contrast in contrasts], about_one, f.setup.observations.n)
+    strengths, each = strengths_of(as_measured(f), terms)
+    strength, coefficients = strengths[0], [c[0] for c in each]
     library = np.array([contrast.kind == "mechanism" for contrast in contrasts])
     chance = np.zeros((0, 2))
     while len(chance) < replicates:
         drawn = drawn_residuals(f, rng, min(AT_ONCE, replicates - len(chance)))
-        made = refit(f, drawn)
-        strengths, _ = strengths_of(made, ready)
+        strengths, _ = strengths_of(refit(f, drawn), terms)
         chance = np.concatenate([chance, _strongest(strengths, library)])
         if progress is not None:
             progress("diagnose", len(chance), replicates)
         if decided(chance[:, 0], float(strength.max())):
             break
-    shown = _shown(contrasts, strength)
+    pairs = [k for k, contrast in enumerate(contrasts) if len(contrast.courses) > 1]
+    weaker = set(sorted(pairs, key=lambda k: -strength[k])[MOST_PAIRS:])  # chance counts them, nothing shows them
+    shown = [k for k in range(len(contrasts)) if k not in weaker]
     contrasts, strength, coefficients = [contrasts[k] for k in shown], strength[shown], [coefficients[k] for k in shown]
     size = f.linear.size_beyond_law(
         added(contrast.courses) @ c for contrast, c in zip(contrasts, coefficients, strict=True)
     )
     p = np.array([share_beyond(chance[:, 0], float(value)) for value in strength])
     return Screen(tuple(contrasts), strength, size, tuple(coefficients), chance[:, 0], chance[:, 1], p)
-
-
-def _shown(contrasts: Sequence[Contrast], strength: FloatArray) -> list[int]:
-    """Which contrasts are shown: of those of two specimens the MOST_PAIRS strongest, and all others."""
-    pairs = [k for k, contrast in enumerate(contrasts) if len(contrast.courses) > 1]
-    if len(pairs) <= MOST_PAIRS:
-        return list(range(len(contrasts)))
-    weaker = set(sorted(pairs, key=lambda k: -strength[k])[MOST_PAIRS:])
-    return [k for k in range(len(contrasts)) if k not in weaker]
 
 
 def allowed_wrong_form(model: ModelFit, allowed: int = 0) -> ModelFit:

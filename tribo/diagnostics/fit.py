@@ -34,7 +34,7 @@ LENGTHS = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a step that does not worsen the pena
 
 @displayed()
 @dataclass(frozen=True)
-class State:
+class FitState:
     """Where a fit has got to: parameters, random effects (q,), residual (n, 2) without them, and the noise.
 
     At this noise, ``factor`` (n, 2, 2) whitens the tests, ``precision`` (q,) is that of the random effects, and
@@ -54,9 +54,9 @@ class State:
         return np.asarray(self.residual - s.random_effects.on_tests(self.effects))
 
 
-def state_at(s: Setup, x: FloatArray, effects: FloatArray, residual: FloatArray, noise: Noise) -> State:
+def state_at(s: Setup, x: FloatArray, effects: FloatArray, residual: FloatArray, noise: Noise) -> FitState:
     """The state of a fit with these parameters and effects at this noise."""
-    return State(
+    return FitState(
         x, effects, residual, noise, whitener(s, noise), prior_sd(s, noise.sizes) ** -2, log_prior(s, noise)
     )
 
@@ -67,7 +67,7 @@ def distance(factor: FloatArray, left: FloatArray) -> FloatArray:
     return static**2 + (factor[:, 1, 0] * left[:, 0] + factor[:, 1, 1] * left[:, 1]) ** 2
 
 
-def weights(s: Setup, state: State) -> FloatArray:
+def weights(s: Setup, state: FitState) -> FloatArray:
     """Weight of every test under the bivariate t, one on average for normal noise, shape (n,)."""
     tail = state.noise.tail
     return (tail + 2.0) / (tail + distance(state.factor, state.left(s)))
@@ -95,7 +95,7 @@ def prior_of(columns: ModelColumns, precision: FloatArray) -> Sides:
 
 
 def solved(
-    state: State, columns: ModelColumns, weight: FloatArray, bounds: tuple[FloatArray, FloatArray]
+    state: FitState, columns: ModelColumns, weight: FloatArray, bounds: tuple[FloatArray, FloatArray]
 ) -> tuple[Inverse, FloatArray]:
     """The inverse of the normal matrix at the weighted noise and one step, (p + q,); a parameter at a bound that would
     leave it is held there."""
@@ -114,7 +114,7 @@ def solved(
     return inverse, solution
 
 
-def penalised(s: Setup, state: State) -> float:
+def penalised(s: Setup, state: FitState) -> float:
     """Log density of the tests given the effects, plus that of the effects, without constants of the noise."""
     tail = state.noise.tail
     tests = -0.5 * (tail + 2.0) * np.sum(np.log1p(distance(state.factor, state.left(s)) / tail))
@@ -122,8 +122,8 @@ def penalised(s: Setup, state: State) -> float:
 
 
 def with_noise_estimated(
-    s: Setup, state: State, columns: ModelColumns, weight: FloatArray, inverse: Inverse
-) -> State:
+    s: Setup, state: FitState, columns: ModelColumns, weight: FloatArray, inverse: Inverse
+) -> FitState:
     """The same state, the noise estimated anew; the inverse says how uncertain each prediction is."""
     left, noise = state.left(s), state.noise
     products = np.stack([left[:, 0] ** 2, left[:, 0] * left[:, 1], left[:, 1] ** 2])
@@ -136,7 +136,7 @@ def with_noise_estimated(
     return state_at(s, state.x, state.effects, state.residual, estimated)
 
 
-def scored(s: Setup, state: State) -> tuple[float, FloatArray]:
+def scored(s: Setup, state: FitState) -> tuple[float, FloatArray]:
     """Log marginal likelihood by Laplace's method, with the priors of the noise sizes; and the weights of the tests."""
     weight = weights(s, state)
     columns = model_columns(np.zeros((len(weight), 2, 0)), s.random_effects)

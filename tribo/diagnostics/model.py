@@ -91,7 +91,7 @@ MOST_PAIRS = 2000  # courses of two specimens that are written out at all
 
 @displayed()
 @dataclass(frozen=True)
-class Course:
+class EffectCourse:
     """Columns of ln T, ``values`` (t, 2, d) on the ``tests`` (t,) of one ``specimen``, by its number, or of EVERY one;
     zero on the others of ``n`` tests."""
 
@@ -120,18 +120,18 @@ class Course:
         return bool(values.size and np.isfinite(values).all() and (np.ptp(values) > 0 or len(values) < self.n))
 
 
-def course(columns: FloatArray, effects: RandomEffects) -> Course:
+def course(columns: FloatArray, effects: RandomEffects) -> EffectCourse:
     """The course of columns (n, 2, d)."""
     changed = effects.specimen[np.any(columns != 0.0, axis=(1, 2))]
     n = len(columns)
     if len(changed) and (changed == changed[0]).all():
         specimen = int(changed[0])
         tests = effects.tests_of[specimen]
-        return Course(n, specimen, tests, columns[tests])
-    return Course(n, EVERY, np.arange(n), columns)
+        return EffectCourse(n, specimen, tests, columns[tests])
+    return EffectCourse(n, EVERY, np.arange(n), columns)
 
 
-def added(courses: Iterable[Course]) -> FloatArray:
+def added(courses: Iterable[EffectCourse]) -> FloatArray:
     """The columns (n, 2, d) that courses add up to."""
     first, *others = courses
     total = first.columns
@@ -380,7 +380,7 @@ class StartChanges:
     """
 
     acting: tuple[Acting, ...]
-    courses: tuple[tuple[Course, ...], ...]
+    courses: tuple[tuple[EffectCourse, ...], ...]
     every_start: Mapping[str, FloatArray]
     adhesion: FloatArray
 
@@ -389,7 +389,7 @@ def start_changes(s: Setup, law: FloatArray) -> StartChanges:
     """The changes of all candidates on top of the flat law ``law``, mechanisms of a model left out."""
     acting = candidates(s, law)
     before = predict(s, law, (), ())
-    single: dict[tuple[str, str], Course] = {}
+    single: dict[tuple[str, str], EffectCourse] = {}
     every = {}
     for a in acting:
         if len(a.mechanism.choosing.parts(a.choice)) > 1:

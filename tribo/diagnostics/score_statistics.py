@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.diagnostics.fit import ModelFit
-from tribo.diagnostics.model import EVERY, MOST_PAIRS, Acting, Course, StartChanges, added, start_changes
+from tribo.diagnostics.model import EVERY, MOST_PAIRS, Acting, EffectCourse, StartChanges, added, start_changes
 from tribo.diagnostics.normal_equations import ROUNDING, BlockCholesky, Sides, block_cholesky
 from tribo.diagnostics.replicates import SIZE_STEPS, Replicates, as_measured
 from tribo.display import displayed
@@ -87,7 +87,7 @@ def terms_in(stacked: FloatArray, spans: Sequence[slice], about_one: FloatArray 
     return Terms(shared, np.arange(len(spans)), (), none, np.zeros((0, 2), np.int64), none, about_one)
 
 
-def terms_of(contrasts: Sequence[tuple[Course, ...]], about_one: FloatArray, n: int) -> Terms:
+def terms_of(contrasts: Sequence[tuple[EffectCourse, ...]], about_one: FloatArray, n: int) -> Terms:
     """The terms of contrasts at ``n`` tests, given by their courses: one each, or two that add up.
 
     Two courses of one specimen each, both of them contrasts of their own, are not written out.
@@ -102,7 +102,7 @@ def terms_of(contrasts: Sequence[tuple[Course, ...]], about_one: FloatArray, n: 
     ends = np.cumsum([contrasts[k][0].freedom for k in shared], dtype=np.int64)
     spans = [slice(int(e) - contrasts[k][0].freedom, int(e)) for e, k in zip(ends, shared, strict=True)]
     stacked = np.concatenate([np.zeros((n, 2, 0)), *(added(contrasts[k]) for k in shared)], axis=2)
-    specimens: dict[int, list[Course]] = {}
+    specimens: dict[int, list[EffectCourse]] = {}
     for k in single:
         specimens.setdefault(contrasts[k][0].specimen, []).append(contrasts[k][0])
     terms = []
@@ -116,7 +116,7 @@ def terms_of(contrasts: Sequence[tuple[Course, ...]], about_one: FloatArray, n: 
     )  # fmt: skip
 
 
-def _of_one_specimen(course: Course) -> bool:
+def _of_one_specimen(course: EffectCourse) -> bool:
     return course.specimen != EVERY and course.freedom == 1
 
 

@@ -8,7 +8,7 @@ load that the law changes most.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -23,7 +23,7 @@ from tribo.diagnostics.predictor import flat_law
 from tribo.diagnostics.verdict import CERTAIN_CAUSES
 from tribo.display import displayed
 from tribo.errors import SimulationError
-from tribo.mechanisms.record import Conditions, Values
+from tribo.mechanisms.record import Values
 from tribo.mechanisms_in_model.extended_run import simulate_pair
 from tribo.records import FloatArray, Run
 from tribo.springblock.config import PAPER, LocalFriction, SimConfig
@@ -95,49 +95,43 @@ def simulate_extension(
     if not picked:
         bounds = f"{100 * np.expm1(LEAST_CHANGE):.0f} and {100 * np.expm1(MOST_CHANGE):.0f} %"
         return NotSimulated(names, f"no test has a change of T between {bounds}")
-    pairs = [_pair(model, test, seed) for test in picked]
+    runs = []
     try:
-        runs = _run_pairs(pairs, jobs, progress)
+        with ThreadPoolExecutor(max(1, jobs)) as pool:
+            for both in pool.map(lambda test: simulate_pair(*_pair(model, test, seed)), picked):
+                runs.append(both)
+                if progress is not None:
+                    progress(STAGE, len(runs), len(picked))
     except SimulationError as why:
         return NotSimulated(names, "; ".join(str(problem) for problem in why.problems))
     table = _table(model, picked, quick, runs)
-    change = interpolated(model, table, quick)
+    change = interpolated(model, picked, table, quick)
     return SimulatedExtension(names, model.predicted - quick + change, change, quick, table, *_ratio(table))
 
 
 def representatives(model: ModelFit, quick: FloatArray) -> list[int]:
-    """Tests to simulate: the most moved of every sample at up to MOST_LOADS of its loads."""
+    """Tests to simulate: the most moved of every sample at up to MOST_LOADS of its loads, evenly over the logarithm of
+    their range; equal loads are one level."""
     c = model.setup.observations.conditions
-    loads = _loads(c.normal_load_N)
+    levels = np.unique(np.round(c.normal_load_N, 6))
+    loads = levels[np.abs(np.log(c.normal_load_N[:, None] / levels)).argmin(axis=1)]
     size = np.abs(quick[:, leading(quick)])
-    found = []
+    tests = []
     for sample in np.unique(c.sample):
         usable = (c.sample == sample) & (np.abs(quick) < MOST_CHANGE).all(axis=1) & (size > LEAST_CHANGE)
-        for load in _spread(loads[usable]):
+        few = np.unique(loads[usable])
+        if len(few) > MOST_LOADS:
+            wanted = np.geomspace(few[0], few[-1], MOST_LOADS)
+            few = np.unique(few[np.abs(np.log(few[:, None] / wanted)).argmin(axis=0)])
+        for load in few:
             rows = np.flatnonzero(usable & (loads == load))
-            found.append(int(rows[np.argmax(size[rows])]))
-    return found
+            tests.append(int(rows[np.argmax(size[rows])]))
+    return tests
 
 
 def leading(quick: FloatArray) -> int:
     """The regime that the effect moves more: 0 static, 1 sliding."""
     return int(np.argmax(np.abs(quick).mean(axis=0)))
-
-
-def _loads(normal_load_N: FloatArray) -> FloatArray:
-    """The load level of each test: equal loads are one level."""
-    distinct = np.unique(np.round(normal_load_N, 6))
-    nearest = np.abs(np.log(normal_load_N[:, None] / distinct)).argmin(axis=1)
-    return np.asarray(distinct[nearest])
-
-
-def _spread(loads: FloatArray) -> FloatArray:
-    """A few of the loads, evenly over the logarithm of their range."""
-    distinct = np.unique(loads)
-    if len(distinct) <= MOST_LOADS:
-        return np.asarray(distinct)
-    wanted = np.geomspace(distinct[0], distinct[-1], MOST_LOADS)
-    return np.unique(distinct[np.abs(np.log(distinct[:, None] / wanted)).argmin(axis=0)])
 
 
 def _pair(model: ModelFit, test: int, seed: int) -> tuple[SimConfig, dict[str, Values], dict[str, float]]:
@@ -152,7 +146,18 @@ def _pair(model: ModelFit, test: int, seed: int) -> tuple[SimConfig, dict[str, V
         sample=sample, pattern=o.patterns[sample], pressure_Pa=pressure, angle_deg=angle, seed=own,
         friction=local_friction(model.law), dt_s=DT_S, duration_peaks=LONG_PEAKS,
     )  # fmt: skip
-    return config, _acting_on(model, test), recorded_of(c, test)
+    at_work: dict[str, Values] = {}
+    for acting, values in zip(model.acting, model.values, strict=True):
+        here = acting.mechanism.on_test(values, acting.choice, c, test)
+        if here is not None:  # the choice concerns this test
+            name = acting.mechanism.name
+            at_work[f"{name}({here.other_sample})" if here.other_sample else name] = here.values
+    known = {
+        "hold_s": c.hold_s, "specimen_run": c.specimen_run, "temperature_C": c.temperature_C,
+        "humidity_pct": c.humidity_pct, "speed_m_s": c.speed_m_s, "elapsed_s": c.elapsed_s,
+    }  # fmt: skip
+    recorded = {name: float(values[test]) for name, values in known.items() if np.isfinite(values[test])}
+    return config, at_work, recorded | {"nominal_area_m2": c.nominal_area_m2}
 
 
 def local_friction(law: FloatArray) -> LocalFriction:
@@ -162,45 +167,6 @@ def local_friction(law: FloatArray) -> LocalFriction:
         PAPER.mu_s * mu_s, PAPER.mu_s_sd * mu_s, PAPER.mu_d * mu_d, PAPER.mu_d_sd * mu_d,
         PAPER.static_adhesion_Pa * static, PAPER.sliding_adhesion_Pa * sliding,
     )  # fmt: skip
-
-
-def _acting_on(model: ModelFit, test: int) -> dict[str, Values]:
-    """Values by mechanism for one test; a mechanism whose choice does not concern the test is left out."""
-    c = model.setup.observations.conditions
-    found: dict[str, Values] = {}
-    for acting, values in zip(model.acting, model.values, strict=True):
-        here = acting.mechanism.on_test(values, acting.choice, c, test)
-        if here is not None:
-            name = acting.mechanism.name
-            found[f"{name}({here.other_sample})" if here.other_sample else name] = here.values
-    return found
-
-
-def recorded_of(c: Conditions, test: int) -> dict[str, float]:
-    """The recorded conditions of one test, those that are there."""
-    known = {
-        "hold_s": c.hold_s, "specimen_run": c.specimen_run, "temperature_C": c.temperature_C,
-        "humidity_pct": c.humidity_pct, "speed_m_s": c.speed_m_s, "elapsed_s": c.elapsed_s,
-    }  # fmt: skip
-    found = {name: float(values[test]) for name, values in known.items() if np.isfinite(values[test])}
-    return found | {"nominal_area_m2": c.nominal_area_m2}
-
-
-def _run_pairs(
-    pairs: Sequence[tuple[SimConfig, Mapping[str, Values], Mapping[str, float]]], jobs: int, progress: Progress | None
-) -> list[tuple[Run, Run]]:
-    """Every pair as (without, with)."""
-
-    def run(pair: tuple[SimConfig, Mapping[str, Values], Mapping[str, float]]) -> tuple[Run, Run]:
-        return simulate_pair(*pair)
-
-    found = []
-    with ThreadPoolExecutor(max(1, jobs)) as pool:
-        for done, both in enumerate(pool.map(run, pairs), start=1):
-            found.append(both)
-            if progress is not None:
-                progress(STAGE, done, len(pairs))
-    return found
 
 
 def _table(
@@ -225,14 +191,14 @@ def _table(
     return pd.DataFrame(rows)
 
 
-def interpolated(model: ModelFit, table: pd.DataFrame, quick: FloatArray) -> FloatArray:
-    """Change of ln T of every test, (n, 2): the quick one, corrected as the pairs of its sample were.
+def interpolated(model: ModelFit, tests: Sequence[int], table: pd.DataFrame, quick: FloatArray) -> FloatArray:
+    """Change of ln T of every test, (n, 2): the quick one, corrected as the pairs of ``tests`` of its sample were.
 
     The correction of both regimes is in proportion to the quick change of the leading one (no effect, no correction).
     Between loads the factor is linear in ln N.
     """
     c = model.setup.observations.conditions
-    places = _places(model, table)
+    places = np.array(tests)
     lead = leading(quick)
     off = table[["simulated_static", "simulated_sliding"]].to_numpy() - quick[places]
     factor = off / quick[places, lead][:, None]
@@ -245,12 +211,6 @@ def interpolated(model: ModelFit, table: pd.DataFrame, quick: FloatArray) -> Flo
         for k in (0, 1):
             change[rows, k] += quick[rows, lead] * np.interp(wanted, known, factor[pairs, k])
     return change
-
-
-def _places(model: ModelFit, table: pd.DataFrame) -> np.ndarray:
-    """The row of the campaign that each pair stands for."""
-    place = {test: k for k, test in enumerate(model.setup.observations.test_ids.tolist())}
-    return np.array([place[test] for test in table["test_id"]])
 
 
 def _ratio(table: pd.DataFrame) -> tuple[float, float]:
