@@ -200,19 +200,19 @@ def orders_of(config: SimConfig) -> Row:
 def reference_failures(config: SimConfig, count: int = 6) -> list[tuple[int, int]]:
     """(block, step) of the first failures of different blocks on the reference engine, stepped singly."""
     lattice = lattice_of(config)
-    model = r.reference_model(config, lattice, thresholds_of(config, lattice))
     drive = drive_of(config, lattice)
     start = 0.99 * first_failure_s(lattice, thresholds_of(config, lattice), drive, config.stiffness_N_m)
-    state = r.State(drive.follow * start + drive.lag, drive.follow.copy(), lattice.contact.copy())
-    record = r.Record(np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1, np.int64), np.full(64, -1, np.int64),
-                      np.zeros(r.N_SUMS))  # fmt: skip
-    work = np.zeros((10, *state.u.shape))
+    model = r.reference_model(config, lattice, thresholds_of(config, lattice), start, 1)
+    run = r.Course(
+        drive.follow * start + drive.lag, drive.follow.copy(), lattice.contact.copy(), np.zeros(1), np.zeros(1),
+        np.zeros(1), np.zeros(1, np.int64), np.full(64, -1, np.int64), np.zeros(r.N_SUMS),
+    )  # fmt: skip
+    work = np.zeros((10, *run.u.shape))
     found: dict[int, int] = {}
     step = 0
     while len(found) < count:
-        one = r.Steps(start + step * config.dt_s, config.dt_s, 1, 1, np.inf)
-        r.integrate_all(state, one, model, work, record)
-        for block in record.failed[: int(record.sums[r.N_FAILED])]:
+        r.integrate_all(run, 1, model._replace(start=start + step * config.dt_s, stop_at_peaks=np.inf), work)
+        for block in run.failed[: int(run.sums[r.N_FAILED])]:
             found.setdefault(int(block), step)
         step += 1
     return list(found.items())[:count]

@@ -199,10 +199,10 @@ def test_a_tilted_sample_has_its_load_off_the_middle_by_what_was_asked() -> None
     lattice = lattice_of(flat)
     place = np.arange(3600) % 60 / 59 - 0.5
     for eccentricity in (0.05, 0.16, 0.25):
-        carried = with_profile(flat, lattice, partial(uneven, eccentricity), even(lattice))
-        assert carried.load.mean() == pytest.approx(1.0)
-        assert np.mean(carried.load * place) == pytest.approx(eccentricity, rel=0.05)
-    assert carried.grip.mean() == pytest.approx(3 * (0.5 - 0.25), abs=0.02)
+        load, grip = with_profile(flat, lattice, partial(uneven, eccentricity), even(lattice))
+        assert load.mean() == pytest.approx(1.0)
+        assert np.mean(load * place) == pytest.approx(eccentricity, rel=0.05)
+    assert grip.mean() == pytest.approx(3 * (0.5 - 0.25), abs=0.02)
 
 
 def test_a_wrong_label_at_share_one_is_the_other_sample_to_the_bit() -> None:

@@ -37,7 +37,7 @@ from tribo.springblock.engines.state import (
     sliding_threshold,
     static_threshold,
 )
-from tribo.springblock.engines.strips import LINE, Layout, aligned, places_of, spare_stiffness, wrap
+from tribo.springblock.engines.strips import LINE, aligned, places_of, spare_stiffness, wrap
 from tribo.springblock.lattice import INNER, NEIGHBOURHOOD, Lattice
 
 # rows of Field.planes: m v / dt and its amount (zero at rest), thresholds (static now, sliding), time of the last
@@ -59,6 +59,15 @@ def integrate(config: SimConfig, lattice: Lattice, thresholds: Thresholds, threa
     for samples, step in in_chunks(config, thresholds, state, numerics, kept):
         advance_dense(state, samples, numerics, step, lattice, drive.follow)
     return trajectory_of(kept, state, numerics, drive, failure)
+
+
+class Layout(NamedTuple):
+    """Where the blocks lie: block (x, y) at ``first + y width + x`` of every plane."""
+
+    width: int
+    first: int
+    last: int  # end of the stretch that is worked on, a whole number of vectors
+    places: int
 
 
 class Field(NamedTuple):
@@ -88,7 +97,7 @@ def layout_of(nx: int, ny: int) -> Layout:
 def field_of(state: State, numerics: Numerics, lattice: Lattice, follow: FloatArray) -> Field:
     """The blocks of a state; ``follow`` (n, 2) is the quasi-static velocity of the cavities in m/s."""
     layout = layout_of(lattice.nx, lattice.ny)
-    inside = places_of(layout, lattice.nx, lattice.ny)
+    inside = places_of(layout.first, layout.width, lattice.nx, lattice.ny)
     now = numerics.start + int(state.counts[STEP]) * numerics.dt
     cells = state.cells
     positions, planes = aligned(4, layout.places), aligned(PLANES, layout.places)
@@ -105,7 +114,7 @@ def field_of(state: State, numerics: Numerics, lattice: Lattice, follow: FloatAr
     there = aligned(1, layout.places)[0]
     there[inside] = 1.0
     if lattice.periodic:
-        wrap(there, layout, lattice.nx, lattice.ny)
+        wrap(there, layout.first, layout.width, lattice.nx, lattice.ny)
     direction = np.array([numerics.direction_x, numerics.direction_y])
     pull = numerics.shear_stiffness * numerics.speed * direction
     along = numerics.dt * float((follow @ direction).sum())
@@ -120,7 +129,7 @@ def advance_dense(
     """Integrate all blocks of a state to a step, or to the end of the run."""
     field = field_of(state, numerics, lattice, follow)
     swapped = steps_of_all(field, state, out, numerics, until_step)
-    inside = places_of(field.layout, lattice.nx, lattice.ny)
+    inside = places_of(field.layout.first, field.layout.width, lattice.nx, lattice.ny)
     cells = state.cells
     now = numerics.start + int(state.counts[STEP]) * numerics.dt
     with np.errstate(over="ignore", invalid="ignore"):  # the caller refuses a run that met such a number
@@ -146,8 +155,8 @@ def steps_of_all(f: Field, s: State, out: Samples, c: Numerics, until_step: int)
         before, after = (2, 0) if swapped else (0, 2)
         x, y = f.positions[before], f.positions[before + 1]
         if c.periodic:
-            wrap(x, f.layout, c.nx, c.ny)
-            wrap(y, f.layout, c.nx, c.ny)
+            wrap(x, f.layout.first, f.layout.width, c.nx, c.ny)
+            wrap(y, f.layout.first, f.layout.width, c.nx, c.ny)
         t = c.start + s.counts[STEP] * c.dt
         if c.spacing > 0.0:
             pushed_apart(f, x, y, c, t)

@@ -1,9 +1,8 @@
-"""The runs of a prediction, in cells of one sample at one pressure, each kept in a file of its own.
+"""The calibrated model's prediction of every sample of a campaign, without refitting.
 
-A cell's file is named after everything its runs are made from, sources included: a file that is there is valid, and
-one finished run is never computed twice. Cells can be run by different processes, or machines, at once.
-
-The calibrated model's prediction of every sample of a campaign, without refitting.
+Its runs are made in cells of one sample at one pressure, each kept in a file named after everything the runs are made
+from, sources included: a file that is there is valid, and one finished run is never computed twice. Cells can be run by
+different processes, or machines, at once.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ import hashlib
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
@@ -176,7 +176,7 @@ def example_run(cells: Sequence[Cell], kept: Path | None = None) -> Run:
 
     config = example_config(cells)
     name = f"example-{quote(config.sample, safe='')}"
-    return kept_or_made(kept, name, config, lambda: simulate(config), SOURCES)
+    return kept_or_made(kept, name, config, partial(simulate, config), SOURCES)
 
 
 def example_config(cells: Sequence[Cell]) -> SimConfig:
@@ -265,19 +265,18 @@ def predict(
     from tribo.springblock import SimConfig
 
     friction, cells = calibrated_cells(campaign, fits, flat, model, progress)
-    if model.kept is not None:
-        remove_other_runs(cells, model.kept)
     table = run_cells(
         cells, model.kept, model.jobs, model.scheduler,
         lambda done, total: progress("simulating the samples", done, total),
     )  # fmt: skip
     table = _as_forces(table, campaign)
+    samples, base = dict.fromkeys(cell.sample for cell in cells), SimConfig()
     return Prediction(
         table,
         _simulated_fits(table, campaign.area_m2, weights),
         _flat_laws(fits, flat),
-        _calibration(friction, SimConfig()),
-        tuple(example_run(own, model.kept) for own in _by_sample(cells).values()),
+        {**asdict(friction), "blocks_x": base.blocks[0], "blocks_y": base.blocks[1], "dt_s": base.dt_s},
+        tuple(example_run([c for c in cells if c.sample == sample], model.kept) for sample in samples),
         flat,
     )
 
@@ -291,25 +290,26 @@ def calibrated_cells(
 ) -> tuple[LocalFriction, tuple[Cell, ...]]:
     """Local friction from the flat sample alone, and the runs that predict every sample, by sample and load.
 
+    Kept runs of other samples, loads, laws or sources are deleted, so that what is kept is of this calibration.
     Parameters and exceptions are those of :func:`predict`.
     """
     from tribo.springblock import CalibrationRuns, SimConfig, calibrate, stratified_design
 
     laws = _flat_laws(fits, flat)
-    loads = loads_to_simulate(campaign)
-    pressures = [campaign.nominal_pressure_Pa(load) for load in loads]
-    wanted = (_law(laws["static"]), _law(laws["sliding"]))
-
-    def calibration() -> LocalFriction:
-        return calibrate(
-            *wanted, runs=CalibrationRuns(pressures, seed=model.seed), jobs=model.jobs,
-            progress=lambda done, total: progress("calibrating on the flat sample", done, total),
-        )  # fmt: skip
-
+    pressures = [campaign.nominal_pressure_Pa(load) for load in loads_to_simulate(campaign)]
+    wanted = tuple((laws[regime].value("mu"), laws[regime].value("tau0_Pa")) for regime in REGIMES)
+    calibration = partial(
+        calibrate, *wanted, runs=CalibrationRuns(pressures, seed=model.seed), jobs=model.jobs,
+        progress=lambda done, total: progress("calibrating on the flat sample", done, total),
+    )  # fmt: skip
     friction = kept_or_made(model.kept, "calibration", (wanted, pressures, model.seed), calibration, SOURCES)
-    samples = {s: campaign.samples[s] for s in _measured_samples(campaign)}
+    measured = {test.sample for test in campaign.tests}
+    samples = {name: pattern for name, pattern in campaign.samples.items() if name in measured}
     design = stratified_design(samples, pressures, model.runs, model.seed, SimConfig(friction=friction))
-    return friction, cells_of(design)
+    cells = cells_of(design)
+    if model.kept is not None:
+        remove_other_runs(cells, model.kept)
+    return friction, cells
 
 
 def run_named_cells(
@@ -328,8 +328,6 @@ def run_named_cells(
         ``only`` names nothing this campaign measured.
     """
     _, cells = calibrated_cells(campaign, fits, flat, model, progress)
-    if model.kept is not None:
-        remove_other_runs(cells, model.kept)  # what a diagnosis finds kept is then of this calibration
     chosen = tuple(c for c in cells if only in ("", c.sample, sample_as_word(c.sample), c.name))
     if not chosen and only != "calibration":
         allowed = ", ".join(["calibration", *dict.fromkeys(c.sample for c in cells), *(c.name for c in cells)])
@@ -346,13 +344,6 @@ def run_named_cells(
     return chosen
 
 
-def _by_sample(cells: tuple[Cell, ...]) -> dict[str, list[Cell]]:
-    found: dict[str, list[Cell]] = {}
-    for cell in cells:
-        found.setdefault(cell.sample, []).append(cell)
-    return found
-
-
 def _flat_laws(fits: tuple[LawFit, ...], flat: str) -> dict[Regime, LawFit]:
     laws = {f.regime: f for f in fits if f.sample == flat and np.isfinite(f.values).all()}
     if len(laws) < len(REGIMES):
@@ -361,15 +352,6 @@ def _flat_laws(fits: tuple[LawFit, ...], flat: str) -> dict[Regime, LawFit]:
             Problem("no_flat_law", f"calibration needs both laws of the flat sample {flat}", found=notes or "none")
         )
     return laws
-
-
-def _law(fit: LawFit) -> tuple[float, float]:
-    return fit.value("mu"), fit.value("tau0_Pa")
-
-
-def _measured_samples(campaign: Campaign) -> list[str]:
-    measured = {test.sample for test in campaign.tests}
-    return [s for s in campaign.samples if s in measured]
 
 
 def _as_forces(table: pd.DataFrame, campaign: Campaign) -> pd.DataFrame:
@@ -391,7 +373,3 @@ def _simulated_fits(table: pd.DataFrame, nominal_area_m2: float, weights: str) -
         test_id=table.index.astype(str), specimen=table["stratum"].astype(str), static_u_N=0.0, sliding_u_N=0.0
     )
     return tuple(f for regime in REGIMES for f in fit_samples(rows, regime, nominal_area_m2, weights=weights))
-
-
-def _calibration(friction: LocalFriction, base: SimConfig) -> dict[str, float]:
-    return {**asdict(friction), "blocks_x": base.blocks[0], "blocks_y": base.blocks[1], "dt_s": base.dt_s}

@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Parameter, Placement, Values, amplitude
+from tribo.mechanisms.record import (
+    Base,
+    Conditions,
+    Forces,
+    Mechanism,
+    MechanismParameter,
+    Placement,
+    Values,
+    amplitude,
+)
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -23,7 +32,7 @@ MECHANISM = Mechanism(
     formula="T_s -> T_s + e (rim length)",
     parameters=(
         amplitude("e", "N/m", 0.0, 1.0, 0.03, "static force per rim length"),
-        Parameter("share", "", 0.0, 0.4, 0.1, "share of it left while sliding"),
+        MechanismParameter("share", "", 0.0, 0.4, 0.1, "share of it left while sliding"),
     ),
     law=law,
     sign=1,

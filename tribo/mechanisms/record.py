@@ -1,14 +1,8 @@
-"""What a mechanism needs besides numbers: which specimen, which pattern, which column.
+"""What a mechanism is: its law, what it needs to choose, where it acts in the model, what shows it besides the forces.
 
-Where a mechanism acts in the spring-block model, as data and functions of arrays.
-
-The module :mod:`tribo.mechanisms_in_model` carries the placement out; it needs nothing else of a mechanism.
-
-Evidence of a mechanism besides the friction forces: in the traces, by a measurement, by varying a condition.
-
-What a mechanism means for a published table of mu and tau0 that prints neither pulls nor conditions.
-
-What a mechanism is: its law, and everything that only it knows.
+From the parts to the whole: :class:`Choosing` (a specimen, a pattern, a column), :class:`Placement` in the
+spring-block model (which :mod:`tribo.mechanisms_in_model` carries out), evidence in traces and direct measurements, the
+meaning for a published table that prints neither pulls nor conditions, and :class:`Mechanism` with its parameters.
 """
 
 from __future__ import annotations
@@ -21,13 +15,13 @@ import numpy as np
 
 from tribo.display import displayed
 from tribo.mechanisms.conditions import (
-    REFERENCE_HOLD_S,
-    REFERENCE_PRESSURE_PA,
-    REFERENCE_SPEED_M_S,
+    REFERENCE_HOLD_S as REFERENCE_HOLD_S,
+    REFERENCE_PRESSURE_PA as REFERENCE_PRESSURE_PA,
+    REFERENCE_SPEED_M_S as REFERENCE_SPEED_M_S,
     Base,
     Conditions,
     Forces,
-    StringArray,
+    StringArray as StringArray,
     Values,
 )
 from tribo.records import FloatArray
@@ -290,7 +284,7 @@ STROKES_APART = "offset between directions"
 
 @displayed()
 @dataclass(frozen=True)
-class Parameter:
+class MechanismParameter:
     """One number of a mechanism. ``zero`` is where the mechanism is absent (amplitudes only)."""
 
     name: str
@@ -352,7 +346,7 @@ class Mechanism:
     name: str
     kind: Kind
     formula: str
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[MechanismParameter, ...]
     law: Law
     sign: Literal[-1, 0, 1]
     regimes: tuple[str, ...]
@@ -379,7 +373,7 @@ class Mechanism:
     any_column: bool = False
 
     @property
-    def amplitude(self) -> Parameter:
+    def amplitude(self) -> MechanismParameter:
         return self.parameters[0]
 
     @property
@@ -406,11 +400,11 @@ class Mechanism:
         return self.choosing.on_test(values, choice, conditions, test)
 
     def zero(self) -> Values:
-        """Parameter values at which the mechanism is absent."""
+        """MechanismParameter values at which the mechanism is absent."""
         return np.array([self.amplitude.zero, *(p.zero if p.amplitude else p.start for p in self.parameters[1:])])
 
     def start(self) -> Values:
-        """Parameter values from which a fit starts: a clear effect."""
+        """MechanismParameter values from which a fit starts: a clear effect."""
         return np.array([p.start for p in self.parameters])
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -423,40 +417,11 @@ class Mechanism:
 
 def amplitude(
     name: str, unit: str, low: float, high: float, start: float, text: str, tries: tuple[float, ...] = ()
-) -> Parameter:
+) -> MechanismParameter:
     """The first parameter of a mechanism, absent at zero."""
-    return Parameter(name, unit, low, high, start, text, amplitude=True, tries=tries)
+    return MechanismParameter(name, unit, low, high, start, text, amplitude=True, tries=tries)
 
 
 def _varies(values: FloatArray) -> bool:
     finite = values[np.isfinite(values)]
     return finite.size == values.size and bool(np.ptp(finite) > 1e-9 * max(1.0, np.abs(finite).max()))
-
-
-__all__ = [
-    "ALONG_RECORDS",
-    "REFERENCE_HOLD_S",
-    "REFERENCE_PRESSURE_PA",
-    "REFERENCE_SPEED_M_S",
-    "STROKES_APART",
-    "Base",
-    "BenchTest",
-    "Choosing",
-    "Conditions",
-    "Contact",
-    "DirectMeasurement",
-    "Forces",
-    "InTable",
-    "Kind",
-    "Mechanism",
-    "OnTest",
-    "Parameter",
-    "Placement",
-    "Readings",
-    "StringArray",
-    "TraceEvidence",
-    "Values",
-    "Variation",
-    "amplitude",
-    "no_choice",
-]  # fmt: skip

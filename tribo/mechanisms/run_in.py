@@ -11,7 +11,7 @@ from tribo.mechanisms.record import (
     Forces,
     InTable,
     Mechanism,
-    Parameter,
+    MechanismParameter,
     Values,
     amplitude,
 )
@@ -30,7 +30,7 @@ MECHANISM = Mechanism(
     formula="T = T_b (1 + c exp(-n / n_0))",
     parameters=(
         amplitude("c", "", -0.8, 3.0, 0.2, "excess of the first pull"),
-        Parameter("n0", "pulls", 0.5, 40.0, 6.0, "pulls over which it fades", tries=(2.0, 20.0)),
+        MechanismParameter("n0", "pulls", 0.5, 40.0, 6.0, "pulls over which it fades", tries=(2.0, 20.0)),
     ),
     law=law,
     sign=0,

@@ -17,7 +17,7 @@ from tribo.errors import Problem, SimulationError
 from tribo.mechanisms.record import Base, Mechanism, Values
 from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model.measuring_chain import MeasuringChain, measured
-from tribo.mechanisms_in_model.on_blocks import RECORDED, Pulled, conditions_of_run, run_with
+from tribo.mechanisms_in_model.on_blocks import NOT_PULLED, RECORDED, Pulled, conditions_of_run, run_with
 from tribo.records import Run
 from tribo.springblock.config import SimConfig
 from tribo.springblock.lattice import pattern_of
@@ -134,15 +134,34 @@ def simulate_with(config: SimConfig, mechanisms: Mapping[str, Values], **recorde
 
     Parameters
     ----------
-    mechanisms : values by name, as :func:`parse_with` gives them
-    recorded : conditions of the pull that the model itself does not have: hold_s, specimen_run, temperature_C,
-        humidity_pct, speed_m_s of the bench (the model's own clock is scaled), elapsed_s since the zero was taken,
-        samples_in_rise of the recorder, nominal_area_m2 of the sled
+    config
+        The run without mechanisms.
+    mechanisms
+        Values of the parameters of each mechanism by its name, in the units of its parameters, as :func:`parse_with`
+        gives them.
+    recorded
+        Conditions of the pull that the model itself does not have: hold_s, specimen_run, temperature_C, humidity_pct,
+        speed_m_s of the bench (the model's own clock is scaled), elapsed_s since the zero was taken, samples_in_rise
+        of the recorder, nominal_area_m2 of the sled.
+
+    Returns
+    -------
+    Run
+        As :func:`tribo.simulate` returns it, seen through the measuring chain where a mechanism acts in it.
 
     Raises
     ------
     SimulationError
         A mechanism that does not exist, or an impossible configuration.
+
+    Examples
+    --------
+    >>> import tribo
+    >>> from tribo.mechanisms_in_model import parse_with
+    >>> config = tribo.SimConfig(sample="C", pressure_Pa=5e3, blocks=(12, 12), dt_s=1e-7, duration_peaks=1.5)
+    >>> with_suction = tribo.simulate_with(config, parse_with("suction:dp=3000"))
+    >>> with_suction.static_friction > tribo.simulate(config).static_friction
+    True
     """
     acting = _acting(mechanisms)
     label = next((key for key in acting if MECHANISMS[name_of(key)].placement.other_sample), None)
@@ -158,7 +177,7 @@ def simulate_pair(
     config: SimConfig, mechanisms: Mapping[str, Values], recorded: Mapping[str, float]
 ) -> tuple[Run, Run]:
     """The run without mechanisms and the one with them, each computed once; parameters as :func:`simulate_with`."""
-    before = run_with(config, {}, recorded, Pulled())
+    before = run_with(config, {}, recorded, NOT_PULLED)
     acting = _acting(mechanisms)
     if not acting:
         return before, before
@@ -196,18 +215,16 @@ def settled(
     """
     on_itself = _on_itself(acting)
     if not on_itself:
-        return run_with(config, acting, recorded, Pulled())
+        return run_with(config, acting, recorded, NOT_PULLED)
     others = {name: values for name, values in acting.items() if name not in on_itself}
-    without = before if before is not None else run_with(config, others, recorded, Pulled())
+    without = before if before is not None else run_with(config, others, recorded, NOT_PULLED)
     pulled = guessed(config, {n: acting[n] for n in on_itself}, recorded, without)
     for _ in range(MOST_ROUNDS):
         run = run_with(config, acting, recorded, pulled)
-        off = max(abs(run.static_friction / pulled.static - 1), abs(run.sliding_friction / pulled.sliding - 1))
+        off = max(abs(run.static_friction / pulled[0] - 1), abs(run.sliding_friction / pulled[1] - 1))
         if off < SETTLED:
             break
-        pulled = Pulled(
-            0.5 * (pulled.static + run.static_friction), 0.5 * (pulled.sliding + run.sliding_friction)
-        )
+        pulled = 0.5 * (pulled[0] + run.static_friction), 0.5 * (pulled[1] + run.sliding_friction)
     return run
 
 
@@ -237,7 +254,7 @@ def guessed(config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[s
         after = MECHANISMS[name].law(values, base, conditions, "")
         static *= float(after.static_N[0] / load) / before.static_friction
         sliding *= float(after.sliding_N[0] / load) / before.sliding_friction
-    return Pulled(static, sliding)
+    return static, sliding
 
 
 def chain_of(acting: Mapping[str, Values], recorded: Mapping[str, float]) -> MeasuringChain:

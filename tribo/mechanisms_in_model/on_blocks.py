@@ -1,17 +1,15 @@
-"""What mechanisms do to the blocks of the spring-block model: coefficients, adhesion, load, contact, springs.
+"""What mechanisms and laws do to the blocks of the spring-block model: coefficients, adhesion, load, contact, springs.
 
 Each mechanism states its placement (:class:`tribo.mechanisms.record.Placement`). Most act on every block in contact
 alike: the law of the mechanism, applied to the law of one contact block, gives the change of its coefficients, its
-adhesion and its normal force. Some depend on where a block lies (rims, floors, the trailing edge); these change the
-thresholds of single blocks.
-
-A law that was found in measurements, put into the spring-block model: every contact block follows it.
+adhesion and its normal force; a law that was found in measurements always acts so. Some depend on where a block lies
+(rims, floors, the trailing edge); these change the thresholds of single blocks.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -36,12 +34,9 @@ RECORDED = {
 Placed = tuple[Placement, Values]
 
 
-@dataclass(frozen=True)
-class Pulled:
-    """Static and sliding T/N of the whole sample, on which some mechanisms depend."""
-
-    static: float = 0.0
-    sliding: float = 0.0
+Pulled = tuple[float, float]
+"""Static and sliding T/N of the whole sample, on which some mechanisms depend."""
+NOT_PULLED = (0.0, 0.0)
 
 
 def run_with(
@@ -58,8 +53,7 @@ def run_with(
     bare = changed.with_(pattern=Pattern("F")) if floors else changed
     lattice = lattice_of(bare)
     start = on_floors(changed, floors) if floors else even(lattice)
-    ratios = (pulled.static, pulled.sliding)
-    static, sliding = (carried_along(changed, lattice, placed, ratio, start) for ratio in ratios)
+    static, sliding = (carried_along(changed, lattice, placed, ratio, start) for ratio in pulled)
     thresholds = weighted(bare, lattice, static, sliding)
     for placement, values in placed:
         if placement.rims is not None:
@@ -72,7 +66,7 @@ def on_every_block(
     config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[str, float], pulled: Pulled
 ) -> SimConfig:
     """The configuration with the local friction and the springs that the mechanisms give every block alike."""
-    contact = Contact(config.pressure_Pa, config.cavities.area_fraction, pulled.static, pulled.sliding)
+    contact = Contact(config.pressure_Pa, config.cavities.area_fraction, *pulled)
     friction, stiffening = config.friction, 1.0
     for name, values in acting.items():
         placement = MECHANISMS[name].placement
@@ -178,18 +172,14 @@ def conditions_of_run(config: SimConfig, recorded: Mapping[str, float]) -> Condi
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Carried:
-    """Normal load and adhesion of every block over those of an even contact, (n,)."""
-
-    load: FloatArray
-    grip: FloatArray
+Carried = tuple[FloatArray, FloatArray]
+"""Normal load and adhesion of every block over those of an even contact, (n,)."""
 
 
 def even(lattice: Lattice) -> Carried:
     """Nothing changed."""
     ones = np.ones(lattice.contact.size)
-    return Carried(ones, ones)
+    return ones, ones
 
 
 def weighted(config: SimConfig, lattice: Lattice, static: Carried, sliding: Carried) -> Thresholds:
@@ -198,8 +188,8 @@ def weighted(config: SimConfig, lattice: Lattice, static: Carried, sliding: Carr
     no_adhesion = replace(config.friction, static_adhesion_Pa=0.0, sliding_adhesion_Pa=0.0)
     bare = thresholds_of(config.with_(friction=no_adhesion), lattice)
     return Thresholds(
-        bare.static_N * static.load + (whole.static_N - bare.static_N) * static.grip,
-        bare.sliding_N * sliding.load + (whole.sliding_N - bare.sliding_N) * sliding.grip,
+        bare.static_N * static[0] + (whole.static_N - bare.static_N) * static[1],
+        bare.sliding_N * sliding[0] + (whole.sliding_N - bare.sliding_N) * sliding[1],
     )
 
 
@@ -210,7 +200,7 @@ def on_floors(config: SimConfig, share: float) -> Carried:
     """
     contact = lattice_of(config).contact
     land = float(contact.mean())
-    return Carried(np.where(contact, (1.0 - share * (1.0 - land)) / land, share), np.where(contact, 1.0, share))
+    return np.where(contact, (1.0 - share * (1.0 - land)) / land, share), np.where(contact, 1.0, share)
 
 
 def on_rims(
@@ -262,8 +252,8 @@ def with_profile(
     along = x * np.cos(angle) + y * np.sin(angle)
     place = (along - along.min()) / max(float(np.ptp(along)), 1.0) - 0.5
     load, grip = profile(place)
-    load = load * carried.load
-    return Carried(load * carried.load[lattice.contact].mean() / load[lattice.contact].mean(), grip * carried.grip)
+    load = load * carried[0]
+    return load * carried[0][lattice.contact].mean() / load[lattice.contact].mean(), grip * carried[1]
 
 
 OF_THE_RUN = ("pressure_Pa", "contact_pressure_Pa")  # columns that a run has by itself

@@ -73,8 +73,36 @@ def calibrate(
 
     Parameters
     ----------
-    base : configuration of the runs (blocks, time step, window); its sample and friction are replaced
-    runs : pressures, repeats and seed of the runs that the sliding law is matched on
+    static, sliding
+        mu and tau0 (Pa) of T = mu N + tau0 A, measured on the flat sample.
+    base
+        Configuration of the runs (blocks, time step, window); its sample and friction are replaced.
+    runs
+        Pressures, repeats and seed of the runs that the sliding law is matched on.
+    jobs
+        Threads.
+    progress
+        Called after each run with the runs done and their total.
+
+    Returns
+    -------
+    LocalFriction
+        For ``SimConfig(friction=...)``.
+
+    Raises
+    ------
+    SimulationError
+        The configuration is impossible, or a run failed.
+
+    Examples
+    --------
+    >>> import tribo
+    >>> from tribo.springblock import CalibrationRuns
+    >>> base = tribo.SimConfig(blocks=(12, 12), dt_s=1e-7, duration_peaks=1.5)
+    >>> few = CalibrationRuns(repeats=1, iterations=1)
+    >>> friction = tribo.calibrate(static=(4.8, 23e3), sliding=(2.9, 12e3), base=base, runs=few)
+    >>> round(friction.static_adhesion_Pa)
+    23000
     """
     base = (base or SimConfig()).with_(sample="F", pattern=None)
     mean, sd, adhesion = static_calibration(static, base.blocks[0] * base.blocks[1])

@@ -1,11 +1,7 @@
-"""Parameters of the friction of single blocks: the laws themselves are in :mod:`tribo.springblock.engines.state`.
+"""The configuration of one run: friction of single blocks, named readings of the paper, all else, and its checks.
 
-Named readings of the text of Berardo et al. (2019): what each sets where the text leaves a choice.
-
-"text" is the letter of the paper, with the choices of docs/concepts/model.md where it is silent. "berardo2019" is the
-set that comes closest to the simulated column of its Table 2 (docs/results/table2-search.md).
-
-The configuration of one run of the spring-block model, checked before the run.
+The reading "text" is the letter of Berardo et al. (2019), with the choices of docs/concepts/model.md where it is
+silent; "berardo2019" is the set that comes closest to the simulated column of its Table 2 (docs/results/table2-search.md).
 """
 
 from __future__ import annotations
@@ -128,6 +124,8 @@ class SimConfig:
         Nominal pressure, and pull direction against x.
     seed
         Draws the local friction. Equal seeds give equal numbers on every sample.
+    friction
+        Coefficients and adhesion (Pa) of single blocks, as :func:`tribo.calibrate` returns them; the paper's by default.
     terms
         What changes the local friction during the run; nothing by default.
     restrengthening
@@ -141,6 +139,8 @@ class SimConfig:
         Blocks along x and y, their distance l, and the layer thickness l_z (l by default).
     block_mass
         "layer": rho l2 l_z; "cube": rho l3, as printed. They differ only where l_z is not l.
+    modulus_Pa, density_kg_m3, damping_per_s, speed_m_s
+        Young's modulus, density, damping rate, and speed of the slider.
     shear_factor
         K_s over K_int (l / l_z)^2. The paper prints 1; G = 3/8 E would give 0.5.
     normal_force
@@ -150,8 +150,10 @@ class SimConfig:
     rotation
         "small" for linearised springs, "finite" for the full r_ij of the paper (engine reference; the peaks differ
         by under 0.5 %).
-    dt_s
-        Time step. 5e-8 s moves the sliding mean by under 1 % against 1e-8 s; see docs/results/simulator-accuracy.md.
+    engine
+        "fast", or "reference" for the algorithm of the paper.
+    dt_s, sample_interval_s
+        Time step, and time between two samples of the trace. 5e-8 s moves the sliding mean by under 1 % against 1e-8 s; see docs/results/simulator-accuracy.md.
     duration_s, duration_peaks
         The run ends at ``duration_s``, or where that is None at ``duration_peaks`` times the time of the peak.
     window_start_peaks, window_end_peaks
@@ -162,6 +164,18 @@ class SimConfig:
     rest_tolerance
         A cavity block rests once its force is below this share of the mean sliding threshold. At 2e-3 static
         friction of single runs stays within 0.1 % of the reference engine (docs/results/simulator-accuracy.md).
+
+    Raises
+    ------
+    SimulationError
+        Not here but by :meth:`check`, with which every run begins: everything that is wrong, all at once.
+
+    Examples
+    --------
+    >>> import tribo
+    >>> config = tribo.SimConfig(sample="B", pressure_Pa=5e3)
+    >>> config.with_(blocks=(40, 40)).check().normal_load_N
+    0.0002
     """
 
     sample: str = "F"

@@ -74,9 +74,29 @@ def stratified_design(
 
     Parameters
     ----------
-    samples : mapping of name to Pattern, or names of the paper's samples
-    pressures_Pa : nominal pressures, the same for all samples or by sample
-    base : everything else, defaults included
+    samples
+        Mapping of name to Pattern, or names of the paper's samples (F, A, B, C, Sx, Sy).
+    pressures_Pa
+        Nominal pressures in Pa, the same for all samples or by sample.
+    repeats
+        Runs per sample and pressure (and angle, where angles are given).
+    seed
+        From which the seed of every run follows; equal seeds give equal runs.
+    base
+        Everything else, by default that of the paper.
+    angles
+        "midpoints", "random", "nominal", or pull angles in degrees.
+
+    Returns
+    -------
+    list of SimConfig
+        By sample, pressure and repeat, for :func:`tribo.run_ensemble`.
+
+    Examples
+    --------
+    >>> import tribo
+    >>> [c.angle_deg for c in tribo.stratified_design(["A"], [10e3], repeats=3)]
+    [15.0, 45.0, 75.0]
     """
     base = base or SimConfig()
     patterns = dict(samples) if isinstance(samples, Mapping) else dict.fromkeys(samples)

@@ -1,6 +1,6 @@
-"""Which blocks of the lattice touch the counterface.
+"""The lattice: which blocks touch the counterface, their neighbourhood, and the springs between them.
 
-The elastic lattice: neighbours, own stiffness, and what cavities do while everything around them sticks.
+The last part solves what cavities do while everything around them sticks.
 """
 
 from __future__ import annotations

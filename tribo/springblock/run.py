@@ -14,16 +14,34 @@ from tribo.springblock.engines.start import Trajectory, lattice_of, thresholds_o
 def simulate(config: SimConfig, threads: int = 1) -> Run:
     """Simulate one pull of one sample at one load; static and sliding friction follow from the slider force.
 
-    Up to ``threads`` threads share a lattice of 100,000 blocks or more; the result does not depend on their number.
-
     Static friction is T/N at the peak, sliding friction the mean of T/N over the window of the configuration,
     by default from 1.05 times the peak time to the end. N is the nominal load p l2 Nx Ny.
+
+    Parameters
+    ----------
+    config
+        Sample, pattern, pressure, pull angle, seed and everything else; the defaults are those of the paper.
+    threads
+        Threads that share a lattice of 100,000 blocks or more; the result does not depend on their number.
+
+    Returns
+    -------
+    Run
+        ``static_friction`` and ``sliding_friction`` (T/N), the trace ``time_s``, ``force_N`` and ``moving`` (blocks in
+        contact that move), shape (n,), and every parameter.
 
     Raises
     ------
     SimulationError
         The configuration is impossible (every fault is listed), a force became non-finite, or the run ended
         before its sliding window began.
+
+    Examples
+    --------
+    >>> import tribo
+    >>> run = tribo.simulate(tribo.SimConfig(sample="F", blocks=(12, 12), dt_s=1e-7, duration_peaks=1.5))
+    >>> run.static_friction > run.sliding_friction
+    True
     """
     config.check()
     lattice = lattice_of(config)

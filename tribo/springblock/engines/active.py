@@ -1,11 +1,11 @@
-"""The lists of strips in each state, the neighbours that moving strips reach, and the queue of those asleep.
-
-Which strips of the lattice are worked on: only those where blocks move, and those their springs reach.
+"""Which strips of the lattice are worked on: only those where blocks move, and those their springs reach.
 
 A strip is asleep (nothing in its reach moves; it waits in a queue for the step in which its first contact block will
 fail), listening (blocks in its reach move, so its forces are looked at in every step), gliding (cavity blocks move) or
 sliding (contact blocks too). A strip asleep fails at a time that is known beforehand: in the coordinates of
 :mod:`tribo.springblock.engines.state` its forces are G + R t until something in its reach moves.
+
+First the lists of strips in each state and the queue, then one time step and the loop over steps (:func:`advance`).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from tribo.springblock.engines.state import (
     observe,
     static_threshold,
 )
-from tribo.springblock.engines.strips import CAVITY, CONTACT, LANES, Layout, Planes, Sums, forces, glides, slides, wrap
+from tribo.springblock.engines.strips import CAVITY, CONTACT, LANES, Planes, Sums, forces, glides, slides, wrap
 from tribo.springblock.engines.team import (
     END,
     FORCES,
@@ -210,7 +210,6 @@ class Active(NamedTuple):
 
     planes: Planes
     sums: Sums  # a row each share
-    layout: Layout
     lists: Lists
     starts: NDArray[np.bool_]  # (strips,) a block at rest gives way
     calm: NDArray[np.bool_]  # (strips,) all cavity blocks may rest
@@ -218,7 +217,7 @@ class Active(NamedTuple):
     team: Team
 
 
-def active_of(planes: Planes, layout: Layout, numerics: Numerics, threads: int = 1) -> Active:
+def active_of(planes: Planes, numerics: Numerics, threads: int = 1) -> Active:
     """Lists of a lattice whose blocks move where ``planes.pace`` says so; a large one has up to ``threads`` threads."""
     n = len(planes.place)
     shares = shares_of(numerics.nx * numerics.ny)
@@ -234,7 +233,7 @@ def active_of(planes: Planes, layout: Layout, numerics: Numerics, threads: int =
     lists.members[PENDING] = n
     starts, calm = np.zeros((2, n), np.bool_)
     team, sums = team_of(threads, shares), Sums(*np.zeros((3, shares, LANES)))
-    return Active(planes, sums, layout, lists, starts, calm, np.zeros(n, np.int64), team)
+    return Active(planes, sums, lists, starts, calm, np.zeros(n, np.int64), team)
 
 
 @inner
@@ -251,7 +250,7 @@ def hold_cavities(strip: int, hold: float, p: Planes) -> None:
 
 
 @inner
-def slipping(strip: int, s: State, p: Planes, layout: Layout, c: Numerics) -> int:
+def slipping(strip: int, s: State, p: Planes, c: Numerics) -> int:
     """Reach of the contact blocks of a strip whose force exceeds what they hold, 0 without any; they are counted."""
     copied_into_callers()
     first = p.place[strip]
@@ -261,7 +260,7 @@ def slipping(strip: int, s: State, p: Planes, layout: Layout, c: Numerics) -> in
         hold = static_threshold(p.hold[i], t - p.since[i], c.law)
         if p.kind[i] != CONTACT or p.f_x[i] * p.f_x[i] + p.f_y[i] * p.f_y[i] <= hold * hold:
             continue
-        y, x = divmod(i - layout.first, layout.width)
+        y, x = divmod(i - p.first, p.width)
         reach |= MIDDLE | (WEST if i == first else 0) | (EAST if i == first + LANES - 1 or x == c.nx - 1 else 0)
         n = s.counts[N_FAILED]
         if n < s.failed.shape[1]:
@@ -334,7 +333,7 @@ def start_all(s: State, a: Active, c: Numerics) -> None:
             if not a.starts[strip]:
                 continue
             a.starts[strip] = False
-            reach = slipping(strip, s, a.planes, a.layout, c)
+            reach = slipping(strip, s, a.planes, c)
             to = SLIDING if reach != 0 or status == SLIDING else GLIDING
             if to != status:
                 leave(strip, lists)
@@ -468,7 +467,7 @@ def advance(a: Active, s: State, out: Samples, c: Numerics, until_step: int) -> 
             wait_for_all(a.team)
         if c.periodic:
             for plane in (a.planes.q_x, a.planes.q_y, a.planes.q_sum, a.planes.q_gap):
-                wrap(plane, a.layout, c.nx, c.ny)
+                wrap(plane, a.planes.first, a.planes.width, c.nx, c.ny)
         moving = 0
         if (s.counts[STEP] + 1) % c.stride == 0:
             for row in range(lists.shares * SLIDING, lists.shares * ASLEEP):

@@ -70,12 +70,12 @@ def active_set(
     """What the compiled loop of the fast engine works on."""
     drag = -config.mass_kg * config.damping_per_s * drive.follow
     pull = np.where(lattice.contact[:, None], drive.rate, drag)
-    return active_of(*planes_of(state, numerics, lattice, pull), numerics, threads)
+    return active_of(planes_of(state, numerics, lattice, pull), numerics, threads)
 
 
 def put_back(active: Active, state: k.State, numerics: k.Numerics) -> None:
     """Write the displacements and velocities of the active set into the state."""
-    inside = places_of(active.layout, numerics.nx, numerics.ny)
+    inside = places_of(active.planes.first, active.planes.width, numerics.nx, numerics.ny)
     p = active.planes
     state.cells[:, k.QX], state.cells[:, k.QY] = p.q_x[inside], p.q_y[inside]
     with np.errstate(over="ignore", invalid="ignore"):  # the caller refuses a run that met such a number

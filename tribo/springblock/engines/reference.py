@@ -52,37 +52,23 @@ class Model(NamedTuple):
     rule: int  # when a sliding block comes to rest: TURNED, SLOW or NEVER
     slow: float  # m/s, for SLOW
     test_every: int  # steps between two tests for rest
+    start: float  # s
+    dt: float
+    stride: int  # steps from one sample to the next
+    stop_at_peaks: float  # the run ends once the time exceeds so many peak times
 
 
 RULES = ("turned", "slow", "never")
 TURNED, SLOW, NEVER = range(len(RULES))
 
 
-class State(NamedTuple):
-    """Every block now: displacement and velocity (n, 2), and whether it rests (n,). Steps change it in place."""
+class Course(NamedTuple):
+    """Every block now, changed in place by each step; samples; running sums exact to the order of the trapezoid."""
 
-    u: FloatArray
-    v: FloatArray
-    resting: NDArray[np.bool_]
-
-
-class Steps(NamedTuple):
-    """How many steps are taken: from ``start``, each ``dt`` long, a sample every ``stride``.
-
-    The run ends early once the time exceeds ``stop_at_peaks`` peak times.
-    """
-
-    start: float
-    dt: float
-    number: int
-    stride: int
-    stop_at_peaks: float
-
-
-class Record(NamedTuple):
-    """Samples every ``stride`` steps, and running sums that are exact to the order of the trapezoid."""
-
-    time: FloatArray
+    u: FloatArray  # (n, 2) displacement
+    v: FloatArray  # (n, 2) velocity
+    resting: NDArray[np.bool_]  # (n,)
+    time: FloatArray  # of the samples
     force: FloatArray
     impulse: FloatArray
     moving: NDArray[np.int64]
@@ -146,20 +132,19 @@ def acceleration(
 
 
 @compiled
-def decide_friction(
-    u: FloatArray, v: FloatArray, t: float, m: Model, resting: NDArray[np.bool_], friction: FloatArray, rec: Record
-) -> None:
+def decide_friction(run: Course, t: float, m: Model, friction: FloatArray) -> None:
     """Release blocks beyond their static threshold, and set the friction force of this step on those that slide."""
+    u, v, resting = run.u, run.v, run.resting
     driving_force(u, t, m, friction)
     for i in range(len(u)):
         driving = math.sqrt(friction[i, 0] * friction[i, 0] + friction[i, 1] * friction[i, 1])
         if resting[i] and driving > m.static[i]:
             resting[i] = False
             m.static[i] = m.again[i]
-            n = int(rec.sums[N_FAILED])
-            if n < len(rec.failed):
-                rec.failed[n] = i
-                rec.sums[N_FAILED] += 1.0
+            n = int(run.sums[N_FAILED])
+            if n < len(run.failed):
+                run.failed[n] = i
+                run.sums[N_FAILED] += 1.0
         speed = math.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
         for d in range(2):
             direction = v[i, d] / speed if speed > 0.0 else (friction[i, d] / driving if driving > 0.0 else 0.0)
@@ -209,9 +194,9 @@ def comes_to_rest(v: FloatArray, new_v: FloatArray, m: Model) -> bool:
 
 
 @compiled
-def finish_step(state: State, t: float, dt: float, m: Model, new_v: FloatArray, rec: Record, tested: bool) -> None:
+def finish_step(run: Course, t: float, m: Model, new_v: FloatArray, tested: bool) -> None:
     """Stop blocks where ``tested``, and add up force, friction work and viscous work of the step."""
-    u, v, resting = state.u, state.v, state.resting
+    u, v, resting, dt = run.u, run.v, run.resting, m.dt
     force_x = 0.0
     force_y = 0.0
     for i in range(len(u)):
@@ -222,43 +207,45 @@ def finish_step(state: State, t: float, dt: float, m: Model, new_v: FloatArray, 
                 new_v[i, 0] = 0.0
                 new_v[i, 1] = 0.0
             after = math.sqrt(new_v[i, 0] * new_v[i, 0] + new_v[i, 1] * new_v[i, 1])
-            rec.sums[FRICTION_WORK] += 0.5 * dt * m.sliding[i] * (before + after)
-            rec.sums[VISCOUS_WORK] += 0.5 * dt * m.mass * m.damping * (before * before + after * after)
+            run.sums[FRICTION_WORK] += 0.5 * dt * m.sliding[i] * (before + after)
+            run.sums[VISCOUS_WORK] += 0.5 * dt * m.mass * m.damping * (before * before + after * after)
             v[i, 0] = new_v[i, 0]
             v[i, 1] = new_v[i, 1]
         force_x += m.shear_stiffness * (m.velocity[0] * (t + dt) - u[i, 0])
         force_y += m.shear_stiffness * (m.velocity[1] * (t + dt) - u[i, 1])
     speed = math.sqrt(m.velocity[0] * m.velocity[0] + m.velocity[1] * m.velocity[1])
     force = (force_x * m.velocity[0] + force_y * m.velocity[1]) / speed
-    rec.sums[IMPULSE] += 0.5 * dt * (rec.sums[FORCE] + force)
-    rec.sums[FORCE] = force
-    if force > rec.sums[PEAK]:
-        rec.sums[PEAK] = force
-        rec.sums[PEAK_TIME] = t + dt
+    run.sums[IMPULSE] += 0.5 * dt * (run.sums[FORCE] + force)
+    run.sums[FORCE] = force
+    if force > run.sums[PEAK]:
+        run.sums[PEAK] = force
+        run.sums[PEAK_TIME] = t + dt
 
 
 @compiled
-def integrate_all(state: State, steps: Steps, m: Model, w: FloatArray, rec: Record) -> int:
-    """Take the steps, or fewer where the run ends early; returns the number of samples taken."""
+def integrate_all(run: Course, steps: int, m: Model, w: FloatArray) -> int:
+    """Take so many steps, or fewer where the run ends early; returns the number of samples taken."""
     samples = 0
-    dt = steps.dt
-    for step in range(steps.number):
-        t = steps.start + step * dt
-        decide_friction(state.u, state.v, t, m, state.resting, w[9], rec)
-        runge_kutta(state.u, state.v, t, dt, state.resting, m, w)
-        finish_step(state, t, dt, m, w[8], rec, (step + 1) % m.test_every == 0)
-        if (step + 1) % steps.stride == 0:
-            rec.time[samples] = t + dt
-            rec.force[samples] = rec.sums[FORCE]
-            rec.impulse[samples] = rec.sums[IMPULSE]
-            rec.moving[samples] = np.sum(m.contact & ~state.resting)
+    dt = m.dt
+    for step in range(steps):
+        t = m.start + step * dt
+        decide_friction(run, t, m, w[9])
+        runge_kutta(run.u, run.v, t, dt, run.resting, m, w)
+        finish_step(run, t, m, w[8], (step + 1) % m.test_every == 0)
+        if (step + 1) % m.stride == 0:
+            run.time[samples] = t + dt
+            run.force[samples] = run.sums[FORCE]
+            run.impulse[samples] = run.sums[IMPULSE]
+            run.moving[samples] = np.sum(m.contact & ~run.resting)
             samples += 1
-            if not math.isfinite(rec.sums[FORCE]) or t > steps.stop_at_peaks * rec.sums[PEAK_TIME]:
+            if not math.isfinite(run.sums[FORCE]) or t > m.stop_at_peaks * run.sums[PEAK_TIME]:
                 break
     return samples
 
 
-def reference_model(config: SimConfig, lattice: Lattice, thresholds: Thresholds) -> Model:
+def reference_model(
+    config: SimConfig, lattice: Lattice, thresholds: Thresholds, start_s: float, stride: int
+) -> Model:
     """The constants of a configuration as the reference engine takes them."""
     offsets, stiffness = np.split(np.array(NEIGHBOURHOOD), [2], axis=1)
     lengths = np.hypot(*offsets.T)
@@ -279,6 +266,10 @@ def reference_model(config: SimConfig, lattice: Lattice, thresholds: Thresholds)
         rule=RULES.index(config.sticking),
         slow=config.stick_speed_m_s,
         test_every=max(1, round((config.stick_interval_s or 0.0) / config.dt_s)),
+        start=start_s,
+        dt=config.dt_s,
+        stride=stride,
+        stop_at_peaks=np.inf if config.duration_s else config.duration_peaks,
     )
 
 
@@ -292,7 +283,6 @@ def integrate(
     SimulationError
         A force became non-finite; the message names the block and the time.
     """
-    model = reference_model(config, lattice, thresholds)
     drive = drive_of(config, lattice)
     failure = first_failure_s(lattice, thresholds, drive, config.stiffness_N_m)
     start = start_share * failure
@@ -305,26 +295,26 @@ def integrate(
     sums = np.zeros(N_SUMS)
     sums[FORCE] = drive.force_rate * start
     sums[IMPULSE] = 0.5 * sums[FORCE] * start
-    record = Record(
-        np.zeros(room), np.zeros(room), np.zeros(room), np.zeros(room, np.int64), np.full(64, -1, np.int64), sums
-    )
-    stop = np.inf if config.duration_s else config.duration_peaks
-    asked = Steps(start, config.dt_s, steps, stride, stop)
-    kept = integrate_all(State(u, v, resting), asked, model, np.zeros((10, *u.shape)), record)
+    course = Course(
+        u, v, resting, np.zeros(room), np.zeros(room), np.zeros(room), np.zeros(room, np.int64),
+        np.full(64, -1, np.int64), sums,
+    )  # fmt: skip
+    model = reference_model(config, lattice, thresholds, start, stride)
+    kept = integrate_all(course, steps, model, np.zeros((10, *u.shape)))
     if not np.isfinite(sums[FORCE]):
-        _refuse(u, lattice, float(record.time[kept - 1]))
+        _refuse(u, lattice, float(course.time[kept - 1]))
     return Trajectory(
-        time_s=np.concatenate([(0.0, start), record.time[:kept]]),
-        force_N=np.concatenate([(0.0, drive.force_rate * start), record.force[:kept]]),
-        impulse_Ns=np.concatenate([(0.0, 0.5 * drive.force_rate * start**2), record.impulse[:kept]]),
-        moving=np.concatenate([np.zeros(2, np.int64), record.moving[:kept]]),
+        time_s=np.concatenate([(0.0, start), course.time[:kept]]),
+        force_N=np.concatenate([(0.0, drive.force_rate * start), course.force[:kept]]),
+        impulse_Ns=np.concatenate([(0.0, 0.5 * drive.force_rate * start**2), course.impulse[:kept]]),
+        moving=np.concatenate([np.zeros(2, np.int64), course.moving[:kept]]),
         peak_N=float(sums[PEAK]),
         peak_s=float(sums[PEAK_TIME]),
         first_peak_N=float(sums[PEAK]),
         first_peak_s=float(sums[PEAK_TIME]),
         first_failure_s=failure,
-        failed=once(record.failed[: int(sums[N_FAILED])]),
-        end_s=float(record.time[kept - 1]),
+        failed=once(course.failed[: int(sums[N_FAILED])]),
+        end_s=float(course.time[kept - 1]),
         end_impulse_Ns=float(sums[IMPULSE]),
         displacement_m=u,
         velocity_m_s=v,

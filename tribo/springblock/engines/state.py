@@ -1,12 +1,10 @@
-"""Terms of the local friction law that act while a run goes on, each a function of its own.
+"""What every compiled engine shares: terms of the friction law, state and constants of a run, samples of the force.
 
-A term takes a threshold and returns the changed one; with an amplitude of zero it returns the identical number.
-:func:`static_threshold` and :func:`sliding_threshold` combine the terms; the loops call only these two. A new term is
-its function, its parameters in :class:`tribo.springblock.config.FrictionTerms` and in :func:`packed`, and its place
-in a chain. What depends only on the position of a block (its pressure, neighbouring cavities) needs no term: it is
-part of the thresholds of the blocks.
-
-What every compiled engine shares: the blocks and counters of a run, its constants, and how the force is recorded.
+A term of the friction law takes a threshold and returns the changed one; with an amplitude of zero it returns the
+identical number. :func:`static_threshold` and :func:`sliding_threshold` combine the terms; the loops call only these
+two. A new term is its function, its parameters in :class:`tribo.springblock.config.FrictionTerms` and in
+:func:`packed`, and its place in a chain. What depends only on the position of a block needs no term: it is part of the
+thresholds of the blocks.
 
 Displacements in a :class:`State` are counted from the quasi-static ones: a cavity block follows the slider at a known
 velocity w while all contact blocks stick, and q is what a block does beyond w t. In these coordinates the in-plane

@@ -1,9 +1,8 @@
-"""How the blocks of a lattice lie in memory: one array ("plane") a quantity, row after row, with a frame.
+"""The loops of the fast engine over strips: eight blocks side by side, which the vector units take at once.
 
-Rows begin at cache lines and lie between rows and columns of places where no block is. These never move or, with
-periodic edges, repeat the opposite side, so that a loop over a row needs no branches at its ends.
-
-The loops of the fast engine over strips: eight blocks side by side, which the vector units take at once.
+Blocks lie in one array ("plane") a quantity, row after row. Rows begin at cache lines and lie between rows and columns
+of places where no block is; these never move or, with periodic edges, repeat the opposite side, so that a loop over a
+row needs no branches at its ends.
 
 ``forces`` finds the force on every block of the strips it is given, and whether one of them starts to move.
 ``glides`` moves the cavity blocks of strips in which no contact block slides, ``slides`` all blocks of the others.
@@ -28,25 +27,16 @@ from tribo.springblock.lattice import INNER, Lattice
 LINE = 8  # numbers in a cache line
 
 
-class Layout(NamedTuple):
-    """Where the blocks lie: block (x, y) at ``first + y width + x`` of every plane."""
-
-    width: int
-    first: int
-    last: int  # end of the stretch that is worked on, a whole number of vectors
-    places: int
-
-
-def interleaved(nx: int, ny: int, planes: int) -> tuple[Layout, list[FloatArray]]:
+def interleaved(nx: int, ny: int, planes: int) -> tuple[int, int, list[FloatArray]]:
     """As many planes in one array, row by row, so that what belongs to a block lies in few pages of memory.
 
-    Each plane is a view of the array from its own beginning on. The last eight places of a row belong to no strip.
+    Each plane is a view of the array from its own beginning on, with block (x, y) at ``first + y width + x``; returns
+    first, width and the planes. The last eight places of a row belong to no strip.
     """
     row = (-(-nx // LINE) + 1) * LINE
     width = planes * row
-    layout = Layout(width, width + LINE, width + LINE + ny * width, (ny + 3) * width)
-    whole = aligned(1, layout.places)[0]
-    return layout, [whole[k * row : (ny + 2) * width + k * row] for k in range(planes)]
+    whole = aligned(1, (ny + 3) * width)[0]
+    return width + LINE, width, [whole[k * row : (ny + 2) * width + k * row] for k in range(planes)]
 
 
 def aligned(rows: int, places: int) -> FloatArray:
@@ -56,10 +46,10 @@ def aligned(rows: int, places: int) -> FloatArray:
     return room[skip : skip + rows * places].reshape(rows, places)
 
 
-def places_of(layout: Layout, nx: int, ny: int) -> NDArray[np.int64]:
+def places_of(first: int, width: int, nx: int, ny: int) -> NDArray[np.int64]:
     """The place of every block, in the order of the blocks."""
     y, x = np.divmod(np.arange(nx * ny), nx)
-    return np.asarray(layout.first + y * layout.width + x)
+    return np.asarray(first + y * width + x)
 
 
 def spare_stiffness(lattice: Lattice) -> FloatArray:
@@ -70,14 +60,14 @@ def spare_stiffness(lattice: Lattice) -> FloatArray:
 
 
 @inner
-def wrap(a: FloatArray, layout: Layout, nx: int, ny: int) -> None:
+def wrap(a: FloatArray, first: int, width: int, nx: int, ny: int) -> None:
     """Put a copy of each side beyond the opposite one."""
-    top = layout.first + (ny - 1) * layout.width
-    below, above = layout.first - layout.width, top + layout.width
+    top = first + (ny - 1) * width
+    below, above = first - width, top + width
     for x in range(nx):
         a[below + x] = a[top + x]
-        a[above + x] = a[layout.first + x]
-    for row in range(below, above + 1, layout.width):
+        a[above + x] = a[first + x]
+    for row in range(below, above + 1, width):
         a[row - 1] = a[row + nx - 1]
         a[row + nx] = a[row]
 
@@ -89,7 +79,7 @@ NOTHING, CONTACT, CAVITY = 0.0, 1.0, 2.0  # Planes.kind
 
 
 class Planes(NamedTuple):
-    """All blocks in the layout of :mod:`tribo.springblock.engines.strips`, and where the strips lie; N and m."""
+    """All blocks row by row, block (x, y) at ``first + y width + x``, and where the strips lie; N and m."""
 
     q_x: FloatArray
     q_y: FloatArray
@@ -112,6 +102,7 @@ class Planes(NamedTuple):
     spare_xx: FloatArray  # N/m: own stiffness that blocks at free edges lack against an inner one
     spare_yy: FloatArray
     spare_xy: FloatArray
+    first: int
     width: int
 
 
@@ -123,18 +114,18 @@ class Sums(NamedTuple):
     work: FloatArray
 
 
-def planes_of(state: State, numerics: Numerics, lattice: Lattice, pull: FloatArray) -> tuple[Planes, Layout]:
-    """The blocks of a state, and where they lie. ``pull`` (n, 2): N/s on contact blocks, N on cavity blocks."""
+def planes_of(state: State, numerics: Numerics, lattice: Lattice, pull: FloatArray) -> Planes:
+    """The blocks of a state as the loops take them. ``pull`` (n, 2): N/s on contact blocks, N on cavity blocks."""
     nx, ny = lattice.nx, lattice.ny
-    layout, planes = interleaved(nx, ny, 16)
-    inside = places_of(layout, nx, ny)
+    first, width, planes = interleaved(nx, ny, 16)
+    inside = places_of(first, width, nx, ny)
     cells, contact = state.cells, lattice.contact
     q_x, q_y, q_sum, q_gap, p_x, p_y, _, _, pull_x, pull_y, kind, hold, again, sliding, pace, since = planes
     q_x[inside], q_y[inside] = cells[:, k.QX], cells[:, k.QY]
     q_sum[inside], q_gap[inside] = q_x[inside] + q_y[inside], q_x[inside] - q_y[inside]
     if numerics.periodic:
         for plane in (q_x, q_y, q_sum, q_gap):
-            wrap(plane, layout, nx, ny)
+            wrap(plane, first, width, nx, ny)
     p_x[inside], p_y[inside] = cells[:, k.VX : k.VY + 1].T * (numerics.mass / numerics.dt)
     pace[inside] = np.hypot(p_x[inside], p_y[inside])
     pull_x[inside], pull_y[inside] = pull.T
@@ -142,15 +133,15 @@ def planes_of(state: State, numerics: Numerics, lattice: Lattice, pull: FloatArr
     moves = pace[inside] != 0.0
     across = -(-nx // LANES)
     row, column = np.divmod(np.arange(across * ny), across)
-    place = layout.first + row * layout.width + LANES * column
+    place = first + row * width + LANES * column
     lanes = place[:, None] + np.arange(LANES)
     hold[lanes] = since[lanes] = np.inf
     hold[inside] = np.where(moves, np.inf, np.where(contact, cells[:, k.FS], 2.0 * numerics.rest_force))
     again[inside], sliding[inside] = cells[:, k.FA], cells[:, k.FD]
     since[inside] = np.where(contact, cells[:, k.SINCE], np.inf)
     edge, spare = _spare(lattice, numerics.stiffness)
-    rows: Any = [*planes, place, edge, *spare, layout.width]
-    return Planes(*rows), layout
+    rows: Any = [*planes, place, edge, *spare, first, width]
+    return Planes(*rows)
 
 
 def _spare(lattice: Lattice, stiffness: float) -> tuple[NDArray[np.int64], FloatArray]:
