@@ -1,7 +1,8 @@
 """The configuration of one run: friction of single blocks, named readings of the paper, all else, and its checks.
 
 The reading "text" is the letter of Berardo et al. (2019), with the choices of docs/concepts/model.md where it is
-silent; "berardo2019" is the set that comes closest to the simulated column of its Table 2 (docs/results/table2-search.md).
+silent; "berardo2019" is the set that comes closest to the simulated column of its Table 2
+(docs/results/table2-search.md).
 """
 
 from __future__ import annotations
@@ -125,7 +126,7 @@ class SimConfig:
     seed
         Draws the local friction. Equal seeds give equal numbers on every sample.
     friction
-        Coefficients and adhesion (Pa) of single blocks, as :func:`tribo.calibrate` returns them; the paper's by default.
+        Coefficients and adhesion (Pa) of single blocks, as :func:`tribo.calibrate` returns them.
     terms
         What changes the local friction during the run; nothing by default.
     restrengthening
@@ -153,7 +154,8 @@ class SimConfig:
     engine
         "fast", or "reference" for the algorithm of the paper.
     dt_s, sample_interval_s
-        Time step, and time between two samples of the trace. 5e-8 s moves the sliding mean by under 1 % against 1e-8 s; see docs/results/simulator-accuracy.md.
+        Time step, and time between two samples of the trace. Steps of 5e-8 s move the sliding mean by under 1 %
+        against 1e-8 s; see docs/results/simulator-accuracy.md.
     duration_s, duration_peaks
         The run ends at ``duration_s``, or where that is None at ``duration_peaks`` times the time of the peak.
     window_start_peaks, window_end_peaks
@@ -174,8 +176,8 @@ class SimConfig:
     --------
     >>> import tribo
     >>> config = tribo.SimConfig(sample="B", pressure_Pa=5e3)
-    >>> config.with_(blocks=(40, 40)).check().normal_load_N
-    0.0002
+    >>> config.with_(blocks=(40, 40)).check().cavities.name
+    'B'
     """
 
     sample: str = "F"
