@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "tribo"
 
 # Each room with the rooms it may import, from the ground up. A room may import itself, and nothing else.
 GROUND = {
-    "display", "errors", "user_text", "input_files", "units", "zeroing", "records", "files", "temporary",
+    "display", "errors", "user_text", "input_files", "units", "zeroing", "fits", "records", "files", "temporary",
     "forked", "laws", "vocabulary", "outputs",
 }  # fmt: skip
 STREET: tuple[tuple[str, set[str]], ...] = (
@@ -25,8 +25,9 @@ STREET: tuple[tuple[str, set[str]], ...] = (
     ("zeroing", {"display"}),
     ("files", {"errors"}),
     ("outputs", {"files", "user_text"}),
-    ("records", {"outputs", "display", "errors", "zeroing"}),
-    ("laws", {"records", "display"}),
+    ("fits", {"outputs", "display", "errors"}),
+    ("records", {"display", "errors", "fits", "zeroing"}),
+    ("laws", {"fits", "records", "display"}),
     ("vocabulary", set()),
     ("temporary", {"files", "errors"}),
     ("forked", set()),

@@ -18,7 +18,7 @@ from tribo.wording.numerals import sentence_case
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 PACKAGES = sorted(file.parent.name for file in Path(tribo.__file__).parent.glob("*/__init__.py"))
 REFERENCE = sorted((DOCS / "reference").glob("*.md"))
-RECORDS = ("records", "errors")
+RECORDS = ("records", "fits", "errors")
 DIRECTIVE = re.compile(r"^\.\. auto(function|class|data|module|exception):: (\S+)", re.MULTILINE)
 LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)(?:#[^)]*)?\)")
 

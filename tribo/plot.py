@@ -117,9 +117,18 @@ def law(diagnosis: Diagnosis) -> Figure:
     return _drawn("law", diagnosis)
 
 
-def residuals(diagnosis: Diagnosis) -> Figure:
-    """The strongest deviations against the variable that each follows."""
-    return _drawn("residuals", diagnosis)
+def residuals(results: Diagnosis | Study) -> Figure:
+    """Of a diagnosis, the strongest deviations against the variable that each follows; of a study, those of its fits.
+
+    The residuals of a study are 100 (measured / fitted - 1) of every test against its load.
+    """
+    from tribo.records import Study
+
+    if not isinstance(results, Study):
+        return _drawn("residuals", results)
+    from tribo.figures.load_and_area import draw_residuals_of_fits, residuals_of_fits
+
+    return draw_residuals_of_fits(residuals_of_fits(results))
 
 
 def extended(diagnosis: Diagnosis) -> Figure:

@@ -32,8 +32,9 @@ Weights = Literal["relative", "ratio", "force", "repeats"]
 Until = Literal["ingest", "fit", "compare", "report"]
 DIAGNOSED_BY = (
     "diagnostics", "lawsearch", "mechanisms", "mechanisms_in_model", "fitting", "laws", "springblock", "records",
+    "fits",
 )  # fmt: skip
-ASSESSED_BY = ("fitting", "laws", "records", "vocabulary")
+ASSESSED_BY = ("fitting", "laws", "records", "fits", "vocabulary")
 
 
 def _silent(stage: str, done: int, total: int) -> None:

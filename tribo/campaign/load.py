@@ -171,7 +171,7 @@ def _sort_rows(
     return usable, tuple(set_aside)
 
 
-def _test(row: TestRow, described: CampaignFile, order: str, area_m2: float) -> Test:
+def _test(row: TestRow, described: CampaignFile, order: str, area_m2: float | None) -> Test:
     """A row without faults as a Test. N = normal_load_N, or (mass + slider mass) g; NaN where the export tells it."""
     cells, general = row.cells, described.campaign
     numbers: dict[str, Any] = {column: number(row, column) for column in NUMBERS}
@@ -179,7 +179,7 @@ def _test(row: TestRow, described: CampaignFile, order: str, area_m2: float) -> 
     speed = numbers["speed_mm_s"] if numbers["speed_mm_s"] is not None else general.pull_speed_mm_s
     load, stress, mass = numbers["normal_load_N"], numbers["normal_stress_Pa"], numbers["mass_g"]
     given = {"normal_load_N": load, "normal_stress_Pa": stress, "mass_g": mass}  # the first of them counts
-    if load is None and stress is not None:
+    if load is None and stress is not None and area_m2 is not None:
         load = stress * area_m2
     if load is None:
         load = math.nan if mass is None else (mass + general.slider_mass_g) * _GRAM * STANDARD_GRAVITY

@@ -68,6 +68,32 @@ def verify(console: Console, out: Path, campaign: Path | None, **_: Any) -> int:
 
 
 @main.command()
+@click.argument("out", type=GivenPath(file_okay=False))
+@click.option("--width", "width_mm", default=190.0, show_default=True, help="Page width in mm; 90 is one column.")
+@click.option(
+    "--names", multiple=True, metavar="SAMPLE=NAME", help='Other names of samples, for example "Sx=across,Sy=along".'
+)
+@click.option(
+    "-o", "--out", "to", required=True, type=click.Path(file_okay=False, path_type=Path), help="Folder for the figures."
+)
+@command_options
+def figures(console: Console, out: Path, width_mm: float, names: tuple[str, ...], to: Path, **_: Any) -> None:
+    """Draw the figures of a report again.
+
+    Draws every figure of OUT from the numbers beside it, as SVG and PDF whose text can be edited. Letters keep their
+    size at any width.
+    """
+    from tribo.report.redraw import write_redrawn
+
+    pairs = [name.partition("=") for given in names for name in given.split(",")]
+    if wrong := next((old for old, sign, new in pairs if not (old and sign and new)), None):
+        raise click.BadParameter(f"{wrong!r} is not of the form SAMPLE=NAME", param_hint="--names")
+    written = write_redrawn(out, to, width_mm, {old.strip(): new.strip() for old, _, new in pairs})
+    listed = "\n".join(path.name for path in written)
+    console.result({"to": str(to), "files": [path.name for path in written]}, f"{listed}\n{len(written)} files in {to}")
+
+
+@main.command()
 @CAMPAIGN
 @click.option(
     "--with", "law_file", type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="LAW.TOML",

@@ -31,7 +31,8 @@ STATUS = {
 ROW_MM = 4.4
 EVIDENCE_FRAME_MM = 24.0
 LEAST_SHOWN = -2.0
-LETTERS_ACROSS = 100  # of the words beside the bars, over the width of the axis
+LETTERS_ACROSS = 100  # of the words beside the bars, over the width of the axis on a page of two columns
+NAMES_MM = 50.0  # left of the axis
 
 
 def evidence_numbers(d: Diagnosis) -> pd.DataFrame:
@@ -90,16 +91,22 @@ def draw_evidence(numbers: pd.DataFrame) -> Figure:
 def _words(row: dict[Any, Any]) -> str:
     """What stands beside a bar, or in its place."""
     if row["status"] == "out":
-        return _short(row["reason"])
+        return _short(row["reason"], _letters() - 4)
     name = f"{row['estimate']}" + (f"  ({row['choice']})" if row["choice"] else "")
     weight = f"weight {row['weight']:.2f},  " if row["weight"] >= 0.005 else ""
-    return f"{row['gain'] + 0.0:.1f}   {weight}{name}".replace("-0.0 ", "0.0 ").replace("-", "−")
+    text = f"{row['gain'] + 0.0:.1f}   {weight}{name}".replace("-0.0 ", "0.0 ").replace("-", "−")
+    return text if style.page_mm() >= style.PAGE_MM else _short(text, _letters() // 2)
+
+
+def _letters() -> int:
+    """How many letters stand side by side over the width of the axis."""
+    return int(LETTERS_ACROSS * (style.page_mm() - NAMES_MM) / (style.PAGE_MM - NAMES_MM))
 
 
 def _reach(gains: FloatArray, words: list[str]) -> float:
     """The right end of the axis, such that the words beside every bar fit on the page."""
     ends = [
-        LEAST_SHOWN + (max(gain, 0.0) - LEAST_SHOWN) / max(1.0 - len(text) / LETTERS_ACROSS, 0.1)
+        LEAST_SHOWN + (max(gain, 0.0) - LEAST_SHOWN) / max(1.0 - len(text) / _letters(), 0.1)
         for gain, text in zip(gains, words, strict=True)
     ]
     return max(*ends, 5.0)
@@ -115,10 +122,11 @@ def _frame(ax: Axes, rows: pd.DataFrame, reach: float) -> None:
     ax.set_xlim(LEAST_SHOWN, reach)
     ax.grid(visible=False, axis="y")
     ax.tick_params(axis="y", length=0)
-    ax.set_xlabel("Increase in log likelihood over the calibrated model, after penalty")
+    narrow = style.page_mm() < style.PAGE_MM
+    ax.set_xlabel(f"Increase in log likelihood over the{chr(10) if narrow else ' '}calibrated model, after penalty")
 
 
-def _short(reason: str, most: int = 96) -> str:
+def _short(reason: str, most: int) -> str:
     """The reason up to its first semicolon, in one line."""
     text = reason.split(";")[0].split(", and each")[0].replace(" +- ", " ± ")
     return text if len(text) <= most else f"{text[: most - 1]}…"
@@ -155,8 +163,12 @@ def draw_power(numbers: pd.DataFrame) -> Figure:
     """Left the size of what was seen, right the power for what may be hidden."""
     rows = numbers[numbers["mark"] == "mechanism"].reset_index(drop=True)
     height_mm = max(ROW_MM * len(rows), 34.0) + POWER_FRAME_MM
-    figure = style.page_figure(height_mm)
-    left, right = figure.subplots(1, 2, width_ratios=(1, 1.5))
+    if style.page_mm() < style.PAGE_MM:  # one above the other
+        figure = style.page_figure(height_mm + 45.0)
+        left, right = figure.subplots(2, 1, height_ratios=(34.0, max(ROW_MM * len(rows), 34.0)))
+    else:
+        figure = style.page_figure(height_mm)
+        left, right = figure.subplots(1, 2, width_ratios=(1, 1.5))
     _chance(left, numbers)
     _sizes(right, rows)
     style.legend_below(

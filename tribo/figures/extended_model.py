@@ -84,7 +84,7 @@ def _spread(at_load: np.ndarray, panel: np.ndarray) -> dict[str, Any]:
 def draw_extended(numbers: pd.DataFrame) -> Figure:
     """Static above sliding for every sample, a few samples to a row; on the line at zero the model is right."""
     samples = style.by_sample(numbers)
-    across = len(samples) if len(samples) <= 4 else 3 if len(samples) <= 6 else 4
+    across = style.across(len(samples) if len(samples) <= 4 else 3 if len(samples) <= 6 else 4)
     deep = -(-len(samples) // across)
     figure, axes = style.panel_grid(2 * deep * across, 40, columns=across, sharex=True, sharey=True)
     for k in range(deep * across):

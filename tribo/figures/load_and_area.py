@@ -18,6 +18,7 @@ from matplotlib.transforms import Transform
 
 from tribo.comparison import study_lookup
 from tribo.comparison.agreement import ratios
+from tribo.errors import Problem, TriboError
 from tribo.figures import style
 from tribo.records import REGIMES, FloatArray, LawFit, Regime, Study
 
@@ -77,7 +78,8 @@ def _curve(study: Study, sample: str, regime: Regime, points: pd.DataFrame) -> p
 def draw_ratio(numbers: pd.DataFrame) -> Figure:
     """Static and sliding side by side; anisotropic samples in a second row where there are any."""
     groups = [g for g in ("isotropic", "anisotropic") if (numbers["group"] == g).any()]
-    figure, axes = style.panel_grid(2 * len(groups), 62, columns=2)
+    columns = 2 if style.page_mm() >= style.PAGE_MM else 1  # titles are long
+    figure, axes = style.panel_grid(2 * len(groups), 62, columns=columns)
     panels = [(group, regime) for group in groups for regime in REGIMES]
     for ax, (group, regime) in zip(axes, panels, strict=True):
         part = numbers[(numbers["group"] == group) & (numbers["regime"] == regime)]
@@ -504,6 +506,46 @@ def _ratio_axis(axes: list[Axes], numbers: pd.DataFrame) -> None:
 
 def _plain(value: float, _: int) -> str:
     return f"{value:g}"
+
+
+def residuals_of_fits(study: Study) -> pd.DataFrame:
+    """100 (measured / fitted - 1) of every test by the fitted law of its sample, against the normal load in N."""
+    table = study.residuals()
+    if table.empty:
+        raise TriboError(Problem("nothing_to_draw", "the study holds no fits, so there are no residuals"))
+    numbers = table["sample"].map(study_lookup.sample_numbers(study))
+    columns = ["sample_number", "sample", "regime", "test_id", "specimen", "normal_load_N", "residual_percent"]
+    return table.assign(sample_number=numbers)[columns]
+
+
+@style.in_house_style
+def draw_residuals_of_fits(numbers: pd.DataFrame) -> Figure:
+    """One panel per sample, static beside sliding at each load; on the line at zero the fit is right."""
+    groups = style.by_sample(numbers)
+    figure, axes = style.panel_grid(len(groups), 45, sharex=True, sharey=True)
+    for ax, (_, sample) in zip(axes, groups, strict=True):
+        ax.axhline(0, color="0.4", lw=0.8)
+        for regime, part in sample.groupby("regime"):
+            colour, marker, side = REGIME_STYLE[str(regime)]
+            style.cover(ax, part["normal_load_N"], part["residual_percent"], part["residual_percent"])
+            ax.plot(
+                part["normal_load_N"], part["residual_percent"], marker, color=colour, ms=2.8, mew=0.6, mfc="none",
+                transform=style.moved_aside(ax, side * AGREEMENT_DODGE_POINTS),
+            )  # fmt: skip
+        style.panel_title(ax, str(sample["sample"].iloc[0]))
+        ax.set_xlabel("Normal load N (N)")
+        ax.tick_params(labelbottom=True)
+        if style.is_leftmost(ax):
+            ax.set_ylabel("measured / fitted − 1 (%)")
+    axes[0].set_xlim(left=0)
+    shown = [r for r in REGIMES if (numbers["regime"] == r).any()]
+    handles = [
+        Line2D([], [], color=REGIME_STYLE[r][0], marker=REGIME_STYLE[r][1], mfc="none", ls="", ms=3.5,
+               label=f"{r} friction")
+        for r in shown
+    ]  # fmt: skip
+    style.legend_below(figure, handles)
+    return figure
 
 
 AGREEMENT = style.StudyFigure(

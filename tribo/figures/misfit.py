@@ -122,6 +122,7 @@ DIVERGING = LinearSegmentedColormap.from_list(
      (0.5, (*to_rgb(style.VERMILLION), 0.0)), (1.0, (*to_rgb(style.VERMILLION), STRONGEST))], N=40,
 )  # fmt: skip
 CELL_MM, HEAD_MM, FOOT_MM = 4.3, 7.0, 20.0
+MARGINS_MM, LEAST_CELL_MM = 32.0, 9.0
 FAINT = 0.35  # how strongly a cell is coloured that chance explains
 
 
@@ -244,18 +245,25 @@ def draw_misfit(numbers: pd.DataFrame) -> Figure:
     panels = [(name, part) for name in TITLES if len(part := numbers[numbers["observable"] == name])]
     labels = numbers.drop_duplicates("covariate").set_index("covariate")["label"]
     heights = [part["row"].nunique() for _, part in panels]
-    figure = style.page_figure(CELL_MM * sum(heights) + HEAD_MM * len(panels) + FOOT_MM)
-    axes = np.atleast_1d(figure.subplots(len(panels), 1, height_ratios=heights, squeeze=True))
+    # a page that is too narrow for all columns has them in blocks, one below the other
+    narrow = style.page_mm() < style.PAGE_MM
+    side_by_side = max(1, int((style.page_mm() - MARGINS_MM) // LEAST_CELL_MM)) if narrow else len(labels)
+    blocks = np.array_split(np.arange(len(labels)), -(-len(labels) // side_by_side))
+    block_mm = CELL_MM * sum(heights) + HEAD_MM * len(panels) + FOOT_MM
+    figure = style.page_figure(block_mm * len(blocks))
+    every = np.atleast_1d(figure.subplots(len(panels) * len(blocks), 1, height_ratios=heights * len(blocks)))
     reach = float(np.clip(numbers["effect_percent"].abs().quantile(0.98), LEAST_PERCENT, MOST_PERCENT))
     norm = TwoSlopeNorm(0.0, -reach, reach)
-    for ax, (name, part) in zip(axes, panels, strict=True):
-        _draw_panel(ax, part, list(labels.index), norm)
-        style.panel_title(ax, TITLES[name])
-    for ax in axes[:-1]:
-        ax.tick_params(labelbottom=False)
-    axes[-1].set_xticks(np.arange(len(labels)) + 0.5, list(labels), rotation=25, ha="right", rotation_mode="anchor")
+    for axes, block in zip(np.split(every, len(blocks)), blocks, strict=True):
+        shown = labels.iloc[block]
+        for ax, (name, part) in zip(axes, panels, strict=True):
+            _draw_panel(ax, part, list(shown.index), norm)
+            style.panel_title(ax, TITLES[name])
+        for ax in axes[:-1]:
+            ax.tick_params(labelbottom=False)
+        axes[-1].set_xticks(np.arange(len(shown)) + 0.5, list(shown), rotation=25, ha="right", rotation_mode="anchor")
     scale = ScalarMappable(norm, DIVERGING)
-    bar = figure.colorbar(scale, ax=list(axes), shrink=0.6, pad=0.015, aspect=35, extend="both")
+    bar = figure.colorbar(scale, ax=list(every), shrink=0.6, pad=0.015, aspect=35, extend="both")
     bar.set_label("100 (measured / model − 1), or its change (%)")
     bar.outline.set_visible(False)
     return figure
@@ -265,7 +273,7 @@ def _draw_panel(ax: Axes, part: pd.DataFrame, covariates: list[str], norm: TwoSl
     """Cells that chance explains are faint, so that the eye goes to the others; paper shows through all of them."""
     rows = list(dict.fromkeys(part["row"]))
     cells, colours = [], []
-    for cell in part.to_dict("records"):
+    for cell in part[part["covariate"].isin(covariates)].to_dict("records"):
         i, j, percent = rows.index(cell["row"]), covariates.index(cell["covariate"]), float(cell["effect_percent"])
         strong = bool(cell["mark"])
         ax.text(

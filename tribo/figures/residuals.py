@@ -160,7 +160,10 @@ def variance_of_mean(d: Diagnosis, weight: FloatArray, rows: np.ndarray) -> floa
     stated = np.where(f.setup.group == PATTERN, max(f.noise.pattern, 1.0), 1.0)
     repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup)[rows], weight)
     repeats += f.setup.observations.reading[rows] ** 2 @ weight**2
-    shared = f.setup.random_effects.take(rows).summed(weight) / len(rows)
+    effects = f.setup.random_effects.take(rows)
+    own = np.zeros((effects.specimens, effects.own.shape[2]))
+    np.add.at(own, effects.specimen, np.einsum("nrk,r->nk", effects.own, weight))
+    shared = np.concatenate([own.ravel(), np.einsum("nrk,r->k", effects.shared, weight)]) / len(rows)
     return float(repeats.sum() / len(rows) ** 2 + shared**2 @ (1.0 / (stated**2 * f.linear.precision)))
 
 
@@ -336,8 +339,8 @@ def _axis_name(column: Covariate) -> str:
 def draw_finding(numbers: pd.DataFrame) -> Figure:
     """Static at the left, sliding at the right, one scale; on the line at zero the model is right."""
     regimes = [r for r in REGIMES if (numbers["regime"] == r).any()]
-    size = (WIDTH_MM / style.MM_PER_INCH, HEIGHT_MM / style.MM_PER_INCH)
-    figure = Figure(figsize=size, layout="constrained")
+    figure = style.page_figure(HEIGHT_MM)
+    figure.set_figwidth(min(WIDTH_MM, style.page_mm()) / style.MM_PER_INCH)
     axes = np.atleast_1d(figure.subplots(1, len(regimes), sharey=True))
     for ax, regime in zip(axes, regimes, strict=True):
         _finding_panel(ax, numbers[numbers["regime"] == regime])

@@ -194,22 +194,28 @@ def run_numbers(run: Run, number: int = 0) -> pd.DataFrame:
 def draw_runs(numbers: pd.DataFrame) -> Figure:
     """The model, the patterns, and all samples in one panel: peak and sliding mean carry the sample's marker."""
     runs = style.by_sample(numbers)
-    rows, legend_rows = -(-len(runs) // PATTERNS_ACROSS), -(-len(runs) // LEGEND_COLUMNS)
-    height = MODEL_MM + rows * PATTERN_MM + TRACES_MM + FOOT_MM + LEGEND_ROW_MM * legend_rows
+    wide = style.page_mm() >= style.PAGE_MM
+    across = PATTERNS_ACROSS if wide else max(1, int((style.page_mm() - 9.0) // 30.3))
+    legend_columns = LEGEND_COLUMNS if wide else across
+    model_mm = MODEL_MM if wide else 2 * MODEL_MM
+    rows, legend_rows = -(-len(runs) // across), -(-len(runs) // legend_columns)
+    height = model_mm + rows * PATTERN_MM + TRACES_MM + FOOT_MM + LEGEND_ROW_MM * legend_rows
     figure = style.page_figure(height, fixed=True)
-    draw_mesh(_axes(figure, 0, 5, 84, MODEL_MM - 6))
-    draw_side_view(_axes(figure, 88, 5, 102, MODEL_MM - 6))
+    draw_mesh(_axes(figure, 0, 5, min(84, style.page_mm()), MODEL_MM - 6))
+    left, top = (88, 5) if wide else (0, 5 + MODEL_MM)
+    draw_side_view(_axes(figure, left, top, min(102, style.page_mm()), MODEL_MM - 6))
     for k, (_, run) in enumerate(runs):
-        row, column = divmod(k, PATTERNS_ACROSS)
+        row, column = divmod(k, across)
         pattern = run[run["mark"] == "pattern"].iloc[0]
-        left, top = 9.0 + 30.3 * column, MODEL_MM + row * PATTERN_MM + HEAD_MM
+        left, top = 9.0 + 30.3 * column, model_mm + row * PATTERN_MM + HEAD_MM
         ax = _axes(figure, left, top, SIDE_MM, SIDE_MM)
         draw_pattern(ax, pattern, str(pattern["sample"]), float(pattern["angle_deg"]))
         if k == 0 and np.isfinite(pattern["domain_x_um"]):
             ax.set_ylabel(f"{pattern['domain_y_um']:.4g} µm", fontsize=7)
-    traces = _axes(figure, 13, MODEL_MM + rows * PATTERN_MM + HEAD_MM, 175, TRACES_MM - HEAD_MM)
+    top = model_mm + rows * PATTERN_MM + HEAD_MM
+    traces = _axes(figure, 13, top, style.page_mm() - 15, TRACES_MM - HEAD_MM)
     handles = _draw_traces(traces, runs, numbers)
-    figure.legend(handles=handles, loc="lower center", ncols=LEGEND_COLUMNS)
+    figure.legend(handles=handles, loc="lower center", ncols=legend_columns)
     return figure
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import wraps
 from importlib.resources import as_file, files
-from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
+from typing import Any, Generic, ParamSpec, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -16,6 +17,7 @@ from matplotlib import rcParams, style
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backend_bases import RendererBase
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.textpath import TextPath
@@ -25,20 +27,20 @@ from matplotlib.transforms import ScaledTranslation, Transform
 from tribo.display import displayed
 from tribo.records import Study
 
-if TYPE_CHECKING:
-    pass
-
-
-COLUMN_WIDTH_MM = 190.0
+PAGE_MM = 190.0  # two columns of a journal
+LEAST_PANEL_MM = 42.0
 MM_PER_INCH = 25.4
 DETAIL_POINTS = 7.5
 LABELS_MM = 6.0  # beside a panel
+LEGEND_ROW_MM = 4.4
 
 # Okabe and Ito (2008), without the yellow, which is lost on white paper.
 BLACK, VERMILLION, BLUE, GREEN = "#000000", "#D55E00", "#0072B2", "#009E73"
 PURPLE, ORANGE, SKY = "#CC79A7", "#E69F00", "#56B4E9"
 SAMPLE_COLOURS = (BLACK, VERMILLION, BLUE, GREEN, PURPLE, ORANGE, SKY)
 SAMPLE_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", "*")
+
+_PAGE: ContextVar[tuple[float, bool]] = ContextVar("page", default=(PAGE_MM, False))  # width in mm, text as text
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -91,10 +93,40 @@ def settle(figure: Figure) -> None:
         figure.set_layout_engine("none")
 
 
+def as_pdf(figure: Figure, about: Mapping[str, str] | None = None) -> bytes:
+    """A figure as PDF without a date; ``about`` is written to its metadata."""
+    buffer = io.BytesIO()
+    with house_style():
+        settle(figure)
+        FigureCanvasPdf(figure).print_pdf(buffer, metadata={"CreationDate": None, **(about or {})})
+    return buffer.getvalue()
+
+
+@contextmanager
+def page(width_mm: float = PAGE_MM, editable_text: bool = False) -> Iterator[None]:
+    """Figures are drawn ``width_mm`` wide within, letters in their usual size; text stays text if ``editable_text``."""
+    token = _PAGE.set((width_mm, editable_text))
+    try:
+        yield
+    finally:
+        _PAGE.reset(token)
+
+
+def page_mm() -> float:
+    """How wide a page is here."""
+    return _PAGE.get()[0]
+
+
+def across(panels: int) -> int:
+    """How many of these panels stand side by side on the page."""
+    return max(1, min(panels, int(page_mm() // LEAST_PANEL_MM)))
+
+
 @contextmanager
 def house_style() -> Iterator[None]:
     """The style sheet for drawing and for rendering; matplotlib's own settings return afterwards."""
-    with as_file(files("tribo.figures") / "tribo.mplstyle") as sheet, style.context(["default", sheet]):
+    text = {"svg.fonttype": "none", "pdf.fonttype": 42} if _PAGE.get()[1] else {}
+    with as_file(files("tribo.figures") / "tribo.mplstyle") as sheet, style.context(["default", sheet, text]):
         yield
 
 
@@ -111,7 +143,7 @@ def in_house_style(draw: Callable[P, R]) -> Callable[P, R]:
 
 def page_figure(height_mm: float, fixed: bool = False) -> PageFigure:
     """An empty figure as wide as the page; ``fixed`` leaves axes where they are put."""
-    figure = PageFigure(figsize=(COLUMN_WIDTH_MM / MM_PER_INCH, height_mm / MM_PER_INCH), layout="constrained")
+    figure = PageFigure(figsize=(page_mm() / MM_PER_INCH, height_mm / MM_PER_INCH), layout="constrained")
     if fixed:
         figure.set_layout_engine("none")
     return figure
@@ -121,7 +153,7 @@ def panel_grid(
     n_panels: int, panel_height_mm: float, columns: int | None = None, **subplots: Any
 ) -> tuple[Figure, list[Axes]]:
     """A figure as wide as the page with ``n_panels`` axes in reading order; places left over stay empty."""
-    columns = columns or _columns_for(n_panels)
+    columns = across(columns or _columns_for(n_panels))
     rows = -(-n_panels // columns)
     legend_mm = 12.0
     figure = page_figure(rows * panel_height_mm + legend_mm)
@@ -156,7 +188,7 @@ def _text_mm(text: str, points: float) -> float:
 def _width_mm(ax: Axes) -> float:
     """About how wide a panel is: its share of the page without the labels at its left; or its own width if fixed."""
     figure, spec = ax.get_figure(root=True), ax.get_subplotspec()
-    page = figure.get_size_inches()[0] * MM_PER_INCH if figure is not None else COLUMN_WIDTH_MM
+    page = figure.get_size_inches()[0] * MM_PER_INCH if figure is not None else page_mm()
     if spec is None or (figure is not None and figure.get_layout_engine() is None):
         return float(page * ax.get_position().width)
     return float(page / spec.get_gridspec().ncols) - LABELS_MM
@@ -202,6 +234,9 @@ def legend_below(figure: Figure, handles: list[Any], columns: int = 6) -> None:
     if handles:
         labels = [str(handle.get_label()) for handle in handles]
         fitting = _columns_that_fit(labels, min(columns, len(handles)), 72 * figure.get_figwidth())
+        if page_mm() < PAGE_MM:  # the legend takes more rows than the page was made for
+            rows = -(-len(handles) // fitting)
+            figure.set_figheight(figure.get_figheight() + max(0, rows - 2) * LEGEND_ROW_MM / MM_PER_INCH)
         figure.legend(handles=handles, loc="outside lower center", ncols=fitting)
 
 
