@@ -11,9 +11,9 @@ from on_the_command_line import run
 from figures.test_figures import collisions
 from tribo.errors import CampaignError
 from tribo.figures import FIGURES, style
+from tribo.outputs import csv_text
 from tribo.records import Study
 from tribo.report.redraw import _numbers, redrawn
-from tribo.report.tables import to_csv
 
 
 @pytest.mark.parametrize("width_mm", [90.0, 190.0])
@@ -32,7 +32,7 @@ def test_no_label_lies_on_another_at_the_width_of_one_column_or_of_two(
 @pytest.mark.parametrize("name", list(FIGURES))
 def test_numbers_read_from_the_file_beside_a_figure_draw_the_same(name: str, study: Study) -> None:
     numbers = FIGURES[name].numbers(study)
-    again = _numbers(to_csv(numbers))
+    again = _numbers(csv_text(numbers))
     first, second = (re.sub(r"\d+\.\d+", "", style.as_svg(FIGURES[name].draw(n))) for n in (numbers, again))
     assert len(first) == pytest.approx(len(second), rel=0.01)
 
