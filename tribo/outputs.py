@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from importlib import import_module
 from pathlib import Path
@@ -40,30 +40,22 @@ def unit_of(column: str) -> str | None:
 
 
 @dataclass(frozen=True)
-class Column:
-    """A column of a table: its name, its unit (None for texts and plain counts) and what it holds."""
-
-    name: str
-    unit: str | None
-    text: str
-
-
-@dataclass(frozen=True)
 class Product:
     """One file of results, or several whose names fit one pattern.
 
     ``stage`` is the stage of a study, or the command, that makes it; ``text`` says what it holds. Tables state their
-    ``columns`` in order; those of ``optional`` may be absent, and where ``open_ended`` is set a user's own columns
-    follow. The ``writer`` of a table of a study is the function of the study and its diagnosis (None where there is
-    none) that makes it, or None where there is nothing to write; other files are given to :func:`write` by the stage.
-    ``group`` is the group of campaign.nc that holds the same table, one entry of the dimension ``row`` for each row.
-    ``origin_in`` are the endings of files that state the origin of their numbers, which ``tribo verify`` reads.
+    ``columns`` in order, each with what it holds; the unit ends the name (:func:`unit_of`). Those of ``optional`` may
+    be absent, and where ``open_ended`` is set a user's own columns follow. The ``writer`` of a table of a study is the
+    function of the study and its diagnosis (None where there is none) that makes it, or None where there is nothing to
+    write; other files are given to :func:`write` by the stage. ``group`` is the group of campaign.nc that holds the
+    same table, one entry of the dimension ``row`` for each row. ``origin_in`` are the endings of files that state the
+    origin of their numbers, which ``tribo verify`` reads.
     """
 
     name: str
     stage: str
     text: str
-    columns: tuple[Column, ...] = ()
+    columns: Mapping[str, str] = field(default_factory=dict)
     writer: str = ""
     group: str = ""
     row: str = ""
@@ -73,7 +65,7 @@ class Product:
 
     @property
     def column_names(self) -> list[str]:
-        return [column.name for column in self.columns]
+        return list(self.columns)
 
     def table(self, study: Any, diagnosis: Any = None) -> pd.DataFrame | None:
         """What its writer makes of a study."""
@@ -82,11 +74,7 @@ class Product:
         return made
 
 
-def _columns(texts: Mapping[str, str]) -> tuple[Column, ...]:
-    return tuple(Column(name, unit_of(name), text) for name, text in texts.items())
-
-
-TESTS = _columns({
+TESTS = {
     "test_id": "the test",
     "static_N": "static friction force",
     "static_u_N": "its standard uncertainty from the reading",
@@ -147,8 +135,8 @@ TESTS = _columns({
     "restart_N": "static force of the first restart",
     "restart_u_N": "its standard uncertainty",
     "restart_hold_s": "time of the hold before it",
-})  # fmt: skip
-RESTARTS = _columns({
+}
+RESTARTS = {
     "test_id": "the test",
     "sample": "sample",
     "specimen": "specimen",
@@ -161,8 +149,8 @@ RESTARTS = _columns({
     "static_u_N": "its standard uncertainty",
     "sliding_N": "mean sliding force after it",
     "sliding_u_N": "its standard uncertainty",
-})  # fmt: skip
-FITS = _columns({
+}
+FITS = {
     "sample": "sample",
     "regime": "static or sliding",
     "mu": "friction coefficient",
@@ -193,8 +181,8 @@ FITS = _columns({
     "tau0_type_a_low_kPa": "lower end of the 95 % interval of tau0 from them alone",
     "tau0_type_a_high_kPa": "upper end",
     "T0_type_a_u_N": "standard uncertainty of T0 from them alone",
-})  # fmt: skip
-OTHER_FITS = _columns({
+}
+OTHER_FITS = {
     "source": "measured or simulated",
     "sample": "sample",
     "regime": "static or sliding",
@@ -209,8 +197,8 @@ OTHER_FITS = _columns({
     "n_specimens": "number of specimens",
     "n_tests": "number of tests",
     "chi2_red": "reduced chi squared",
-})  # fmt: skip
-LAWS_OF_LOAD = _columns({
+}
+LAWS_OF_LOAD = {
     "sample": "sample",
     "regime": "static or sliding",
     "law": "the law",
@@ -224,8 +212,8 @@ LAWS_OF_LOAD = _columns({
     "se_percent": "standard error of its excess over the best law",
     "loads": "number of loads",
     "chosen": "whether it is the law chosen by the data",
-})  # fmt: skip
-DEPENDENCE = _columns({
+}
+DEPENDENCE = {
     "sample": "sample",
     "regime": "static or sliding",
     "variable": "the recorded variable",
@@ -239,8 +227,8 @@ DEPENDENCE = _columns({
     "p": "probability of so large a correlation by chance",
     "p_adjusted": "the same, adjusted for the number of variables",
     "inseparable_from": "variables that change together with it",
-})  # fmt: skip
-BUDGET = _columns({
+}
+BUDGET = {
     "component": "source of uncertainty; combined is the sum",
     "type": "A, from scatter, or B, from what is known of the instrument",
     "u_mu": "what it adds to the standard uncertainty of mu",
@@ -253,8 +241,8 @@ BUDGET = _columns({
     "origin": "what its size rests on",
     "sample": "sample",
     "regime": "static or sliding",
-})  # fmt: skip
-DIFFERENCES = _columns({
+}
+DIFFERENCES = {
     "sample": "one sample",
     "other": "the other sample, measured on the same specimens",
     "regime": "static or sliding",
@@ -268,8 +256,8 @@ DIFFERENCES = _columns({
     "high": "upper end",
     "p": "probability of so large a difference by chance",
     "specimens": "the specimens",
-})  # fmt: skip
-COMPARISON = _columns({
+}
+COMPARISON = {
     "sample": "sample",
     "regime": "static or sliding",
     "normal_load_N": "normal load",
@@ -280,8 +268,8 @@ COMPARISON = _columns({
     "ratio": "measured over simulated force",
     "ratio_low": "lower end of its 95 % interval",
     "ratio_high": "upper end",
-})  # fmt: skip
-RESIDUALS = _columns({
+}
+RESIDUALS = {
     "test_id": "the test",
     "sample": "sample",
     "specimen": "specimen",
@@ -301,8 +289,8 @@ RESIDUALS = _columns({
     "residual_calibrated_percent": "100 (measured / calibrated - 1)",
     "residual_extended_percent": "100 (measured / extended - 1)",
     "simulated_N": "force of the extended model where it was run in the simulator itself",
-})  # fmt: skip
-LAYERS = _columns({
+}
+LAYERS = {
     "kind": "pattern correction, cause, law, remainder, misfit, gain or rms",
     "name": "its name",
     "samples": "where it acts",
@@ -318,8 +306,8 @@ LAYERS = _columns({
     "log_score_gain_se": "its standard error",
     "rmse_percent_before": "root mean square error of tests left out, without it",
     "rmse_percent_after": "the same with it",
-})  # fmt: skip
-TWO_REPORTS = _columns({
+}
+TWO_REPORTS = {
     "sample": "sample",
     "regime": "static or sliding",
     "quantity": "mu, tau0_kPa or T_N",
@@ -335,16 +323,16 @@ TWO_REPORTS = _columns({
     "difference_high": "upper end",
     "difference_percent": "difference over the first value",
     "distinct": "whether the difference exceeds its interval",
-})  # fmt: skip
-LAWS_TRIED = _columns({
+}
+LAWS_TRIED = {
     "formula": "formula of the law",
     "regime": "static, sliding or both",
     "where": "on which samples it acts",
     "log_likelihood_gain": "gain of the log likelihood",
     "net_of_choosing": "the same less what the choice among all laws gains by chance",
     "acts_on": "the quantity that follows it",
-})  # fmt: skip
-ACROSS_PATTERNS = _columns({
+}
+ACROSS_PATTERNS = {
     "terms": "number of terms of the law",
     "formula": "formula of the law",
     "left_out_error": "error at a pattern left out of the fit, rms of ln T",
@@ -353,7 +341,7 @@ ACROSS_PATTERNS = _columns({
     "p_of_the_best": "probability of so good a law by chance",
     "nested_error": "error with the choice of the law left out as well",
     "laws_tried": "number of laws tried",
-})  # fmt: skip
+}
 STUDY_STAGES = ("ingest", "fit", "compare", "diagnose", "report")
 PRODUCTS = (
     Product(

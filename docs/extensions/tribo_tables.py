@@ -81,14 +81,15 @@ class Outputs(Written):
     optional_arguments = 1
 
     def text(self) -> Iterator[str]:
-        from tribo.outputs import PRODUCTS
+        from tribo.outputs import PRODUCTS, unit_of
 
         for product in PRODUCTS:
             if not self.arguments:
                 yield from (f"`{product.name}`", f": {product.text}", "")
             elif product.columns:
                 yield from (f"### {product.name} (stage {product.stage})", "")
-                yield from _rows(["column", "unit", "text"], ((c.name, c.unit or "", c.text) for c in product.columns))
+                columns = product.columns.items()
+                yield from _rows(["column", "unit", "text"], ((c, unit_of(c) or "", text) for c, text in columns))
 
 
 def _rows(names: Sequence[str], rows: Iterable[Iterable[object]]) -> Iterator[str]:

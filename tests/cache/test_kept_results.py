@@ -192,3 +192,15 @@ def test_what_is_at_several_places_is_written_once_and_comes_back_as_one() -> No
     assert back["last"] is back["first"][1] is back["first"][2]["deep"][0]
     assert back["first"][0] is back["first"][2]["deep"][1]
     assert fingerprint(back) == fingerprint(value)
+
+
+def test_the_sources_that_decide_kept_results_are_there() -> None:
+    from tribo.comparison.prediction import SOURCES
+    from tribo.report.drawings import DRAWN_BY, SET_BY
+    from tribo.stages import ASSESSED_BY, DIAGNOSED_BY
+
+    for code in (SOURCES, DRAWN_BY, SET_BY, ASSESSED_BY, DIAGNOSED_BY):
+        assert not isinstance(code, str)
+        assert sources(*code) != sources()
+    with pytest.raises(OSError, match=r"no_such_room\.py"):
+        sources("no_such_room")

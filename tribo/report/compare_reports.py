@@ -9,7 +9,7 @@ import base64
 import json
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
@@ -98,34 +98,13 @@ def _json(path: Path) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-@displayed(lambda f: f"{f.sample}, {f.regime} friction")
-@dataclass(frozen=True)
-class Fitted:
-    """One fit: mu and tau0 (kPa) with the half widths of their 95 % intervals, by the combined uncertainty if known.
+def fit_numbers(fit: Mapping[Any, Any]) -> dict[str, Any]:
+    """mu and tau0_kPa of a row of fits.csv, each with the half width of its 95 % interval by the combined uncertainty;
+    NaN where the row has no number.
 
     ``variances`` are those of mu, of both, and of tau0; ``widening`` is the half width over the standard uncertainty.
+    Reports of earlier versions hold the combined uncertainty in columns of their own.
     """
-
-    sample: str
-    regime: str
-    mu: float
-    mu_half: float
-    tau0_kPa: float
-    tau0_half_kPa: float
-    variances: tuple[float, float, float]
-    widening: float
-
-    def force_N(self, load_N: float, area_m2: float) -> tuple[float, float]:
-        """T at a load, and the half width of its 95 % interval."""
-        per_kPa = 1e3 * area_m2
-        of_mu, of_both, of_tau0 = self.variances
-        variance = load_N**2 * of_mu + 2 * load_N * per_kPa * of_both + per_kPa**2 * of_tau0
-        u = math.sqrt(max(variance, 0.0)) if math.isfinite(variance) else math.nan
-        return self.mu * load_N + self.tau0_kPa * per_kPa, self.widening * u
-
-
-def fitted(fit: dict[Any, Any]) -> Fitted:
-    """A row of fits.csv; NaN where it has no number."""
 
     def cell(name: str) -> float:
         value = fit.get(name)
@@ -135,16 +114,20 @@ def fitted(fit: dict[Any, Any]) -> Fitted:
     mu_half = (cell(f"mu{last}_high") - cell(f"mu{last}_low")) / 2
     tau0_half = (cell(f"tau0{last}_high_kPa") - cell(f"tau0{last}_low_kPa")) / 2
     mu_u, tau0_u = cell(f"mu_u{last}"), cell(f"tau0_u{last}_kPa")
-    return Fitted(
-        str(fit["sample"]),
-        str(fit["regime"]),
-        cell("mu"),
-        mu_half,
-        cell("tau0_kPa"),
-        tau0_half,
-        variances=(mu_u**2, cell(f"cov{last}"), tau0_u**2),
-        widening=mu_half / mu_u if mu_u > 0 else math.nan,
-    )
+    return {
+        "sample": str(fit["sample"]), "regime": str(fit["regime"]), "mu": (cell("mu"), mu_half),
+        "tau0_kPa": (cell("tau0_kPa"), tau0_half), "variances": (mu_u**2, cell(f"cov{last}"), tau0_u**2),
+        "widening": mu_half / mu_u if mu_u > 0 else math.nan,
+    }  # fmt: skip
+
+
+def _force_N(fit: Mapping[str, Any], load_N: float, area_m2: float) -> tuple[float, float]:
+    """T of a fit at a load, and the half width of its 95 % interval."""
+    per_kPa = 1e3 * area_m2
+    of_mu, of_both, of_tau0 = fit["variances"]
+    variance = load_N**2 * of_mu + 2 * load_N * per_kPa * of_both + per_kPa**2 * of_tau0
+    u = math.sqrt(max(variance, 0.0)) if math.isfinite(variance) else math.nan
+    return fit["mu"][0] * load_N + fit["tau0_kPa"][0] * per_kPa, fit["widening"] * u
 
 
 QUANTITIES = {"mu": ("μ", "1"), "tau0_kPa": ("τ₀", "kPa"), "T_N": ("T", "N")}
@@ -173,9 +156,10 @@ def differences(first: Reported, second: Reported) -> pd.DataFrame:
 
 
 def _rows(one: dict[Any, Any], other: dict[Any, Any], load_N: float, areas: tuple[float, float]) -> Iterator[Any]:
-    fits = fitted(one), fitted(other)
+    fits = [fit_numbers(fit) for fit in (one, other)]
+    fits = [fit | {"T_N": _force_N(fit, load_N, area)} for fit, area in zip(fits, areas, strict=True)]
     for quantity, (_, unit) in QUANTITIES.items():
-        a, b = (_value(fit, quantity, load_N, area) for fit, area in zip(fits, areas, strict=True))
+        a, b = (fit[quantity] for fit in fits)
         half = math.hypot(a[1], b[1])
         difference = b[0] - a[0]
         if not (math.isfinite(difference) and math.isfinite(half)):
@@ -185,13 +169,6 @@ def _rows(one: dict[Any, Any], other: dict[Any, Any], load_N: float, areas: tupl
             b[0] + b[1], difference, difference - half, difference + half,
             100 * difference / a[0] if a[0] > 0 else math.nan, abs(difference) > half,
         )  # fmt: skip
-
-
-def _value(fit: Fitted, quantity: str, load_N: float, area_m2: float) -> tuple[float, float]:
-    """A number of a fit and the half width of its 95 % interval."""
-    if quantity == "mu":
-        return fit.mu, fit.mu_half
-    return (fit.tau0_kPa, fit.tau0_half_kPa) if quantity == "tau0_kPa" else fit.force_N(load_N, area_m2)
 
 
 def sentences(table: pd.DataFrame, load_N: float) -> list[str]:

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 OF_STRAIGHT_LINES = ("fig4", "fig6", "fig7", "fig8")  # without the model, "forces" shows the law chosen by the data
 STAGE = "drawing figures"
-DRAWN_BY = ("figures", "report/drawings")
+DRAWN_BY = ("figures", "vocabulary", "report/drawings")
 SET_BY = ("report/drawings",)
 PNG_DPI = 300.0
 FIGURE_PAGE = """#set page(width: auto, height: auto, margin: 0pt, fill: white)

@@ -34,7 +34,15 @@ def environment(*others: str) -> Environment:
 
 
 def style_and_script(templates: Environment, styles: Sequence[str], scripts: Sequence[str]) -> dict[str, str]:
-    """What ``base.html`` needs of both: the texts of these files, joined, and their hashes for its policy."""
+    """What ``base.html`` needs of both: the texts of these files, joined, and their hashes for its policy.
+
+    Parameters
+    ----------
+    templates : Environment
+        The templates among which the files are (:func:`environment`).
+    styles, scripts : sequence of str
+        Names of the files, in the order in which they are joined.
+    """
     style = "".join(_static(templates, name) for name in styles)
     script = '"use strict";\n(() => {\n' + "".join(_static(templates, name) for name in scripts) + "})();\n"
     return {

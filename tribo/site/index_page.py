@@ -37,7 +37,7 @@ from tribo.site.steps import INDEX, Step, note, read_record
 from tribo.user_text import for_spreadsheet
 
 if TYPE_CHECKING:
-    from tribo.report.compare_reports import Fitted, Reported
+    from tribo.report.compare_reports import Reported
 
 
 def comparable(current: Path, names: Iterable[str]) -> dict[str, Any]:
@@ -59,7 +59,7 @@ def comparable(current: Path, names: Iterable[str]) -> dict[str, Any]:
 
 
 def _told(report: Reported) -> dict[str, Any]:
-    from tribo.report.compare_reports import fitted
+    from tribo.report.compare_reports import fit_numbers
 
     folder = quote(report.folder.name)
     return {
@@ -70,20 +70,17 @@ def _told(report: Reported) -> dict[str, Any]:
         "next_test": report.next_test(),
         "loads": _numbers(report.loads_N),
         "newton_per_kPa": _numbers([1e3 * report.area_m2])[0],
-        "fits": [_fit(fitted(row)) for row in report.fits.to_dict("records")],
+        "fits": [_fit(fit_numbers(row)) for row in report.fits.to_dict("records")],
         "figures": {name: f"{folder}/figures/{name}.svg" for name in report.pictures()},
     }
 
 
-def _fit(fit: Fitted) -> dict[str, Any]:
+def _fit(fit: Mapping[str, Any]) -> dict[str, Any]:
     return {
-        "sample": fit.sample,
-        "regime": fit.regime,
-        "mu": _numbers([fit.mu, fit.mu_half]),
-        "tau0": _numbers([fit.tau0_kPa, fit.tau0_half_kPa]),
-        "variances": _numbers(fit.variances),
-        "widening": _numbers([fit.widening])[0],
-    }
+        "sample": fit["sample"], "regime": fit["regime"], "mu": _numbers(fit["mu"]),
+        "tau0": _numbers(fit["tau0_kPa"]), "variances": _numbers(fit["variances"]),
+        "widening": _numbers([fit["widening"]])[0],
+    }  # fmt: skip
 
 
 def _numbers(values: Iterable[float]) -> list[float | None]:
