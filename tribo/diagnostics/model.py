@@ -76,6 +76,12 @@ class RandomEffects:
         of_own = np.einsum("nrk,...nk->...nr", self.own, own[..., self.specimen, :])
         return np.asarray(of_own + of_shared.reshape(of_own.shape))
 
+    def summed(self, weight: FloatArray) -> FloatArray:
+        """The columns of all effects (q,), regimes added with ``weight`` (2,) and tests added up."""
+        own = np.zeros((self.specimens, OF_A_SPECIMEN))
+        np.add.at(own, self.specimen, np.einsum("nrk,r->nk", self.own, weight))
+        return np.concatenate([own.ravel(), np.einsum("nrk,r->k", self.shared, weight)])
+
     def take(self, keep: np.ndarray) -> RandomEffects:
         """The same for the tests picked by a mask or by indices."""
         return replace(self, specimen=self.specimen[keep], own=self.own[keep], shared=self.shared[keep])
