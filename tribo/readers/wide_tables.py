@@ -36,8 +36,13 @@ def records_side_by_side(source: Source, layout: Layout, given: Given) -> Iterat
         records = _records(layout, given)
     except ReadError as why:
         raise ReadError(replace(p, file=source.file, row=layout.names_row) for p in why.problems) from None
-    rows = [] if source.arrays or not records else _rows(source, layout)
+    rows = []
+    if records and not source.arrays:
+        text = source.text(bytes(source.data[layout.start :])).replace("\r\n", "\n")
+        rows = [cut(line, layout.delimiter) for line in text.split("\n") if line.strip()]
+    above = [cut(line, layout.delimiter) for line in source.head[: (layout.names_row or 1) - 1]]
     for number, (label, columns, own, hints) in enumerate(records, start=1):
+        over = next((row[columns[0]] for row in reversed(above) if columns[0] < len(row)), "")
         alone = replace(
             layout,
             delimiter="\t" if layout.delimiter in (" ", layout.decimal) else layout.delimiter,
@@ -46,13 +51,13 @@ def records_side_by_side(source: Source, layout: Layout, given: Given) -> Iterat
             units=tuple(layout.units[k] for k in columns),
             filled=tuple(layout.filled[k] or k in own for k in columns),
             metadata={**layout.metadata, "record": label} if label else layout.metadata,
-            label=label or _label_above(source, layout, columns[0]) or f"specimen {number}",
+            label=label or over or f"specimen {number}",
         )
         if source.arrays:
             part = replace(source, part=alone.label, names=alone.names, arrays=tuple(source.arrays[k] for k in columns))
         else:
             end = len(rows)
-            while end and all(_is_nothing(rows[end - 1], k) for k in own):
+            while end and all(k >= len(rows[end - 1]) or rows[end - 1][k].lower() in _NOTHING for k in own):
                 end -= 1
             lines = [alone.delimiter.join(row[k] if k < len(row) else "" for k in columns) for row in rows[:end]]
             data = ("\n" * layout.header_rows + "\n".join(lines) + "\n").encode(source.codec, errors="replace")
@@ -61,30 +66,48 @@ def records_side_by_side(source: Source, layout: Layout, given: Given) -> Iterat
         yield part, alone, _restated(given, columns, hints)
 
 
-def _records(layout: Layout, given: Given) -> tuple[Record, ...]:
+def _records(layout: Layout, given: Given) -> Sequence[Record]:
     if any(hint.is_pattern for hint in given.hints):
         return _by_patterns(layout, given)
-    whole = tuple(_repeated(layout.names))
-    if whole:
-        return whole
-    used = [
-        k for k in range(layout.n_cells) if (layout.names[k] or layout.filled[k]) and not _ignored(layout, given, k)
-    ]
-    times = [k for k in used if _quantity(_stem(layout.names[k])) == "time"]
-    rest = [k for k in used if k not in times]
-    stems = [_stem(layout.names[k]) for k in rest]
-    if len(times) != 1 or len(rest) < 2:
-        return tuple(_with_own_time(layout, used))
-    for width in range(1, len(rest) // 2 + 1):
-        forces = [stem for stem in stems[:width] if _quantity(stem) == "friction force"]
-        if len(rest) % width == 0 and stems == stems[:width] * (len(rest) // width) and len(forces) == 1:
-            groups = [tuple(rest[at : at + width]) for at in range(0, len(rest), width)]
-            return tuple(
-                (_label(layout, group), (*times, *group), group, _hints(layout, (*times, *group))) for group in groups
-            )
+    names = layout.names
+    named = [k for k, name in enumerate(names) if name]
+    for groups in _repeats(named, [names[k] for k in named], 2):  # the same names several times in a row
+        if len({names[k] for k in groups[0]}) == len(groups[0]):
+            return [("", group, group, ()) for group in groups]
+    used = [k for k in range(layout.n_cells) if (names[k] or layout.filled[k]) and not given.ignores(k, names[k])]
+    stems = {k: _stem(names[k]) for k in used}
+    meant = {k: _quantity(stem) for k, stem in stems.items()}
+    times = tuple(k for k in used if meant[k] == "time")
+    rest = [k for k in used if meant[k] != "time"]
+
+    def record(own: tuple[int, ...], shared: tuple[int, ...] = ()) -> Record:
+        columns = (*shared, *own)
+        hints: dict[str, Hint] = {}
+        for j, k in enumerate(columns, start=1):
+            if meant[k]:
+                hints.setdefault(meant[k], Hint(meant[k], f"#{j}", f'named "{names[k]}"'))
+        return _label(layout, own), columns, own, tuple(hints.values())
+
+    if len(times) != 1 or len(rest) < 2:  # the same names but for a number, with a time and a force in each
+        for groups in _repeats(used, list(stems.values()), 2):
+            if {"time", "friction force"} <= {meant[k] for k in groups[0]}:
+                return [record(group) for group in groups]
+        return ()
+    for groups in _repeats(rest, [stems[k] for k in rest], 1):
+        if [meant[k] for k in groups[0]].count("friction force") == 1:
+            return [record(group, times) for group in groups]
     if all(_is_a_force_by_unit(layout, k) for k in rest):
-        return tuple(_forced(layout, (*times, k), k) for k in rest)
+        by_unit = [Hint("friction force", "#2", f'"{names[k]}", by its unit') for k in rest]
+        return [(names[k], (*times, k), (k,), (hint,)) for k, hint in zip(rest, by_unit, strict=True)]
     return ()
+
+
+def _repeats(columns: Sequence[int], names: Sequence[str], fewest: int) -> Iterator[list[tuple[int, ...]]]:
+    """Columns in groups under the same names, for every size of a group, from ``fewest`` on, that fits."""
+    for width in range(fewest, len(columns) // 2 + 1):
+        repeats, rest = divmod(len(columns), width)
+        if not rest and list(names) == [*names[:width]] * repeats:
+            yield [tuple(columns[k * width : (k + 1) * width]) for k in range(repeats)]
 
 
 def looks_wide(layout: Layout) -> bool:
@@ -92,10 +115,6 @@ def looks_wide(layout: Layout) -> bool:
     filled = [name for name, there in zip(layout.names, layout.filled, strict=True) if there or name]
     known = [_quantity(name) for name in filled if _quantity(name)]
     return known == ["time"] and len(filled) > 2
-
-
-def _ignored(layout: Layout, given: Given, k: int) -> bool:
-    return given.ignores(k, layout.names[k])
 
 
 def _quantity(name: str) -> str:
@@ -115,44 +134,6 @@ def _label(layout: Layout, group: Sequence[int]) -> str:
     return layout.names[group[0]] or f"#{group[0] + 1}"
 
 
-def _repeated(names: Sequence[str]) -> Iterator[Record]:
-    """Each specimen where the same names stand several times in a row."""
-    at = [k for k, name in enumerate(names) if name]
-    kept = [names[k] for k in at]
-    for width in range(2, len(kept) // 2 + 1):
-        repeats, rest = divmod(len(kept), width)
-        if not rest and kept == kept[:width] * repeats and len(set(kept[:width])) == width:
-            for k in range(repeats):
-                columns = tuple(at[k * width : (k + 1) * width])
-                yield "", columns, columns, ()
-            return
-
-
-def _with_own_time(layout: Layout, used: Sequence[int]) -> Iterator[Record]:
-    """Each specimen where names repeat but for their number, with a time and a force in each."""
-    stems = [_stem(layout.names[k]) for k in used]
-    for width in range(2, len(used) // 2 + 1):
-        first = stems[:width]
-        quantities = [_quantity(stem) for stem in first]
-        repeats = len(used) // width
-        if len(used) % width or stems != first * repeats or not {"time", "friction force"} <= set(quantities):
-            continue
-        for k in range(repeats):
-            columns = tuple(used[k * width : (k + 1) * width])
-            yield _label(layout, columns), columns, columns, _hints(layout, columns)
-        return
-
-
-def _hints(layout: Layout, columns: Sequence[int]) -> tuple[Hint, ...]:
-    """The quantities of a record by its names without their numbers, as positions within it."""
-    found: dict[str, Hint] = {}
-    for j, k in enumerate(columns):
-        quantity = _quantity(_stem(layout.names[k]))
-        if quantity:
-            found.setdefault(quantity, Hint(quantity, f"#{j + 1}", f'named "{layout.names[k]}"'))
-    return tuple(found.values())
-
-
 def _is_a_force_by_unit(layout: Layout, k: int) -> bool:
     """Whether a column without a known name, and with one that is no number, has a unit of force."""
     name, unit = split_unit(layout.names[k])
@@ -161,17 +142,17 @@ def _is_a_force_by_unit(layout: Layout, k: int) -> bool:
     return named and bool(unit) and unit not in ("g", "kg") and is_unit(unit, "friction force")
 
 
-def _forced(layout: Layout, columns: tuple[int, ...], own: int) -> Record:
-    hint = Hint("friction force", f"#{columns.index(own) + 1}", f'"{layout.names[own]}", by its unit')
-    return layout.names[own], columns, (own,), (hint,)
-
-
-def _by_patterns(layout: Layout, given: Given) -> tuple[Record, ...]:
+def _by_patterns(layout: Layout, given: Given) -> list[Record]:
     """One record for each column that the pattern of a name fits; other patterns fit as many, in the same order."""
     fitting = {h: _fitting(h, layout, given) for h in given.hints if h.is_pattern}
-    problems = [_fits_nothing(h, layout) for h, columns in fitting.items() if not columns]
+    listed = ", ".join(name or f"#{k + 1}" for k, name in enumerate(layout.names))
+    problems = [
+        Problem("missing_column", f"no column has a name that fits the pattern for the {h.quantity}", found=h.wanted)
+        for h, columns in fitting.items()
+        if not columns
+    ]
     if problems:
-        raise ReadError(problems)
+        raise ReadError(replace(problem, allowed=listed) for problem in problems)
     sizes = {len(columns) for columns in fitting.values()}
     if len(sizes) > 1:
         found = ", ".join(f"{h.quantity}: {len(columns)}" for h, columns in fitting.items())
@@ -183,59 +164,33 @@ def _by_patterns(layout: Layout, given: Given) -> tuple[Record, ...]:
     for r in range(sizes.pop()):
         own = tuple(columns[r] for columns in fitting.values())
         columns = tuple(sorted((*shared, *own)))
-        hints = tuple(
-            Hint(h.quantity, f"#{columns.index(fitted[r]) + 1}{_unit_of(h)}", f"asked for by {h.wanted}")
-            for h, fitted in fitting.items()
-        )
-        records.append((_label(layout, own), columns, own, hints))
-    return tuple(records)
-
-
-def _unit_of(hint: Hint) -> str:
-    unit = split_unit(hint.wanted)[1]
-    return f" [{unit}]" if unit else ""
+        hints = []
+        for h, fitted in fitting.items():
+            position, unit = f"#{columns.index(fitted[r]) + 1}", split_unit(h.wanted)[1]
+            hints.append(Hint(h.quantity, f"{position} [{unit}]" if unit else position, f"asked for by {h.wanted}"))
+        records.append((_label(layout, own), columns, own, tuple(hints)))
+    return records
 
 
 def _fitting(hint: Hint, layout: Layout, given: Given) -> tuple[int, ...]:
-    """Columns whose name a pattern fits; ``*`` alone leaves out what has another name or is asked for otherwise."""
+    """Columns whose name a pattern fits.
+
+    ``*`` alone leaves out what is known by another name, has a unit of another quantity, or is asked for otherwise.
+    """
     pattern = split_unit(hint.wanted)[0]
-    others = [h for h in given.hints if not h.is_pattern]
+    others = [split_unit(h.wanted)[0] for h in given.hints if not h.is_pattern]
     found = []
     for k, name in enumerate(layout.names):
-        if not (name or layout.filled[k]) or _ignored(layout, given, k):
+        if not (name or layout.filled[k]) or given.ignores(k, name):
             continue
-        bare = split_unit(name)[0]
-        wanted = any(split_unit(h.wanted)[0] in (name, bare, f"#{k + 1}") for h in others)
-        other = pattern == "*" and (_quantity(name) not in ("", hint.quantity) or _has_other_unit(layout, k, hint))
-        if not wanted and not other and (fnmatchcase(bare, pattern) or fnmatchcase(name, pattern)):
+        bare, unit = split_unit(name)
+        unit = bare_unit(layout.units[k]) or unit
+        is_other = _quantity(name) not in ("", hint.quantity) or bool(unit and not is_unit(unit, hint.quantity))
+        asked_for = any(other in (name, bare, f"#{k + 1}") for other in others)
+        fits = fnmatchcase(bare, pattern) or fnmatchcase(name, pattern)
+        if fits and not asked_for and not (pattern == "*" and is_other):
             found.append(k)
     return tuple(found)
-
-
-def _has_other_unit(layout: Layout, k: int, hint: Hint) -> bool:
-    """Whether a column has a unit of its own that is none of the quantity a pattern stands for."""
-    unit = bare_unit(layout.units[k]) or split_unit(layout.names[k])[1]
-    return bool(unit) and not is_unit(unit or "", hint.quantity)
-
-
-def _fits_nothing(hint: Hint, layout: Layout) -> Problem:
-    what = f"no column has a name that fits the pattern for the {hint.quantity}"
-    listed = ", ".join(name or f"#{k + 1}" for k, name in enumerate(layout.names))
-    return Problem("missing_column", what, found=hint.wanted, allowed=listed)
-
-
-def _rows(source: Source, layout: Layout) -> list[list[str]]:
-    text = source.text(bytes(source.data[source.offset(source.start, layout.header_rows) :])).replace("\r\n", "\n")
-    return [cut(line, layout.delimiter) for line in text.split("\n") if line.strip()]
-
-
-def _is_nothing(row: Sequence[str], k: int) -> bool:
-    return k >= len(row) or row[k].lower() in _NOTHING
-
-
-def _label_above(source: Source, layout: Layout, column: int) -> str:
-    above = [cut(line, layout.delimiter) for line in source.head[: (layout.names_row or 1) - 1]]
-    return next((row[column] for row in reversed(above) if column < len(row)), "")
 
 
 def _restated(given: Given, columns: Sequence[int], hints: Sequence[Hint]) -> Given:
