@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 from urllib.parse import quote
@@ -32,28 +32,39 @@ _UM = 1e-6
 _QUOTED_NUMBER = re.compile(r"([-+]?\d+(?:[.,]\d+)?)\s*[^\d]{0,10}")
 
 
-def _on_one_line(text: str) -> str:
-    if any(map(is_control, text)):
-        raise ValueError("must not contain control characters or line breaks")
-    return text
+def _checked(is_allowed: Callable[[Any], bool], otherwise: str) -> AfterValidator:
+    def check(value: Any) -> Any:
+        if not is_allowed(value):
+            raise ValueError(otherwise)
+        return value
+
+    return AfterValidator(check)
 
 
-def _measurable(value: float) -> float:
-    if 0 < value < SMALLEST_NUMBER:
-        raise ValueError(f"must be 0, or {SMALLEST_NUMBER:g} or more")
-    return value
-
-
-def _fit_for_a_file_name(name: str) -> str:
-    if len(quote(name, safe="")) > LONGEST_NAME:
-        raise ValueError(f"must not be longer than {LONGEST_NAME} bytes in the encoding of addresses")
-    return name
-
-
-Positive = Annotated[float, Field(gt=0, le=LARGEST_NUMBER, allow_inf_nan=False), AfterValidator(_measurable)]
-NotNegative = Annotated[float, Field(ge=0, le=LARGEST_NUMBER, allow_inf_nan=False), AfterValidator(_measurable)]
-Line = Annotated[str, AfterValidator(_on_one_line)]
-Name = Annotated[Line, AfterValidator(_fit_for_a_file_name)]
+_MEASURABLE = _checked(lambda value: not 0 < value < SMALLEST_NUMBER, f"must be 0, or {SMALLEST_NUMBER:g} or more")
+Positive = Annotated[float, Field(gt=0, le=LARGEST_NUMBER, allow_inf_nan=False), _MEASURABLE]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST_NUMBER, allow_inf_nan=False), _MEASURABLE]
+Line = Annotated[
+    str,
+    _checked(lambda text: not any(map(is_control, text)), "must not contain control characters or line breaks"),
+]
+Name = Annotated[  # part of the names of files
+    Line,
+    _checked(
+        lambda name: len(quote(name, safe="")) <= LONGEST_NAME,
+        f"must not be longer than {LONGEST_NAME} bytes in the encoding of addresses",
+    ),
+]
+Range = Annotated[
+    list[float], _checked(lambda given: len(given) == 2 and given[0] < given[1], "must be [lowest, highest]")
+]
+Measured = Annotated[
+    list[Annotated[float, Field(allow_inf_nan=False, ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]],
+    _checked(
+        lambda given: len(given) == 2 and given[1] > 0,
+        "must be [value, standard uncertainty], the uncertainty more than 0",
+    ),
+]
 
 
 class _Strict(BaseModel):
@@ -168,15 +179,6 @@ class InstrumentTable(_Strict):
     sampling_rate_Hz: Positive | None = None
 
 
-def _low_and_high(given: list[float]) -> list[float]:
-    if len(given) != 2 or not given[0] < given[1]:
-        raise ValueError("must be [lowest, highest]")
-    return given
-
-
-Range = Annotated[list[float], AfterValidator(_low_and_high)]
-
-
 class PlausibleTable(_Strict):
     """[plausible]: bounds outside which a number is doubtful, in place of those of the material class."""
 
@@ -191,16 +193,6 @@ class PlausibleTable(_Strict):
     humidity_pct: Range | None = None
 
 
-def _value_and_uncertainty(given: list[float]) -> list[float]:
-    if len(given) != 2 or not given[1] > 0:
-        raise ValueError("must be [value, standard uncertainty], the uncertainty more than 0")
-    return given
-
-
-Measured = Annotated[
-    list[Annotated[float, Field(allow_inf_nan=False, ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]],
-    AfterValidator(_value_and_uncertainty),
-]
 Stated = dict[str, str | list[str] | dict[str, str | list[str]]]
 
 

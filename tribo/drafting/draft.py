@@ -307,12 +307,19 @@ def _say_what_is_missing(draft: Draft, used: Mapping[str, Sequence[Trace]], spee
 
 def _signs(draft: Draft, readable: Mapping[str, Sequence[Trace]]) -> None:
     """Note whether the friction force is negative in every record, or takes both signs within one."""
-    records = [record for found in readable.values() for record in found]
-    draft.negative = bool(records) and all(map(_is_negative, records))
+    # lowest and highest force of each record but for a twentieth of the samples at either end, N
+    ranges = {name: [np.percentile(r.force_N, (5, 95)) for r in found] for name, found in readable.items()}
+    every = [between for found in ranges.values() for between in found]
+    draft.negative = bool(every) and all(low < 0 and high < _BOTH_SIGNS * -low for low, high in every)
     if draft.negative:
         draft.found.append("the friction force is negative in every record: sign = -1 was written")
-    mixed = [name for name, found in readable.items() if len(found) == 1 and _takes_both_signs(found[0])]
-    if mixed and all(map(_positive_over_rest, records)):
+    alone = {name: found[0] for name, found in ranges.items() if len(found) == 1}
+    mixed = [
+        name
+        for name, (low, high) in alone.items()
+        if low < 0 < high and min(-low, high) > _BOTH_SIGNS * max(-low, high)
+    ]
+    if mixed and all(_positive_over_rest(record) for found in readable.values() for record in found):
         draft.zero = "at rest"
         draft.found.append(
             f"the force takes both signs within {len(mixed)} records, and is positive against the level at which the "
@@ -323,22 +330,6 @@ def _signs(draft: Draft, readable: Mapping[str, Sequence[Trace]]) -> None:
             f"the force takes both signs within {len(mixed)} records: state its zero in campaign.toml, and "
             f"sign = -1 if friction is negative ({_listed(mixed)})"
         )
-
-
-def _range(record: Trace) -> tuple[float, float]:
-    """Lowest and highest force but for a twentieth of the samples at either end, N."""
-    low, high = np.percentile(record.force_N, (5, 95))
-    return float(low), float(high)
-
-
-def _is_negative(record: Trace) -> bool:
-    low, high = _range(record)
-    return low < 0 and high < _BOTH_SIGNS * -low
-
-
-def _takes_both_signs(record: Trace) -> bool:
-    low, high = _range(record)
-    return low < 0 < high and min(-low, high) > _BOTH_SIGNS * max(-low, high)
 
 
 def _positive_over_rest(record: Trace) -> bool:
