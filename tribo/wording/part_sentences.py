@@ -17,7 +17,7 @@ from tribo.lawsearch.law_file import KnownLaw
 from tribo.lawsearch.model_choice import CauseForms, FoundLaw
 from tribo.mechanisms.record import Mechanism, TraceEvidence
 from tribo.mechanisms.table import MECHANISMS, mechanism
-from tribo.vocabulary import COLUMNS, OBSERVABLES, in_words, label_with_unit
+from tribo.vocabulary import COLUMNS, OBSERVABLES, in_words
 from tribo.wording.law_sentences import law_sentence, law_test, size_sentence, tied_laws
 from tribo.wording.numerals import joined, p_text, sentence_case
 
@@ -276,7 +276,7 @@ def why_not(e: Excluded) -> str:
     if e.why == "vary together":
         one, other, samples = e.shows
         return (
-            f"This design cannot tell the effect of {label_with_unit(one)} from that of {label_with_unit(other)}: they "
+            f"This design cannot tell the effect of {in_words(one)} from that of {in_words(other)}: they "
             f"vary together for {_listed(samples)}."
         )
     if isinstance(e.shows, str):
