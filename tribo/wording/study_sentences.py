@@ -14,7 +14,7 @@ from tribo.comparison.oddness import OddPull
 from tribo.comparison.study_lookup import all_set_aside, shown
 from tribo.records import PA_PER_KPA, REGIMES, ByHand, Campaign, LawFit, Pull, Regime, Study, Test
 from tribo.vocabulary import label_with_unit
-from tribo.wording.numerals import counted, joined, loads_in_words, percent, significant, span, with_uncertainty
+from tribo.wording.numerals import counted, joined, loads_in_words, p_text, percent, significant, span, with_uncertainty
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,19 +62,13 @@ def what_was_measured(study: Study) -> str:
     return (
         f"{counted(len(tests), 'pull')} of {counted(len(specimens), 'specimen')} of "
         f"{counted(len(samples), 'sample')} ({joined(samples)}) at {loads_in_words(levels.tolist())}{pressure}. "
-        f"{_set_aside_clause(aside)}"
+        f"{'No test was' if not aside else counted(aside, 'test') + (' was' if aside == 1 else ' were')} set aside."
     )
 
 
 def specimens_of(campaign: Campaign, tests: Iterable[Test]) -> set[tuple[str, str]]:
     """Pattern and name of every specimen: one that was pulled in two directions counts once."""
     return {(campaign.samples[t.sample].name if t.sample in campaign.samples else t.sample, t.specimen) for t in tests}
-
-
-def _set_aside_clause(aside: int) -> str:
-    if not aside:
-        return "No test was set aside."
-    return f"{counted(aside, 'test')} {'was' if aside == 1 else 'were'} set aside."
 
 
 def flat_law(study: Study) -> list[str]:
@@ -298,10 +292,6 @@ def bent_laws(study: Study) -> Iterator[str]:
         )
 
 
-def _intercept(study: Study) -> str:
-    return "τ₀" if study.ingested.campaign.has_area else "T₀"
-
-
 def friction_sentence(study: Study) -> str:
     """The measured friction, highest and lowest, where it was not compared with a model."""
     if study.comparison is not None:
@@ -406,13 +396,9 @@ def _dependence(study: Study) -> Iterator[str]:
         change = f"{percent(row['change_percent'] / 100)} from {significant(row['low'])} to {significant(row['high'])}"
         yield (
             f"{row['regime'].capitalize()} T/N of {row['sample']} varies with {row['label']}: {change} (rank "
-            f"correlation {row['rank']:.2f}, adjusted p {_adjusted_p(row['p_adjusted'])}, {counted(row['n'], 'test')})."
+            f"correlation {row['rank']:.2f}, adjusted p {p_text(row['p_adjusted'])}, {counted(row['n'], 'test')})."
         )
     yield from _inseparable(table)
-
-
-def _adjusted_p(value: float) -> str:
-    return "below 0.001" if value < 0.001 else f"= {value:.1g}"
 
 
 def _inseparable(table: pd.DataFrame) -> Iterator[str]:

@@ -74,8 +74,7 @@ def worded(v: Verdict) -> Verdict:
         v = replace(v, sentence=published_sentence(v), evidence=published_evidence(v))
         return replace(v, text=f"{v.sentence} {v.evidence}")
     if isinstance(v.shows, ColumnsTested):
-        said = _own_laws(v) + [_names_found(v)] + [c.text for c in v.causes] + _untold(v)
-        return replace(v, sentence=_without_model(v), evidence=" ".join(_untold(v)), text=" ".join(filter(None, said)))
+        return _without_model(v)
     v = replace(v, shows=v.shows or AgainstModel())
     if v.shows.known:
         v = replace(v, model={**v.model, "known_laws": _known_laws(v.shows.known)})
@@ -305,39 +304,33 @@ def _all(names: Sequence[str]) -> str:
 # ------------------------------------------------------------------------------------------ without the model
 
 
-def _without_model(v: Verdict) -> str:
-    """What friction varies with beside the load; without anything, the first law."""
-    laws = [layer.text for layer in of_kind(v, "baseline")]
-    return " ".join([c.text for c in v.causes] or [*laws[:1], "Nothing beyond the law of each sample was found."])
-
-
-def _own_laws(v: Verdict) -> list[str]:
+def _without_model(v: Verdict) -> Verdict:
+    """What friction varies with beside the load; without anything, the first law and that nothing else was seen."""
+    shows: ColumnsTested = v.shows
     laws = [layer.text for layer in of_kind(v, "baseline")]
     more = [f"The laws of {len(laws) - MOST_LAWS} more are listed below."] if len(laws) > MOST_LAWS else []
-    return [*laws[:MOST_LAWS], *more]
-
-
-def _names_found(v: Verdict) -> str:
-    names = list(dict.fromkeys(name_in_words(c.mechanism) for c in v.causes))
-    return f"Found beside the law of each sample: {'; '.join(names)}." if names else ""
-
-
-def _untold(v: Verdict) -> list[str]:
-    """What was tested without effect, what could not be tested, and what cannot be told apart."""
-    shows: ColumnsTested = v.shows
-    said = []
-    if not v.causes and not shows.untested:
-        tested = joined(sorted(map(in_words, shows.columns)))
-        columns = f"Tested: {tested}." if tested else "No further column varies."
-        said.append(f"Beside the law of each sample, nothing exceeds chance. {columns}")
+    evidence = []
     if shows.untested == "no column varies":
-        said.append("No recorded column varies beside the load.")
-    if shows.untested == "too few tests":
-        said.append(
+        evidence = ["No recorded column varies beside the load."]
+    elif shows.untested == "too few tests":
+        evidence = [
             f"Dependence on recorded columns was not tested: there are {shows.n_tests} tests, and at least "
             f"{shows.needed} are needed beside the laws of these samples."
-        )
-    return said + [e.reason for e in v.not_testable if e.why in ("only with the load", "vary together")]
+        ]
+    elif not shows.untested and not v.causes:
+        tested = joined(sorted(map(in_words, shows.columns)))
+        evidence = [f"Tested: {tested}." if tested else "No further column varies."]
+    if v.causes:
+        names = "; ".join(dict.fromkeys(name_in_words(c.mechanism) for c in v.causes))
+        found = [c.text for c in v.causes]
+        sentence, said = found, [f"Found beside the law of each sample: {names}.", *found]
+    else:
+        nothing = "nothing was tested" if shows.untested else "nothing exceeds chance"
+        said = [f"Beside the law of each sample, {nothing}."]
+        sentence = [*laws[:1], *said]
+    evidence += [e.reason for e in v.not_testable if e.why in ("only with the load", "vary together")]
+    text = [*laws[:MOST_LAWS], *more, *said, *evidence]
+    return replace(v, sentence=" ".join(sentence), evidence=" ".join(evidence), text=" ".join(text))
 
 
 # ------------------------------------------------------------------------------------ its parts, for a report
