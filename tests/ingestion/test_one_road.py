@@ -133,6 +133,19 @@ def test_a_zero_at_rest_that_a_record_of_strokes_does_not_have_sets_them_aside(t
         ingested(tmp_path, strokes(), {"T": "#*"}, zero="at rest")
 
 
+def test_a_load_that_the_record_of_a_chosen_pull_contradicts_is_doubted(tmp_path: Path) -> None:
+    for pull in by_choice(tmp_path, one_pull(), normal_load_N=3.0):
+        assert "off_load" in pull.flags
+        assert [p.kind for p in pull.problems] == ["off_load"]
+
+
+def test_a_zero_that_is_known_holds_for_every_stroke_in_the_sign_of_the_record(tmp_path: Path) -> None:
+    ingested(tmp_path, strokes(), {"T": "#*"})
+    forward, backward = (tribo.read_pull(f"{tmp_path}/raw/0.txt#1/{k}", zero=(0.15, 0.01)) for k in (3, 4))
+    assert (forward.zero_N, backward.zero_N) == (0.15, -0.15)
+    assert (forward.sliding_N, backward.sliding_N) == pytest.approx((1.0, 1.0), abs=0.02)
+
+
 @pytest.mark.parametrize(("stiffness", "regime"), [(80.0, "stick-slip"), (400.0, "inertial oscillation")])
 def test_a_stiffness_holds_for_a_pull_that_is_chosen(tmp_path: Path, stiffness: float, regime: str) -> None:
     for pull in by_choice(tmp_path, sawtooth(), **{**SAW, "stiffness_N_per_m": stiffness}):

@@ -187,9 +187,10 @@ def pieces_of(tables: Trace | Sequence[Trace], options: PullOptions = WHOLE) -> 
     test = options.test or Test("", "", "", math.nan, "")
     cut: dict[str, tuple[Trace, bool, Zero | None, Zero | None]] = {}
     for t, table in enumerate(tables, 1):
-        zeros = stated_zeros(table, test.zero, test.load_zero)
+        zero, load_zero = stated_zeros(table, test.zero, test.load_zero)
+        zero, load_zero = options.zero or zero, options.load_zero or load_zero
         pieces = split_pulls(table)
-        cut |= {f"{t}/{k}": (piece, len(pieces) == 1, *zeros) for k, piece in enumerate(pieces, 1)}
+        cut |= {f"{t}/{k}": (piece, len(pieces) == 1, zero, load_zero) for k, piece in enumerate(pieces, 1)}
     if not cut:
         raise TraceError(Problem("no_strokes", "no strokes are given"))
     offsets = [zero.force_N if zero else 0.0 for _, _, zero, _ in cut.values()]
@@ -197,7 +198,7 @@ def pieces_of(tables: Trace | Sequence[Trace], options: PullOptions = WHOLE) -> 
     found = {}
     for sign, (address, (piece, alone, zero, load_zero)) in zip(signs, cut.items(), strict=True):
         whole = alone and shared is None
-        if whole and test.zero.kind != "value":
+        if whole and test.zero.kind != "value" and options.zero is None:
             zero = None  # it is read from the whole record as from any other
         elif zero is None and shared is not None:
             zero = Zero(*shared, "strokes in both directions")
@@ -205,7 +206,7 @@ def pieces_of(tables: Trace | Sequence[Trace], options: PullOptions = WHOLE) -> 
             piece if sign > 0 else replace(piece, force_N=-piece.force_N),
             replace(
                 options, zero=zero and replace(zero, force_N=sign * zero.force_N),
-                load_zero=None if whole else load_zero, turned=sign < 0,
+                load_zero=options.load_zero if whole else load_zero, turned=sign < 0,
                 begins="" if whole else "step" if shared is None else "reversal",
             ),
         )  # fmt: skip
