@@ -118,13 +118,13 @@ class RememberedFigures(Remembered):
         from tribo.report import drawings
 
         super().__init__(file)
-        real = drawings._svg_and_series
+        real = drawings._svg_and_points
 
         def drawn(record: Any, numbers: Any, origin: str) -> Any:
             key = fingerprint((numbers, record.title, origin))
             return self.made(key, lambda: real(record, numbers, origin))
 
-        drawings._svg_and_series = drawn
+        drawings._svg_and_points = drawn
 
 
 OF_STEPS = ("out/current", "out/.tribo", "out/campaign.toml")  # what a step reads and writes of a site

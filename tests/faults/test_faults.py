@@ -67,7 +67,7 @@ def test_report_and_build_withstand_a_fault_at_each_kind_of_file_operation(
     # what the bench replaces in this process is put back afterwards
     monkeypatch.setattr(typst, "Compiler", typst.Compiler)
     monkeypatch.setattr(build, "_snakemake", build._snakemake)
-    monkeypatch.setattr(drawings, "_svg_and_series", drawings._svg_and_series)
+    monkeypatch.setattr(drawings, "_svg_and_points", drawings._svg_and_points)
     monkeypatch.setattr(SimConfig.__init__, "__defaults__", SimConfig.__init__.__defaults__)
     place = write_inputs(tmp_path.resolve() / "watched")
     commands = prepared(place, tmp_path.resolve())

@@ -1,4 +1,7 @@
-"""A figure is drawn once for the same numbers, the same on several processes, and reads on light and on dark."""
+"""A figure is drawn once for the same numbers, the same on several processes, and reads on light and on dark.
+
+A point under the pointer says the numbers that were plotted, from where it stands on the page.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from tribo.records import Study
 from tribo.report import drawings
-from tribo.report.drawings import Drawn, draw_all, inline_svg
+from tribo.report.drawings import MOST_POINTS, Drawn, draw_all, inline_svg, points_of, svg_text
 
 
 @dataclass(frozen=True)
@@ -74,3 +79,33 @@ def test_the_names_inside_a_figure_are_its_own() -> None:
     body = inline_svg('<svg viewBox="0 0 1 1"><defs><path id="m1"/></defs><use href="#m1"/></svg>', "fig6", "label")
     assert 'id="fig6-m1"' in body
     assert 'href="#fig6-m1"' in body
+
+
+@pytest.fixture
+def figure() -> Figure:
+    figure = Figure(figsize=(4, 3))
+    ax = figure.subplots()
+    ax.set_title("A", loc="left")
+    ax.set_xlabel("N (N)")
+    ax.set_ylabel("T (N)")
+    ax.errorbar([1, 2], [3, np.nan], [0.1, 0.1], fmt="o", label="measured")
+    ax.plot(np.linspace(0, 1, 1000), np.zeros(1000), label="model")
+    ax.set_xlim(0, 4)
+    ax.set_ylim(0, 6)
+    svg_text(figure)
+    return figure
+
+
+def test_every_mark_is_found_and_the_caps_of_its_bar_are_not(figure: Figure) -> None:
+    marks, line = points_of(figure)
+    assert marks["value"] == [1.0, 3.0]
+    assert (marks["name"], marks["x"], marks["y"]) == ("A", "N (N)", "T (N)")
+    assert len(line["value"]) <= 4 * MOST_POINTS
+    assert line["name"] == "A, model"
+
+
+def test_the_place_is_that_on_the_page_from_the_top_left(figure: Figure) -> None:
+    box = figure.axes[0].get_position()
+    x, y = points_of(figure)[0]["place"]
+    assert x == pytest.approx((box.x0 + box.width / 4) * 4 * 72, abs=0.05)
+    assert y == pytest.approx((1 - box.y0 - box.height / 2) * 3 * 72, abs=0.05)

@@ -215,11 +215,11 @@ def place_problems(target: Path, inputs: Sequence[Path] = ()) -> list[Problem]:
     """Why nothing may be written at ``target``, links resolved: it is, holds or lies in something that is read."""
     allowed = "a folder outside of every campaign"
     for given in inputs:
-        how = _relation(target.resolve(), given.resolve())
-        if how:
+        if how := _relation(target.resolve(), given.resolve()):
             what = f"results must not be written here: it {how} {given}"
             return [Problem("out_in_input", what, file=str(target), allowed=allowed)]
-    around = [folder for folder in _upwards(target.resolve()) if (folder / CAMPAIGN_FILE).is_file()]
+    place = target.resolve()
+    around = [folder for folder in (place, *place.parents) if (folder / CAMPAIGN_FILE).is_file()]
     if around:
         what = f"results must not be written here: it is or lies in the campaign {around[0]}"
         return [Problem("out_in_campaign", what, file=str(target), allowed=allowed)]
@@ -240,10 +240,6 @@ def _same(one: Path, other: Path) -> bool:
         return one == other or os.path.samefile(one, other)
     except OSError:
         return False
-
-
-def _upwards(target: Path) -> tuple[Path, ...]:
-    return (target, *target.parents)
 
 
 def foreign_files(out: Path) -> list[str]:
