@@ -50,7 +50,6 @@ def test_forces_are_logarithms_and_their_uncertainties_relative() -> None:
     assert o.log_force == pytest.approx(np.log([[2.0, 1.0], [3.0, 2.0], [4.0, 3.0], [5.0, 4.0]]))
     assert o.reading == pytest.approx(np.array([[0.02 / s, 0.01 / (s - 1)] for s in (2.0, 3.0, 4.0, 5.0)]))
     assert o.zero_N == pytest.approx([0.0, 0.1, 0.2, 0.3])
-    assert list(o.zero_u_N) == [0.003] * 4
     assert list(o.rise_N_per_m) == [5e3] * 4
     assert list(o.stick_slip_N) == [0.2] * 4
     assert list(o.noise_N) == [0.01] * 4
@@ -98,10 +97,9 @@ def test_a_test_without_a_speed_has_that_of_the_campaign() -> None:
     assert seen([row(0, speed_m_s=None), row(1)]).conditions.speed_m_s == pytest.approx([1e-3, 2e-4])
 
 
-def test_the_clock_is_in_hours_of_the_day_and_the_day_is_its_date() -> None:
+def test_the_clock_is_in_hours_of_the_day() -> None:
     o = seen()
     assert o.clock_h == pytest.approx([8.5, 9.0 + 15 / 60 + 30 / 3600, 16.0, 17.75])
-    assert o.day.tolist() == ["2026-03-02", "2026-03-02", "2026-03-03", "2026-03-03"]
     assert np.isnan(seen([row(0, started_at="")]).clock_h).all()
 
 

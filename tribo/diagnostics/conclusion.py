@@ -92,12 +92,12 @@ def each_once(misfits: Sequence[Misfit]) -> tuple[Misfit, ...]:
 
 def misfits_of_patterns(corrections: Sequence[Layer], level: float) -> list[Misfit]:
     """Each patterned sample whose mean friction differs from the model beyond chance, the largest first."""
-    found = [
+    misfits = [
         Misfit(c.regimes[0], c.name, "sample", c.effect_percent, c.p_adjusted, low=c.low, high=c.high, shows=c)
         for c in corrections
         if c.p_adjusted < level
     ]
-    return sorted(found, key=lambda m: -abs(m.effect_percent))
+    return sorted(misfits, key=lambda m: -abs(m.effect_percent))
 
 
 def patterns_apart(misfits: Sequence[Misfit]) -> tuple[str, ...]:
@@ -109,26 +109,26 @@ def patterns_apart(misfits: Sequence[Misfit]) -> tuple[str, ...]:
 
 def causes_weighed(shown: Sequence[Weighed], baseline: ModelFit) -> list[Cause]:
     """Weighed mechanisms with their parameters, the effect of each beyond what ``baseline`` fits."""
-    found = []
+    causes = []
     for candidate, weight, parameters in shown:
         moved = candidate.fit.predicted - baseline.predicted
         low, high = percent(np.array([moved.min(), moved.max()]))
         changes = float(low), float(high)
-        found.append(Cause(candidate.name, weight, parameters, choice=candidate.acting.choice, changes=changes))
-    return found
+        causes.append(Cause(candidate.name, weight, parameters, choice=candidate.acting.choice, changes=changes))
+    return causes
 
 
 def causes_from_evidence(certain: Mapping[str, tuple[Evidence, float]]) -> list[tuple[Cause, Misfit]]:
     """Mechanisms that direct evidence shows with certainty, each as a cause and as the misfit that it is."""
-    found = []
+    each = []
     for name, stated in stated_evidence().items():
         if name in certain:
             e, p = certain[name]
             parameters = {MECHANISMS[name].amplitude.name: Estimate(e.value, *e.interval, e.unit)}
             cause = Cause(name, 1.0, parameters, shows=stated)
             observable, size = ("rise", 100.0 * e.change) if stated.quantity == "rise" else ("zero", float("nan"))
-            found.append((cause, Misfit(observable, "", stated.covariate, size, p, shows=cause)))
-    return found
+            each.append((cause, Misfit(observable, "", stated.covariate, size, p, shows=cause)))
+    return each
 
 
 def exclusions(

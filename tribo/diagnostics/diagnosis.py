@@ -166,7 +166,7 @@ def misfit_map(d: Diagnosis) -> pd.DataFrame:
     rows = residual_table(d)
     rows["load"] = rows["normal_load_N"].round(5)
     groups = rows.groupby(["regime", "sample", "load"])
-    found = [
+    cells = [
         {
             "regime": regime, "sample": sample, "normal_load_N": load, "n_tests": len(cell),
             "residual_percent": cell["residual_percent"].mean(),
@@ -175,7 +175,7 @@ def misfit_map(d: Diagnosis) -> pd.DataFrame:
         }
         for (regime, sample, load), cell in groups
     ]  # fmt: skip
-    return pd.DataFrame(found)
+    return pd.DataFrame(cells)
 
 
 def contrast_table(d: Diagnosis) -> pd.DataFrame:

@@ -48,8 +48,8 @@ class Evidence:
 
 def direct_evidence(o: Observations) -> dict[str, Evidence]:
     """What the traces show of every mechanism that states an evidence in them, by name."""
-    found = {name: ESTIMATES[stated.quantity](o) for name, stated in stated_evidence().items()}
-    return {name: e for name, e in found.items() if e is not None}
+    each = {name: ESTIMATES[stated.quantity](o) for name, stated in stated_evidence().items()}
+    return {name: e for name, e in each.items() if e is not None}
 
 
 def stated_evidence() -> dict[str, TraceEvidence]:
@@ -77,48 +77,35 @@ def zero_offset(o: Observations) -> Evidence | None:
 
 def zero_drift(o: Observations) -> Evidence | None:
     """Slope of the force before contact over the series, N/h; within the traces where the series has no clock."""
-    across, within = _drifts_across(o), _drift_within(o)
+    elapsed_s = o.conditions.elapsed_s
+    order = np.argsort(elapsed_s)
+    gaps = np.diff(elapsed_s[order], prepend=elapsed_s[order[0]])
+    at_bench = np.empty_like(elapsed_s)  # hours with no pause counted for more than five times the usual one
+    at_bench[order] = np.cumsum(np.minimum(gaps, 5.0 * np.median(gaps))) / 3600.0
+    across = [e for e in (_drift_along(o, hours) for hours in (elapsed_s / 3600.0, at_bench)) if e is not None]
+    within = _drift_within(o)
     best = max(across, key=lambda e: abs(e.value) / e.standard_error, default=None)
-    found = [e for e in (best, within) if e is not None]
-    chosen = next((e for e in found if e.certain), found[0] if found else None)
+    both = [e for e in (best, within) if e is not None]
+    chosen = next((e for e in both if e.certain), both[0] if both else None)
     return chosen and replace(chosen, estimates=len(across) + (within is not None))
 
 
-def _drifts_across(o: Observations) -> list[Evidence]:
-    """Over the hours of the clock, and over those at the bench (nights left out)."""
-    clocks = (o.conditions.elapsed_s / 3600.0, _bench_hours(o.conditions.elapsed_s))
-    return [e for e in (_drift_along(o, hours) for hours in clocks) if e is not None]
-
-
-def _bench_hours(elapsed_s: FloatArray) -> FloatArray:
-    """Hours since the first pull, no pause counted for more than five times the usual one."""
-    order = np.argsort(elapsed_s)
-    gaps = np.diff(elapsed_s[order], prepend=elapsed_s[order[0]])
-    hours = np.empty_like(elapsed_s)
-    hours[order] = np.cumsum(np.minimum(gaps, 5.0 * np.median(gaps))) / 3600.0
-    return hours
-
-
 def _drift_along(o: Observations, hours: FloatArray) -> Evidence | None:
+    """By the median slope of all pairs; of many tests, of the medians of MOST_IN_PAIRS stretches of the series."""
     from scipy.stats import theilslopes
 
     good = np.isfinite(o.zero_N) & np.isfinite(hours)
     if good.sum() < 10 or np.ptp(hours[good]) <= 0:
         return None
-    slope, _, low, high = theilslopes(*_in_stretches(o.zero_N[good], hours[good]), 0.90)
+    values, at = o.zero_N[good], hours[good]
+    if len(values) > MOST_IN_PAIRS:
+        stretches = np.array_split(np.argsort(at, kind="stable"), MOST_IN_PAIRS)
+        values, at = (np.array([np.median(x[s]) for s in stretches]) for x in (values, at))
+    slope, _, low, high = theilslopes(values, at, 0.90)
     error = max((high - low) / 3.29, 1e-15)
     change = float(slope * np.ptp(hours[good]))
     certain = abs(slope) > CERTAIN * error and abs(change) > _matters_N(o)
     return Evidence(float(slope), float(error), bool(certain), "N/h", change)
-
-
-def _in_stretches(values: FloatArray, hours: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Values and hours; of many tests the medians of MOST_IN_PAIRS stretches of the series, as every pair is taken."""
-    if len(values) <= MOST_IN_PAIRS:
-        return values, hours
-    stretches = np.array_split(np.argsort(hours, kind="stable"), MOST_IN_PAIRS)
-    found = np.array([(np.median(values[s]), np.median(hours[s])) for s in stretches])
-    return found[:, 0], found[:, 1]
 
 
 def _drift_within(o: Observations) -> Evidence | None:

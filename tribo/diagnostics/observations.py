@@ -37,13 +37,11 @@ class Observations:
     log_force: FloatArray
     reading: FloatArray
     zero_N: FloatArray
-    zero_u_N: FloatArray
     zero_slope_N_per_s: FloatArray
     rise_N_per_m: FloatArray
     stick_slip_N: FloatArray
     noise_N: FloatArray
     clock_h: FloatArray
-    day: StringArray
     flat: str
     set_aside: tuple[SetAside, ...] = ()
     measured: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -51,10 +49,6 @@ class Observations:
     @property
     def n(self) -> int:
         return len(self.test_ids)
-
-    @property
-    def samples(self) -> tuple[str, ...]:
-        return tuple(self.patterns)
 
     def take(self, keep: np.ndarray) -> Observations:
         """The tests picked by a mask or by indices, in that order."""
@@ -92,13 +86,11 @@ def observe(ingested: Ingested) -> Observations:
         log_force=np.log(force),
         reading=np.nan_to_num(error / force, nan=0.0, posinf=0.0),
         zero_N=np.array([p.zero_N for p in pulls]),
-        zero_u_N=np.array([p.zero_u_N for p in pulls]),
         zero_slope_N_per_s=np.array([_slope_before(t, p) for t, p in zip(traces, pulls, strict=True)]),
         rise_N_per_m=np.array([p.rise_stiffness_N_per_m for p in pulls]),
         stick_slip_N=np.array([p.stick_slip_amplitude_N for p in pulls]),
         noise_N=np.array([p.noise_N for p in pulls]),
         clock_h=np.array([_clock_h(t.started_at) for t in tests]),
-        day=np.array([t.started_at[:10] for t in tests], str),
         flat=campaign.flat_sample or NO_FLAT,
         set_aside=(*ingested.set_aside, *left_out),
         measured=dict(campaign.measured),

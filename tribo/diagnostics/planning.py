@@ -148,8 +148,7 @@ def expected_fit(campaign: Campaign, noise: Noise, law: FloatArray, predictor: P
     o = Observations(
         test_ids=np.array([t.test_id for t in tests], str), conditions=conditions_of(campaign, tests),
         patterns=patterns, log_force=np.zeros((n, 2)), reading=np.full((n, 2), 0.005), zero_N=nothing,
-        zero_u_N=nothing, zero_slope_N_per_s=nothing, rise_N_per_m=nothing, stick_slip_N=nothing,
-        noise_N=nothing, clock_h=hours, day=np.array([t.started_at[:10] for t in tests], str),
+        zero_slope_N_per_s=nothing, rise_N_per_m=nothing, stick_slip_N=nothing, noise_N=nothing, clock_h=hours,
         flat=campaign.flat_sample or NO_FLAT,
     )  # fmt: skip
     s = setup(o, predictor or tabled_predictor(patterns))

@@ -192,12 +192,12 @@ def simulated_predictor(
 def _law_of_runs(rows: pd.DataFrame, area_m2: float) -> FloatArray:
     """mu and tau0 in Pa of both regimes, relative errors weighted alike."""
     load = rows["normal_load_N"].to_numpy(float)
-    found = []
+    law: list[float] = []
     for column in ("static_N", "sliding_N"):
         force = rows[column].to_numpy(float)
         design = np.column_stack([load, np.full_like(load, area_m2)]) / force[:, None]
-        found += list(np.linalg.lstsq(design, np.ones_like(load), rcond=None)[0])
-    return np.array(found)
+        law += list(np.linalg.lstsq(design, np.ones_like(load), rcond=None)[0])
+    return np.array(law)
 
 
 def _with_error(

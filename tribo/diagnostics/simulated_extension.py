@@ -236,23 +236,23 @@ def with_simulation(
     model: dict[str, object] = {**d.verdict.model, "shares_from": d.baseline.setup.predictor.source}
     if d.named is None or not d.named.causes or d.verdict.verdict not in CERTAIN_CAUSES:
         return replace(d, verdict=replace(d.verdict, model=model))
-    found = simulate_extension(d.named.model, seed=seed, jobs=jobs, progress=progress)
-    if isinstance(found, NotSimulated):
-        model["not_simulated"] = {"mechanisms": list(found.mechanisms), "reason": found.reason}
+    extension = simulate_extension(d.named.model, seed=seed, jobs=jobs, progress=progress)
+    if isinstance(extension, NotSimulated):
+        model["not_simulated"] = {"mechanisms": list(extension.mechanisms), "reason": extension.reason}
         return replace(d, verdict=replace(d.verdict, model=model))
-    before, quick, after = residual_percent(d, found)
+    before, quick, after = residual_percent(d, extension)
     model["simulated"] = {
-        "mechanisms": list(found.mechanisms), "pairs_of_runs": len(found.table), "effect_over_law": found.ratio,
-        "effect_over_law_u": found.ratio_u, "rms_percent_before": before, "rms_percent_law": quick,
-        "rms_percent_simulated": after,
+        "mechanisms": list(extension.mechanisms), "pairs_of_runs": len(extension.table),
+        "effect_over_law": extension.ratio, "effect_over_law_u": extension.ratio_u, "rms_percent_before": before,
+        "rms_percent_law": quick, "rms_percent_simulated": after,
     }  # fmt: skip
-    return replace(d, simulated=found, verdict=replace(d.verdict, model=model))
+    return replace(d, simulated=extension, verdict=replace(d.verdict, model=model))
 
 
-def residual_percent(d: Diagnosis, found: SimulatedExtension) -> tuple[float, float, float]:
+def residual_percent(d: Diagnosis, extension: SimulatedExtension) -> tuple[float, float, float]:
     """Root mean square of 100 (measured / modelled T - 1): calibrated, extended by law, and by the simulator."""
     assert d.named is not None
     measured = d.baseline.setup.observations.log_force
-    left = (d.baseline.residual, d.named.model.residual, measured - found.log_force)
+    left = (d.baseline.residual, d.named.model.residual, measured - extension.log_force)
     before, quick, after = (rms_percent(part) for part in left)
     return before, quick, after

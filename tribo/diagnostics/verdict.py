@@ -200,7 +200,7 @@ class Verdict:
 
     def as_dict(self) -> dict[str, Any]:
         """The verdict as plain types, in the order of the schema; numbers that do not exist are null."""
-        found = {
+        fields_of_schema = {
             "schema": SCHEMA,
             "verdict": self.verdict,
             "text": self.text,
@@ -216,7 +216,7 @@ class Verdict:
             "smallest_effects_percent": dict(self.smallest_effects),
             "model": dict(self.model),
         }
-        clean: dict[str, Any] = _finite(found)
+        clean: dict[str, Any] = _finite(fields_of_schema)
         return clean
 
     def to_json(self) -> str:
