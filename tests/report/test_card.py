@@ -18,7 +18,7 @@ from tribo.errors import Problem
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import LawFit, SetAside, Study
 from tribo.wording.card import Card, card_law, card_of
-from tribo.wording.terminal import card_text
+from tribo.wording.terminal import card_text, verdict_text
 from tribo.wording.verdict_sentences import why_next, worded
 
 LAYER: dict[str, Any] = {
@@ -99,6 +99,16 @@ def test_a_cause_that_the_traces_show_stands_in_the_finding_beside_those_of_the_
     both = worded(replace(found, causes=(offset, *found.causes), next_test=None))
     said = "; in addition, an offset of the load cell (F 0 = 0.00600 N (90 % interval 0.00500 to 0.00700))"
     assert said in both.sentence
+
+
+def test_one_sentence_states_the_finding_wherever_it_is_said(study: Study) -> None:
+    """Card, verdict.json and terminal had a sentence each; what stands beside the card says only what it rests on."""
+    for plain in (FOUND, FOUND | {"verdict": "unknown", "misfits": [misfit()], "causes": [], "layers": []}):
+        verdict = verdict_of(plain)
+        card = card_of(study, verdict)
+        assert card.sentence == verdict.sentence
+        assert verdict.as_dict()["text"] == f"{verdict.sentence} {verdict.evidence}"
+        assert f"{card_text(card)}\n\n{verdict_text(verdict)}".count(verdict.sentence) == 1
 
 
 def test_laws_that_a_test_would_part_are_called_by_their_column() -> None:
