@@ -134,7 +134,7 @@ def fit(ingested: Ingested, *, weights: Weights = "relative") -> Fits:
     >>> ingested = tribo.ingest(tribo.load_campaign(tribo.data_dir() / "example"))
     >>> fits = tribo.fit(ingested)
     >>> print(f"{fits['F', 'static'].mu:.1f}")
-    4.9
+    4.7
     """
     from tribo.fitting.budget import combined_fits
     from tribo.fitting.samples import fit_regimes
