@@ -1,7 +1,4 @@
-"""Text of users, escaped for the place it goes to: a terminal, a cell of a spreadsheet, a file name.
-
-What a user may have meant: the nearest of the names that are allowed, capitals, blanks and brackets left aside.
-"""
+"""Text of users: escaped for a terminal, a cell of a spreadsheet or a file name; and the name they may have meant."""
 
 from __future__ import annotations
 
@@ -13,6 +10,7 @@ from collections.abc import Iterable
 _DIRECTION_MARKS = "\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069\ufeff"
 _NOT_PRINTED = ("Cc", "Cs", "Zl", "Zp")
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # OWASP, CSV injection: beginnings that spreadsheets take for a formula
+_FEWEST_INSIDE = 4  # letters of a name that may stand for a longer one: "load" for "normal_load_N"
 _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 
 
@@ -59,9 +57,6 @@ def _would_be_formula(cell: str) -> bool:
     """Whether a cell begins like a formula, apostrophes before it not counted."""
     begins = cell.lstrip("'")
     return begins.startswith(_FORMULA) and not _NUMBER.fullmatch(begins)
-
-
-_FEWEST_INSIDE = 4  # letters of a name that may stand for a longer one: "load" for "normal_load_N"
 
 
 def nearest(given: str, allowed: Iterable[str], cutoff: float = 0.6) -> str:
