@@ -169,7 +169,7 @@ def pieces_of(tables: Trace | Sequence[Trace], options: PullOptions = WHOLE) -> 
 
     Each is turned so that friction is positive, and comes with the options for :func:`evaluate`. Strokes in both
     directions share a zero, determined from their asymmetry where ``options.test`` states none. A zero that is stated
-    is read on the clock of the table. A table of one pull is read as a whole record.
+    is read on the clock of the table. A record of one pull is read as a whole.
 
     Parameters
     ----------
@@ -185,19 +185,18 @@ def pieces_of(tables: Trace | Sequence[Trace], options: PullOptions = WHOLE) -> 
     """
     tables = [tables] if isinstance(tables, Trace) else list(tables)
     test = options.test or Test("", "", "", math.nan, "")
-    cut: dict[str, tuple[Trace, bool, Zero | None, Zero | None]] = {}
+    cut: dict[str, tuple[Trace, Zero | None, Zero | None]] = {}
     for t, table in enumerate(tables, 1):
         zero, load_zero = stated_zeros(table, test.zero, test.load_zero)
         zero, load_zero = options.zero or zero, options.load_zero or load_zero
-        pieces = split_pulls(table)
-        cut |= {f"{t}/{k}": (piece, len(pieces) == 1, zero, load_zero) for k, piece in enumerate(pieces, 1)}
+        cut |= {f"{t}/{k}": (piece, zero, load_zero) for k, piece in enumerate(split_pulls(table), 1)}
     if not cut:
         raise TraceError(Problem("no_strokes", "no strokes are given"))
-    offsets = [zero.force_N if zero else 0.0 for _, _, zero, _ in cut.values()]
-    signs, shared = directions_of([piece for piece, _, _, _ in cut.values()], offsets)
+    offsets = [zero.force_N if zero else 0.0 for _, zero, _ in cut.values()]
+    signs, shared = directions_of([piece for piece, _, _ in cut.values()], offsets)
+    whole = len(cut) == 1 and next(iter(cut.values()))[0] is tables[0]  # nothing was cut off
     found = {}
-    for sign, (address, (piece, alone, zero, load_zero)) in zip(signs, cut.items(), strict=True):
-        whole = alone and shared is None
+    for sign, (address, (piece, zero, load_zero)) in zip(signs, cut.items(), strict=True):
         if whole and test.zero.kind != "value" and options.zero is None:
             zero = None  # it is read from the whole record as from any other
         elif zero is None and shared is not None:
