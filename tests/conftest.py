@@ -100,7 +100,7 @@ def small_report(small_campaign: Path, once: Once) -> Path:
     return once("small_report", report) / "out"
 
 
-LONG_FILES = ("pipeline", "test_spoiled_campaigns", "faults", "blind", "cli", "simulate", "diagnose")
+LONG_FILES = ("pipeline", "test_spoiled_campaigns", "faults", "blind", "cli", "springblock", "diagnose")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

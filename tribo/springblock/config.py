@@ -302,12 +302,14 @@ def _unknown_sample(sample: str) -> Problem:
     )  # fmt: skip
 
 
-_POSITIVE = (
-    "stick_speed_m_s", "stick_interval_s",
-    "pressure_Pa", "spacing_m", "thickness_m", "modulus_Pa", "density_kg_m3", "speed_m_s", "shear_factor", "dt_s",
-    "duration_s", "sample_interval_s", "rest_tolerance",
-)  # fmt: skip
-_NOT_NEGATIVE = ("damping_per_s",)
+# numbers of a configuration, its friction and its terms, and the bound that each lies above
+_POSITIVE = {
+    "stick_speed_m_s", "stick_interval_s", "pressure_Pa", "spacing_m", "thickness_m", "modulus_Pa", "density_kg_m3",
+    "speed_m_s", "shear_factor", "dt_s", "duration_s", "sample_interval_s", "rest_tolerance", "ageing_t0_s",
+    "speed_v0_m_s",
+}  # fmt: skip
+_NOT_NEGATIVE = {"damping_per_s", "mu_s", "mu_s_sd", "mu_d", "mu_d_sd", "ageing_b", "hold_s"}
+_BEYOND_THE_PEAK = {"duration_peaks", "window_start_peaks", "window_end_peaks"}
 _CHOICES: dict[str, tuple[str, ...]] = {
     "normal_force": ("redistributed", "uniform"),
     "edges": ("free", "periodic"),
@@ -317,9 +319,6 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "block_mass": ("layer", "cube"),
     "sticking": ("turned", "slow", "never"),
 }
-_ABOVE = {"duration_peaks": 1.0, "window_start_peaks": 1.0, "window_end_peaks": 1.0}
-
-
 _OF_THE_STEP = {"dt_s", "spacing_m", "thickness_m", "modulus_Pa", "density_kg_m3", "damping_per_s", "shear_factor"}
 _OF_THE_GEOMETRY = {"spacing_m", "edges", "cavity_shape"}
 _OF_THE_WINDOW = {"window_start_peaks", "window_end_peaks"}
@@ -329,9 +328,9 @@ def _problems(config: SimConfig) -> Iterator[Problem]:
     """Every fault of a configuration; what follows from several numbers is checked where each of them is possible."""
     faults = [
         *_number_problems(config),
+        *_number_problems(config.friction),
+        *_number_problems(config.terms),
         *_choice_problems(config),
-        *_friction_problems(config.friction),
-        *_term_problems(config.terms),
     ]
     yield from faults
     faulty = {problem.column for problem in faults}
@@ -378,70 +377,42 @@ def _unsupported(config: SimConfig) -> Iterator[Problem]:
         )  # fmt: skip
 
 
-def _term_problems(terms: FrictionTerms) -> Iterator[Problem]:
-    for field in fields(terms):
-        value = getattr(terms, field.name)
-        if not math.isfinite(value):
-            yield Problem("not_finite", "not a finite number", column=field.name, found=str(value), allowed="a number")
-        elif field.name in ("ageing_b", "hold_s") and value < 0:
-            yield Problem("negative", "must not be negative", column=field.name, found=f"{value:g}", allowed=">= 0")
-        elif field.name in ("ageing_t0_s", "speed_v0_m_s") and value <= 0:
-            yield Problem("not_positive", "must be positive", column=field.name, found=f"{value:g}", allowed="> 0")
-
-
-def _beyond_measure(name: str, value: float) -> bool:
-    """Whether a number is so large or small that products of it leave double precision."""
-    return abs(value) > LARGEST_NUMBER or (name in _POSITIVE and 0 < value < SMALLEST_NUMBER)
-
-
-def _number_problems(config: SimConfig) -> Iterator[Problem]:
-    for field in fields(config):
-        value = getattr(config, field.name)
+def _number_problems(part: SimConfig | LocalFriction | FrictionTerms) -> Iterator[Problem]:
+    """Numbers that are not finite, out of their bounds, or so large or small that products leave double precision."""
+    for field in fields(part):
+        name, value = field.name, getattr(part, field.name)
+        if isinstance(value, bool) or not isinstance(value, float | int) or name == "seed":
+            continue
         if isinstance(value, float) and not math.isfinite(value):
-            yield Problem("not_finite", "not a finite number", column=field.name, found=str(value), allowed="a number")
-            continue
-        if value is None:
-            continue
-        if field.name != "seed" and isinstance(value, float | int) and _beyond_measure(field.name, value):
-            allowed = f"{SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}"
+            yield Problem("not_finite", "not a finite number", column=name, found=str(value), allowed="a number")
+        elif abs(value) > LARGEST_NUMBER or (name in _POSITIVE and 0 < value < SMALLEST_NUMBER):
             found = f"{value:g}" if abs(value) < 1e300 else "more than 1e300"
-            yield Problem("impossible_number", "not a possible value", column=field.name, found=found, allowed=allowed)
-            continue
-        if field.name in _POSITIVE and not value > 0:
-            yield Problem("not_positive", "must be positive", column=field.name, found=f"{value:g}", allowed="> 0")
-        if field.name in _NOT_NEGATIVE and value < 0:
-            yield Problem("negative", "must not be negative", column=field.name, found=f"{value:g}", allowed=">= 0")
-        if field.name in _ABOVE and not value > _ABOVE[field.name]:
-            yield Problem(
-                "too_short", "must extend beyond the peak", column=field.name, found=f"{value:g}",
-                allowed=f"> {_ABOVE[field.name]:g}",
-            )  # fmt: skip
-    if not (isinstance(config.seed, int) and config.seed >= 0):
-        yield Problem("seed", "not a seed", column="seed", found=str(config.seed), allowed="a whole number >= 0")
-    if not 0 <= config.restrengthening <= 1:
-        yield Problem(
-            "share", "not a fraction", column="restrengthening", found=f"{config.restrengthening:g}", allowed="0 to 1"
-        )
-    if not 0 < config.peak_drop < 1:
-        yield Problem("share", "not a fraction", column="peak_drop", found=f"{config.peak_drop:g}", allowed="0 to 1")
+            allowed = f"{SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}"
+            yield Problem("impossible_number", "not a possible value", column=name, found=found, allowed=allowed)
+        elif name in _POSITIVE and value <= 0:
+            yield Problem("not_positive", "must be positive", column=name, found=f"{value:g}", allowed="> 0")
+        elif name in _NOT_NEGATIVE and value < 0:
+            yield Problem("negative", "must not be negative", column=name, found=f"{value:g}", allowed=">= 0")
+        elif name in _BEYOND_THE_PEAK and value <= 1.0:
+            yield Problem("too_short", "must extend beyond the peak", column=name, found=f"{value:g}", allowed="> 1")
 
 
 def _choice_problems(config: SimConfig) -> Iterator[Problem]:
+    """Names that are none of those allowed, a seed that is none, and shares that are not between 0 and 1."""
     for name, allowed in {**_CHOICES, "engine": tuple(ENGINES)}.items():
         value = getattr(config, name)
         if value not in allowed:
             yield Problem(
                 "unknown_choice", f"unknown {name}", column=name, found=str(value), allowed=" or ".join(allowed)
             )
-
-
-def _friction_problems(friction: LocalFriction) -> Iterator[Problem]:
-    for field in fields(friction):
-        value = getattr(friction, field.name)
-        if not math.isfinite(value):
-            yield Problem("not_finite", "not a finite number", column=field.name, found=str(value), allowed="a number")
-        elif field.name.startswith("mu") and value < 0:
-            yield Problem("negative", "must not be negative", column=field.name, found=f"{value:g}", allowed=">= 0")
+    if not (isinstance(config.seed, int) and config.seed >= 0):
+        yield Problem("seed", "not a seed", column="seed", found=str(config.seed), allowed="a whole number >= 0")
+    for name, possible in (
+        ("restrengthening", 0 <= config.restrengthening <= 1), ("peak_drop", 0 < config.peak_drop < 1)
+    ):  # fmt: skip
+        if not possible:
+            found = f"{getattr(config, name):g}"
+            yield Problem("share", "not a fraction", column=name, found=found, allowed="0 to 1")
 
 
 def _geometry_problems(config: SimConfig) -> Iterator[Problem]:
