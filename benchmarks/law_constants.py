@@ -4,7 +4,7 @@
     python benchmarks/law_constants.py table out/law-constants.jsonl     the table of docs/results/blind-laws.md
 
 The campaigns come from the generator of tests/blind with a seed of their own (SEED), which no reported figure uses.
-Each is diagnosed once; then the causes are contested and the best form is decided anew with every variant.
+Each is diagnosed once; then causes and laws are weighed and the best form is chosen anew with every variant.
 """
 
 from __future__ import annotations

@@ -35,8 +35,8 @@ ROOT = Path(__file__).parents[1]
 ROOMS = {
     "traces": "tribo/traces",
     "fitting": "tribo/fitting",
-    "diagnose: statistics": "tribo/diagnose/statistics",
-    "diagnose: search": "tribo/diagnose/search",
+    "diagnostics": "tribo/diagnostics",
+    "law search": "tribo/lawsearch",
     "mechanisms": "tribo/mechanisms",
     "readers: reading": "tribo/readers/reading.py",
     "readers: wide tables": "tribo/readers/wide_tables.py",

@@ -1,8 +1,1 @@
-"""The missing law: a complete search of a small grammar where a misfit follows a column and no mechanism."""
-
-from __future__ import annotations
-
-
-
-
-
+"""Laws of recorded columns: a complete search of a small grammar for what no mechanism explains."""
