@@ -17,9 +17,9 @@ import numpy as np
 from tribo.diagnostics.candidates import PER_PARAMETER, refitted
 from tribo.diagnostics.contrasts import FORM
 from tribo.diagnostics.effect_sizes import NORMAL_90
-from tribo.diagnostics.fit import Linear, ModelFit, fit
+from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.inference import estimates, gain, informed_share
-from tribo.diagnostics.model import Acting, Setup, effect_of
+from tribo.diagnostics.model import Acting, effect_of
 from tribo.diagnostics.verdict import Estimate, Gain
 from tribo.lawsearch.grammar import (
     LOAD_TERM,
@@ -80,21 +80,34 @@ class FoundLaw:
     band: FloatArray
 
 
-@dataclass(frozen=True)
 class Background:
-    """A campaign at the noise that a ``law`` leaves, ready to score other laws in its place; ``linear`` is the model
-    without it, ``residual`` (n, 2) what that leaves."""
+    """A campaign at the noise that a law leaves, ready to score other laws in its place.
 
-    law: WrittenLaw
-    setup: Setup
-    terms: dict[str, FloatArray]
-    linear: Linear
-    residual: FloatArray
-    informed: float
+    Parameters
+    ----------
+    model : ModelFit
+        The campaign without the law.
+    law : WrittenLaw
+        Fitted beside the causes and laws of the model; ``after`` is that fit. ``linear`` is the model without it,
+        ``residual`` (n, 2) what that leaves.
+    """
+
+    def __init__(self, model: ModelFit, law: WrittenLaw) -> None:
+        acting = Acting(law.mechanism())
+        after = fit(model.setup, (*model.acting, acting), start=model)
+        self.law, self.after, self.setup, self.terms = law, after, after.setup, terms_of(after)
+        self.linear = replace(after.linear, jacobian=after.linear.jacobian[:, :, : -len(acting.mechanism.parameters)])
+        self.residual = after.residual + effect_of(after.setup, after.law, acting, after.values[-1])
+        self.informed = informed_share(after.noise)
 
     @cached_property
     def projected(self) -> Projection:
         return Projection(self.linear, self.residual[None])
+
+    @cached_property
+    def unweighted(self) -> Projection:
+        """The same with every test counting alike."""
+        return Projection(replace(self.linear, weight=np.ones(len(self.residual))), self.residual[None])
 
     @property
     def conditions(self) -> Conditions:
@@ -158,8 +171,8 @@ def choose_form(
     rng : numpy Generator
         Of the resamples behind the error of the gain.
     """
-    after, background, forms = _best_forms(model, grammar, first)
-    form = forms[0]
+    background, forms = _best_forms(model, grammar, first)
+    after, form = background.after, forms[0]
     parameters = estimates(after, len(after.acting) - 1) | _place_and_width(form)
     wider = 1.0
     if form.best.shapes[0].kind != "wave":  # the interval of the amplitude over that of the linear model
@@ -179,57 +192,43 @@ def forms_in_reach(model: ModelFit, grammar: Grammar) -> tuple[Background, list[
     projected = Projection(model.linear, model.linear.residual[None])
     net = projected.gains(grammar.courses, grammar.acts)[0] - grammar.scope_cost[:, None]
     net[corrects_a_pattern(grammar.scopes, grammar.courses.shapes)] = -np.inf
-    _, background, forms = _best_forms(model, grammar, grammar.law(int(np.argmax(net))))
-    return background, forms
+    return _best_forms(model, grammar, grammar.law(int(np.argmax(net))))
 
 
-def _best_forms(model: ModelFit, grammar: Grammar, law: WrittenLaw) -> tuple[ModelFit, Background, list[Form]]:
-    """The model with the form that has the best likelihood when fitted in full, less what its choice costs; the
-    campaign at its noise, and the forms in reach there, the chosen one first.
+def _best_forms(model: ModelFit, grammar: Grammar, law: WrittenLaw) -> tuple[Background, list[Form]]:
+    """The campaign with the form that has the best likelihood when fitted in full, less what its choice costs; and the
+    forms in reach there, the chosen one first.
 
     The weights of the tests follow the law with which they were estimated: where it is wrong they are small. So the
     forms to be fitted are the best with these weights and the best with none.
     """
-    after, background = _with_law(model, law)
-    fitted: dict[object, tuple[float, ModelFit, Background]] = {}
+    background = Background(model, law)
+    fitted: dict[object, tuple[float, Background]] = {}
     for _ in range(ROUNDS):
-        unweighted = replace(background.linear, weight=np.ones(len(background.residual)))
-        for at in (background, replace(background, linear=unweighted)):
-            for form in _forms_at(at, grammar)[:FITTED]:
+        for projected in (background.projected, background.unweighted):
+            for form in _forms_at(background, projected, grammar)[:FITTED]:
                 if form.best.form not in fitted:
-                    again, there = _with_law(model, form.best)
-                    fitted[form.best.form] = again.score - (form.gains.max() - form.evidence), again, there
+                    there = Background(model, form.best)
+                    fitted[form.best.form] = there.after.score - (form.gains.max() - form.evidence), there
         best = max(fitted, key=lambda key: fitted[key][0])
-        if fitted[best][2] is background:
+        if fitted[best][1] is background:
             break
-        _, after, background = fitted[best]
-    forms = _forms_at(background, grammar)
+        background = fitted[best][1]
+    forms = _forms_at(background, background.projected, grammar)
     shift = {f.best.form: fitted[f.best.form][0] - fitted[best][0] for f in forms if f.best.form in fitted}
     own = next((f for f in forms if f.best.form == best), None)
     if own is None:
-        return after, background, forms
+        return background, forms
     judged = [replace(f, evidence=own.evidence + shift[f.best.form]) if f.best.form in shift else f for f in forms]
     ranked = sorted(judged, key=lambda f: (f.best.form != best, -f.evidence))
-    if own.best != background.law:
-        after, background = _with_law(model, own.best)
-    return after, background, ranked
+    return background if own.best == background.law else Background(model, own.best), ranked
 
 
-def _with_law(model: ModelFit, law: WrittenLaw) -> tuple[ModelFit, Background]:
-    """The model with a law fitted, and the same campaign without it at the noise of that fit."""
-    acting = Acting(law.mechanism())
-    after = fit(model.setup, (*model.acting, acting), start=model)
-    residual = after.residual + effect_of(after.setup, after.law, acting, after.values[-1])
-    jacobian = after.linear.jacobian[:, :, : -len(acting.mechanism.parameters)]
-    linear = replace(after.linear, jacobian=jacobian)
-    return after, Background(law, after.setup, terms_of(after), linear, residual, informed_share(after.noise))
-
-
-def _forms_at(at: Background, grammar: Grammar) -> list[Form]:
-    """The forms in reach of the best on the fine grid, the best first."""
+def _forms_at(at: Background, projected: Projection, grammar: Grammar) -> list[Form]:
+    """The forms in reach of the best on the fine grid, with some weights of the tests, the best first."""
     order, begins, count = grammar.courses.by_form
     acts = acts_of(at.effects(*grammar.scopes), at.setup)
-    gains = at.projected.gains(grammar.courses, acts)[0, :, order].T
+    gains = projected.gains(grammar.courses, acts)[0, :, order].T
     worth = np.maximum.reduceat(gains, begins, axis=1) - grammar.scope_cost[:, None] - np.log(count)
     worth[corrects_a_pattern(grammar.scopes, [grammar.courses.shapes[k] for k in order[begins]])] = -np.inf
     worth = worth.ravel()
@@ -238,28 +237,31 @@ def _forms_at(at: Background, grammar: Grammar) -> list[Form]:
     for g, f in zip(*np.divmod(ranked[worth[ranked] > worth[ranked[0]] - IN_REACH], len(count)), strict=True):
         leading = int(order[begins[f] + int(gains[g, begins[f] : begins[f] + count[f]].argmax())])
         shapes = grammar.courses.shapes[leading]
-        forms.append(_on_fine_grid(at, grammar, int(g), shapes, float(grammar.courses.cost[leading])))
+        costs = float(grammar.scope_cost[g]), float(grammar.courses.cost[leading]) if len(shapes) > 1 else 0.0
+        forms.append(_on_fine_grid(at, projected, grammar.scopes[g], shapes, costs))
     return sorted(forms, key=lambda f: -f.evidence)
 
 
-def _on_fine_grid(at: Background, grammar: Grammar, g: int, shapes: tuple[Shape, ...], cost: float) -> Form:
+def _on_fine_grid(
+    at: Background, projected: Projection, scope: WrittenLaw, shapes: tuple[Shape, ...], costs: tuple[float, float]
+) -> Form:
     """A form with its places and widths on the fine grid, and about the best of these on a finer one.
 
-    The evidence is that of the fine grid, less the price of the scope, of the choice of a product, and of every number
-    of a shape besides its amplitude.
+    The evidence is that of the fine grid, less the ``costs`` of the scope and of the choice of a product, and that of
+    every number of a shape besides its amplitude.
     """
-    scope, c = grammar.scopes[g], at.conditions
+    c = at.setup.observations.conditions
     acts = acts_of(at.effects(scope), at.setup)
     grid = fine_products(shapes) if len(shapes) > 1 else [(s,) for s in fine_shapes(shapes[0], c)]
     courses = Courses([(s, 0.0) for s in grid], c)
-    gains = at.projected.gains(courses, acts)[0, 0]
+    gains = projected.gains(courses, acts)[0, 0]
     mean = float(gains.max() + np.log(np.mean(np.exp(gains - gains.max()))))
     further = sum((s.kind in PLACED) + (s.kind in WIDE) + (s.kind == "wave") for s in courses.shapes[0])
-    evidence = mean - float(grammar.scope_cost[g]) - (cost if len(shapes) > 1 else 0.0) - PER_PARAMETER * further
+    evidence = mean - costs[0] - costs[1] - PER_PARAMETER * further
     finer = refined_shapes(courses.shapes[int(gains.argmax())][0], c) if len(shapes) == 1 else []
     if finer:
         courses = Courses([((s,), 0.0) for s in finer], c)
-        gains = at.projected.gains(courses, acts)[0, 0]
+        gains = projected.gains(courses, acts)[0, 0]
     return Form(scope, courses, gains, evidence)
 
 

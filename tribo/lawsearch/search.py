@@ -24,23 +24,16 @@ MOST_LAWS = 3
 
 
 @dataclass(frozen=True)
-class ScoredLaw:
-    """One law by its score: log likelihood gained, and what is left of it after paying for the choice."""
-
-    law: WrittenLaw
-    gain: float
-    net: float
-
-
-@dataclass(frozen=True)
 class Discovery:
     """What the search found: laws in the order of their strength, and the best of the table of scores.
+
+    Of each scored law there is the log likelihood that it gains, and what is left of that after paying for the choice.
 
     ``of_causes`` are the other forms that the laws of the causes may have, where these are recorded columns.
     """
 
     laws: tuple[FoundLaw, ...]
-    scored: tuple[ScoredLaw, ...]
+    scored: tuple[tuple[WrittenLaw, float, float], ...]
     searched: int
     of_causes: tuple[CauseForms, ...] = ()
 
@@ -76,7 +69,7 @@ def discover_laws(
     """
     rng = rng or np.random.default_rng(0)
     found: list[FoundLaw] = []
-    table: tuple[ScoredLaw, ...] = ()
+    table: tuple[tuple[WrittenLaw, float, float], ...] = ()
     searched = 0
     if model.acting:
         model = allowed_wrong_form(model)
@@ -86,7 +79,7 @@ def discover_laws(
         if not grammar.courses.shapes:
             break
         scored = _scored(model, grammar)
-        strongest = scored[0].net
+        best, _, strongest = scored[0]
         table, searched = table or tuple(scored[:SHOWN]), searched or grammar.size
         # after Wilks, the chance that a law gains so much if it is the only one tried: less than that of the best of
         # all, so that a law which fails here needs no simulated campaigns
@@ -95,20 +88,20 @@ def discover_laws(
         p = share_beyond(_best_by_chance(model, grammar, strongest, (replicates, rng), progress), strongest)
         if p >= level:
             break
-        law = choose_form(model, grammar, scored[0].law, p, rng)
+        law = choose_form(model, grammar, best, p, rng)
         found.append(law)
         model = law.model
     return Discovery(tuple(found), table, searched)
 
 
-def _scored(model: ModelFit, grammar: Grammar) -> list[ScoredLaw]:
+def _scored(model: ModelFit, grammar: Grammar) -> list[tuple[WrittenLaw, float, float]]:
     """The best laws of the campaign, scored with its own noise, the best first."""
     net = grammar.net(Projection(model.linear, model.linear.residual[None]))[0]
     index = best_of(net, RESCORED_MEASURED)
     gains = grammar.gains(as_measured(model), index)[0]
     nets = gains - grammar.cost(index)
     each = zip(index, gains, nets, strict=True)
-    return sorted((ScoredLaw(grammar.law(i), float(g), float(n)) for i, g, n in each), key=lambda s: -s.net)
+    return sorted(((grammar.law(i), float(g), float(n)) for i, g, n in each), key=lambda scored: -scored[2])
 
 
 def _best_by_chance(

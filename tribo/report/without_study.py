@@ -37,10 +37,10 @@ def write_discovery(d: Discovery, title: str, out: Path, provenance: Provenance)
     text = discovery_sentence(d)
     rows = [
         {
-            "formula": s.law.formula(), "regime": s.law.regime, "where": s.law.where, "log_likelihood_gain": s.gain,
-            "net_of_choosing": s.net, "acts_on": subject(s.law),
+            "formula": law.formula(), "regime": law.regime, "where": law.where, "log_likelihood_gain": gain,
+            "net_of_choosing": net, "acts_on": subject(law),
         }
-        for s in d.scored
+        for law, gain, net in d.scored
     ]  # fmt: skip
     record: dict[str, Any] = {
         "schema": SCHEMA, "text": text, "laws_tried": d.searched,
