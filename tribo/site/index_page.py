@@ -291,7 +291,7 @@ def panel(key: Key, rows: Sequence[CampaignRow], changes: Sequence[Change]) -> d
     def end(value: float, law: FittedParameter) -> float:
         return y(value if math.isfinite(value) else law.value)
 
-    points = [
+    points: list[dict[str, Any]] = [
         {
             "x": x(k), "y": y(law.value), "y_low": end(law.low, law), "y_high": end(law.high, law),
             "text": _hover(row, law), "link": report_link(row.name) if row.has_report else "",
