@@ -44,7 +44,7 @@ def table2(
     Parameters
     ----------
     design : the runs, those of :func:`table2_design` by default
-    weights : as for :func:`tribo.springblock.simulated_law`
+    weights : "ratio" for a scatter of T/N that is equal at all pressures, or "force" for one of T
     path, scheduler : as for :func:`tribo.springblock.run_stored`; without a path nothing is kept
     published : the published table (columns sample, regime, source, mu, tau0_kPa); adds the deviations
 
