@@ -59,3 +59,25 @@ def test_three_lines_of_python_give_the_numbers_of_tribo_fit(small_campaign: Pat
 
     table = pd.read_csv(tmp_path / "fits.csv").set_index(["sample", "regime"])["mu"]
     assert {key: pytest.approx(mu, rel=1e-7) for key, mu in table.items()} == fits
+
+
+TUTORIAL = Path(__file__).resolve().parents[1] / "docs" / "tutorials" / "in-python.md"
+
+
+def test_the_fifteen_lines_of_the_tutorial_run_as_written_and_give_what_the_report_states(tmp_path: Path) -> None:
+    import re
+
+    import pandas as pd
+    from on_the_command_line import run
+
+    cells = re.findall(r"```\{code-cell\} ipython3\n(.*?)```", TUTORIAL.read_text(encoding="utf-8"), re.DOTALL)[:2]
+    lines = [line for cell in cells for line in cell.splitlines() if line.strip()]
+    assert len(lines) <= 15
+    said: dict[str, Any] = {}
+    exec("\n".join(lines), said)
+    assert run("fit", tribo.data_dir() / "example", "-o", tmp_path, "-q").exit_code == 0
+    written = pd.read_csv(tmp_path / "fits.csv")
+    pd.testing.assert_frame_equal(said["table"], written[list(said["table"].columns)], rtol=1e-6)
+    assert len(said["pulls"]) == 144
+    assert set(said["residuals"]["regime"]) == {"static", "sliding"}
+    assert said["run"].static_friction > said["run"].sliding_friction > 0

@@ -215,7 +215,7 @@ class Fits(tuple[LawFit, ...]):
         return "\n".join(["Fits:", *(f"  {fit._headline()}" for fit in self)])  # type: ignore[attr-defined]
 
     def _repr_html_(self) -> str:
-        return str(self.table()[["sample", "regime", "mu", "mu_u", "tau0_kPa", "tau0_u_kPa", "T0_N"]]._repr_html_())
+        return str(self.table()[["sample", "regime", "mu", "mu_u", "tau0_kPa", "tau0_u_kPa", "T0_N"]].to_html())
 
 
 def _fit_row(fit: LawFit) -> dict[str, object]:

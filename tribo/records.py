@@ -507,6 +507,12 @@ class Study:
     ``differences`` holds the differences between samples measured on the same specimens, one row per pair of samples,
     regime and number. ``laws`` compares the candidate laws of every sample by held-out loads, ``dependence`` states
     how T/N changes with each recorded variable. ``doubts`` are the numbers outside their broad physical bounds.
+
+    Examples
+    --------
+    >>> study = tribo.study(tribo.load_campaign(tribo.data_dir() / "example"), until="fit")
+    >>> len(study.fits), len(study.residuals())
+    (12, 288)
     """
 
     ingested: Ingested

@@ -85,16 +85,39 @@ def ingest(
     overrides: Path | None = None,
     progress: Progress = _silent,
 ) -> Ingested:
-    """Read every usable test of a campaign into a trace and a pull, on ``jobs`` processes where that pays.
+    """Read every usable test of a campaign into a trace and a pull.
 
     A test that cannot be read is set aside with its problems; the other tests are read. A row that names several pulls
-    of its export becomes one test per pull. ``overrides`` is a table of decisions made by hand about single pulls
-    (:mod:`tribo.ingestion.overrides`). The result does not depend on ``jobs``.
+    of its export becomes one test per pull.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        From :func:`load_campaign`.
+    rule : str
+        How static and sliding friction are read from a trace, a name in ``tribo.traces.RULES``.
+    jobs : int
+        Processes that read at once, where that pays; the result does not depend on it.
+    overrides : Path, optional
+        Table of decisions made by hand about single pulls (:mod:`tribo.ingestion.overrides`).
+    progress : callable, optional
+        Called with a stage, the steps done and the steps there are.
+
+    Returns
+    -------
+    Ingested
+        ``pulls`` and ``traces`` by the id of the test, ``set_aside`` with reasons; ``table()`` has one row per pull.
 
     Raises
     ------
     CampaignError
         No test could be read, or the overrides have errors.
+
+    Examples
+    --------
+    >>> ingested = tribo.ingest(tribo.load_campaign(tribo.data_dir() / "example"))
+    >>> print(f"{ingested.pulls['T001'].static_N:.2f} N of {len(ingested.pulls)} pulls")
+    2.22 N of 144 pulls
     """
     from tribo.ingestion.exports import ingest_campaign
     from tribo.ingestion.overrides import apply_overrides
@@ -175,10 +198,28 @@ def compare(
 ) -> Study:
     """Calibrate the model on the flat sample, predict every sample at its loads, and compare.
 
+    Parameters
+    ----------
+    ingested : Ingested
+        The campaign with its pulls.
+    fits : Fits
+        From :func:`fit`. The model is calibrated and judged by the tests of each sample alone (type A), since what all
+        pulls share moves every sample.
+    options : StudyOptions, optional
+        Number of runs, seed, processes, the folder of finished simulations, the flat sample.
+    progress : callable, optional
+        Called with a stage, the steps done and the steps there are.
+
+    Returns
+    -------
+    Study
+        ``comparison.rows`` holds the measured and the simulated force in N at each load, with standard uncertainties;
+        ``simulated`` one row per run.
+
     Raises
     ------
     CampaignError
-        No flat sample to calibrate on.
+        No flat sample to calibrate on, or no nominal area.
     FitError, SimulationError
         The flat sample gives no law, or the model cannot be run for a pattern.
     """
@@ -204,7 +245,37 @@ def study(
 ) -> Study:
     """Run the stages up to ``until`` on one campaign.
 
-    Without a pattern or a flat sample, or by choice, the spring-block model is left out; a note says why.
+    Without a pattern, a flat sample or a nominal area, or by choice, the spring-block model is left out; a note says
+    why.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        From :func:`load_campaign`.
+    options : StudyOptions, optional
+        Options of every stage.
+    until : "ingest", "fit", "compare" or "report"
+        The last stage; "fit" takes seconds, the model minutes.
+    progress : callable, optional
+        Called with a stage, the steps done and the steps there are.
+
+    Returns
+    -------
+    Study
+        What the stages gave; ``fits``, ``residuals()`` and ``ingested.table()`` are tables and records of the results.
+
+    Raises
+    ------
+    CampaignError
+        No test could be read.
+    FitError, SimulationError
+        No sample gives a law that the model needs, or the model cannot be run for a pattern.
+
+    Examples
+    --------
+    >>> study = tribo.study(tribo.load_campaign(tribo.data_dir() / "example"), until="fit")
+    >>> print(f"{study.fits['B', 'static'].mu:.2f} ± {study.fits['B', 'static'].mu_u:.2f}")
+    2.16 ± 0.09
     """
     chosen = with_zeros(with_flat_sample(campaign, options.flat), options.zero, options.load_zero)
     ingested = ingest(chosen, rule=options.rule, jobs=options.jobs, overrides=options.overrides, progress=progress)
@@ -265,7 +336,27 @@ def without_model(campaign: Campaign, options: StudyOptions) -> str:
 
 
 def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
-    """Add to a study: fits with other weights and laws, uncertainty budget, power and outlying pulls."""
+    """Add to a study: fits with other weights and laws, uncertainty budget, power and outlying pulls.
+
+    Parameters
+    ----------
+    walked : Study
+        A study with its fits, from :func:`compare` or ``study(campaign, until="fit")``.
+    options : StudyOptions, optional
+        ``weights`` of the fits, and the folder ``kept`` of finished results.
+
+    Returns
+    -------
+    Study
+        The same with ``other_fits``, ``budget``, ``power``, ``outlying``, ``laws``, ``dependence`` and ``differences``.
+
+    Examples
+    --------
+    >>> ingested = tribo.ingest(tribo.load_campaign(tribo.data_dir() / "example"))
+    >>> study = tribo.assess(tribo.Study(ingested, tribo.fit(ingested)))
+    >>> sorted(study.budget["type"].unique())
+    ['', 'A', 'B']
+    """
     from tribo.fitting.assessment import assessment
 
     made_from = (walked.ingested, walked.fits, options.weights)

@@ -60,5 +60,7 @@ def test_what_cannot_be_drawn_again_is_said(small_report: Path, tmp_path: Path) 
         redrawn(small_report, 9.0)
     with pytest.raises(CampaignError, match="Q"):
         redrawn(small_report, names={"Q": "other"})
-    result = run("figures", small_report, "--names", "B", "-o", tmp_path / "drawn")
-    assert result.exit_code == 2
+    assert run("figures", small_report, "--names", "B", "-o", tmp_path / "drawn").exit_code == 2
+    refused = run("figures", small_report, "-o", small_report / "figures")
+    assert refused.exit_code == 1
+    assert "there already" in refused.output

@@ -76,8 +76,11 @@ def verify(console: Console, out: Path, campaign: Path | None, **_: Any) -> int:
 @click.option(
     "-o", "--out", "to", required=True, type=click.Path(file_okay=False, path_type=Path), help="Folder for the figures."
 )
+@click.option("--force", is_flag=True, help="Replace figures of the same name.")
 @command_options
-def figures(console: Console, out: Path, width_mm: float, names: tuple[str, ...], to: Path, **_: Any) -> None:
+def figures(
+    console: Console, out: Path, width_mm: float, names: tuple[str, ...], to: Path, force: bool, **_: Any
+) -> None:
     """Draw the figures of a report again.
 
     Draws every figure of OUT from the numbers beside it, as SVG and PDF whose text can be edited. Letters keep their
@@ -88,7 +91,7 @@ def figures(console: Console, out: Path, width_mm: float, names: tuple[str, ...]
     pairs = [name.partition("=") for given in names for name in given.split(",")]
     if wrong := next((old for old, sign, new in pairs if not (old and sign and new)), None):
         raise click.BadParameter(f"{wrong!r} is not of the form SAMPLE=NAME", param_hint="--names")
-    written = write_redrawn(out, to, width_mm, {old.strip(): new.strip() for old, _, new in pairs})
+    written = write_redrawn(out, to, width_mm, {old.strip(): new.strip() for old, _, new in pairs}, force)
     listed = "\n".join(path.name for path in written)
     console.result({"to": str(to), "files": [path.name for path in written]}, f"{listed}\n{len(written)} files in {to}")
 

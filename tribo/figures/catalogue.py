@@ -17,7 +17,7 @@ from tribo.figures.style import FigureOf, StudyFigure
 
 if TYPE_CHECKING:
     from tribo.berardo2019.table_diagnosis import PublishedDiagnosis
-    from tribo.figures.style import DiagnosisFigure
+    from tribo.diagnostics import Diagnosis
 
 
 def _by_name(*figures: FigureOf[Any]) -> dict[str, FigureOf[Any]]:
@@ -32,7 +32,7 @@ FIGURES: dict[str, StudyFigure] = _by_name(
 FRICTION_FIGURES: dict[str, StudyFigure] = _by_name(FORCES, DEPENDENCE, RECORDS, OSCILLATIONS, RESTARTS)
 """Figures of the measured friction by itself, by name."""
 
-DIAGNOSIS_FIGURES: dict[str, DiagnosisFigure] = _by_name(FINDING, MISFIT, RESIDUALS, EXTENDED, LAW, EVIDENCE, POWER)
+DIAGNOSIS_FIGURES: dict[str, FigureOf[Diagnosis]] = _by_name(FINDING, MISFIT, RESIDUALS, EXTENDED, LAW, EVIDENCE, POWER)
 """The figures of a diagnosis by name."""
 
 PUBLISHED_FIGURES: dict[str, FigureOf[PublishedDiagnosis]] = _by_name(PUBLISHED, PUBLISHED_READINGS)

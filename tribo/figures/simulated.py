@@ -202,7 +202,7 @@ def draw_runs(numbers: pd.DataFrame) -> Figure:
     height = model_mm + rows * PATTERN_MM + TRACES_MM + FOOT_MM + LEGEND_ROW_MM * legend_rows
     figure = style.page_figure(height, fixed=True)
     draw_mesh(_axes(figure, 0, 5, min(84, style.page_mm()), MODEL_MM - 6))
-    left, top = (88, 5) if wide else (0, 5 + MODEL_MM)
+    left, top = (88.0, 5.0) if wide else (0.0, 5.0 + MODEL_MM)
     draw_side_view(_axes(figure, left, top, min(102, style.page_mm()), MODEL_MM - 6))
     for k, (_, run) in enumerate(runs):
         row, column = divmod(k, across)

@@ -218,12 +218,15 @@ def power_of_campaign(
         specimen_sd, repeat_sd = float(np.sqrt(max(total - repeat / repeats, 0.0))), float(np.sqrt(repeat))
 
         sd = (specimen_sd, repeat_sd)
-        more_specimens = _fewest(
-            range(2, MOST_SPECIMENS + 1), lambda g, sd=sd: _smallest(sd, g, repeats, level, power) <= wanted
-        )
-        more_repeats = _fewest(
-            range(1, MOST_REPEATS + 1), lambda r, sd=sd: _smallest(sd, specimens, r, level, power) <= wanted
-        )
+
+        def enough_specimens(count: int, sd: tuple[float, float] = sd) -> bool:
+            return _smallest(sd, count, repeats, level, power) <= wanted
+
+        def enough_repeats(count: int, sd: tuple[float, float] = sd) -> bool:
+            return _smallest(sd, specimens, count, level, power) <= wanted
+
+        more_specimens = _fewest(range(2, MOST_SPECIMENS + 1), enough_specimens)
+        more_repeats = _fewest(range(1, MOST_REPEATS + 1), enough_repeats)
         powers.append(
             Power(
                 regime, number, reference, specimens, repeats, 100 * specimen_sd, 100 * repeat_sd,

@@ -73,14 +73,28 @@ def redrawn(
 
 
 def write_redrawn(
-    out: Path, to: Path, width_mm: float = style.PAGE_MM, names: Mapping[str, str] | None = None
+    out: Path,
+    to: Path,
+    width_mm: float = style.PAGE_MM,
+    names: Mapping[str, str] | None = None,
+    force: bool = False,
 ) -> list[Path]:
-    """Write the figures of :func:`redrawn` to the folder ``to``, as NAME.svg and NAME.pdf."""
-    return [
-        write_bytes(to / f"{name}.{ending}", content)
+    """Write the figures of :func:`redrawn` to the folder ``to``, as NAME.svg and NAME.pdf.
+
+    Raises
+    ------
+    CampaignError
+        As :func:`redrawn`; or a file of the same name is there already and ``force`` is not given.
+    """
+    contents = {
+        to / f"{name}.{ending}": content
         for name, endings in redrawn(out, width_mm, names).items()
         for ending, content in endings.items()
-    ]
+    }
+    if not force and (there := [path for path in contents if path.exists()]):
+        what, allowed = "a file of this name is there already", "a folder without figures, or --force"
+        raise CampaignError(Problem("file_there", what, file=str(there[0]), allowed=allowed))
+    return [write_bytes(path, content) for path, content in contents.items()]
 
 
 def _numbers(text: str) -> pd.DataFrame:
