@@ -38,7 +38,6 @@ EFFECTS = {
     "run_in": 2.0, "edge_adhesion": 2.1, "pattern_geometry": 1.9, "cavity_shear_deformation": 1.9,
     "mislabelled_specimen": 1.0, "load_cell_offset": 0.05,
 }  # fmt: skip
-STATISTICS, SEARCH = "tribo.diagnostics.statistics", "tribo.diagnostics.search"
 Value = Any
 
 
@@ -73,15 +72,16 @@ class Constant:
     on_clean: bool = False
 
 
-RIVALS, NAMING, SCREEN, WEIGHING = (f"{SEARCH}.{m}" for m in ("rivals", "naming", "screen", "weighing"))
-NOISE, EVIDENCE = f"{STATISTICS}.scatter", f"{STATISTICS}.direct_evidence"
+CANDIDATES, CONTRASTS, NOISE, EVIDENCE = (
+    f"tribo.diagnostics.{name}" for name in ("candidates", "contrasts", "scatter", "direct_evidence")
+)
 CONSTANTS = {
-    "TIED (log likelihood)": Constant((RIVALS,), "TIED", _first),
-    "TIED (share of the gain)": Constant((RIVALS,), "TIED", _second),
-    "CLOSE": Constant((RIVALS, NAMING), "CLOSE"),
-    "IN_COMMON": Constant((RIVALS,), "IN_COMMON"),
-    "FORM": Constant((SCREEN,), "FORM"),
-    "PER_PARAMETER": Constant((WEIGHING,), "PER_PARAMETER"),
+    "TIED (log likelihood)": Constant((CANDIDATES,), "TIED", _first),
+    "TIED (share of the gain)": Constant((CANDIDATES,), "TIED", _second),
+    "CLOSE": Constant((CANDIDATES,), "CLOSE"),
+    "IN_COMMON": Constant((CANDIDATES,), "IN_COMMON"),
+    "FORM": Constant((CONTRASTS,), "FORM"),
+    "PER_PARAMETER": Constant((CANDIDATES,), "PER_PARAMETER"),
     "CERTAIN": Constant((EVIDENCE,), "CERTAIN", on_clean=True),
     "specimen gain, expected": Constant((NOISE,), "SIZE_PRIORS", _row(0, 0), on_clean=True),
     "specimen slope, expected": Constant((NOISE,), "SIZE_PRIORS", _row(2, 0), on_clean=True),
