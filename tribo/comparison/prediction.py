@@ -297,12 +297,12 @@ def calibrated_cells(
 
     laws = _flat_laws(fits, flat)
     pressures = [campaign.nominal_pressure_Pa(load) for load in loads_to_simulate(campaign)]
-    wanted = tuple((laws[regime].value("mu"), laws[regime].value("tau0_Pa")) for regime in REGIMES)
+    static, sliding = ((laws[regime].value("mu"), laws[regime].value("tau0_Pa")) for regime in REGIMES)
     calibration = partial(
-        calibrate, *wanted, runs=CalibrationRuns(pressures, seed=model.seed), jobs=model.jobs,
+        calibrate, static, sliding, runs=CalibrationRuns(pressures, seed=model.seed), jobs=model.jobs,
         progress=lambda done, total: progress("calibrating on the flat sample", done, total),
     )  # fmt: skip
-    friction = kept_or_made(model.kept, "calibration", (wanted, pressures, model.seed), calibration, SOURCES)
+    friction = kept_or_made(model.kept, "calibration", ((static, sliding), pressures, model.seed), calibration, SOURCES)
     measured = {test.sample for test in campaign.tests}
     samples = {name: pattern for name, pattern in campaign.samples.items() if name in measured}
     design = stratified_design(samples, pressures, model.runs, model.seed, SimConfig(friction=friction))

@@ -130,7 +130,8 @@ def _rows_of(design: Sequence[SimConfig], path: Path, work: Work) -> dict[int, M
     if fault is not None or not path.exists():
         return {}
     table = read_stored(path)
-    return {int(k): table.loc[k, list(work.units)].to_dict() for k in np.flatnonzero(table[DONE])}
+    rows: list[dict[str, Any]] = table[list(work.units)].to_dict("records")  # type: ignore[assignment]
+    return {int(k): rows[k] for k in np.flatnonzero(table[DONE])}
 
 
 def read_stored(path: str | Path) -> pd.DataFrame:
