@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+import inspect
 import re
 from importlib import import_module
 from pathlib import Path
@@ -20,6 +21,7 @@ PACKAGES = sorted(file.parent.name for file in Path(tribo.__file__).parent.glob(
 REFERENCE = sorted((DOCS / "reference").glob("*.md"))
 RECORDS = ("records", "fits", "errors")
 DIRECTIVE = re.compile(r"^\.\. auto(function|class|data|module|exception):: (\S+)", re.MULTILINE)
+EXPLAINED = [name for name in tribo.__all__ if callable(getattr(tribo, name)) and name != "diagnosis"]  # an old name
 LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)(?:#[^)]*)?\)")
 
 
@@ -68,7 +70,24 @@ def test_a_public_name_has_an_entry_in_the_reference(name: str) -> None:
     assert any(here is wanted for here in documented())
 
 
-@pytest.mark.parametrize("name", [n for n in tribo.__all__ if ">>>" in (getattr(tribo, n).__doc__ or "")])
+def sections_of(name: str) -> dict[str, str]:
+    """Heading -> text of the numpy sections that explain a public name."""
+    parts = re.split(r"^(\w+)\n-+\n", inspect.getdoc(getattr(tribo, name)) or "", flags=re.MULTILINE)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+@pytest.mark.parametrize("name", EXPLAINED)
+def test_a_public_name_explains_what_it_takes_and_gives_and_has_an_example(name: str) -> None:
+    signature, sections = inspect.signature(getattr(tribo, name)), sections_of(name)
+    heads = re.findall(r"^\w.*", sections.get("Parameters", ""), re.MULTILINE)
+    explained = {argument.lstrip("*") for head in heads for argument in head.split(" : ")[0].split(", ")}
+    assert set(signature.parameters) == explained
+    gives = not isinstance(getattr(tribo, name), type) and signature.return_annotation != "None"
+    assert ("Returns" in sections) == gives
+    assert ">>>" in sections.get("Examples", "")
+
+
+@pytest.mark.parametrize("name", EXPLAINED)
 def test_the_example_of_a_public_name_gives_what_it_says(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(DOCS.parent)
     examples = doctest.DocTestFinder(recurse=False).find(getattr(tribo, name), name, globs={"tribo": tribo})

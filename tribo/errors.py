@@ -32,12 +32,17 @@ class Problem:
         A short slug for programs ("unknown_unit", "missing_file", "truncated").
     what : str
         The error in one sentence, without its place.
-    file, row, column, found, allowed : str or int, optional
-        Its place, the value found there and the values allowed. ``row`` counts lines of the file from 1.
+    file, row, column : str or int, optional
+        Its place; ``row`` counts lines of the file from 1.
+    found, allowed : str, optional
+        The value found there, of a long one its beginning and end, and the values allowed.
     test_id : str, optional
         The test it belongs to.
 
-    Where ``found`` is long, its middle is left out.
+    Examples
+    --------
+    >>> print(tribo.Problem("unknown_unit", "unknown unit", file="raw/T001.csv", row=4, found="lb", allowed="N, mN"))
+    raw/T001.csv, row 4: unknown unit; found 'lb'; allowed: N, mN
     """
 
     kind: str
@@ -72,7 +77,21 @@ class Problem:
 
 
 class TriboError(Exception):
-    """An error that a user can correct. Holds all problems found, not only the first."""
+    """An error that a user can correct. Holds all problems found, not only the first.
+
+    Parameters
+    ----------
+    problems : Problem or iterable of Problem
+        What is wrong; of the error itself a tuple.
+
+    Examples
+    --------
+    >>> try:
+    ...     tribo.load_campaign(tribo.data_dir() / "berardo2019")
+    ... except tribo.TriboError as error:
+    ...     print(error.problems[0].what)
+    a campaign must contain campaign.toml
+    """
 
     def __init__(self, problems: Problem | Iterable[Problem]):
         self.problems: tuple[Problem, ...] = (problems,) if isinstance(problems, Problem) else tuple(problems)

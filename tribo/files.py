@@ -215,10 +215,20 @@ PATTERN_SHARES = "pattern_shares"
 def data_dir() -> Path:
     """Folder of the bundled data: ``tribo/_data`` of an installed wheel, ``data`` of a source checkout.
 
+    Returns
+    -------
+    Path
+        The folder; it holds the example campaign and the published tables.
+
     Raises
     ------
     FileNotFoundError
         Neither is there: the installation is incomplete.
+
+    Examples
+    --------
+    >>> sorted(path.name for path in (tribo.data_dir() / "example").glob("*.csv"))
+    ['tests.csv']
     """
     places = (_PACKAGE / "_data", _PACKAGE.parent / "data")
     for folder in places:

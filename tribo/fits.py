@@ -27,15 +27,53 @@ PA_PER_KPA = 1e3
 class LawFit:
     """A friction law fitted to one sample in one regime, with the covariance of its parameters.
 
-    ``values`` and ``covariance`` follow ``parameters``: mu and tau0_Pa for T = mu N + tau0 A; mu and T0_N for
-    T = mu N + T0, where no nominal area is known (``nominal_area_m2`` is None).
+    The covariance of a fit that a study states is the combined one (GUM): ``type_a`` and what all pulls share (type B:
+    gain, zero, load, area, angle), which counts as known. Samples of one campaign are compared by the fit in ``alone``,
+    which is without the scatter of other samples and without the instrument.
 
-    The covariance of a fit that a study states is the combined one (GUM): ``type_a``, that of the mean over specimens
-    with ``dof`` degrees of freedom, plus what all pulls share (type B: gain, zero, load, area, angle), which counts as
-    known. ``largest`` holds, for each parameter and for T, the component with the largest share of the variance and
-    that share in percent. ``alone`` is then the fit by the tests of the sample alone (type A), without the scatter of
-    other samples and without the instrument: samples of one campaign are compared by it. A fit that is one by the tests
-    of the sample alone has neither.
+    Parameters
+    ----------
+    sample : str
+        Name of the sample.
+    regime : "static" or "sliding"
+        Whether the law is that of static or of sliding friction.
+    law : str
+        Name of the law, such as "coulomb_adhesion".
+    parameters : tuple of str, shape (p,)
+        Names of the parameters: mu and tau0_Pa for T = mu N + tau0 A; mu and T0_N for T = mu N + T0, where no nominal
+        area is known. mu has no unit.
+    values : ndarray, shape (p,)
+        Fitted parameters, in the unit that their names end in.
+    covariance : ndarray, shape (p, p)
+        Their covariance, in the products of these units.
+    dof : float
+        Degrees of freedom of the scatter between specimens.
+    n_specimens, n_tests : int
+        Number of specimens and of tests in the fit.
+    method : str
+        How the law was fitted, in words.
+    chi2_red : float
+        Reduced chi-squared of the load means about the line of each specimen.
+    nominal_area_m2 : float or None
+        Nominal area in m2; None where it is not stated.
+    specimens : mapping of str to ndarray, shape (p,)
+        The parameters of each specimen by itself.
+    notes : tuple of str
+        What is doubtful about the fit, as sentences.
+    bent : bool
+        Whether the load means deviate from a straight line beyond chance.
+    type_a : ndarray, shape (p, p), optional
+        Part of the covariance that is of the mean over specimens, with ``dof`` degrees of freedom.
+    largest : mapping of str to (str, float)
+        For each parameter and for T, the component with the largest share of the variance, and that share in percent.
+    alone : LawFit, optional
+        The fit by the tests of the sample alone (type A). That fit itself has no ``type_a``, ``largest`` and ``alone``.
+
+    Examples
+    --------
+    >>> fit = tribo.fit(tribo.ingest(tribo.load_campaign(tribo.data_dir() / "example")))["F", "static"]
+    >>> print(f"mu = {fit.mu:.2f} ± {fit.mu_u:.2f}, T = {fit.force_N(1.0):.2f} ± {fit.force_u_N(1.0):.2f} N at 1 N")
+    mu = 4.74 ± 0.27, T = 6.05 ± 0.33 N at 1 N
     """
 
     sample: str
@@ -50,9 +88,9 @@ class LawFit:
     method: str
     chi2_red: float
     nominal_area_m2: float | None
-    specimens: Mapping[str, FloatArray] = field(default_factory=dict)  # specimen -> its own values
+    specimens: Mapping[str, FloatArray] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
-    bent: bool = False  # the load means deviate from a straight line beyond chance
+    bent: bool = False
     type_a: FloatArray | None = None
     largest: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     alone: LawFit | None = None
@@ -244,8 +282,36 @@ def _fit_row(fit: LawFit) -> dict[str, object]:
 class Run:
     """One run of the spring-block model: force of the slider along the pull, with static and sliding friction.
 
-    ``static_friction`` and ``sliding_friction`` are T/N (dimensionless), ``window_s`` the sliding window,
-    ``parameters`` every input with its unit in the name, ``moving`` the number of moving blocks.
+    Parameters
+    ----------
+    sample : str
+        Name of the sample.
+    pressure_Pa, angle_deg : float
+        Nominal pressure in Pa, and pull direction against x in degrees.
+    seed : int
+        Seed of the local friction.
+    time_s, force_N : ndarray, shape (n,)
+        Time in s and force of the slider in N.
+    moving : ndarray of int, shape (n,)
+        Number of blocks in contact that move.
+    normal_load_N : float
+        Nominal load of the lattice in N.
+    static_friction, sliding_friction : float
+        T/N at the peak and as a mean over the window (dimensionless).
+    peak_s : float
+        Time of the peak in s.
+    window_s : tuple of float, shape (2,)
+        Start and end of the sliding window in s.
+    engine : str
+        Engine that computed the run.
+    parameters : mapping of str to object
+        Every input, with its unit in the name.
+
+    Examples
+    --------
+    >>> run = tribo.simulate(tribo.SimConfig(blocks=(12, 12), dt_s=1e-7, duration_peaks=1.5))
+    >>> print(f"T/N = {run.static_friction:.1f} after {1e3 * run.peak_s:.1f} ms, then {run.sliding_friction:.1f}")
+    T/N = 7.4 after 3.1 ms, then 3.5
     """
 
     sample: str

@@ -42,9 +42,34 @@ class ExportFormat:
 class Trace:
     """Force against time of one export, in SI units, as recorded (never resampled).
 
-    Arrays share one length n >= 1. ``columns`` holds further quantities by SI name ("normal_force_N"),
-    ``metadata`` the file's own header untouched, ``flags`` doubts of the reader. ``first_row`` is the line of the
-    file, counted from 1, with the first data point.
+    Parameters
+    ----------
+    name : str
+        Name of the trace: the id of its test, or the name of its file.
+    time_s, force_N : ndarray, shape (n,)
+        Time in s and friction force in N, with n >= 1.
+    displacement_m : ndarray, shape (n,), optional
+        Displacement of the sled in m, where it was recorded.
+    columns : mapping of str to ndarray, shape (n,)
+        Further quantities by their name in SI units, such as "normal_force_N".
+    metadata : mapping of str to str
+        The header of the file as it is.
+    source : ExportFormat, optional
+        How the export was read.
+    file : str
+        The export.
+    flags : tuple of str
+        Doubts of the reader, each in a word.
+    problems : tuple of Problem
+        Doubts of the reader with their place.
+    first_row : int
+        Line of the file, counted from 1, that holds the first data point.
+
+    Examples
+    --------
+    >>> trace = tribo.read_export(tribo.data_dir() / "example" / "raw" / "T001.csv")
+    >>> print(trace.time_s.shape, f"{trace.time_s[-1]:.2f} s, at most {trace.force_N.max():.2f} N")
+    (400,) 15.96 s, at most 2.18 N
     """
 
     name: str
@@ -116,10 +141,56 @@ class Oscillation:
 class Pull:
     """Static peak and mean sliding force of one trace, by a named rule. Times as recorded in the trace.
 
-    ``*_u_N`` are standard uncertainties (k = 1) of the reading within the trace. ``zero_N`` was subtracted
-    from every force. ``window_s`` is the sliding window (start, end). NaN where a trace does not determine a value.
-    ``first_maximum_N``, ``highest_N`` and ``first_drop_N`` are three readings of the static peak: where they differ,
-    ``static_u_N`` includes the difference.
+    Uncertainties are standard uncertainties (k = 1) of the reading within the trace. NaN where a trace does not
+    determine a value.
+
+    Parameters
+    ----------
+    test_id : str
+        Id of the test.
+    rule : str
+        Rule by which static and sliding friction were read, a name in ``tribo.traces.RULES``.
+    static_N, static_u_N : float
+        Static friction force in N, and its uncertainty.
+    sliding_N, sliding_u_N : float
+        Mean sliding friction force in N, and its uncertainty.
+    zero_N, zero_u_N : float
+        Zero in N that was subtracted from every force, and its uncertainty.
+    onset_s, peak_s : float
+        Times in s at which the force begins to rise and at which it has its static peak.
+    window_s : tuple of float, shape (2,)
+        Start and end of the sliding window in s.
+    rise_N_per_s, rise_stiffness_N_per_m : float
+        Slope of the force before the peak, against time in N/s and against the displacement in N/m.
+    stick_slip_amplitude_N, stick_slip_period_s : float
+        Amplitude in N and period in s of stick-slip.
+    noise_N : float
+        Standard deviation of the noise in N.
+    drift_N_per_s : float
+        Drift of the sliding force in N/s.
+    flags : tuple of str
+        What is doubtful about the pull, each in a word.
+    problems : tuple of Problem
+        What is doubtful about the pull, with its place.
+    first_maximum_N, highest_N, first_drop_N : float
+        Static friction in N read at the first maximum, at the highest point before sliding and before the first drop.
+        Where they differ, ``static_u_N`` includes the difference.
+    zero_rule : str
+        Where the zero was taken, such as "before contact".
+    recorded_load_N, recorded_load_u_N : float
+        Mean of the recorded normal force in N, and its uncertainty.
+    oscillation : Oscillation, optional
+        How the force varies while sliding.
+    restarts : tuple of Restart
+        Static friction after every stop within the record.
+    phases : tuple of Phase
+        The parts of the record, in order of time.
+
+    Examples
+    --------
+    >>> pull = tribo.read_pull(tribo.data_dir() / "example" / "raw" / "T001.csv")
+    >>> print(f"{pull.static_N:.2f} N at {pull.peak_s:.2f} s, sliding {pull.sliding_N:.2f} N")
+    2.22 N at 3.56 s, sliding 1.18 N
     """
 
     test_id: str
@@ -159,11 +230,28 @@ CLOSED_TRACK_M = 10.0  # a longer slide runs over its own track again and again;
 @displayed(lambda p: f"{p.name}, {'flat' if p.is_flat else p.cavity}")
 @dataclass(frozen=True)
 class Pattern:
-    """Geometry of one cavity pattern, lengths in metres; ``cavity`` is none, circle, square or rectangle.
+    """Geometry of one cavity pattern.
 
-    ``size_m`` is (x, y) of the cavity (the diameter twice for a circle); ``pitch_m`` the lattice spacing;
-    ``staggered`` shifts every other row by half a pitch in x. ``measured_area_fraction``, where given,
-    replaces the nominal one.
+    Parameters
+    ----------
+    name : str
+        Name of the pattern.
+    cavity : "none", "circle", "square" or "rectangle"
+        Shape of the cavities; "none" for a flat sample.
+    size_m : tuple of float, shape (2,), optional
+        Size of a cavity in m along x and y; the diameter twice for a circle.
+    pitch_m : tuple of float, shape (2,), optional
+        Distance in m from one cavity to the next along x and y.
+    staggered : bool
+        Whether every other row is shifted by half a pitch in x.
+    measured_area_fraction : float, optional
+        Contact area over nominal area as measured, in place of that of the geometry.
+
+    Examples
+    --------
+    >>> pattern = tribo.Pattern("B", "circle", size_m=(10e-6, 10e-6), pitch_m=(15e-6, 15e-6))
+    >>> round(pattern.area_fraction, 3)
+    0.651
     """
 
     name: str
@@ -308,11 +396,54 @@ class Doubt:
 class Campaign:
     """A campaign as described by campaign.toml and tests.csv; the exports in raw/ are not read yet.
 
-    ``tests`` are the usable rows, ``set_aside`` the rows with faults or an ``exclude`` reason.
-    ``samples`` maps each sample name to its pattern (``Sx`` is pattern S pulled along x).
-    ``chosen_flat`` names the flat sample that calibrates the model where a user chose one; every stage asks
-    :attr:`flat_sample`. ``inputs`` maps each input file that was read, by its path in the campaign, to the SHA-256 of
-    the bytes that were read.
+    Parameters
+    ----------
+    title : str
+        Title of the campaign.
+    root : Path
+        Its folder.
+    nominal_area_m2 : float or None
+        Area of the face of a sample in m2, cavities included; None where it is not stated.
+    tests : tuple of Test
+        The usable rows of tests.csv.
+    samples : mapping of str to Pattern
+        Pattern of each sample by its name (``Sx`` is pattern S pulled along x).
+    material, counterface : str
+        The two materials in contact, as stated.
+    slider_mass_kg : float
+        Mass of the slider in kg without the weights put on it.
+    pull_speed_m_s : float, optional
+        Pull speed in m/s of tests that state none.
+    set_aside : tuple of SetAside
+        Rows with faults or with a reason in the column ``exclude``.
+    problems : tuple of Problem
+        Doubts about campaign.toml and tests.csv.
+    columns : mapping of str to str or list of str
+        Column of the exports by quantity, from [columns].
+    columns_by_file : mapping of str to mapping
+        The same for single files or patterns of names of files.
+    instrument : mapping of str to float
+        Standard uncertainties (k = 1) and properties of the rig from [instrument], in the unit that each name ends in.
+    chosen_flat : str
+        The flat sample that a user chose for the calibration of the model; :attr:`flat_sample` is the one in use.
+    zero, load_zero : ZeroChoice
+        Where the zeros of the force and of the recorded normal load come from, for tests that do not state it.
+    contact : str
+        As stated: sled, pin_on_disc, ball_on_disc, ring_shear, reciprocating or rotary.
+    material_class : str
+        As stated: elastomer, polymer, metal, ceramic, lubricated or granular.
+    plausible : mapping of str to tuple of float, shape (2,)
+        Stated bounds of a quantity, in the unit that its name ends in, in place of those of the material class.
+    measured : mapping of str to tuple of float, shape (2,)
+        Amplitude of a mechanism that was measured directly, and its standard uncertainty, in the unit of the mechanism.
+    inputs : mapping of str to str
+        SHA-256 of every file that was read, by its path in the campaign.
+
+    Examples
+    --------
+    >>> campaign = tribo.load_campaign(tribo.data_dir() / "example")
+    >>> print(len(campaign.tests), campaign.flat_sample, f"{campaign.nominal_pressure_Pa(1.0):.0f} Pa")
+    144 F 18182 Pa
     """
 
     title: str
@@ -332,10 +463,10 @@ class Campaign:
     chosen_flat: str = ""
     zero: ZeroChoice = DEFAULT
     load_zero: ZeroChoice = DEFAULT
-    contact: str = ""  # as stated: sled, pin_on_disc, ball_on_disc, ring_shear, reciprocating or rotary
-    material_class: str = ""  # as stated: elastomer, polymer, metal, ceramic, lubricated or granular
-    plausible: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # bounds stated in place of the usual
-    measured: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # amplitude of a mechanism, and its u
+    contact: str = ""
+    material_class: str = ""
+    plausible: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    measured: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     inputs: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @property
@@ -406,10 +537,25 @@ class ByHand:
 class Ingested:
     """A campaign with its exports read: one trace and one pull per usable test, the rest set aside.
 
-    A test whose forces were evaluated elsewhere has a pull and no trace.
+    Parameters
+    ----------
+    campaign : Campaign
+        The campaign; a row that names several pulls of an export has become one test per pull.
+    traces : mapping of str to Trace
+        Trace by the id of its test; none where forces were evaluated elsewhere.
+    pulls : mapping of str to Pull
+        Static and sliding friction by the id of the test.
+    set_aside : tuple of SetAside
+        Tests that are not used, with reasons.
+    by_hand : mapping of str to ByHand
+        Tests with a decision made by hand: an excluded one is also in ``set_aside``; a moved one has its new result in
+        ``pulls``.
 
-    ``by_hand`` holds every test with a decision made by hand: an excluded test is also in ``set_aside``; a moved one
-    has its new result in ``pulls``.
+    Examples
+    --------
+    >>> ingested = tribo.ingest(tribo.load_campaign(tribo.data_dir() / "example"))
+    >>> len(ingested.pulls), len(ingested.set_aside), ingested.traces["T001"].file
+    (144, 0, 'raw/T001.csv')
     """
 
     campaign: Campaign
@@ -496,17 +642,42 @@ def _numbers_or_texts(cells: list[str]) -> list[float] | list[str]:
 @displayed(lambda s: f"{s.ingested.campaign.title}, {len(s.ingested.pulls)} pulls, {len(s.fits)} fits")
 @dataclass(frozen=True)
 class Study:
-    """One campaign with the results of all stages.
+    """One campaign with the results of all stages. Its tables have the columns and units of the files of their names.
 
-    ``fits`` holds the measured law of every sample and regime (T = mu N + tau0 A, the default weights) with its
-    combined uncertainty, which is what the report states, ``other_fits`` the same by the tests of each sample alone
-    under other weights or laws. ``simulated`` is the ensemble, one row per run: sample, pressure_Pa, normal_load_N (p
-    times the nominal area of the campaign), angle_deg, seed, static_N, sliding_N. ``example_runs`` holds one full force
-    trace of the model per sample. ``budget`` is the uncertainty budget of every fitted number, one row per component.
-    ``power`` states the differences this campaign could detect, ``outlying`` the outlying pulls and specimens.
-    ``differences`` holds the differences between samples measured on the same specimens, one row per pair of samples,
-    regime and number. ``laws`` compares the candidate laws of every sample by held-out loads, ``dependence`` states
-    how T/N changes with each recorded variable. ``doubts`` are the numbers outside their broad physical bounds.
+    Parameters
+    ----------
+    ingested : Ingested
+        The campaign with its pulls.
+    fits : Fits
+        Measured law T = mu N + tau0 A of every sample and regime under the chosen weights, with its combined
+        uncertainty, which is what the report states.
+    other_fits : tuple of LawFit
+        The same by the tests of each sample alone, under other weights or laws.
+    comparison : Comparison, optional
+        Measured and simulated force in N at each load.
+    simulated : DataFrame, optional
+        One row per run of the model: sample, pressure_Pa, normal_load_N (p times the nominal area of the campaign),
+        angle_deg, seed, static_N, sliding_N.
+    example_runs : tuple of Run
+        One full force trace of the model per sample.
+    budget : DataFrame, optional
+        Uncertainty budget of every fitted number, one row per component.
+    power : tuple of str
+        The differences that this campaign could detect, as sentences.
+    outlying : tuple of str
+        Outlying pulls and specimens, as sentences.
+    differences : DataFrame, optional
+        Differences between samples measured on the same specimens, one row per pair of samples, regime and number.
+    laws : DataFrame, optional
+        The candidate laws of every sample, compared by held-out loads.
+    dependence : DataFrame, optional
+        How T/N changes with each recorded variable.
+    notes : tuple of str
+        What was left out, and what a reader must know of the model runs, as sentences.
+    doubts : tuple of Doubt
+        Numbers outside their broad physical bounds.
+    undiagnosed : str
+        Why there is no diagnosis.
 
     Examples
     --------
@@ -529,7 +700,7 @@ class Study:
     dependence: pd.DataFrame | None = None
     notes: tuple[str, ...] = ()
     doubts: tuple[Doubt, ...] = ()
-    undiagnosed: str = ""  # why there is no diagnosis
+    undiagnosed: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "fits", Fits(self.fits))  # the record is frozen

@@ -44,21 +44,57 @@ def _silent(stage: str, done: int, total: int) -> None:
 @displayed()
 @dataclass(frozen=True)
 class StudyOptions:
-    """Options of a study; each is recorded with the results."""
+    """Options of a study; each is recorded with the results.
+
+    Parameters
+    ----------
+    rule : str
+        How static and sliding friction are read from a trace, a name in ``tribo.traces.RULES``.
+    weights : "relative", "ratio", "force" or "repeats"
+        Which scatter is taken as constant over the loads; see :func:`tribo.fit`.
+    zero, load_zero : str
+        Zero of the force and of the recorded normal load, for tests without their own: "before contact", "at rest",
+        "none", a number in N, or "[from, to]" in s.
+    no_model : bool
+        Leave the spring-block model out.
+    flat : str
+        The sample that calibrates the model; empty: F, or the only flat sample.
+    runs : int
+        Simulations per sample and load.
+    seed : int
+        Seed of all random numbers.
+    jobs : int
+        Processes at once; no result depends on it.
+    laws : Path, optional
+        Folder with laws of earlier campaigns.
+    overrides : Path, optional
+        Table of decisions made by hand about single pulls.
+    kept : Path, optional
+        Folder of finished simulations and diagnosis, used again by the next start.
+    scheduler : str, optional
+        Address of a dask scheduler that runs the simulations.
+
+    Examples
+    --------
+    >>> options = tribo.StudyOptions(rule="astm_d1894", no_model=True)
+    >>> study = tribo.study(tribo.load_campaign(tribo.data_dir() / "example"), options, until="ingest")
+    >>> study.ingested.pulls["T001"].rule
+    'astm_d1894'
+    """
 
     rule: str = "first_peak"
     weights: Weights = "relative"
-    zero: str = ""  # of the force, for tests without their own
-    load_zero: str = ""  # of the recorded normal load
-    no_model: bool = False  # report without the spring-block model
-    flat: str = ""  # the sample that calibrates the model; empty: F, or the only flat sample
+    zero: str = ""
+    load_zero: str = ""
+    no_model: bool = False
+    flat: str = ""
     runs: int = 4
     seed: int = 0
     jobs: int = 2
-    laws: Path | None = None  # folder with laws of earlier campaigns
-    overrides: Path | None = None  # table of decisions made by hand about single pulls
-    kept: Path | None = None  # folder of finished simulations and diagnosis, used again by the next start
-    scheduler: str | None = None  # address of a dask scheduler that runs the simulations
+    laws: Path | None = None
+    overrides: Path | None = None
+    kept: Path | None = None
+    scheduler: str | None = None
 
     @property
     def model_runs(self) -> ModelRuns:
@@ -222,6 +258,19 @@ def compare(
         No flat sample to calibrate on, or no nominal area.
     FitError, SimulationError
         The flat sample gives no law, or the model cannot be run for a pattern.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> campaign = tribo.load_campaign(tribo.data_dir() / "example")
+    >>> few = tuple(test for test in campaign.tests if test.sample in "FA" and test.normal_load_N > 0.4)
+    >>> ingested = tribo.ingest(replace(campaign, tests=few))
+    >>> study = tribo.compare(ingested, tribo.fit(ingested), tribo.StudyOptions(runs=2))
+    >>> for row in study.comparison.rows:
+    ...     if row.sample == "A" and row.regime == "static":
+    ...         print(f"{row.normal_load_N:.2f} N: {row.measured_N:.1f} N, of the model {row.simulated_N:.1f} N")
+    0.51 N: 3.7 N, of the model 3.3 N
+    1.37 N: 8.8 N, of the model 7.0 N
     """
     from tribo.comparison.prediction import predict
     from tribo.comparison.side_by_side import put_side_by_side

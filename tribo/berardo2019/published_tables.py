@@ -13,20 +13,39 @@ BERARDO2019 = "berardo2019"
 
 
 def load_table1() -> pd.DataFrame:
-    """Table 1 of Berardo et al. (2019): the patterns, one row per sample.
+    """Table 1 of Berardo et al. (2019): the patterns.
 
-    Columns: sample, cavity (none, circle, rectangle), size_x_um, size_y_um (the diameter twice for a circle),
-    pitch_x_um, pitch_y_um, area_fraction_printed, area_fraction_computed (from the sizes printed beside it),
-    area_fraction_model (of the paper's 85 x 85 blocks). NaN where a flat sample has no value.
+    Returns
+    -------
+    DataFrame
+        One row per sample: sample, cavity (none, circle, rectangle), size_x_um, size_y_um (the diameter twice for a
+        circle), pitch_x_um, pitch_y_um (lengths in um), area_fraction_printed, area_fraction_computed (from the sizes
+        printed beside it), area_fraction_model (of the paper's 85 x 85 blocks). NaN where a flat sample has no value.
+
+    Examples
+    --------
+    >>> patterns = tribo.load_table1().set_index("sample")
+    >>> float(patterns.loc["C", "size_x_um"]), round(float(patterns.loc["C", "area_fraction_computed"]), 3)
+    (15.0, 0.558)
     """
     return _read("table1.csv")
 
 
 def load_table2() -> pd.DataFrame:
-    """Table 2 of Berardo et al. (2019) in long form, one row per sample, regime and source.
+    """Table 2 of Berardo et al. (2019) in long form.
 
-    Columns: sample, regime (static, sliding), source (experiment, simulation), mu, mu_sd, tau0_kPa,
-    tau0_sd_kPa. The standard deviations are as printed; the covariance of mu and tau0 is not published.
+    Returns
+    -------
+    DataFrame
+        One row per sample, regime and source: sample, regime (static, sliding), source (experiment, simulation), mu,
+        mu_sd (no unit), tau0_kPa, tau0_sd_kPa (kPa). The standard deviations are as printed; the covariance of mu and
+        tau0 is not published.
+
+    Examples
+    --------
+    >>> table = tribo.load_table2()
+    >>> len(table), float(table.query("sample == 'F' and regime == 'static' and source == 'experiment'")["mu"].iloc[0])
+    (24, 4.76)
     """
     return _read("table2.csv")
 
@@ -67,7 +86,16 @@ def load_model_parameters() -> pd.DataFrame:
 def contradictions() -> pd.DataFrame:
     """Points on which the paper contradicts itself or gives no value.
 
-    Columns: topic, one_place, other_place, effect, tribo_default.
+    Returns
+    -------
+    DataFrame
+        One row per point, all text: topic, one_place, other_place, effect, tribo_default.
+
+    Examples
+    --------
+    >>> points = tribo.contradictions().set_index("topic")
+    >>> points.loc["pitch of pattern S along x", "tribo_default"]
+    '220 x 120 um'
     """
     return _read("contradictions.csv")
 

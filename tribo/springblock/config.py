@@ -160,9 +160,9 @@ class SimConfig:
         The run ends at ``duration_s``, or where that is None at ``duration_peaks`` times the time of the peak.
     window_start_peaks, window_end_peaks
         Sliding window in units of the peak time; the end is that of the run by default.
-    peak_rule
+    peak_rule, peak_drop
         "highest" takes the largest force of the run as static friction, "first" the first maximum after which
-        the force fell by ``peak_drop``.
+        the force fell by the share ``peak_drop``.
     rest_tolerance
         A cavity block rests once its force is below this share of the mean sliding threshold. At 2e-3 static
         friction of single runs stays within 0.1 % of the reference engine (docs/results/simulator-accuracy.md).
