@@ -5,6 +5,8 @@ from __future__ import annotations
 import doctest
 import inspect
 import re
+import shutil
+import textwrap
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -94,6 +96,24 @@ def test_the_example_of_a_public_name_gives_what_it_says(name: str, monkeypatch:
     results = [doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(example) for example in examples]
     assert sum(result.attempted for result in results)
     assert not sum(result.failed for result in results)
+
+
+@pytest.mark.slow
+def test_the_python_of_the_readme_and_of_its_reference_runs_as_written(
+    small_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    readme = (DOCS.parent / "README.md").read_text(encoding="utf-8").split("\nIn Python:\n")[1].split("\n## ")[0]
+    blocks = re.findall(r"```python\n(.*?)```", (DOCS / "reference" / "python.md").read_text(encoding="utf-8"), re.DOTALL)
+    shutil.copytree(small_campaign, tmp_path / "my-campaign")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(textwrap.dedent(readme), names)
+    assert Path("out/report.html").is_file()
+    shutil.rmtree("out")
+    for block in blocks:
+        exec(block, names)
+    assert Path("out/report.html").is_file()
+    assert Path("misfit.png").is_file()
 
 
 @pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda page: str(page.relative_to(DOCS)))
