@@ -103,7 +103,8 @@ def test_the_python_of_the_readme_and_of_its_reference_runs_as_written(
     small_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     readme = (DOCS.parent / "README.md").read_text(encoding="utf-8").split("\nIn Python:\n")[1].split("\n## ")[0]
-    blocks = re.findall(r"```python\n(.*?)```", (DOCS / "reference" / "python.md").read_text(encoding="utf-8"), re.DOTALL)
+    reference = (DOCS / "reference" / "python.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", reference, re.DOTALL)
     shutil.copytree(small_campaign, tmp_path / "my-campaign")
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {}

@@ -360,14 +360,14 @@ def naming_set_aside(ingested: Ingested) -> Iterator[None]:
         raise FitError((*why.problems, *problems)) from why
 
 
-def with_doubts(walked: Study) -> Study:
+def with_doubts(study: Study) -> Study:
     """The study with the numbers that lie outside their broad physical bounds."""
     from tribo.plausibility import doubts_of
 
-    fits = walked.fits
+    fits = study.fits
     with suppress(FitError):
-        fits = fits or fit(walked.ingested)
-    return replace(walked, doubts=doubts_of(walked.ingested.campaign, walked.ingested, _alone(fits)))
+        fits = fits or fit(study.ingested)
+    return replace(study, doubts=doubts_of(study.ingested.campaign, study.ingested, _alone(fits)))
 
 
 def without_model(campaign: Campaign, options: StudyOptions) -> str:
@@ -384,12 +384,12 @@ def without_model(campaign: Campaign, options: StudyOptions) -> str:
     return ""
 
 
-def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
+def assess(study: Study, options: StudyOptions = DEFAULTS) -> Study:
     """Add to a study: fits with other weights and laws, uncertainty budget, power and outlying pulls.
 
     Parameters
     ----------
-    walked : Study
+    study : Study
         A study with its fits, from :func:`compare` or ``study(campaign, until="fit")``.
     options : StudyOptions, optional
         ``weights`` of the fits, and the folder ``kept`` of finished results.
@@ -408,9 +408,9 @@ def assess(walked: Study, options: StudyOptions = DEFAULTS) -> Study:
     """
     from tribo.fitting.assessment import assessment
 
-    made_from = (walked.ingested, walked.fits, options.weights)
-    looks = kept_or_made(options.kept, "assessment", made_from, lambda: assessment(*made_from), ASSESSED_BY)
-    return replace(walked, **looks)
+    made_from = (study.ingested, study.fits, options.weights)
+    found = kept_or_made(options.kept, "assessment", made_from, lambda: assessment(*made_from), ASSESSED_BY)
+    return replace(study, **found)
 
 
 def with_fits(read: Study, weights: Weights = "relative") -> Study:

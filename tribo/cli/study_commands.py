@@ -400,10 +400,11 @@ def discover(
 @output_options()
 @command_options
 def compare_reports(console: Console, first: Path, second: Path, out: Output, **_: Any) -> int:
-    """Compare two reports: FIRST and SECOND are output folders of tribo report.
+    """Compare two reports.
 
-    Writes compare.html, with the findings and figures of both side by side, and compare.csv, with the difference of mu,
-    tau0 and T of every sample that both have and its 95 % interval.
+    FIRST and SECOND are output folders of tribo report. Writes compare.html, with the findings and figures of both
+    side by side, and compare.csv, with the difference of mu, tau0 and T of every sample that both have and its 95 %
+    interval.
     """
     from tribo.report.compare_reports import write_comparison
     from tribo.report.provenance import provenance_of_comparison

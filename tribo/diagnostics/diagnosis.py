@@ -90,7 +90,7 @@ def examine(
     progress : callable, optional
         Called with a stage, the steps done and the steps there are.
     replicates : (int, int)
-        Simulated campaigns at most: for the first look, and for what a cause leaves.
+        Simulated campaigns at most: for the baseline, and for what a cause leaves.
 
     Returns
     -------

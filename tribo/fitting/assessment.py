@@ -45,9 +45,9 @@ def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> di
         if area is not None:
             with suppress(FitError):
                 power += [p.text() for p in power_of_campaign(table, regime, area, weights=weights)]
-        for look in (outlying_pulls, outlying_specimens):
+        for search in (outlying_pulls, outlying_specimens):
             with suppress(FitError):
-                outlying += [found.text() for found in look(table, regime, area)]
+                outlying += [found.text() for found in search(table, regime, area)]
     return {
         "other_fits": _other_fits(ingested, fits, weights),
         "budget": pd.concat(parts, ignore_index=True) if parts else None,
@@ -202,7 +202,9 @@ def _specimen_forces(
     return np.array(names)[above], np.array(samples)[above], forces[above]
 
 
-def _apart(names: np.ndarray, samples: np.ndarray, log_force: FloatArray, regime: Regime, looks: int) -> list[Outlying]:
+def _apart(
+    names: np.ndarray, samples: np.ndarray, log_force: FloatArray, regime: Regime, comparisons: int
+) -> list[Outlying]:
     from statsmodels.robust.norms import HuberT
     from statsmodels.robust.robust_linear_model import RLM
 
@@ -216,7 +218,7 @@ def _apart(names: np.ndarray, samples: np.ndarray, log_force: FloatArray, regime
     if scale == 0:
         return []
     score = np.abs(residual) / (scale * np.sqrt(1 - leverage))
-    limit = _limit(looks * len(names), dof)
+    limit = _limit(comparisons * len(names), dof)
     return [
         Outlying(
             "specimen", str(names[k]), str(samples[k]), regime,
@@ -226,12 +228,12 @@ def _apart(names: np.ndarray, samples: np.ndarray, log_force: FloatArray, regime
     ]  # fmt: skip
 
 
-def _limit(looks: int, dof: float) -> float:
-    """Score that the largest of ``looks`` passes with probability FALSE_ALARMS (Bonferroni, t with ``dof``).
+def _limit(comparisons: int, dof: float) -> float:
+    """Score that the largest of ``comparisons`` passes with probability FALSE_ALARMS (Bonferroni, t with ``dof``).
 
     The robust scale is worth about 0.37 of the degrees of freedom of a standard deviation (the efficiency of
     the median absolute deviation under Gaussian scatter).
     """
     from scipy.stats import t
 
-    return float(t.ppf(1 - FALSE_ALARMS / (2 * looks), max(0.37 * dof, 1.0)))
+    return float(t.ppf(1 - FALSE_ALARMS / (2 * comparisons), max(0.37 * dof, 1.0)))

@@ -44,7 +44,7 @@ def with_laws(
     """The same diagnosis with laws as further layers: those ``known`` that hold, and those of what is left.
 
     A cause that loses against a law of its own column is no longer a cause. Every campaign is searched: a law of one
-    sample, say, may not show in any look at the whole campaign.
+    sample, say, may not show in any contrast of the whole campaign.
     """
     rng = np.random.default_rng(seed)
     standing, lost, forms = without_refuted_causes(explained(d))
