@@ -127,15 +127,15 @@ def build(console: Console, drop: Path, site: Path, dry_run: bool, **options: An
     index page lists all of them. If DROP holds NAME.overrides.csv, it is applied to campaign NAME. Exit status 75:
     another build of the site is running.
     """
-    from tribo.site.build import BuildOptions, Watch, build_site
+    from tribo.site.build import BuildOptions, build_site
 
     chosen = BuildOptions(**options)
     if dry_run:
         with console.progress() as checks:
-            built = build_site(drop, site, chosen, dry_run=True, watch=Watch(checks=checks))
+            built = build_site(drop, site, chosen, dry_run=True, checks=checks)
     else:
         with build_progress(console) as steps:
-            built = build_site(drop, site, chosen, watch=Watch(steps=steps))
+            built = build_site(drop, site, chosen, steps=steps)
     console.result(built.as_dict(), _words(built, dry_run, all_of_them=console.verbosity > 0))
     unusable = any(status == "unusable" for status in built.status.values())
     return SOME_SET_ASIDE if unusable or built.waiting else DONE

@@ -164,15 +164,15 @@ def bench(console: Console, campaign: Path | None, large: bool, jobs: int, **_: 
 
     Times are compared with those of reference programs, measured alternately in the same run.
     """
-    from tribo.cli.setup_commands import against_pandas, in_words_reading_speed, timing_in_words
+    from tribo.cli.setup_commands import against_pandas, ratio_in_words, timing_in_words
     from tribo.files import data_dir
     from tribo.springblock.engine_speed import simulator_benchmarks
 
     with console.progress() as progress:
         ratios = against_pandas(campaign or data_dir() / "example", jobs)
         timings = simulator_benchmarks(lambda done, total: progress("timing the simulator", done, total), large=large)
-    record = {"reading": [vars(r) for r in ratios], "simulator": [t.record() for t in timings]}
-    console.result(record, "\n".join([*map(in_words_reading_speed, ratios), *map(timing_in_words, timings)]))
+    record = {"reading": ratios, "simulator": [t.record() for t in timings]}
+    console.result(record, "\n".join([*map(ratio_in_words, ratios), *map(timing_in_words, timings)]))
 
 
 @main.command()

@@ -8,8 +8,7 @@ import re
 import statistics
 import sys
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -192,39 +191,21 @@ def in_words(found: dict[str, Any]) -> str:
 Work = Callable[[], Any]
 
 
-@dataclass(frozen=True)
-class Ratio:
-    """One line of the benchmark: seconds of two ways to do the same, and their ratio (ours over the other)."""
+def compare_in_turns(
+    name: str, ours: tuple[str, Work], other: tuple[str, Work], wanted: str, rounds: int = 5
+) -> dict[str, Any]:
+    """Seconds of two ways to do the same, timed alternately after one round of each that is not counted.
 
-    name: str
-    ours: str
-    other: str
-    ours_s: float
-    other_s: float
-    ratio: float
-    lowest: float
-    highest: float
-    wanted: str
-    rounds: int
-
-
-def compare_in_turns(name: str, ours: tuple[str, Work], other: tuple[str, Work], wanted: str, rounds: int = 5) -> Ratio:
-    """Time two tasks alternately, after one round of each that is not counted."""
+    ``ratio`` is the median of ours over the other's, between ``lowest`` and ``highest``.
+    """
     ours[1](), other[1]()
     seconds = [(_timed(ours[1]), _timed(other[1])) for _ in range(rounds)]
     ratios = [a / b for a, b in seconds]
-    return Ratio(
-        name,
-        ours[0],
-        other[0],
-        statistics.median(a for a, _ in seconds),
-        statistics.median(b for _, b in seconds),
-        statistics.median(ratios),
-        min(ratios),
-        max(ratios),
-        wanted,
-        rounds,
-    )
+    return {
+        "name": name, "ours": ours[0], "other": other[0], "ours_s": statistics.median(a for a, _ in seconds),
+        "other_s": statistics.median(b for _, b in seconds), "ratio": statistics.median(ratios),
+        "lowest": min(ratios), "highest": max(ratios), "wanted": wanted, "rounds": rounds,
+    }  # fmt: skip
 
 
 def _timed(work: Work) -> float:
@@ -233,7 +214,7 @@ def _timed(work: Work) -> float:
     return time.perf_counter() - start
 
 
-def against_pandas(path: Path, jobs: int = 1) -> list[Ratio]:
+def against_pandas(path: Path, jobs: int = 1) -> list[dict[str, Any]]:
     """Time of reading a campaign, and of reducing it to pulls, relative to pandas.read_csv with known file layouts."""
     import pandas as pd
 
@@ -271,13 +252,12 @@ def against_pandas(path: Path, jobs: int = 1) -> list[Ratio]:
         ]
 
 
-def in_words_reading_speed(ratio: Ratio) -> str:
+def ratio_in_words(ratio: Mapping[str, Any]) -> str:
     """One ratio as a line."""
     return (
-        f"{ratio.name}: {ratio.ours} {ratio.ours_s:.3g} s, {ratio.other} {ratio.other_s:.3g} s, "
-        f"ratio {ratio.ratio:.2f} ({ratio.lowest:.2f} to {ratio.highest:.2f} in {ratio.rounds} rounds; "
-        f"target {ratio.wanted})"
-    )
+        "{name}: {ours} {ours_s:.3g} s, {other} {other_s:.3g} s, ratio {ratio:.2f} "
+        "({lowest:.2f} to {highest:.2f} in {rounds} rounds; target {wanted})"
+    ).format(**ratio)
 
 
 def timing_in_words(timing: Timing) -> str:

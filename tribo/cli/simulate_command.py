@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from tribo.lawsearch.grammar import WrittenLaw
     from tribo.records import Run
     from tribo.springblock import SimConfig
-    from tribo.springblock.ensemble import Work
 
 
 # options that describe the runs; a design file may replace them
@@ -94,8 +93,10 @@ def simulate(
     runs.
     """
     from tribo.cache.own_folder import check_file, only_writer_of
+    from tribo.display import exact_text
     from tribo.mechanisms_in_model import columns_from, parse_given, parse_with
     from tribo.springblock.design_file import asked_runs, described_by_options, read_design, together
+    from tribo.springblock.ensemble import FRICTION, Work
     from tribo.springblock.kept_runs import fault_of, run_stored
     from tribo.springblock.results_file import ENSEMBLE, ONE_RUN, kind_of
     from tribo.springblock.run import simulate as run_model
@@ -116,14 +117,15 @@ def simulate(
         lambda: parse_with(mechanisms),
         lambda: parse_given(given),
     )
-    added = Added(acting, conditions, laws, columns)
+    changed = partial(pulled, acting=acting, conditions=conditions, laws=laws, columns=columns)
     check_file(out, ONE_RUN if one else ENSEMBLE, kind_of, force)
     if one:
         with only_writer_of(out, wait_s):
-            run = pulled(runs[0], added) if acting or laws else run_model(runs[0], jobs)
+            run = changed(runs[0]) if acting or laws else run_model(runs[0], jobs)
             _one_run(console, run, out)
     else:
-        work = _work(added)
+        label = exact_text((acting, conditions)) + (exact_text((laws, columns)) if laws else "")
+        work = Work(changed, label=label) if acting or laws else FRICTION
         if force and out.exists() and fault_of(runs, out, work) is not None:
             out.unlink()
         with console.progress() as progress:
@@ -133,25 +135,25 @@ def simulate(
         _say_ensemble(console, ran, out, table2)
 
 
-@dataclass(frozen=True)
-class Added:
-    """What is added to the model: mechanisms, the conditions of the test, laws with their values, and their columns."""
+def pulled(
+    config: SimConfig,
+    acting: Mapping[str, Any],
+    conditions: Mapping[str, float],
+    laws: tuple[tuple[WrittenLaw, tuple[float, ...]], ...],
+    columns: Mapping[str, str],
+) -> Run:
+    """One run with laws and mechanisms in the model; at module level so that workers can import it.
 
-    acting: Mapping[str, Any]
-    conditions: Mapping[str, float]
-    laws: tuple[tuple[WrittenLaw, tuple[float, ...]], ...] = ()
-    columns: Mapping[str, str] = field(default_factory=dict)
-
-
-def pulled(config: SimConfig, added: Added) -> Run:
-    """One run with laws and mechanisms in the model; at module level so that workers can import it."""
+    ``laws`` hold their values; ``columns`` are the recorded columns that they stand for, ``conditions`` those of the
+    test.
+    """
     import numpy as np
 
     from tribo.mechanisms_in_model import simulate_with, with_law
 
-    for law, values in added.laws:
-        config = with_law(config, (law.mechanism(), np.array(values)), added.conditions, added.columns)
-    return simulate_with(config, added.acting, **added.conditions)
+    for law, values in laws:
+        config = with_law(config, (law.mechanism(), np.array(values)), conditions, columns)
+    return simulate_with(config, acting, **conditions)
 
 
 def _laws_in(text: str) -> tuple[tuple[tuple[WrittenLaw, tuple[float, ...]], ...], str]:
@@ -184,20 +186,6 @@ def _one_run(console: Console, run: Run, out: Path) -> None:
         f"{run.sample} at {run.pressure_Pa / 1e3:g} kPa: static T/N {run.static_friction:.4f}, sliding T/N "
         f"{run.sliding_friction:.4f} (mean from {start:.2f} to {end:.2f} ms), written to {out}",
     )
-
-
-def _work(added: Added) -> Work:
-    """What is done for each run of an ensemble: the run itself, with what is added to the model."""
-    from functools import partial
-
-    from tribo.display import exact_text
-    from tribo.springblock.ensemble import FRICTION, Work
-
-    if not added.acting and not added.laws:
-        return FRICTION
-    label = exact_text((added.acting, added.conditions))
-    label += exact_text((added.laws, added.columns)) if added.laws else ""
-    return Work(partial(pulled, added=added), label=label)
 
 
 def _say_ensemble(console: Console, table: pd.DataFrame, out: Path, table2: bool) -> None:

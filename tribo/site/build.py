@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -75,15 +76,8 @@ class BuildOptions:
         )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Watch:
-    """What is told of a build while it works: ``steps`` how far it is, ``checks`` the exports read by a dry run."""
-
-    steps: Callable[[Progress], None] = lambda progress: None
-    checks: Callable[[str, int, int], None] = lambda stage, done, total: None
-
-
-UNWATCHED = Watch()
+def _untold(*_: Any) -> None:
+    """Nobody is told how far a build is."""
 
 
 @dataclass(frozen=True)
@@ -118,11 +112,18 @@ def workflow_dir() -> Path:
 
 
 def build_site(
-    drop: Path, site: Path, options: BuildOptions, *, dry_run: bool = False, watch: Watch = UNWATCHED
+    drop: Path,
+    site: Path,
+    options: BuildOptions,
+    *,
+    dry_run: bool = False,
+    steps: Callable[[Progress], None] = _untold,
+    checks: Callable[[str, int, int], None] = _untold,
 ) -> Built:
     """Bring the site up to date with a folder of campaigns; with ``dry_run`` only check what would be built.
 
-    A dry run lists the steps with their reasons, and opens every export of the campaigns that are due.
+    A dry run lists the steps with their reasons, and opens every export of the campaigns that are due. ``steps`` is
+    told how far a build is, ``checks`` (stage, done, total) how many exports a dry run has read.
 
     Raises
     ------
@@ -142,11 +143,11 @@ def build_site(
     check_site(site, drop, options.force)
     state = site.resolve() / STATE
     if dry_run:
-        return _planned(drop, state, options, watch)
+        return _planned(drop, state, options, checks)
     busy = Problem("busy", f"another build of this site is running; {WAIT}", file=str(site))
     with only_writer(state / "lock", options.wait_s, lasting=True, busy=busy) as descriptor:
         _clear_leftovers(state)
-        return _built(drop, state, options, watch, descriptor)
+        return _built(drop, state, options, steps, descriptor)
 
 
 def _clear_leftovers(state: Path) -> None:
@@ -159,15 +160,19 @@ def _clear_leftovers(state: Path) -> None:
     clear_abandoned(place_of_temporary_files(), PREFIX)
 
 
-def _planned(drop: Path, state: Path, options: BuildOptions, watch: Watch) -> Built:
+def _planned(drop: Path, state: Path, options: BuildOptions, checks: Callable[[str, int, int], None]) -> Built:
     """What a build would do, and what it would meet in the campaigns that are due."""
     found, ready, due = _due(drop, state / "dry-run", options)
     config = _configuration(found, ready, state / "dry-run.json", options)
     steps = _steps(state, ready, due, config, options)
-    said = _snakemake(state, config, options, ("--dry-run", *_forced(due, state)), steps, None, UNWATCHED)
+    said = _snakemake(state, config, options, ("--dry-run", *_forced(due, state)), steps, None, _untold)
     if said.returncode:
         raise BuildError(_failures(state, said.stdout))
-    checked = {c.name: _checked(c, options, watch) for c in found if c.name in due}
+    checked = {
+        c.name: check(c.path, options.of_study(c.overrides), "report", progress=partial(_of_campaign, c.name, checks))
+        for c in found
+        if c.name in due
+    }
     status = {c.name: "unusable" if c.refused else _status(c.name, state) for c in found if c.name not in due}
     status |= {name: "unusable" if look.faults else "to be built" for name, look in checked.items()}
     return Built(
@@ -175,11 +180,8 @@ def _planned(drop: Path, state: Path, options: BuildOptions, watch: Watch) -> Bu
     )  # fmt: skip
 
 
-def _checked(campaign: Dropped, options: BuildOptions, watch: Watch) -> Checked:
-    def progress(stage: str, done: int, total: int) -> None:
-        watch.checks(f"{campaign.name}: {stage}", done, total)
-
-    return check(campaign.path, options.of_study(campaign.overrides), "report", progress=progress)
+def _of_campaign(name: str, checks: Callable[[str, int, int], None], stage: str, done: int, total: int) -> None:
+    checks(f"{name}: {stage}", done, total)
 
 
 def _due(
@@ -198,12 +200,14 @@ def _refused(found: Sequence[Dropped]) -> dict[str, tuple[str, ...]]:
     return {c.name: c.refused for c in found if c.refused}
 
 
-def _built(drop: Path, state: Path, options: BuildOptions, watch: Watch, descriptor: int | None) -> Built:
+def _built(
+    drop: Path, state: Path, options: BuildOptions, tell: Callable[[Progress], None], descriptor: int | None
+) -> Built:
     found, ready, due = _due(drop, state / "inputs", options)
     config = _configuration(found, ready, state / "build.json", options)
     steps = _steps(state, ready, due, config, options)
     (state / JOURNAL).unlink(missing_ok=True)
-    said = _snakemake(state, config, options, _forced(due, state), steps, descriptor, watch)
+    said = _snakemake(state, config, options, _forced(due, state), steps, descriptor, tell)
     write_text(state / "log" / "snakemake.log", said.stdout)
     collect_laws(state.parent / CURRENT, state)
     dated = date_build(state.parent, options.keep)
@@ -304,7 +308,7 @@ def _configuration(found: Sequence[Dropped], ready: Mapping[str, Any], file: Pat
 
 def _snakemake(
     state: Path, config: Path, options: BuildOptions, more: Sequence[str], steps: Sequence[Step],
-    descriptor: int | None, watch: Watch,
+    descriptor: int | None, tell: Callable[[Progress], None],
 ) -> subprocess.CompletedProcess[str]:
     """Run the workflow; the lock of the site is what keeps two apart, so that Snakemake needs none of its own.
 
@@ -316,7 +320,7 @@ def _snakemake(
         "--configfile", str(config), "--profile", str(_profile_folder(options.profile)), "--workflow-profile", "none",
         "--cores", str(options.jobs), "--nolock", "--nocolor", *more,
     ]  # fmt: skip
-    return run_workflow(command, state, steps, descriptor, watch.steps)
+    return run_workflow(command, state, steps, descriptor, tell)
 
 
 def _status(name: str, state: Path) -> str:

@@ -186,17 +186,6 @@ def _number(cell: str) -> float:
 KEPT = "laws"  # folder in the state of a site, with the laws of each campaign in a folder of its name
 
 
-@dataclass(frozen=True)
-class LawAnswer:
-    """What the campaign ``tested_in`` says of a law: held, not held, or cannot be told."""
-
-    law: str
-    found_in: str
-    formula: str
-    tested_in: str
-    answer: str
-
-
 def collect_laws(current: Path, state: Path) -> None:
     """Copy the laws of every report to the state of the site, where the steps of the next build find them.
 
@@ -213,10 +202,13 @@ def collect_laws(current: Path, state: Path) -> None:
             write_text(kept / name, text)
 
 
-def answers_of(current: Path) -> tuple[LawAnswer, ...]:
-    """The answers of all reports, by law and then by campaign."""
-    found = [answer for verdict in _of_reports(current, "verdict.json") for answer in _in_verdict(verdict)]
-    return tuple(sorted(found, key=lambda a: (a.law, a.tested_in)))
+def answers_of(current: Path) -> list[dict[str, str]]:
+    """What each campaign says of each law of an earlier one, by law and then by campaign.
+
+    Columns: law, found_in, formula, tested_in, answer (held, not held, or cannot be told).
+    """
+    answers = [answer for verdict in _of_reports(current, "verdict.json") for answer in _in_verdict(verdict)]
+    return sorted(answers, key=lambda a: (a["law"], a["tested_in"]))
 
 
 def _of_reports(folder: Path, pattern: str) -> list[Path]:
@@ -224,34 +216,36 @@ def _of_reports(folder: Path, pattern: str) -> list[Path]:
     return [path for report in found_in(folder, "*") for path in found_in(report, pattern)]
 
 
-def _in_verdict(path: Path) -> list[LawAnswer]:
+def _in_verdict(path: Path) -> list[dict[str, str]]:
     """The answers of one report; none where its verdict is damaged. Raises OSError where it cannot be read."""
     try:
         known: Sequence[Mapping[str, Any]] = json.loads(text_of(path))["model"].get("known_laws", ())
         return [
-            LawAnswer(str(law["law"]), str(law["found_in"]), str(law["formula"]), path.parent.name, str(law["answer"]))
+            {
+                "law": str(law["law"]), "found_in": str(law["found_in"]), "formula": str(law["formula"]),
+                "tested_in": path.parent.name, "answer": str(law["answer"]),
+            }
             for law in known
-        ]
+        ]  # fmt: skip
     except (FileNotFoundError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return []
 
 
-def laws_csv(answers: Sequence[LawAnswer]) -> str:
+def laws_csv(answers: Sequence[Mapping[str, str]]) -> str:
     """laws.csv: one row a law and campaign."""
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["law", "found_in", "formula", "tested_in", "answer"])
-    rows = ((a.law, a.found_in, a.formula, a.tested_in, a.answer) for a in answers)
-    writer.writerows([for_spreadsheet(cell) for cell in row] for row in rows)
+    writer = csv.DictWriter(text, ["law", "found_in", "formula", "tested_in", "answer"], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({name: for_spreadsheet(cell) for name, cell in row.items()} for row in answers)
     return text.getvalue()
 
 
-def laws_in_words(answers: Sequence[LawAnswer]) -> list[str]:
+def laws_in_words(answers: Sequence[Mapping[str, str]]) -> list[str]:
     """One sentence a law: in which campaigns it held and in which it did not."""
     said = []
-    for law in dict.fromkeys(a.law for a in answers):
-        here = [a for a in answers if a.law == law]
-        by = {answer: [a.tested_in for a in here if a.answer == answer] for answer in ("held", "not held")}
+    for law in dict.fromkeys(a["law"] for a in answers):
+        here = [a for a in answers if a["law"] == law]
+        by = {answer: [a["tested_in"] for a in here if a["answer"] == answer] for answer in ("held", "not held")}
         parts = [f"{answer} in {', '.join(names)}" for answer, names in by.items() if names]
-        said.append(f"{law} ({here[0].formula}): {'; '.join(parts) or 'no later campaign can tell'}.")
+        said.append(f"{law} ({here[0]['formula']}): {'; '.join(parts) or 'no later campaign can tell'}.")
     return said
