@@ -90,7 +90,7 @@ def in_short(value: object) -> str:
         return "" if value is None or value != value else f"{value:.6g}"
     if isinstance(value, str):
         return _cut(value)
-    if hasattr(value, "columns") and hasattr(value, "index"):
+    if hasattr(type(value), "columns") and hasattr(type(value), "index"):
         return _cut(f"table of {_count(len(value.index), 'row')}: {', '.join(map(str, value.columns))}")
     if hasattr(value, "shape") and hasattr(value, "dtype"):
         return _array_in_short(value)

@@ -46,7 +46,7 @@ def deviations(seed: int, noise: float = 0.05, slope: float = -1.4, n: int = 8) 
 def published() -> Deviations:
     table = load_table2()
     measured, simulated = (table[table["source"] == which] for which in ("experiment", "simulation"))
-    return table_deviations(read_table(measured, simulated, readings()[0].correlation))
+    return table_deviations(read_table(measured, simulated, readings()[0][1]))
 
 
 def test_a_law_of_the_cavity_share_is_found_beyond_chance_and_predicts_patterns_left_out() -> None:

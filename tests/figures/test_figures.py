@@ -186,7 +186,7 @@ def test_fig5_draws_the_model_and_every_pattern_at_scale(study: Study) -> None:
     figure = FIGURES["fig5"].draw(FIGURES["fig5"].numbers(study))
     titles = [ax.get_title(loc="left") for ax in figure.axes]
     assert titles[:2] == ["Mesh, from above", "Side view, not to scale"]
-    assert titles[2:8] == list(study.comparison.area_fractions) if study.comparison else []
+    assert titles[2:8] == list(study.ingested.campaign.samples)
     panels = dict(zip(titles, figure.axes, strict=True))
     mark = panels["B"].lines[0]  # circles of 10 µm at a pitch of 15 µm
     on_paper = panels["B"].get_window_extent().width / figure.dpi * 72 / 425

@@ -83,8 +83,8 @@ def test_what_the_friction_varies_with_is_found_and_the_rest_is_not() -> None:
 def test_load_and_run_order_that_rise_together_are_said_to_be_inseparable() -> None:
     load = np.linspace(1, 8, 30)
     rows = dependence(ingested(np.arange(30), load, 0.5 * load**-0.2)).set_index("variable")
-    assert rows.loc["normal_load_N", "inseparable_from"] == "run order"
-    assert rows.loc["cycle", "inseparable_from"] == ""
+    assert rows.loc["normal_load_N", "inseparable_from"] == ("run_order",)
+    assert rows.loc["cycle", "inseparable_from"] == ()
 
 
 def test_the_error_on_loads_left_out_is_known_to_about_a_third_with_six_levels() -> None:

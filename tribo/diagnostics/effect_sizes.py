@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from tribo.diagnostics.contrasts import BEND, Contrast
+from tribo.display import displayed
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray
 
@@ -67,6 +68,7 @@ Between = Literal["mean", "bend", "ends", "groups", "extremes"]
 Run = Literal["rising", "falling", "hump", "hollow"]
 
 
+@displayed()
 @dataclass(frozen=True)
 class Effect:
     """A signed percentage with its 90 % interval, between what it is taken, and the contrast that sees it.

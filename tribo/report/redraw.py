@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -47,7 +48,7 @@ def redrawn(
     if not NARROWEST_MM <= width_mm <= WIDEST_MM:
         allowed = f"{NARROWEST_MM:g} to {WIDEST_MM:g} mm"
         raise CampaignError(Problem("bad_width", "not a width of a page", found=f"{width_mm:g} mm", allowed=allowed))
-    known = {**FIGURES, **FRICTION_FIGURES, **DIAGNOSIS_FIGURES}
+    known: dict[str, Any] = {**FIGURES, **FRICTION_FIGURES, **DIAGNOSIS_FIGURES}
     folder = out / "figures"
     paths = {path.stem: path for path in (found_in(folder, "*.csv") if folder.is_dir() else ()) if path.stem in known}
     texts = {name: text_of(paths[name]) for name in known if name in paths}

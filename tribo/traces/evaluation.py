@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from tribo.display import displayed
 from tribo.errors import Problem, TraceError
 from tribo.records import STANDARD_GRAVITY, Evaluated, FloatArray, Phase, Pull, Restart, Test, Trace
 from tribo.traces.loading import Zero, loading_of, starting_level
@@ -49,6 +50,7 @@ _OFF_LOAD = 0.02  # share by which the recorded load may differ from that of the
 _OFF_SPEED = 0.2  # share by which the travel while sliding may differ from the speed of the test times the time
 
 
+@displayed()
 @dataclass(frozen=True)
 class PullOptions:
     """How a trace is read.
