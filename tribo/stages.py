@@ -272,13 +272,15 @@ def compare(
     0.51 N: 3.7 N, of the model 3.3 N
     1.37 N: 8.8 N, of the model 7.0 N
     """
-    from tribo.comparison.prediction import predict
+    from tribo.comparison.prediction import calibrated_cells, predict
     from tribo.comparison.side_by_side import put_side_by_side
 
     campaign = with_flat_sample(ingested.campaign, options.flat)
     ingested = replace(ingested, campaign=campaign)
     flat = required_flat_sample(campaign)
-    prediction = predict(campaign, _alone(fits), flat, options.model_runs, weights=options.weights, progress=progress)
+    alone, model = _alone(fits), options.model_runs
+    calibrated = calibrated_cells(campaign, alone, flat, model, progress)
+    prediction = predict(campaign, alone, flat, calibrated, model, weights=options.weights, progress=progress)
     return Study(
         ingested,
         fits,
@@ -331,23 +333,20 @@ def study(
     if until == "ingest":
         return with_doubts(Study(ingested))
     with naming_set_aside(ingested):
-        return _from_pulls(ingested, options, until, progress)
-
-
-def _from_pulls(ingested: Ingested, options: StudyOptions, until: Until, progress: Progress) -> Study:
-    """The stages after the reading of exports."""
-    without = without_model(ingested.campaign, options) if until != "fit" else ""
-    fits = Fits()
-    no_law = ""
-    try:
-        fits = fit(ingested, weights=options.weights)
-    except FitError as why:
-        if not without:
-            raise
-        no_law = f"No friction law over load was fitted: {why}."
-    if until == "fit" or without:
-        return assess(with_doubts(Study(ingested, fits, notes=tuple(filter(None, (without, no_law))))), options)
-    return assess(with_doubts(compare(ingested, fits, options, progress=progress)), options)
+        without = without_model(ingested.campaign, options) if until != "fit" else ""
+        fits = Fits()
+        no_law = ""
+        try:
+            fits = fit(ingested, weights=options.weights)
+        except FitError as why:
+            if not without:
+                raise
+            no_law = f"No friction law over load was fitted: {why}."
+        if until == "fit" or without:
+            fitted = Study(ingested, fits, notes=tuple(filter(None, (without, no_law))))
+        else:
+            fitted = compare(ingested, fits, options, progress=progress)
+        return assess(with_doubts(fitted), options)
 
 
 @contextmanager

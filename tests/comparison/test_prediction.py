@@ -14,7 +14,14 @@ from small_lattices import small_lattices
 from tribo import stages
 from tribo.cache.kept_results import DamagedResultWarning
 from tribo.campaign import load_campaign
-from tribo.comparison.prediction import MOST_LOADS, ModelRuns, Prediction, loads_to_simulate, predict
+from tribo.comparison.prediction import (
+    MOST_LOADS,
+    ModelRuns,
+    Prediction,
+    calibrated_cells,
+    loads_to_simulate,
+    predict,
+)
 from tribo.comparison.side_by_side import load_means
 from tribo.errors import CampaignError, FitError
 from tribo.records import LawFit, Regime
@@ -45,7 +52,9 @@ def run(fitted: Fitted, kept: Path, **options: Any) -> tuple[Prediction, set[str
         if stage.startswith("calibrating"):
             computed.add("calibration")
 
-    found = predict(ingested.campaign, fits, "F", ModelRuns(runs=2, kept=kept, **options), progress=progress)
+    model = ModelRuns(runs=2, kept=kept, **options)
+    calibrated = calibrated_cells(ingested.campaign, fits, "F", model, progress)
+    found = predict(ingested.campaign, fits, "F", calibrated, model, progress=progress)
     computed |= {name for name, content in contents(kept).items() if before.get(name) != content}
     return found, computed
 
@@ -132,7 +141,7 @@ def test_the_flat_law_is_all_the_model_sees_of_the_measurement(fitted: Fitted, f
 def test_a_campaign_without_a_flat_law_is_refused(fitted: Fitted) -> None:
     ingested, fits = fitted
     with pytest.raises(FitError, match="flat sample F"):
-        predict(ingested.campaign, tuple(f for f in fits if f.sample != "F"), "F")
+        calibrated_cells(ingested.campaign, tuple(f for f in fits if f.sample != "F"), "F")
 
 
 def test_many_loads_are_thinned_over_their_whole_range(small_campaign: Path) -> None:

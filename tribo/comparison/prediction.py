@@ -242,16 +242,18 @@ def predict(
     campaign: Campaign,
     fits: tuple[LawFit, ...],
     flat: str,
+    calibrated: tuple[LocalFriction, tuple[Cell, ...]],
     model: ModelRuns = MODEL_RUNS,
     *,
     weights: str = "relative",
     progress: Progress = lambda stage, done, total: None,
 ) -> Prediction:
-    """Calibrate the model on the measured flat sample and simulate every measured sample at the campaign's loads.
+    """Simulate every measured sample at the campaign's loads by the model as calibrated on the flat sample.
 
     Parameters
     ----------
     fits : laws measured on the samples, the flat one among them
+    calibrated : local friction and the runs to make, from :func:`calibrated_cells`
     model : number of runs, seed, and where the model is run
     weights : of the fits to the simulated forces
 
@@ -264,7 +266,7 @@ def predict(
     """
     from tribo.springblock import SimConfig
 
-    friction, cells = calibrated_cells(campaign, fits, flat, model, progress)
+    friction, cells = calibrated
     table = run_cells(
         cells, model.kept, model.jobs, model.scheduler,
         lambda done, total: progress("simulating the samples", done, total),
@@ -291,7 +293,13 @@ def calibrated_cells(
     """Local friction from the flat sample alone, and the runs that predict every sample, by sample and load.
 
     Kept runs of other samples, loads, laws or sources are deleted, so that what is kept is of this calibration.
-    Parameters and exceptions are those of :func:`predict`.
+
+    Raises
+    ------
+    FitError
+        The flat sample has no fitted law, static and sliding.
+    SimulationError
+        A pattern that the lattice cannot hold.
     """
     from tribo.springblock import CalibrationRuns, SimConfig, calibrate, stratified_design
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from tribo.display import displayed
 from tribo.springblock.config import PAPER, LocalFriction, SimConfig
-from tribo.springblock.ensemble import Progress, run_ensemble, stratified_design
+from tribo.springblock.ensemble import Progress, check_all, finished_runs, stratified_design
 from tribo.springblock.ensemble_laws import simulated_law
 
 Law = tuple[float, float]
@@ -117,15 +117,11 @@ def calibrate(
         design = stratified_design(
             ["F"], runs.pressures_Pa, runs.repeats, runs.seed, replace(base, friction=friction())
         )
-        total = runs.iterations * len(design)
-        done_before = turn * len(design)
-
-        def report(done: int, _: int, before: int = done_before, total: int = total) -> None:
+        check_all(design)
+        pressure_Pa, friction_of_run = np.zeros(len(design)), np.zeros(len(design))
+        for done, (k, row) in enumerate(finished_runs(design, jobs), start=1):
+            pressure_Pa[k], friction_of_run[k] = row["pressure_Pa"], row["sliding_friction"]
             if progress is not None:
-                progress(before + done, total)
-
-        table = run_ensemble(design, jobs, report)
-        local += np.array(sliding) - simulated_law(
-            table["pressure_Pa"].to_numpy(float), table["sliding_friction"].to_numpy(float)
-        )
+                progress(turn * len(design) + done, runs.iterations * len(design))
+        local += np.array(sliding) - simulated_law(pressure_Pa, friction_of_run)
     return friction()
