@@ -12,7 +12,7 @@ from tribo.errors import SimulationError
 from tribo.mechanisms.record import Base, Conditions
 from tribo.mechanisms.table import MECHANISMS, NAMES
 from tribo.mechanisms_in_model.extended_run import SIMULATED, choice_of, parse_given, parse_with, simulate_with
-from tribo.mechanisms_in_model.on_blocks import conditions_of_run
+from tribo.mechanisms_in_model.on_blocks import RECORDED, conditions_of_run
 from tribo.records import Run
 from tribo.springblock import SimConfig, simulate
 
@@ -102,6 +102,12 @@ def _choice(key: str, config: SimConfig, conditions: Conditions) -> str:
         "pattern_geometry": config.sample[0], "covariate": "column is this",
         "mislabelled_specimen(C)": f" of {config.sample} behaves as C",
     }.get(key, "")  # fmt: skip
+
+
+def test_every_stated_condition_of_a_pull_reaches_the_laws() -> None:
+    stated = {name: 7.5 for name in RECORDED if name != "samples_in_rise"}  # of the recorder alone
+    conditions = conditions_of_run(SMALL, stated)
+    assert {name: float(np.squeeze(getattr(conditions, name))) for name in stated} == stated
 
 
 def test_every_mechanism_of_the_library_can_be_simulated() -> None:

@@ -154,7 +154,7 @@ def _pair(model: ModelFit, test: int, seed: int) -> tuple[SimConfig, dict[str, V
             at_work[f"{name}({here.other_sample})" if here.other_sample else name] = here.values
     known = {
         "hold_s": c.hold_s, "specimen_run": c.specimen_run, "temperature_C": c.temperature_C,
-        "humidity_pct": c.humidity_pct, "speed_m_s": c.speed_m_s, "elapsed_s": c.elapsed_s,
+        "humidity_pct": c.humidity_pct, "speed_m_s": c.speed_m_s, "elapsed_s": c.elapsed_s, "run_order": c.run_order,
     }  # fmt: skip
     recorded = {name: float(values[test]) for name, values in known.items() if np.isfinite(values[test])}
     return config, at_work, recorded | {"nominal_area_m2": c.nominal_area_m2}

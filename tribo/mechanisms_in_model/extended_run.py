@@ -141,8 +141,8 @@ def simulate_with(config: SimConfig, mechanisms: Mapping[str, Values], **recorde
         gives them.
     recorded
         Conditions of the pull that the model itself does not have: hold_s, specimen_run, temperature_C, humidity_pct,
-        speed_m_s of the bench (the model's own clock is scaled), elapsed_s since the zero was taken, samples_in_rise
-        of the recorder, nominal_area_m2 of the sled.
+        speed_m_s of the bench (the model's own clock is scaled), elapsed_s since the zero was taken, run_order of the
+        test, samples_in_rise of the recorder, nominal_area_m2 of the sled.
 
     Returns
     -------

@@ -27,7 +27,7 @@ from tribo.springblock.run import run_of, simulate
 
 RECORDED = {
     "hold_s": 10.0, "specimen_run": 1.0, "temperature_C": 23.0, "humidity_pct": 50.0, "speed_m_s": 2e-4,
-    "elapsed_s": 3600.0, "samples_in_rise": 100.0, "nominal_area_m2": SLED_AREA_M2,
+    "elapsed_s": 3600.0, "run_order": 1.0, "samples_in_rise": 100.0, "nominal_area_m2": SLED_AREA_M2,
 }  # fmt: skip
 
 
@@ -165,7 +165,7 @@ def conditions_of_run(config: SimConfig, recorded: Mapping[str, float]) -> Condi
         cavity_width_m=one(min(size) if size else 0.0), elongation=one(float(long)),
         sample=np.array([config.sample]), pattern=np.array([pattern.name]), specimen=np.array([""]),
         speed_m_s=one(known["speed_m_s"]),
-        hold_s=one(known["hold_s"]), specimen_run=one(known["specimen_run"]), run_order=one(1.0),
+        hold_s=one(known["hold_s"]), specimen_run=one(known["specimen_run"]), run_order=one(known["run_order"]),
         elapsed_s=one(known["elapsed_s"]), temperature_C=one(known["temperature_C"]),
         humidity_pct=one(known["humidity_pct"]), clip_N=one(0.0),
         columns={"column": np.array(["this"])},
@@ -278,7 +278,7 @@ def conditions_under(config: SimConfig, recorded: Mapping[str, float], columns: 
     """The run as one test with these values of further columns."""
     conditions = conditions_of_run(config, recorded)
     own = {name: np.array([text]) for name, text in columns.items() if name != "run_order"}
-    order = np.array([float(columns.get("run_order", 1.0))])
+    order = np.array([float(columns["run_order"])]) if "run_order" in columns else conditions.run_order
     return replace(conditions, run_order=order, columns={**conditions.columns, **own})
 
 
