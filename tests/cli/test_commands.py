@@ -13,6 +13,7 @@ from on_the_command_line import digest, run
 
 from tribo.errors import FitError, Problem
 from tribo.records import Comparison, Study
+from tribo.traces.rules import RULES
 
 
 @pytest.fixture
@@ -165,6 +166,12 @@ def test_a_dry_run_says_what_would_be_done_and_writes_nothing(small_campaign: Pa
 @pytest.mark.parametrize("arguments", [["report"], ["fit", "nowhere", "-o", "x"], ["fits"], ["simulate", "--sample"]])
 def test_wrong_usage_ends_with_status_2(arguments: list[str]) -> None:
     assert run(*arguments).exit_code == 2
+
+
+def test_a_question_mark_for_the_rule_lists_every_rule_without_a_campaign() -> None:
+    result = run("fit", "--rule", "?")
+    assert result.exit_code == 0
+    assert [line.split(":")[0] for line in result.stdout.splitlines()] == list(RULES)
 
 
 def test_init_writes_a_campaign_that_loads_and_never_overwrites(tmp_path: Path) -> None:

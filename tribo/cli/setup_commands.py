@@ -35,12 +35,12 @@ _TABLE = "--table sample=COLUMN,normal_load_N=COLUMN,coefficient=COLUMN"
 )  # fmt: skip
 @click.option(
     "--names", multiple=True, metavar="PATTERN",
-    help="What the names of files say, such as {sample}_{normal_load_N}N_{speed_rpm}RPM_{repeat}; [N] is text that may "
-    "be missing. Can be repeated: the first that fits is used. [default: a pattern is proposed]",
+    help="Pattern of the names of files, such as {sample}_{normal_load_N}N_{speed_rpm}RPM_{repeat}; [N] is text that "
+    "may be missing. Can be repeated: the first that fits is used. [default: a pattern is proposed]",
 )  # fmt: skip
 @click.option(
     "--records", default="", metavar="PATTERN",
-    help="What the heads of records within one export say, such as {normal_stress_Pa}.",
+    help="Pattern of the headings of records within one export, such as {normal_stress_Pa}.",
 )  # fmt: skip
 @click.option(
     "--table", default="", metavar="COLUMN=NAME,...",
@@ -50,7 +50,7 @@ _TABLE = "--table sample=COLUMN,normal_load_N=COLUMN,coefficient=COLUMN"
 )  # fmt: skip
 @click.option(
     "--fill", default="", metavar="COLUMN=VALUE,...",
-    help="Columns of tests.csv with one value for all tests that do not say otherwise, such as mass_g=30.7.",
+    help="Columns of tests.csv with one value for all tests that state no other, such as mass_g=30.7.",
 )  # fmt: skip
 @click.option("--area-mm2", type=click.FloatRange(min=0, min_open=True), help="Nominal contact area.")
 @click.option("--dry-run", is_flag=True, help="Show both files without writing anything.")

@@ -32,6 +32,8 @@ from tribo.cli.study_options import (
     OUT,
     OVERRIDES,
     RULE,
+    RUNS,
+    SCHEDULER,
     ZEROS,
     fit_options,
     model_options,
@@ -88,7 +90,10 @@ def fit(console: Console, campaign: Path, out: Output, dry_run: bool, **options:
     "Default: all parts.",
 )
 @fit_options
-@model_options
+@FLAT
+@click.option("--no-model", is_flag=True, hidden=True)  # still taken; it changes nothing here
+@RUNS
+@SCHEDULER
 @command_options
 def predict(console: Console, campaign: Path, out: Output, only: str, columns: str, **options: Any) -> int:
     """Run the simulations of CAMPAIGN only.

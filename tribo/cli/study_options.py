@@ -96,16 +96,20 @@ DRY_RUN = click.option("--dry-run", is_flag=True, help="Check everything and lis
 
 
 def _rule(context: click.Context, parameter: click.Parameter, given: str) -> str:
-    """The name of the rule today, said once where an old one was given."""
-    from tribo.traces.rules import OLD_NAMES
+    """The name of the rule today, said once where an old one was given; "?" lists all rules and ends the command."""
+    from tribo.traces.rules import OLD_NAMES, RULES
 
+    if given == "?":
+        for rule in RULES.values():
+            click.echo(f"{rule.name}: static friction, {rule.static_part}; sliding friction, {rule.sliding_part}")
+        context.exit()
     if given in OLD_NAMES:
         click.echo(f"--rule {given} is now called {OLD_NAMES[given]}; both mean the same.", err=True)
     return OLD_NAMES.get(given, given)
 
 
 RULE = click.option(
-    "--rule", default="first_peak", show_default=True, callback=_rule, metavar="NAME",
+    "--rule", default="first_peak", show_default=True, callback=_rule, is_eager=True, metavar="NAME",
     help="Rule by which static and sliding force are determined; --rule ? lists all of them.",
 )  # fmt: skip
 WEIGHTS = click.option(
