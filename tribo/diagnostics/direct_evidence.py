@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import erfc
 
 from tribo.diagnostics.observations import Observations
+from tribo.display import displayed
 from tribo.mechanisms.record import Quantity, TraceEvidence
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray
@@ -20,6 +21,7 @@ MOST_IN_PAIRS = 1500  # values whose slope is the median over all pairs, which a
 LEAST_P = 1e-12  # no estimate has a tail that is known further out
 
 
+@displayed()
 @dataclass(frozen=True)
 class Evidence:
     """An estimate with its standard error, and whether it is certain and large enough to matter.

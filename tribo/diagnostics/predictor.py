@@ -42,6 +42,7 @@ class TabledPattern:
     shares: Law
 
 
+@displayed()
 @dataclass(frozen=True)
 class ErrorSize:
     """Standard deviations of ln T of a pattern, each (static, sliding).
