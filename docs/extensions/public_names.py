@@ -1,7 +1,7 @@
 """References in docstrings that name an object by the module that defines it.
 
 The pages document objects by their public names, such as ``tribo.read_export``. A reference to
-``tribo.readers.export.read_export`` is linked to that entry. An object without an entry is set as plain code.
+``tribo.readers.reading.read_export`` is linked to that entry. An object without an entry is set as plain code.
 A name that does not exist stays a warning.
 """
 
