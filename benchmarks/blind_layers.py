@@ -159,7 +159,7 @@ def of_clean(case: Case) -> dict[str, Any]:
     corrections = pattern_corrections(d.baseline)
     v = with_laws(d, seed=case.seed).verdict
     truth = true_corrections(case, d.baseline.setup)
-    held = [bool(c.mean.low <= truth[c.sample, c.regime] <= c.mean.high) for c in corrections]
+    held = [bool(c.low <= truth[c.name, c.regimes[0]] <= c.high) for c in corrections]
     return {
         "cell": case.cell, "seed": case.seed, "effects": [], "verdict": v.verdict,
         "causes": sorted([c.mechanism] for c in v.causes), "covariates": [m.covariate for m in v.misfits[:3]],

@@ -32,7 +32,7 @@ def held(seed: int, factor: float) -> list[bool]:
     o = observe(ingested(hide(seed, [], case.design), seed))
     s = setup(o, tabled_predictor(o.patterns))
     truth = true_corrections(case, s)
-    return [c.mean.low <= truth[c.sample, c.regime] <= c.mean.high for c in pattern_corrections(fit(s))]
+    return [c.low <= truth[c.name, c.regimes[0]] <= c.high for c in pattern_corrections(fit(s))]
 
 
 def main() -> None:

@@ -247,10 +247,17 @@ def test_of_several_causes_the_newest_is_left_out_where_its_own_column_is_still_
     assert found.wrong_in_form == ("run_in",)
 
 
+def screen_of(contrasts: list[Any], strength: list[float], p: list[float]) -> Screen:
+    """A screen of these contrasts without replicates; sizes are a tenth of the strengths."""
+    size, none = np.array(strength) / 10, np.zeros(0)
+    each = tuple(np.zeros(1) for _ in contrasts)
+    return Screen(tuple(contrasts), np.array(strength), size, each, none, none, np.array(p))
+
+
 def chosen_of(monkeypatch: pytest.MonkeyPatch, best: CauseCandidate | None, strength: float | None) -> str:
     """Which layer is added where a mechanism and a free course of a column, of this strength, are beyond chance."""
     contrast: Any = SimpleNamespace(columns=np.ones((4, 2)))
-    other = None if strength is None else naming.Remainder(contrast, strength, np.zeros(1), 0.1, 0.001)
+    other = None if strength is None else screen_of([contrast], [strength], [0.001])
     monkeypatch.setattr(naming, "best_beyond_chance", lambda *_: best)
     monkeypatch.setattr(naming, "strongest_beside_mechanisms", lambda *_: other)
     monkeypatch.setattr(naming, "sort_rivals", lambda model, best, ranked: ((best,), ()))
@@ -285,15 +292,14 @@ def contrast_of(kind: str, taken_up: bool = False) -> Any:
 def test_what_is_left_beside_mechanisms_is_the_strongest_contrast_beyond_chance_that_no_law_takes_up() -> None:
     bend = contrast_of("bend", taken_up=True)
     contrasts = (contrast_of("column"), contrast_of("mechanism"), bend, contrast_of("column"))
-    strength, p = np.array([3.0, 6.0, 5.0, 4.0]), np.array([0.004, 0.001, 0.002, 0.003])
-    known = {"strength": strength, "p": p, "size": strength / 10, "coefficients": list("abcd")}
-    seen: Any = SimpleNamespace(contrasts=contrasts, **known)
+    seen = screen_of([*contrasts], [3.0, 6.0, 5.0, 4.0], [0.004, 0.001, 0.002, 0.003])
     found = naming.strongest_beside_mechanisms(seen, 0.01, "F")
     assert found is not None
-    assert (found.contrast, found.strength, found.p, found.size) == (contrasts[3], 4.0, 0.003, 0.4)
+    assert found.contrasts == (contrasts[3],)
+    assert (*found.strength, *found.p, *found.size) == (4.0, 0.003, 0.4)
     other = naming.strongest_beside_mechanisms(seen, 0.01, "B")
     assert other is not None
-    assert other.contrast is contrasts[2]
+    assert other.contrasts[0] is contrasts[2]
     assert naming.strongest_beside_mechanisms(seen, 0.003, "F") is None  # at the level itself: within chance
 
 

@@ -88,14 +88,14 @@ def test_without_noise_the_corrections_are_the_errors_that_were_drawn() -> None:
     wrong_by = true - predict(s, np.array(exact.law), (), ())
     found = pattern_corrections(fit(s))
     drawn = [
-        100 * np.expm1(wrong_by[o.conditions.sample == c.sample, ("static", "sliding").index(c.regime)].mean())
+        100 * np.expm1(wrong_by[o.conditions.sample == c.name, ("static", "sliding").index(c.regimes[0])].mean())
         for c in found
     ]
     assert np.abs(drawn).max() > 10
-    assert min(c.p for c in found) < 0.01
-    assert max(c.p for c in found) == 1.0
-    assert np.corrcoef([c.mean.value for c in found], drawn)[0, 1] > 0.95
-    assert [c.mean.value for c in found] == pytest.approx(drawn, abs=4)  # specimens are expected to differ by 5 %
+    assert min(c.p_adjusted for c in found) < 0.01
+    assert max(c.p_adjusted for c in found) == 1.0
+    assert np.corrcoef([c.effect_percent for c in found], drawn)[0, 1] > 0.95
+    assert [c.effect_percent for c in found] == pytest.approx(drawn, abs=4)  # specimens are expected to differ by 5 %
 
 
 def test_every_patterned_sample_has_a_correction_in_each_regime_and_the_flat_one_has_none(beside: Diagnosis) -> None:
@@ -107,8 +107,8 @@ def test_the_chance_of_a_correction_is_that_of_its_interval_times_the_number_of_
     found = pattern_corrections(beside.baseline)
     assert len(found) == 6
     for c in found:
-        assert c.mean.low < c.mean.value < c.mean.high
-        low, value, high = np.log1p(np.array([c.mean.low, c.mean.value, c.mean.high]) / 100)
+        assert c.low < c.effect_percent < c.high
+        low, value, high = np.log1p(np.array([c.low, c.effect_percent, c.high]) / 100)
         assert high - value == pytest.approx(value - low)
         two_sided = 2 * norm.sf(abs(value) / ((high - low) / (2 * 1.645)))
-        assert c.p == pytest.approx(min(6 * two_sided, 1.0))
+        assert c.p_adjusted == pytest.approx(min(6 * two_sided, 1.0))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from tribo.diagnostics import examine
-from tribo.diagnostics.inference import pattern_excess
+from tribo.diagnostics.inference import pattern_corrections, pattern_excess
+from tribo.records import REGIMES
 from tribo.wording.verdict_sentences import worded
 
 from .synthetic import hidden
@@ -29,15 +30,15 @@ def test_patterns_six_times_as_far_off_as_stated_are_reported_each_with_its_own_
 
 def test_the_reported_percentages_are_those_by_which_the_patterns_were_moved() -> None:
     f = baseline(3, off(6.0))
-    excess = pattern_excess(f)
-    assert excess is not None
+    assert pattern_excess(f) is not None
     left = f.residual - f.setup.random_effects.dense[:, :, f.setup.group < 4] @ f.effects[f.setup.group < 4]
-    for sample, percent in excess.percent.items():
-        mean = left[f.setup.observations.conditions.sample == sample].mean(axis=0)
-        assert max(abs(mean - [math.log1p(p / 100.0) for p in percent])) < 0.03
-    assert "F" not in excess.percent
+    corrections = pattern_corrections(f)
+    for c in corrections:
+        mean = left[f.setup.observations.conditions.sample == c.name, REGIMES.index(c.regimes[0])].mean()
+        assert abs(mean - math.log1p(c.effect_percent / 100.0)) < 0.03
+    assert "F" not in {c.name for c in corrections}
 
 
 def test_patterns_one_and_a_half_times_as_far_off_as_stated_are_not_reported() -> None:
     found = [pattern_excess(baseline(seed, off(1.5))) for seed in (1, 2, 3, 4, 5, 6)]
-    assert all(excess is None or excess.p > 0.01 for excess in found)
+    assert all(excess is None or excess[1] > 0.01 for excess in found)

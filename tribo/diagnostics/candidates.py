@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tribo.diagnostics.contrasts import Contrast, Screen
+from tribo.diagnostics.contrasts import Screen
 from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.model import Acting, Target, with_free_columns
 from tribo.diagnostics.score_statistics import StartEffects, start_effects
@@ -161,33 +161,20 @@ def weights_of(candidates: Sequence[CauseCandidate]) -> FloatArray:
 
 @displayed()
 @dataclass(frozen=True)
-class Remainder:
-    """A contrast that no mechanism explains: its ``strength`` as a normal deviate, its peak-to-peak ``size`` in ln T
-    and its adjusted p value."""
-
-    contrast: Contrast
-    strength: float
-    coefficients: np.ndarray
-    size: float
-    p: float
-
-
-@displayed()
-@dataclass(frozen=True)
 class Named:
     """What explains the campaign: one set of candidates per cause, the best first in each.
 
     ``model`` is fitted with the causes; ``left`` is the screen of what remains after all layers. ``rivals`` are
     distinct mechanisms that explain the last cause about equally; ``remainders`` are what follows a column and no
-    mechanism. ``wrong_in_form`` are mechanisms that were left out because a misfit remained in the very column they
-    depend on, ``weighed`` all that were weighed for the first cause.
+    mechanism, each a screen of that contrast alone. ``wrong_in_form`` are mechanisms that were left out because a
+    misfit remained in the very column they depend on, ``weighed`` all that were weighed for the first cause.
     """
 
     model: ModelFit
     left: Screen
     causes: tuple[tuple[CauseCandidate, ...], ...] = ()
     rivals: tuple[CauseCandidate, ...] = ()
-    remainders: tuple[Remainder, ...] = ()
+    remainders: tuple[Screen, ...] = ()
     wrong_in_form: tuple[str, ...] = ()
     weighed: tuple[CauseCandidate, ...] = ()
 
@@ -236,14 +223,13 @@ def best_beyond_chance(ranked: Sequence[CauseCandidate], seen: Screen, level: fl
     return next((c for c in ranked if seen.p_library(c.strength) < level), None)
 
 
-def strongest_beside_mechanisms(seen: Screen, level: float, flat: str) -> Remainder | None:
-    """The strongest contrast beyond chance that is no mechanism."""
+def strongest_beside_mechanisms(seen: Screen, level: float, flat: str) -> Screen | None:
+    """The strongest contrast beyond chance that is no mechanism, alone."""
     for k in np.argsort(-seen.strength):
-        contrast, p = seen.contrasts[k], float(seen.p[k])
-        if p >= level:
+        if seen.p[k] >= level:
             return None
-        if contrast.kind != "mechanism" and not contrast.is_taken_up(flat):
-            return Remainder(contrast, float(seen.strength[k]), seen.coefficients[k], float(seen.size[k]), p)
+        if seen.contrasts[k].kind != "mechanism" and not seen.contrasts[k].is_taken_up(flat):
+            return seen.alone(int(k))
     return None
 
 
@@ -251,12 +237,12 @@ def _grown(named: Named, ranked: Sequence[CauseCandidate], level: float) -> Name
     """One layer more: the best mechanism, unless a free course of a column explains far more; None without either."""
     best = best_beyond_chance(ranked, named.left, level)
     other = strongest_beside_mechanisms(named.left, level, named.model.setup.observations.flat)
-    if best is not None and (other is None or best.raw > 0.5 * other.strength**2 - CLOSE):
+    if best is not None and (other is None or best.raw > 0.5 * float(other.strength[0]) ** 2 - CLOSE):
         alike, rivals = sort_rivals(named.model, best, ranked)
         return replace(named, model=best.fit, causes=(*named.causes, alike), rivals=rivals)
     if other is None:
         return None
-    wider = with_free_columns(named.model.setup, other.contrast.columns, other.coefficients)
+    wider = with_free_columns(named.model.setup, other.contrasts[0].columns, other.coefficients[0])
     model = fit(wider, named.model.acting, start=named.model)
     return replace(named, model=model, remainders=(*named.remainders, other))
 

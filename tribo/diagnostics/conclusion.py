@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from tribo.diagnostics.candidates import CauseCandidate, Named, judged, refitted, weights_of
-from tribo.diagnostics.contrasts import Contrast, Screen
+from tribo.diagnostics.contrasts import Screen
 from tribo.diagnostics.direct_evidence import Evidence, stated_evidence
 from tribo.diagnostics.effect_sizes import effect_of_contrast, percent
 from tribo.diagnostics.fit import ModelFit, residual_on_flat
@@ -55,33 +55,17 @@ def misfits_of(
         contrast = screened.contrasts[k]
         if contrast.kind != "mechanism" and not contrast.is_taken_up(flat):
             shown.setdefault((contrast.column, contrast.sample), k)
-    return [
-        _misfit(
-            screened.contrasts[k], log_ratio, conditions, screened.coefficients[k], float(screened.size[k]),
-            float(screened.strength[k]), float(screened.p[k]),
-        )
-        for k in [*shown.values()][:SHOWN] or beyond[:1]
-    ]  # fmt: skip
+    return [_misfit(screened, k, log_ratio, conditions) for k in [*shown.values()][:SHOWN] or beyond[:1]]
 
 
-def _misfit(
-    contrast: Contrast, log_ratio: FloatArray, conditions: Conditions, coefficients: FloatArray, size: float,
-    strength: float, p: float,
-) -> Misfit:
-    """What a contrast sees in a residual, as a misfit."""
-    effect = effect_of_contrast(contrast, log_ratio, conditions, coefficients, size, strength)
+def _misfit(screened: Screen, k: int, log_ratio: FloatArray, conditions: Conditions) -> Misfit:
+    """What one contrast of a screen sees in a residual, as a misfit."""
+    contrast, size, strength = screened.contrasts[k], float(screened.size[k]), float(screened.strength[k])
+    effect = effect_of_contrast(contrast, log_ratio, conditions, screened.coefficients[k], size, strength)
     return Misfit(
-        contrast.observable, contrast.sample, contrast.column, effect.percent, p, low=effect.low, high=effect.high,
-        shows=effect,
+        contrast.observable, contrast.sample, contrast.column, effect.percent, float(screened.p[k]), low=effect.low,
+        high=effect.high, shows=effect,
     )  # fmt: skip
-
-
-def _remaining(named: Named) -> list[Misfit]:
-    """What follows a recorded column and no mechanism."""
-    residual, conditions = named.model.residual, named.model.setup.observations.conditions
-    return [
-        _misfit(r.contrast, residual, conditions, r.coefficients, r.size, r.strength, r.p) for r in named.remainders
-    ]
 
 
 def each_once(misfits: Sequence[Misfit]) -> tuple[Misfit, ...]:
@@ -167,18 +151,6 @@ def exclusions_beside(
     return excluded
 
 
-def pattern_layers(model: ModelFit) -> list[Layer]:
-    """One layer per patterned sample and regime: how far the measurement is from the model, with its interval."""
-    return [
-        Layer(
-            kind="pattern_correction", name=c.sample, samples=(c.sample,), regimes=(c.regime,), p_adjusted=c.p,
-            effect_percent=c.mean.value, low=c.mean.low, high=c.mean.high,
-            parameters={f"at {load:g} N": estimate for load, estimate in c.at_load.items()},
-        )
-        for c in pattern_corrections(model)
-    ]  # fmt: skip
-
-
 def cause_layers(
     named: Named, shown: Sequence[Weighed], first: Screen, before: ModelFit, rng: np.random.Generator
 ) -> list[Layer]:
@@ -246,7 +218,7 @@ def conclude(
     o = baseline.setup.observations
     model = named.model if named is not None else baseline
     excess = pattern_excess(model if named is not None and named.causes else baseline)
-    excess = excess if excess is not None and excess.p < level else None
+    excess = excess if excess is not None and excess[1] < level else None
     outcome = _outcome(named, excess is not None, bool(certain), level)
     shown = _shown(named) if named is not None and outcome in CERTAIN_CAUSES else []
     gained = None
@@ -263,10 +235,10 @@ def conclude(
     direct = causes_from_evidence(certain)
     misfits = [m for _, m in direct] + misfits_of(screened, level, residual_on_flat(baseline), o.conditions, o.flat)
     causes = [c for c, _ in direct] + sorted(causes_weighed(shown, baseline), key=lambda c: -c.weight)
-    patterns = pattern_layers(model)
+    patterns = pattern_corrections(model)
     layers = patterns
     if named is not None:
-        remain = _remaining(named)
+        remain = [_misfit(alone, 0, model.residual, o.conditions) for alone in named.remainders]
         left = remain + misfits_of(named.left, level, model.residual, o.conditions, o.flat)
         misfits = [*left, *misfits] if named.causes and not patterns_apart(misfits) else [*misfits, *left]
         layers = [*patterns, *cause_layers(named, shown, screened, baseline, rng), *remainder_layers(remain)]

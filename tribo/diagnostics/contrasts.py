@@ -221,6 +221,14 @@ class Screen:
     chance_library: FloatArray
     p: FloatArray
 
+    def alone(self, k: int) -> Screen:
+        """The same of one contrast."""
+        one = slice(k, k + 1)
+        return replace(
+            self, contrasts=self.contrasts[one], strength=self.strength[one], size=self.size[one],
+            coefficients=self.coefficients[one], p=self.p[one],
+        )  # fmt: skip
+
     def without_columns(self) -> Screen:
         """The same without the columns of the contrasts, which are large."""
         return replace(self, contrasts=tuple(replace(contrast, courses=()) for contrast in self.contrasts))

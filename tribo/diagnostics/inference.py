@@ -7,8 +7,8 @@ it is that large here. The gain is a cross-validation by whole samples, specimen
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import gammaln
@@ -21,7 +21,7 @@ from tribo.diagnostics.normal_equations import model_columns
 from tribo.diagnostics.observations import Observations
 from tribo.diagnostics.replicates import drawn_residuals, refits
 from tribo.diagnostics.scatter import Noise, log_size_prior
-from tribo.diagnostics.verdict import Estimate, Gain
+from tribo.diagnostics.verdict import Estimate, Gain, Layer
 from tribo.records import REGIMES, FloatArray
 
 DROP_90 = 0.5 * NORMAL_90**2  # of the log likelihood at the ends of a 90 % interval
@@ -179,54 +179,20 @@ def _score_at(f: ModelFit, index: int, k: int, value: float) -> float:
 WITHIN = 1.5  # times the stated error of the model: the range for which docs/blind.md counts false alarms
 
 
-@dataclass(frozen=True)
-class PatternExcess:
-    """How far the patterned samples are from the model.
-
-    ``factor`` is the estimated error of the model over the stated one, ``p`` the chance of such a factor where the true
-    one is at most WITHIN. ``percent`` holds the mean of measured over modelled T, less one, in percent, by sample as
-    (static, sliding).
-    """
-
-    factor: float
-    p: float
-    percent: Mapping[str, tuple[float, float]]
-
-
-def pattern_excess(f: ModelFit) -> PatternExcess | None:
-    """Likelihood ratio of the estimated factor against WITHIN, one-sided; None where the factor is not larger."""
+def pattern_excess(f: ModelFit) -> tuple[float, float] | None:
+    """The estimated error of the model over the stated one, and the chance of such a factor where the true one is at
+    most WITHIN (likelihood ratio, one-sided); None where the factor is not larger."""
     s = f.setup
     patterns = s.group[s.random_effects.of_specimens :] == PATTERN
     if not patterns.any() or f.noise.pattern <= WITHIN:
         return None
     ratio = 2.0 * (f.score - with_pattern_error(f, WITHIN).score)
-    correction = s.random_effects.shared[:, :, patterns] @ s.random_effects.parts(f.effects)[1][patterns]
-    sample = s.observations.conditions.sample
-    percent = {
-        str(name): (float(mean[0]), float(mean[1]))
-        for name in np.unique(sample)
-        if np.any(mean := 100.0 * np.expm1(correction[sample == name].mean(axis=0)))
-    }
-    p = max(0.5 * float(chi2.sf(max(ratio, 0.0), 1)), 1e-12)
-    return PatternExcess(f.noise.pattern, p, percent)
+    return f.noise.pattern, max(0.5 * float(chi2.sf(max(ratio, 0.0), 1)), 1e-12)
 
 
-@dataclass(frozen=True)
-class PatternCorrection:
-    """What the measurement of one sample in one regime is over the model, on average over its tests and at loads (N).
-
-    ``p`` is the chance of such a mean correction where the model is right, adjusted for the number of corrections.
-    """
-
-    sample: str
-    regime: str
-    mean: Estimate
-    at_load: dict[float, Estimate]
-    p: float
-
-
-def pattern_corrections(f: ModelFit) -> list[PatternCorrection]:
-    """The corrections of all patterned samples, static before sliding; none where no sample is patterned.
+def pattern_corrections(f: ModelFit) -> list[Layer]:
+    """How far the measurement of every patterned sample is from the model, static before sliding: on average over its
+    tests, and as parameters at loads (N). p values are adjusted for the number of corrections.
 
     The estimates are shrunk towards the model by as much as the campaign itself suggests: the size of the pattern error
     is learnt from all samples together, and the estimates are averaged over how large it may be. Of the loads, the
@@ -264,8 +230,14 @@ def pattern_corrections(f: ModelFit) -> list[PatternCorrection]:
             rows = columns[sample == name, k]
             mean, sd = estimate(rows.mean(axis=0))
             chance = min(2.0 * float(norm.sf(abs(mean) / sd)) * 2 * len(there), 1.0)
-            at = {float(f"{loads[i]:.4g}"): in_percent(*estimate(rows[i])) for i in three}
-            corrections.append(PatternCorrection(name, regime, in_percent(mean, sd), at, chance))
+            at = {f"at {float(f'{loads[i]:.4g}'):g} N": in_percent(*estimate(rows[i])) for i in three}
+            over = in_percent(mean, sd)
+            corrections.append(
+                Layer(
+                    kind="pattern_correction", name=name, samples=(name,), regimes=(regime,), p_adjusted=chance,
+                    effect_percent=over.value, low=over.low, high=over.high, parameters=at,
+                )
+            )  # fmt: skip
     return corrections
 
 

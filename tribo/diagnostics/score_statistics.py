@@ -28,11 +28,16 @@ Index = NDArray[np.int64]
 
 @displayed()
 @dataclass(frozen=True)
-class SharedTerms:
-    """Columns (n, 2, k) that tests of several specimens show, those of one contrast at one of ``spans``.
+class Terms:
+    """The columns of all contrasts, made ready for many replicates.
 
-    ``products`` (3, n, m) are those of the pairs of columns of one contrast that some test shows both of; the pairs of
-    each contrast are at ``pairs`` of the m, and fill its matrix at ``places``.
+    Contrasts at ``shared_at`` are of several specimens: their ``columns`` (n, 2, k), those of one contrast at one of
+    ``spans``, and the ``products`` (3, n, m) of the pairs of columns of one contrast that some test shows both of; the
+    pairs of each contrast are at ``pairs`` of the m, and fill its matrix at ``places``. Contrasts at ``single_at`` are
+    of one specimen: ``single`` holds each specimen, its tests (t,), the columns (t, 2, k) that they alone show, and
+    their products (3, t, k). Contrasts at ``pair_at`` are each the sum of two of the latter, ``pair_of`` (pairs, 2).
+    ``about_one`` (contrasts,) is the precision with which the coefficient of a contrast is known to be one: zero where
+    its size is free.
     """
 
     columns: FloatArray
@@ -40,32 +45,8 @@ class SharedTerms:
     products: FloatArray
     pairs: tuple[slice, ...]
     places: tuple[tuple[Index, Index], ...]
-
-
-@displayed()
-@dataclass(frozen=True)
-class SpecimenTerms:
-    """Single columns (t, 2, k) that the ``tests`` (t,) of one ``specimen`` alone show, and their products (3, t, k)."""
-
-    specimen: int
-    tests: Index
-    columns: FloatArray
-    products: FloatArray
-
-
-@displayed()
-@dataclass(frozen=True)
-class Terms:
-    """The columns of all contrasts, made ready for many replicates.
-
-    Contrasts at ``shared_at`` are of several specimens and those at ``single_at`` of one; those at ``pair_at`` are each
-    the sum of two of the latter, ``pair_of`` (pairs, 2). ``about_one`` (contrasts,) is the precision with which the
-    coefficient of a contrast is known to be one: zero where its size is free.
-    """
-
-    shared: SharedTerms
     shared_at: Index
-    single: tuple[SpecimenTerms, ...]
+    single: tuple[tuple[int, Index, FloatArray, FloatArray], ...]
     single_at: Index
     pair_of: Index
     pair_at: Index
@@ -75,7 +56,7 @@ class Terms:
     def freedom(self) -> Index:
         """Of every contrast, (contrasts,)."""
         freedom = np.ones(len(self.about_one), np.int64)
-        freedom[self.shared_at] = [span.stop - span.start for span in self.shared.spans]
+        freedom[self.shared_at] = [span.stop - span.start for span in self.spans]
         return freedom
 
 
@@ -83,8 +64,8 @@ def terms_in(stacked: FloatArray, spans: Sequence[slice], about_one: FloatArray 
     """The terms of contrasts whose columns (n, 2, k) are written out, those of each at one of ``spans``."""
     about_one = np.zeros(len(spans)) if about_one is None else about_one
     none = np.zeros(0, np.int64)
-    shared = _shared_terms(stacked, spans)
-    return Terms(shared, np.arange(len(spans)), (), none, np.zeros((0, 2), np.int64), none, about_one)
+    shared = stacked, tuple(spans), *_shared_products(stacked, spans)
+    return Terms(*shared, np.arange(len(spans)), (), none, np.zeros((0, 2), np.int64), none, about_one)
 
 
 def terms_of(contrasts: Sequence[tuple[EffectCourse, ...]], about_one: FloatArray, n: int) -> Terms:
@@ -109,10 +90,11 @@ def terms_of(contrasts: Sequence[tuple[EffectCourse, ...]], about_one: FloatArra
     for specimen, courses in specimens.items():
         columns = np.concatenate([c.values for c in courses], axis=2)
         each = np.arange(columns.shape[2])
-        terms.append(SpecimenTerms(specimen, courses[0].tests, columns, _products(columns, each, each)))
+        terms.append((specimen, courses[0].tests, columns, _products(columns, each, each)))
     return Terms(
-        _shared_terms(stacked, spans), np.array(shared, np.int64), tuple(terms), np.array(single, np.int64),
-        np.array(pair_of, np.int64).reshape(-1, 2), np.array(pairs, np.int64), about_one,
+        stacked, tuple(spans), *_shared_products(stacked, spans), np.array(shared, np.int64), tuple(terms),
+        np.array(single, np.int64), np.array(pair_of, np.int64).reshape(-1, 2), np.array(pairs, np.int64),
+        about_one,
     )  # fmt: skip
 
 
@@ -120,7 +102,10 @@ def _of_one_specimen(course: EffectCourse) -> bool:
     return course.specimen != EVERY and course.freedom == 1
 
 
-def _shared_terms(columns: FloatArray, spans: Sequence[slice]) -> SharedTerms:
+def _shared_products(
+    columns: FloatArray, spans: Sequence[slice]
+) -> tuple[FloatArray, tuple[slice, ...], tuple[tuple[Index, Index], ...]]:
+    """Products of the columns of each contrast, and where they are: ``products``, ``pairs`` and ``places`` of Terms."""
     shown = np.any(columns != 0.0, axis=1).astype(np.float32)
     places: list[tuple[Index, Index]] = []
     for span in spans:
@@ -132,7 +117,7 @@ def _shared_terms(columns: FloatArray, spans: Sequence[slice]) -> SharedTerms:
         np.concatenate([np.zeros(0, np.int64), *(p[i] + span.start for p, span in zip(places, spans, strict=True))])
         for i in (0, 1)
     ]
-    return SharedTerms(columns, tuple(spans), _products(columns, *sides), tuple(pairs), tuple(places))
+    return _products(columns, *sides), tuple(pairs), tuple(places)
 
 
 def _products(columns: FloatArray, first: Index, second: Index) -> FloatArray:
@@ -166,22 +151,22 @@ def _term_products(fitted: Replicates, terms: Terms) -> tuple[TermProducts, list
     static, mixed, sliding = (fitted.precision[:, i] for i in range(3))
     first, second = fitted.residual[:, 0], fitted.residual[:, 1]
     residual = np.stack([static * first + mixed * second, mixed * first + sliding * second], axis=2)  # weighted
-    r, shared = len(residual), terms.shared
-    n, _, k = shared.columns.shape
-    score = residual.reshape(r, 2 * n) @ shared.columns.reshape(2 * n, k)
-    information = fitted.precision.reshape(r, 3 * n) @ shared.products.reshape(3 * n, shared.products.shape[2])
+    r = len(residual)
+    n, _, k = terms.columns.shape
+    score = residual.reshape(r, 2 * n) @ terms.columns.reshape(2 * n, k)
+    information = fitted.precision.reshape(r, 3 * n) @ terms.products.reshape(3 * n, terms.products.shape[2])
     each = []
-    for term in terms.single:
-        t, k = len(term.tests), term.columns.shape[2]
+    for _, tests, columns, squares in terms.single:
+        t, k = len(tests), columns.shape[2]
         each.append(
             TermProducts(
-                fitted.weighted.own_times(term.tests, term.columns),
-                fitted.weighted.border_times(term.tests, term.columns),
-                residual[:, term.tests].reshape(r, 2 * t) @ term.columns.reshape(2 * t, k),
-                fitted.precision[:, :, term.tests].reshape(r, 3 * t) @ term.products.reshape(3 * t, k),
+                fitted.weighted.own_times(tests, columns),
+                fitted.weighted.border_times(tests, columns),
+                residual[:, tests].reshape(r, 2 * t) @ columns.reshape(2 * t, k),
+                fitted.precision[:, :, tests].reshape(r, 3 * t) @ squares.reshape(3 * t, k),
             )
         )
-    return TermProducts(*fitted.weighted.times(shared.columns), score, information), each
+    return TermProducts(*fitted.weighted.times(terms.columns), score, information), each
 
 
 def scores(fitted: Replicates, terms: Terms, steps: int = len(SIZE_STEPS)) -> tuple[FloatArray, list[FloatArray]]:
@@ -237,8 +222,7 @@ def _scores_at(
     alone = np.where(seen, toward_one / np.maximum(left + terms.about_one, 1e-300), 0.0)
     chi2 = np.where(seen, alone * toward_one - terms.about_one, 0.0)
     coefficients = list(alone.T[:, :, None])
-    shared = terms.shared
-    for k, span, pair, place in zip(terms.shared_at, shared.spans, shared.pairs, shared.places, strict=True):
+    for k, span, pair, place in zip(terms.shared_at, terms.spans, terms.pairs, terms.places, strict=True):
         d = span.stop - span.start
         if d > 1:
             own = np.zeros((len(score), d, d))
@@ -257,8 +241,8 @@ def _one_column(
     """Of the first column of every contrast: the score beyond the model and the information left and whole,
     (r, contrasts). And of the shared terms: what the model takes of them, (r, 4 S + m, k), and their scores, (r, k)."""
     taken, shared_score = _shared_beyond(products[0], roots)
-    spans, pairs = terms.shared.spans, terms.shared.pairs
-    first = [span.start for span in spans]
+    pairs = terms.pairs
+    first = [span.start for span in terms.spans]
     squares = np.sum(taken[:, :, first] ** 2, axis=1)
     shown = np.array([pair.stop > pair.start for pair in pairs], bool)  # a column of zeros has no products
     score, left, whole = (np.zeros((len(shared_score), len(terms.about_one))) for _ in range(3))
@@ -267,10 +251,10 @@ def _one_column(
     score[:, terms.shared_at] = shared_score[:, first]
     if terms.single:
         each, borders = [], []
-        for term, product in zip(terms.single, products[1], strict=True):
-            own = roots.own[:, term.specimen] @ product.own
-            border = roots.border_of(product.border, roots.across[:, term.specimen].transpose(0, 2, 1) @ own)
-            of_own = np.einsum("rak,ra->rk", own, roots.right[0][:, term.specimen])
+        for (specimen, *_), product in zip(terms.single, products[1], strict=True):
+            own = roots.own[:, specimen] @ product.own
+            border = roots.border_of(product.border, roots.across[:, specimen].transpose(0, 2, 1) @ own)
+            of_own = np.einsum("rak,ra->rk", own, roots.right[0][:, specimen])
             beyond = product.score - of_own - np.einsum("rmk,rm->rk", border, roots.right[1])
             rest = product.information - np.sum(own**2, axis=1) - np.sum(border**2, axis=1)
             each.append((beyond, rest, product.information))

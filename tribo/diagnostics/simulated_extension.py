@@ -68,18 +68,9 @@ class SimulatedExtension:
         return float(100 * np.sqrt(np.mean((left - right) ** 2)))
 
 
-@displayed(lambda s: ", ".join(s.mechanisms))
-@dataclass(frozen=True)
-class NotSimulated:
-    """Named mechanisms that could not be simulated, and why."""
-
-    mechanisms: tuple[str, ...]
-    reason: str
-
-
 def simulate_extension(
     model: ModelFit, *, seed: int = 0, jobs: int = 2, progress: Progress | None = None
-) -> SimulatedExtension | NotSimulated:
+) -> SimulatedExtension | str:
     """The model of a campaign with its mechanisms in the simulator, or the reason why it was not simulated.
 
     Parameters
@@ -88,13 +79,12 @@ def simulate_extension(
     seed : draws the local friction, equal in both runs of a pair
     jobs : threads
     """
-    names = tuple(a.name for a in model.acting)
     each = zip(model.acting, model.values, strict=True)
     quick = sum((effect_of(model.setup, model.law, a, v) for a, v in each), np.zeros_like(model.residual))
     picked = representatives(model, quick)
     if not picked:
         bounds = f"{100 * np.expm1(LEAST_CHANGE):.0f} and {100 * np.expm1(MOST_CHANGE):.0f} %"
-        return NotSimulated(names, f"no test has a change of T between {bounds}")
+        return f"no test has a change of T between {bounds}"
     runs = []
     try:
         with ThreadPoolExecutor(max(1, jobs)) as pool:
@@ -103,10 +93,12 @@ def simulate_extension(
                 if progress is not None:
                     progress(STAGE, len(runs), len(picked))
     except SimulationError as why:
-        return NotSimulated(names, "; ".join(str(problem) for problem in why.problems))
+        return "; ".join(str(problem) for problem in why.problems)
     table = _table(model, picked, quick, runs)
     change = interpolated(model, picked, table, quick)
-    return SimulatedExtension(names, model.predicted - quick + change, change, quick, table, *_ratio(table))
+    return SimulatedExtension(
+        tuple(a.name for a in model.acting), model.predicted - quick + change, change, quick, table, *_ratio(table)
+    )
 
 
 def representatives(model: ModelFit, quick: FloatArray) -> list[int]:
@@ -237,8 +229,8 @@ def with_simulation(
     if d.named is None or not d.named.causes or d.verdict.verdict not in CERTAIN_CAUSES:
         return replace(d, verdict=replace(d.verdict, model=model))
     extension = simulate_extension(d.named.model, seed=seed, jobs=jobs, progress=progress)
-    if isinstance(extension, NotSimulated):
-        model["not_simulated"] = {"mechanisms": list(extension.mechanisms), "reason": extension.reason}
+    if isinstance(extension, str):
+        model["not_simulated"] = {"mechanisms": [a.name for a in d.named.model.acting], "reason": extension}
         return replace(d, verdict=replace(d.verdict, model=model))
     before, quick, after = residual_percent(d, extension)
     model["simulated"] = {

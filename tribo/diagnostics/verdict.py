@@ -158,15 +158,16 @@ class NextTest:
 class AgainstModel:
     """What a verdict on the spring-block model rests on beside its parts.
 
-    ``samples`` were measured and the model was calibrated on ``flat``. ``excess`` (a PatternExcess) says by how much
-    patterned samples differ from the model beyond its own error; ``wrong_in_form`` are mechanisms that left a misfit in
-    the column they depend on. Of the law search: the answers about ``known`` laws (pairs of KnownLaw and Held), whether
-    what its laws leave is ``within_chance`` (None without laws), and the search ``across`` patterns (AcrossPatterns).
+    ``samples`` were measured and the model was calibrated on ``flat``. ``excess`` says how many times its stated error
+    the patterned samples differ from the model, and the chance of that; ``wrong_in_form`` are mechanisms that left a
+    misfit in the column they depend on. Of the law search: the answers about ``known`` laws (pairs of KnownLaw and
+    Held), whether what its laws leave is ``within_chance`` (None without laws), and the search ``across`` patterns
+    (AcrossPatterns).
     """
 
     samples: tuple[str, ...] = ()
     flat: str = ""
-    excess: Any = None
+    excess: tuple[float, float] | None = None
     wrong_in_form: tuple[str, ...] = ()
     known: tuple[Any, ...] = ()
     within_chance: bool | None = None

@@ -11,13 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as t_distribution
 
-from tribo.diagnostics.verdict import Estimate
+from tribo.diagnostics.verdict import Estimate, Layer
+from tribo.mechanisms.record import STROKES_APART
+from tribo.mechanisms.table import MECHANISMS
 from tribo.records import CLOSED_TRACK_M, FloatArray, Ingested, Pull, Test, Trace
 
 BLOCKS = 20  # of equal distance; the first is compared with those of the second half
 _FEWEST_IN_BLOCK = 5
 CERTAIN = 5.0  # standard errors, as for other evidence from traces
 _FEWEST = 3  # pairs of strokes
+OFFSET = next(m.name for m in MECHANISMS.values() if STROKES_APART in m.without_model)
 
 
 @dataclass(frozen=True)
@@ -89,25 +92,12 @@ def _travel(test: Test, trace: Trace) -> FloatArray | None:
     return None
 
 
+def stroke_offset(ingested: Ingested) -> Layer | None:
+    """The offset of the force over all pairs of strokes, half of what separates the two directions, in N and in percent
+    of the mean sliding force; it shows how many strokes are forward and how many backward.
 
-@dataclass(frozen=True)
-class StrokeOffset:
-    """The ``offset`` of the force in N with its 90 % interval: half of what separates the two directions.
-
-    ``percent`` is that of the mean sliding force. ``strokes`` counts those forward and those backward.
+    None where it is not certain, without strokes in both directions, or with fewer than three pairs.
     """
-
-    offset: Estimate
-    percent: float
-    low_percent: float
-    high_percent: float
-    p: float
-    certain: bool
-    strokes: tuple[int, int]
-
-
-def stroke_offset(ingested: Ingested) -> StrokeOffset | None:
-    """The offset over all pairs of strokes; None without strokes in both directions, or with fewer than three pairs."""
     pulls = list(ingested.pulls.values())
     forward = [p for p in pulls if "forward" in p.flags]
     backward = [p for p in pulls if "backward" in p.flags]
@@ -115,11 +105,14 @@ def stroke_offset(ingested: Ingested) -> StrokeOffset | None:
     if len(zeros) < _FEWEST or not backward:
         return None
     mean, se = float(zeros.mean()), max(float(zeros.std(ddof=1) / np.sqrt(len(zeros))), 1e-12)
+    if abs(mean) <= CERTAIN * se:
+        return None
     half = float(t_distribution.ppf(0.95, len(zeros) - 1)) * se
     force = float(np.mean([p.sliding_N for p in (*forward, *backward)]))
     p = float(2.0 * t_distribution.sf(abs(mean) / se, len(zeros) - 1))
     low, high = mean - half, mean + half
-    return StrokeOffset(
-        Estimate(mean, low, high, "N"), 100 * mean / force, 100 * low / force, 100 * high / force, p,
-        abs(mean) > CERTAIN * se, (len(forward), len(backward)),
+    return Layer(
+        kind="cause", name=OFFSET, samples=(), regimes=(), p_adjusted=p, effect_percent=100 * mean / force,
+        low=100 * low / force, high=100 * high / force, parameters={"F0": Estimate(mean, low, high, "N")},
+        shows=(len(forward), len(backward)),
     )  # fmt: skip

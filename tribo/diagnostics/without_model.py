@@ -19,7 +19,7 @@ from tribo.diagnostics.column_search import (
     search_columns,
 )
 from tribo.diagnostics.verdict import Cause, Estimate, Excluded, Layer, Misfit, NextTest, Verdict
-from tribo.diagnostics.within_records import RunningIn, StrokeOffset, running_in, stroke_offset
+from tribo.diagnostics.within_records import RunningIn, running_in, stroke_offset
 from tribo.mechanisms.record import ALONG_RECORDS, STROKES_APART
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import REGIMES, Study
@@ -31,19 +31,10 @@ WITH_CONSTANT = ("power", "linear", "constant", "three_term", "hertz")  # laws w
 BASELINE = "the law of each sample alone"
 SHOWN_BY = {shown: m.name for m in MECHANISMS.values() for shown in m.without_model}
 ANY_COLUMN = next(m.name for m in MECHANISMS.values() if m.any_column)
-RUNNING_IN, OFFSET = SHOWN_BY[ALONG_RECORDS], SHOWN_BY[STROKES_APART]
+RUNNING_IN = SHOWN_BY[ALONG_RECORDS]
 MECHANISMS_OF_COLUMNS = {k: name for k, name in SHOWN_BY.items() if k not in (ALONG_RECORDS, STROKES_APART)}
 Shown = tuple[list[Layer], list[Cause], list[Misfit]]
 SERIES = ("run_order", "specimen_run", "started_at", "date")  # columns that no one can vary
-
-
-@dataclass(frozen=True)
-class ConstantPart:
-    """What a straight line leaves at zero load, and its share of T (percent) at the middle load."""
-
-    constant: Estimate
-    share_percent: float
-    load_N: float
 
 
 def law_layers(study: Study) -> list[Layer]:
@@ -87,11 +78,12 @@ def _parameters(row: Mapping[str, Any]) -> dict[str, Estimate]:
     }
 
 
-def _constant_part(line: Mapping[str, Any], loads: np.ndarray) -> ConstantPart:
+def _constant_part(line: Mapping[str, Any], loads: np.ndarray) -> tuple[Estimate, float, float]:
+    """What a straight line leaves at zero load, and its share of T (percent) at the middle load (N)."""
     constant = _estimate(line["b"], line["b_u"], "N", line["loads"] - 2)
     middle = float(np.median(loads))
     share = 100.0 * line["b"] / max(line["a"] * middle + line["b"], 1e-300)
-    return ConstantPart(constant, float(share), middle)
+    return constant, float(share), middle
 
 
 def _estimate(value: float, u: float, unit: str, dof: int) -> Estimate:
@@ -132,8 +124,9 @@ def diagnose_without_model(study: Study, *, seed: int = 0, level: float = 0.01) 
     enough = [t for t in tests if t.enough]
     effects = [f for t in enough for f in search_columns(t, len(enough), level, rng)]
     records = [r for r in running_in(study.ingested) if r.p < level]
-    offset = stroke_offset(study.ingested)
-    shown = [_of_columns(effects), _of_records(records), _of_strokes(offset)]
+    offsets = [] if (offset := stroke_offset(study.ingested)) is None else [offset]
+    of_strokes = [Cause(layer.name, 1.0, layer.parameters, shows=layer) for layer in offsets]
+    shown = [_of_columns(effects), _of_records(records), (offsets, of_strokes, [])]
     causes = [cause for _, each, _ in shown for cause in each]
     tied = ((f.name, *f.alike) for f in effects if f.alike)
     return Verdict(
@@ -202,16 +195,6 @@ def _middle(records: Sequence[RunningIn]) -> Estimate:
     """The median over records, and their range."""
     changes = [r.first_percent for r in records]
     return Estimate(float(np.median(changes)), min(changes), max(changes), "%")
-
-
-def _of_strokes(offset: StrokeOffset | None) -> Shown:
-    if offset is None or not offset.certain:
-        return [], [], []
-    layer = Layer(
-        kind="cause", name=OFFSET, samples=(), regimes=(), p_adjusted=offset.p, effect_percent=offset.percent,
-        low=offset.low_percent, high=offset.high_percent, parameters={"F0": offset.offset}, shows=(offset,),
-    )  # fmt: skip
-    return [layer], [Cause(OFFSET, 1.0, {"F0": offset.offset}, shows=(offset,))], []
 
 
 def _inseparable(study: Study, enough: list[RegimeTests]) -> list[Excluded]:

@@ -8,10 +8,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tribo.diagnostics.conclusion import pattern_layers
 from tribo.diagnostics.contrasts import Screen, screen_left
 from tribo.diagnostics.diagnosis import Diagnosis, examine
 from tribo.diagnostics.fit import ModelFit
+from tribo.diagnostics.inference import pattern_corrections
 from tribo.diagnostics.planning import HOURS_PER_PULL, PULLS, first_test_of
 from tribo.diagnostics.verdict import CERTAIN_CAUSES, Excluded, Layer, Misfit, NextTest, Outcome, Verdict
 from tribo.lawsearch.across_patterns import CERTAIN, across_patterns, deviations_of
@@ -185,7 +185,7 @@ def _extended(
     next_test = v.next_test
     if ties and not v.equivalent:
         next_test = separating_test(*ties[0], model.setup.observations.conditions)
-    layers = (*pattern_layers(model), *kept, *tested.layers, *law_layers(found), *remainders)
+    layers = (*pattern_corrections(model), *kept, *tested.layers, *law_layers(found), *remainders)
     shows = replace(v.shows, within_chance=bool(screened.p.min() >= level))
     return replace(v, layers=layers, next_test=next_test, shows=shows)
 

@@ -11,8 +11,8 @@ from tribo.diagnostics.column_search import ColumnEffect
 from tribo.diagnostics.direct_evidence import Evidence
 from tribo.diagnostics.effect_sizes import Effect
 from tribo.diagnostics.verdict import UNTESTED, Cause, Estimate, Excluded, Layer, Misfit, NextTest
-from tribo.diagnostics.within_records import RunningIn, StrokeOffset
-from tribo.diagnostics.without_model import SERIES, ConstantPart
+from tribo.diagnostics.within_records import OFFSET, RunningIn
+from tribo.diagnostics.without_model import SERIES
 from tribo.lawsearch.law_file import KnownLaw
 from tribo.lawsearch.model_choice import CauseForms, FoundLaw
 from tribo.mechanisms.record import Mechanism, TraceEvidence
@@ -136,6 +136,8 @@ def _off(o: OverLoads) -> str:
 
 def cause_sentence(c: Cause) -> str:
     """A cause with its size and what distinguishes it."""
+    if isinstance(c.shows, Layer):
+        return layer_sentence(c.shows)
     if isinstance(c.shows, tuple):
         return without_model_sentence(c.shows)
     name = sentence_case(with_choice(c.mechanism, c.choice))
@@ -169,7 +171,7 @@ def layer_sentence(layer: Layer) -> str:
     if isinstance(shows, Misfit):
         return misfit_sentence(shows)
     if isinstance(shows, tuple):
-        return without_model_sentence(shows)
+        return _offset(layer) if layer.name == OFFSET else without_model_sentence(shows)
     if layer.kind != "cause" or layer.most is None:
         return layer.text
     said = (
@@ -194,17 +196,16 @@ def _own_law(layer: Layer) -> str:
         return f"Mean {regime} T/N of {sample}: {_sized(layer.parameters['T/N'])}; the loads do not determine a law."
     sizes = ", ".join(f"{n} = {_sized(e)}" for n, e in layer.parameters.items())
     said = f"{sentence_case(regime)} friction of {sample} follows {layer.formula} with {sizes}."
-    part = layer.shows
-    if not isinstance(part, ConstantPart):
+    if layer.shows is None:
         return said
-    constant = part.constant
+    constant, share_percent, load_N = layer.shows
     if constant.low <= 0.0 <= constant.high:
         return f"{said} A straight line leaves no certain part of T that does not depend on the load."
     if constant.value < 0.0:
         return f"{said} A straight line falls to {_sized(constant)} at zero load: friction is weak at small loads."
     return (
-        f"{said} A straight line leaves {_sized(constant)} at zero load: {part.share_percent:.0f} % of T at "
-        f"{part.load_N:.3g} N does not depend on the load."
+        f"{said} A straight line leaves {_sized(constant)} at zero load: {share_percent:.0f} % of T at "
+        f"{load_N:.3g} N does not depend on the load."
     )
 
 
@@ -214,10 +215,8 @@ def _sized(e: Estimate) -> str:
 
 
 def without_model_sentence(shows: Sequence[Any]) -> str:
-    """What friction varies with beside the law of each sample: columns, running-in along records, an offset."""
-    if isinstance(shows[0], RunningIn):
-        return _running_in(shows)
-    return " ".join(_follows(f) if isinstance(f, ColumnEffect) else _offset(f) for f in shows)
+    """What friction varies with beside the law of each sample: columns, running-in along records."""
+    return _running_in(shows) if isinstance(shows[0], RunningIn) else " ".join(map(_follows, shows))
 
 
 def _follows(f: ColumnEffect) -> str:
@@ -247,10 +246,11 @@ def _running_in(records: Sequence[RunningIn]) -> str:
     )
 
 
-def _offset(a: StrokeOffset) -> str:
+def _offset(layer: Layer) -> str:
+    (forward, backward), offset = layer.shows, layer.parameters["F0"]
     return (
-        f"The force recorded in {a.strokes[0]} forward and {a.strokes[1]} backward strokes is offset by "
-        f"{a.offset.value:.3g} N (90 % interval {a.offset.low:.3g} to {a.offset.high:.3g} N), {abs(a.percent):.0f} % "
+        f"The force recorded in {forward} forward and {backward} backward strokes is offset by {offset.value:.3g} N "
+        f"(90 % interval {offset.low:.3g} to {offset.high:.3g} N), {abs(layer.effect_percent):.0f} % "
         "of the sliding force: the directions differ by twice that. The offset was subtracted as the zero of each pair."
     )
 

@@ -255,9 +255,10 @@ def _evidence(v: Verdict) -> Iterator[str]:
             "remains beyond chance; the true formula may be another one."
         )
     if shows.excess is not None:
+        factor, p = shows.excess
         yield (
-            f"The patterned samples differ from the model by about {shows.excess.factor:.1f} times the error that is "
-            f"stated for it (p {p_text(shows.excess.p)} for a factor of at most {WITHIN:g})."
+            f"The patterned samples differ from the model by about {factor:.1f} times the error that is "
+            f"stated for it (p {p_text(p)} for a factor of at most {WITHIN:g})."
         )
     if shows.known:
         held = sum(answer.answer == "held" for _, answer in shows.known)
