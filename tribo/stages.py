@@ -273,22 +273,16 @@ def compare(
     1.37 N: 8.8 N, of the model 7.0 N
     """
     from tribo.comparison.prediction import calibrated_cells, predict
-    from tribo.comparison.side_by_side import put_side_by_side
 
     campaign = with_flat_sample(ingested.campaign, options.flat)
     ingested = replace(ingested, campaign=campaign)
     flat = required_flat_sample(campaign)
     alone, model = _alone(fits), options.model_runs
     calibrated = calibrated_cells(campaign, alone, flat, model, progress)
-    prediction = predict(campaign, alone, flat, calibrated, model, weights=options.weights, progress=progress)
-    return Study(
-        ingested,
-        fits,
-        comparison=put_side_by_side(ingested, prediction),
-        simulated=prediction.table,
-        example_runs=prediction.example_runs,
-        notes=prediction.notes,
+    comparison, simulated, example_runs = predict(
+        ingested, alone, flat, calibrated, model, weights=options.weights, progress=progress
     )
+    return Study(ingested, fits, comparison=comparison, simulated=simulated, example_runs=example_runs)
 
 
 def study(

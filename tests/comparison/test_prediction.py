@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 from small_lattices import small_lattices
 
@@ -17,14 +18,13 @@ from tribo.campaign import load_campaign
 from tribo.comparison.prediction import (
     MOST_LOADS,
     ModelRuns,
-    Prediction,
     calibrated_cells,
+    load_means,
     loads_to_simulate,
     predict,
 )
-from tribo.comparison.side_by_side import load_means
 from tribo.errors import CampaignError, FitError
-from tribo.records import LawFit, Regime
+from tribo.records import LawFit, Regime, Run
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -42,8 +42,8 @@ def fitted(small_campaign: Path) -> tuple[stages.Ingested, tuple[LawFit, ...]]:
 Fitted = tuple[stages.Ingested, tuple[LawFit, ...]]
 
 
-def run(fitted: Fitted, kept: Path, **options: Any) -> tuple[Prediction, set[str]]:
-    """A prediction of two runs a load, and the stages that had to be computed for it."""
+def run(fitted: Fitted, kept: Path, **options: Any) -> tuple[pd.DataFrame, tuple[Run, ...], set[str]]:
+    """Table and example runs of a prediction of two runs a load, and the stages that had to be computed for it."""
     ingested, fits = fitted
     computed: set[str] = set()
     before = contents(kept)
@@ -54,9 +54,9 @@ def run(fitted: Fitted, kept: Path, **options: Any) -> tuple[Prediction, set[str
 
     model = ModelRuns(runs=2, kept=kept, **options)
     calibrated = calibrated_cells(ingested.campaign, fits, "F", model, progress)
-    found = predict(ingested.campaign, fits, "F", calibrated, model, progress=progress)
+    _, table, examples = predict(ingested, fits, "F", calibrated, model, progress=progress)
     computed |= {name for name, content in contents(kept).items() if before.get(name) != content}
-    return found, computed
+    return table, examples, computed
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -68,7 +68,8 @@ def contents(folder: Path) -> dict[str, bytes]:
 class First:
     """A prediction from nothing, what had to be computed for it, and the folder of what it keeps: for tests to copy."""
 
-    prediction: Prediction
+    table: pd.DataFrame
+    examples: tuple[Run, ...]
     computed: set[str]
     kept: Path
 
@@ -86,23 +87,21 @@ def kept(first: First, tmp_path: Path) -> Path:
 
 
 def test_a_second_start_computes_nothing_and_says_the_same(fitted: Fitted, first: First, kept: Path) -> None:
-    again, recomputed = run(fitted, kept)
+    again, examples, recomputed = run(fitted, kept)
     assert "calibration" in first.computed
     assert len([name for name in first.computed if name.endswith(".nc")]) == 4
     assert recomputed == set()
-    assert again.table.equals(first.prediction.table)
-    assert [r.force_N.tolist() for r in again.example_runs] == [
-        r.force_N.tolist() for r in first.prediction.example_runs
-    ]
+    assert again.equals(first.table)
+    assert [r.force_N.tolist() for r in examples] == [r.force_N.tolist() for r in first.examples]
 
 
 def test_a_damaged_cell_is_run_again_and_no_other(fitted: Fitted, first: First, kept: Path) -> None:
     damaged = sorted(kept.glob("B@*.nc"))[0]
     damaged.write_bytes(b"not HDF5")
     with pytest.warns(DamagedResultWarning, match=f"{damaged.name}: cannot be read .*these simulations are made again"):
-        again, recomputed = run(fitted, kept)
+        again, _, recomputed = run(fitted, kept)
     assert recomputed == {damaged.name}
-    assert again.table.equals(first.prediction.table)
+    assert again.equals(first.table)
 
 
 def test_runs_of_another_seed_replace_those_there_are(fitted: Fitted, kept: Path) -> None:
@@ -123,7 +122,7 @@ def test_cells_run_one_by_one_are_what_a_prediction_takes(fitted: Fitted, kept: 
     cells = {p.name for p in kept.glob("*.nc")}
     stages.simulate_cells(ingested, fits, options, "F")
     assert len(cells) == 2
-    _, computed = run(fitted, kept)
+    *_, computed = run(fitted, kept)
     assert computed == set()
     stages.simulate_cells(ingested, fits, replace(options, seed=1), "calibration")
     assert list(kept.glob("*.nc")) == []
@@ -134,8 +133,8 @@ def test_cells_run_one_by_one_are_what_a_prediction_takes(fitted: Fitted, kept: 
 def test_the_flat_law_is_all_the_model_sees_of_the_measurement(fitted: Fitted, first: First, tmp_path: Path) -> None:
     ingested, fits = fitted
     alone = tuple(f for f in fits if f.sample == "F")
-    flat_only, _ = run((ingested, alone), tmp_path)
-    assert flat_only.table.equals(first.prediction.table)
+    flat_only, *_ = run((ingested, alone), tmp_path)
+    assert flat_only.equals(first.table)
 
 
 def test_a_campaign_without_a_flat_law_is_refused(fitted: Fitted) -> None:

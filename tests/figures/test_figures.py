@@ -264,8 +264,8 @@ def test_the_ratio_interval_without_model_error_is_the_t_interval_of_the_measure
 def test_samples_are_told_apart_by_marker_and_by_colour() -> None:
     n = len(SAMPLE_COLOURS) * len(SAMPLE_MARKERS)
     marks = [sample_mark(k) for k in range(n)]
-    assert len({(m.colour, m.marker) for m in marks}) == n
-    assert all(a.colour != b.colour and a.marker != b.marker for a, b in pairwise(marks))
+    assert len(set(marks)) == n
+    assert all(a[0] != b[0] and a[1] != b[1] for a, b in pairwise(marks))
 
 
 def test_a_sample_keeps_its_colour_where_others_are_missing(study: Study) -> None:

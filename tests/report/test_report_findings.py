@@ -117,10 +117,10 @@ def test_samples_that_cannot_be_parted_judge_nothing() -> None:
 
 def test_the_direction_ratio_is_that_of_the_fitted_forces(study: Study) -> None:
     ratios = findings.direction_ratios(study)
-    assert {(r.pattern, r.pair) for r in ratios} == {("S", ("Sx", "Sy"))}
+    assert {(r.pattern, r.x, r.y) for r in ratios.itertuples()} == {("S", "Sx", "Sy")}
     assert len(ratios) == 3 * len(REGIMES)
     x, y = (next(f for f in study.fits if f.sample == s and f.regime == "static") for s in ("Sx", "Sy"))
-    first = ratios[0]
+    first = ratios.iloc[0]
     assert first.measured == pytest.approx(float(x.force_N(first.normal_load_N) / y.force_N(first.normal_load_N)))
     assert first.low < first.measured < first.high
     sentence = wording.direction_sentences(ratios)[0]
@@ -132,7 +132,7 @@ def test_a_campaign_without_directions_says_nothing_of_them(study: Study) -> Non
     campaign = study.ingested.campaign
     samples = {s: p for s, p in campaign.samples.items() if s != "Sy"}
     without = replace(study, ingested=replace(study.ingested, campaign=replace(campaign, samples=samples)))
-    assert findings.direction_ratios(without) == []
+    assert findings.direction_ratios(without).empty
 
 
 def test_the_correlation_of_mu_and_tau0_is_that_of_the_covariance(study: Study) -> None:

@@ -158,18 +158,7 @@ def _differ(a: LawFit, b: LawFit, load: float) -> bool:
     return abs(float(a.force_N(load) - b.force_N(load))) > half
 
 
-@dataclass(frozen=True)
-class DirectionRatio:
-    """T pulled along x over T pulled along y of one pattern at one load, with 95 % interval."""
-
-    pattern: str
-    pair: tuple[str, str]
-    regime: Regime
-    normal_load_N: float
-    measured: float
-    low: float
-    high: float
-    simulated: float
+DIRECTION_COLUMNS = ["pattern", "x", "y", "regime", "normal_load_N", "measured", "low", "high", "simulated"]
 
 
 def direction_pairs(study: Study) -> list[tuple[str, str, str]]:
@@ -181,24 +170,29 @@ def direction_pairs(study: Study) -> list[tuple[str, str, str]]:
     return [(n, x, y) for n, x, y in both if samples[x].name == samples[y].name == n]
 
 
-def direction_ratios(study: Study) -> list[DirectionRatio]:
-    """The anisotropy of every pattern pulled both ways, at the lowest, middle and highest load."""
-    if study.comparison is None:
-        return []
+def direction_ratios(study: Study) -> pd.DataFrame:
+    """T along x over T along y of every pattern pulled both ways, at the lowest, middle and highest load.
+
+    ``measured`` with its 95 % interval from ``low`` to ``high``, and ``simulated``; x and y are the names of samples.
+    """
+    pairs = direction_pairs(study) if study.comparison is not None else []
     found = [
-        _direction_ratio(study, names, regime, load)
-        for names in direction_pairs(study)
+        (pattern, x, y, regime, load, *ratio)
+        for pattern, x, y in pairs
         for regime in REGIMES
         for load in dict.fromkeys(common_loads(study))
+        if (ratio := _direction_ratio(study, x, y, regime, load)) is not None
     ]
-    return [ratio for ratio in found if ratio is not None]
+    return pd.DataFrame(found, columns=DIRECTION_COLUMNS)
 
 
-def _direction_ratio(study: Study, names: tuple[str, str, str], regime: Regime, load: float) -> DirectionRatio | None:
+def _direction_ratio(
+    study: Study, x: str, y: str, regime: Regime, load: float
+) -> tuple[float, float, float, float] | None:
+    """Measured ratio with the ends of its 95 % interval, and the simulated one; None without a fit of all four."""
     from scipy.stats import t
 
     assert study.comparison is not None
-    pattern, x, y = names
     measured = [study.fits.of(s, regime) for s in (x, y)]
     model = [study_lookup.fit_of(study.comparison.simulated, s, regime) for s in (x, y)]
     if any(f is None for f in measured + model):
@@ -210,9 +204,7 @@ def _direction_ratio(study: Study, names: tuple[str, str, str], regime: Regime, 
     ux, uy = (float(f.force_u_N(load) / f.force_N(load)) for f in (fx, fy))
     half = float(t.ppf(0.975, welch_dof((ux, fx.dof), (uy, fy.dof)))) * math.hypot(ux, uy)
     simulated = float(mx.force_N(load) / my.force_N(load))
-    return DirectionRatio(
-        pattern, (x, y), regime, load, ratio, ratio * math.exp(-half), ratio * math.exp(half), simulated
-    )
+    return ratio, ratio * math.exp(-half), ratio * math.exp(half), simulated
 
 
 def parameter_correlations(fits: Iterable[LawFit]) -> list[float]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,19 +16,11 @@ MAD_TO_SD = 1.4826  # of a normal distribution
 FEWEST_SIBLINGS = 2
 
 
-@dataclass(frozen=True)
-class OddPull:
-    """Deviation of a pull from the median of the other pulls of its sample and load, and in robust SDs."""
+def standings(study: Study) -> dict[str, dict[str, Any]]:
+    """Deviation of every pull, in the regime in which it is larger: regime, deviation, score and siblings by test.
 
-    test_id: str
-    regime: Regime
-    deviation: float
-    score: float
-    siblings: int
-
-
-def standings(study: Study) -> dict[str, OddPull]:
-    """Deviation of every pull, in the regime in which it is larger.
+    ``deviation`` is from the median of the other pulls of the sample at the load, of which there are ``siblings``;
+    ``score`` is the same in robust standard deviations.
 
     Deviations are taken in ln T from the median of the other pulls of the sample at the load, and scaled by the
     median absolute deviation over the whole campaign: one cell has too few pulls to determine a scale. A pull
@@ -37,26 +29,15 @@ def standings(study: Study) -> dict[str, OddPull]:
     ingested = study.ingested
     left_out = {i: b.automatic for i, b in ingested.by_hand.items() if b.override.action == "exclude"}
     table = replace(ingested, pulls={**ingested.pulls, **left_out}).table()
-    found: dict[str, OddPull] = {}
+    found: dict[str, dict[str, Any]] = {}
     for regime in REGIMES if not table.empty else ():
-        for pull in _judged_in(table, regime):
-            if pull.test_id not in found or abs(pull.score) > abs(found[pull.test_id].score):
-                found[pull.test_id] = pull
+        for test_id, pull in _judged_in(table, regime).items():
+            if test_id not in found or abs(pull["score"]) > abs(found[test_id]["score"]):
+                found[test_id] = pull
     return found
 
 
-def odd_pulls(study: Study) -> list[OddPull]:
-    """Used pulls with a modified z-score beyond 3.5, largest deviation first; each pull is listed once."""
-    odd = [p for i, p in standings(study).items() if i in study.ingested.pulls and abs(p.score) > ODD_SCORE]
-    return sorted(odd, key=lambda pull: (-abs(pull.score), pull.test_id))
-
-
-def oddness(standing: OddPull | None, flags: Collection[str]) -> float:
-    """The outlier score by which pulls are sorted: robust standard deviations, plus one for every flag."""
-    return (abs(standing.score) if standing is not None else 0.0) + len(flags)
-
-
-def _judged_in(table: pd.DataFrame, regime: Regime) -> list[OddPull]:
+def _judged_in(table: pd.DataFrame, regime: Regime) -> dict[str, dict[str, Any]]:
     table = table[table[f"{regime}_N"] > 0]
     level_N = study_lookup.load_levels(table["normal_load_N"].to_numpy(float))
     log_force = np.log(table[f"{regime}_N"])
@@ -66,9 +47,12 @@ def _judged_in(table: pd.DataFrame, regime: Regime) -> list[OddPull]:
     judged = siblings >= FEWEST_SIBLINGS
     scale = MAD_TO_SD * float(deviation[judged].abs().median())
     if not scale > 0:
-        return []
+        return {}
     rows = zip(table["test_id"][judged], deviation[judged], siblings[judged], strict=True)
-    return [OddPull(str(i), regime, float(np.expm1(d)), float(d) / scale, int(n)) for i, d, n in rows]
+    return {
+        str(i): {"regime": regime, "deviation": float(np.expm1(d)), "score": float(d) / scale, "siblings": int(n)}
+        for i, d, n in rows
+    }
 
 
 def _from_the_others(values: pd.Series) -> np.ndarray:

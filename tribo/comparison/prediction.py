@@ -21,7 +21,18 @@ import numpy as np
 from tribo.cache.kept_results import DamagedResultWarning, kept_or_made, sources
 from tribo.errors import CampaignError, FitError, Problem, SimulationError, failed_by_system, naming
 from tribo.files import found_in
-from tribo.records import REGIMES, Campaign, FloatArray, LawFit, Pattern, Regime, Run
+from tribo.records import (
+    REGIMES,
+    Campaign,
+    Comparison,
+    ComparisonRow,
+    FloatArray,
+    Ingested,
+    LawFit,
+    Pattern,
+    Regime,
+    Run,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -206,40 +217,8 @@ def loads_to_simulate(campaign: Campaign) -> FloatArray:
     return np.geomspace(loads[0], loads[-1], MOST_LOADS)
 
 
-@dataclass(frozen=True)
-class Prediction:
-    """Predictions of the model for a campaign: the runs, the laws fitted to them, and the force at any load."""
-
-    table: pd.DataFrame
-    fits: tuple[LawFit, ...]
-    measured_flat: dict[Regime, LawFit]
-    calibration: dict[str, float]
-    example_runs: tuple[Run, ...]
-    flat: str
-    notes: tuple[str, ...] = ()
-
-    @property
-    def samples(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(self.table["sample"]))
-
-    def force_N(self, sample: str, regime: Regime, normal_load_N: float) -> tuple[float, float]:
-        """Predicted force and its standard uncertainty, in N.
-
-        Mean over runs, linear between simulated loads. The uncertainty joins the scatter of the runs with
-        that of the measured flat sample at this load, which calibrated the model.
-        """
-        rows = self.table[self.table["sample"] == sample]
-        cells = rows.groupby("normal_load_N")[f"{regime}_N"].agg(["mean", "sem"])
-        loads = cells.index.to_numpy()
-        force = float(np.interp(normal_load_N, loads, cells["mean"]))
-        scatter = float(np.interp(normal_load_N, loads, cells["sem"]))
-        flat = self.measured_flat[regime]
-        relative = float(flat.force_u_N(normal_load_N) / flat.force_N(normal_load_N))
-        return force, float(np.hypot(scatter, force * relative))
-
-
 def predict(
-    campaign: Campaign,
+    ingested: Ingested,
     fits: tuple[LawFit, ...],
     flat: str,
     calibrated: tuple[LocalFriction, tuple[Cell, ...]],
@@ -247,8 +226,10 @@ def predict(
     *,
     weights: str = "relative",
     progress: Progress = lambda stage, done, total: None,
-) -> Prediction:
+) -> tuple[Comparison, pd.DataFrame, tuple[Run, ...]]:
     """Simulate every measured sample at the campaign's loads by the model as calibrated on the flat sample.
+
+    Returns the fits of the model beside the measurement, one row per run, and an example run of each sample.
 
     Parameters
     ----------
@@ -266,6 +247,7 @@ def predict(
     """
     from tribo.springblock import SimConfig
 
+    campaign = ingested.campaign
     friction, cells = calibrated
     table = run_cells(
         cells, model.kept, model.jobs, model.scheduler,
@@ -273,14 +255,60 @@ def predict(
     )  # fmt: skip
     table = _as_forces(table, campaign)
     samples, base = dict.fromkeys(cell.sample for cell in cells), SimConfig()
-    return Prediction(
-        table,
-        _simulated_fits(table, campaign.area_m2, weights),
-        _flat_laws(fits, flat),
-        {**asdict(friction), "blocks_x": base.blocks[0], "blocks_y": base.blocks[1], "dt_s": base.dt_s},
-        tuple(example_run([c for c in cells if c.sample == sample], model.kept) for sample in samples),
-        flat,
+    simulated = _simulated_fits(table, campaign.area_m2, weights)
+    calibration = {**asdict(friction), "blocks_x": base.blocks[0], "blocks_y": base.blocks[1], "dt_s": base.dt_s}
+    rows = _side_by_side(ingested, table, _flat_laws(fits, flat))
+    examples = tuple(example_run([c for c in cells if c.sample == sample], model.kept) for sample in samples)
+    return Comparison(simulated, rows, calibration, flat), table, examples
+
+
+def _side_by_side(
+    ingested: Ingested, table: pd.DataFrame, measured_flat: Mapping[Regime, LawFit]
+) -> tuple[ComparisonRow, ...]:
+    """The forces of measurement and model at each load that was measured."""
+    return tuple(
+        ComparisonRow(
+            sample, regime, load, mean, u, *_simulated_force_N(table, sample, regime, load, measured_flat[regime])
+        )
+        for regime in REGIMES
+        for sample in dict.fromkeys(table["sample"])
+        for load, mean, u in load_means(ingested, sample, regime)
     )
+
+
+def _simulated_force_N(
+    table: pd.DataFrame, sample: str, regime: Regime, normal_load_N: float, flat: LawFit
+) -> tuple[float, float]:
+    """Predicted force and its standard uncertainty, in N.
+
+    Mean over runs, linear between simulated loads. The uncertainty joins the scatter of the runs with
+    that of the measured flat sample at this load, which calibrated the model.
+    """
+    rows = table[table["sample"] == sample]
+    cells = rows.groupby("normal_load_N")[f"{regime}_N"].agg(["mean", "sem"])
+    loads = cells.index.to_numpy()
+    force = float(np.interp(normal_load_N, loads, cells["mean"]))
+    scatter = float(np.interp(normal_load_N, loads, cells["sem"]))
+    relative = float(flat.force_u_N(normal_load_N) / flat.force_N(normal_load_N))
+    return force, float(np.hypot(scatter, force * relative))
+
+
+def load_means(ingested: Ingested, sample: str, regime: Regime) -> list[tuple[float, float, float]]:
+    """(normal load, mean force, its standard uncertainty) of a sample at each load, in newton.
+
+    Specimens are averaged first, so that the uncertainty is that of the mean over specimens; with one
+    specimen at a load it is that of the mean over its repeats, with one pull that of the reading.
+    """
+    table = ingested.table()
+    rows = table[(table["sample"] == sample) & np.isfinite(table[f"{regime}_N"])]
+    means = []
+    for load, cell in rows.groupby("normal_load_N", sort=True):
+        by_specimen = cell.groupby("specimen")[f"{regime}_N"].mean().to_numpy()
+        values = by_specimen if by_specimen.size > 1 else cell[f"{regime}_N"].to_numpy()
+        spread = float(values.std(ddof=1) / np.sqrt(values.size)) if values.size > 1 else float("nan")
+        alone = float(cell[f"{regime}_u_N"].iloc[0])
+        means.append((float(load), float(by_specimen.mean()), spread if values.size > 1 else alone))
+    return means
 
 
 def calibrated_cells(

@@ -98,20 +98,20 @@ def draw_ratio(numbers: pd.DataFrame) -> Figure:
 
 def _ratio_panel(ax: Axes, part: pd.DataFrame) -> None:
     for number, sample in style.by_sample(part):
-        mark = style.sample_mark(number)
+        colour, marker = style.sample_mark(number)
         mean, curve = sample[sample["mark"] == "mean"], sample[sample["mark"] == "fit"]
-        ax.plot(curve["pressure_kPa"], curve["T_over_N"], color=mark.colour, lw=0.9)
+        ax.plot(curve["pressure_kPa"], curve["T_over_N"], color=colour, lw=0.9)
         ax.errorbar(
             mean["pressure_kPa"], mean["T_over_N"], mean["T_over_N_u"].fillna(0.0),
-            fmt=mark.marker, color=mark.colour, elinewidth=0.8,
+            fmt=marker, color=colour, elinewidth=0.8,
         )  # fmt: skip
     ax.set_ylim(bottom=0)
     ax.set_xlim(left=0)
 
 
 def _sample_handle(number: int, name: str) -> Line2D:
-    mark = style.sample_mark(number)
-    return Line2D([], [], color=mark.colour, marker=mark.marker, lw=0.9, label=name)
+    colour, marker = style.sample_mark(number)
+    return Line2D([], [], color=colour, marker=marker, lw=0.9, label=name)
 
 
 FORCE_COLUMNS = [
@@ -407,7 +407,7 @@ def _point(ax: Axes, point: pd.Series, aside: Transform) -> None:
     measured = point["mark"] == "measured"
     ax.errorbar(
         point["area_fraction"], point["value"], point["value_u"] if np.isfinite(point["value_u"]) else 0.0,
-        fmt=style.sample_mark(int(point["sample_number"])).marker, color=COLOURS[point["mark"]],
+        fmt=style.sample_mark(int(point["sample_number"]))[1], color=COLOURS[point["mark"]],
         mfc=COLOURS[point["mark"]] if measured else "white", elinewidth=0.8, transform=aside,
         ms=4.5, mew=0.9, zorder=3 if measured else 2.5,
     )  # fmt: skip
@@ -416,7 +416,7 @@ def _point(ax: Axes, point: pd.Series, aside: Transform) -> None:
 def _area_legend(numbers: pd.DataFrame) -> list[Line2D]:
     points = numbers.dropna(subset="sample_number").drop_duplicates("sample_number").sort_values("sample_number")
     samples = [
-        Line2D([], [], color="0.35", marker=style.sample_mark(int(number)).marker, ls="", label=name)
+        Line2D([], [], color="0.35", marker=style.sample_mark(int(number))[1], ls="", label=name)
         for number, name in zip(points["sample_number"], points["sample"], strict=True)
     ]
     return [

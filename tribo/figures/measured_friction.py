@@ -137,11 +137,11 @@ def draw_dependence(numbers: pd.DataFrame) -> Figure:
     for ax, variable in zip(axes, variables, strict=True):
         part = numbers[numbers["variable"] == variable]
         for (number, regime), points in part.groupby(["sample_number", "regime"]):
-            mark = style.sample_mark(int(str(number)))
-            face = "none" if _OPEN[str(regime)] else mark.colour
+            colour, marker = style.sample_mark(int(str(number)))
+            face = "none" if _OPEN[str(regime)] else colour
             ax.errorbar(
-                points["value"], points["T_over_N"], points["T_over_N_u"].fillna(0.0), fmt=mark.marker, ms=3,
-                color=mark.colour, mfc=face, elinewidth=0.6,
+                points["value"], points["T_over_N"], points["T_over_N_u"].fillna(0.0), fmt=marker, ms=3,
+                color=colour, mfc=face, elinewidth=0.6,
             )  # fmt: skip
         ax.set_xlabel(_sentence(str(part["label"].iloc[0])))
         ax.set_ylabel("T / N")
@@ -158,15 +158,15 @@ def draw_forces(numbers: pd.DataFrame) -> Figure:
     for ax, regime in zip(axes, regimes, strict=True):
         part = numbers[numbers["regime"] == regime]
         for number, points in style.by_sample(part):
-            mark = style.sample_mark(number)
+            colour, marker = style.sample_mark(number)
             measured = points[points["mark"] == "measured"]
             load, force = measured["normal_load_N"], measured["T_N"]
-            ax.plot(load, force, mark.marker, ms=3, color=mark.colour, mfc="none", mew=0.6)
+            ax.plot(load, force, marker, ms=3, color=colour, mfc="none", mew=0.6)
             for formula, line in points[points["mark"] != "measured"].groupby("mark"):
-                ax.plot(line["normal_load_N"], line["T_N"], color=mark.colour, lw=1.1)
+                ax.plot(line["normal_load_N"], line["T_N"], color=colour, lw=1.1)
                 below = -LINE_POINTS * (len(ax.texts) + 1)
                 ax.annotate(str(formula), (0.02, 1.0), (0.0, below), xycoords="axes fraction",
-                            textcoords="offset points", color=mark.colour, fontsize=7)  # fmt: skip
+                            textcoords="offset points", color=colour, fontsize=7)  # fmt: skip
         style.panel_title(ax, _sentence(f"{regime} friction"))
         ax.set_xlabel("Normal load N (N)")
         ax.set_ylabel("Friction force T (N)")
@@ -187,7 +187,7 @@ def draw_records(numbers: pd.DataFrame) -> Figure:
     figure, axes = style.panel_grid(len(groups), 50)
     for ax, (_, sample) in zip(axes, groups, strict=True):
         for number, (_, record) in enumerate(sample.groupby("test_id", sort=False)):
-            ax.plot(record["value"], record["T_over_N"], lw=0.7, color=style.sample_mark(number).colour)
+            ax.plot(record["value"], record["T_over_N"], lw=0.7, color=style.sample_mark(number)[0])
         first = sample.iloc[0]
         style.panel_title(ax, first["sample"], f"{sample['test_id'].nunique()} records")
         ax.set_xlabel(_sentence(str(first["way"])))
@@ -225,9 +225,9 @@ def draw_restarts(numbers: pd.DataFrame) -> Figure:
     """Static force over load against the time of the hold."""
     figure, (ax,) = style.panel_grid(1, 70)
     for number, points in style.by_sample(numbers):
-        mark = style.sample_mark(number)
+        colour, marker = style.sample_mark(number)
         x, y, u = points["hold_s"], points["T_over_N"], points["T_over_N_u"]
-        ax.errorbar(x, y, u, fmt=mark.marker, color=mark.colour, ms=4)
+        ax.errorbar(x, y, u, fmt=marker, color=colour, ms=4)
     ax.set_xlabel("Time of the hold (s)")
     ax.set_ylabel("Static T / N at the restart")
     _spread(ax, numbers["hold_s"])
@@ -255,7 +255,7 @@ def _sentence(label: str) -> str:
 def _samples(numbers: pd.DataFrame) -> list[Line2D]:
     found = numbers.drop_duplicates("sample_number").sort_values("sample_number")
     marks = [(style.sample_mark(int(n)), s) for n, s in zip(found["sample_number"], found["sample"], strict=True)]
-    return [Line2D([], [], color=m.colour, marker=m.marker, ls="", label=str(s)) for m, s in marks]
+    return [Line2D([], [], color=colour, marker=marker, ls="", label=str(s)) for (colour, marker), s in marks]
 
 
 def _regimes(numbers: pd.DataFrame) -> list[Line2D]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,16 +36,6 @@ NAMES = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Panel:
-    """One contrast as a panel: the tests it is about, and their covariate."""
-
-    contrast: Contrast
-    covariate: Covariate
-    here: np.ndarray
-    p: float
-
-
 def residual_numbers(d: Diagnosis) -> pd.DataFrame:
     """Residuals, 100 (measured / model - 1), of the strongest contrasts, one panel each.
 
@@ -58,26 +47,28 @@ def residual_numbers(d: Diagnosis) -> pd.DataFrame:
     from tribo.diagnostics.fit import residual_on_flat
 
     residual = residual_on_flat(d.baseline)
-    frames = [_rows(d, k, panel, residual) for k, panel in enumerate(panels(d))]
+    frames = [_rows(d, k, panel, residual) for k, panel in enumerate(_panels(d))]
     return pd.DataFrame([row for rows in frames for row in rows], columns=RESIDUAL_COLUMNS)
 
 
-def panels(d: Diagnosis) -> list[Panel]:
-    """The strongest contrast with each covariate and sample, the strongest first."""
+def _panels(d: Diagnosis) -> list[tuple[Contrast, Covariate, np.ndarray, float]]:
+    """The strongest contrast with each covariate and sample, its covariate, the tests it is about, and its p."""
     s = d.screened
-    found: dict[tuple[str, str], Panel] = {}
+    found: dict[tuple[str, str], tuple[Contrast, Covariate, np.ndarray, float]] = {}
     for k in np.argsort(-s.strength):
         contrast = s.contrasts[k]
-        panel = _panel(d, contrast, s.p_adjusted(float(s.strength[k])))
-        if panel is not None and not contrast.is_taken_up(d.baseline.setup.observations.flat):
-            found.setdefault((panel.covariate.name, contrast.sample if contrast.kind == "sample" else ""), panel)
+        about = _tests_and_covariate(d, contrast)
+        if about is not None and not contrast.is_taken_up(d.baseline.setup.observations.flat):
+            column, here = about
+            key = (column.name, contrast.sample if contrast.kind == "sample" else "")
+            found.setdefault(key, (contrast, column, here, s.p_adjusted(float(s.strength[k]))))
         if len(found) == MOST_PANELS:
             break
-    certain = [p for p in found.values() if p.p < 0.05]
+    certain = [panel for panel in found.values() if panel[-1] < 0.05]
     return certain or list(found.values())[:3]
 
 
-def _panel(d: Diagnosis, contrast: Contrast, p: float) -> Panel | None:
+def _tests_and_covariate(d: Diagnosis, contrast: Contrast) -> tuple[Covariate, np.ndarray] | None:
     c = d.baseline.setup.observations.conditions
     here = np.ones(len(c.sample), bool)
     name = contrast.covariate
@@ -95,32 +86,34 @@ def _panel(d: Diagnosis, contrast: Contrast, p: float) -> Panel | None:
     if contrast.kind == "block":
         return None
     try:
-        return Panel(contrast, covariate(d.baseline.setup, name), here, p)
+        return covariate(d.baseline.setup, name), here
     except KeyError:
         return None
 
 
-def _rows(d: Diagnosis, k: int, panel: Panel, residual: FloatArray) -> list[dict[str, Any]]:
-    contrast, here = panel.contrast, panel.here
+def _rows(
+    d: Diagnosis, k: int, panel: tuple[Contrast, Covariate, np.ndarray, float], residual: FloatArray
+) -> list[dict[str, Any]]:
+    contrast, column, here, p = panel
     o = d.baseline.setup.observations
     observable = _observable(contrast)
     weight = np.array(WEIGHTS[observable])
     samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
     places = {s: i for i, s in enumerate(samples)}
-    x, y = panel.covariate.values, percent(residual @ weight)
+    x, y = column.values, percent(residual @ weight)
     added = added_by_causes(d, residual, weight)
     common = {
-        "panel": k, "title": _title(contrast), "detail": f"p {_p(panel.p)}", "axis": panel.covariate.axis,
+        "panel": k, "title": _title(contrast), "detail": f"p {_p(p)}", "axis": column.axis,
         "y_axis": f"{NAMES[observable]}:\nmeasured / model − 1 (%)",
     }  # fmt: skip
     tests = [
         {
             "mark": "test", "sample_number": places[o.conditions.sample[i]], "sample": o.conditions.sample[i],
-            "test_id": o.test_ids[i], "x": x[i], "x_name": _name(panel.covariate, x[i]), "y": y[i],
+            "test_id": o.test_ids[i], "x": x[i], "x_name": _name(column, x[i]), "y": y[i],
         }
         for i in np.flatnonzero(here)
     ]  # fmt: skip
-    return [common | row for row in (*tests, *summaries(d, panel.covariate, here, y, weight, added))]
+    return [common | row for row in (*tests, *summaries(d, column, here, y, weight, added))]
 
 
 def added_by_causes(d: Diagnosis, residual: FloatArray, weight: FloatArray) -> FloatArray | None:
@@ -221,8 +214,8 @@ def _residual_panel(ax: Axes, part: pd.DataFrame) -> None:
     names = tests.drop_duplicates("x")[["x", "x_name"]].sort_values("x") if tests["x_name"].any() else None
     shifted = tests["x"] + (0.22 * _jitter(len(tests)) if names is not None else 0.0)
     for number, points in tests.groupby("sample_number"):
-        mark = style.sample_mark(int(float(str(number))))
-        ax.plot(shifted[points.index], points["y"], mark.marker, color=mark.colour, ms=2.0, alpha=0.45, mew=0)
+        colour, marker = style.sample_mark(int(float(str(number))))
+        ax.plot(shifted[points.index], points["y"], marker, color=colour, ms=2.0, alpha=0.45, mew=0)
     mean = part[part["mark"] == "mean"]
     bars = np.abs(mean[["y_low", "y_high"]].to_numpy(float) - mean[["y"]].to_numpy(float)).T
     ax.errorbar(mean["x"], mean["y"], bars, fmt="o", ms=3.4, color="black", elinewidth=0.9, zorder=5)
@@ -264,7 +257,7 @@ def _residual_legend(numbers: pd.DataFrame) -> list[Any]:
     shown = tests.drop_duplicates("sample_number").sort_values("sample_number")
     marks = [(str(row["sample"]), style.sample_mark(int(row["sample_number"]))) for row in shown.to_dict("records")]
     handles: list[Any] = [
-        Line2D([], [], color=m.colour, marker=m.marker, lw=0, ms=3.5, label=name) for name, m in marks
+        Line2D([], [], color=colour, marker=marker, lw=0, ms=3.5, label=name) for name, (colour, marker) in marks
     ]
     handles.append(Line2D([], [], color="black", marker="o", lw=0.9, ms=3.4, label="mean ± 2 SE"))
     handles.append(Patch(color="0.75", alpha=0.5, lw=0, label="± 2 SD of a mean, expected"))

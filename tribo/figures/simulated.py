@@ -230,12 +230,12 @@ def _axes(figure: Figure, left_mm: float, top_mm: float, width_mm: float, height
 def _draw_traces(ax: Axes, runs: list[tuple[int, pd.DataFrame]], numbers: pd.DataFrame) -> list[Any]:
     handles = []
     for number, run in runs:
-        mark = style.sample_mark(number)
+        colour, marker = style.sample_mark(number)
         trace, peak, window = (run[run["mark"] == m] for m in ("trace", "peak", "window"))
-        ax.plot(trace["time_ms"], trace["T_over_N"], color=mark.colour, lw=0.8, label=f"{run['sample'].iloc[0]}")
-        ax.plot(peak["time_ms"], peak["T_over_N"], mark.marker, color=mark.colour, ms=5)
+        ax.plot(trace["time_ms"], trace["T_over_N"], color=colour, lw=0.8, label=f"{run['sample'].iloc[0]}")
+        ax.plot(peak["time_ms"], peak["T_over_N"], marker, color=colour, ms=5)
         handles += ax.plot(
-            window["time_ms"], window["T_over_N"], ls=":", marker=mark.marker, mfc="white", color=mark.colour,
+            window["time_ms"], window["T_over_N"], ls=":", marker=marker, mfc="white", color=colour,
             label=f"{run['sample'].iloc[0]} ({_angle(run['angle_deg'].iloc[0])})",
         )  # fmt: skip
     pressures = " and ".join(f"{p:.3g}" for p in sorted(numbers["pressure_kPa"].unique()))

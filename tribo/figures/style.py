@@ -46,21 +46,9 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-@displayed()
-@dataclass(frozen=True)
-class SampleMark:
-    """How one sample is drawn in every figure."""
-
-    colour: str
-    marker: str
-
-
-def sample_mark(sample_number: int) -> SampleMark:
+def sample_mark(sample_number: int) -> tuple[str, str]:
     """Colour and marker of a sample by its place in the campaign; 63 samples before a pair comes again."""
-    return SampleMark(
-        SAMPLE_COLOURS[sample_number % len(SAMPLE_COLOURS)],
-        SAMPLE_MARKERS[sample_number % len(SAMPLE_MARKERS)],
-    )
+    return SAMPLE_COLOURS[sample_number % len(SAMPLE_COLOURS)], SAMPLE_MARKERS[sample_number % len(SAMPLE_MARKERS)]
 
 
 class PageFigure(Figure):

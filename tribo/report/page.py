@@ -12,7 +12,7 @@ from tribo import __version__
 from tribo.figures.catalogue import TITLES
 from tribo.report.content import figure_numbers, figure_places
 from tribo.report.drawings import Drawn, inline_svg
-from tribo.report.pulls import PullCard, on_pages, trace_data
+from tribo.report.pulls import on_pages, trace_data
 from tribo.report.shell import STYLE, WORKING, environment, script_json, style_and_script
 from tribo.wording.study_sentences import flags_in_words
 
@@ -29,7 +29,7 @@ def pages_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str,
     places = {k: [_shown(figures[n], numbers[n]) for n in names] for k, names in figure_places(list(figures)).items()}
     each = on_pages(said["cards"])
     campaign = said["campaign"]  # tells this report from others, for what a browser remembers of it
-    told = [campaign.title, *sorted(campaign.inputs.values()), *sorted(card.test_id for card in said["cards"])]
+    told = [campaign.title, *sorted(campaign.inputs.values()), *sorted(card["test_id"] for card in said["cards"])]
     report_key = sha256("\0".join(told).encode("utf-8", errors="backslashreplace")).hexdigest()[:16]
     names = [PAGE, *(f"pulls-{k}.html" for k in range(2, len(each) + 1))]
     pages = {}
@@ -48,7 +48,7 @@ def pages_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str,
                 pulls=len(said["cards"]),
                 report_key=report_key,
                 figure_data=script_json({n: figure.series for n, figure in shown.items()}),
-                trace_data=trace_data(said["study"], [card.test_id for card in cards]),
+                trace_data=trace_data(said["study"], [card["test_id"] for card in cards]),
                 **style_and_script(environment(), [STYLE], [*WORKING, "pulls.js"]),
             )
         )
@@ -65,12 +65,12 @@ def compared_page(columns: Sequence[Any], rows: Sequence[Any], said: Sequence[st
     )  # fmt: skip
 
 
-def _filters(cards: list[PullCard]) -> list[tuple[str, str, list[tuple[str, str]]]]:
+def _filters(cards: list[dict[str, Any]]) -> list[tuple[str, str, list[tuple[str, str]]]]:
     """What pulls can be filtered by: attribute of a card, label, and values with their texts."""
-    flags = sorted({flag for card in cards for flag in card.flags})
-    specimens = sorted({card.specimen for card in cards})
-    samples = sorted({card.sample for card in cards})
-    loads = sorted({card.load for card in cards}, key=float)
+    flags = sorted({flag for card in cards for flag in card["flags"]})
+    specimens = sorted({card["specimen"] for card in cards})
+    samples = sorted({card["sample"] for card in cards})
+    loads = sorted({card["load"] for card in cards}, key=float)
     return [
         ("sample", "Sample", [(s, s) for s in samples]),
         ("load", "Load", [(load, f"{load} N") for load in loads]),

@@ -13,7 +13,6 @@ from tribo.files import write_bytes, write_text
 from tribo.records import Study
 from tribo.report.content import figure_numbers, figure_places
 from tribo.report.drawings import Drawn
-from tribo.report.pulls import PullCard
 from tribo.temporary import temporary_folder
 from tribo.wording.card import Card
 from tribo.wording.numerals import ratio_text, significant, unbroken
@@ -102,7 +101,7 @@ def record_of(said: Mapping[str, Any], figures: Mapping[str, Drawn]) -> dict[str
         "outlying": study.outlying,
         "notes": study.notes,
         "provenance": [[n, v] for n, v in said["provenance"] or () if n not in NOT_OF_THE_INPUTS],
-        "pulls": [_pull_row(card) for card in sorted(said["cards"], key=lambda card: card.test_id)],
+        "pulls": [_pull_row(card) for card in sorted(said["cards"], key=lambda card: card["test_id"])],
         **_diagnosis_tables(verdict),
     }
     spaced: dict[str, Any] = _spaced(record)
@@ -178,11 +177,11 @@ def _first_tests(tests: list[str]) -> str:
     return ", ".join(tests[:MOST_TESTS]) + more
 
 
-def _pull_row(card: PullCard) -> list[str]:
-    said = [card.flags_in_words, {"used": "", "moved": "moved by hand", "excluded": "excluded by hand"}[card.state]]
+def _pull_row(card: Mapping[str, Any]) -> list[str]:
+    by_hand = {"used": "", "moved": "moved by hand", "excluded": "excluded by hand"}[card["state"]]
     return [
-        card.test_id, card.sample, card.specimen, card.load, card.static, card.sliding, card.window,
-        significant(card.oddness, 2), "; ".join(part for part in said if part),
+        *(card[name] for name in ("test_id", "sample", "specimen", "load", "static", "sliding", "window")),
+        significant(card["oddness"], 2), "; ".join(part for part in (card["flags_in_words"], by_hand) if part),
     ]  # fmt: skip
 
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
 from tribo.comparison import study_lookup
-from tribo.comparison.oddness import ODD_SCORE, OddPull, oddness, standings
+from tribo.comparison.oddness import ODD_SCORE, standings
 from tribo.figures.one_pull import thin_trace
 from tribo.records import ByHand, FloatArray, Pull, Study, Test, Trace
 from tribo.report.shell import script_json
@@ -26,33 +25,12 @@ PULLS_A_PAGE = 2000  # more of them on one page are slow to open
 BY_HAND = ("peak_by_hand", "window_by_hand")
 
 
-@dataclass(frozen=True)
-class PullCard:
-    """One pull as shown on the page. ``state`` is used, moved or excluded; cards are sorted by ``oddness``."""
+def pull_cards(study: Study) -> list[dict[str, Any]]:
+    """Every pull that was read, as the page shows it, including those excluded by hand.
 
-    test_id: str
-    sample: str
-    specimen: str
-    load: str
-    state: str
-    static: str
-    sliding: str
-    zero: str
-    window: str
-    flags: tuple[str, ...]
-    odd: str
-    by_hand: str
-    oddness: float
-    order: int
-    picture: Markup
-
-    @property
-    def flags_in_words(self) -> str:
-        return flags_in_words(self.flags)
-
-
-def pull_cards(study: Study) -> list[PullCard]:
-    """Every pull that was read, highest outlier score first, including those excluded by hand."""
+    ``state`` is used, moved or excluded; ``oddness``, by which they are sorted, is the deviation in robust standard
+    deviations, plus one for every flag.
+    """
     ingested = study.ingested
     standing = standings(study)
     levels = load_labels(study)
@@ -60,15 +38,15 @@ def pull_cards(study: Study) -> list[PullCard]:
     points = int(np.clip(PICTURE_BYTES / (9 * min(max(len(read), 1), PULLS_A_PAGE)), 24, 160))
     read = [t for t in read if t.test_id in study.ingested.traces or t.test_id in study.ingested.by_hand]
     cards = [_card(study, t, levels[t.test_id], standing.get(t.test_id), points) for t in read]
-    return sorted(cards, key=lambda card: (-card.oddness, card.test_id))
+    return sorted(cards, key=lambda card: (-card["oddness"], card["test_id"]))
 
 
-def on_pages(cards: list[PullCard]) -> list[list[PullCard]]:
+def on_pages(cards: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
     """The cards of each page. Where there are several pages, pulls with a decision by hand come first, so that the
     first page holds all decisions."""
     if len(cards) <= PULLS_A_PAGE:
         return [cards]
-    ordered = sorted(cards, key=lambda card: card.state == "used")
+    ordered = sorted(cards, key=lambda card: card["state"] == "used")
     return [ordered[k : k + PULLS_A_PAGE] for k in range(0, len(ordered), PULLS_A_PAGE)]
 
 
@@ -100,28 +78,30 @@ def reading(study: Study, test_id: str) -> tuple[Pull, Trace, ByHand | None]:
     return decided.automatic, decided.trace, decided
 
 
-def _card(study: Study, test: Test, load: str, standing: OddPull | None, points: int) -> PullCard:
+def _card(study: Study, test: Test, load: str, standing: Mapping[str, Any] | None, points: int) -> dict[str, Any]:
     pull, trace, decided = reading(study, test.test_id)
     used = test.test_id in study.ingested.pulls
     start, end = pull.window_s
     flags = tuple(flag for flag in pull.flags if flag not in BY_HAND)
-    return PullCard(
-        test.test_id,
-        test.sample,
-        test.specimen,
-        load,
-        "excluded" if not used else "moved" if decided else "used",
-        with_uncertainty(pull.static_N, pull.static_u_N),
-        with_uncertainty(pull.sliding_N, pull.sliding_u_N),
-        significant(pull.zero_N, 2),
-        f"{significant(start)} to {significant(end)}",
-        flags,
-        odd_sentence(standing) if standing is not None and abs(standing.score) > ODD_SCORE else "",
-        by_hand_sentence(decided, pull if used else None) if decided is not None else "",
-        round(oddness(standing, flags), 2),
-        test.run_order or 0,
-        trace_picture(trace, pull, points),
-    )
+    score = abs(standing["score"]) if standing is not None else 0.0
+    return {
+        "test_id": test.test_id,
+        "sample": test.sample,
+        "specimen": test.specimen,
+        "load": load,
+        "state": "excluded" if not used else "moved" if decided else "used",
+        "static": with_uncertainty(pull.static_N, pull.static_u_N),
+        "sliding": with_uncertainty(pull.sliding_N, pull.sliding_u_N),
+        "zero": significant(pull.zero_N, 2),
+        "window": f"{significant(start)} to {significant(end)}",
+        "flags": flags,
+        "flags_in_words": flags_in_words(flags),
+        "odd": odd_sentence(standing) if standing is not None and score > ODD_SCORE else "",
+        "by_hand": by_hand_sentence(decided, pull if used else None) if decided is not None else "",
+        "oddness": round(score + len(flags), 2),
+        "order": test.run_order or 0,
+        "picture": trace_picture(trace, pull, points),
+    }
 
 
 def trace_picture(trace: Trace, pull: Pull, points: int = 120) -> Markup:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tribo.comparison import findings, study_lookup
-from tribo.comparison.findings import Agreement, DirectionRatio, Ranking, Verdict
-from tribo.comparison.oddness import OddPull
+from tribo.comparison.findings import Agreement, Ranking, Verdict
 from tribo.comparison.study_lookup import all_set_aside, shown
-from tribo.records import PA_PER_KPA, REGIMES, ByHand, Campaign, LawFit, Pull, Regime, Study, Test
+from tribo.records import PA_PER_KPA, REGIMES, ByHand, Campaign, LawFit, Pull, Study, Test
 from tribo.vocabulary import label_with_unit
 from tribo.wording.numerals import counted, joined, loads_in_words, p_text, percent, significant, span, with_uncertainty
 
@@ -187,22 +186,21 @@ def ranking_sentence(ranking: Ranking) -> str:
     return start + f"the model ranks {n - len(ranking.reversed)} of them in the measured order and reverses {wrong}."
 
 
-def direction_sentences(ratios: Iterable[DirectionRatio]) -> list[str]:
+def direction_sentences(ratios: pd.DataFrame) -> list[str]:
     """Ratio of the friction along x to that along y of each pattern, measured and simulated."""
-    groups: dict[tuple[str, Regime], list[DirectionRatio]] = {}
-    for ratio in ratios:
-        groups.setdefault((ratio.pattern, ratio.regime), []).append(ratio)
-    return [_direction_sentence(group) for group in groups.values()]
+    groups = ratios.groupby(["pattern", "regime"], sort=False)
+    return [_direction_sentence(part.to_dict("records")) for _, part in groups]
 
 
-def _direction_sentence(group: list[DirectionRatio]) -> str:
-    x, y = group[0].pair
+def _direction_sentence(group: Sequence[Mapping[Any, Any]]) -> str:
+    x, y = group[0]["x"], group[0]["y"]
     values = ", ".join(
-        f"{r.measured:.2f} ({r.low:.2f} to {r.high:.2f}) and {r.simulated:.2f} at {significant(r.normal_load_N)} N"
+        f"{r['measured']:.2f} ({r['low']:.2f} to {r['high']:.2f}) and {r['simulated']:.2f} at "
+        f"{significant(r['normal_load_N'])} N"
         for r in group
     )
-    outside = [r for r in group if not r.low <= r.simulated <= r.high]
-    anisotropic = [r for r in group if not r.low <= 1 <= r.high]
+    outside = [r for r in group if not r["low"] <= r["simulated"] <= r["high"]]
+    anisotropic = [r for r in group if not r["low"] <= 1 <= r["high"]]
     seen = (
         f"In the measurement, the directions differ significantly at {_at(len(anisotropic), len(group))}"
         if anisotropic
@@ -213,7 +211,7 @@ def _direction_sentence(group: list[DirectionRatio]) -> str:
         if not outside
         else f"the simulated ratio lies outside the 95 % interval of the measurement at {len(outside)} of them"
     )
-    return f"Ratio of {group[0].regime} friction {x} / {y}, measured and simulated: {values}. {seen}; {verdict}."
+    return f"Ratio of {group[0]['regime']} friction {x} / {y}, measured and simulated: {values}. {seen}; {verdict}."
 
 
 def pooling_note(study: Study) -> str:
@@ -243,12 +241,13 @@ def correlation_note(study: Study) -> str:
     )
 
 
-def odd_sentence(pull: OddPull) -> str:
-    """How far a pull is from the other pulls of its sample at its load."""
-    side = "above" if pull.deviation > 0 else "below"
+def odd_sentence(standing: Mapping[str, Any]) -> str:
+    """How far a pull is from the other pulls of its sample at its load, from its row of the standings."""
+    side = "above" if standing["deviation"] > 0 else "below"
     return (
-        f"{pull.regime.capitalize()} force {percent(abs(pull.deviation))} {side} the median of the {pull.siblings} "
-        f"other pulls of this sample at this load ({abs(pull.score):.1f} robust standard deviations)."
+        f"{standing['regime'].capitalize()} force {percent(abs(standing['deviation']))} {side} the median of the "
+        f"{standing['siblings']} other pulls of this sample at this load ({abs(standing['score']):.1f} robust standard "
+        "deviations)."
     )
 
 
