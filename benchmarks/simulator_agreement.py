@@ -202,16 +202,12 @@ def reference_failures(config: SimConfig, count: int = 6) -> list[tuple[int, int
     lattice = lattice_of(config)
     drive = drive_of(config, lattice)
     start = 0.99 * first_failure_s(lattice, thresholds_of(config, lattice), drive, config.stiffness_N_m)
-    model = r.reference_model(config, lattice, thresholds_of(config, lattice), start, 1)
-    run = r.Course(
-        drive.follow * start + drive.lag, drive.follow.copy(), lattice.contact.copy(), np.zeros(1), np.zeros(1),
-        np.zeros(1), np.zeros(1, np.int64), np.full(64, -1, np.int64), np.zeros(r.N_SUMS),
-    )  # fmt: skip
+    run = r.reference_model(config, lattice, thresholds_of(config, lattice), start, 1, 1)
     work = np.zeros((10, *run.u.shape))
     found: dict[int, int] = {}
     step = 0
     while len(found) < count:
-        r.integrate_all(run, 1, model._replace(start=start + step * config.dt_s, stop_at_peaks=np.inf), work)
+        r.integrate_all(run._replace(start=start + step * config.dt_s, stop_at_peaks=np.inf), 1, work)
         for block in run.failed[: int(run.sums[r.N_FAILED])]:
             found.setdefault(int(block), step)
         step += 1

@@ -100,6 +100,18 @@ def test_a_design_file_says_all_of_it(tmp_path: Path):
     assert run("--sample", "F", "-o", tmp_path / "e.nc").exit_code == 2
 
 
+def test_the_dense_engine_is_taken_as_the_fast_one(tmp_path: Path):
+    """Said once on stderr, and the file is that of the fast engine."""
+    asked = ("--sample", "F", "--pressure", 5, *QUICK, "--json")
+    fast = run(*asked, "--engine", "fast", "-o", tmp_path / "fast.nc")
+    dense = run(*asked, "--engine", "dense", "-o", tmp_path / "dense.nc")
+    assert dense.stderr.count("the dense engine is no longer part of tribo") == 1
+    assert "dense" not in fast.stderr
+    assert json.loads(dense.stdout) | {"out": ""} == json.loads(fast.stdout) | {"out": ""}
+    with xr.open_dataset(tmp_path / "dense.nc", engine="h5netcdf") as data:
+        assert data.attrs["engine"] == "fast"
+
+
 def test_one_run_has_the_seed_it_is_given(tmp_path: Path):
     """FILE.nc holds the run that the library makes of the same seed, to the bit."""
     asked = ("--sample", "Sy", "--pressure", 5, *QUICK, "--seed", 11, "-o", tmp_path / "run.nc", "--json")

@@ -232,7 +232,7 @@ def test_what_it_states_of_evidence_tests_and_tables_is_complete(m: Mechanism) -
     t = m.in_table
     assert not (t.missing and (t.barred or t.finding))
     assert bool(t.finding) <= bool(t.guess)
-    assert t.next_test is None or set(t.next_test.separates) <= set(NAMES)
+    assert set(t.separates) <= set(NAMES)
     if t.finding is not None:
         text = t.finding(Readings((0.0, 4.0), (0.0, 0.1), lambda: 0.2, 6e4))
         assert text.endswith(".")

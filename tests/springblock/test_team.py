@@ -43,9 +43,9 @@ def test_a_lattice_in_shares_gives_the_forces_of_one_that_is_not(monkeypatch: py
 
 def test_a_team_has_no_more_threads_than_cores_or_shares(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(team, "cores", lambda: 3)
-    assert team.team_of(8, team.SHARES).threads == 3
-    assert team.team_of(2, team.SHARES).threads == 2
-    assert team.team_of(8, 1).threads == 1
+    assert team.team_size(team.orders_for(8, team.SHARES)) == 3
+    assert team.team_size(team.orders_for(2, team.SHARES)) == 2
+    assert team.team_size(team.orders_for(8, 1)) == 1
 
 
 def test_no_thread_is_started_that_cannot_take_orders():
@@ -55,7 +55,7 @@ def test_no_thread_is_started_that_cannot_take_orders():
     def fails(thread: int) -> None:
         raise ValueError("does not compile")
 
-    two = team.Team(2, np.zeros(2 * team.LINE, np.int64))
+    two = np.zeros(2 * team.LINE, np.int64)
     with pytest.raises(ValueError, match="does not compile"), team.helped(two, fails):
         pass
     assert threading.active_count() == before
@@ -69,7 +69,7 @@ def test_the_other_threads_end_when_the_leader_fails(monkeypatch: pytest.MonkeyP
     def waits(thread: int) -> None:
         ended.append(_take_orders(two))
 
-    two = team.team_of(2, team.SHARES)
+    two = team.orders_for(2, team.SHARES)
     with pytest.raises(ValueError, match="the leader"), team.helped(two, waits):
         raise ValueError("the leader")
     assert ended == [True, True]

@@ -343,8 +343,8 @@ def exclusions(main: TableReading, shown: set[str]) -> list[Excluded]:
 
 def _next_test() -> NextTest | None:
     """The bench test that a mechanism of the library proposes."""
-    test = next((m.in_table.next_test for m in MECHANISMS.values() if m.in_table.next_test is not None), None)
-    return NextTest("at the bench", test.separates, test.design, shows=test) if test is not None else None
+    table = next((m.in_table for m in MECHANISMS.values() if m.in_table.next_test), None)
+    return NextTest("at the bench", table.separates, table.design, shows=table.next_test) if table is not None else None
 
 
 @dataclass(frozen=True)

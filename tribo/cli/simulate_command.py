@@ -101,6 +101,9 @@ def simulate(
     from tribo.springblock.results_file import ENSEMBLE, ONE_RUN, kind_of
     from tribo.springblock.run import simulate as run_model
 
+    if options["engine"] == "dense":
+        console.say("the dense engine is no longer part of tribo; the fast engine runs and gives the same results")
+        options["engine"] = "fast"
     scheduler, seed, jobs = (options.pop(name) for name in ("scheduler", "seed", "jobs"))
     force, wait_s = options.pop("force"), options.pop("wait_s")
     if design and (table2 or any(value not in (None, ()) for value in options.values())):

@@ -6,7 +6,6 @@ import numpy as np
 
 from tribo.mechanisms.record import (
     Base,
-    BenchTest,
     Conditions,
     Forces,
     InTable,
@@ -52,10 +51,10 @@ MECHANISM = Mechanism(
     in_table=InTable(
         guess="deformed patterns",
         finding=finding,
-        next_test=BenchTest(
-            "Pull S along x, along y, in reverse and at 45 degrees, each at three loads: 72 pulls.",
-            ("cavity_shear_deformation", "pull_angle", "load_cell_offset"),
-            {"sample": "S", "direction_deg": [0, 45, 90, 180], "pressure_kPa": [3, 9, 25], "pulls": 72, "hours": 8.4},
-        ),
+        next_test="Pull S along x, along y, in reverse and at 45 degrees, each at three loads: 72 pulls.",
+        separates=("cavity_shear_deformation", "pull_angle", "load_cell_offset"),
+        design={
+            "sample": "S", "direction_deg": [0, 45, 90, 180], "pressure_kPa": [3, 9, 25], "pulls": 72, "hours": 8.4,
+        },
     ),
 )

@@ -137,7 +137,7 @@ class Placement:
         Normal force and adhesion of every block over their mean, given T/N and the place of the block along the
         pull, from -1/2 (trailing edge) to 1/2, both (n,).
     chain
-        Fields of :class:`tribo.mechanisms_in_model.measuring_chain.MeasuringChain`, given the recorded conditions.
+        Arguments of :func:`tribo.mechanisms_in_model.measuring_chain.measured`, given the recorded conditions.
         Where several mechanisms set the same field, their values add.
     other_sample
         The sample is another one, named in brackets behind the mechanism; the amplitude moves ln T towards it.
@@ -236,16 +236,6 @@ class Readings:
 
 @displayed()
 @dataclass(frozen=True)
-class BenchTest:
-    """A test at the bench that would decide what the table leaves open, and the mechanisms it separates."""
-
-    text: str
-    separates: tuple[str, ...]
-    design: Mapping[str, Any] = field(default_factory=dict)
-
-
-@displayed()
-@dataclass(frozen=True)
 class InTable:
     """A mechanism in the diagnosis of a published table.
 
@@ -259,15 +249,18 @@ class InTable:
         The explanation proposed by the authors that it stands for.
     finding
         What the table says about that explanation, in sentences.
-    next_test
-        The bench test to do next.
+    next_test, separates, design
+        The test at the bench that would decide what the table leaves open, in words; the mechanisms it separates; its
+        conditions. Empty without one.
     """
 
     missing: str = ""
     barred: str = ""
     guess: str = ""
     finding: Callable[[Readings], str] | None = None
-    next_test: BenchTest | None = None
+    next_test: str = ""
+    separates: tuple[str, ...] = ()
+    design: Mapping[str, Any] = field(default_factory=dict)
 
 
 WEIGHED = InTable()

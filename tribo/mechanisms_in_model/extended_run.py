@@ -16,7 +16,7 @@ import numpy as np
 from tribo.errors import Problem, SimulationError
 from tribo.mechanisms.record import Base, Mechanism, Values
 from tribo.mechanisms.table import MECHANISMS
-from tribo.mechanisms_in_model.measuring_chain import MeasuringChain, measured
+from tribo.mechanisms_in_model.measuring_chain import measured
 from tribo.mechanisms_in_model.on_blocks import NOT_PULLED, RECORDED, Pulled, conditions_of_run, run_with
 from tribo.records import Run
 from tribo.springblock.config import SimConfig
@@ -202,8 +202,7 @@ def _simulate(
     config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[str, float], before: Run | None = None
 ) -> Run:
     run = settled(config, acting, recorded, before)
-    chain = chain_of(acting, recorded)
-    return measured(run, chain, config.speed_m_s)
+    return measured(run, config.speed_m_s, **chain_of(acting, recorded))
 
 
 def settled(
@@ -257,15 +256,15 @@ def guessed(config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[s
     return static, sliding
 
 
-def chain_of(acting: Mapping[str, Values], recorded: Mapping[str, float]) -> MeasuringChain:
-    """The measuring chain with the mechanisms that act in it; what several set in the same place adds up."""
+def chain_of(acting: Mapping[str, Values], recorded: Mapping[str, float]) -> dict[str, float]:
+    """What :func:`measured` takes, of the mechanisms that act in the chain; what several set in one place adds up."""
     known = {**RECORDED, **recorded}
-    fields: dict[str, float] = {}
+    fields = {"nominal_area_m2": known["nominal_area_m2"]}
     for name, values in acting.items():
         in_chain = MECHANISMS[name].placement.chain
         for field, value in in_chain(values, known).items() if in_chain is not None else ():
             fields[field] = fields.get(field, 0.0) + value
-    return MeasuringChain(**fields, nominal_area_m2=known["nominal_area_m2"])
+    return fields
 
 
 def mixed(own: Run, other: Run, share: float) -> Run:

@@ -7,7 +7,7 @@ for bit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,12 +16,23 @@ from tribo.records import FloatArray, Run
 SLED_AREA_M2 = 55e-6
 
 
-@dataclass(frozen=True)
-class MeasuringChain:
-    """The measuring chain between slider and recorded data, in the order of the signal.
+def measured(
+    run: Run,
+    speed_m_s: float,
+    *,
+    wire_angle_rad: float = 0.0,
+    roller_friction: float = 0.0,
+    compliance_m_per_N: float = 0.0,
+    offset_N: float = 0.0,
+    interval_peaks: float = 0.0,
+    nominal_area_m2: float = SLED_AREA_M2,
+) -> Run:
+    """The run as recorded by the chain between slider and recorded data, in the order of the signal.
 
     Parameters
     ----------
+    speed_m_s
+        The crosshead speed in the time of the model.
     wire_angle_rad
         Upward angle of the wire: its tension is the pull over the cosine (without its effect on the normal load).
     roller_friction
@@ -36,31 +47,16 @@ class MeasuringChain:
     nominal_area_m2
         Nominal area of the sled.
     """
-
-    wire_angle_rad: float = 0.0
-    roller_friction: float = 0.0
-    compliance_m_per_N: float = 0.0
-    offset_N: float = 0.0
-    interval_peaks: float = 0.0
-    nominal_area_m2: float = SLED_AREA_M2
-
-
-def measured(run: Run, chain: MeasuringChain, speed_m_s: float) -> Run:
-    """The run as recorded by the chain; ``speed_m_s`` is the crosshead speed in the time of the model."""
-    if chain.wire_angle_rad or chain.roller_friction:
-        run = amplified(run, float(np.exp(chain.roller_friction * np.pi / 2) / np.cos(chain.wire_angle_rad)))
-    if chain.compliance_m_per_N:
-        run = with_compliance(run, chain.compliance_m_per_N * _sleds(run, chain), speed_m_s)
-    if chain.offset_N:
-        run = shifted(run, chain.offset_N / _sleds(run, chain))
-    if chain.interval_peaks:
-        run = sampled(run, chain.interval_peaks * run.peak_s)
+    sleds = nominal_area_m2 * run.pressure_Pa / run.normal_load_N  # how many of the model's squares make the sled
+    if wire_angle_rad or roller_friction:
+        run = amplified(run, float(np.exp(roller_friction * np.pi / 2) / np.cos(wire_angle_rad)))
+    if compliance_m_per_N:
+        run = with_compliance(run, compliance_m_per_N * sleds, speed_m_s)
+    if offset_N:
+        run = shifted(run, offset_N / sleds)
+    if interval_peaks:
+        run = sampled(run, interval_peaks * run.peak_s)
     return run
-
-
-def _sleds(run: Run, chain: MeasuringChain) -> float:
-    """How many of the model's squares make the sled."""
-    return chain.nominal_area_m2 * run.pressure_Pa / run.normal_load_N
 
 
 def amplified(run: Run, gain: float) -> Run:

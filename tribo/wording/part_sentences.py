@@ -338,7 +338,7 @@ def next_test_sentence(t: NextTest) -> str:
         return f"To tell {names} from the load, repeat four loads of the range, three times each, in random order."
     return (
         "Print T at every load, or the covariance of mu and tau0, which decides what is beyond chance. At the bench: "
-        f"{t.shows.text}"
+        f"{t.shows}"
     )
 
 

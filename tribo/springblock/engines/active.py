@@ -38,12 +38,12 @@ from tribo.springblock.engines.team import (
     END,
     FORCES,
     MOTION,
-    Team,
     done,
     give,
     next_order,
+    orders_for,
     shares_of,
-    team_of,
+    team_size,
     wait_for_all,
 )
 from tribo.springblock.lattice import OFFSETS
@@ -214,7 +214,7 @@ class Active(NamedTuple):
     starts: NDArray[np.bool_]  # (strips,) a block at rest gives way
     calm: NDArray[np.bool_]  # (strips,) all cavity blocks may rest
     moving: NDArray[np.int64]  # (strips,) contact blocks that move
-    team: Team
+    orders: NDArray[np.int64]  # what the leader of the team asks the other threads for, and what they have done
 
 
 def active_of(planes: Planes, numerics: Numerics, threads: int = 1) -> Active:
@@ -232,8 +232,8 @@ def active_of(planes: Planes, numerics: Numerics, threads: int = 1) -> Active:
     lists.strips[PENDING, :n] = np.arange(n)
     lists.members[PENDING] = n
     starts, calm = np.zeros((2, n), np.bool_)
-    team, sums = team_of(threads, shares), Sums(*np.zeros((3, shares, LANES)))
-    return Active(planes, sums, lists, starts, calm, np.zeros(n, np.int64), team)
+    sums = Sums(*np.zeros((3, shares, LANES)))
+    return Active(planes, sums, lists, starts, calm, np.zeros(n, np.int64), orders_for(threads, shares))
 
 
 @inner
@@ -271,9 +271,9 @@ def slipping(strip: int, s: State, p: Planes, c: Numerics) -> int:
 
 
 @inner
-def threads_for(strips: int, team: Team) -> int:
+def threads_for(strips: int, orders: NDArray[np.int64]) -> int:
     """The whole team where many strips are worked on, else the leader alone."""
-    return team.threads if strips >= MANY else 1
+    return team_size(orders) if strips >= MANY else 1
 
 
 @inner
@@ -303,14 +303,14 @@ def move(thread: int, threads: int, s: State, a: Active, c: Numerics) -> None:
 @compiled
 def assist(a: Active, s: State, c: Numerics, thread: int) -> None:
     """What another thread of the team than the leader does, until the leader has no more orders."""
-    kind = next_order(thread, a.team)
+    kind = next_order(thread, a.orders)
     while kind != END:
         if kind == FORCES:
-            find_forces(thread, a.team.threads, s, a, c)
+            find_forces(thread, team_size(a.orders), s, a, c)
         else:
-            move(thread, a.team.threads, s, a, c)
-        done(thread, a.team)
-        kind = next_order(thread, a.team)
+            move(thread, team_size(a.orders), s, a, c)
+        done(thread, a.orders)
+        kind = next_order(thread, a.orders)
 
 
 @inner
@@ -318,12 +318,12 @@ def start_all(s: State, a: Active, c: Numerics) -> None:
     """Find forces of the strips that listen, glide or slide, and start those of their blocks that give way."""
     copied_into_callers()
     lists = a.lists
-    threads = threads_for(listed(LISTENING, lists), a.team)
+    threads = threads_for(listed(LISTENING, lists), a.orders)
     if threads > 1:
-        give(FORCES, a.team)
+        give(FORCES, a.orders)
     find_forces(0, threads, s, a, c)
     if threads > 1:
-        wait_for_all(a.team)
+        wait_for_all(a.orders)
     for row in range(lists.shares * ASLEEP):  # strips that begin to listen now join a list that has been seen
         status = row // lists.shares
         m = lists.members[row] - 1
@@ -459,12 +459,12 @@ def advance(a: Active, s: State, out: Samples, c: Numerics, until_step: int) -> 
         start_all(s, a, c)
         active = listed(GLIDING, lists)
         s.counts[ACTIVE_STEPS] += LANES * active
-        threads = threads_for(active, a.team)
+        threads = threads_for(active, a.orders)
         if threads > 1:
-            give(MOTION, a.team)
+            give(MOTION, a.orders)
         move(0, threads, s, a, c)
         if threads > 1:
-            wait_for_all(a.team)
+            wait_for_all(a.orders)
         if c.periodic:
             for plane in (a.planes.q_x, a.planes.q_y, a.planes.q_sum, a.planes.q_gap):
                 wrap(plane, a.planes.first, a.planes.width, c.nx, c.ny)

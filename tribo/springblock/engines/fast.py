@@ -34,7 +34,7 @@ def integrate(config: SimConfig, lattice: Lattice, thresholds: Thresholds, threa
     state, numerics = at_rest(config, lattice, thresholds, drive, failure - 1.5 * config.dt_s)
     active = active_set(state, numerics, lattice, drive, config, threads)
     kept: list[k.Samples] = []
-    with uncollected(advance), helped(active.team, lambda thread: assist(active, state, numerics, thread)):
+    with uncollected(advance), helped(active.orders, lambda thread: assist(active, state, numerics, thread)):
         for samples, step in in_chunks(config, thresholds, state, numerics, kept):
             advance(active, state, samples, numerics, step)
     put_back(active, state, numerics)

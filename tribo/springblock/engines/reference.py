@@ -29,18 +29,19 @@ from tribo.records import FloatArray
 from tribo.springblock.config import SimConfig
 from tribo.springblock.engines.jit import compiled
 from tribo.springblock.engines.start import Thresholds, Trajectory, drive_of, first_failure_s, once
+from tribo.springblock.engines.state import Samples
 from tribo.springblock.lattice import NEIGHBOURHOOD, NEIGHBOURS, Lattice
 
 START_SHARE = 0.98  # of the first failure
 
 
 class Model(NamedTuple):
-    """Constants of a run in SI units; arrays over the n blocks."""
+    """A run in SI units: its constants, and every block now, which each step changes in place; arrays over n blocks."""
 
     neighbours: NDArray[np.int64]  # (n + 1, NEIGHBOURS), n where there is none
     rest: FloatArray  # (NEIGHBOURS, 3): rest vector to each neighbour and its length
     springs: FloatArray  # (NEIGHBOURS,): k_ij
-    static: FloatArray  # (n,)
+    static: FloatArray  # (n,) lowered to ``again`` when a block slips
     sliding: FloatArray
     contact: NDArray[np.bool_]
     shear_stiffness: float
@@ -56,24 +57,16 @@ class Model(NamedTuple):
     dt: float
     stride: int  # steps from one sample to the next
     stop_at_peaks: float  # the run ends once the time exceeds so many peak times
+    u: FloatArray  # (n, 2) displacement
+    v: FloatArray  # (n, 2) velocity
+    resting: NDArray[np.bool_]  # (n,)
+    failed: NDArray[np.int64]  # the first blocks that slipped
+    out: Samples
+    sums: FloatArray  # running sums exact to the order of the trapezoid; see the names below
 
 
 RULES = ("turned", "slow", "never")
 TURNED, SLOW, NEVER = range(len(RULES))
-
-
-class Course(NamedTuple):
-    """Every block now, changed in place by each step; samples; running sums exact to the order of the trapezoid."""
-
-    u: FloatArray  # (n, 2) displacement
-    v: FloatArray  # (n, 2) velocity
-    resting: NDArray[np.bool_]  # (n,)
-    time: FloatArray  # of the samples
-    force: FloatArray
-    impulse: FloatArray
-    moving: NDArray[np.int64]
-    failed: NDArray[np.int64]
-    sums: FloatArray  # see the names below
 
 
 FORCE, IMPULSE, PEAK, PEAK_TIME, FRICTION_WORK, VISCOUS_WORK, N_FAILED, N_SUMS = range(8)
@@ -132,19 +125,19 @@ def acceleration(
 
 
 @compiled
-def decide_friction(run: Course, t: float, m: Model, friction: FloatArray) -> None:
+def decide_friction(m: Model, t: float, friction: FloatArray) -> None:
     """Release blocks beyond their static threshold, and set the friction force of this step on those that slide."""
-    u, v, resting = run.u, run.v, run.resting
+    u, v, resting = m.u, m.v, m.resting
     driving_force(u, t, m, friction)
     for i in range(len(u)):
         driving = math.sqrt(friction[i, 0] * friction[i, 0] + friction[i, 1] * friction[i, 1])
         if resting[i] and driving > m.static[i]:
             resting[i] = False
             m.static[i] = m.again[i]
-            n = int(run.sums[N_FAILED])
-            if n < len(run.failed):
-                run.failed[n] = i
-                run.sums[N_FAILED] += 1.0
+            n = int(m.sums[N_FAILED])
+            if n < len(m.failed):
+                m.failed[n] = i
+                m.sums[N_FAILED] += 1.0
         speed = math.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
         for d in range(2):
             direction = v[i, d] / speed if speed > 0.0 else (friction[i, d] / driving if driving > 0.0 else 0.0)
@@ -194,9 +187,9 @@ def comes_to_rest(v: FloatArray, new_v: FloatArray, m: Model) -> bool:
 
 
 @compiled
-def finish_step(run: Course, t: float, m: Model, new_v: FloatArray, tested: bool) -> None:
+def finish_step(m: Model, t: float, new_v: FloatArray, tested: bool) -> None:
     """Stop blocks where ``tested``, and add up force, friction work and viscous work of the step."""
-    u, v, resting, dt = run.u, run.v, run.resting, m.dt
+    u, v, resting, dt = m.u, m.v, m.resting, m.dt
     force_x = 0.0
     force_y = 0.0
     for i in range(len(u)):
@@ -207,49 +200,52 @@ def finish_step(run: Course, t: float, m: Model, new_v: FloatArray, tested: bool
                 new_v[i, 0] = 0.0
                 new_v[i, 1] = 0.0
             after = math.sqrt(new_v[i, 0] * new_v[i, 0] + new_v[i, 1] * new_v[i, 1])
-            run.sums[FRICTION_WORK] += 0.5 * dt * m.sliding[i] * (before + after)
-            run.sums[VISCOUS_WORK] += 0.5 * dt * m.mass * m.damping * (before * before + after * after)
+            m.sums[FRICTION_WORK] += 0.5 * dt * m.sliding[i] * (before + after)
+            m.sums[VISCOUS_WORK] += 0.5 * dt * m.mass * m.damping * (before * before + after * after)
             v[i, 0] = new_v[i, 0]
             v[i, 1] = new_v[i, 1]
         force_x += m.shear_stiffness * (m.velocity[0] * (t + dt) - u[i, 0])
         force_y += m.shear_stiffness * (m.velocity[1] * (t + dt) - u[i, 1])
     speed = math.sqrt(m.velocity[0] * m.velocity[0] + m.velocity[1] * m.velocity[1])
     force = (force_x * m.velocity[0] + force_y * m.velocity[1]) / speed
-    run.sums[IMPULSE] += 0.5 * dt * (run.sums[FORCE] + force)
-    run.sums[FORCE] = force
-    if force > run.sums[PEAK]:
-        run.sums[PEAK] = force
-        run.sums[PEAK_TIME] = t + dt
+    m.sums[IMPULSE] += 0.5 * dt * (m.sums[FORCE] + force)
+    m.sums[FORCE] = force
+    if force > m.sums[PEAK]:
+        m.sums[PEAK] = force
+        m.sums[PEAK_TIME] = t + dt
 
 
 @compiled
-def integrate_all(run: Course, steps: int, m: Model, w: FloatArray) -> int:
+def integrate_all(m: Model, steps: int, w: FloatArray) -> int:
     """Take so many steps, or fewer where the run ends early; returns the number of samples taken."""
     samples = 0
     dt = m.dt
     for step in range(steps):
         t = m.start + step * dt
-        decide_friction(run, t, m, w[9])
-        runge_kutta(run.u, run.v, t, dt, run.resting, m, w)
-        finish_step(run, t, m, w[8], (step + 1) % m.test_every == 0)
+        decide_friction(m, t, w[9])
+        runge_kutta(m.u, m.v, t, dt, m.resting, m, w)
+        finish_step(m, t, w[8], (step + 1) % m.test_every == 0)
         if (step + 1) % m.stride == 0:
-            run.time[samples] = t + dt
-            run.force[samples] = run.sums[FORCE]
-            run.impulse[samples] = run.sums[IMPULSE]
-            run.moving[samples] = np.sum(m.contact & ~run.resting)
+            m.out.time[samples] = t + dt
+            m.out.force[samples] = m.sums[FORCE]
+            m.out.impulse[samples] = m.sums[IMPULSE]
+            m.out.moving[samples] = np.sum(m.contact & ~m.resting)
             samples += 1
-            if not math.isfinite(run.sums[FORCE]) or t > m.stop_at_peaks * run.sums[PEAK_TIME]:
+            if not math.isfinite(m.sums[FORCE]) or t > m.stop_at_peaks * m.sums[PEAK_TIME]:
                 break
     return samples
 
 
 def reference_model(
-    config: SimConfig, lattice: Lattice, thresholds: Thresholds, start_s: float, stride: int
+    config: SimConfig, lattice: Lattice, thresholds: Thresholds, start_s: float, stride: int, samples: int
 ) -> Model:
-    """The constants of a configuration as the reference engine takes them."""
+    """A run at its start, all blocks on the quasi-static motion, with room for so many samples."""
     offsets, stiffness = np.split(np.array(NEIGHBOURHOOD), [2], axis=1)
     lengths = np.hypot(*offsets.T)
     drive = drive_of(config, lattice)
+    sums = np.zeros(N_SUMS)
+    sums[FORCE] = drive.force_rate * start_s
+    sums[IMPULSE] = 0.5 * sums[FORCE] * start_s
     return Model(
         neighbours=lattice.neighbours,
         rest=config.spacing_m * np.column_stack([offsets, lengths]),
@@ -270,6 +266,12 @@ def reference_model(
         dt=config.dt_s,
         stride=stride,
         stop_at_peaks=np.inf if config.duration_s else config.duration_peaks,
+        u=drive.follow * start_s + drive.lag,
+        v=drive.follow.copy(),
+        resting=lattice.contact.copy(),
+        failed=np.full(64, -1, np.int64),
+        out=Samples(np.zeros(samples), np.zeros(samples), np.zeros(samples), np.zeros(samples, np.int64)),
+        sums=sums,
     )
 
 
@@ -286,38 +288,29 @@ def integrate(
     drive = drive_of(config, lattice)
     failure = first_failure_s(lattice, thresholds, drive, config.stiffness_N_m)
     start = start_share * failure
-    u, v = drive.follow * start + drive.lag, drive.follow.copy()
-    resting = lattice.contact.copy()
     end = config.duration_s or 2.0 * config.duration_peaks * float(thresholds.static_N.sum()) / drive.force_rate
     steps = max(1, int(np.ceil((end - start) / config.dt_s)))
     stride = min(max(1, round(config.sample_interval_s / config.dt_s)), steps)
-    room = steps // stride
-    sums = np.zeros(N_SUMS)
-    sums[FORCE] = drive.force_rate * start
-    sums[IMPULSE] = 0.5 * sums[FORCE] * start
-    course = Course(
-        u, v, resting, np.zeros(room), np.zeros(room), np.zeros(room), np.zeros(room, np.int64),
-        np.full(64, -1, np.int64), sums,
-    )  # fmt: skip
-    model = reference_model(config, lattice, thresholds, start, stride)
-    kept = integrate_all(course, steps, model, np.zeros((10, *u.shape)))
+    run = reference_model(config, lattice, thresholds, start, stride, steps // stride)
+    kept = integrate_all(run, steps, np.zeros((10, *run.u.shape)))
+    out, sums = run.out, run.sums
     if not np.isfinite(sums[FORCE]):
-        _refuse(u, lattice, float(course.time[kept - 1]))
+        _refuse(run.u, lattice, float(out.time[kept - 1]))
     return Trajectory(
-        time_s=np.concatenate([(0.0, start), course.time[:kept]]),
-        force_N=np.concatenate([(0.0, drive.force_rate * start), course.force[:kept]]),
-        impulse_Ns=np.concatenate([(0.0, 0.5 * drive.force_rate * start**2), course.impulse[:kept]]),
-        moving=np.concatenate([np.zeros(2, np.int64), course.moving[:kept]]),
+        time_s=np.concatenate([(0.0, start), out.time[:kept]]),
+        force_N=np.concatenate([(0.0, drive.force_rate * start), out.force[:kept]]),
+        impulse_Ns=np.concatenate([(0.0, 0.5 * drive.force_rate * start**2), out.impulse[:kept]]),
+        moving=np.concatenate([np.zeros(2, np.int64), out.moving[:kept]]),
         peak_N=float(sums[PEAK]),
         peak_s=float(sums[PEAK_TIME]),
         first_peak_N=float(sums[PEAK]),
         first_peak_s=float(sums[PEAK_TIME]),
         first_failure_s=failure,
-        failed=once(course.failed[: int(sums[N_FAILED])]),
-        end_s=float(course.time[kept - 1]),
+        failed=once(run.failed[: int(sums[N_FAILED])]),
+        end_s=float(out.time[kept - 1]),
         end_impulse_Ns=float(sums[IMPULSE]),
-        displacement_m=u,
-        velocity_m_s=v,
+        displacement_m=run.u,
+        velocity_m_s=run.v,
         friction_work_J=float(sums[FRICTION_WORK]),
         viscous_work_J=float(sums[VISCOUS_WORK]),
     )

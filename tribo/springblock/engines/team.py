@@ -13,7 +13,7 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 from numba import types
@@ -28,14 +28,8 @@ SHARES = 4
 FEWEST_BLOCKS = 100_000  # a smaller lattice fits into the cache of one core, and a step takes less than an order
 SPINS = 2000  # looks at an order before the core is offered to others
 FORCES, MOTION, END = range(3)
-ORDER, KIND = 0, 1  # places in Team.orders
-
-
-class Team(NamedTuple):
-    """Who works on a lattice. Every number that threads wait for has a cache line of its own."""
-
-    threads: int
-    orders: NDArray[np.int64]  # (LINE * threads,) number and kind of the last order; then what each thread has done
+ORDER, KIND = 0, 1  # places in the orders of a team: number and kind of the last one; then what each thread has done
+IntArray = NDArray[np.int64]  # the orders have LINE places a thread: each number waited for has its own cache line
 
 
 def _place_of(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
@@ -69,10 +63,15 @@ def shares_of(blocks: int) -> int:
     return SHARES if blocks >= FEWEST_BLOCKS else 1
 
 
-def team_of(threads: int, shares: int) -> Team:
-    """As many threads as were asked for, at most one for each share and for each core."""
-    threads = max(1, min(threads, shares, cores()))
-    return Team(threads, np.zeros(LINE * threads, np.int64))
+def orders_for(threads: int, shares: int) -> IntArray:
+    """The orders of a team of as many threads as were asked for, at most one for each share and for each core."""
+    return np.zeros(LINE * max(1, min(threads, shares, cores())), np.int64)
+
+
+@inner
+def team_size(orders: IntArray) -> int:
+    """How many threads these orders are for."""
+    return len(orders) // LINE
 
 
 def cores() -> int:
@@ -83,59 +82,60 @@ def cores() -> int:
 
 
 @contextmanager
-def helped(team: Team, assist: Callable[[int], None]) -> Iterator[None]:
+def helped(orders: IntArray, assist: Callable[[int], None]) -> Iterator[None]:
     """``assist(thread)`` runs beside the leader for every other thread of the team, until the block is left."""
-    if team.threads > 1:
-        dismiss(team)
+    team = len(orders) // LINE
+    if team > 1:
+        dismiss(orders)
         assist(1)  # compiled here: a thread that fails to would be waited for without end
-        team.orders[:] = 0
-    threads = [threading.Thread(target=assist, args=(k,), daemon=True) for k in range(1, team.threads)]
+        orders[:] = 0
+    threads = [threading.Thread(target=assist, args=(k,), daemon=True) for k in range(1, team)]
     for thread in threads:
         thread.start()
     try:
         yield
     finally:
         if threads:
-            dismiss(team)
+            dismiss(orders)
         for thread in threads:
             thread.join()
 
 
 @inner
-def give(kind: int, team: Team) -> None:
+def give(kind: int, orders: IntArray) -> None:
     """The leader asks the others for something."""
     copied_into_callers()
-    team.orders[KIND] = kind
-    shown(team.orders, ORDER, team.orders[ORDER] + 1)
+    orders[KIND] = kind
+    shown(orders, ORDER, orders[ORDER] + 1)
 
 
 @compiled
-def dismiss(team: Team) -> None:
+def dismiss(orders: IntArray) -> None:
     """The leader has no more orders."""
-    give(END, team)
+    give(END, orders)
 
 
 @inner
-def wait_for_all(team: Team) -> None:
+def wait_for_all(orders: IntArray) -> None:
     """The leader waits until the others have done what it asked for."""
     copied_into_callers()
-    for thread in range(1, team.threads):
-        wait_until(team.orders, LINE * thread, team.orders[ORDER])
+    for thread in range(1, team_size(orders)):
+        wait_until(orders, LINE * thread, orders[ORDER])
 
 
 @inner
-def done(thread: int, team: Team) -> None:
+def done(thread: int, orders: IntArray) -> None:
     """A thread says that it has done what was asked for last."""
     copied_into_callers()
-    shown(team.orders, LINE * thread, team.orders[LINE * thread] + 1)
+    shown(orders, LINE * thread, orders[LINE * thread] + 1)
 
 
 @inner
-def next_order(thread: int, team: Team) -> int:
+def next_order(thread: int, orders: IntArray) -> int:
     """Wait for the order after the last one this thread has done, and return its kind."""
     copied_into_callers()
-    wait_until(team.orders, ORDER, team.orders[LINE * thread] + 1)
-    return team.orders[KIND]
+    wait_until(orders, ORDER, orders[LINE * thread] + 1)
+    return orders[KIND]
 
 
 @inner
