@@ -76,8 +76,8 @@ def test_the_other_threads_end_when_the_leader_fails(monkeypatch: pytest.MonkeyP
     assert threading.active_count() == before
 
 
-def _take_orders(taken: team.Team) -> bool:
+def _take_orders(taken: team.IntArray) -> bool:
     """Wait for the last order, in Python."""
-    while taken.orders[team.ORDER] == 0:
+    while taken[team.ORDER] == 0:
         pass
-    return bool(taken.orders[team.KIND] == team.END)
+    return bool(taken[team.KIND] == team.END)
