@@ -202,6 +202,44 @@ def test_the_tree_in_contributing_names_every_package_and_top_module() -> None:
     assert {w for w in words if w.endswith(("/", ".py"))} <= packages | modules
 
 
+MOST_STOPS = 12
+
+
+def ways_of(text: str) -> list[list[tuple[str, str]]]:
+    """The lines "a.py: f, g -> b.py: h" of a page, each as its functions with their files."""
+    lines = [line.strip() for line in text.splitlines() if line.startswith("    cli/") and " -> " in line]
+    parts = [[part.split(": ") for part in line.split(" -> ")] for line in lines]
+    return [[(file, name) for file, names in way for name in names.split(", ")] for way in parts]
+
+
+def names_in(file: str, function: str) -> set[str]:
+    """Every name in a function of a file, those of what it calls, is handed or hands on among them."""
+    tree = parsed((PACKAGE / file).read_text("utf-8"))
+    (found,) = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef) and n.name == function]
+    nodes = list(ast.walk(found))
+    imported = {a.asname or a.name: a.name for n in nodes if isinstance(n, ast.ImportFrom) for a in n.names}
+    named = {n.id for n in nodes if isinstance(n, ast.Name)} | {n.attr for n in nodes if isinstance(n, ast.Attribute)}
+    return {imported.get(name, name) for name in named}
+
+
+def breaks_of(way: list[tuple[str, str]]) -> list[str]:
+    """Functions of a way that neither the one before them names nor the one before that, through it."""
+    named: list[set[str]] = [{way[0][1]}, *(names_in(*stop) for stop in way)]
+    return [name for k, (_, name) in enumerate(way) if name not in named[k] | named[max(k - 1, 0)]]
+
+
+def test_the_four_ways_of_a_report_are_as_stated_and_short() -> None:
+    ways = ways_of((PACKAGE.parent / "CONTRIBUTING.md").read_text("utf-8"))
+    assert [way[-1][1] for way in ways] == ["parse_block", "find_apex", "advance", "finding"]
+    assert [len(way) for way in ways if len(way) > MOST_STOPS] == []
+    assert [breaks_of(way) for way in ways] == [[]] * len(ways)
+
+
+def test_a_way_with_a_function_left_out_is_seen() -> None:
+    way = ways_of((PACKAGE.parent / "CONTRIBUTING.md").read_text("utf-8"))[1]
+    assert breaks_of([*way[:4], *way[6:]]) == ["evaluate"]
+
+
 def test_a_forbidden_import_is_seen() -> None:
     assert imported_rooms("from tribo.report import tables\nimport tribo.cli\nfrom tribo import stages") == {
         "report",
