@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,12 +17,13 @@ from tribo import stages
 from tribo.campaign import load_campaign
 from tribo.cli import main
 from tribo.diagnostics.column_search import load_levels, regime_tests
-from tribo.diagnostics.verdict import Verdict
-from tribo.diagnostics.within_records import running_in
+from tribo.diagnostics.verdict import Cause, Verdict
+from tribo.diagnostics.within_records import running_in, stroke_offset
 from tribo.fitting.alternatives import compared_laws
 from tribo.fitting.dependence import dependence
 from tribo.plausibility import doubts_of
 from tribo.records import Campaign, Ingested, Pattern, Pull, Study, Test, Trace
+from tribo.wording.part_sentences import cause_sentence, layer_sentence
 
 Change = Callable[[dict[str, Any]], float]
 Further = Callable[[dict[str, Any]], dict[str, Any]]
@@ -168,6 +170,25 @@ def test_running_in_along_a_long_slide_is_found_and_a_steady_one_is_left() -> No
     # over the first 7.5 m, 0.3 exp(-s / 5 m) has the mean 0.3 (1 - exp(-1.5)) / 1.5
     assert [r.first_percent for r in found] == pytest.approx([100 * 0.3 * (1 - np.exp(-1.5)) / 1.5] * 4, abs=1.5)
     assert all(r.p > 0.01 for r in running_in(long_slides(0.0)))
+
+
+def strokes(zeros: list[float]) -> Any:
+    """Pulls in both directions in turn, with these zeros (N)."""
+    flags = (("forward",), ("backward",))
+    return SimpleNamespace(
+        pulls={str(k): SimpleNamespace(flags=flags[k % 2], zero_N=z, sliding_N=2.0) for k, z in enumerate(zeros)}
+    )
+
+
+def test_an_offset_between_strokes_is_stated_in_newtons_only_where_it_is_certain() -> None:
+    layer = stroke_offset(strokes([0.3, 0.3, 0.31, 0.3, 0.29, 0.3, 0.3, 0.3]))
+    assert layer is not None
+    assert layer.parameters["F0"].value == pytest.approx(0.3)
+    assert layer.effect_percent == pytest.approx(15.0)
+    said = layer_sentence(layer)
+    assert said.startswith("The force recorded in 4 forward and 4 backward strokes is offset by 0.3 N")
+    assert cause_sentence(Cause(layer.name, 1.0, layer.parameters, shows=layer)) == said
+    assert stroke_offset(strokes([0.3, 0.3, -0.31, 0.3, 0.29, 0.3, -0.3, 0.3])) is None
 
 
 def test_diagnose_writes_a_verdict_without_the_model(tmp_path: Path) -> None:
