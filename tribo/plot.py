@@ -7,6 +7,7 @@ which a study has no numbers, for example a comparison without a model, is a :cl
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from tribo.errors import Problem, TriboError
@@ -42,79 +43,62 @@ def _drawn(name: str, record: Any) -> Figure:
     return figure.draw(numbers)
 
 
-def agreement(study: Study) -> Figure:
-    """Ratio of measured to simulated friction force at each load, for every sample."""
-    return _drawn("agreement", study)
+def _of_study(name: str, shows: str, figure: str = "") -> Callable[[Study], Figure]:
+    """The function that draws one figure of a study; ``figure`` where a report calls it otherwise."""
+
+    def draw(study: Study) -> Figure:
+        return _drawn(figure or name, study)
+
+    draw.__name__ = draw.__qualname__ = name
+    draw.__doc__ = shows
+    return draw
 
 
-def pulls(study: Study) -> Figure:
-    """One pull of each sample at a middle load, with its static peak and sliding window."""
-    return _drawn("fig3", study)
+def _of_diagnosis(name: str, shows: str, figure: str = "") -> Callable[[Diagnosis | PublishedDiagnosis], Figure]:
+    """The function that draws one figure of a diagnosis; ``figure`` where a report calls it otherwise."""
+
+    def draw(diagnosis: Diagnosis | PublishedDiagnosis) -> Figure:
+        return _drawn(figure or name, diagnosis)
+
+    draw.__name__ = draw.__qualname__ = name
+    draw.__doc__ = shows
+    return draw
 
 
-def ratio_against_pressure(study: Study) -> Figure:
-    """T/N against nominal pressure, with the fitted curves."""
-    return _drawn("fig4", study)
-
-
-def simulated_pulls(study: Study) -> Figure:
-    """Pattern, model and simulated T/N against time, one run per sample."""
-    return _drawn("fig5", study)
-
-
-def static_force(study: Study) -> Figure:
-    """Static friction force of every pull against load, with fit and model."""
-    return _drawn("fig6", study)
-
-
-def sliding_force(study: Study) -> Figure:
-    """Mean sliding friction force of every pull against load, with fit and model."""
-    return _drawn("fig7", study)
-
-
-def laws_against_area(study: Study) -> Figure:
-    """mu and tau0 of every sample against its contact area fraction."""
-    return _drawn("fig8", study)
-
-
-def dependence(study: Study) -> Figure:
-    """T/N of every test against each recorded variable that varies."""
-    return _drawn("dependence", study)
-
-
-def forces(study: Study) -> Figure:
-    """Friction force of every test against the load, with the law that the data choose."""
-    return _drawn("forces", study)
-
-
-def records(study: Study) -> Figure:
-    """T/N along each record."""
-    return _drawn("records", study)
-
-
-def oscillations(study: Study) -> Figure:
-    """Force lost in a slip, and period, of every test that oscillates."""
-    return _drawn("oscillations", study)
-
-
-def restarts(study: Study) -> Figure:
-    """Static friction after each stop of the drive against the time of the hold."""
-    return _drawn("restarts", study)
-
-
-def misfit(diagnosis: Diagnosis) -> Figure:
-    """Where the calibrated model fails, by sample and recorded variable."""
-    return _drawn("misfit", diagnosis)
-
-
-def finding(diagnosis: Diagnosis) -> Figure:
-    """Measured over modelled friction against what the finding follows: the picture of the card."""
-    return _drawn("finding", diagnosis)
-
-
-def law(diagnosis: Diagnosis) -> Figure:
-    """What a law that was found explains, test by test, with its band."""
-    return _drawn("law", diagnosis)
+agreement = _of_study("agreement", "Ratio of measured to simulated friction force at each load, for every sample.")
+pulls = _of_study("pulls", "One pull of each sample at a middle load, with its static peak and sliding window.", "fig3")
+ratio_against_pressure = _of_study(
+    "ratio_against_pressure", "T/N against nominal pressure, with the fitted curves.", "fig4"
+)
+simulated_pulls = _of_study(
+    "simulated_pulls", "Pattern, model and simulated T/N against time, one run per sample.", "fig5"
+)
+static_force = _of_study(
+    "static_force", "Static friction force of every pull against load, with fit and model.", "fig6"
+)
+sliding_force = _of_study(
+    "sliding_force", "Mean sliding friction force of every pull against load, with fit and model.", "fig7"
+)
+laws_against_area = _of_study(
+    "laws_against_area", "mu and tau0 of every sample against its contact area fraction.", "fig8"
+)
+dependence = _of_study("dependence", "T/N of every test against each recorded variable that varies.")
+forces = _of_study("forces", "Friction force of every test against the load, with the law that the data choose.")
+records = _of_study("records", "T/N along each record.")
+oscillations = _of_study("oscillations", "Force lost in a slip, and period, of every test that oscillates.")
+restarts = _of_study("restarts", "Static friction after each stop of the drive against the time of the hold.")
+misfit = _of_diagnosis("misfit", "Where the calibrated model fails, by sample and recorded variable.")
+finding = _of_diagnosis(
+    "finding", "Measured over modelled friction against what the finding follows: the picture of the card."
+)
+law = _of_diagnosis("law", "What a law that was found explains, test by test, with its band.")
+extended = _of_diagnosis("extended", "Residuals before and after the model is extended by the named mechanism.")
+evidence = _of_diagnosis("evidence", "Increase in log likelihood by each mechanism.")
+power = _of_diagnosis("power", "The effects that this campaign could have detected.")
+published = _of_diagnosis("published", "A published table compared with the model of the paper.")
+published_readings = _of_diagnosis(
+    "published_readings", "Evidence for each mechanism under each interpretation of the table.", "published-readings"
+)
 
 
 def residuals(results: Diagnosis | Study) -> Figure:
@@ -129,31 +113,6 @@ def residuals(results: Diagnosis | Study) -> Figure:
     from tribo.figures.load_and_area import draw_residuals_of_fits, residuals_of_fits
 
     return draw_residuals_of_fits(residuals_of_fits(results))
-
-
-def extended(diagnosis: Diagnosis) -> Figure:
-    """Residuals before and after the model is extended by the named mechanism."""
-    return _drawn("extended", diagnosis)
-
-
-def evidence(diagnosis: Diagnosis) -> Figure:
-    """Increase in log likelihood by each mechanism."""
-    return _drawn("evidence", diagnosis)
-
-
-def power(diagnosis: Diagnosis) -> Figure:
-    """The effects that this campaign could have detected."""
-    return _drawn("power", diagnosis)
-
-
-def published(diagnosis: PublishedDiagnosis) -> Figure:
-    """A published table compared with the model of the paper."""
-    return _drawn("published", diagnosis)
-
-
-def published_readings(diagnosis: PublishedDiagnosis) -> Figure:
-    """Evidence for each mechanism under each interpretation of the table."""
-    return _drawn("published-readings", diagnosis)
 
 
 def pull(ingested: Ingested, test_id: str) -> Figure:
