@@ -29,9 +29,9 @@ from tribo.diagnostics.fit import fit
 from tribo.diagnostics.model import Acting, Setup, predict, setup
 from tribo.diagnostics.observations import observe
 from tribo.lawsearch.diagnosis_with_laws import explained, searched_laws
-from tribo.lawsearch.grammar import LOAD_TERM
+from tribo.lawsearch.grammar import LOAD_TERM, WrittenLaw
 from tribo.lawsearch.known_laws import validate_law
-from tribo.lawsearch.model_choice import CauseForms, FoundLaw, centred, without_refuted_causes
+from tribo.lawsearch.model_choice import FoundLaw, centred, without_refuted_causes
 from tribo.lawsearch.scoring import terms_of
 from tribo.lawsearch.search import Discovery
 from tribo.wording.law_sentences import held_sentence
@@ -85,20 +85,20 @@ def _one(piece: Piece) -> dict[str, Any]:
     if piece.form and found.laws:
         return row | judged(hidden, found, kept, piece.seed)
     if piece.form and found.of_causes:
-        return row | judged_cause(hidden, found.of_causes[0])
+        return row | judged_cause(hidden, *next(iter(found.of_causes.items())))
     return row
 
 
-def judged_cause(hidden: Hidden, cause: CauseForms) -> dict[str, Any]:
+def judged_cause(hidden: Hidden, cause: str, forms: tuple[WrittenLaw, ...]) -> dict[str, Any]:
     """The same where a cause of the library is the law of a recorded column: its form with those it cannot be told
     from. It acts on all samples, in both regimes."""
-    law, truth = cause.law, hidden.truth
+    (law, *ties), truth = forms, hidden.truth
     return {
-        "cause": cause.cause, "columns": list(law.columns), "kind": _kind(law), "where": law.where,
-        "regime": law.regime, "ties": [[*t.columns, _kind(t), t.regime, t.where] for t in cause.ties],
+        "cause": cause, "columns": list(law.columns), "kind": _kind(law), "where": law.where,
+        "regime": law.regime, "ties": [[*t.columns, _kind(t), t.regime, t.where] for t in ties],
         "column_right": _same_columns(law.columns, truth.columns), "regime_right": truth.regimes == (1.0, 1.0),
         "samples_right": set(hidden.bench.column("sample").tolist()) == set(truth.samples),
-        "form_right": _kind(law) in truth.kinds, "form_tied": any(_kind(t) in truth.kinds for t in cause.ties),
+        "form_right": _kind(law) in truth.kinds, "form_tied": any(_kind(t) in truth.kinds for t in ties),
     }  # fmt: skip
 
 

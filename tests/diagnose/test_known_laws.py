@@ -58,11 +58,11 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_known_law_that_holds_is_added_and_one_that_cannot_be_tested_says_why(folder: Path) -> None:
-    tested = validate_laws(baseline(made(warming, seed=31)), read_laws(folder), np.random.default_rng(0))
-    assert [held.answer for _, held in tested.answers] == ["held", "cannot be told"]
-    assert [layer.name for layer in tested.layers] == ["temperature_C"]
-    assert "The law of first held" in layer_sentence(tested.layers[0])
-    assert tested.layers[0].low < tested.layers[0].effect_percent < tested.layers[0].high
+    _, answers, layers, _ = validate_laws(baseline(made(warming, seed=31)), read_laws(folder), np.random.default_rng(0))
+    assert [held.answer for _, held in answers] == ["held", "cannot be told"]
+    assert [layer.name for layer in layers] == ["temperature_C"]
+    assert "The law of first held" in layer_sentence(layers[0])
+    assert layers[0].low < layers[0].effect_percent < layers[0].high
 
 
 def test_a_verdict_lists_the_answers_about_known_laws(folder: Path) -> None:
@@ -87,11 +87,11 @@ def test_a_known_law_replaces_a_cause_of_its_column_unless_that_explains_more(
 ) -> None:
     model = refitted(baseline(made(at_work, seed=31)), [Acting(MECHANISMS["temperature"])])
     known = KnownLaw("law-1.toml", "first", STEP, {"a": Estimate(a, a - 0.04, a + 0.04, "")})
-    tested = validate_laws(model, [known], np.random.default_rng(0))
-    assert tested.answers[0][1].answer == answer
-    left = {a.name for a in tested.model.acting}
+    after, answers, _, replaced = validate_laws(model, [known], np.random.default_rng(0))
+    assert answers[0][1].answer == answer
+    left = {a.name for a in after.acting}
     assert ("temperature" in left) == (answer == "not held")
-    assert ("temperature" in tested.replaced) == (answer == "held")
+    assert ("temperature" in replaced) == (answer == "held")
 
 
 def test_the_form_of_a_known_law_may_be_wrong_by_some_of_its_effect() -> None:
@@ -145,12 +145,13 @@ def test_other_forms_of_a_recorded_column_that_explain_as_much_are_told_with_its
     tests = tuple(replace(t, covariates={"film_um": str(film_of(t.test_id))}) for t in plain.campaign.tests)
     filmed = replace(plain, campaign=replace(plain.campaign, tests=tests))
     line = refitted(baseline(filmed), [Acting(MECHANISMS["covariate"], "film_um")])
-    _, _, (forms,) = without_refuted_causes(line)
-    assert forms.cause == "covariate:film_um"
-    assert forms.law.form == ((("linear", "film_um", ""),), "T", "both", "all")
-    assert "saturating" in {tie.shapes[0].kind for tie in forms.ties}
-    assert {tie.columns for tie in forms.ties} == {("film_um",)}
-    assert forms.law.form not in {tie.form for tie in forms.ties}
+    forms = without_refuted_causes(line)[2]
+    assert list(forms) == ["covariate:film_um"]
+    law, *ties = forms["covariate:film_um"]
+    assert law.form == ((("linear", "film_um", ""),), "T", "both", "all")
+    assert "saturating" in {tie.shapes[0].kind for tie in ties}
+    assert {tie.columns for tie in ties} == {("film_um",)}
+    assert law.form not in {tie.form for tie in ties}
 
 
 @pytest.mark.parametrize(("own_column", "by", "lost"), [(True, 5.0, False), (True, 7.0, True), (False, 5.0, True)])

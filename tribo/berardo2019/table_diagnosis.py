@@ -29,7 +29,7 @@ from tribo.berardo2019.table_model import (
     upper_limit,
 )
 from tribo.diagnostics.verdict import Cause, Excluded, Gain, Misfit, NextTest, Outcome, Verdict
-from tribo.lawsearch.across_patterns import AcrossPatterns, Deviations, across_patterns, geometry_of
+from tribo.lawsearch.across_patterns import Deviations, LawsAcross, across_patterns, geometry_of
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import REGIMES, FloatArray
 
@@ -398,12 +398,12 @@ def diagnose_published(
     return PublishedDiagnosis("berardo2019", verdict_of(found, gain), tuple(found))
 
 
-def across_published(d: PublishedDiagnosis, *, seed: int = 0) -> AcrossPatterns:
+def across_published(d: PublishedDiagnosis, *, seed: int = 0) -> tuple[LawsAcross, ...]:
     """Laws of up to three terms across the patterns of the table, in the main reading.
 
     Readings differ in the correlation and the number of specimens, which this search does not use, and in the model.
     """
     found = across_patterns(table_deviations(d.main.table), most_terms=3, seed=seed)
-    if found is None:
+    if not found:
         raise ValueError("a law across patterns needs at least four patterns")
     return found

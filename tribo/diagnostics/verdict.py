@@ -161,8 +161,8 @@ class AgainstModel:
     ``samples`` were measured and the model was calibrated on ``flat``. ``excess`` says how many times its stated error
     the patterned samples differ from the model, and the chance of that; ``wrong_in_form`` are mechanisms that left a
     misfit in the column they depend on. Of the law search: the answers about ``known`` laws (pairs of KnownLaw and
-    Held), whether what its laws leave is ``within_chance`` (None without laws), and the search ``across`` patterns
-    (AcrossPatterns).
+    Validation), whether what its laws leave is ``within_chance`` (None without laws), and the searches ``across``
+    patterns (LawsAcross).
     """
 
     samples: tuple[str, ...] = ()
@@ -171,7 +171,7 @@ class AgainstModel:
     wrong_in_form: tuple[str, ...] = ()
     known: tuple[Any, ...] = ()
     within_chance: bool | None = None
-    across: Any = None
+    across: tuple[Any, ...] = ()
 
 
 @displayed()

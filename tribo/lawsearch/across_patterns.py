@@ -27,6 +27,7 @@ from tribo.records import REGIMES, FloatArray
 if TYPE_CHECKING:
     import pandas as pd
 
+Term = tuple[str, str, str]  # a quantity of the pattern, what it acts on, and the regime ("both" or one)
 BENT = "T, in proportion to ln p"
 LOADS = 3  # groups of tests by load
 CERTAIN = 0.01
@@ -57,6 +58,11 @@ class Deviations:
         geometry = {name: values[k] for name, values in self.geometry.items()}
         names = tuple(self.patterns[i] for i in k)
         return Deviations(names, geometry, self.pressure_Pa, self.log_ratio[k], self.adhesion_share[k])
+
+    @property
+    def size(self) -> float:
+        """Their rms: that of ln(measured / model) without a law."""
+        return float(np.sqrt(np.mean(self.log_ratio**2)))
 
 
 def geometry_of(
@@ -96,21 +102,14 @@ def _by_load(load_N: FloatArray, here: np.ndarray) -> list[np.ndarray]:
     return list(np.array_split(rows[np.argsort(load_N[rows], kind="stable")], LOADS))
 
 
-@dataclass(frozen=True)
-class Term:
-    """One term of a law: a quantity of the pattern, what it acts on, and the regime ("both" or one)."""
-
-    quantity: str
-    acts_on: str
-    regime: str
-
-    def column(self, d: Deviations) -> FloatArray:
-        """Its values (n, 2, m) at coefficient one."""
-        share = {T: 1.0, LOAD_TERM: 1.0 - d.adhesion_share, ADHESION_TERM: d.adhesion_share}
-        log_p = np.log(d.pressure_Pa / np.exp(np.log(d.pressure_Pa).mean()))
-        there = np.array([self.regime in ("both", r) for r in REGIMES], float)[None, :, None]
-        along = d.geometry[self.quantity][:, None, None] * there
-        return np.asarray(along * share.get(self.acts_on, log_p) * np.ones_like(d.log_ratio))
+def column(term: Term, d: Deviations) -> FloatArray:
+    """The values (n, 2, m) of a term at coefficient one."""
+    quantity, acts_on, regime = term
+    share = {T: 1.0, LOAD_TERM: 1.0 - d.adhesion_share, ADHESION_TERM: d.adhesion_share}
+    log_p = np.log(d.pressure_Pa / np.exp(np.log(d.pressure_Pa).mean()))
+    there = np.array([regime in ("both", r) for r in REGIMES], float)[None, :, None]
+    along = d.geometry[quantity][:, None, None] * there
+    return np.asarray(along * share.get(acts_on, log_p) * np.ones_like(d.log_ratio))
 
 
 @dataclass(frozen=True)
@@ -130,6 +129,7 @@ class LawsAcross:
     of patterns for which the law was chosen without them, ``chosen`` the law of each.
     """
 
+    deviations: Deviations
     terms: int
     tried: int
     laws: tuple[LawAcross, ...]
@@ -143,34 +143,24 @@ class LawsAcross:
         return self.laws[0]
 
 
-@dataclass(frozen=True)
-class AcrossPatterns:
-    """The searches by number of terms, and the rms of ln(measured / model) without a law."""
-
-    deviations: Deviations
-    without: float
-    searches: tuple[LawsAcross, ...]
-
-
 def grammar(d: Deviations) -> tuple[Term, ...]:
     """Every term whose column is not zero everywhere."""
     every = (
-        Term(quantity, acts_on, regime)
+        (quantity, acts_on, regime)
         for quantity in d.geometry
         for acts_on in (T, LOAD_TERM, ADHESION_TERM, BENT)
         for regime in ("both", *REGIMES)
     )
-    return tuple(term for term in every if np.abs(term.column(d)).max() > 0)
+    return tuple(term for term in every if np.abs(column(term, d)).max() > 0)
 
 
-def across_patterns(d: Deviations, *, most_terms: int = 2, seed: int = 0) -> AcrossPatterns | None:
-    """Search the laws of one to ``most_terms`` terms; None where fewer than four patterns were measured."""
+def across_patterns(d: Deviations, *, most_terms: int = 2, seed: int = 0) -> tuple[LawsAcross, ...]:
+    """Search the laws of one to ``most_terms`` terms; nothing where fewer than four patterns were measured."""
     if len(d.patterns) < FEWEST:
-        return None
+        return ()
     terms = grammar(d)
     orders = _orders(len(d.patterns), np.random.default_rng(seed))
-    searches = tuple(_searched(d, terms, k, orders) for k in range(1, most_terms + 1))
-    return AcrossPatterns(d, float(np.sqrt(np.mean(d.log_ratio**2))), searches)
+    return tuple(_searched(d, terms, k, orders) for k in range(1, most_terms + 1))
 
 
 def _orders(n: int, rng: np.random.Generator) -> list[tuple[int, ...]]:
@@ -182,7 +172,7 @@ def _orders(n: int, rng: np.random.Generator) -> list[tuple[int, ...]]:
 
 
 def _searched(d: Deviations, terms: Sequence[Term], k: int, orders: Sequence[tuple[int, ...]]) -> LawsAcross:
-    columns = np.array([term.column(d) for term in terms])
+    columns = np.array([column(term, d) for term in terms])
     laws = np.array(list(combinations(range(len(terms)), k)))
     errors = left_out_errors(columns, d.log_ratio, laws)
     ranked = np.argsort(errors, kind="stable")
@@ -190,7 +180,7 @@ def _searched(d: Deviations, terms: Sequence[Term], k: int, orders: Sequence[tup
     best = tuple(_law(d, terms, laws[i], float(errors[i])) for i in ranked[:LISTED])
     chosen = tuple(_nested(d, terms, laws, columns))
     return LawsAcross(
-        k, len(laws), best, float((1 + np.sum(by_chance <= SAME * errors[ranked[0]])) / (1 + len(by_chance))),
+        d, k, len(laws), best, float((1 + np.sum(by_chance <= SAME * errors[ranked[0]])) / (1 + len(by_chance))),
         float(np.median(by_chance)), float(np.sqrt(np.mean([law.error**2 for law in chosen]))), chosen,
     )  # fmt: skip
 
@@ -240,14 +230,14 @@ def _nested(d: Deviations, terms: Sequence[Term], laws: np.ndarray, columns: Flo
 def _law(d: Deviations, terms: Sequence[Term], law: np.ndarray, error: float) -> LawAcross:
     """A law fitted to all given patterns."""
     chosen = tuple(terms[i] for i in law)
-    design = np.array([term.column(d).ravel() for term in chosen]).T
+    design = np.array([column(term, d).ravel() for term in chosen]).T
     found = np.linalg.lstsq(design, d.log_ratio.ravel(), rcond=ROUNDING)[0]
     return LawAcross(chosen, tuple(found.tolist()), error)
 
 
 def predicted(law: LawAcross, d: Deviations) -> FloatArray:
     """ln(measured / model) by the law, (n, 2, m)."""
-    parts = [c * term.column(d) for c, term in zip(law.coefficients, law.terms, strict=True)]
+    parts = [c * column(term, d) for c, term in zip(law.coefficients, law.terms, strict=True)]
     return np.asarray(sum(parts))
 
 
@@ -258,21 +248,22 @@ def formula(law: LawAcross) -> str:
 
 
 def _term_formula(term: Term) -> str:
-    what = "" if term.quantity == "1" else f" {term.quantity}"
-    acts = {T: "", BENT: " ln(p/p_mean)"}.get(term.acts_on, f" x share of the {term.acts_on}")
-    return f"{what}{acts}" + ("" if term.regime == "both" else f" ({term.regime})")
+    quantity, acts_on, regime = term
+    what = "" if quantity == "1" else f" {quantity}"
+    acts = {T: "", BENT: " ln(p/p_mean)"}.get(acts_on, f" x share of the {acts_on}")
+    return f"{what}{acts}" + ("" if regime == "both" else f" ({regime})")
 
 
-def table_of(found: AcrossPatterns) -> pd.DataFrame:
+def table_of(found: Sequence[LawsAcross]) -> pd.DataFrame:
     """The best laws of every number of terms: formula, errors (rms of ln T), and chance."""
     import pandas as pd
 
     rows = [
         {
-            "terms": s.terms, "formula": formula(law), "left_out_error": law.error, "model_error": found.without,
+            "terms": s.terms, "formula": formula(law), "left_out_error": law.error, "model_error": s.deviations.size,
             "best_of_chance_error": s.chance, "p_of_the_best": s.p, "nested_error": s.nested, "laws_tried": s.tried,
         }
-        for s in found.searches
+        for s in found
         for law in s.laws
     ]  # fmt: skip
     return pd.DataFrame(rows)

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from tribo.diagnostics.contrasts import Screen, screen_left
+from tribo.diagnostics.contrasts import screen_left
 from tribo.diagnostics.diagnosis import Diagnosis, examine
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.inference import pattern_corrections
@@ -16,9 +16,9 @@ from tribo.diagnostics.planning import HOURS_PER_PULL, PULLS, first_test_of
 from tribo.diagnostics.verdict import CERTAIN_CAUSES, Excluded, Layer, Misfit, NextTest, Outcome, Verdict
 from tribo.lawsearch.across_patterns import CERTAIN, across_patterns, deviations_of
 from tribo.lawsearch.grammar import PRESSURES, WrittenLaw, column_values
-from tribo.lawsearch.known_laws import ValidatedLaws, Validation, law_layer, validate_law, validate_laws
+from tribo.lawsearch.known_laws import Validation, law_layer, validate_law, validate_laws
 from tribo.lawsearch.law_file import KnownLaw
-from tribo.lawsearch.model_choice import CauseForms, without_refuted_causes
+from tribo.lawsearch.model_choice import without_refuted_causes
 from tribo.lawsearch.search import Discovery, Progress, discover_laws
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray, Ingested
@@ -49,18 +49,35 @@ def with_laws(
     rng = np.random.default_rng(seed)
     standing, lost, forms = without_refuted_causes(explained(d))
     d = replace(d, verdict=with_forms_of_causes(d.verdict, forms, standing))
-    tested = validate_laws(standing, known, rng)
+    with_known, answers, held, replaced = validate_laws(standing, known, rng)
+    if answers:
+        d = replace(d, verdict=replace(d.verdict, shows=replace(d.verdict.shows, known=answers)))
+    settled = {name for law, told in answers if told.answer == "held" for name in law.law.columns}
     strict = LEVEL_OF_LAWS * level
-    found = discover_laws(tested.model, level=strict, rng=rng, progress=progress, without=tested.columns)
+    found = discover_laws(with_known, level=strict, rng=rng, progress=progress, without=settled)
     found = replace(found, of_causes=forms)
-    if not found.laws and not tested.layers:
-        return replace(d, verdict=with_tested(d.verdict, tested), laws=found)
-    model = found.laws[-1].model if found.laws else tested.model
-    allowed = len(tested.model.acting) if found.laws else 0
+    if not found.laws and not held:
+        return replace(d, laws=found)
+    model = found.laws[-1].model if found.laws else with_known
+    allowed = len(with_known.acting) if found.laws else 0
     left = screen_left(model, replicates=REPLICATES_LEFT, rng=rng, progress=progress, allowed=allowed)
-    gone = {**(lost if found.laws else {}), **tested.replaced}
-    verdict = with_tested(with_misfits(without_causes(d.verdict, gone), found), tested)
-    return replace(d, laws=found, verdict=_extended(verdict, (tested, found), model, left, level))
+    gone = {**(lost if found.laws else {}), **replaced}
+    verdict = with_misfits(without_causes(d.verdict, gone), found)
+    explained_by_laws = settled | {name for law in found.laws for name in law.law.columns}
+    open_columns = {
+        contrast.column for contrast, p in zip(left.contrasts, left.p, strict=True)
+        if p < level and contrast.kind != "mechanism" and contrast.column not in explained_by_laws
+    }  # fmt: skip
+    layers = (
+        *pattern_corrections(model), *(x for x in verdict.layers if x.kind == "cause"), *held, *law_layers(found),
+        *(x for x in verdict.layers if x.kind == "remainder" and x.name in open_columns),
+    )  # fmt: skip
+    next_test = verdict.next_test
+    ties = [(law.law, law.ties[0]) for law in found.laws if law.ties]
+    if ties and not verdict.equivalent:
+        next_test = separating_test(*ties[0], model.setup.observations.conditions)
+    shows = replace(verdict.shows, within_chance=bool(left.p.min() >= level))
+    return replace(d, laws=found, verdict=replace(verdict, layers=layers, next_test=next_test, shows=shows))
 
 
 def discover_on_campaign(
@@ -89,11 +106,6 @@ def validate_on_campaign(
     return validate_law(model, known.law, known.parameters)
 
 
-def with_tested(v: Verdict, tested: ValidatedLaws) -> Verdict:
-    """The verdict with the answers about known laws."""
-    return replace(v, shows=replace(v.shows, known=tested.answers)) if tested.answers else v
-
-
 def explained(d: Diagnosis) -> ModelFit:
     """The model with the causes that are certain, and with the laws of what they leave where these were searched."""
     if d.laws is not None and d.laws.laws:
@@ -102,19 +114,19 @@ def explained(d: Diagnosis) -> ModelFit:
     return d.named.model if d.named is not None and certain else d.baseline
 
 
-def with_forms_of_causes(v: Verdict, forms: Sequence[CauseForms], model: ModelFit) -> Verdict:
+def with_forms_of_causes(v: Verdict, forms: Mapping[str, tuple[WrittenLaw, ...]], model: ModelFit) -> Verdict:
     """The verdict with the other forms that a recorded column among its causes may have, and the test that separates
     them where it proposes none."""
-    tied = {f.cause: f for f in forms if f.ties}
+    tied = {cause: laws for cause, laws in forms.items() if len(laws) > 1}
     if not tied:
         return v
     layers = tuple(
-        replace(layer, shows=tied[layer.name])
+        replace(layer, shows=tied[layer.name][1:])
         if layer.kind == "cause" and layer.name in tied else layer
         for layer in v.layers
     )  # fmt: skip
-    first = next(iter(tied.values()))
-    next_test = v.next_test or separating_test(first.law, first.ties[0], model.setup.observations.conditions)
+    own, other, *_ = next(iter(tied.values()))
+    next_test = v.next_test or separating_test(own, other, model.setup.observations.conditions)
     return replace(v, layers=layers, next_test=next_test)
 
 
@@ -171,32 +183,13 @@ def _alternatives(v: Verdict, lost: Mapping[str, float]) -> set[str]:
     return {c.mechanism for c in v.causes}.difference(*layers)
 
 
-def _extended(
-    v: Verdict, laws: tuple[ValidatedLaws, Discovery], model: ModelFit, screened: Screen, level: float
-) -> Verdict:
-    """The verdict with corrections of the patterns beside the laws, the laws, and what is left after them."""
-    tested, found = laws
-    columns = {name for law in found.laws for name in law.law.columns} | tested.columns
-    kept = [layer for layer in v.layers if layer.kind == "cause"]
-    certain = zip(screened.contrasts, screened.p, strict=True)
-    left = {contrast.column for contrast, p in certain if p < level and contrast.kind != "mechanism"}
-    remainders = [x for x in v.layers if x.kind == "remainder" and x.name in left and x.name not in columns]
-    ties = [(law.law, law.ties[0]) for law in found.laws if law.ties]
-    next_test = v.next_test
-    if ties and not v.equivalent:
-        next_test = separating_test(*ties[0], model.setup.observations.conditions)
-    layers = (*pattern_corrections(model), *kept, *tested.layers, *law_layers(found), *remainders)
-    shows = replace(v.shows, within_chance=bool(screened.p.min() >= level))
-    return replace(v, layers=layers, next_test=next_test, shows=shows)
-
-
 def with_law_across(d: Diagnosis, *, seed: int = 0) -> Diagnosis:
     """The same diagnosis with the search across patterns, where the model is wrong about several of them."""
     wrong = {x.name for x in d.verdict.layers if x.kind == "pattern_correction" and x.p_adjusted < CERTAIN}
     if len(wrong) < 2 or d.verdict.verdict == "no_misfit":
         return d
     found = across_patterns(deviations_of(explained(d)), seed=seed)
-    return d if found is None else replace(d, verdict=replace(d.verdict, shows=replace(d.verdict.shows, across=found)))
+    return replace(d, verdict=replace(d.verdict, shows=replace(d.verdict.shows, across=found))) if found else d
 
 
 Difference = Literal["pressures", "columns", "samples", "terms", "regimes", "corners", "place"]

@@ -94,24 +94,6 @@ def why_not_testable(c: Conditions, law: WrittenLaw) -> Untested | None:
     return ("not varied", law.columns) if not len(course) or np.ptp(course) < 1e-9 else None
 
 
-@dataclass(frozen=True)
-class ValidatedLaws:
-    """The answers of a campaign about known laws, the layers of those that held, and the model with these.
-
-    ``replaced`` are causes of the same columns that explain the campaign less well, each with the log likelihood by
-    which the law is better.
-    """
-
-    model: ModelFit
-    answers: tuple[tuple[KnownLaw, Validation], ...]
-    layers: tuple[Layer, ...]
-    replaced: Mapping[str, float]
-
-    @property
-    def columns(self) -> set[str]:
-        return {name for known, held in self.answers if held.answer == "held" for name in known.law.columns}
-
-
 def read_laws(folder: Path) -> tuple[KnownLaw, ...]:
     """Every law in a folder and the folders in it, by the name of its file.
 
@@ -134,9 +116,18 @@ def read_laws(folder: Path) -> tuple[KnownLaw, ...]:
     return tuple(found)
 
 
-def validate_laws(model: ModelFit, known: Sequence[KnownLaw], rng: np.random.Generator) -> ValidatedLaws:
+def validate_laws(
+    model: ModelFit, known: Sequence[KnownLaw], rng: np.random.Generator
+) -> tuple[ModelFit, tuple[tuple[KnownLaw, Validation], ...], tuple[Layer, ...], dict[str, float]]:
     """Test every law on a fitted campaign; those that held are added, the surest first, while they hold beside the
-    others. A column has one law; a cause that explains the campaign as well stays in its place."""
+    others. A column has one law; a cause that explains the campaign as well stays in its place.
+
+    Returns
+    -------
+    model, answers, layers, replaced
+        The model with the laws that were added, the answer about each law, the layers of those added, and the causes of
+        the same columns that explain the campaign less well, each with the log likelihood by which the law is better.
+    """
     answers = {k.name: validate_law(model, k.law, k.parameters, len(known)) for k in known}
     layers: list[Layer] = []
     replaced: dict[str, float] = {}
@@ -159,7 +150,7 @@ def validate_laws(model: ModelFit, known: Sequence[KnownLaw], rng: np.random.Gen
         taken |= set(k.law.columns)
         replaced |= rivals
         model = after
-    return ValidatedLaws(model, tuple((k, answers[k.name]) for k in known), tuple(layers), replaced)
+    return model, tuple((k, answers[k.name]) for k in known), tuple(layers), replaced
 
 
 def law_layer(

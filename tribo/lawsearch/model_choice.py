@@ -143,16 +143,6 @@ class Form:
         return np.asarray(weight / weight.sum())
 
 
-@dataclass(frozen=True)
-class CauseForms:
-    """A recorded column as a ``cause``, written as the law that it is, and the other forms of a law of that column that
-    explain the campaign about as well, the likeliest first."""
-
-    cause: str
-    law: WrittenLaw
-    ties: tuple[WrittenLaw, ...]
-
-
 def choose_form(
     model: ModelFit, grammar: Grammar, first: WrittenLaw, p: float, rng: np.random.Generator
 ) -> FoundLaw:
@@ -356,7 +346,7 @@ def centred(change: FloatArray, c: Conditions, load_share: FloatArray) -> FloatA
     return found
 
 
-def without_refuted_causes(model: ModelFit) -> tuple[ModelFit, dict[str, float], tuple[CauseForms, ...]]:
+def without_refuted_causes(model: ModelFit) -> tuple[ModelFit, dict[str, float], dict[str, tuple[WrittenLaw, ...]]]:
     """The model without the mechanisms that lose against a law of their own column, or two of them against a product
     of their columns.
 
@@ -366,11 +356,12 @@ def without_refuted_causes(model: ModelFit) -> tuple[ModelFit, dict[str, float],
         With the causes that stand.
     lost : dict of str to float
         By how much log likelihood a law is better than each of the others.
-    forms : tuple of CauseForms
-        Of every recorded column among the causes that stand.
+    forms : dict of str to tuple of WrittenLaw
+        Of every recorded column among the causes that stand: the law that it is, and the other forms of a law of that
+        column that explain the campaign about as well, the likeliest first.
     """
     lost: dict[str, float] = {}
-    forms: dict[str, CauseForms] = {}
+    forms: dict[str, tuple[WrittenLaw, ...]] = {}
     for together in (*((a,) for a in model.acting), *combinations(model.acting, 2)):
         laws = _laws_instead(model, together) if all(a in model.acting for a in together) else None
         if laws is None:
@@ -382,10 +373,10 @@ def without_refuted_causes(model: ModelFit) -> tuple[ModelFit, dict[str, float],
             model = refitted(model, [a for a in model.acting if a not in together])
         elif len(together) == 1 and recorded:
             law = _as_law(together[0], model.setup.observations.conditions)
-            others = tuple(tie for tie in ties if tie.form != law.form and set(tie.columns) == set(law.columns))
-            forms[together[0].name] = CauseForms(together[0].name, law, others)
+            others = (tie for tie in ties if tie.form != law.form and set(tie.columns) == set(law.columns))
+            forms[together[0].name] = (law, *others)
     standing = {a.name for a in model.acting}
-    return model, lost, tuple(f for f in forms.values() if f.cause in standing)
+    return model, lost, {cause: laws for cause, laws in forms.items() if cause in standing}
 
 
 def _laws_instead(model: ModelFit, together: Sequence[Acting]) -> tuple[float, bool, tuple[WrittenLaw, ...]] | None:

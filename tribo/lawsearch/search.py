@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import chdtrc
@@ -12,7 +12,7 @@ from tribo.diagnostics.contrasts import allowed_wrong_form, decided, share_beyon
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit
 from tribo.lawsearch.grammar import WrittenLaw
-from tribo.lawsearch.model_choice import CauseForms, FoundLaw, choose_form
+from tribo.lawsearch.model_choice import FoundLaw, choose_form
 from tribo.lawsearch.scoring import Grammar, Index, Projection
 from tribo.records import FloatArray
 
@@ -29,13 +29,14 @@ class Discovery:
 
     Of each scored law there is the log likelihood that it gains, and what is left of that after paying for the choice.
 
-    ``of_causes`` are the other forms that the laws of the causes may have, where these are recorded columns.
+    ``of_causes`` are the forms that the laws of the causes may have, where these are recorded columns: the law that
+    the cause is, and those that explain the campaign about as well, the likeliest first.
     """
 
     laws: tuple[FoundLaw, ...]
     scored: tuple[tuple[WrittenLaw, float, float], ...]
     searched: int
-    of_causes: tuple[CauseForms, ...] = ()
+    of_causes: Mapping[str, tuple[WrittenLaw, ...]] = field(default_factory=dict)
 
 
 def discover_laws(

@@ -138,8 +138,8 @@ def _table2(table: Mapping[str, Any], intercept: str) -> list[dict[str, Any]]:
 
 def _card(card: Card) -> dict[str, Any]:
     """The card with its next test in one line."""
-    said = card.as_dict() | {"next": card.next_test.line if card.next_test is not None else ""}
-    return said | {"laws": [[law.sample, law.regime, law.mu, law.intercept, law.largest] for law in card.laws]}
+    said = card.as_dict() | {"next": card.next_test["line"] if card.next_test is not None else ""}
+    return said | {"laws": [list(law.values()) for law in card.laws]}
 
 
 def _agreement(part: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,7 @@ from tribo.wording.part_sentences import layer_sentence
 
 if TYPE_CHECKING:
     from tribo.berardo2019.table_diagnosis import PublishedDiagnosis
-    from tribo.lawsearch.across_patterns import AcrossPatterns
+    from tribo.lawsearch.across_patterns import LawsAcross
     from tribo.lawsearch.known_laws import Validation
     from tribo.lawsearch.search import Discovery
 
@@ -68,7 +69,7 @@ def write_validation(held: Validation, out: Path, provenance: Provenance) -> tup
     return record, text
 
 
-def write_published(d: PublishedDiagnosis, across: AcrossPatterns, out: Path, provenance: Provenance) -> None:
+def write_published(d: PublishedDiagnosis, across: Sequence[LawsAcross], out: Path, provenance: Provenance) -> None:
     """Write out/verdict.json, out/across-patterns.csv, out/figures/NAME.svg, .pdf, .png and .csv, and provenance.json
     with the hash of each."""
     contents: dict[str, Any] = {"verdict.json": d.verdict.as_dict(), "across-patterns.csv": table_of(across)}

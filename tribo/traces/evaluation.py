@@ -319,7 +319,7 @@ def _from_rest(
         readings = static_readings(motion, loading.end)
     window = rule.sliding(motion, rule.parameters) if window_s is None else window_between(motion.time_s, *window_s)
     sliding = sliding_over(motion, window)
-    level, mean = motion.zero, sliding.mean
+    level = motion.zero
     static_wander = level.wander_rate * max(static.time_s - level.time_s, 0.0)
     since_zero_s = sliding.window_s[0] - level.time_s + (sliding.window_s[1] - sliding.window_s[0]) / 3.0
     open_N = left_open_N(readings, static)
@@ -333,8 +333,8 @@ def _from_rest(
         rule=rule.name,
         static_N=static.force_N,
         static_u_N=math.sqrt(static.u_N**2 + static.shape_u_N**2 + level.u_N**2 + static_wander + open_N**2),
-        sliding_N=mean.mean_N,
-        sliding_u_N=math.sqrt(mean.u_N**2 + level.u_N**2 + sliding.wander_rate * max(since_zero_s, 0.0)),
+        sliding_N=sliding.mean_N,
+        sliding_u_N=math.sqrt(sliding.u_N**2 + level.u_N**2 + sliding.wander_rate * max(since_zero_s, 0.0)),
         zero_N=level.force_N,
         zero_u_N=level.u_N,
         zero_rule=zero.rule if zero else BEFORE_CONTACT,
@@ -345,8 +345,8 @@ def _from_rest(
         rise_stiffness_N_per_m=stiffness,
         stick_slip_amplitude_N=sliding.swing_N,
         stick_slip_period_s=sliding.period_s,
-        noise_N=mean.noise_N if sliding.enough else motion.noise_N,
-        drift_N_per_s=mean.drift_N_per_s,
+        noise_N=sliding.noise_N if sliding.enough else motion.noise_N,
+        drift_N_per_s=sliding.drift_N_per_s,
         flags=_flags(motion, static, sliding, rule, peak_ambiguous=open_N > 0, peak_by_hand=peak_s is not None,
                      window_by_hand=window_s is not None),
         problems=motion.problems,
@@ -357,7 +357,7 @@ def _from_rest(
 
 
 def _flags(motion: Motion, static: Apex, sliding: Sliding, rule: Rule, **more: bool) -> tuple[str, ...]:
-    enough, mean, travel = sliding.enough, sliding.mean, motion.travel_m
+    enough, travel = sliding.enough, motion.travel_m
     start, end = sliding.window
     asked = rule.parameters.get("length_m", 0.0)
     raised = {
@@ -366,7 +366,7 @@ def _flags(motion: Motion, static: Apex, sliding: Sliding, rule: Rule, **more: b
         "gap_at_peak": _gap_at(motion.time_s, static.time_s),
         "rounded_peak": static.shape == "rounded",
         "peak_between_samples": static.shape == "highest sample",
-        "no_drop": enough and static.force_N - mean.mean_N < 3.0 * math.hypot(static.u_N, mean.u_N),
+        "no_drop": enough and static.force_N - sliding.mean_N < 3.0 * math.hypot(static.u_N, sliding.u_N),
         "no_sliding": not enough,
         "window_short": enough and travel is not None and bool(travel[end - 1] - travel[start] < 0.9 * asked),
         "stick_slip": not math.isnan(sliding.period_s),
@@ -404,19 +404,19 @@ def _sliding(signal: Signal, span: tuple[int, int], zero: Zero | None, options: 
         if speed and slides_on_closed_track(speed * signal.time_s, span):
             start = first + force.size // 2
     level = zero or Zero(0.0, math.nan, "none")
-    mean = steady(signal.time_s[start:last], signal.force_N[start:last])
-    if mean.mean_N - level.force_N < 0:
+    mean_N, mean_u_N, drift, noise = steady(signal.time_s[start:last], signal.force_N[start:last])
+    if mean_N - level.force_N < 0:
         what = "the force acts against the pull direction; its sign may be reversed"
-        raise TraceError(Problem("sign_flipped", what, column="force", found=f"{mean.mean_N - level.force_N:.6g} N"))
+        raise TraceError(Problem("sign_flipped", what, column="force", found=f"{mean_N - level.force_N:.6g} N"))
     flags = ("no_static",) if zero else ("no_static", "no_zero_phase")
     nan = math.nan
     return Pull(
         test_id="", rule=options.rule, static_N=nan, static_u_N=nan,
-        sliding_N=mean.mean_N - level.force_N,
-        sliding_u_N=math.hypot(mean.u_N, level.u_N if math.isfinite(level.u_N) else 0.0), zero_N=level.force_N,
+        sliding_N=mean_N - level.force_N,
+        sliding_u_N=math.hypot(mean_u_N, level.u_N if math.isfinite(level.u_N) else 0.0), zero_N=level.force_N,
         zero_u_N=level.u_N, zero_rule=level.rule, onset_s=nan, peak_s=nan,
-        window_s=(float(signal.time_s[start]), float(signal.time_s[last - 1])), noise_N=mean.noise_N,
-        drift_N_per_s=mean.drift_N_per_s, flags=(*flags, "spike") if signal.problems else flags,
+        window_s=(float(signal.time_s[start]), float(signal.time_s[last - 1])), noise_N=noise,
+        drift_N_per_s=drift, flags=(*flags, "spike") if signal.problems else flags,
         problems=signal.problems,
     )  # fmt: skip
 
@@ -433,12 +433,12 @@ def _over(pull: Pull, signal: Signal, start_s: float, end_s: float) -> Pull:
     if end - first < _FEWEST_BY_HAND:
         what, allowed = "too few data points in this window", f"{_FEWEST_BY_HAND} data points or more"
         raise TraceError(Problem("window_short", what, found=f"{end - first} data points", allowed=allowed))
-    mean = steady(signal.time_s[first:end], signal.force_N[first:end])
+    mean_N, mean_u_N, drift, noise = steady(signal.time_s[first:end], signal.force_N[first:end])
     zero_u = pull.zero_u_N if math.isfinite(pull.zero_u_N) else 0.0
     return replace(
-        pull, sliding_N=mean.mean_N - pull.zero_N, sliding_u_N=math.hypot(mean.u_N, zero_u),
-        window_s=(float(signal.time_s[first]), float(signal.time_s[end - 1])), noise_N=mean.noise_N,
-        drift_N_per_s=mean.drift_N_per_s, flags=(*pull.flags, "window_by_hand"),
+        pull, sliding_N=mean_N - pull.zero_N, sliding_u_N=math.hypot(mean_u_N, zero_u),
+        window_s=(float(signal.time_s[first]), float(signal.time_s[end - 1])), noise_N=noise,
+        drift_N_per_s=drift, flags=(*pull.flags, "window_by_hand"),
     )  # fmt: skip
 
 

@@ -151,20 +151,11 @@ def _mean_within(estimate: float, u: float, most: float) -> float:
     return estimate + u * density / mass
 
 
-@dataclass(frozen=True)
-class Steady:
-    """Mean force over a window: standard uncertainty of the mean from short-lived noise, drift and sample noise."""
-
-    mean_N: float
-    u_N: float
-    drift_N_per_s: float
-    noise_N: float
-
-
-def steady(time_s: FloatArray, force: FloatArray) -> Steady:
-    """Mean over a window of samples with the uncertainty that their correlation leaves."""
+def steady(time_s: FloatArray, force: FloatArray) -> tuple[float, float, float, float]:
+    """Mean force over a window (N), its standard uncertainty from short-lived noise, correlation counted, the drift
+    (N/s) and the sample noise (N)."""
     mean_u, _, noise = wander(force, float(time_s[-1] - time_s[0]))
-    return Steady(float(force.mean()), mean_u, line(time_s, force)[0], noise)
+    return float(force.mean()), mean_u, line(time_s, force)[0], noise
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,11 @@ import numpy as np
 
 from tribo.records import CLOSED_TRACK_M, FloatArray
 from tribo.traces.peak import Motion
-from tribo.traces.signal import Steady, condense, line, steady, wander
+from tribo.traces.signal import condense, line, steady, wander
 
 Window = tuple[int, int]
 
 _FEWEST = 10  # samples from which on a mean is taken
-_NO_STEADY = Steady(math.nan, math.nan, math.nan, math.nan)
 _BATCH = 5
 _MOST_BATCHES = 2000
 _LATEST = 0.5  # at most this share of the record after the peak is taken as unsettled
@@ -27,11 +26,15 @@ _REGULAR = 0.4  # largest spread of the cycle times over their mean that still c
 class Sliding:
     """What a pull says of sliding. NaN where fewer than ten samples, or no stick-slip, leave a number out.
 
-    ``mean`` is taken over the ``window`` of samples that a rule or a person chose. The whole record after the fall
-    gives the stick-slip, and ``wander_rate``, the variance that a slow walk of the force gathers per second.
+    Mean, drift and sample noise are of the ``window`` of samples that a rule or a person chose; ``u_N`` is the standard
+    uncertainty of the mean. The whole record after the fall gives the stick-slip, and ``wander_rate``, the variance
+    that a slow walk of the force gathers per second.
     """
 
-    mean: Steady
+    mean_N: float
+    u_N: float
+    drift_N_per_s: float
+    noise_N: float
     window: Window
     window_s: tuple[float, float]
     swing_N: float
@@ -60,11 +63,11 @@ def sliding_over(motion: Motion, window: Window) -> Sliding:
     if long := last - fallen >= _FEWEST:
         swing, period = stick_slip(after_s, after_N, motion.noise_N)
     if end - start < _FEWEST:
-        return Sliding(_NO_STEADY, window, (math.nan, math.nan), swing, period, rate)
+        return Sliding(math.nan, math.nan, math.nan, math.nan, window, (math.nan, math.nan), swing, period, rate)
     if long:  # the window was chosen for its steadiness, so it alone would tell too little wander
         rate = wander(after_N, float(after_s[-1] - after_s[0]))[1]
     mean = steady(time[start:end], force[start:end])
-    return Sliding(mean, window, (float(time[start]), float(time[end - 1])), swing, period, rate)
+    return Sliding(*mean, window, (float(time[start]), float(time[end - 1])), swing, period, rate)
 
 
 def fallen_range(motion: Motion) -> Window:

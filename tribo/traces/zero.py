@@ -126,5 +126,5 @@ def load_of(trace: Trace) -> tuple[float, float]:
     load = trace.columns.get("normal_force_N")
     if load is None:
         return math.nan, math.nan
-    level = steady(trace.time_s, np.abs(load) if float(np.median(load)) > 0 else -load)
-    return level.mean_N, level.u_N
+    mean_N, u_N, _, _ = steady(trace.time_s, np.abs(load) if float(np.median(load)) > 0 else -load)
+    return mean_N, u_N

@@ -25,27 +25,6 @@ MOST_REASONS = 3
 NUMBERS = {"mu": "μ", "tau0_Pa": "τ₀", "T0_N": "T₀"}
 
 
-@dataclass(frozen=True)
-class CardLaw:
-    """mu and tau0 (T0 without an area) of one sample in one regime, and what dominates their uncertainty."""
-
-    sample: str
-    regime: str
-    mu: str
-    intercept: str
-    largest: str
-
-
-@dataclass(frozen=True)
-class NextStep:
-    """The next test: what, why, and how long (``hours``, None where nobody can say); ``line`` says all of it."""
-
-    what: str
-    why: str
-    hours: float | None
-    line: str
-
-
 @displayed(lambda card: card.counts)
 @dataclass(frozen=True)
 class Card:
@@ -54,7 +33,9 @@ class Card:
     ``sentence`` says what happens to friction, how much, where and what it is called; ``meanings`` are the names used
     in it, each with one sentence. ``used`` and ``set_aside``
     count tests; ``specimens`` counts each one once, also if it was pulled in two directions. ``doubts`` are the numbers
-    outside their physical bounds, one sentence each.
+    outside their physical bounds, one sentence each. ``laws`` are rows of mu and ``intercept``, tau0 (T0 without an
+    area), of one sample in one regime, with the ``largest`` part of their uncertainty. ``next_test`` has ``what``,
+    ``why``, ``hours`` (None where nobody can say), and the ``line`` that says all of it.
     """
 
     sentence: str
@@ -64,10 +45,10 @@ class Card:
     specimens: int
     counts: str
     intercept: str
-    laws: tuple[CardLaw, ...]
+    laws: tuple[dict[str, str], ...]
     uncertainty: str
     to_know: tuple[str, ...]
-    next_test: NextStep | None
+    next_test: dict[str, Any] | None
     doubts: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
@@ -102,16 +83,14 @@ def _law(study: Study, sample: str, regime: str) -> LawFit | None:
     return fit if fit is not None and np.isfinite(fit.values).all() else None
 
 
-def card_law(fit: LawFit) -> CardLaw:
+def card_law(fit: LawFit) -> dict[str, str]:
     """One fit as the card shows it."""
     unit = PA_PER_KPA if fit.has_area else 1.0
-    return CardLaw(
-        fit.sample,
-        fit.regime,
-        with_uncertainty(fit.mu, fit.mu_u),
-        with_uncertainty(fit.value(fit.adhesion) / unit, fit.standard_uncertainty(fit.adhesion) / unit),
-        _largest(fit),
-    )
+    intercept, u = fit.value(fit.adhesion) / unit, fit.standard_uncertainty(fit.adhesion) / unit
+    return {
+        "sample": fit.sample, "regime": fit.regime, "mu": with_uncertainty(fit.mu, fit.mu_u),
+        "intercept": with_uncertainty(intercept, u), "largest": _largest(fit),
+    }  # fmt: skip
 
 
 def _largest(fit: LawFit) -> str:
@@ -137,13 +116,13 @@ def _counts(study: Study, used: int, aside: int, specimens: int) -> str:
     return f"{counted(used, 'test')} used, {left_out}{doubts}; {where}{f'; {loads}' if loads else ''}."
 
 
-def _next(verdict: Verdict | None) -> NextStep | None:
+def _next(verdict: Verdict | None) -> dict[str, Any] | None:
     if verdict is None or verdict.next_test is None:
         return None
     hours: float | None = verdict.next_test.design.get("hours")
     what, why = verdict.next_test.text, why_next(verdict)
     takes = "" if hours is None else f" (about {hours:.1f} h)" if hours >= 1 else f" (about {60 * hours:.0f} min)"
-    return NextStep(what, why, hours, f"{what.rstrip('.')}{takes}: {why}.")
+    return {"what": what, "why": why, "hours": hours, "line": f"{what.rstrip('.')}{takes}: {why}."}
 
 
 def to_know(study: Study, verdict: Verdict | None) -> Iterator[str]:

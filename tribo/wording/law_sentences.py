@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tribo.diagnostics.verdict import Estimate
-from tribo.lawsearch.across_patterns import AcrossPatterns, LawsAcross, formula
+from tribo.lawsearch.across_patterns import LawsAcross, formula
 from tribo.lawsearch.diagnosis_with_laws import CERTAIN, Difference
 from tribo.lawsearch.grammar import ALL, BOTH, CAVITY_SHARE, ELONGATION, FLAT, PATTERNED, RIM, Shape, T, WrittenLaw
 from tribo.lawsearch.known_laws import SHOWS, PlannedLaw, Untested, Validation
@@ -174,21 +174,22 @@ def law_test(difference: Difference, law: WrittenLaw, other: WrittenLaw, design:
     return f"Pull at {in_words(column)} = {factor * design[column]:.4g} {unit}".rstrip()
 
 
-def across_sentence(found: AcrossPatterns) -> str:
+def across_sentence(found: Sequence[LawsAcross]) -> str:
     """Whether the geometry of the patterns predicts what the model gets wrong about them."""
-    beyond = [s for s in found.searches if s.p < CERTAIN and s.nested < found.without]
+    without = found[0].deviations.size
+    beyond = [s for s in found if s.p < CERTAIN and s.nested < without]
     if beyond:
         best = min(beyond, key=lambda s: s.nested)
         return (
             f"One law across the patterns predicts the deviation of a pattern that it was not fitted to: "
-            f"{formula(best.best)}. It lowers the error of friction from {_factor(found.without)} to "
+            f"{formula(best.best)}. It lowers the error of friction from {_factor(without)} to "
             f"{_factor(best.nested)} (p {p_text(best.p)}). {_tried(best)}"
         )
-    best = min(found.searches, key=lambda s: s.best.error)
+    best = min(found, key=lambda s: s.best.error)
     return (
         f"No law across the patterns is beyond chance. The best one, {formula(best.best)}, predicts patterns that it "
         f"was not fitted to within {_factor(best.best.error)}, where the model alone is wrong by "
-        f"{_factor(found.without)}; but a search with the deviations assigned to other patterns does as well in "
+        f"{_factor(without)}; but a search with the deviations assigned to other patterns does as well in "
         f"{100 * best.p:.0f} % of all assignments, and a law that is also chosen without the pattern it predicts is "
         f"wrong by {_factor(best.nested)}. {_tried(best)}"
     )
@@ -203,15 +204,16 @@ def _factor(rms: float) -> str:
     return f"a factor of {np.exp(rms):.2f}"
 
 
-def across_record(found: AcrossPatterns) -> Mapping[str, object]:
+def across_record(found: Sequence[LawsAcross]) -> Mapping[str, object]:
     """The outcome for a JSON file."""
+    deviations = found[0].deviations
     return {
-        "text": across_sentence(found), "patterns": list(found.deviations.patterns), "model_error": found.without,
+        "text": across_sentence(found), "patterns": list(deviations.patterns), "model_error": deviations.size,
         "searches": [
             {
                 "terms": s.terms, "laws_tried": s.tried, "best": formula(s.best), "left_out_error": s.best.error,
                 "p": s.p, "best_of_chance_error": s.chance, "nested_error": s.nested,
             }
-            for s in found.searches
+            for s in found
         ],
     }  # fmt: skip

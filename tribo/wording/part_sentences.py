@@ -13,8 +13,9 @@ from tribo.diagnostics.effect_sizes import Effect
 from tribo.diagnostics.verdict import UNTESTED, Cause, Estimate, Excluded, Layer, Misfit, NextTest
 from tribo.diagnostics.within_records import OFFSET, RunningIn
 from tribo.diagnostics.without_model import SERIES
+from tribo.lawsearch.grammar import WrittenLaw
 from tribo.lawsearch.law_file import KnownLaw
-from tribo.lawsearch.model_choice import CauseForms, FoundLaw
+from tribo.lawsearch.model_choice import FoundLaw
 from tribo.mechanisms.record import Mechanism, TraceEvidence
 from tribo.mechanisms.table import MECHANISMS, mechanism
 from tribo.vocabulary import COLUMNS, OBSERVABLES, in_words
@@ -170,7 +171,8 @@ def layer_sentence(layer: Layer) -> str:
         return f"The law of {shows.found_in or shows.name} held: {said}."
     if isinstance(shows, Misfit):
         return misfit_sentence(shows)
-    if isinstance(shows, tuple):
+    tied = isinstance(shows, tuple) and any(isinstance(x, WrittenLaw) for x in shows)  # forms that a cause may have
+    if isinstance(shows, tuple) and not tied:
         return _offset(layer) if layer.name == OFFSET else without_model_sentence(shows)
     if layer.kind != "cause" or layer.most is None:
         return layer.text
@@ -178,7 +180,7 @@ def layer_sentence(layer: Layer) -> str:
         f"{sentence_case(mechanism(layer.name).in_words)} changes T by {value:+.0f} % (90 % interval {low:+.0f} to "
         f"{high:+.0f} %) where it acts most: {place(layer)}."
     )
-    return f"{said} {tied_laws(shows.ties)}" if isinstance(shows, CauseForms) else said
+    return f"{said} {tied_laws(shows)}" if tied else said
 
 
 def place(layer: Layer) -> str:

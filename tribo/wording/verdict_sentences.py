@@ -270,7 +270,7 @@ def _evidence(v: Verdict) -> Iterator[str]:
     if shows.within_chance is not None and v.verdict not in ("no_misfit", "named"):
         within = "With this included, the remaining differences are within chance."
         yield within if shows.within_chance else "A misfit remains."
-    if shows.across is not None:
+    if shows.across:
         yield across_sentence(shows.across)
     yield from _simulation(v.model)
 
