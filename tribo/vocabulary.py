@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Variable:
-    """A recorded variable: in a sentence, in a narrow table, on an axis with its unit.
+class ColumnWords:
+    """A recorded column in words: in a sentence, in a narrow table, on an axis with its unit.
 
     ``unit`` is the one in which values are read, ``factor`` leads to it from the unit in which they are stored.
     """
@@ -25,28 +25,28 @@ class Variable:
 
 
 COLUMNS = {
-    "sample": Variable("the sample"),
-    "normal_load_N": Variable("the normal load", "load", "Normal load N (N)", "N"),
-    "speed_mm_s": Variable("the pull speed", "speed", "Speed (mm/s)", "mm/s"),
-    "hold_s": Variable("the hold time", "hold time", "Hold (s)", "s"),
-    "run_order": Variable("the run order", "run order", "Run order"),
-    "specimen_run": Variable("the number of the pull on its specimen", "pull of specimen", "Pull of the specimen"),
-    "repeat": Variable("the repeat", "repeat", "Repeat"),
-    "started_at": Variable("the time since the first pull", "time", "Time since the first pull (h)"),
-    "time of day": Variable("the time of day", "time of day", "Time of day (h)"),
-    "temperature_C": Variable("the temperature", "temperature", "Temperature (°C)", "°C"),
-    "humidity_pct": Variable("the humidity", "humidity", "Relative humidity (%)", "%"),
+    "sample": ColumnWords("the sample"),
+    "normal_load_N": ColumnWords("the normal load", "load", "Normal load N (N)", "N"),
+    "speed_mm_s": ColumnWords("the pull speed", "speed", "Speed (mm/s)", "mm/s"),
+    "hold_s": ColumnWords("the hold time", "hold time", "Hold (s)", "s"),
+    "run_order": ColumnWords("the run order", "run order", "Run order"),
+    "specimen_run": ColumnWords("the number of the pull on its specimen", "pull of specimen", "Pull of the specimen"),
+    "repeat": ColumnWords("the repeat", "repeat", "Repeat"),
+    "started_at": ColumnWords("the time since the first pull", "time", "Time since the first pull (h)"),
+    "time of day": ColumnWords("the time of day", "time of day", "Time of day (h)"),
+    "temperature_C": ColumnWords("the temperature", "temperature", "Temperature (°C)", "°C"),
+    "humidity_pct": ColumnWords("the humidity", "humidity", "Relative humidity (%)", "%"),
     # quantities that follow from what is recorded
-    "elapsed_s": Variable("the time since the first pull", unit="h", factor=1 / 3600),
-    "speed_m_s": Variable("the pull speed", unit="mm/s", factor=1e3),
-    "pressure_Pa": Variable("the nominal pressure", unit="kPa", factor=1e-3),
-    "contact_pressure_Pa": Variable("the contact pressure", unit="kPa", factor=1e-3),
-    "tau0": Variable("the share of adhesion in the friction force"),
-    "clip_N": Variable("the force lost between two samples"),
-    "area_fraction": Variable("the area fraction"),
-    "rim_per_m": Variable("the length of the cavity edges"),
-    "elongation": Variable("the pull direction along long cavities"),
-    "bend": Variable("the bend with load", "bend with load"),
+    "elapsed_s": ColumnWords("the time since the first pull", unit="h", factor=1 / 3600),
+    "speed_m_s": ColumnWords("the pull speed", unit="mm/s", factor=1e3),
+    "pressure_Pa": ColumnWords("the nominal pressure", unit="kPa", factor=1e-3),
+    "contact_pressure_Pa": ColumnWords("the contact pressure", unit="kPa", factor=1e-3),
+    "tau0": ColumnWords("the share of adhesion in the friction force"),
+    "clip_N": ColumnWords("the force lost between two samples"),
+    "area_fraction": ColumnWords("the area fraction"),
+    "rim_per_m": ColumnWords("the length of the cavity edges"),
+    "elongation": ColumnWords("the pull direction along long cavities"),
+    "bend": ColumnWords("the bend with load", "bend with load"),
 }
 
 OBSERVABLES = {
