@@ -1,6 +1,7 @@
 """Every figure of a report by name: a study, a diagnosis, a pull or a run in, a matplotlib Figure out.
 
-Each figure is as in the report, also in a notebook; ``figure.savefig("name.png")`` writes it. The numbers of a figure
+Each figure is as in the report, also in a notebook; ``width_mm=90`` draws it for one column of a journal.
+``figure.savefig("name.png")`` writes it. The numbers of a figure
 are ``tribo.figures.FIGURES[NAME].numbers(study)``, and beside each figure of a report as a .csv file. A figure for
 which a study has no numbers, for example a comparison without a model, is a :class:`tribo.errors.TriboError`.
 """
@@ -26,12 +27,15 @@ __all__ = [
 ]  # fmt: skip
 
 
+PAGE_MM = 190.0  # as in the report
+
+
 def __dir__() -> list[str]:
     return sorted(__all__)
 
 
-def _drawn(name: str, record: Any) -> Figure:
-    from tribo.figures import catalogue
+def _drawn(name: str, record: Any, width_mm: float) -> Figure:
+    from tribo.figures import catalogue, style
 
     tables = (
         catalogue.FIGURES, catalogue.FRICTION_FIGURES, catalogue.DIAGNOSIS_FIGURES, catalogue.PUBLISHED_FIGURES,
@@ -40,25 +44,26 @@ def _drawn(name: str, record: Any) -> Figure:
     numbers = figure.numbers(record)
     if numbers.empty:
         raise TriboError(Problem("nothing_to_draw", f"there are no numbers for the figure “{figure.title}”"))
-    return figure.draw(numbers)
+    with style.page(width_mm):
+        return figure.draw(numbers)
 
 
-def _of_study(name: str, shows: str, figure: str = "") -> Callable[[Study], Figure]:
+def _of_study(name: str, shows: str, figure: str = "") -> Callable[..., Figure]:
     """The function that draws one figure of a study; ``figure`` where a report calls it otherwise."""
 
-    def draw(study: Study) -> Figure:
-        return _drawn(figure or name, study)
+    def draw(study: Study, width_mm: float = PAGE_MM) -> Figure:
+        return _drawn(figure or name, study, width_mm)
 
     draw.__name__ = draw.__qualname__ = name
     draw.__doc__ = shows
     return draw
 
 
-def _of_diagnosis(name: str, shows: str, figure: str = "") -> Callable[[Diagnosis | PublishedDiagnosis], Figure]:
+def _of_diagnosis(name: str, shows: str, figure: str = "") -> Callable[..., Figure]:
     """The function that draws one figure of a diagnosis; ``figure`` where a report calls it otherwise."""
 
-    def draw(diagnosis: Diagnosis | PublishedDiagnosis) -> Figure:
-        return _drawn(figure or name, diagnosis)
+    def draw(diagnosis: Diagnosis | PublishedDiagnosis, width_mm: float = PAGE_MM) -> Figure:
+        return _drawn(figure or name, diagnosis, width_mm)
 
     draw.__name__ = draw.__qualname__ = name
     draw.__doc__ = shows
@@ -101,7 +106,7 @@ published_readings = _of_diagnosis(
 )
 
 
-def residuals(results: Diagnosis | Study) -> Figure:
+def residuals(results: Diagnosis | Study, width_mm: float = PAGE_MM) -> Figure:
     """Of a diagnosis, the strongest deviations against the variable that each follows; of a study, those of its fits.
 
     The residuals of a study are 100 (measured / fitted - 1) of every test against its load.
@@ -109,10 +114,12 @@ def residuals(results: Diagnosis | Study) -> Figure:
     from tribo.records import Study
 
     if not isinstance(results, Study):
-        return _drawn("residuals", results)
+        return _drawn("residuals", results, width_mm)
+    from tribo.figures import style
     from tribo.figures.load_and_area import draw_residuals_of_fits, residuals_of_fits
 
-    return draw_residuals_of_fits(residuals_of_fits(results))
+    with style.page(width_mm):
+        return draw_residuals_of_fits(residuals_of_fits(results))
 
 
 def pull(ingested: Ingested, test_id: str) -> Figure:

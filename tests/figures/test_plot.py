@@ -22,7 +22,7 @@ OF_A_STUDY = ("agreement", "pulls", "ratio_against_pressure", "simulated_pulls",
 def test_every_figure_of_a_report_has_its_function_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
 
-    def note(name: str, record: Any) -> None:
+    def note(name: str, record: Any, width_mm: float) -> None:
         asked.append(name)
 
     monkeypatch.setattr(plot, "_drawn", note)
@@ -34,6 +34,11 @@ def test_every_figure_of_a_report_has_its_function_and_no_other(monkeypatch: pyt
 @pytest.mark.parametrize("name", OF_A_STUDY)
 def test_a_study_gives_a_figure_without_a_file_or_a_window(name: str, study: Study) -> None:
     assert isinstance(getattr(plot, name)(study), Figure)
+
+
+def test_a_figure_is_as_wide_as_asked(study: Study) -> None:
+    widths = [plot.static_force(study, **asked).get_figwidth() * 25.4 for asked in ({}, {"width_mm": 90.0})]
+    assert widths == pytest.approx([190.0, 90.0])
 
 
 def test_a_figure_shows_itself_in_a_notebook(study: Study) -> None:
