@@ -84,7 +84,7 @@ def _first_plain(record: Any) -> str:
     return next((v for v in values if isinstance(v, str) and v), "")
 
 
-def in_short(value: object) -> str:
+def in_short(value: Any) -> str:
     """One line of at most ``MOST_LETTERS`` letters for any value; empty for None, NaN and empty collections."""
     if value is None or isinstance(value, float):
         return "" if value is None or value != value else f"{value:.6g}"
