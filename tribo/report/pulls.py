@@ -12,7 +12,7 @@ import numpy as np
 from markupsafe import Markup
 
 from tribo.comparison import study_lookup
-from tribo.comparison.oddness import ODD_SCORE, standings
+from tribo.comparison.study_lookup import ODD_SCORE, standings
 from tribo.figures.one_pull import thin_trace
 from tribo.records import ByHand, FloatArray, Pull, Study, Test, Trace
 from tribo.report.shell import script_json
