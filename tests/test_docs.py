@@ -89,7 +89,9 @@ def test_a_public_name_explains_what_it_takes_and_gives_and_has_an_example(name:
     assert ">>>" in sections.get("Examples", "")
 
 
-@pytest.mark.parametrize("name", EXPLAINED)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in ("write_report", "compare") else n for n in EXPLAINED]
+)
 def test_the_example_of_a_public_name_gives_what_it_says(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(DOCS.parent)
     examples = doctest.DocTestFinder(recurse=False).find(getattr(tribo, name), name, globs={"tribo": tribo})

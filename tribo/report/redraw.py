@@ -87,14 +87,17 @@ def write_redrawn(
     CampaignError
         As :func:`redrawn`; or a file of the same name is there already and ``force`` is not given.
     """
+    folder = out / "figures"
+    stems = [path.stem for path in (found_in(folder, "*.csv") if folder.is_dir() else ())]
+    there = [path for stem in stems for path in (to / f"{stem}.svg", to / f"{stem}.pdf") if path.exists()]
+    if there and not force:
+        what, allowed = "a file of this name is there already", "a folder without figures, or --force"
+        raise CampaignError(Problem("file_there", what, file=str(there[0]), allowed=allowed))
     contents = {
         to / f"{name}.{ending}": content
         for name, endings in redrawn(out, width_mm, names).items()
         for ending, content in endings.items()
     }
-    if not force and (there := [path for path in contents if path.exists()]):
-        what, allowed = "a file of this name is there already", "a folder without figures, or --force"
-        raise CampaignError(Problem("file_there", what, file=str(there[0]), allowed=allowed))
     return [write_bytes(path, content) for path, content in contents.items()]
 
 
