@@ -13,7 +13,7 @@ from threading import Thread
 from typing import IO
 
 from tribo.files import found_below
-from tribo.site.steps import Step, journal, read_record
+from tribo.site.steps import JOURNAL, Step, journal, read_record
 from tribo.temporary import temporary_folder_of_child
 
 WORDS = {
@@ -81,8 +81,10 @@ def run_workflow(
     of Snakemake are in a folder of tribo: what it leaves when it is killed goes at the next start.
     """
     (state / "log").mkdir(parents=True, exist_ok=True)
-    typical_s, before = typical_seconds(state / "steps"), None
+    typical_s = typical_seconds(state / "steps")
+    now, read = Progress(0, len(due), (), 0.0), -1
     said: list[str] = []
+    path = state / JOURNAL
     with temporary_folder_of_child() as (temporary, in_use), subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
         env={**os.environ, "PYTHONUNBUFFERED": "1", "PYTHONSAFEPATH": "1", "TMPDIR": str(temporary)},
@@ -92,10 +94,12 @@ def run_workflow(
         try:
             for line in _lines(process.stdout):
                 said.append(line)
-                now = progress_of(state, due, typical_s)
-                if not line or now != before:
+                size = path.stat().st_size if path.is_file() else 0
+                if size != read:  # Snakemake says much more than the journal holds
+                    now, read = progress_of(state, due, typical_s), size
                     tell(now)
-                before = now
+                elif not line:
+                    tell(now)
             process.wait()
         except BaseException:
             _end(process)
