@@ -21,7 +21,7 @@ from typing import Any
 from tribo.cli.console import DONE, SOME_SET_ASIDE, UNUSABLE
 from tribo.errors import is_of_the_system
 from tribo.files import found_below, text_of
-from tribo.site.steps import Step, note, read_record
+from tribo.site.steps import Step, noted, read_record
 
 DONE_WORDS = {DONE: "done", SOME_SET_ASIDE: "some_set_aside", UNUSABLE: "unusable"}
 
@@ -31,13 +31,7 @@ def run_step(
 ) -> int:
     """Run a tribo command as a step, write its record and note both in the journal; returns the exit status."""
     step, state = Step.of_record(record), record.parents[2]
-    note(state, step, "begun")
-    status = 1
-    try:
-        status = _recorded(record, command, digest, after, files)
-    finally:
-        note(state, step, "ended", status)
-    return status
+    return noted(state, step, lambda: _recorded(record, command, digest, after, files))
 
 
 def _recorded(record: Path, command: Sequence[str], digest: str, after: Sequence[Path], files: Path | None) -> int:

@@ -33,7 +33,7 @@ from tribo.errors import unexpected
 from tribo.files import bytes_of
 from tribo.records import FloatArray
 from tribo.site.history import CampaignRow, FittedParameter, answers_of, history, laws_csv, laws_in_words
-from tribo.site.steps import INDEX, Step, note, read_record
+from tribo.site.steps import INDEX, Step, noted, read_record
 from tribo.user_text import for_spreadsheet
 
 if TYPE_CHECKING:
@@ -348,25 +348,25 @@ def change_sentence(change: Change, rows: Sequence[CampaignRow]) -> str:
 
 def main(arguments: Sequence[str]) -> int:
     """Write the index of a site, and the record of this step of the workflow unless it is "-"."""
+    site, marker = arguments
+    if marker == "-":
+        return _written(Path(site), None)
+    return noted(Path(marker).parent, Step(INDEX), lambda: _written(Path(site), Path(marker)))
+
+
+def _written(site: Path, record: Path | None) -> int:
+    """Exit status of writing the index, and its record where one is wanted."""
     from tribo.files import write_text
 
-    site, marker = arguments
-    step, state = Step(INDEX), Path(marker).parent
-    status = 1
-    if marker != "-":
-        note(state, step, "begun")
     try:
-        digest = write_index(Path(site))
-        if marker != "-":
-            listed = read_record(state / "build.json", "digest") or {}
-            write_text(Path(marker), json.dumps({"index": digest, "digest": listed.get("digest", "")}) + "\n")
-        status = 0
+        digest = write_index(site)
+        if record is not None:
+            listed = read_record(record.parent / "build.json", "digest") or {}
+            write_text(record, json.dumps({"index": digest, "digest": listed.get("digest", "")}) + "\n")
     except OSError as why:
         print(unexpected(why, "the index of the site cannot be written"), file=sys.stderr)
-    finally:
-        if marker != "-":
-            note(state, step, "ended", status)
-    return status
+        return 1
+    return 0
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -76,6 +76,17 @@ def note(state: Path, step: Step, event: str, status: int = 0) -> None:
         (state / JOURNAL).parent.mkdir(parents=True, exist_ok=True)
         with (state / JOURNAL).open("a", encoding="utf-8") as file:
             file.write(f"{line}\n")  # one write: steps that run at once share the file
+
+
+def noted(state: Path, step: Step, work: Callable[[], int]) -> int:
+    """Do the work of a step, and note when it begins and how it ends; returns its exit status."""
+    note(state, step, "begun")
+    status = 1
+    try:
+        status = work()
+    finally:
+        note(state, step, "ended", status)
+    return status
 
 
 def journal(state: Path) -> Iterator[tuple[Step, str, int]]:
