@@ -306,4 +306,5 @@ def is_seen(case: Case) -> bool:
         return True
     f = fit(setup(o, tabled_predictor(o.patterns)))
     rng = np.random.default_rng(case.seed)
-    return screen(f, all_contrasts(f.setup, start_changes(f.setup, f.law)), replicates=120, rng=rng).p_adjusted() < 0.01
+    acting, courses, _ = start_changes(f.setup, f.law)
+    return screen(f, all_contrasts(f.setup, f.law, acting, courses), replicates=120, rng=rng).p_adjusted() < 0.01

@@ -168,7 +168,7 @@ def _held_out(hidden: Hidden, law: FoundLaw, seed: int) -> tuple[float, float, f
 def _error(s: Setup, acting: tuple[Acting, ...], out: np.ndarray) -> float:
     trained = fit(s.take(~out), acting)
     residual = s.observations.log_force - predict(s, trained.law, trained.acting, trained.values)
-    return float(np.sqrt(np.mean((residual - s.random_effects.dense @ trained.effects)[out] ** 2)))
+    return float(np.sqrt(np.mean((residual - s.dense @ trained.effects)[out] ** 2)))
 
 
 def _pair(piece: Piece) -> dict[str, Any]:

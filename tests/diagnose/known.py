@@ -49,4 +49,5 @@ def setup_of(campaign: Ingested) -> Setup:
 
 def contrasts_of(f: ModelFit) -> list[Contrast]:
     """Every contrast of a fitted model."""
-    return all_contrasts(f.setup, start_changes(f.setup, f.law))
+    candidates, courses, _ = start_changes(f.setup, f.law)
+    return all_contrasts(f.setup, f.law, candidates, courses)

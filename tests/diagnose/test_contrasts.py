@@ -36,7 +36,8 @@ def setup_of(o: Observations) -> Setup:
 
 def contrasts(o: Observations) -> list[Contrast]:
     s = setup_of(o)
-    return all_contrasts(s, start_changes(s, s.first_law))
+    acting, courses, _ = start_changes(s, s.first_law)
+    return all_contrasts(s, s.first_law, acting, courses)
 
 
 @cache
@@ -218,13 +219,16 @@ def test_an_order_that_is_not_recorded_gives_no_stretch_and_no_period() -> None:
 
 def test_every_candidate_is_a_contrast_at_what_it_changes_and_adhesion_one_at_its_share() -> None:
     s = setup_of(observed())
-    changes = start_changes(s, s.first_law)
+    candidates, courses, _ = start_changes(s, s.first_law)
     mechanisms = {(x.acting.mechanism.name, x.acting.choice): x for x in of_kind("mechanism") if x.acting is not None}
-    for k, acting in enumerate(changes.acting):
-        column = added(changes.courses[k])[:, :, 0]
+    for k, acting in enumerate(candidates):
+        column = added(courses[k])[:, :, 0]
         if np.ptp(column) > 0:
             assert mechanisms[acting.mechanism.name, acting.choice].columns[:, :, 0] == pytest.approx(column)
-    assert one("trend", "both", "tau0").columns[:, :, 0] == pytest.approx(changes.adhesion)
+    base, load = s.base(s.first_law), s.observations.conditions.normal_load_N
+    forces = base.forces(load)
+    share = np.column_stack([base.static_adhesion_N / forces.static_N, base.sliding_adhesion_N / forces.sliding_N])
+    assert one("trend", "both", "tau0").columns[:, :, 0] == pytest.approx(share)
     assert all(contrast.freedom == 1 for contrast in of_kind("mechanism"))
 
 

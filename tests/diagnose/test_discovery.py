@@ -63,7 +63,7 @@ def test_a_law_of_the_pressure_alone_acts_on_several_patterns_or_on_none() -> No
     model = baseline(made(nothing, seed=3))
     grammar = Grammar(model, ())
     shapes, groups = grammar.courses.shapes, grammar.scopes
-    net = grammar.net(Projection(model.linear, model.linear.residual[None]))[0].reshape(len(groups), len(shapes))
+    net = grammar.net(Projection(model, model.residual[None]))[0].reshape(len(groups), len(shapes))
     allowed = {
         groups[g].where
         for g, k in zip(*np.nonzero(np.isfinite(net)), strict=True)
@@ -206,7 +206,7 @@ def test_the_best_law_by_the_fitted_noise_is_among_those_scored_anew() -> None:
     rng = np.random.default_rng(3)
     drawn = drawn_residuals(model, rng, 1)
     laws = Grammar(model, ())
-    nets = laws.net(Projection(model.linear, drawn.transpose(0, 2, 1)))
+    nets = laws.net(Projection(model, drawn.transpose(0, 2, 1)))
     every = np.arange(laws.size)
     made_again = refit(model, drawn)
     for k, net in enumerate(nets):

@@ -26,12 +26,12 @@ def conditions(model: ModelFit) -> Conditions:
 
 def test_laws_scored_together_score_as_each_does_alone(model: ModelFit) -> None:
     laws = Grammar(model, ())
-    together = laws.net(Projection(model.linear, model.linear.residual[None]))[0]
+    together = laws.net(Projection(model, model.residual[None]))[0]
     one_column = np.flatnonzero(~np.isin(np.arange(laws.size) % len(laws.courses.shapes), laws.courses.two))
     some = one_column[:: len(one_column) // 60]
     groups, shapes = np.divmod(some, len(laws.courses.shapes))
     columns = [laws.courses.column(k) * laws.effects[g] for g, k in zip(groups, shapes, strict=True)]
-    left, residual = model.linear.cleared(np.stack(columns, axis=2))
+    left, residual = model.cleared(np.stack(columns, axis=2))
     alone = 0.5 * (left.T @ residual) ** 2 / np.sum(left**2, axis=0) - laws.cost(some)
     assert together[some] == pytest.approx(alone, abs=1e-6)
 
@@ -39,8 +39,8 @@ def test_laws_scored_together_score_as_each_does_alone(model: ModelFit) -> None:
 def test_a_wave_gains_what_its_sine_and_cosine_gain_together(model: ModelFit) -> None:
     laws = Grammar(model, ())
     first = int(laws.courses.two[0])
-    gain = Projection(model.linear, model.linear.residual[None]).gains(laws.courses, laws.acts)[0, 0, first]
-    left, residual = model.linear.cleared(np.stack([laws.courses.column(first)] * 2, axis=1))
+    gain = Projection(model, model.residual[None]).gains(laws.courses, laws.acts)[0, 0, first]
+    left, residual = model.cleared(np.stack([laws.courses.column(first)] * 2, axis=1))
     pull = left.T @ residual
     assert gain + 1.0 == pytest.approx(0.5 * pull @ np.linalg.solve(left.T @ left, pull), abs=1e-6)
 

@@ -16,7 +16,7 @@ from scipy.stats import multivariate_normal
 
 from tribo.diagnostics.fit import (
     FitState,
-    Linear,
+    fit,
     penalised,
     scored,
     solved,
@@ -99,7 +99,7 @@ def dense(s: Setup, noise: Noise) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     alone = np.zeros((2 * n, 2 * n))
     for k, own in enumerate(of_tests(s, noise)):
         alone[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = own
-    random = s.random_effects.dense.reshape(2 * n, -1)
+    random = s.dense.reshape(2 * n, -1)
     return alone + random @ np.diag(of_effects(s, noise)) @ random.T, alone, random
 
 
@@ -123,7 +123,7 @@ def whole_inverse(inverse: Inverse, columns: ModelColumns) -> np.ndarray:
 
 def step_from(s: Setup, state: FitState, jacobian: np.ndarray, bounds: Any) -> tuple[Inverse, np.ndarray, ModelColumns]:
     """One step of a fit: the inverse of the normal matrix, the solution, and the columns of the model."""
-    columns = model_columns(jacobian, s.random_effects)
+    columns = model_columns(jacobian, s)
     return *solved(state, columns, weights(s, state), bounds), columns
 
 
@@ -222,7 +222,8 @@ def test_cleared_columns_have_the_informations_and_scores_of_the_marginal_model(
     at = at_the_mode(s, noise)
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
     weight = 0.5 + rng.random(s.observations.n)
-    linear = Linear(jacobian, s.random_effects, residual_of(s), at.factor, at.precision, weight)
+    fitted = {"residual": residual_of(s), "factor": at.factor, "precision": at.precision, "weight": weight}
+    linear = replace(fit(s, noise=noise), jacobian=jacobian, **fitted)
     columns = rng.normal(size=(s.observations.n, 2, 2))
     left, cleared = linear.cleared(columns)
     alone = np.zeros((2 * s.observations.n,) * 2)
@@ -358,9 +359,9 @@ def test_the_noise_is_estimated_from_what_is_left_and_from_how_uncertain_it_is()
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
     solved_inverse, _, columns = step_from(s, state, jacobian, target.bounds)
     after = with_noise_estimated(s, state, columns, weights(s, state), solved_inverse).noise
-    left = residual_of(s) - s.random_effects.dense @ state.effects
+    left = residual_of(s) - s.dense @ state.effects
     inverse = whole_inverse(solved_inverse, columns)[0]
-    spread = np.array([c @ inverse @ c.T for c in np.concatenate([jacobian, s.random_effects.dense], axis=2)])
+    spread = np.array([c @ inverse @ c.T for c in np.concatenate([jacobian, s.dense], axis=2)])
     square = weights(s, state)[:, None, None] * (left[:, :, None] * left[:, None, :] + spread)
     squares = np.array([square[:, 0, 0], square[:, 0, 1], square[:, 1, 1]])
     assert noise.scatter is not None
@@ -389,8 +390,8 @@ def test_many_replicates_are_weighed_and_solved_as_each_by_dense_matrices() -> N
     distance = np.einsum("ran,nab,rbn->rn", residual, inverse, residual)
     assert weight == pytest.approx(10.0 / (8.0 + distance))
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
-    along = np.concatenate([jacobian, s.random_effects.dense], axis=2).transpose(1, 0, 2).copy()
-    columns = model_columns(jacobian, s.random_effects)
+    along = np.concatenate([jacobian, s.dense], axis=2).transpose(1, 0, 2).copy()
+    columns = model_columns(jacobian, s)
     precision = sizes.inverse * weight[:, None]
     inverted, (own, border) = solved_at_once(columns, precision, residual, sizes)
     spread, solution = whole_inverse(inverted, columns), columns.vector(own, border)
@@ -417,15 +418,15 @@ def test_the_normal_matrix_by_blocks_is_the_dense_one() -> None:
     s, rng = campaign(), np.random.default_rng(6)
     target = Target(s, ())
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
-    columns = model_columns(jacobian, s.random_effects)
+    columns = model_columns(jacobian, s)
     weight = 0.5 + rng.random(s.observations.n)
     inverse = np.linalg.inv(of_tests(s, noise_of(s))) * weight[:, None, None]
     precision = np.array([[inverse[:, 0, 0], inverse[:, 0, 1], inverse[:, 1, 1]]])
-    along = np.concatenate([jacobian, s.random_effects.dense], axis=2)
+    along = np.concatenate([jacobian, s.dense], axis=2)
     whole = np.einsum("nak,nab,nbl->kl", along, inverse, along)
     found = columns.weighted(precision)
     normal = found.normal
-    specimens = s.random_effects.specimens
+    specimens = s.specimens
     here = np.arange(4, 4 + 4 * specimens).reshape(specimens, 4)
     border = np.concatenate([np.arange(4), np.arange(4 + 4 * specimens, whole.shape[0])])
     for k, own in enumerate(here):
@@ -449,18 +450,17 @@ def test_the_normal_matrix_by_blocks_is_the_dense_one() -> None:
 
 def test_the_covariance_of_predictions_is_that_of_the_whole_matrix_and_random_effects_lie_on_their_own_tests() -> None:
     s, rng = campaign(), np.random.default_rng(7)
-    effects = s.random_effects
-    values = rng.normal(size=(2, effects.count))
-    assert effects.on_tests(values) == pytest.approx(np.einsum("nak,rk->rna", s.random_effects.dense, values))
+    values = rng.normal(size=(2, s.n_effects))
+    assert s.on_tests(values) == pytest.approx(np.einsum("nak,rk->rna", s.dense, values))
     target = Target(s, ())
     state = at_the_mode(s, noise_of(s))
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
     inverse, _, columns = step_from(s, state, jacobian, target.bounds)
     rows = np.array([0, 5, 6, 20])
-    some = model_columns(np.zeros((len(rows), 2, 4)), effects.take(rows))
-    flat = np.concatenate([np.zeros((len(rows), 2, 4)), effects.dense[rows]], axis=2).reshape(2 * len(rows), -1)
+    some = model_columns(np.zeros((len(rows), 2, 4)), s.take(rows))
+    flat = np.concatenate([np.zeros((len(rows), 2, 4)), s.dense[rows]], axis=2).reshape(2 * len(rows), -1)
     expected = flat @ whole_inverse(inverse, columns)[0] @ flat.T
-    assert inverse.between(some, effects.specimen[rows]) == pytest.approx(expected)
+    assert inverse.between(some, s.specimen[rows]) == pytest.approx(expected)
     of_tests_alone = np.einsum("nanb->abn", expected.reshape(len(rows), 2, len(rows), 2))  # some specimens have none
     assert inverse.spread(some)[0] == pytest.approx(of_tests_alone[[0, 0, 1], [0, 1, 1]])
 

@@ -31,7 +31,7 @@ def test_patterns_six_times_as_far_off_as_stated_are_reported_each_with_its_own_
 def test_the_reported_percentages_are_those_by_which_the_patterns_were_moved() -> None:
     f = baseline(3, off(6.0))
     assert pattern_excess(f) is not None
-    left = f.residual - f.setup.random_effects.dense[:, :, f.setup.group < 4] @ f.effects[f.setup.group < 4]
+    left = f.residual - f.setup.dense[:, :, f.setup.group < 4] @ f.effects[f.setup.group < 4]
     corrections = pattern_corrections(f)
     for c in corrections:
         mean = left[f.setup.observations.conditions.sample == c.name, REGIMES.index(c.regimes[0])].mean()

@@ -63,7 +63,7 @@ def test_repeats_of_a_replicate_scatter_as_those_of_the_campaign_were_made_to() 
 def test_a_column_that_the_law_takes_up_counts_for_nothing() -> None:
 
     f = baseline()
-    law = terms_in(f.linear.jacobian, [slice(k, k + 1) for k in range(4)])
+    law = terms_in(f.jacobian, [slice(k, k + 1) for k in range(4)])
     chi2, coefficients = scores(as_measured(f), law)
     assert chi2.max() == 0.0
     assert all((c == 0.0).all() for c in coefficients)

@@ -97,13 +97,13 @@ def test_simulated_campaigns_scatter_as_much_as_the_fit_says() -> None:
     f = baseline(4, replace(SMALL, repeats=3))
     drawn = drawn_residuals(f, np.random.default_rng(1), 2000)
     sd = 1.0 / np.sqrt(precision(f))
-    effects = np.einsum("nrq,q->nr", f.setup.random_effects.dense**2, sd**2)
+    effects = np.einsum("nrq,q->nr", f.setup.dense**2, sd**2)
     repeats = np.einsum("nrr->nr", f.noise.per_test(f.setup)) + f.setup.observations.reading**2
     assert np.mean(np.var(drawn, axis=0).T / (effects + repeats)) == pytest.approx(1.08, abs=0.12)
 
 
 def precision(f: ModelFit) -> np.ndarray:
-    return f.linear.precision
+    return f.precision
 
 
 def test_sizes_are_estimated_anew_in_every_simulated_campaign() -> None:

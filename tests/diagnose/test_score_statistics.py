@@ -25,7 +25,7 @@ def one_replicate(s: Setup, noise: Noise) -> tuple[Replicates, np.ndarray]:
     """The campaign as one replicate of normal noise, and the columns of its law."""
     target = Target(s, ())
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
-    along = model_columns(jacobian, s.random_effects)
+    along = model_columns(jacobian, s)
     residual = residual_of(s).T[None]
     return replicates_at(s, along, fitted_noise(s, noise, 1), residual, residual, noise.tail), jacobian.reshape(-1, 4)
 
@@ -97,7 +97,7 @@ def test_a_campaign_of_two_replicates_is_scored_one_by_one() -> None:
     noise = noise_of(s)
     replicate, _ = one_replicate(s, noise)
     target = Target(s, ())
-    along = model_columns(target.jacobian(s.first_law, target.predict(s.first_law)), s.random_effects)
+    along = model_columns(target.jacobian(s.first_law, target.predict(s.first_law)), s)
     residual = np.repeat(residual_of(s).T[None], 2, axis=0)
     both = replicates_at(s, along, fitted_noise(s, noise, 2), residual, residual * np.array([1.0, 0.5])[:, None, None],
                          noise.tail)  # fmt: skip
@@ -109,27 +109,27 @@ def test_a_campaign_of_two_replicates_is_scored_one_by_one() -> None:
 
 def local_courses(s: Setup) -> list[EffectCourse]:
     """Columns that one specimen each shows, two of them on the first."""
-    effects, rng = s.random_effects, np.random.default_rng(9)
+    rng = np.random.default_rng(9)
     found = []
     for specimen in (0, 0, 3, 5):
         values = np.zeros((s.observations.n, 2, 1))
-        values[effects.tests_of[specimen]] = rng.normal(size=(len(effects.tests_of[specimen]), 2, 1))
-        found.append(course(values, effects))
+        values[s.tests_of[specimen]] = rng.normal(size=(len(s.tests_of[specimen]), 2, 1))
+        found.append(course(values, s))
     return found
 
 
 def test_a_course_of_one_specimen_is_kept_on_its_tests_and_gives_its_columns_back() -> None:
     s = campaign()
-    wide = course(columns(s), s.random_effects)
+    wide = course(columns(s), s)
     assert wide.specimen == EVERY
     assert np.array_equal(wide.columns, columns(s))
     for found, specimen in zip(local_courses(s), (0, 0, 3, 5), strict=True):
         assert found.specimen == specimen
-        assert found.tests.tolist() == np.flatnonzero(s.random_effects.specimen == specimen).tolist()
+        assert found.tests.tolist() == np.flatnonzero(s.specimen == specimen).tolist()
         assert np.any(found.columns, axis=(1, 2)).sum() == len(found.values)
         assert found.shows
-    assert not course(np.zeros((s.observations.n, 2, 1)), s.random_effects).shows
-    assert not course(np.full((s.observations.n, 2, 1), np.nan), s.random_effects).shows
+    assert not course(np.zeros((s.observations.n, 2, 1)), s).shows
+    assert not course(np.full((s.observations.n, 2, 1), np.nan), s).shows
 
 
 def test_contrasts_at_one_specimen_and_at_two_score_as_the_same_columns_written_out() -> None:
@@ -137,7 +137,7 @@ def test_contrasts_at_one_specimen_and_at_two_score_as_the_same_columns_written_
     s = campaign()
     replicate, _ = one_replicate(s, noise_of(s))
     alone = local_courses(s)
-    wide = course(columns(s)[:, :, :2], s.random_effects)
+    wide = course(columns(s)[:, :, :2], s)
     both = [(alone[0], alone[2]), (alone[1], alone[3])]
     contrasts = [(alone[2],), (wide,), (alone[0],), both[0], (alone[1],), (alone[3],), both[1]]
     stacked = np.concatenate([added(contrast) for contrast in contrasts], axis=2)
@@ -156,7 +156,7 @@ def test_the_information_and_the_score_of_candidates_are_those_of_the_marginal_m
     noise = noise_of(s)
     replicate, flat = one_replicate(s, noise)
     alone = local_courses(s)
-    wide = course(columns(s)[:, :, :1], s.random_effects)
+    wide = course(columns(s)[:, :, :1], s)
     contrasts = [(alone[2],), (wide,), (alone[0],), (alone[0], alone[2]), (alone[0], alone[3])]
     left, pull = informations(replicate, terms_of(contrasts, np.zeros(5), s.observations.n))
     inverse = np.linalg.inv(dense(s, noise)[0])

@@ -33,14 +33,14 @@ def test_deviates_are_as_rare_as_the_chi_squared_they_stand_for() -> None:
 def test_columns_of_the_law_itself_are_cleared_away() -> None:
 
     f = baseline()
-    left = f.linear.cleared(f.linear.jacobian)[0]
-    assert np.abs(left).max() < 1e-3 * np.abs(f.linear.jacobian).max() / 0.05
+    left = f.cleared(f.jacobian)[0]
+    assert np.abs(left).max() < 1e-3 * np.abs(f.jacobian).max() / 0.05
 
 
 def test_the_quick_score_is_that_of_the_cleared_columns() -> None:
     f = baseline()
     contrasts = [contrast for contrast in contrasts_of(f) if contrast.freedom == 1][:60]
-    left, target = f.linear.cleared(np.concatenate([contrast.columns for contrast in contrasts], axis=2))
+    left, target = f.cleared(np.concatenate([contrast.columns for contrast in contrasts], axis=2))
     size = np.sqrt(np.sum(left**2, axis=0))
     seen = size > 1e-3
     ends = [slice(k, k + 1) for k in range(len(contrasts))]
@@ -56,7 +56,7 @@ def test_a_contrast_that_is_whole_or_absent_is_tested_at_a_size_about_one() -> N
     about_one = np.full(len(contrasts), 0.15**-2)
     spans = [slice(k, k + 1) for k in range(len(contrasts))]
     found = scores(as_measured(f), terms_in(stacked, spans, about_one), steps=AS_FITTED)[0][0]
-    left, target = f.linear.cleared(stacked)
+    left, target = f.cleared(stacked)
     sizes = np.linspace(-1.0, 3.0, 40001)[:, None]
     at_size = 2.0 * sizes * (left.T @ target) - sizes**2 * np.sum(left**2, axis=0) - ((sizes - 1.0) / 0.15) ** 2
     assert found == pytest.approx(np.maximum(at_size.max(axis=0), 0.0), abs=1e-3)

@@ -98,8 +98,8 @@ def test_what_is_expected_of_a_right_model_does_not_grow_with_how_wrong_the_camp
     sample = np.flatnonzero(f.setup.observations.conditions.area_fraction < 1.0)
     found = []
     for factor in (1.0, 10.0):
-        linear = replace(f.linear, precision=np.where(patterned, factor**-2.0, f.linear.precision))
-        wrong = replace(f, noise=replace(f.noise, pattern=factor), linear=linear)
+        precision = np.where(patterned, factor**-2.0, f.precision)
+        wrong = replace(f, noise=replace(f.noise, pattern=factor), precision=precision)
         found.append(residuals.variance_of_mean(replace(nothing, baseline=wrong), np.array([1.0, 0.0]), sample))
     assert found[1] == pytest.approx(found[0])
 

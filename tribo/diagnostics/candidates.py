@@ -142,7 +142,7 @@ def _likeness(start: ModelFit, best: CauseCandidate, others: Sequence[CauseCandi
     x = np.concatenate([f.law, *f.values[:-1]])
     jacobian = ground.jacobian(x, ground.predict(x))
     changes = [c.fit.predicted - start.predicted for c in (best, *others)]
-    left = replace(f.linear, jacobian=jacobian).cleared(np.stack(changes, axis=2))[0]
+    left = replace(f, jacobian=jacobian).cleared(np.stack(changes, axis=2))[0]
     length = np.sqrt(np.sum(left**2, axis=0)) + 1e-12
     return np.asarray((left[:, 1:].T @ left[:, 0]) / (length[1:] * length[0]))
 

@@ -18,9 +18,10 @@ from tribo.diagnostics.model import (
     Acting,
     EffectCourse,
     Setup,
-    StartChanges,
     added,
     course,
+    log_forces,
+    predict,
     start_changes,
     with_form_error,
 )
@@ -91,12 +92,15 @@ class Contrast:
         return self.courses[0].freedom
 
 
-def all_contrasts(s: Setup, changes: StartChanges) -> list[Contrast]:
-    """Every contrast that this design allows, ``changes`` being those of the candidates."""
-    mechanisms = zip(changes.acting, changes.courses, strict=True)
-    contrasts = [Contrast("mechanism", "both", acting.name, "", courses, acting) for acting, courses in mechanisms]
-    adhesion = course(changes.adhesion[:, :, None], s.random_effects)
-    contrasts.append(Contrast("trend", "both", "tau0", "", (adhesion,)))
+def all_contrasts(
+    s: Setup, law: FloatArray, acting: Sequence[Acting], courses: Sequence[tuple[EffectCourse, ...]]
+) -> list[Contrast]:
+    """Every contrast that this design allows: the candidates with their ``courses``, the share of adhesion in T by the
+    flat law ``law``, and those of what was recorded."""
+    mechanisms = zip(acting, courses, strict=True)
+    contrasts = [Contrast("mechanism", "both", a.name, "", along, a) for a, along in mechanisms]
+    adhesion = np.exp(log_forces(s.base(law).forces(np.zeros(s.observations.n))) - predict(s, law, (), ()))
+    contrasts.append(Contrast("trend", "both", "tau0", "", (course(adhesion[:, :, None], s),)))
     contrasts += [*_of_columns(s), *_of_samples(s), *_of_specimens(s), *_of_series(s)]
     return [contrast for contrast in contrasts if all(c.shows for c in contrast.courses)]
 
@@ -128,7 +132,7 @@ def _contrast(
     s: Setup, kind: str, observable: str, covariate: str, values: FloatArray, sample: str = "", detail: str = ""
 ) -> Contrast:
     """The contrast of an observable along columns (n, d) of all tests."""
-    along = course(_in_regimes(values, observable), s.random_effects)
+    along = course(_in_regimes(values, observable), s)
     return Contrast(kind, observable, covariate, sample, (along,), detail=detail)
 
 
@@ -170,7 +174,7 @@ def _of_samples(s: Setup) -> Iterator[Contrast]:
 def _of_specimens(s: Setup) -> Iterator[Contrast]:
     """Each specimen's offset against its siblings, and its slope against ln p."""
     c = s.observations.conditions
-    for number, tests in enumerate(s.random_effects.tests_of):
+    for number, tests in enumerate(s.tests_of):
         name, where = f"specimen {c.specimen[tests[0]]}", "/".join(sorted(set(c.sample[tests])))
         ones, load = np.ones((len(tests), 1)), s.log_pressure[tests, None]
         offsets = [(observable, "", ones) for observable in ("static", "sliding", "both")]
@@ -286,7 +290,7 @@ def screen(
     weaker = set(sorted(pairs, key=lambda k: -strength[k])[MOST_PAIRS:])  # chance counts them, nothing shows them
     shown = [k for k in range(len(contrasts)) if k not in weaker]
     contrasts, strength, coefficients = [contrasts[k] for k in shown], strength[shown], [coefficients[k] for k in shown]
-    size = f.linear.size_beyond_law(
+    size = f.size_beyond_law(
         added(contrast.courses) @ c for contrast, c in zip(contrasts, coefficients, strict=True)
     )
     p = np.array([share_beyond(chance[:, 0], float(value)) for value in strength])
@@ -306,7 +310,8 @@ def screen_left(
 ) -> Screen:
     """What is left after a model, its laws allowed to be wrong in form (:func:`allowed_wrong_form`)."""
     widened = allowed_wrong_form(model, allowed)
-    contrasts = all_contrasts(widened.setup, start_changes(widened.setup, widened.law))
+    acting, courses, _ = start_changes(widened.setup, widened.law)
+    contrasts = all_contrasts(widened.setup, widened.law, acting, courses)
     return screen(widened, contrasts, replicates=replicates, rng=rng, progress=progress)
 
 

@@ -107,7 +107,7 @@ def examine(
     s = setup(observations, predictor or tabled_predictor(observations.patterns))
     baseline = fit(s)
     effects = start_effects(baseline)
-    contrasts = all_contrasts(s, effects.changes)
+    contrasts = all_contrasts(s, baseline.law, effects.acting, effects.courses)
     screened = screen(baseline, contrasts, replicates=replicates[0], rng=rng, progress=progress)
     evidence = direct_evidence(observations)
     barred = exclusions(observations.conditions, evidence, effects.absorbed)

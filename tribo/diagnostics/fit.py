@@ -12,7 +12,7 @@ from itertools import islice, product
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.diagnostics.model import N_LAW, Acting, RandomEffects, Setup, Target, predict
+from tribo.diagnostics.model import N_LAW, Acting, Setup, Target, predict
 from tribo.diagnostics.normal_equations import Inverse, ModelColumns, Normal, Sides, Weighted, model_columns
 from tribo.diagnostics.scatter import (
     Noise,
@@ -51,7 +51,7 @@ class FitState:
 
     def left(self, s: Setup) -> FloatArray:
         """What is left of every test, (n, 2), random effects taken out."""
-        return np.asarray(self.residual - s.random_effects.on_tests(self.effects))
+        return np.asarray(self.residual - s.on_tests(self.effects))
 
 
 def state_at(s: Setup, x: FloatArray, effects: FloatArray, residual: FloatArray, noise: Noise) -> FitState:
@@ -139,7 +139,7 @@ def with_noise_estimated(
 def scored(s: Setup, state: FitState) -> tuple[float, FloatArray]:
     """Log marginal likelihood by Laplace's method, with the priors of the noise sizes; and the weights of the tests."""
     weight = weights(s, state)
-    columns = model_columns(np.zeros((len(weight), 2, 0)), s.random_effects)
+    columns = model_columns(np.zeros((len(weight), 2, 0)), s)
     normal = columns.weighted(precision_of(state.factor, weight)).normal
     curvature = float(normal.with_prior(*columns.sides(state.precision[None])).log_determinant()[0])
     scale = float(np.sum(np.log(state.factor[:, 0, 0] * state.factor[:, 1, 1])))
@@ -149,25 +149,49 @@ def scored(s: Setup, state: FitState) -> tuple[float, FloatArray]:
 
 @displayed()
 @dataclass(frozen=True)
-class Linear:
-    """A fitted model linear about its parameters, with the noise at which it was fitted.
+class ModelFit:
+    """A fitted model, linear about its parameters. ``residual`` (n, 2) is ln T measured minus the law without random
+    effects.
 
-    ``jacobian`` (n, 2, p) is the derivative of ln T by law and mechanisms; the ``precision`` of the ``random_effects``
-    is (q,). ``residual`` (n, 2) is that of the fit; ``factor`` (n, 2, 2) whitens a test without its robust ``weight``
-    (n,).
+    ``score`` is the log of the marginal likelihood (Laplace), ``inverse`` that of the normal matrix at the last
+    step, nothing where a parameter is held at a bound; ``effects`` (q,) are the predicted random effects and
+    ``precision`` (q,) is that of each. ``jacobian`` (n, 2, p) is the derivative of ln T by law and mechanisms;
+    ``factor`` (n, 2, 2) whitens a test without its robust ``weight`` (n,).
     """
 
+    setup: Setup
+    acting: tuple[Acting, ...]
+    law: FloatArray
+    values: tuple[FloatArray, ...]
+    noise: Noise
+    effects: FloatArray
+    residual: FloatArray
+    score: float
+    inverse: Inverse = field(repr=False)
     jacobian: FloatArray = field(repr=False)
-    random_effects: RandomEffects = field(repr=False)
-    residual: FloatArray = field(repr=False)
     factor: FloatArray = field(repr=False)
     precision: FloatArray = field(repr=False)
     weight: FloatArray = field(repr=False)
 
+    @property
+    def covariance(self) -> FloatArray:
+        """Of the parameters of law and mechanisms, (p, p)."""
+        p = self.columns.parameters
+        return self.inverse.border[0, :p, :p]
+
+    @property
+    def predicted(self) -> FloatArray:
+        return self.setup.observations.log_force - self.residual
+
+    @property
+    def left(self) -> FloatArray:
+        """What is left of every test, (n, 2), random effects taken out."""
+        return np.asarray(self.residual - self.setup.on_tests(self.effects))
+
     @cached_property
     def columns(self) -> ModelColumns:
         """The columns of the model."""
-        return model_columns(self.jacobian, self.random_effects)
+        return model_columns(self.jacobian, self.setup)
 
     @cached_property
     def weighted(self) -> Weighted:
@@ -184,18 +208,13 @@ class Linear:
         """Products of the columns with the residual."""
         return self.weighted.with_residual(self.residual.T[None])
 
-    @property
-    def inverse(self) -> Inverse:
-        """Of the normal matrix."""
-        return self.normal.inverse()
-
     def cleared(self, stacked: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Columns (n, 2, k) and the residual, whitened, with law, mechanisms and random effects taken out.
 
         Their inner products are scores and informations of the marginal model: taking out penalised columns is
         an ordinary projection once the penalty is written as further rows.
         """
-        columns, inverse = self.columns, self.inverse
+        columns, inverse = self.columns, self.normal.inverse()
         others = np.concatenate([stacked, self.residual[:, :, None]], axis=2)
         own, border = self.weighted.times(others)
         each = [inverse.solution(own[..., k], border[..., k]) for k in range(others.shape[2])]
@@ -219,42 +238,6 @@ class Linear:
         while batch := list(islice(rest, AT_ONCE)):
             sizes.append(np.ptp(self.beyond_law(np.stack(batch, axis=2)), axis=(0, 1)))
         return np.concatenate(sizes)
-
-
-@displayed()
-@dataclass(frozen=True)
-class ModelFit:
-    """A fitted model. ``residual`` (n, 2) is ln T measured minus the law without random effects.
-
-    ``score`` is the log of the marginal likelihood (Laplace), ``inverse`` that of the normal matrix, ``effects`` (q,)
-    the predicted random effects, ``linear`` the model linear about these parameters.
-    """
-
-    setup: Setup
-    acting: tuple[Acting, ...]
-    law: FloatArray
-    values: tuple[FloatArray, ...]
-    noise: Noise
-    effects: FloatArray
-    residual: FloatArray
-    score: float
-    inverse: Inverse = field(repr=False)
-    linear: Linear = field(repr=False)
-
-    @property
-    def covariance(self) -> FloatArray:
-        """Of the parameters of law and mechanisms, (p, p)."""
-        p = self.linear.columns.parameters
-        return self.inverse.border[0, :p, :p]
-
-    @property
-    def weight(self) -> FloatArray:
-        """How much each test counts, (n,)."""
-        return self.linear.weight
-
-    @property
-    def predicted(self) -> FloatArray:
-        return self.setup.observations.log_force - self.residual
 
 
 def fit(
@@ -326,10 +309,10 @@ def _fitted(target: Target, x: FloatArray, noise: Noise, estimate: bool, until: 
     p = len(x)
     residual = target.residual(x)
     jacobian = target.jacobian(x, log_force - residual)
-    state = state_at(s, x, np.zeros(s.random_effects.count), residual, noise)
+    state = state_at(s, x, np.zeros(s.n_effects), residual, noise)
     score, weight = -np.inf, np.zeros(0)
     for _ in range(iterations):
-        columns, weight = model_columns(jacobian, s.random_effects), weights(s, state)
+        columns, weight = model_columns(jacobian, s), weights(s, state)
         inverse, solution = solved(state, columns, weight, target.bounds)
         before = state
         least = penalised(s, before) - 1e-9
@@ -351,5 +334,5 @@ def _fitted(target: Target, x: FloatArray, noise: Noise, estimate: bool, until: 
     jacobian = target.jacobian(state.x, log_force - state.residual)
     return ModelFit(
         s, target.acting, state.x[:N_LAW], target.values(state.x), state.noise, state.effects, state.residual, score,
-        inverse, Linear(jacobian, s.random_effects, state.residual, state.factor, state.precision, weight),
+        inverse, jacobian, state.factor, state.precision, weight,
     )  # fmt: skip

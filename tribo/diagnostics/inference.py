@@ -183,7 +183,7 @@ def pattern_excess(f: ModelFit) -> tuple[float, float] | None:
     """The estimated error of the model over the stated one, and the chance of such a factor where the true one is at
     most WITHIN (likelihood ratio, one-sided); None where the factor is not larger."""
     s = f.setup
-    patterns = s.group[s.random_effects.of_specimens :] == PATTERN
+    patterns = s.group[s.of_specimens :] == PATTERN
     if not patterns.any() or f.noise.pattern <= WITHIN:
         return None
     ratio = 2.0 * (f.score - with_pattern_error(f, WITHIN).score)
@@ -199,14 +199,14 @@ def pattern_corrections(f: ModelFit) -> list[Layer]:
     lowest, the middle and the highest are given.
     """
     s = f.setup
-    patterns = np.flatnonzero(s.group[s.random_effects.of_specimens :] == PATTERN)
+    patterns = np.flatnonzero(s.group[s.of_specimens :] == PATTERN)
     if not len(patterns):
         return []
     weight, fits = over_pattern_error(f)
-    each = np.array([s.random_effects.parts(g.effects)[1][patterns] for g in fits])
+    each = np.array([g.effects[s.of_specimens :][patterns] for g in fits])
     effects = weight @ each
     apart = np.einsum("i,ip,iq->pq", weight, each - effects, each - effects)
-    here = f.linear.columns.parameters + patterns
+    here = f.columns.parameters + patterns
     within = [g.inverse.border[0][np.ix_(here, here)] / informed_share(g.noise) for g in fits]
     spread = np.tensordot(weight, np.array(within), axes=1) + apart
 
@@ -218,7 +218,7 @@ def pattern_corrections(f: ModelFit) -> list[Layer]:
         low, middle, high = (100.0 * float(np.expm1(value + k * NORMAL_90 * sd)) for k in (-1, 0, 1))
         return Estimate(middle, low, high, "%")
 
-    columns = s.random_effects.shared[:, :, patterns]
+    columns = s.shared[:, :, patterns]
     sample, load = s.observations.conditions.sample, s.observations.conditions.normal_load_N
     there = [str(name) for name in np.unique(sample) if np.any(columns[sample == name])]
     corrections = []
@@ -292,9 +292,9 @@ def _held_out(model: ModelFit, out: np.ndarray) -> tuple[FloatArray, FloatArray]
     s = model.setup
     target, x = Target(s, trained.acting), np.concatenate([trained.law, *trained.values])
     residual = target.residual(x)
-    error = (residual - s.random_effects.on_tests(trained.effects))[out]
+    error = (residual - s.on_tests(trained.effects))[out]
     jacobian = target.jacobian(x, s.observations.log_force - residual)
-    columns = model_columns(jacobian[out], s.random_effects.take(out))
+    columns = model_columns(jacobian[out], s.take(out))
     spread = trained.inverse.spread(columns)[0][[[0, 1], [1, 2]]].transpose(2, 0, 1)
     if np.abs(spread).max() > UNKNOWN:
         return None

@@ -8,7 +8,7 @@ What one specimen alone shows is kept without the tests of the others.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -25,127 +25,6 @@ from tribo.records import FloatArray
 OF_A_SPECIMEN = 4  # gain and slope, alike in both regimes and apart
 
 
-@displayed()
-@dataclass(frozen=True)
-class RandomEffects:
-    """The design of the random effects, without the zeros of all specimens that a test was not made on.
-
-    ``specimen`` (n,) is the number of the specimen of every test, below ``specimens``, and ``own`` (n, 2, 4) are the
-    columns of its effects; ``shared`` (n, 2, c) are those that tests of several specimens show. A vector of all effects
-    (q,) holds those of the specimens one after the other, then the shared ones.
-    """
-
-    specimen: NDArray[np.int64]
-    specimens: int
-    own: FloatArray
-    shared: FloatArray
-
-    @property
-    def of_specimens(self) -> int:
-        """How many effects belong to specimens; the shared ones follow."""
-        return OF_A_SPECIMEN * self.specimens
-
-    @property
-    def count(self) -> int:
-        return self.of_specimens + int(self.shared.shape[2])
-
-    @cached_property
-    def tests_of(self) -> tuple[NDArray[np.int64], ...]:
-        """The tests of every specimen, as indices."""
-        order = np.argsort(self.specimen, kind="stable")
-        ends = np.cumsum(np.bincount(self.specimen, minlength=self.specimens))
-        return tuple(np.split(order, ends[:-1]))
-
-    @property
-    def dense(self) -> FloatArray:
-        """The whole design, (n, 2, q)."""
-        columns = np.zeros((*self.own.shape[:2], self.specimens, OF_A_SPECIMEN))
-        columns[np.arange(len(self.own)), :, self.specimen] = self.own
-        return np.concatenate([columns.reshape(*self.own.shape[:2], -1), self.shared], axis=2)
-
-    def parts(self, effects: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """A vector of effects (..., q) as those of the specimens (..., specimens, 4) and the shared ones (..., c)."""
-        own = effects[..., : self.of_specimens].reshape(*effects.shape[:-1], self.specimens, OF_A_SPECIMEN)
-        return own, effects[..., self.of_specimens :]
-
-    def on_tests(self, effects: FloatArray) -> FloatArray:
-        """What effects (..., q) add to ln T of every test, (..., n, 2)."""
-        own, shared = self.parts(effects)
-        n, regimes, c = self.shared.shape
-        of_shared = shared @ self.shared.reshape(n * regimes, c).T
-        of_own = np.einsum("nrk,...nk->...nr", self.own, own[..., self.specimen, :])
-        return np.asarray(of_own + of_shared.reshape(of_own.shape))
-
-    def summed(self, weight: FloatArray) -> FloatArray:
-        """The columns of all effects (q,), regimes added with ``weight`` (2,) and tests added up."""
-        own = np.zeros((self.specimens, OF_A_SPECIMEN))
-        np.add.at(own, self.specimen, np.einsum("nrk,r->nk", self.own, weight))
-        return np.concatenate([own.ravel(), np.einsum("nrk,r->k", self.shared, weight)])
-
-    def take(self, keep: np.ndarray) -> RandomEffects:
-        """The same for the tests picked by a mask or by indices."""
-        return replace(self, specimen=self.specimen[keep], own=self.own[keep], shared=self.shared[keep])
-
-    def with_shared(self, columns: FloatArray) -> RandomEffects:
-        """The same with further effects along ``columns`` (n, 2, d)."""
-        return replace(self, shared=np.concatenate([self.shared, columns], axis=2))
-
-
-EVERY = -1  # in place of a specimen: all tests
-MOST_PAIRS = 2000  # courses of two specimens that are written out at all
-
-
-@displayed()
-@dataclass(frozen=True)
-class EffectCourse:
-    """Columns of ln T, ``values`` (t, 2, d) on the ``tests`` (t,) of one ``specimen``, by its number, or of EVERY one;
-    zero on the others of ``n`` tests."""
-
-    n: int
-    specimen: int
-    tests: NDArray[np.int64]
-    values: FloatArray
-
-    @property
-    def columns(self) -> FloatArray:
-        """On all tests, (n, 2, d)."""
-        if self.specimen == EVERY:
-            return self.values
-        columns = np.zeros((self.n, *self.values.shape[1:]))
-        columns[self.tests] = self.values
-        return columns
-
-    @property
-    def freedom(self) -> int:
-        return int(self.values.shape[2])
-
-    @property
-    def shows(self) -> bool:
-        """Whether it is finite, and a change for some test."""
-        values = self.values
-        return bool(values.size and np.isfinite(values).all() and (np.ptp(values) > 0 or len(values) < self.n))
-
-
-def course(columns: FloatArray, effects: RandomEffects) -> EffectCourse:
-    """The course of columns (n, 2, d)."""
-    changed = effects.specimen[np.any(columns != 0.0, axis=(1, 2))]
-    n = len(columns)
-    if len(changed) and (changed == changed[0]).all():
-        specimen = int(changed[0])
-        tests = effects.tests_of[specimen]
-        return EffectCourse(n, specimen, tests, columns[tests])
-    return EffectCourse(n, EVERY, np.arange(n), columns)
-
-
-def added(courses: Iterable[EffectCourse]) -> FloatArray:
-    """The columns (n, 2, d) that courses add up to."""
-    first, *others = courses
-    total = first.columns
-    for other in others:
-        total = total + other.columns
-    return total
-
-
 N_LAW = 4  # mu static, tau0 static (kPa), mu sliding, tau0 sliding (kPa)
 FLOOR_N = 1e-6
 WITHIN_MEASURED = 3.0  # standard uncertainties: one measurement in 400 lies further off
@@ -156,6 +35,8 @@ LAW_BOUNDS = (np.array([0.01, -200.0, 0.01, -200.0]), np.array([100.0, 1000.0, 1
 GAIN, SLOPE, PATTERN = 0, 2, 4
 ALIKE_IN_BOTH, APART = np.array([1.0, 1.0]) / np.sqrt(2.0), np.array([1.0, -1.0]) / np.sqrt(2.0)
 FIXED = -1  # the group of effects whose size is not estimated
+EVERY = -1  # in place of a specimen: all tests
+MOST_PAIRS = 2000  # courses of two specimens that are written out at all
 
 
 @displayed()
@@ -192,9 +73,12 @@ class Acting:
 @displayed()
 @dataclass(frozen=True)
 class Setup:
-    """What every model of one campaign shares: shares, random-effect design, groups.
+    """What every model of one campaign shares: shares, the design of the random effects, what the repeats depend on.
 
-    There are q ``random_effects``. The standard deviation of effect j is ``unit[j]`` times the size of its ``group[j]``
+    ``specimen`` (n,) is the number of the specimen of every test, below ``specimens``, and ``own`` (n, 2, 4) are the
+    columns of its random effects, without the zeros of all specimens that a test was not made on; ``shared`` (n, 2, c)
+    are those that tests of several specimens show. A vector of all q effects holds those of the specimens one after the
+    other, then the shared ones. The standard deviation of effect j is ``unit[j]`` times the size of its ``group[j]``
     (GAIN and SLOPE, plus one for the difference of the regimes; PATTERN), or ``unit[j]`` itself where the group is
     FIXED. ``scatter`` (n, k) holds what the repeats may depend on: the sample, and the logarithm of the force.
     ``first_law`` (4,) is a first guess of the flat law.
@@ -203,19 +87,67 @@ class Setup:
     observations: Observations
     predictor: Predictor
     shares: FloatArray
-    random_effects: RandomEffects
+    specimen: NDArray[np.int64]
+    specimens: int
+    own: FloatArray
+    shared: FloatArray
     unit: FloatArray
     group: NDArray[np.int64]
     log_pressure: FloatArray
     scatter: FloatArray
     first_law: FloatArray
 
-    def take(self, keep: NDArray[np.bool_]) -> Setup:
-        """The same for the tests that ``keep`` (n,) marks."""
+    @property
+    def of_specimens(self) -> int:
+        """How many random effects belong to specimens; the shared ones follow."""
+        return OF_A_SPECIMEN * self.specimens
+
+    @property
+    def n_effects(self) -> int:
+        """How many random effects there are."""
+        return self.of_specimens + int(self.shared.shape[2])
+
+    @cached_property
+    def tests_of(self) -> tuple[NDArray[np.int64], ...]:
+        """The tests of every specimen, as indices."""
+        order = np.argsort(self.specimen, kind="stable")
+        ends = np.cumsum(np.bincount(self.specimen, minlength=self.specimens))
+        return tuple(np.split(order, ends[:-1]))
+
+    @property
+    def dense(self) -> FloatArray:
+        """The whole design of the random effects, (n, 2, q)."""
+        columns = np.zeros((*self.own.shape[:2], self.specimens, OF_A_SPECIMEN))
+        columns[np.arange(len(self.own)), :, self.specimen] = self.own
+        return np.concatenate([columns.reshape(*self.own.shape[:2], -1), self.shared], axis=2)
+
+    def on_tests(self, effects: FloatArray) -> FloatArray:
+        """What random effects (..., q) add to ln T of every test, (..., n, 2)."""
+        own = effects[..., : self.of_specimens].reshape(*effects.shape[:-1], self.specimens, OF_A_SPECIMEN)
+        n, regimes, c = self.shared.shape
+        of_shared = effects[..., self.of_specimens :] @ self.shared.reshape(n * regimes, c).T
+        of_own = np.einsum("nrk,...nk->...nr", self.own, own[..., self.specimen, :])
+        return np.asarray(of_own + of_shared.reshape(of_own.shape))
+
+    def summed(self, weight: FloatArray) -> FloatArray:
+        """The columns of all random effects (q,), regimes added with ``weight`` (2,) and tests added up."""
+        own = np.zeros((self.specimens, OF_A_SPECIMEN))
+        np.add.at(own, self.specimen, np.einsum("nrk,r->nk", self.own, weight))
+        return np.concatenate([own.ravel(), np.einsum("nrk,r->k", self.shared, weight)])
+
+    def take(self, keep: np.ndarray) -> Setup:
+        """The same for the tests picked by a mask or by indices."""
         return replace(
-            self, observations=self.observations.take(keep), shares=self.shares[keep],
-            random_effects=self.random_effects.take(keep), log_pressure=self.log_pressure[keep],
+            self, observations=self.observations.take(keep), shares=self.shares[keep], specimen=self.specimen[keep],
+            own=self.own[keep], shared=self.shared[keep], log_pressure=self.log_pressure[keep],
             scatter=self.scatter[keep],
+        )  # fmt: skip
+
+    def with_effects(self, columns: FloatArray, sd: FloatArray) -> Setup:
+        """The same with further random effects along ``columns`` (n, 2, d), of the standard deviations ``sd`` (d,)."""
+        return replace(
+            self, shared=np.concatenate([self.shared, columns], axis=2), unit=np.concatenate([self.unit, sd]),
+            group=np.concatenate([self.group, np.full(len(sd), FIXED)]),
         )  # fmt: skip
 
     def base(self, law: FloatArray) -> Base:
@@ -255,15 +187,65 @@ def setup(observations: Observations, predictor: Predictor) -> Setup:
                 units.append(size)
                 groups.append(PATTERN)
     shared = np.stack(columns, axis=2) if columns else np.zeros((o.n, 2, 0))
-    effects = RandomEffects(specimen, len(names), own, shared)
     bare = Setup(
-        o, predictor, predictor.table(c.sample), effects, np.array(units), np.array(groups), log_p,
-        np.zeros((o.n, 0)), np.zeros(N_LAW),
+        o, predictor, predictor.table(c.sample), specimen, len(names), own, shared, np.array(units), np.array(groups),
+        log_p, np.zeros((o.n, 0)), np.zeros(N_LAW),
     )  # fmt: skip
     law = _first_law(bare)
     force = predict(bare, law, (), ()).mean(axis=1)
     scatter = [*((c.sample == name) * 1.0 for name in np.unique(c.sample)), force - force.mean()]
     return replace(bare, first_law=law, scatter=np.column_stack(scatter))
+
+
+@displayed()
+@dataclass(frozen=True)
+class EffectCourse:
+    """Columns of ln T, ``values`` (t, 2, d) on the ``tests`` (t,) of one ``specimen``, by its number, or of EVERY one;
+    zero on the others of ``n`` tests."""
+
+    n: int
+    specimen: int
+    tests: NDArray[np.int64]
+    values: FloatArray
+
+    @property
+    def columns(self) -> FloatArray:
+        """On all tests, (n, 2, d)."""
+        if self.specimen == EVERY:
+            return self.values
+        columns = np.zeros((self.n, *self.values.shape[1:]))
+        columns[self.tests] = self.values
+        return columns
+
+    @property
+    def freedom(self) -> int:
+        return int(self.values.shape[2])
+
+    @property
+    def shows(self) -> bool:
+        """Whether it is finite, and a change for some test."""
+        values = self.values
+        return bool(values.size and np.isfinite(values).all() and (np.ptp(values) > 0 or len(values) < self.n))
+
+
+def course(columns: FloatArray, s: Setup) -> EffectCourse:
+    """The course of columns (n, 2, d)."""
+    changed = s.specimen[np.any(columns != 0.0, axis=(1, 2))]
+    n = len(columns)
+    if len(changed) and (changed == changed[0]).all():
+        specimen = int(changed[0])
+        tests = s.tests_of[specimen]
+        return EffectCourse(n, specimen, tests, columns[tests])
+    return EffectCourse(n, EVERY, np.arange(n), columns)
+
+
+def added(courses: Iterable[EffectCourse]) -> FloatArray:
+    """The columns (n, 2, d) that courses add up to."""
+    first, *others = courses
+    total = first.columns
+    for other in others:
+        total = total + other.columns
+    return total
 
 
 def _first_law(s: Setup) -> FloatArray:
@@ -317,7 +299,7 @@ def with_form_error(
     """Further random effects that let each mechanism's effect be off by a ``share`` of itself, per sample and regime,
     in size and slope."""
     c = s.observations.conditions
-    columns, sizes = [], []
+    columns = []
     for a, v in zip(acting, values, strict=True):
         change = effect_of(s, law, a, v)
         for shape in (np.ones(s.observations.n), s.log_pressure):
@@ -328,26 +310,13 @@ def with_form_error(
                     column[:, regime] = change[:, regime] * here
                     if np.abs(column).max() > 1e-6:
                         columns.append(column)
-                        sizes.append(share)
-    if not columns:
-        return s
-    return replace(
-        s,
-        random_effects=s.random_effects.with_shared(np.stack(columns, axis=2)),
-        unit=np.concatenate([s.unit, np.array(sizes)]),
-        group=np.concatenate([s.group, np.full(len(sizes), FIXED)]),
-    )
+    return s.with_effects(np.stack(columns, axis=2), np.full(len(columns), share)) if columns else s
 
 
 def with_free_columns(s: Setup, columns: FloatArray, coefficients: FloatArray) -> Setup:
     """Further random effects along ``columns`` (n, 2, d), free to be about twice as large as ``coefficients`` (d,)."""
     freedom = np.maximum(2.0 * np.abs(coefficients), 0.5 * np.abs(coefficients).max())
-    return replace(
-        s,
-        random_effects=s.random_effects.with_shared(columns),
-        unit=np.concatenate([s.unit, freedom]),
-        group=np.concatenate([s.group, np.full(len(freedom), FIXED)]),
-    )
+    return s.with_effects(columns, freedom)
 
 
 def candidates(s: Setup, law: FloatArray) -> list[Acting]:
@@ -374,41 +343,31 @@ def candidates(s: Setup, law: FloatArray) -> list[Acting]:
     return acting
 
 
-@displayed()
-@dataclass(frozen=True)
-class StartChanges:
-    """What every candidate changes before it is fitted.
+def start_changes(
+    s: Setup, law: FloatArray
+) -> tuple[list[Acting], list[tuple[EffectCourse, ...]], dict[str, FloatArray]]:
+    """What every candidate changes on top of the flat law ``law`` before it is fitted, mechanisms of a model left out.
 
-    ``courses`` (k,) are the changes of ln T at the start values of ``acting`` (k,): one each, or two that add up, each
-    that of another candidate. ``every_start`` holds the changes at all sizes that a fit would start from,
-    (n, 2, sizes), of the mechanisms without a choice, by name. ``adhesion`` (n, 2) is the share of adhesion in T by the
-    law alone.
+    Returns
+    -------
+    acting, courses, every_start
+        The candidates (k,); the change of ln T by each at its start values (k,): one course, or two that add up, each
+        that of another candidate; and the changes at all sizes that a fit would start from, (n, 2, sizes), of the
+        mechanisms without a choice, by name.
     """
-
-    acting: tuple[Acting, ...]
-    courses: tuple[tuple[EffectCourse, ...], ...]
-    every_start: Mapping[str, FloatArray]
-    adhesion: FloatArray
-
-
-def start_changes(s: Setup, law: FloatArray) -> StartChanges:
-    """The changes of all candidates on top of the flat law ``law``, mechanisms of a model left out."""
     acting = candidates(s, law)
-    before = predict(s, law, (), ())
     single: dict[tuple[str, str], EffectCourse] = {}
     every = {}
     for a in acting:
         if len(a.mechanism.choosing.parts(a.choice)) > 1:
             continue
         column = effect_of(s, law, a, a.start)
-        single[a.mechanism.name, a.choice] = course(column[:, :, None], s.random_effects)
+        single[a.mechanism.name, a.choice] = course(column[:, :, None], s)
         if not a.choice:
             further = [np.array([size, *a.start[1:]]) for size in a.mechanism.amplitude.tries]
             every[a.name] = np.stack([column, *(effect_of(s, law, a, v) for v in further)], axis=2)
-    adhesion = np.exp(log_forces(s.base(law).forces(np.zeros(s.observations.n))) - before)
     names = [(a.mechanism.name, a.mechanism.choosing.parts(a.choice)) for a in acting]
-    courses = tuple(tuple(single[name, part] for part in parts) for name, parts in names)
-    return StartChanges(tuple(acting), courses, every, adhesion)
+    return acting, [tuple(single[name, part] for part in parts) for name, parts in names], every
 
 
 @displayed()

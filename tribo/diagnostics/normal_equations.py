@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.diagnostics.model import RandomEffects
+from tribo.diagnostics.model import Setup
 from tribo.display import displayed
 from tribo.records import FloatArray
 
@@ -64,10 +64,10 @@ class ModelColumns:
         return Weighted(self, _weighted(precision, self.own), _weighted(precision, self.border))
 
 
-def model_columns(jacobian: FloatArray, effects: RandomEffects) -> ModelColumns:
+def model_columns(jacobian: FloatArray, s: Setup) -> ModelColumns:
     """The columns of law and mechanisms (n, 2, p) and of the random effects."""
-    border = np.concatenate([jacobian, effects.shared], axis=2)
-    return ModelColumns(effects.own, border, int(jacobian.shape[2]), effects.tests_of)
+    border = np.concatenate([jacobian, s.shared], axis=2)
+    return ModelColumns(s.own, border, int(jacobian.shape[2]), s.tests_of)
 
 
 def _weighted(precision: FloatArray, columns: FloatArray) -> FloatArray:

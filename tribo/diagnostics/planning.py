@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from tribo.diagnostics.candidates import ALIKE, CauseCandidate, Named
-from tribo.diagnostics.fit import Linear, ModelFit, scored, state_at
+from tribo.diagnostics.fit import ModelFit, scored, solved, state_at
 from tribo.diagnostics.model import Target, added, effect_of, predict, setup
 from tribo.diagnostics.normal_equations import model_columns
 from tribo.diagnostics.observations import NO_FLAT, Observations, conditions_of
@@ -110,11 +110,11 @@ def plan_design(
     for k, a in enumerate(effects.acting):
         first.setdefault(a.name, k)
     acting = [effects.acting[k] for k in first.values()]
-    columns = np.concatenate([added(effects.changes.courses[k]) for k in first.values()], axis=2)
-    left = f.linear.cleared(columns)[0]
+    columns = np.concatenate([added(effects.courses[k]) for k in first.values()], axis=2)
+    left = f.cleared(columns)[0]
     length = np.sqrt(np.sum(left**2, axis=0))
     cosine = (left.T @ left) / np.maximum(length[:, None] * length[None, :], 1e-12)
-    size = np.ptp(f.linear.beyond_law(columns), axis=(0, 1))
+    size = np.ptp(f.beyond_law(columns), axis=(0, 1))
     findings = []
     for k in np.argsort(-length / np.maximum(size, 1e-12)):
         name, m = acting[k].name, acting[k].mechanism
@@ -153,11 +153,15 @@ def expected_fit(campaign: Campaign, noise: Noise, law: FloatArray, predictor: P
     )  # fmt: skip
     s = setup(o, predictor or tabled_predictor(patterns))
     s = replace(s, observations=replace(o, log_force=predict(s, law, (), ())))
-    state = state_at(s, law, np.zeros(s.random_effects.count), np.zeros((n, 2)), noise)
-    jacobian = Target(s, ()).jacobian(law, s.observations.log_force - state.residual)
+    state = state_at(s, law, np.zeros(s.n_effects), np.zeros((n, 2)), noise)
+    target = Target(s, ())
+    jacobian = target.jacobian(law, s.observations.log_force - state.residual)
     score, weight = scored(s, state)
-    linear = Linear(jacobian, s.random_effects, state.residual, state.factor, state.precision, weight)
-    return ModelFit(s, (), law, (), noise, state.effects, state.residual, score, linear.inverse, linear)
+    inverse, _ = solved(state, model_columns(jacobian, s), weight, target.bounds)
+    return ModelFit(
+        s, (), law, (), noise, state.effects, state.residual, score, inverse, jacobian, state.factor, state.precision,
+        weight,
+    )  # fmt: skip
 
 
 def next_test_of(
@@ -266,8 +270,7 @@ def _distance2(f: ModelFit, difference: FloatArray, rows: np.ndarray) -> float:
     """Squared difference of two predictions in units of the noise of further pulls on the same specimens."""
     s = f.setup
     noise = block_diag(*f.noise.per_test(s)[rows])
-    effects = s.random_effects.take(rows)
-    without_law = np.zeros((len(rows), 2, f.linear.columns.parameters))
-    total = noise + f.inverse.between(model_columns(without_law, effects), effects.specimen)
+    without_law = np.zeros((len(rows), 2, f.columns.parameters))
+    total = noise + f.inverse.between(model_columns(without_law, s.take(rows)), s.specimen[rows])
     vector = difference.ravel()
     return float(vector @ np.linalg.solve(total, vector))

@@ -135,19 +135,19 @@ def replicates_at(
 
 def as_measured(f: ModelFit) -> Replicates:
     """The fitted campaign itself, as if it were one replicate."""
-    left = (f.residual - f.setup.random_effects.on_tests(f.effects)).T[None]
+    left = f.left.T[None]
     noise = fitted_noise(f.setup, f.noise, 1)
-    return replicates_at(f.setup, f.linear.columns, noise, left, f.residual.T[None], f.noise.tail)
+    return replicates_at(f.setup, f.columns, noise, left, f.residual.T[None], f.noise.tail)
 
 
 def drawn_residuals(f: ModelFit, rng: np.random.Generator, replicates: int) -> FloatArray:
     """ln T less what the fit predicts, (replicates, 2, n): new specimens and pattern errors, repeats resampled."""
     s = f.setup
     n = s.observations.n
-    effects = rng.normal(size=(replicates, s.random_effects.count)) / np.sqrt(f.linear.precision)
+    effects = rng.normal(size=(replicates, s.n_effects)) / np.sqrt(f.precision)
     left = standardised(f)
-    noise = np.linalg.solve(f.linear.factor, left[rng.integers(0, n, (replicates, n))][..., None])[..., 0]
-    return np.asarray((noise + s.random_effects.on_tests(effects)).transpose(0, 2, 1))
+    noise = np.linalg.solve(f.factor, left[rng.integers(0, n, (replicates, n))][..., None])[..., 0]
+    return np.asarray((noise + s.on_tests(effects)).transpose(0, 2, 1))
 
 
 def standardised(f: ModelFit) -> FloatArray:
@@ -156,7 +156,7 @@ def standardised(f: ModelFit) -> FloatArray:
     The random effects follow the tests, so that what is left is smaller than the noise: it is scaled to the noise that
     the fit states, to a weighted covariance of one.
     """
-    left = np.einsum("nij,nj->ni", f.linear.factor, f.residual - f.setup.random_effects.on_tests(f.effects))
+    left = np.einsum("nij,nj->ni", f.factor, f.left)
     left = left - left.mean(axis=0)
     for _ in range(3):
         weight = (f.noise.tail + 2.0) / (f.noise.tail + np.sum(left**2, axis=1))
@@ -168,7 +168,7 @@ def standardised(f: ModelFit) -> FloatArray:
 def refit(f: ModelFit, residual: FloatArray) -> Replicates:
     """Law, random effects, weights and noise of campaigns that differ from ``f`` by ``residual`` (r, 2, n)."""
     noise, solution, _, left = refits(f, residual)
-    columns = f.linear.columns
+    columns = f.columns
     of_law = columns.border[:, :, : columns.parameters]
     law = np.tensordot(solution, of_law, axes=(1, 2)).transpose(0, 2, 1)
     return replicates_at(f.setup, columns, noise, left, residual - law, f.noise.tail)
@@ -177,7 +177,7 @@ def refit(f: ModelFit, residual: FloatArray) -> Replicates:
 def refits(f: ModelFit, residual: FloatArray) -> tuple[ReplicateNoise, FloatArray, FloatArray, FloatArray]:
     """Each of these campaigns fitted, linear about ``f``: the noise, the coefficients (r, p) of law and mechanisms with
     their variances (r, p), and what is left of every test, (r, 2, n)."""
-    s, columns, tail = f.setup, f.linear.columns, f.noise.tail
+    s, columns, tail = f.setup, f.columns, f.noise.tail
     p = columns.parameters
     noise, left = fitted_noise(s, f.noise, len(residual)), residual
     for _ in range(ITERATIONS):

@@ -7,14 +7,14 @@ columns is that of :mod:`tribo.diagnostics.normal_equations`: static, mixed and 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tribo.diagnostics.fit import ModelFit
-from tribo.diagnostics.model import EVERY, MOST_PAIRS, Acting, EffectCourse, StartChanges, added, start_changes
+from tribo.diagnostics.model import EVERY, MOST_PAIRS, Acting, EffectCourse, added, start_changes
 from tribo.diagnostics.normal_equations import ROUNDING, BlockCholesky, Sides, block_cholesky
 from tribo.diagnostics.replicates import SIZE_STEPS, Replicates, as_measured
 from tribo.display import displayed
@@ -295,6 +295,7 @@ def _in_common(border: FloatArray, i: Index, j: Index) -> FloatArray:
 class StartEffects:
     """The effects of all candidates at their start values, made once for a fitted ``model``.
 
+    ``courses`` are those of the candidates ``acting`` (:func:`tribo.diagnostics.model.start_changes`), both (k,).
     ``length`` (k,) is the strength with which each would show beside the model's own columns, as a standard normal
     deviate, ``pull`` (k,) its score there and ``size`` (k,) its peak-to-peak effect in ln T beyond the law, where it
     was computed. ``absorbed`` are the names of the mechanisms whose effect the calibration on the flat sample absorbs
@@ -302,36 +303,33 @@ class StartEffects:
     """
 
     model: ModelFit
-    changes: StartChanges
+    acting: Sequence[Acting]
+    courses: Sequence[tuple[EffectCourse, ...]]
     length: FloatArray
     pull: FloatArray
     size: FloatArray
     absorbed: frozenset[str]
 
-    @property
-    def acting(self) -> tuple[Acting, ...]:
-        return self.changes.acting
-
 
 def start_effects(f: ModelFit) -> StartEffects:
     """The effects of all candidates on top of a fit; the size of pairs of specimens is infinite where there are very
     many of them."""
-    changes = start_changes(f.setup, f.law)
-    terms = terms_of(changes.courses, np.zeros(len(changes.courses)), f.setup.observations.n)
+    acting, every_course, every_start = start_changes(f.setup, f.law)
+    terms = terms_of(every_course, np.zeros(len(acting)), f.setup.observations.n)
     left, pull = (each[0] for each in informations(as_measured(f), terms))
-    alone = np.array([len(courses) == 1 for courses in changes.courses])
+    alone = np.array([len(courses) == 1 for courses in every_course])
     sized = alone if np.sum(~alone) > MOST_PAIRS else np.ones(len(alone), bool)
     size = np.full(len(sized), np.inf)
-    size[sized] = f.linear.size_beyond_law(added(changes.courses[k])[:, :, 0] for k in np.flatnonzero(sized))
-    return StartEffects(f, changes, np.sqrt(left), pull, size, _absorbed(f, changes))
+    size[sized] = f.size_beyond_law(added(every_course[k])[:, :, 0] for k in np.flatnonzero(sized))
+    return StartEffects(f, acting, every_course, np.sqrt(left), pull, size, _absorbed(f, every_start))
 
 
-def _absorbed(f: ModelFit, changes: StartChanges) -> frozenset[str]:
-    names = [name for name, columns in changes.every_start.items() for _ in range(columns.shape[2])]
+def _absorbed(f: ModelFit, every_start: Mapping[str, FloatArray]) -> frozenset[str]:
+    names = [name for name, columns in every_start.items() for _ in range(columns.shape[2])]
     if not names:
         return frozenset()
-    columns = np.concatenate(list(changes.every_start.values()), axis=2)
-    kept = np.sum(f.linear.cleared(columns)[0] ** 2, axis=0)
+    columns = np.concatenate(list(every_start.values()), axis=2)
+    kept = np.sum(f.cleared(columns)[0] ** 2, axis=0)
     whole = np.sum(columns**2, axis=(0, 1)) / np.mean(np.diag(f.noise.repeat))
     seen = {name for name, k, w in zip(names, kept, whole, strict=True) if k >= SEEN * max(w, 1e-30)}
     return frozenset(set(names) - seen)

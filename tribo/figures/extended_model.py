@@ -154,7 +154,7 @@ def law_numbers_of(found: Discovery) -> pd.DataFrame:
 def _of_law(number: int, found: FoundLaw) -> pd.DataFrame:
     s, law = found.model.setup, found.law
     c = s.observations.conditions
-    left = found.model.residual - s.random_effects.on_tests(found.model.effects)
+    left = found.model.left
     change = effect_of(s, found.model.law, found.model.acting[-1], found.model.values[-1])
     half = 0.5 * (found.band[2] - found.band[1])
     x, names = _abscissa(found)

@@ -194,7 +194,7 @@ def _end_to_end(column: Covariate, residual: FloatArray, here: np.ndarray) -> fl
 def _strengths(f: ModelFit, shapes: FloatArray, observable: str) -> FloatArray:
     """Signed score of every shape (n, k) in one observable, as the diagnosis itself judges its contrasts."""
     stacked = shapes[:, None, :] * np.array(PATTERNS[observable])[None, :, None]
-    left, target = f.linear.cleared(stacked)
+    left, target = f.cleared(stacked)
     length = np.sqrt(np.sum(left**2, axis=0))
     return np.asarray(left.T @ target / np.maximum(length, 1e-9))
 

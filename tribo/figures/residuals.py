@@ -153,11 +153,8 @@ def variance_of_mean(d: Diagnosis, weight: FloatArray, rows: np.ndarray) -> floa
     stated = np.where(f.setup.group == PATTERN, max(f.noise.pattern, 1.0), 1.0)
     repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup)[rows], weight)
     repeats += f.setup.observations.reading[rows] ** 2 @ weight**2
-    effects = f.setup.random_effects.take(rows)
-    own = np.zeros((effects.specimens, effects.own.shape[2]))
-    np.add.at(own, effects.specimen, np.einsum("nrk,r->nk", effects.own, weight))
-    shared = np.concatenate([own.ravel(), np.einsum("nrk,r->k", effects.shared, weight)]) / len(rows)
-    return float(repeats.sum() / len(rows) ** 2 + shared**2 @ (1.0 / (stated**2 * f.linear.precision)))
+    shared = f.setup.take(rows).summed(weight) / len(rows)
+    return float(repeats.sum() / len(rows) ** 2 + shared**2 @ (1.0 / (stated**2 * f.precision)))
 
 
 def _bins(x: FloatArray, here: np.ndarray, column: Covariate) -> list[np.ndarray]:

@@ -217,7 +217,7 @@ def plan_law(campaign: Campaign, law: WrittenLaw, parameters: Mapping[str, Estim
         return PlannedLaw(formula, 0.0, 0, n, why)
     acting = Acting(law.mechanism())
     values = np.array([parameters[p.name].value for p in acting.mechanism.parameters])
-    left = f.linear.cleared(effect_of(f.setup, f.law, acting, values)[:, :, None])[0]
+    left = f.cleared(effect_of(f.setup, f.law, acting, values)[:, :, None])[0]
     strength = float(np.sqrt(np.sum(left**2)))
     needed = int(np.ceil(n * (SHOWS / max(strength, 1e-6)) ** 2))
     return PlannedLaw(formula, strength, needed, n)

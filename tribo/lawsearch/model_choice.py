@@ -88,7 +88,7 @@ class Background:
     model : ModelFit
         The campaign without the law.
     law : WrittenLaw
-        Fitted beside the causes and laws of the model; ``after`` is that fit. ``linear`` is the model without it,
+        Fitted beside the causes and laws of the model; ``after`` is that fit. ``without`` is the model without it,
         ``residual`` (n, 2) what that leaves.
     """
 
@@ -96,18 +96,18 @@ class Background:
         acting = Acting(law.mechanism())
         after = fit(model.setup, (*model.acting, acting), start=model)
         self.law, self.after, self.setup, self.terms = law, after, after.setup, terms_of(after)
-        self.linear = replace(after.linear, jacobian=after.linear.jacobian[:, :, : -len(acting.mechanism.parameters)])
+        self.without = replace(after, jacobian=after.jacobian[:, :, : -len(acting.mechanism.parameters)])
         self.residual = after.residual + effect_of(after.setup, after.law, acting, after.values[-1])
         self.informed = informed_share(after.noise)
 
     @cached_property
     def projected(self) -> Projection:
-        return Projection(self.linear, self.residual[None])
+        return Projection(self.without, self.residual[None])
 
     @cached_property
     def unweighted(self) -> Projection:
         """The same with every test counting alike."""
-        return Projection(replace(self.linear, weight=np.ones(len(self.residual))), self.residual[None])
+        return Projection(replace(self.without, weight=np.ones(len(self.residual))), self.residual[None])
 
     @property
     def conditions(self) -> Conditions:
@@ -179,7 +179,7 @@ def choose_form(
 
 def forms_in_reach(model: ModelFit, grammar: Grammar) -> tuple[Background, list[Form]]:
     """The campaign at the noise that the best of these laws leaves, and the forms in reach there, the best first."""
-    projected = Projection(model.linear, model.linear.residual[None])
+    projected = Projection(model, model.residual[None])
     net = projected.gains(grammar.courses, grammar.acts)[0] - grammar.scope_cost[:, None]
     net[corrects_a_pattern(grammar.scopes, grammar.courses.shapes)] = -np.inf
     return _best_forms(model, grammar, grammar.law(int(np.argmax(net))))

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.diagnostics.fit import Linear, ModelFit, whitened
+from tribo.diagnostics.fit import ModelFit, whitened
 from tribo.diagnostics.model import Setup, log_forces
 from tribo.diagnostics.normal_equations import block_cholesky
 from tribo.diagnostics.replicates import Replicates
@@ -108,8 +108,8 @@ def effects_of(scopes: Sequence[WrittenLaw], c: Conditions, terms: Mapping[str, 
 
 def acts_of(effects: FloatArray, s: Setup) -> Acts:
     """The same effects sample by sample. A specimen belongs to one part."""
-    c, specimen = s.observations.conditions, s.random_effects.specimen
-    first = [int(tests[0]) if len(tests) else 0 for tests in s.random_effects.tests_of]
+    c, specimen = s.observations.conditions, s.specimen
+    first = [int(tests[0]) if len(tests) else 0 for tests in s.tests_of]
     sample = c.sample[first][specimen]
     parts = []
     for name in np.unique(sample):
@@ -126,8 +126,8 @@ class Projection:
 
     Parameters
     ----------
-    linear : Linear
-        The model with the noise and weights at which columns are scored.
+    model : ModelFit
+        With the noise and weights at which columns are scored.
     residual : array (r, n, 2)
         ln T less the model, of the campaign itself or of campaigns with the same noise.
 
@@ -141,16 +141,16 @@ class Projection:
         The whitened residual less what the model absorbs of it.
     """
 
-    def __init__(self, linear: Linear, residual: FloatArray) -> None:
-        self.factor = linear.factor * np.sqrt(linear.weight)[:, None, None]
-        self.n = len(linear.residual)
-        self.specimen = linear.random_effects.specimen
-        absorbed = block_cholesky(linear.normal, linear.right)
+    def __init__(self, model: ModelFit, residual: FloatArray) -> None:
+        self.factor = model.factor * np.sqrt(model.weight)[:, None, None]
+        self.n = len(model.residual)
+        self.specimen = model.setup.specimen
+        absorbed = block_cholesky(model.normal, model.right)
         specimen = np.tile(self.specimen, 2)
-        white = whitened(self.factor, linear.columns.own)
+        white = whitened(self.factor, model.columns.own)
         self.own = (absorbed.own[0, specimen] @ white[:, :, None])[:, :, 0]
         taken = (self.own[:, None] @ absorbed.across[0, specimen])[:, 0]
-        self.border = (whitened(self.factor, linear.columns.border) - taken) @ absorbed.border[0].T
+        self.border = (whitened(self.factor, model.columns.border) - taken) @ absorbed.border[0].T
         right = whitened(self.factor, residual.transpose(1, 2, 0))
         self.left = right - self._taken(right)
 

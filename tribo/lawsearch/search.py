@@ -97,7 +97,7 @@ def discover_laws(
 
 def _scored(model: ModelFit, grammar: Grammar) -> list[tuple[WrittenLaw, float, float]]:
     """The best laws of the campaign, scored with its own noise, the best first."""
-    net = grammar.net(Projection(model.linear, model.linear.residual[None]))[0]
+    net = grammar.net(Projection(model, model.residual[None]))[0]
     index = best_of(net, RESCORED_MEASURED)
     gains = grammar.gains(as_measured(model), index)[0]
     nets = gains - grammar.cost(index)
@@ -121,7 +121,7 @@ def _best_by_chance(
     while len(chance) < replicates:
         drawn = drawn_residuals(model, rng, CAMPAIGNS_AT_ONCE)
         made = refit(model, drawn)
-        nets = grammar.net(Projection(model.linear, drawn.transpose(0, 2, 1)))
+        nets = grammar.net(Projection(model, drawn.transpose(0, 2, 1)))
         for k, net in enumerate(nets):
             index = best_of(net, RESCORED)
             chance.append(float((grammar.gains(made.one(k), index)[0] - grammar.cost(index)).max()))
