@@ -86,9 +86,9 @@ def test_names_of_users_cannot_put_markup_into_a_notebook() -> None:
 
 
 def test_a_display_leaves_out_what_is_empty_and_names_what_is_there() -> None:
-    shown = repr(records.Override("T7", "exclude", "tipped over"))
+    shown = repr(records.Override("T7", "exclude", records.Pull("T7", "first_peak"), reason="tipped over"))
     assert shown.split("\n")[0] == "Override: T7: exclude"
-    assert "reason   tipped over" in shown
+    assert "reason     tipped over" in shown
     assert "peak_s" not in shown
 
 

@@ -195,15 +195,15 @@ class Pull:
 
     test_id: str
     rule: str
-    static_N: float
-    static_u_N: float
-    sliding_N: float
-    sliding_u_N: float
-    zero_N: float
-    zero_u_N: float
-    onset_s: float
-    peak_s: float
-    window_s: tuple[float, float]
+    static_N: float = float("nan")
+    static_u_N: float = float("nan")
+    sliding_N: float = float("nan")
+    sliding_u_N: float = float("nan")
+    zero_N: float = 0.0
+    zero_u_N: float = 0.0
+    onset_s: float = float("nan")
+    peak_s: float = float("nan")
+    window_s: tuple[float, float] = (float("nan"), float("nan"))
     rise_N_per_s: float = float("nan")
     rise_stiffness_N_per_m: float = float("nan")
     stick_slip_amplitude_N: float = float("nan")
@@ -305,23 +305,13 @@ class Correction:
 UNCORRECTED = Correction()
 
 
-@displayed()
-@dataclass(frozen=True)
-class Evaluated:
-    """Forces of one test that were evaluated elsewhere, with standard uncertainties; NaN where one is not given."""
-
-    static_N: float = float("nan")
-    static_u_N: float = float("nan")
-    sliding_N: float = float("nan")
-    sliding_u_N: float = float("nan")
-
-
 @displayed(lambda t: f"{t.test_id}, {t.sample}, {t.normal_load_N:.4g} N")
 @dataclass(frozen=True)
 class Test:
     """One row of tests.csv: one pull, its load and its covariates.
 
-    ``correction`` is what was stated about the numbers of its export; ``evaluated`` holds its forces where it has none.
+    ``correction`` is what was stated about the numbers of its export. Where it has none, ``evaluated`` holds its forces
+    by their names in :class:`Pull`, such as "static_N" and "static_u_N".
     """
 
     __test__ = False  # not a pytest class
@@ -345,7 +335,7 @@ class Test:
     covariates: Mapping[str, str] = field(default_factory=dict)
     row: int | None = None
     correction: Correction = UNCORRECTED
-    evaluated: Evaluated | None = None
+    evaluated: Mapping[str, float] | None = None
     zero: ZeroChoice = DEFAULT
     load_zero: ZeroChoice = DEFAULT
     stiffness_N_per_m: float | None = None  # of the spring, wire or beam through which the slider is pulled
@@ -511,25 +501,17 @@ class Campaign:
 class Override:
     """A decision made by hand about one test: exclude it, or move its static peak or sliding window.
 
-    Times as recorded in the trace; None where the automatic value is kept. ``row`` is its line in overrides.csv.
+    Times as recorded in the trace; None where the automatic value is kept. ``automatic`` is the result without the
+    decision; ``trace`` is None where the forces were evaluated elsewhere.
     """
 
     test_id: str
     action: Literal["exclude", "move"]
+    automatic: Pull
+    trace: Trace | None = None
     reason: str = ""
     window_s: tuple[float, float] | None = None
     peak_s: float | None = None
-    row: int | None = None
-
-
-@displayed(lambda b: f"{b.override.test_id}: {b.override.action}")
-@dataclass(frozen=True)
-class ByHand:
-    """A test with a decision made by hand, its trace and its automatic result."""
-
-    override: Override
-    trace: Trace
-    automatic: Pull
 
 
 @displayed(lambda i: f"{i.campaign.title}, {len(i.pulls)} pulls, {len(i.set_aside)} tests set aside")
@@ -547,9 +529,9 @@ class Ingested:
         Static and sliding friction by the id of the test.
     set_aside : tuple of SetAside
         Tests that are not used, with reasons.
-    by_hand : mapping of str to ByHand
-        Tests with a decision made by hand: an excluded one is also in ``set_aside``; a moved one has its new result in
-        ``pulls``.
+    by_hand : mapping of str to Override
+        Tests that have a trace, with a decision made by hand: an excluded one is also in ``set_aside``; a moved one has
+        its new result in ``pulls``.
 
     Examples
     --------
@@ -562,24 +544,16 @@ class Ingested:
     traces: Mapping[str, Trace]
     pulls: Mapping[str, Pull]
     set_aside: tuple[SetAside, ...]
-    by_hand: Mapping[str, ByHand] = field(default_factory=dict)
-
-    def _file_of(self, test_id: str) -> str:
-        """The export of a test; "" where its forces were evaluated elsewhere."""
-        trace = self.traces.get(test_id)
-        return trace.file if trace else ""
-
-    def _trace_problems(self, test_id: str) -> tuple[Problem, ...]:
-        trace = self.traces.get(test_id)
-        return trace.problems if trace else ()
+    by_hand: Mapping[str, Override] = field(default_factory=dict)
 
     def doubts(self) -> tuple[SetAside, ...]:
         """Tests that were used although their row, export or pull is doubtful, for example because of a spike."""
         found = []
         for test_id, pull in self.pulls.items():
+            trace = self.traces.get(test_id)  # none where the forces were evaluated elsewhere
+            file, of_trace = (trace.file, trace.problems) if trace else ("", ())
             problems = tuple(
-                replace(p, file=self._file_of(test_id) or p.file, test_id=test_id)
-                for p in dict.fromkeys((*self._trace_problems(test_id), *pull.problems))
+                replace(p, file=file or p.file, test_id=test_id) for p in dict.fromkeys((*of_trace, *pull.problems))
             )
             problems += tuple(note for note in self.campaign.problems if note.test_id == test_id)
             if problems:
@@ -619,7 +593,12 @@ class Ingested:
                 table[name] = values
         for name in dict.fromkeys(name for test in tests for name in test.covariates):
             if name not in table:
-                table[name] = _numbers_or_texts([test.covariates.get(name, "") for test in tests])
+                cells = [test.covariates.get(name, "") for test in tests]
+                filled = [cell for cell in cells if cell]
+                if filled and all(map(_PLAIN_NUMBER.fullmatch, filled)):
+                    table[name] = [float(cell) if cell else float("nan") for cell in cells]
+                else:
+                    table[name] = cells
         return table
 
 
@@ -629,14 +608,6 @@ CONDITIONS = (
     "humidity_pct", "operator",
 )  # fmt: skip
 _PLAIN_NUMBER = re.compile(r"-?(0|[1-9]\d*)(\.\d+)?([eE][-+]?\d{1,2})?")  # 001 is a name
-
-
-def _numbers_or_texts(cells: list[str]) -> list[float] | list[str]:
-    """The cells of a column as numbers where every one that is filled is written as such."""
-    filled = [cell for cell in cells if cell]
-    if not filled or not all(_PLAIN_NUMBER.fullmatch(cell) for cell in filled):
-        return cells
-    return [float(cell) if cell else float("nan") for cell in cells]
 
 
 @displayed(lambda s: f"{s.ingested.campaign.title}, {len(s.ingested.pulls)} pulls, {len(s.fits)} fits")
@@ -746,13 +717,11 @@ __all__ = [
     "REGIMES",
     "STANDARD_GRAVITY",
     "UNCORRECTED",
-    "ByHand",
     "Campaign",
     "Comparison",
     "ComparisonRow",
     "Correction",
     "Doubt",
-    "Evaluated",
     "ExportFormat",
     "Fits",
     "FloatArray",

@@ -211,5 +211,5 @@ def test_a_normal_stress_is_a_load_by_the_nominal_area(tmp_path: Path) -> None:
     found = load_campaign(campaign(tmp_path / "c", tests, {}))
     assert found.tests[0].normal_load_N == pytest.approx(0.1)
     assert found.tests[0].evaluated is not None
-    assert found.tests[0].evaluated.sliding_N == pytest.approx(0.05)
+    assert found.tests[0].evaluated["sliding_N"] == pytest.approx(0.05)
     assert [s.problems[0].kind for s in found.set_aside] == ["load_not_positive"]

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from report.laid_out import html
-from tribo.records import ByHand, Override, SetAside, Study
+from tribo.records import Override, SetAside, Study
 from tribo.report.pulls import pull_cards
 from tribo.wording.study_sentences import by_hand_sentence
 
@@ -21,8 +21,8 @@ def decided(study: Study) -> Study:
     out, moved = ingested.pulls["T0001"], ingested.pulls["T0002"]
     after = replace(moved, window_s=(12.0, 20.0), sliding_N=0.9 * moved.sliding_N, flags=("window_by_hand",))
     by_hand = {
-        "T0001": ByHand(Override("T0001", "exclude", "sled <tipped>"), ingested.traces["T0001"], out),
-        "T0002": ByHand(Override("T0002", "move", "drift", (12.0, 20.0)), ingested.traces["T0002"], moved),
+        "T0001": Override("T0001", "exclude", out, ingested.traces["T0001"], "sled <tipped>"),
+        "T0002": Override("T0002", "move", moved, ingested.traces["T0002"], "drift", (12.0, 20.0)),
     }
     pulls = {**{i: p for i, p in ingested.pulls.items() if i != "T0001"}, "T0002": after}
     traces = {i: t for i, t in ingested.traces.items() if i != "T0001"}

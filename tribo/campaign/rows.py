@@ -35,7 +35,7 @@ from tribo.input_files import (
     SMALLEST_LOAD_N,
     SMALLEST_NUMBER,
 )
-from tribo.records import Correction, Evaluated, Pattern
+from tribo.records import Correction, Pattern
 from tribo.units import CAMPAIGN_COLUMNS
 from tribo.user_text import did_you_mean
 from tribo.zeroing import ALLOWED, zero_choice
@@ -288,8 +288,8 @@ def correction_of(numbers: Mapping[str, float | None], general: Any, speed_m_s: 
     )
 
 
-def evaluated_forces(row: TestRow, load_N: float) -> Evaluated | None:
-    """The forces of a row without an export, in newton; a coefficient is multiplied by the load."""
+def evaluated_forces(row: TestRow, load_N: float) -> dict[str, float] | None:
+    """The forces of a row without an export by their names in a Pull, in newton; a coefficient times the load."""
     if row.cells.get("file") or not any(row.cells.get(column) for column in (*_FORCES, *_RATIOS)):
         return None
     found: dict[str, float] = {}
@@ -300,7 +300,7 @@ def evaluated_forces(row: TestRow, load_N: float) -> Evaluated | None:
             u = number(row, uncertainty if is_force else f"{column}_u") or 0.0
             found[force] = value if is_force else value * load_N
             found[uncertainty] = u if is_force else u * load_N
-    return Evaluated(**found)
+    return found
 
 
 def columns_of(file: str, general: Columns, by_file: Mapping[str, Columns]) -> Columns:

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import date, datetime, time
 from pathlib import Path
+from typing import Any
 
 from tribo.errors import CampaignError, Problem, ReadError, system_problem
 from tribo.input_files import (
@@ -80,33 +81,24 @@ class TestRow:
         return self.cells.get("test_id") or f"row {self.row}"
 
 
-@dataclass(frozen=True)
-class Table:
-    """A table of a file: column names, the line they are in, and the lines below."""
-
-    names: tuple[str, ...]
-    header_row: int
-    rows: tuple[TestRow, ...]
-
-
 def read_tests(root: Path, problems: list[Problem]) -> list[TestRow] | None:
     """The rows of the table of tests; None where it cannot be used, with every fault added to ``problems``."""
     file = str(root)
     try:
         file = _tests_file(root)
-        table = read_table(root / file, file)
+        names, header_row, rows = read_table(root / file, file)
     except OSError as why:
         problems.append(system_problem(why, file))
         return None
     except CampaignError as why:
         problems += why.problems
         return None
-    if table is None:
+    if not names:
         problems.append(Problem("empty", "the file has neither a header nor tests", file=file))
         return None
-    found = _header_faults(list(table.names), file, table.header_row)
+    found = _header_faults(names, file, header_row)
     problems += found
-    return None if any(p.kind != "resembles_a_column" for p in found) else list(table.rows)
+    return None if any(p.kind != "resembles_a_column" for p in found) else rows
 
 
 def _tests_file(root: Path) -> str:
@@ -124,8 +116,10 @@ def _tests_file(root: Path) -> str:
     raise CampaignError(Problem("missing_file", f"a campaign must contain {TABLES[0]}", TABLES[0], allowed=allowed))
 
 
-def read_table(path: Path, file: str) -> Table | None:
-    """A delimited table of any encoding and delimiter, or a sheet of a workbook; None where there is no header.
+def read_table(path: Path, file: str) -> tuple[list[str], int, list[TestRow]]:
+    """The column names of a table, the line they are in, and the lines below; no names where there is no header.
+
+    A delimited table of any encoding and delimiter, or a sheet of a workbook.
 
     Raises
     ------
@@ -137,18 +131,13 @@ def read_table(path: Path, file: str) -> Table | None:
     raw = read_input(path, LARGEST_TABLE_BYTES)
     is_workbook = raw[:4] in (ZIP, OLD_EXCEL)
     text = _sheet_of_tests(raw, file) if is_workbook else _decoded(raw)
-    lines = text.splitlines()
-    first = next((k for k, line in enumerate(lines) if line.strip()), None)
-    if first is None:
-        return None
-    delimiter = "\t" if is_workbook else max(",;\t|", key=lines[first].count)
-    lines_of_text = io.StringIO(text, newline="")
-    if is_workbook:
-        reader = csv.reader(lines_of_text, delimiter=delimiter, quoting=csv.QUOTE_NONE)
-    else:
-        reader = csv.reader(lines_of_text, delimiter=delimiter)
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    delimiter = "\t" if is_workbook else max(",;\t|", key=first.count)
+    quoting: Any = csv.QUOTE_NONE if is_workbook else csv.QUOTE_MINIMAL
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, quoting=quoting)
     names: list[str] = []
-    header_row, rows = 0, []
+    header_row = 0
+    rows: list[TestRow] = []
     try:
         for cells in reader:
             stripped = [cell.strip() for cell in cells]
@@ -167,7 +156,7 @@ def read_table(path: Path, file: str) -> Table | None:
             allowed = f"at most {LONGEST_CELL} characters"
             problem = Problem("cell_too_long", what, file, reader.line_num, allowed=allowed)
         raise CampaignError(problem) from why
-    return Table(tuple(names), header_row, tuple(rows))
+    return names, header_row, rows
 
 
 def _sheet_of_tests(raw: bytes, file: str) -> str:

@@ -20,7 +20,7 @@ from tribo.cli.study_options import corrected, reading_options
 from tribo.errors import Problem
 
 if TYPE_CHECKING:
-    from tribo.drafting.draft import Draft, Stated
+    from tribo.drafting.draft import Draft
     from tribo.springblock.engine_speed import Timing
 
 
@@ -66,10 +66,20 @@ def init(console: Console, folder: Path, raw: Path | None, dry_run: bool, **opti
     if raw is None:
         return _template(console, folder)
     from tribo.drafting.draft_files import texts, write_draft
+    from tribo.drafting.draft_table import draft_from_table
+    from tribo.readers import columns_from_text
+    from tribo.records import UNCORRECTED
 
-    stated = _stated(options)
-    draft = _from_table(raw, options["table"]) if options["table"] else _from_exports(raw, stated)
-    contents = texts(folder, draft, stated, options["area_mm2"])
+    columns = columns_from_text(options["columns"]) if options["columns"] else {}
+    correction = corrected(UNCORRECTED, options["stated"])
+    if options["table"]:
+        draft = draft_from_table(raw, columns_from_text(options["table"]))
+    else:
+        draft = _from_exports(
+            raw, patterns=tuple(options["names"]), records=options["records"], columns=columns, correction=correction,
+            filled=columns_from_text(options["fill"]) if options["fill"] else {},
+        )  # fmt: skip
+    contents = texts(folder, draft, columns, correction, options["area_mm2"])
     if not dry_run:
         write_draft(folder, contents, raw if draft.of_exports else None)
     record = {
@@ -90,14 +100,7 @@ def _template(console: Console, folder: Path) -> int:
     return 0
 
 
-def _from_table(path: Path, mapping: str) -> Draft:
-    from tribo.drafting.draft_table import draft_from_table
-    from tribo.readers import columns_from_text
-
-    return draft_from_table(path, columns_from_text(mapping))
-
-
-def _from_exports(raw: Path, stated: Stated) -> Draft:
+def _from_exports(raw: Path, **stated: Any) -> Draft:
     """The draft of a folder of exports; of one table of evaluated forces where the columns say that it is one."""
     from tribo.drafting.draft import draft_campaign, exports_in
     from tribo.drafting.draft_table import draft_from_table, is_table_of_forces
@@ -107,25 +110,11 @@ def _from_exports(raw: Path, stated: Stated) -> Draft:
     if not more and is_table_of_forces(file):
         return draft_from_table(file, {})
     try:
-        return draft_campaign(raw, stated)
+        return draft_campaign(raw, **stated)
     except CampaignError as why:
         what = "a table of forces that were evaluated elsewhere is read with --table"
         hints = [] if more else [Problem("no_export", what, allowed=_TABLE)]
         raise CampaignError([*why.problems, *hints]) from None
-
-
-def _stated(options: dict[str, Any]) -> Stated:
-    from tribo.drafting.draft import Stated
-    from tribo.readers import columns_from_text
-    from tribo.records import UNCORRECTED
-
-    return Stated(
-        patterns=tuple(options["names"]),
-        records=options["records"],
-        columns=columns_from_text(options["columns"]) if options["columns"] else {},
-        correction=corrected(UNCORRECTED, options["stated"]),
-        filled=columns_from_text(options["fill"]) if options["fill"] else {},
-    )
 
 
 def _words(draft: Draft, folder: Path, dry_run: bool) -> str:

@@ -77,7 +77,7 @@ def standings(study: Study) -> dict[str, dict[str, Any]]:
     excluded by hand is judged like any other; a pull with fewer than two others to compare with is not judged.
     """
     ingested = study.ingested
-    left_out = {i: b.automatic for i, b in ingested.by_hand.items() if b.override.action == "exclude"}
+    left_out = {i: o.automatic for i, o in ingested.by_hand.items() if o.action == "exclude"}
     table = replace(ingested, pulls={**ingested.pulls, **left_out}).table()
     found: dict[str, dict[str, Any]] = {}
     for regime in REGIMES if not table.empty else ():

@@ -19,7 +19,7 @@ from tribo.campaign.rows import Columns
 from tribo.campaign.table import LOADS
 from tribo.errors import CampaignError, Problem, ReadError, TriboError
 from tribo.files import found_below
-from tribo.records import Correction, Test, Trace
+from tribo.records import UNCORRECTED, Correction, Test, Trace
 from tribo.units import unit_factor
 
 _FIELD = re.compile(r"\{(\w+)\}|\[([^\[\]{}]*)\]")
@@ -92,17 +92,6 @@ class Draft:
         return list(dict.fromkeys(row["sample"] for row in self.rows))
 
 
-@dataclass(frozen=True)
-class Stated:
-    """What a user states for all exports of a draft; patterns are those of names of files and of heads of records."""
-
-    patterns: tuple[str, ...] = ()
-    records: str = ""
-    columns: Columns = field(default_factory=dict)
-    correction: Correction = field(default_factory=Correction)
-    filled: Mapping[str, str] = field(default_factory=dict)  # columns of tests.csv with one value for all tests
-
-
 def exports_in(raw: Path) -> dict[str, Path]:
     """Exports below a folder (or the one file) by the name they get in raw/: entries of a .zip as ZIP/ENTRY."""
     from tribo.readers.source import entries_of
@@ -123,8 +112,19 @@ def exports_in(raw: Path) -> dict[str, Path]:
     return found
 
 
-def draft_campaign(raw: Path, stated: Stated) -> Draft:
+def draft_campaign(
+    raw: Path,
+    *,
+    patterns: Sequence[str] = (),
+    records: str = "",
+    columns: Columns | None = None,
+    correction: Correction = UNCORRECTED,
+    filled: Mapping[str, str] | None = None,
+) -> Draft:
     """The rows of tests.csv that the exports of a folder give.
+
+    ``patterns`` are those of names of files, ``records`` that of the heads of records; ``columns`` and ``correction``
+    are stated for all exports, ``filled`` holds columns of tests.csv with one value for all tests.
 
     Raises
     ------
@@ -133,40 +133,50 @@ def draft_campaign(raw: Path, stated: Stated) -> Draft:
     """
     from tribo.readers import read_blocks
 
-    for pattern in (*stated.patterns, *([stated.records] if stated.records else [])):
+    for pattern in (*patterns, *([records] if records else [])):
         name_expression(pattern)
-    records: dict[str, tuple[Trace, ...]] = {}  # of the exports that can be read
+    readable: dict[str, tuple[Trace, ...]] = {}
     refused: dict[str, tuple[Problem, ...]] = {}
     for name, path in exports_in(raw).items():
         try:
-            blocks = read_blocks(path, columns=stated.columns, correction=stated.correction, name=name, file=name)
+            blocks = read_blocks(path, columns=columns, correction=correction, name=name, file=name)
         except TriboError as why:
             refused[name] = why.problems
             continue
         if found := tuple(r for r in blocks if r.time_s.size >= _FEWEST_ROWS):
-            records[name] = found
+            readable[name] = found
         else:
             refused[name] = (Problem("short", "no record of more than a few rows", name),)
-    used = dict(records)
+    used = dict(readable)
     if not used:  # a draft says how to read those that lack names or units
         used = {name: () for name, problems in refused.items() if all(p.kind in _NAMES_OR_UNITS for p in problems)}
     if not used:
         raise CampaignError([problems[0] for problems in refused.values() if problems[0].kind != "short"])
     draft = Draft(not_read=[f"{name}: {problems[0].what}" for name, problems in refused.items() if name not in used])
-    named = _named(used, stated.patterns, draft)
+    named = _named(used, patterns, draft)
     for name, found in used.items():
-        for row in _rows_of(name, found, named.get(name, {}), stated):
-            draft.rows.append(row | {column: value for column, value in stated.filled.items() if not row.get(column)})
-    _choose_records(draft.rows)
-    _number_rows(draft.rows, raw.stem)
+        for row in _rows_of(name, found, named.get(name, {}), records):
+            draft.rows.append(row | {c: value for c, value in (filled or {}).items() if not row.get(c)})
+    loaded = [any(row.get(key) for key in LOADS) for row in draft.rows]
+    for row, there in zip(draft.rows, loaded, strict=True):
+        # beside rows with a load, a row that leaves it to its export names the record: raw/a.csv#1
+        if any(loaded) and not there and "#" not in row["file"] and "nominal_load_N" in row:
+            row["file"] += "#1"
+    width = len(str(len(draft.rows)))
+    for k, row in enumerate(draft.rows, start=1):
+        row.setdefault("test_id", f"T{k:0{width}d}")
+        row.setdefault("sample", raw.stem)
+    if all(len(row.get("started_at", "")) > len("2026-01-01") for row in draft.rows):  # a date with a time
+        for k, row in enumerate(sorted(draft.rows, key=lambda r: r["started_at"]), start=1):
+            row["run_order"] = str(k)
     for what in dict.fromkeys(f"{p.what}; give: {p.allowed}" for name in used for p in refused.get(name, ())):
         draft.missing.append(what)
-    _say_what_is_missing(draft, used, speed_given=stated.correction.speed_m_s is not None)
-    _signs(draft, records)
+    _say_what_is_missing(draft, used, speed_given=correction.speed_m_s is not None)
+    _signs(draft, readable)
     return draft
 
 
-def _named(used: Iterable[str], patterns: tuple[str, ...], draft: Draft) -> dict[str, dict[str, str]]:
+def _named(used: Iterable[str], patterns: Sequence[str], draft: Draft) -> dict[str, dict[str, str]]:
     """What the names of files say, and a note on the patterns used and on names that none fits."""
     # the name without folder and suffixes; a point between digits is no suffix
     stems = {file: re.sub(r"(?:\.[A-Za-z]\w{0,5})+$", "", file.rpartition("/")[2]) for file in used}
@@ -182,26 +192,27 @@ def _named(used: Iterable[str], patterns: tuple[str, ...], draft: Draft) -> dict
     return {file: columns for file, columns in read.items() if columns is not None}
 
 
-def _rows_of(name: str, records: Sequence[Trace], named: Mapping[str, str], stated: Stated) -> Iterator[dict[str, str]]:
-    """One row for each record of an export; strokes in both directions share a row, as they share one zero."""
+def _rows_of(name: str, records: Sequence[Trace], named: Mapping[str, str], pattern: str) -> Iterator[dict[str, str]]:
+    """One row for each record of an export; strokes in both directions share a row, as they share one zero.
+
+    ``pattern`` is that of the heads of records, where there is one.
+    """
     file = f"raw/{name}"
     # mean force of the second half
     signs = {math.copysign(1.0, float(np.mean(r.force_N[r.force_N.size // 2 :]))) for r in records}
     if len(records) < 2:
-        yield _row(file, named, records[0] if records else None, stated)
-    elif len(signs) == 2 and not stated.records:
-        yield _row(f"{file}#*", named, records[0], stated)
+        yield _row(file, named, records[0], pattern) if records else {"file": file, **named}
+    elif len(signs) == 2 and not pattern:
+        yield _row(f"{file}#*", named, records[0], pattern)
     else:
         for k, record in enumerate(records, start=1):
-            yield _row(f"{file}#{k}", named, record, stated)
+            yield _row(f"{file}#{k}", named, record, pattern)
 
 
-def _row(file: str, named: Mapping[str, str], record: Trace | None, stated: Stated) -> dict[str, str]:
+def _row(file: str, named: Mapping[str, str], record: Trace, pattern: str) -> dict[str, str]:
     row = {"file": file, **named}
-    if record is None:
-        return row
     label = str(record.metadata.get("record", ""))
-    in_label = columns_in_name(label, [stated.records]) if stated.records else None
+    in_label = columns_in_name(label, [pattern]) if pattern else None
     if in_label is not None:
         row |= in_label
     elif label:
@@ -265,26 +276,6 @@ def started_at(metadata: Mapping[str, str]) -> str:
                 clock = parts.get("clock")
                 return f"{date}T{clock:0>{5 if clock.count(':') == 1 else 8}}" if clock else date
     return ""
-
-
-def _choose_records(rows: Sequence[dict[str, str]]) -> None:
-    """Beside rows with a load, a row that leaves it to its export names the record: raw/a.csv#1."""
-    loaded = [any(row.get(key) for key in LOADS) for row in rows]
-    if any(loaded):
-        for row, there in zip(rows, loaded, strict=True):
-            if not there and "#" not in row["file"] and "nominal_load_N" in row:
-                row["file"] += "#1"
-
-
-def _number_rows(rows: Sequence[dict[str, str]], sample: str) -> None:
-    """Every row gets a test_id, a sample, and its place in the order of starts where all have a date."""
-    width = len(str(len(rows)))
-    for k, row in enumerate(rows, start=1):
-        row.setdefault("test_id", f"T{k:0{width}d}")
-        row.setdefault("sample", sample)
-    if all(len(row.get("started_at", "")) > len("2026-01-01") for row in rows):
-        for k, row in enumerate(sorted(rows, key=lambda r: r["started_at"]), start=1):
-            row["run_order"] = str(k)
 
 
 def _say_what_is_missing(draft: Draft, used: Mapping[str, Sequence[Trace]], speed_given: bool) -> None:

@@ -9,11 +9,12 @@ import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
+from tribo.campaign.rows import Columns
 from tribo.campaign.table import KNOWN, LOADS, RAW, TABLES, TOML
-from tribo.drafting.draft import Draft, Stated
+from tribo.drafting.draft import Draft
 from tribo.errors import CampaignError, Problem
 from tribo.files import found_below, write_new
-from tribo.records import UNCORRECTED
+from tribo.records import UNCORRECTED, Correction
 
 _TOML = """\
 # Written by tribo init from the exports in raw/. Lines that begin with "# FILL IN" hold what the exports do not say.
@@ -30,9 +31,11 @@ title = {title}
 _NO_AREA = "# FILL IN nominal_area_mm2 =   # area of the sample face"
 
 
-def texts(folder: Path, draft: Draft, stated: Stated, area_mm2: float | None) -> dict[Path, str]:
+def texts(
+    folder: Path, draft: Draft, stated_columns: Columns, given: Correction, area_mm2: float | None
+) -> dict[Path, str]:
     """The two files of a campaign by their paths."""
-    given, keys = stated.correction, {}
+    keys = {}
     if draft.negative or given.sign < 0:
         keys["sign"] = f"{given.sign * (-1.0 if draft.negative else 1.0):g}"
     if given.gain != UNCORRECTED.gain:
@@ -45,7 +48,7 @@ def texts(folder: Path, draft: Draft, stated: Stated, area_mm2: float | None) ->
         keys["pull_speed_mm_s"] = f"{given.speed_m_s * 1e3:g}"
     if draft.zero:
         keys["zero"] = json.dumps(draft.zero)
-    columns = [f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in stated.columns.items()]
+    columns = [f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in stated_columns.items()]
     samples = [json.dumps(sample, ensure_ascii=False) for sample in draft.samples]
     toml = _TOML.format(
         title=json.dumps(folder.resolve().name, ensure_ascii=False),

@@ -6,10 +6,10 @@ Its columns are as a user maps them, or as their names and units tell the sample
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from tribo.campaign.table import EVALUATED, KNOWN, Table, read_table
+from tribo.campaign.table import EVALUATED, KNOWN, read_table
 from tribo.drafting.draft import Draft, as_column
 from tribo.errors import CampaignError, Problem
 from tribo.units import match_quantity
@@ -29,6 +29,8 @@ _FIELDS = {
 }  # fmt: skip
 _LOOKED_AT = 200  # rows in which a label has to repeat the number with its unit
 
+Table = Mapping[str, Sequence[str]]  # the cells of each column by its name
+
 
 def draft_from_table(path: Path, mapping: Mapping[str, str]) -> Draft:
     """The rows of tests.csv from a table; ``mapping`` gives its column for each column of tests.csv.
@@ -42,37 +44,19 @@ def draft_from_table(path: Path, mapping: Mapping[str, str]) -> Draft:
     CampaignError
         The table has no rows, a column that is not there is mapped, or neither a force nor a load is.
     """
-    table = read_table(path, path.name)
-    if table is None or not table.rows:
+    table, header_row = _table_of(path)
+    n_rows = len(next(iter(table.values()), ()))
+    if not n_rows:
         raise CampaignError(Problem("empty", "the table has no rows", file=path.name))
     draft = Draft(of_exports=False)
     if not mapping and (mapping := proposed_mapping(table)):
         text = ",".join(f"{field}={name}" for field, name in mapping.items())
         draft.found.append(f'columns "{text}" (proposed; give --table to read them otherwise)')
-    if problems := _faults(table, mapping, path.name):
-        raise CampaignError(problems)
-    left_out = set(mapping.values()) | repeated_or_derived(table, dict(mapping))
-    kept = [n for n in table.names if n and n not in left_out and n not in KNOWN]
-    kept = [n for n in kept if len({row.cells.get(n, "") for row in table.rows}) > 1]
-    width = len(str(len(table.rows)))
-    for k, row in enumerate(table.rows, start=1):
-        cells = {name: " ".join(row.cells.get(name, "").split()) for name in table.names}
-        stated = dict(as_column(field, cells[name]) for field, name in mapping.items())
-        others = {name: cells[name] for name in kept}
-        draft.rows.append({"test_id": f"T{k:0{width}d}", "sample": path.stem, **others, **stated})
-    draft.found.append(
-        f"{len(table.rows)} rows with {', '.join(mapping)}; kept as covariates: {', '.join(kept) or 'none'}"
-    )
-    return draft
-
-
-def _faults(table: Table, mapping: Mapping[str, str], file: str) -> list[Problem]:
-    here = ", ".join(name for name in table.names if name)
-    place = (file, table.header_row)
+    place, here = (path.name, header_row), ", ".join(filter(None, table))
     problems = [
         Problem("missing_column", f"no such column for {field}", *place, name, None, here)
         for field, name in mapping.items()
-        if name not in table.names
+        if name not in table
     ]
     columns = {as_column(field, "1")[0] for field in mapping}
     for wanted in (EVALUATED, ("normal_load_N", "mass_g", "normal_stress_Pa")):
@@ -80,16 +64,32 @@ def _faults(table: Table, mapping: Mapping[str, str], file: str) -> list[Problem
             what = "the table needs a force or coefficient, and a load"
             allowed = f"one of {', '.join(wanted)}; columns here: {here}"
             problems.append(Problem("missing_column", what, *place, None, None, allowed))
-    return problems
+    if problems:
+        raise CampaignError(problems)
+    left_out = {"", *KNOWN, *mapping.values(), *repeated_or_derived(table, mapping)}
+    kept = [name for name, cells in table.items() if name not in left_out and len(set(cells)) > 1]
+    width = len(str(n_rows))
+    for k in range(n_rows):
+        cells = {name: " ".join(column[k].split()) for name, column in table.items()}
+        stated = dict(as_column(field, cells[name]) for field, name in mapping.items())
+        others = {name: cells[name] for name in kept}
+        draft.rows.append({"test_id": f"T{k + 1:0{width}d}", "sample": path.stem, **others, **stated})
+    draft.found.append(f"{n_rows} rows with {', '.join(mapping)}; kept as covariates: {', '.join(kept) or 'none'}")
+    return draft
+
+
+def _table_of(path: Path) -> tuple[Table, int]:
+    """A table by its columns, and the line of the file that names them."""
+    names, header_row, rows = read_table(path, path.name)
+    return {name: [row.cells.get(name, "") for row in rows] for name in names}, header_row
 
 
 def is_table_of_forces(path: Path) -> bool:
     """Whether the columns of a file name a load and a friction, both with units, and no time."""
     try:
-        table = read_table(path, path.name)
+        return bool(proposed_mapping(_table_of(path)[0]))
     except (CampaignError, OSError):
         return False
-    return table is not None and bool(proposed_mapping(table))
 
 
 def proposed_mapping(table: Table) -> dict[str, str]:
@@ -98,10 +98,10 @@ def proposed_mapping(table: Table) -> dict[str, str]:
     The unit of a number stands in brackets behind the name, or in a column of labels that repeats it: 10 beside
     "10 mN". Without a unit a column is not taken. A table with a time or a displacement is a trace.
     """
-    if any((match_quantity(name) or ("", 0))[0] in ("time", "displacement") for name in table.names):
+    if any((match_quantity(name) or ("", 0))[0] in ("time", "displacement") for name in table):
         return {}
     found: dict[str, str] = {}
-    for name in table.names:
+    for name in table:
         plain = _plain(name)
         if plain in _SAMPLE:
             found.setdefault("sample", name)
@@ -113,19 +113,14 @@ def proposed_mapping(table: Table) -> dict[str, str]:
             field = _FIELDS.get(_unit(table, name), "")
             if field.startswith("speed") == bool(_SPEED.fullmatch(plain)) and field:
                 found.setdefault(field, name)
-    if (finer := _finer(table, found.get("sample", ""))) is not None:
-        found["sample"] = finer
+    if "sample" in found:
+        sample = table[found["sample"]]
+        for name, cells in table.items():  # data sets, each of one sample
+            if _plain(name) in _SETS and len(set(zip(cells, sample, strict=True))) == len(set(cells)) < len(cells) / 2:
+                found["sample"] = name
+                break
     loads = [field for field in found if field.startswith(("normal_load", "mass"))]
     return found if loads and ("coefficient" in found or "sliding_N" in found) else {}
-
-
-def _finer(table: Table, sample: str) -> str | None:
-    """A column of data sets, each of one sample; None where there is none."""
-    for name in table.names:
-        pairs = {(row.cells.get(name, ""), row.cells.get(sample, "")) for row in table.rows}
-        if _plain(name) in _SETS and sample and len(pairs) == len({one for one, _ in pairs}) < len(table.rows) / 2:
-            return name
-    return None
 
 
 def _plain(name: str) -> str:
@@ -134,18 +129,14 @@ def _plain(name: str) -> str:
 
 
 def _unit(table: Table, name: str) -> str:
-    stated = _UNIT_AT_END.search(name)
-    return stated[1] if stated else next(_units_in_labels(table, name), "")
-
-
-def _units_in_labels(table: Table, name: str) -> Iterator[str]:
-    """The unit behind the number in another column, where that column repeats this one row by row."""
-    rows = table.rows[:_LOOKED_AT]
-    for other in table.names:
-        units = {_unit_behind(row.cells.get(name, ""), row.cells.get(other, "")) for row in rows} - {None}
-        alike = all(_unit_behind(row.cells.get(name, ""), row.cells.get(other, "")) is not None for row in rows)
-        if other != name and alike and len(units) == 1:
-            yield str(units.pop())
+    """The unit behind a name, or behind the numbers in another column that repeats this one row by row; else empty."""
+    if stated := _UNIT_AT_END.search(name):
+        return stated[1]
+    for other, labels in table.items():
+        units = {_unit_behind(*cells) for cells in zip(table[name][:_LOOKED_AT], labels, strict=False)}
+        if other != name and len(units) == 1 and units != {None}:
+            return str(units.pop())
+    return ""
 
 
 def _unit_behind(number: str, label: str) -> str | None:
@@ -153,19 +144,15 @@ def _unit_behind(number: str, label: str) -> str | None:
     return unit.strip() if number.strip() and unit != label.strip() and unit.strip() in _FIELDS else None
 
 
-def repeated_or_derived(table: Table, taken: dict[str, str]) -> set[str]:
+def repeated_or_derived(table: Table, taken: Mapping[str, str]) -> set[str]:
     """Columns that say nothing of their own: copies of a mapped number in other units or words, and further figures of
     the evaluation, whose names begin like that of the friction ("CoF.sd" beside "CoF.mean")."""
     friction = [name for field, name in taken.items() if field in ("coefficient", "sliding_N", "static_N")]
     stems = {_plain(name).split(" ")[0] for name in friction}
-    found = {name for name in table.names if _plain(name).split(" ")[0] in stems and name not in friction}
+    found = {name for name in table if _plain(name).split(" ")[0] in stems and name not in friction}
     mapped = [name for name in taken.values() if name not in friction]
-    for name in table.names:
-        if any(name != other and _one_to_one(table, name, other) for other in mapped):
-            found.add(name)
+    for name, cells in table.items():
+        for other in (table[other] for other in mapped if other != name):
+            if len(set(zip(cells, other, strict=True))) == len(set(cells)) == len(set(other)):
+                found.add(name)
     return found
-
-
-def _one_to_one(table: Table, one: str, other: str) -> bool:
-    pairs = {(row.cells.get(one, ""), row.cells.get(other, "")) for row in table.rows}
-    return len(pairs) == len({a for a, _ in pairs}) == len({b for _, b in pairs})

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from tribo.campaign.table import Table, TestRow, read_table
+from tribo.campaign.table import TestRow, read_table
 from tribo.errors import CampaignError, Problem, system_problem
 from tribo.files import LEADS_OUT, leads_out
 from tribo.ingestion.exports import read_row, stated_columns
 from tribo.input_files import hashes_of_reads
-from tribo.records import ByHand, Ingested, Override, SetAside, Trace
+from tribo.records import Ingested, Override, SetAside, Trace
 from tribo.user_text import did_you_mean
 
 TIMES = ("window_start_s", "window_end_s", "peak_s")
@@ -39,32 +39,26 @@ def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
     """
     with hashes_of_reads() as hashes:
         overrides = read_overrides(path, ingested)
-    known = [o for o in overrides if o.test_id in ingested.pulls]  # what is set aside already stays so
-    by_hand = {
-        o.test_id: ByHand(o, ingested.traces[o.test_id], ingested.pulls[o.test_id])
-        for o in known
-        if o.test_id in ingested.traces
-    }
-    left_out = tuple(
-        SetAside(o.test_id, f"excluded by hand in {path.name}: {o.reason}") for o in known if o.action == "exclude"
-    )
-    gone = {s.test_id for s in left_out}
-    pulls = {i: p for i, p in ingested.pulls.items() if i not in gone}
+    excluded = {o.test_id: o.reason for o in overrides if o.action == "exclude"}
+    left_out = tuple(SetAside(i, f"excluded by hand in {path.name}: {reason}") for i, reason in excluded.items())
+    pulls = {i: p for i, p in ingested.pulls.items() if i not in excluded}
     if not pulls:
         raise CampaignError(Problem("no_usable_test", "all tests are excluded", file=path.name))
     tests = {t.test_id: t for t in ingested.campaign.tests}
     columns = stated_columns(ingested.campaign)
     problems: list[Problem] = []
-    for o in known:
-        if o.action == "move":
-            ((_, outcome),), _ = read_row(ingested.campaign.root, columns, rule, tests[o.test_id], o)
-            if isinstance(outcome, SetAside):
-                problems += outcome.problems
-            else:
-                pulls[o.test_id] = outcome[1]
+    for o in overrides:
+        if o.action == "exclude":
+            continue
+        ((_, outcome),), _ = read_row(ingested.campaign.root, columns, rule, tests[o.test_id], o)
+        if isinstance(outcome, SetAside):
+            problems += outcome.problems
+        else:
+            pulls[o.test_id] = outcome[1]
     if problems:
         raise CampaignError(problems)
-    traces = {i: t for i, t in ingested.traces.items() if i not in gone}
+    traces = {i: t for i, t in ingested.traces.items() if i not in excluded}
+    by_hand = {o.test_id: o for o in overrides if o.trace is not None}
     inputs = {**ingested.campaign.inputs, **dict.fromkeys([OVERRIDES], *hashes.values())}
     return replace(
         ingested, campaign=replace(ingested.campaign, inputs=inputs), traces=traces, pulls=pulls,
@@ -73,7 +67,7 @@ def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
 
 
 def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
-    """The rows of overrides.csv, checked against the tests and traces of a campaign.
+    """The rows of overrides.csv, checked against the tests and traces of a campaign; what is set aside stays so.
 
     Raises
     ------
@@ -85,55 +79,53 @@ def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
     if leads_out(path.parent, path):
         raise CampaignError(Problem("link", LEADS_OUT, file=file))
     try:
-        table = read_table(path, file)
+        names, header_row, rows = read_table(path, file)
     except FileNotFoundError:
         raise CampaignError(Problem("missing_file", "this file does not exist", file=str(path))) from None
     except OSError as why:
         raise CampaignError(system_problem(why, str(path))) from None
-    if table is None:
+    if not names:
         raise CampaignError(Problem("empty", "the file has no header", file=file, allowed=",".join(COLUMNS)))
-    if faults := list(_header_faults(table, file)):
-        raise CampaignError(faults)
+    place, listed = (file, header_row), ", ".join(names)
+    problems = [
+        Problem("missing_column", "this required column is missing", *place, name, listed)
+        for name in COLUMNS[:2]
+        if name not in names
+    ]
+    for name in dict.fromkeys(names):
+        if name not in COLUMNS:
+            hint = did_you_mean(name, COLUMNS) or ", ".join(COLUMNS)
+            problems.append(Problem("unknown_column", "unknown column", *place, name, name, hint))
+        elif names.count(name) > 1:
+            problems.append(Problem("duplicate_column", "this column occurs twice", *place, name))
+    if problems:
+        raise CampaignError(problems)
     traces: dict[str, Trace | None] = dict.fromkeys([s.test_id for s in ingested.set_aside])
     traces |= {t.test_id: ingested.traces.get(t.test_id) for t in ingested.campaign.tests}
-    elsewhere = ingested.pulls.keys() - ingested.traces.keys()
     first: dict[str, int] = {}
-    problems: list[Problem] = []
     overrides = []
-    for row in table.rows:
+    for row in rows:
         if row.test_id in first:
             what = f"this test already occurs in row {first[row.test_id]}"
-            found = Problem("duplicate_row", what, file, row.row, "test_id", row.test_id, "one row per test")
-            problems.append(found)
+            problems.append(Problem("duplicate_row", what, file, row.row, "test_id", row.test_id, "one row per test"))
         first.setdefault(row.test_id, row.row)
-        times, faults = _times(row, file)
-        faults += _row_faults(row, file, traces, elsewhere, None if faults else times)
+        times, faults = _times(row)
+        faults += _row_faults(row, traces, ingested, None if faults else times)
         faults = [row.fault] if row.fault else faults
         problems += faults
-        if not faults:
+        if not faults and row.test_id in ingested.pulls:
             window = (times["window_start_s"], times["window_end_s"]) if "window_start_s" in times else None
             action: Literal["exclude", "move"] = "exclude" if row.cells["action"] == "exclude" else "move"
-            reason = row.cells.get("reason", "")
-            overrides.append(Override(row.cells["test_id"], action, reason, window, times.get("peak_s"), row.row))
+            automatic, reason = ingested.pulls[row.test_id], row.cells.get("reason", "")
+            overrides.append(
+                Override(row.test_id, action, automatic, traces[row.test_id], reason, window, times.get("peak_s"))
+            )
     if problems:
         raise CampaignError(problems)
     return tuple(overrides)
 
 
-def _header_faults(table: Table, file: str) -> Iterator[Problem]:
-    for name in COLUMNS[:2]:
-        if name not in table.names:
-            yield Problem("missing_column", "this required column is missing", file, table.header_row, name,
-                          ", ".join(table.names))  # fmt: skip
-    for name in dict.fromkeys(table.names):
-        if name not in COLUMNS:
-            yield Problem("unknown_column", "unknown column", file, table.header_row, name, name,
-                          did_you_mean(name, COLUMNS) or ", ".join(COLUMNS))  # fmt: skip
-        elif table.names.count(name) > 1:
-            yield Problem("duplicate_column", "this column occurs twice", file, table.header_row, name)
-
-
-def _times(row: TestRow, file: str) -> tuple[dict[str, float], list[Problem]]:
+def _times(row: TestRow) -> tuple[dict[str, float], list[Problem]]:
     """The times given, in seconds, and the cells that hold none."""
     found, problems = {}, []
     for column in TIMES:
@@ -143,7 +135,8 @@ def _times(row: TestRow, file: str) -> tuple[dict[str, float], list[Problem]]:
             if cell and ("_" in cell or not math.isfinite(value)):
                 raise ValueError(cell)
         except ValueError:
-            problems.append(Problem("not_a_number", "not a time", file, row.row, column, cell, "a number of seconds"))
+            place = (row.file, row.row, column, cell)
+            problems.append(Problem("not_a_number", "not a time", *place, "a number of seconds"))
             continue
         if cell:
             found[column] = value
@@ -151,46 +144,42 @@ def _times(row: TestRow, file: str) -> tuple[dict[str, float], list[Problem]]:
 
 
 def _row_faults(
-    row: TestRow,
-    file: str,
-    traces: Mapping[str, Trace | None],
-    elsewhere: Collection[str],
-    times: Mapping[str, float] | None,
+    row: TestRow, traces: Mapping[str, Trace | None], ingested: Ingested, times: Mapping[str, float] | None
 ) -> Iterator[Problem]:
-    """Faults of a row; ``times`` are None where one of them is none, ``elsewhere`` the tests evaluated elsewhere."""
-    test_id, action = row.cells.get("test_id", ""), row.cells.get("action", "")
+    """Faults of a row; ``times`` are None where one of them is none."""
+    test_id, action, place = row.cells.get("test_id", ""), row.cells.get("action", ""), (row.file, row.row)
     if test_id not in traces:
         hint = "; ".join(filter(None, ("a test of this campaign", did_you_mean(test_id, traces, 0.5))))
-        yield Problem("unknown_test", "no test has this test_id", file, row.row, "test_id", test_id, hint)
+        yield Problem("unknown_test", "no test has this test_id", *place, "test_id", test_id, hint)
     if action not in ACTIONS:
         hint = did_you_mean(action, ACTIONS) or " or ".join(ACTIONS)
-        yield Problem("unknown_action", "unknown action", file, row.row, "action", action, hint)
+        yield Problem("unknown_action", "unknown action", *place, "action", action, hint)
     if action == "exclude":
         if not row.cells.get("reason"):
-            yield Problem("no_reason", "an excluded test needs a reason", file, row.row, "reason", "", "a short text")
+            yield Problem("no_reason", "an excluded test needs a reason", *place, "reason", "", "a short text")
         for column in TIMES:
             if cell := row.cells.get(column):
                 what = "an excluded test cannot have a peak or window"
-                yield Problem("unused_cell", what, file, row.row, column, cell, "an empty cell")
-    elif action == "move" and test_id in elsewhere:
+                yield Problem("unused_cell", what, *place, column, cell, "an empty cell")
+    elif action == "move" and test_id in ingested.pulls and test_id not in ingested.traces:
         what = "the forces of this test were evaluated elsewhere, so it has no peak and no window to move"
-        yield Problem("no_trace", what, file, row.row, "action", action, "exclude")
+        yield Problem("no_trace", what, *place, "action", action, "exclude")
     elif action == "move" and times is not None:
-        yield from _move_faults(row, file, times, traces.get(test_id))
+        yield from _move_faults(row, times, traces.get(test_id))
 
 
-def _move_faults(row: TestRow, file: str, times: Mapping[str, float], trace: Trace | None) -> Iterator[Problem]:
+def _move_faults(row: TestRow, times: Mapping[str, float], trace: Trace | None) -> Iterator[Problem]:
+    place = row.file, row.row
     start, end = times.get("window_start_s"), times.get("window_end_s")
     if not times:
         what = "neither a peak nor a window is given"
-        yield Problem("nothing_moved", what, file, row.row, None, None, "window_start_s and window_end_s, or peak_s")
+        yield Problem("nothing_moved", what, *place, None, None, "window_start_s and window_end_s, or peak_s")
     if (start is None) != (end is None):
         column = "window_start_s" if start is None else "window_end_s"
-        yield Problem("half_a_window", "a window needs start and end", file, row.row, column, "", "seconds")
+        yield Problem("half_a_window", "a window needs start and end", *place, column, "", "seconds")
     if start is not None and end is not None and not start < end:
-        found = row.cells["window_end_s"]
-        yield Problem("window_reversed", "the window must end after its start", file, row.row, "window_end_s", found,
-                      f"more than {start:g}")  # fmt: skip
+        found, allowed = row.cells["window_end_s"], f"more than {start:g}"
+        yield Problem("window_reversed", "the window must end after its start", *place, "window_end_s", found, allowed)
         return
     if trace is None:
         return
@@ -198,9 +187,9 @@ def _move_faults(row: TestRow, file: str, times: Mapping[str, float], trace: Tra
     for column, value in times.items():
         if not first <= value <= last:
             what = "this time is outside the recorded trace"
-            yield Problem("outside_trace", what, file, row.row, column, row.cells[column], f"{first:g} to {last:g}")
+            yield Problem("outside_trace", what, *place, column, row.cells[column], f"{first:g} to {last:g}")
     if start is not None and end is not None:
         inside = np.count_nonzero((trace.time_s >= start) & (trace.time_s <= end))
         if inside < FEWEST_IN_WINDOW:
-            yield Problem("window_short", "too few data points in this window", file, row.row, "window_end_s",
-                          f"{inside} data points", f"at least {FEWEST_IN_WINDOW}")  # fmt: skip
+            found, allowed = f"{inside} data points", f"at least {FEWEST_IN_WINDOW}"
+            yield Problem("window_short", "too few data points in this window", *place, "window_end_s", found, allowed)

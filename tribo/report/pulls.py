@@ -14,7 +14,7 @@ from markupsafe import Markup
 from tribo.comparison import study_lookup
 from tribo.comparison.study_lookup import ODD_SCORE, standings
 from tribo.figures.one_pull import thin_trace
-from tribo.records import ByHand, FloatArray, Pull, Study, Test, Trace
+from tribo.records import FloatArray, Override, Pull, Study, Test, Trace
 from tribo.report.shell import script_json
 from tribo.wording.numerals import significant, with_uncertainty
 from tribo.wording.study_sentences import by_hand_sentence, flags_in_words, odd_sentence
@@ -68,13 +68,14 @@ def load_labels(study: Study) -> dict[str, str]:
     return {t.test_id: significant(float(level)) for t, level in zip(tests, levels, strict=True)}
 
 
-def reading(study: Study, test_id: str) -> tuple[Pull, Trace, ByHand | None]:
+def reading(study: Study, test_id: str) -> tuple[Pull, Trace, Override | None]:
     """The pull of a test (also if it is excluded), its trace and the decision made by hand."""
     ingested = study.ingested
     decided = ingested.by_hand.get(test_id)
     if test_id in ingested.pulls:
         return ingested.pulls[test_id], ingested.traces[test_id], decided
     assert decided is not None
+    assert decided.trace is not None
     return decided.automatic, decided.trace, decided
 
 
@@ -154,10 +155,9 @@ def _pull_record(study: Study, test_id: str, points: int) -> dict[str, Any]:
     if doubts:
         record["doubts"] = [[_short(time), "; ".join(what)] for time, what in doubts.items()]
     if decided is not None:
-        override = decided.override
         record["automatic"] = _marks(decided.automatic)
         record["decided"] = {
-            "action": override.action, "reason": override.reason, "peak": override.peak_s, "window": override.window_s,
+            "action": decided.action, "reason": decided.reason, "peak": decided.peak_s, "window": decided.window_s,
         }  # fmt: skip
     return record
 

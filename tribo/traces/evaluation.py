@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from tribo.display import displayed
 from tribo.errors import Problem, TraceError
-from tribo.records import STANDARD_GRAVITY, Evaluated, FloatArray, Phase, Pull, Restart, Test, Trace
+from tribo.records import STANDARD_GRAVITY, FloatArray, Phase, Pull, Restart, Test, Trace
 from tribo.traces.loading import Zero, loading_of, starting_level
 from tribo.traces.oscillation import oscillation_of
 from tribo.traces.peak import (
@@ -119,7 +119,9 @@ def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
     if trace is None:
         assert options.test is not None
         assert options.test.evaluated is not None
-        return _evaluated_elsewhere(options.test.test_id, options.test.evaluated)
+        forces: Mapping[str, Any] = options.test.evaluated
+        without = () if "static_N" in forces else ("no_static",)
+        return Pull(options.test.test_id, GIVEN, flags=("evaluated_elsewhere", *without), **forces)
     test = options.test or Test(trace.name, trace.file, "", math.nan, "")
     options = replace(options, rule=rule.name, test=test)
     zero, load_zero, load = options.zero, options.load_zero, trace.columns.get("normal_force_N")
@@ -255,16 +257,6 @@ def read_pulls(
     if problems:
         raise TraceError(problems)
     return tuple(pulls)
-
-
-def _evaluated_elsewhere(test_id: str, forces: Evaluated) -> Pull:
-    """Forces that were evaluated elsewhere, taken as they stand."""
-    flags = ("evaluated_elsewhere", "no_static") if math.isnan(forces.static_N) else ("evaluated_elsewhere",)
-    return Pull(
-        test_id=test_id, rule=GIVEN, static_N=forces.static_N, static_u_N=forces.static_u_N,
-        sliding_N=forces.sliding_N, sliding_u_N=forces.sliding_u_N, zero_N=0.0, zero_u_N=0.0, onset_s=math.nan,
-        peak_s=math.nan, window_s=(math.nan, math.nan), flags=flags,
-    )  # fmt: skip
 
 
 def _starts_sliding(force_N: FloatArray) -> bool:
@@ -409,12 +401,10 @@ def _sliding(signal: Signal, span: tuple[int, int], zero: Zero | None, options: 
         what = "the force acts against the pull direction; its sign may be reversed"
         raise TraceError(Problem("sign_flipped", what, column="force", found=f"{mean_N - level.force_N:.6g} N"))
     flags = ("no_static",) if zero else ("no_static", "no_zero_phase")
-    nan = math.nan
     return Pull(
-        test_id="", rule=options.rule, static_N=nan, static_u_N=nan,
-        sliding_N=mean_N - level.force_N,
-        sliding_u_N=math.hypot(mean_u_N, level.u_N if math.isfinite(level.u_N) else 0.0), zero_N=level.force_N,
-        zero_u_N=level.u_N, zero_rule=level.rule, onset_s=nan, peak_s=nan,
+        test_id="", rule=options.rule, sliding_N=mean_N - level.force_N,
+        sliding_u_N=math.hypot(mean_u_N, level.u_N if math.isfinite(level.u_N) else 0.0),
+        zero_N=level.force_N, zero_u_N=level.u_N, zero_rule=level.rule,
         window_s=(float(signal.time_s[start]), float(signal.time_s[last - 1])), noise_N=noise,
         drift_N_per_s=drift, flags=(*flags, "spike") if signal.problems else flags,
         problems=signal.problems,

@@ -11,7 +11,7 @@ import numpy as np
 from tribo.comparison import findings, study_lookup
 from tribo.comparison.findings import Agreement, Ranking, Verdict
 from tribo.comparison.study_lookup import all_set_aside, shown
-from tribo.records import PA_PER_KPA, REGIMES, ByHand, Campaign, LawFit, Pull, Study, Test
+from tribo.records import PA_PER_KPA, REGIMES, Campaign, LawFit, Override, Pull, Study, Test
 from tribo.vocabulary import label_with_unit
 from tribo.wording.numerals import counted, joined, loads_in_words, p_text, percent, significant, span, with_uncertainty
 
@@ -251,16 +251,16 @@ def odd_sentence(standing: Mapping[str, Any]) -> str:
     )
 
 
-def by_hand_sentence(decided: ByHand, pull: Pull | None) -> str:
+def by_hand_sentence(decided: Override, pull: Pull | None) -> str:
     """A decision made by hand about a pull, and how it changed the automatic values."""
-    reason = f" ({decided.override.reason})" if decided.override.reason else ""
+    reason = f" ({decided.reason})" if decided.reason else ""
     if pull is None:
         return f"Excluded by hand{reason}."
     automatic = decided.automatic
     moved = []
-    if decided.override.peak_s is not None:
+    if decided.peak_s is not None:
         moved.append(f"static peak from {significant(automatic.peak_s)} to {significant(pull.peak_s)} s")
-    if decided.override.window_s is not None:
+    if decided.window_s is not None:
         before, after = (" to ".join(map(significant, p.window_s)) for p in (automatic, pull))
         moved.append(f"sliding window from {before} s to {after} s")
     return (
