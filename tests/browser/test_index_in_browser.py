@@ -52,7 +52,7 @@ def site(small_report: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     fits.loc[here, [c for c in fits.columns if c.startswith("cov")]] *= 1.3**2
     fits.to_csv(path, index=False)
     rows = [CampaignRow(name, name, "done", has_report=True) for name in NAMES]
-    (folder / "index.html").write_text(index_page(rows, [], (), comparable(folder, NAMES)), encoding="utf-8")
+    (folder / "index.html").write_text(index_page(rows, {}, (), comparable(folder, NAMES)), encoding="utf-8")
     return folder
 
 

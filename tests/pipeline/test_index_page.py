@@ -12,14 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tribo.site.history import CampaignRow, FittedParameter, history
+from tribo.site.history import CampaignRow, history
 from tribo.site.index_page import (
     _range,
     change_points,
     change_sentence,
     page,
     series,
-    series_name,
     ticks,
     trend_csv,
     write_index,
@@ -32,14 +31,13 @@ def campaigns(jump: float = 0.0) -> list[CampaignRow]:
     rows = []
     for k in range(12):
         value = 4.8 + rng.normal(0, 0.05) + (jump if k >= 7 else 0.0)
-        laws = (FittedParameter("F", "static", "mu", value, value - 0.1, value + 0.1),)
+        laws = {("F", "static", "mu"): (value, value - 0.1, value + 0.1)}
         rows.append(CampaignRow(f"no {k}", "A & B <x>", "done", (), f"2026-{k + 1:02d}-01", has_report=True, laws=laws))
     return rows
 
 
 def rendered(rows: list[CampaignRow]) -> str:
-    changes = change_points({series_name(k): v for k, v in series(rows).items()})
-    return page(rows, changes)
+    return page(rows, change_points(series(rows)))
 
 
 def test_a_change_is_marked_and_said_with_its_campaign() -> None:
@@ -82,8 +80,8 @@ def test_the_page_needs_nothing_from_anywhere_and_is_well_formed() -> None:
 
 def test_every_point_lies_inside_its_panel_whatever_its_interval() -> None:
     rows = campaigns(1.0)
-    wide = FittedParameter("F", "static", "mu", 5.0, -1e6, float("nan"))
-    rows[3] = CampaignRow("wide", "wide", "done", laws=(wide,))
+    wide = {("F", "static", "mu"): (5.0, -1e6, float("nan"))}
+    rows[3] = CampaignRow("wide", "wide", "done", laws=wide)
     for y in re.findall(r'(?:cy|y1|y2)="([\d.-]+)"', rendered(rows)):
         assert 0 <= float(y) <= 136
 
@@ -96,8 +94,7 @@ def test_the_numbers_of_the_figures_stand_in_the_table() -> None:
 
 def test_names_with_quotes_commas_and_line_breaks_come_back_from_the_table() -> None:
     names = ('6" wafer, "old"', "a\nb", "plain")
-    fits = {name: FittedParameter(f"{name},F", "static", "mu", 1.0, 0.9, 1.1) for name in names}
-    rows = [CampaignRow(name, "", "done", laws=(fits[name],)) for name in names]
+    rows = [CampaignRow(name, "", "done", laws={(f"{name},F", "static", "mu"): (1.0, 0.9, 1.1)}) for name in names]
     back = list(csv.DictReader(io.StringIO(trend_csv(rows), newline="")))
     assert [(row["campaign"], row["sample"]) for row in back] == [(name, f"{name},F") for name in names]
 
@@ -105,8 +102,8 @@ def test_names_with_quotes_commas_and_line_breaks_come_back_from_the_table() -> 
 @pytest.mark.parametrize(("after", "verb"), [(1.0, "rises"), (-1.0, "falls")])
 def test_a_change_is_said_in_its_direction(after: float, verb: str) -> None:
     rows = campaigns(after)
-    (change,) = change_points({series_name(("F", "static", "mu")): series(rows)["F", "static", "mu"]})
-    assert verb in change_sentence(change, rows)
+    ((key, (change,)),) = change_points(series(rows)).items()
+    assert verb in change_sentence(key, change, rows)
 
 
 def site_with(tmp_path: Path, record: dict[str, object] | None, waiting: list[str], listed: bool = True) -> Path:
@@ -115,8 +112,7 @@ def site_with(tmp_path: Path, record: dict[str, object] | None, waiting: list[st
     (state / "steps" / "a").mkdir(parents=True)
     (tmp_path / "current").mkdir()
     config = {
-        "campaigns": {"a": {"waiting": waiting}} if listed else {}, "ready": {"a": {"digest": "D"}},
-        "sources": "1", "options": {"words": "w"},
+        "campaigns": {"a": {"waiting": waiting}} if listed else {}, "ready": {"a": {"digest": "D 1 w"}},
     }  # fmt: skip
     (state / "build.json").write_text(json.dumps(config))
     if record is not None:
@@ -175,13 +171,13 @@ def test_the_page_is_written_only_where_it_differs(tmp_path: Path) -> None:
 
 
 def test_intervals_of_campaigns_that_agree_are_shown_whole() -> None:
-    laws = [FittedParameter("F", "static", "mu", value, value - 0.4, value + 0.4) for value in (2.2361, 2.2362, 2.2363)]
-    assert _range(laws) == pytest.approx((1.8361, 2.6363))
+    intervals = [(value, value - 0.4, value + 0.4) for value in (2.2361, 2.2362, 2.2363)]
+    assert _range(intervals) == pytest.approx((1.8361, 2.6363))
 
 
 def test_one_absurd_interval_does_not_squeeze_the_others() -> None:
-    laws = [FittedParameter("F", "static", "mu", 2.0 + k / 10, 1.9, 2.4) for k in range(5)]
-    assert _range([*laws, FittedParameter("F", "static", "mu", 2.1, -500.0, 500.0)]) == pytest.approx((1.9, 2.4))
+    intervals = [(2.0 + k / 10, 1.9, 2.4) for k in range(5)]
+    assert _range([*intervals, (2.1, -500.0, 500.0)]) == pytest.approx((1.9, 2.4))
 
 
 @pytest.mark.parametrize(("low", "high"), [(2.2351, 2.2363), (0.0, 140.0), (-0.02, 0.03), (4.7, 9.1)])
@@ -201,7 +197,6 @@ def test_a_campaign_shows_the_sentence_of_its_card_and_its_combined_interval(tmp
     head = "sample,regime,mu,mu_low,mu_high,mu_combined_low,mu_combined_high"
     (out / "fits.csv").write_text(f"{head}\nF,static,2.0,1.9,2.1,1.5,2.5\nA,static,2.0,1.9,2.1,,\n")
     (row,) = history(site)
-    assert (row.laws[0].low, row.laws[0].high) == (1.5, 2.5)
-    assert (row.laws[1].low, row.laws[1].high) == (1.9, 2.1)
-    shown = page([row], [])
+    assert row.laws == {("F", "static", "mu"): (2.0, 1.5, 2.5), ("A", "static", "mu"): (2.0, 1.9, 2.1)}
+    shown = page([row], {})
     assert all(words in shown for words in ("Friction falls.", "9 tests used", "Next test: Weigh the sled."))

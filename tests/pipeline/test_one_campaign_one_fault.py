@@ -18,8 +18,8 @@ from tribo.cli import main
 from tribo.report.provenance import read_record
 from tribo.site import build, index_page
 from tribo.site.build import BuildOptions, _configuration
-from tribo.site.history import CampaignRow, FittedParameter, history
-from tribo.site.index_page import change_points, page, series_name, trend_csv, write_index
+from tribo.site.history import CampaignRow, history
+from tribo.site.index_page import change_points, page, series, trend_csv, write_index
 from tribo.site.scan import scan
 from tribo.site.steps import Step, inputs_of, note
 
@@ -215,8 +215,7 @@ def test_campaigns_are_in_the_order_of_their_times_and_not_of_their_texts(tmp_pa
 
 
 def test_a_sample_with_a_bar_in_its_name_has_its_trend() -> None:
-    law = [FittedParameter("A|B", "static", "mu", 4.0 + (k > 6), 3.9, 5.1) for k in range(12)]
-    rows = [CampaignRow(f'no "{k}"', "", "done", measured=f"2026-01-{k + 1:02d}", laws=(law[k],)) for k in range(12)]
-    changes = change_points({series_name(("A|B", "static", "mu")): [law_.value for law_ in law]})
-    assert "Static μ of A|B rises" in page(rows, changes)
+    laws = [{("A|B", "static", "mu"): (4.0 + (k > 6), 3.9, 5.1)} for k in range(12)]
+    rows = [CampaignRow(f'no "{k}"', "", "done", measured=f"2026-01-{k + 1:02d}", laws=laws[k]) for k in range(12)]
+    assert "Static μ of A|B rises" in page(rows, change_points(series(rows)))
     assert '"no ""3""",2026-01-04,A|B,static,mu,4,3.9,5.1' in trend_csv(rows).splitlines()

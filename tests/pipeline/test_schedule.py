@@ -12,20 +12,24 @@ import shlex
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from tribo.errors import TriboError
-from tribo.site.schedule import Schedule, cron_line, in_words, units
+from tribo.site import schedule
+from tribo.site.schedule import build_command, daily_build, in_words
 
 ODD = "my drop 100% $HOME \"x\" 'y'"
 
 
-def schedule(tmp_path: Path, notify: str = "cat > told") -> Schedule:
-    return Schedule.checked(tmp_path / ODD, tmp_path / "the site", at="6:05", keep=4, notify=notify)
+def texts_of(tmp_path: Path, notify: str = "cat > told", site: str = "the site") -> dict[str, str]:
+    return daily_build(tmp_path / ODD, tmp_path / site, at="6:05", keep=4, notify=notify)
+
+
+def units(texts: dict[str, str]) -> dict[str, str]:
+    return {name: text for name, text in texts.items() if name != "crontab"}
 
 
 @pytest.mark.parametrize("notify", ["", "cat > told"])
@@ -33,7 +37,7 @@ def test_systemd_accepts_the_units(tmp_path: Path, notify: str) -> None:
     analyze = shutil.which("systemd-analyze")
     if analyze is None:
         pytest.skip("no systemd-analyze here")
-    texts = units(schedule(tmp_path, notify))
+    texts = units(texts_of(tmp_path, notify))
     for name, text in texts.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     env = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path), "SYSTEMD_LOG_TARGET": "console"}
@@ -46,7 +50,7 @@ def test_systemd_accepts_the_units(tmp_path: Path, notify: str) -> None:
 
 def test_the_units_build_that_folder_at_that_time_and_tell_of_a_failure(tmp_path: Path) -> None:
     found = {}
-    for name, text in units(schedule(tmp_path)).items():
+    for name, text in units(texts_of(tmp_path)).items():
         parser = configparser.ConfigParser(interpolation=None, delimiters=("=",))
         parser.optionxform = str  # type: ignore[assignment,method-assign]
         parser.read_string(text)
@@ -62,37 +66,35 @@ def test_the_units_build_that_folder_at_that_time_and_tell_of_a_failure(tmp_path
 
 
 @pytest.mark.parametrize(("status", "told"), [(0, False), (3, False), (75, False), (1, True)])
-def test_the_cron_line_tells_of_a_failure_and_of_nothing_else(tmp_path: Path, status: int, told: bool) -> None:
-    class Pretend(Schedule):
-        @property
-        def command(self) -> list[str]:
-            return [sys.executable, "-c", f"print('the end'); raise SystemExit({status})"]
-
-    wanted = schedule(tmp_path, 'sh -c "cat > told; echo $1 >> told"')
-    line = cron_line(Pretend(**{name: getattr(wanted, name) for name in wanted.__dataclass_fields__}))
-    minute, hour, *rest, command = line.rstrip("\n").split(" ", 5)
+def test_the_cron_line_tells_of_a_failure_and_of_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: int, told: bool
+) -> None:
+    ending = [sys.executable, "-c", f"print('the end'); raise SystemExit({status})"]
+    monkeypatch.setattr(schedule, "build_command", lambda *_: ending)
+    texts = texts_of(tmp_path, 'sh -c "cat > told; echo $1 >> told"')
+    minute, hour, *rest, command = texts["crontab"].rstrip("\n").split(" ", 5)
     assert (minute, hour, rest) == ("5", "6", ["*", "*", "*"])
     subprocess.run(["/bin/sh", "-c", command.replace(r"\%", "%")], cwd=tmp_path, check=False)
     assert (tmp_path / "told").is_file() == told
     if told:
-        assert (tmp_path / "told").read_text().splitlines() == ["the end", wanted.name]
+        assert (tmp_path / "told").read_text().splitlines() == ["the end", next(iter(texts)).removesuffix(".service")]
 
 
 def test_cron_takes_the_whole_line_since_every_percent_sign_is_escaped(tmp_path: Path) -> None:
-    line = cron_line(schedule(tmp_path))
+    line = texts_of(tmp_path)["crontab"]
     assert line.count("\n") == 1
     assert line.count("%") == line.count(r"\%") > 0
 
 
 def test_two_sites_have_two_names(tmp_path: Path) -> None:
-    one = schedule(tmp_path)
-    assert one.name != replace(one, site=tmp_path / "elsewhere" / "the site").name
-    assert all(name in in_words({**units(one), "crontab": cron_line(one)}) for name in units(one))
+    one, other = texts_of(tmp_path), texts_of(tmp_path, site="elsewhere/the site")
+    assert not units(one).keys() & units(other).keys()
+    assert all(name in in_words(one) for name in units(one))
 
 
 def test_every_fault_of_a_schedule_is_listed_at_once(tmp_path: Path) -> None:
     with pytest.raises(TriboError) as found:
-        Schedule.checked(tmp_path, tmp_path, at="25:00", notify="x", mail="nobody")
+        daily_build(tmp_path, tmp_path, at="25:00", notify="x", mail="nobody")
     assert [p.kind for p in found.value.problems] == ["not_a_time", "not_an_address", "two_notices"]
 
 
@@ -157,21 +159,21 @@ def keys(text: str) -> str:
 def test_no_name_and_no_command_makes_lines_or_words_of_its_own(
     tmp_path: Path, drop: str, site: str, notify: str
 ) -> None:
-    wanted = Schedule.checked(tmp_path / drop, tmp_path / site, notify=notify)
-    texts = units(wanted)
-    service, timer, *failed = texts.values()
+    texts = daily_build(tmp_path / drop, tmp_path / site, notify=notify)
+    command = build_command((tmp_path / drop).resolve(), (tmp_path / site).resolve(), 10)
+    name = next(iter(texts)).removesuffix(".service")
+    service, timer, *failed, line = texts.values()
     assert keys(service) == SECTIONS["notified" if notify else "service"]
     assert keys(timer) == SECTIONS["timer"]
-    assert systemd_runs(service) == wanted.command
+    assert systemd_runs(service) == command
     if notify:
         assert keys(failed[0]) == SECTIONS["failed"]
-        assert systemd_runs(failed[0])[3:] == ["sh", f"{wanted.name}.service", notify]
-    line = cron_line(wanted)
+        assert systemd_runs(failed[0])[3:] == ["sh", f"{name}.service", notify]
     assert len(line.splitlines()) == 1
     words = shell_words(cron_runs(line.rstrip("\n")))
-    log = str(wanted.site / ".tribo" / "cron.log")
-    assert words[3 : 3 + len(wanted.command)] == wanted.command
-    told = ["*)", "tail", "-n", "40", log, "|", "/bin/sh", "-c", notify, "sh", f"{wanted.name};;"]
+    log = str((tmp_path / site).resolve() / ".tribo" / "cron.log")
+    assert words[3 : 3 + len(command)] == command
+    told = ["*)", "tail", "-n", "40", log, "|", "/bin/sh", "-c", notify, "sh", f"{name};;"]
     assert words[words.index("*)") :] == ([*told, "esac"] if notify else ["*)", "exit", "$s;;", "esac"])
 
 
@@ -198,7 +200,7 @@ def test_what_is_no_command_address_or_time_is_refused(
     tmp_path: Path, options: dict[str, str], kinds: list[str]
 ) -> None:
     with pytest.raises(TriboError) as found:
-        Schedule.checked(tmp_path, tmp_path, **options)
+        daily_build(tmp_path, tmp_path, **options)
     assert [p.kind for p in found.value.problems] == kinds
 
 
@@ -206,9 +208,9 @@ def test_what_is_no_command_address_or_time_is_refused(
 def test_a_folder_whose_name_would_end_a_line_is_refused(tmp_path: Path, name: str) -> None:
     for drop, site in ((tmp_path / name, tmp_path), (tmp_path, tmp_path / name)):
         with pytest.raises(TriboError, match="control character"):
-            Schedule.checked(drop, site)
+            daily_build(drop, site)
 
 
 @pytest.mark.parametrize("mail", ["lab@example.org", "first.last+tribo@localhost", "a@b-c.d1"])
 def test_an_ordinary_mail_address_is_taken(tmp_path: Path, mail: str) -> None:
-    assert mail in cron_line(Schedule.checked(tmp_path, tmp_path, mail=mail))
+    assert mail in daily_build(tmp_path, tmp_path, mail=mail)["crontab"]

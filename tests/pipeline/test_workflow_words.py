@@ -42,13 +42,14 @@ def written(folder: Path) -> Path:
     stand_in.chmod(0o755)
     ready = {
         name: {
-            "path": f"/drop/{name}", "digest": f"d {name}", "samples": [], "cells": [name],
-            "files": f"inputs/{name}.json", "overrides": shlex.join(["--overrides", f"/drop/{name}{ODD}"]),
+            "path": f"/drop/{name}", "digest": f"d {name} s {shlex.join(['--flat', ODD])}",
+            "samples": [], "cells": [name], "files": f"inputs/{name}.json",
+            "overrides": shlex.join(["--overrides", f"/drop/{name}{ODD}"]),
         }
         for name in NAMES
     }  # fmt: skip
-    options = {name: shlex.join(["--flat", ODD]) for name in ("fit", "model", "diagnose", "words")}
-    config = {"ready": ready, "campaigns": {}, "digest": "d", "options": options, "sources": "s"}
+    options = {name: shlex.join(["--flat", ODD]) for name in ("fit", "model", "diagnose")}
+    config = {"ready": ready, "campaigns": {}, "digest": "d", "options": options}
     file = folder / "build.json"
     file.write_text(json.dumps({**config, "python": str(stand_in), "threads": 1}))
     return file

@@ -21,7 +21,7 @@ from tribo.figures.catalogue import FIGURES
 from tribo.records import SetAside, Study
 from tribo.report import Provenance
 from tribo.report.drawings import Drawn, svg_text
-from tribo.site.history import CampaignRow, FittedParameter
+from tribo.site.history import CampaignRow
 from tribo.site.index_page import change_points, page as index_page
 
 TEXTS = (
@@ -158,7 +158,7 @@ def test_the_data_in_the_report_page_are_read_back_as_they_were(hostile: Study) 
 def index_of(texts: Sequence[str]) -> str:
     rows = []
     for k, text in enumerate(texts):
-        laws = tuple(FittedParameter(f"{t} sample", "static", "mu", 4.8 + k / 9, 4.7, 5.9) for t in texts)
+        laws = {(f"{t} sample", "static", "mu"): (4.8 + k / 9, 4.7, 5.9) for t in texts}
         rows.append(CampaignRow(f"{text} {k}", f"{text} title", "unusable", (text, text), "2026-01-01",
                                 has_report=True, laws=laws, verdict=text, verdict_text=text))  # fmt: skip
     return index_page(rows, change_points({}))

@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tribo.cli.console import DONE, FOLDER, FORCE, SOME_SET_ASIDE, Console, GivenPath, command_options
+from tribo.cli.console import (
+    DONE,
+    FOLDER,
+    FORCE,
+    SOME_SET_ASIDE,
+    Console,
+    GivenPath,
+    command_options,
+    findings_text,
+)
 from tribo.cli.study_options import FLAT, RULE, RUNS, SCHEDULER, WEIGHTS
 from tribo.site.workflow import Progress
 
@@ -129,7 +138,7 @@ def build(console: Console, drop: Path, site: Path, dry_run: bool, **options: An
     """
     from tribo.site.build import BuildOptions, build_site
 
-    chosen = BuildOptions(**options)
+    chosen = BuildOptions(force=console.force, wait_s=console.wait_s, **options)
     if dry_run:
         with console.progress() as checks:
             built = build_site(drop, site, chosen, dry_run=True, checks=checks)
@@ -143,8 +152,6 @@ def build(console: Console, drop: Path, site: Path, dry_run: bool, **options: An
 
 def _words(built: Built, dry_run: bool, *, all_of_them: bool) -> str:
     """What was built, or would be built, and why."""
-    from tribo.cli.console import findings_text
-
     verb = "would build" if dry_run else "built"
     lines = [f"{verb} {name}: {why}" for name, why in built.due.items()]
     lines += [f"postponed to the next build: {name}: {'; '.join(why)}" for name, why in built.waiting.items()]
@@ -184,8 +191,7 @@ def print_schedule(console: Console, drop: Path, site: Path, **options: Any) -> 
 
     Both build DROP every day.
     """
-    from tribo.site.schedule import Schedule, cron_line, in_words, units
+    from tribo.site.schedule import daily_build, in_words
 
-    wanted = Schedule.checked(drop, site, **{name: options[name] for name in ("at", "keep", "notify", "mail")})
-    texts = {**units(wanted), "crontab": cron_line(wanted)}
+    texts = daily_build(drop, site, **{name: options[name] for name in ("at", "keep", "notify", "mail")})
     console.result(texts, in_words(texts))

@@ -79,7 +79,7 @@ def verify(console: Console, out: Path, campaign: Path | None, **_: Any) -> int:
 @click.option("--force", is_flag=True, help="Replace figures of the same name.")
 @command_options
 def figures(
-    console: Console, out: Path, width_mm: float, names: tuple[str, ...], to: Path, force: bool, **_: Any
+    console: Console, out: Path, width_mm: float, names: tuple[str, ...], to: Path, **_: Any
 ) -> None:
     """Draw the figures of a report again.
 
@@ -91,7 +91,8 @@ def figures(
     pairs = [name.partition("=") for given in names for name in given.split(",")]
     if wrong := next((old for old, sign, new in pairs if not (old and sign and new)), None):
         raise click.BadParameter(f"{wrong!r} is not of the form SAMPLE=NAME", param_hint="--names")
-    written = write_redrawn(out, to, width_mm, {old.strip(): new.strip() for old, _, new in pairs}, force)
+    renamed = {old.strip(): new.strip() for old, _, new in pairs}
+    written = write_redrawn(out, to, width_mm, renamed, console.force)
     listed = "\n".join(path.name for path in written)
     console.result({"to": str(to), "files": [path.name for path in written]}, f"{listed}\n{len(written)} files in {to}")
 

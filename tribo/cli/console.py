@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tribo.cache.kept_results import DamagedResultWarning
-from tribo.cache.own_folder import KEPT, BusyError, check_folder, own_folder
+from tribo.cache.own_folder import BusyError, own_folder
 from tribo.errors import Problem, TriboError, failed_by_system, of_the_system, system_problem, unexpected
 from tribo.records import Doubt, SetAside
 from tribo.user_text import nearest, printable
@@ -231,43 +231,13 @@ WAIT = click.option(
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Output:
-    """The output folder of a command, ``path``, and how it may be taken."""
-
-    path: Path
-    force: bool = False
-    wait_s: float = 0.0
-
-    @property
-    def kept(self) -> Path:
-        """Folder of finished simulations and the like, for the next start."""
-        return self.path / KEPT
-
-    def check(self, *inputs: Path) -> None:
-        """Refuse a folder that results of these inputs must not be written to."""
-        check_folder(self.path, inputs, self.force)
-
-    def taken(self, *inputs: Path, shared: bool = False) -> AbstractContextManager[Path]:
-        """The folder, held as its only writer; or ``shared`` with others that only add kept results."""
-        return own_folder(self.path, inputs, force=self.force, wait_s=self.wait_s, shared=shared)
-
-
 def output_options(default: str | None = None) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Add -o, --force and --wait to a command, which receives them as one :class:`Output`."""
+    """Add -o, --force and --wait to a command."""
     out = click.option(
         "-o", "--out", type=FOLDER, required=default is None, default=default, show_default=default is not None,
         help="Output folder.",
     )  # fmt: skip
-
-    def with_options(function: Callable[..., Any]) -> Callable[..., Any]:
-        @functools.wraps(function)
-        def command(*arguments: Any, out: Path, force: bool, wait_s: float, **options: Any) -> Any:
-            return function(*arguments, out=Output(out, force, wait_s), **options)
-
-        return out(FORCE(WAIT(command)))
-
-    return with_options
+    return lambda function: out(FORCE(WAIT(function)))
 
 
 def provenance_of_run(study: Study, campaign: Path, chosen: StudyOptions) -> Provenance:
@@ -306,10 +276,20 @@ BUSY = 75  # EX_TEMPFAIL of sysexits.h: nothing is wrong, try again later
 
 @dataclass(frozen=True)
 class Console:
-    """Output of a command: results to standard output, everything else to standard error."""
+    """Output of a command: results to standard output, everything else to standard error; and files into its folder.
+
+    With ``force`` a folder is written to that holds files of others; where another process writes, ``wait_s`` is how
+    long it waits.
+    """
 
     as_json: bool = False
     verbosity: int = 0
+    force: bool = False
+    wait_s: float = 0.0
+
+    def taken(self, out: Path, *inputs: Path, shared: bool = False) -> AbstractContextManager[Path]:
+        """The output folder, held as its only writer; or ``shared`` with others that only add kept results."""
+        return own_folder(out, inputs, force=self.force, wait_s=self.wait_s, shared=shared)
 
     def say(self, text: str, *, level: int = 0) -> None:
         """Print a line to standard error; level 1 is shown only with -v, level -1 even with -q."""
@@ -456,8 +436,10 @@ def command_options(function: Callable[..., int | None]) -> Callable[..., None]:
     @click.option("-q", "--quiet", is_flag=True, help="Print only results and errors.")
     @click.option("--debug", is_flag=True, help="Print the traceback of unexpected errors.")
     @functools.wraps(function)
-    def command(as_json: bool, verbose: int, quiet: bool, debug: bool, **options: Any) -> None:
-        console = Console(as_json, -1 if quiet else verbose)
+    def command(
+        as_json: bool, verbose: int, quiet: bool, debug: bool, force: bool = False, wait_s: float = 0.0, **options: Any
+    ) -> None:
+        console = Console(as_json, -1 if quiet else verbose, force, wait_s)
         logging.basicConfig(level=logging.INFO if verbose else logging.ERROR, stream=sys.stderr, format="%(message)s")
         logging.getLogger("tribo").setLevel(logging.DEBUG if debug else logging.NOTSET)
         try:

@@ -105,7 +105,6 @@ def simulate(
         console.say("the dense engine is no longer part of tribo; the fast engine runs and gives the same results")
         options["engine"] = "fast"
     scheduler, seed, jobs = (options.pop(name) for name in ("scheduler", "seed", "jobs"))
-    force, wait_s = options.pop("force"), options.pop("wait_s")
     if design and (table2 or any(value not in (None, ()) for value in options.values())):
         raise click.UsageError(
             "--design describes all runs; it cannot be combined with other options that describe runs"
@@ -121,19 +120,19 @@ def simulate(
         lambda: parse_given(given),
     )
     changed = partial(pulled, acting=acting, conditions=conditions, laws=laws, columns=columns)
-    check_file(out, ONE_RUN if one else ENSEMBLE, kind_of, force)
+    check_file(out, ONE_RUN if one else ENSEMBLE, kind_of, console.force)
     if one:
-        with only_writer_of(out, wait_s):
+        with only_writer_of(out, console.wait_s):
             run = changed(runs[0]) if acting or laws else run_model(runs[0], jobs)
             _one_run(console, run, out)
     else:
         label = exact_text((acting, conditions)) + (exact_text((laws, columns)) if laws else "")
         work = Work(changed, label=label) if acting or laws else FRICTION
-        if force and out.exists() and fault_of(runs, out, work) is not None:
+        if console.force and out.exists() and fault_of(runs, out, work) is not None:
             out.unlink()
         with console.progress() as progress:
             ran = run_stored(
-                runs, out, jobs, scheduler, lambda done, total: progress("simulating", done, total), work, wait_s
+                runs, out, jobs, scheduler, partial(progress, "simulating"), work, console.wait_s
             )  # fmt: skip
         _say_ensemble(console, ran, out, table2)
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tribo.cache.own_folder import KEPT, check_folder
 from tribo.cli.console import (
     UNUSABLE,
     Console,
     GivenPath,
-    Output,
     command_line,
     command_options,
     dry_run_text,
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 @DRY_RUN
 @fit_options
 @command_options
-def ingest(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
+def ingest(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
     """Read the exports of CAMPAIGN.
 
     Determines the static peak and the mean sliding force of each pull. Writes tests.csv and campaign.nc.
@@ -72,7 +72,7 @@ def ingest(console: Console, campaign: Path, out: Output, dry_run: bool, **optio
 @DRY_RUN
 @fit_options
 @command_options
-def fit(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
+def fit(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
     """Fit mu and tau0 of every sample.
 
     Writes fits.csv, with the uncertainties of both parameters, in addition to the files of tribo ingest.
@@ -95,7 +95,7 @@ def fit(console: Console, campaign: Path, out: Output, dry_run: bool, **options:
 @RUNS
 @SCHEDULER
 @command_options
-def predict(console: Console, campaign: Path, out: Output, only: str, columns: str, **options: Any) -> int:
+def predict(console: Console, campaign: Path, out: Path, only: str, columns: str, **options: Any) -> int:
     """Run the simulations of CAMPAIGN only.
 
     Calibrates the model on the flat sample, runs it for every sample and stores the results in OUT/kept, where
@@ -105,9 +105,9 @@ def predict(console: Console, campaign: Path, out: Output, only: str, columns: s
     from tribo.campaign import open_campaign
 
     stated = options.pop("stated")
-    chosen = stages.StudyOptions(kept=out.kept, **options)
+    chosen = stages.StudyOptions(kept=out / KEPT, **options)
     with (
-        out.taken(campaign, shared=True),
+        console.taken(out, campaign, shared=True),
         open_campaign(campaign) as described,
         console.progress() as progress,
     ):
@@ -118,7 +118,7 @@ def predict(console: Console, campaign: Path, out: Output, only: str, columns: s
             cells = stages.simulate_cells(ingested, fits, chosen, only, progress)
     names = [cell.name for cell in cells]
     set_aside = ingested.set_aside
-    record = {"out": str(out.path), "cells": names, "set_aside": set_aside_record(set_aside)}
+    record = {"out": str(out), "cells": names, "set_aside": set_aside_record(set_aside)}
     console.result(record, f"model calibrated; simulations run: {', '.join(names) or 'none'}")
     return console.status_after(set_aside)
 
@@ -130,7 +130,7 @@ def predict(console: Console, campaign: Path, out: Output, only: str, columns: s
 @fit_options
 @model_options
 @command_options
-def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
+def compare(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
     """Compare the measurements with the model.
 
     The model is calibrated on the flat sample alone. Writes comparison.csv and the figures in addition to the files
@@ -156,7 +156,7 @@ def compare(console: Console, campaign: Path, out: Output, dry_run: bool, **opti
 def diagnose(
     console: Console,
     campaign: Path | None,
-    out: Output,
+    out: Path,
     published: str | None,
     dry_run: bool,
     columns: str,
@@ -179,10 +179,10 @@ def diagnose(
     from tribo.wording.card import card_of
     from tribo.wording.terminal import card_text, verdict_text
 
-    chosen = stages.StudyOptions(kept=out.kept, **options)
+    chosen = stages.StudyOptions(kept=out / KEPT, **options)
     if dry_run:
         return _checked(console, campaign, out, "diagnose", chosen, lambda c: with_reading_options(c, columns, stated))
-    with out.taken(campaign), open_campaign(campaign) as opened, console.progress() as progress:
+    with console.taken(out, campaign), open_campaign(campaign) as opened, console.progress() as progress:
         stated_so = with_reading_options(opened, columns, stated)
         until: Until = "compare" if stages.without_model(stated_so, chosen) else "ingest"
         study = stages.study(stated_so, chosen, until=until, progress=progress)
@@ -191,13 +191,13 @@ def diagnose(
         drawing = Drawing(progress, chosen.jobs, chosen.kept)
         verdict = found.verdict
         card = card_of(stages.with_fits(study), verdict)
-        write_until(study, out.path, "ingest", drawing, provenance_of_run(study, campaign, chosen), found, card)
+        write_until(study, out, "ingest", drawing, provenance_of_run(study, campaign, chosen), found, card)
     console.result(verdict.as_dict() | {"card": card.as_dict()}, f"{card_text(card)}\n\n{verdict_text(verdict)}")
     console.list_doubts(study.doubts)
     return console.status_after(study.ingested.set_aside)
 
 
-def _diagnose_published(console: Console, out: Output, seed: int) -> int:
+def _diagnose_published(console: Console, out: Path, seed: int) -> int:
     """The verdict on Table 2 of Berardo et al. (2019), for every interpretation of what it leaves open."""
     from dataclasses import replace
 
@@ -211,11 +211,11 @@ def _diagnose_published(console: Console, out: Output, seed: int) -> int:
     from tribo.wording.verdict_sentences import worded
 
     folder, tables = data_dir() / BERARDO2019, ("table2.csv", "table2_tribo.csv")
-    with out.taken(folder), console.progress() as progress:
+    with console.taken(out, folder), console.progress() as progress:
         found = diagnose_published(load_table2(), load_table2_simulated_anew(), seed=seed, progress=progress)
         found = replace(found, verdict=worded(found.verdict))
         across = across_published(found, seed=seed)
-        write_published(found, across, out.path, provenance_of_table(folder, tables, command_line(), seed, now()))
+        write_published(found, across, out, provenance_of_table(folder, tables, command_line(), seed, now()))
     record = {**found.verdict.as_dict(), "across_patterns": across_record(across)}
     next_test = found.verdict.next_test.text if found.verdict.next_test is not None else ""
     lines = [found.verdict.sentence, verdict_text(found.verdict), f"  next test: {next_test}", across_sentence(across)]
@@ -231,7 +231,7 @@ def _diagnose_published(console: Console, out: Output, seed: int) -> int:
 @model_options
 @LAWS
 @command_options
-def report(console: Console, campaign: Path, out: Output, dry_run: bool, **options: Any) -> int:
+def report(console: Console, campaign: Path, out: Path, dry_run: bool, **options: Any) -> int:
     """Run every stage and write the report.
 
     Runs ingest, fit, compare and diagnose on CAMPAIGN. Writes their files, report.html, report.pdf and
@@ -245,17 +245,17 @@ def report(console: Console, campaign: Path, out: Output, dry_run: bool, **optio
 @fit_options
 @model_options
 @command_options
-def demo(console: Console, out: Output, **options: Any) -> int:
+def demo(console: Console, out: Path, **options: Any) -> int:
     """Write the report on the bundled example."""
     from tribo.files import data_dir
 
     status = _run_stages(console, data_dir() / "example", out, "report", False, **options)
-    console.say(f"open {out.path / 'report.html'}")
+    console.say(f"open {out / 'report.html'}")
     return status
 
 
 def _run_stages(
-    console: Console, path: Path, out: Output, until: Until, dry_run: bool, columns: str, **options: Any
+    console: Console, path: Path, out: Path, until: Until, dry_run: bool, columns: str, **options: Any
 ) -> int:
     """Run the stages up to ``until`` on one campaign and write their results."""
     from tribo import stages
@@ -265,17 +265,17 @@ def _run_stages(
     from tribo.wording.card import card_of
 
     stated = options.pop("stated")
-    chosen = stages.StudyOptions(kept=out.kept, **options)
+    chosen = stages.StudyOptions(kept=out / KEPT, **options)
     if dry_run:
         return _checked(console, path, out, until, chosen, lambda c: with_reading_options(c, columns, stated))
-    with out.taken(path), open_campaign(path) as described, console.progress() as progress:
+    with console.taken(out, path), open_campaign(path) as described, console.progress() as progress:
         study = stages.study(with_reading_options(described, columns, stated), chosen, until=until, progress=progress)
         study, found = _diagnosed(study, chosen, progress) if until == "report" else (study, None)
         drawing = Drawing(progress, chosen.jobs, chosen.kept)
         verdict = found.verdict if found else None
         card = card_of(study, verdict) if until == "report" else None
-        write_until(study, out.path, until, drawing, provenance_of_run(study, path, chosen), found, card)
-    return _conclude(console, study, out.path, verdict, card)
+        write_until(study, out, until, drawing, provenance_of_run(study, path, chosen), found, card)
+    return _conclude(console, study, out, verdict, card)
 
 
 def _diagnosed(
@@ -341,7 +341,7 @@ def _conclude(
 
 
 def _checked(
-    console: Console, path: Path, out: Output, until: DryUntil, chosen: StudyOptions,
+    console: Console, path: Path, out: Path, until: DryUntil, chosen: StudyOptions,
     prepared: Callable[[Campaign], Campaign],
 ) -> int:  # fmt: skip
     """Print everything that a study of a campaign would meet, and the status it would end with."""
@@ -350,10 +350,10 @@ def _checked(
     with console.progress() as progress:
         found = check(path, chosen, until, prepared, progress)
     try:
-        out.check(path)
+        check_folder(out, (path,), console.force)
     except TriboError as why:
         found = replace(found, faults=(*why.problems, *found.faults))
-    console.result(found.as_record(), dry_run_text(found, out.path, all_of_them=console.verbosity > 0))
+    console.result(found.as_record(), dry_run_text(found, out, all_of_them=console.verbosity > 0))
     console.list_problems(found.faults)
     return UNUSABLE if found.faults else status_of(found.set_aside)
 
@@ -369,7 +369,7 @@ def _checked(
 @FLAT
 @command_options
 def discover(
-    console: Console, campaign: Path, out: Output, law_file: Path | None, **options: Any
+    console: Console, campaign: Path, out: Path, law_file: Path | None, **options: Any
 ) -> int:
     """Search for the law of what no mechanism explains.
 
@@ -384,17 +384,17 @@ def discover(
     from tribo.report.without_study import write_discovery, write_validation
 
     law = read_law(law_file) if law_file is not None else None
-    with out.taken(campaign), open_campaign(campaign) as opened, console.progress() as progress:
-        chosen = stages.StudyOptions(kept=out.kept, **options)
+    with console.taken(out, campaign), open_campaign(campaign) as opened, console.progress() as progress:
+        chosen = stages.StudyOptions(kept=out / KEPT, **options)
         study = stages.study(opened, chosen, until="ingest", progress=progress)
         record = provenance_of_run(study, campaign, chosen)
         with stages.naming_set_aside(study.ingested):
             if law is not None:
                 held = validate_on_campaign(study.ingested, law, seed=chosen.seed)
-                said, text = write_validation(held, out.path, record)
+                said, text = write_validation(held, out, record)
             else:
                 found = discover_on_campaign(study.ingested, seed=chosen.seed, progress=progress)
-                said, text = write_discovery(found, study.ingested.campaign.title, out.path, record)
+                said, text = write_discovery(found, study.ingested.campaign.title, out, record)
     console.result(said, text)
     return console.status_after(study.ingested.set_aside)
 
@@ -404,7 +404,7 @@ def discover(
 @click.argument("second", type=GivenPath(file_okay=False))
 @output_options()
 @command_options
-def compare_reports(console: Console, first: Path, second: Path, out: Output, **_: Any) -> int:
+def compare_reports(console: Console, first: Path, second: Path, out: Path, **_: Any) -> int:
     """Compare two reports.
 
     FIRST and SECOND are output folders of tribo report. Writes compare.html, with the findings and figures of both
@@ -414,9 +414,9 @@ def compare_reports(console: Console, first: Path, second: Path, out: Output, **
     from tribo.report.compare_reports import write_comparison
     from tribo.report.provenance import provenance_of_comparison
 
-    with out.taken(first, second) as folder:
+    with console.taken(out, first, second) as folder:
         record = provenance_of_comparison((first, second), command_line(), now())
         table, said = write_comparison((first, second), folder, record)
-    words = [*said, f"Written: {out.path / 'compare.html'}"]
+    words = [*said, f"Written: {out / 'compare.html'}"]
     console.result({"sentences": said, "differences": table.to_dict("records")}, "\n".join(words))
     return 0

@@ -27,7 +27,7 @@ from tribo.site.history import collect_laws
 from tribo.site.scan import CURRENT, Dropped, clear_unfinished, date_build, difference, scan
 from tribo.site.steps import INDEX, JOURNAL, OF_A_REPORT, Step, due_steps, inputs_of, journal, read_record
 from tribo.site.workflow import Progress, run_workflow
-from tribo.stages import StudyOptions, Weights
+from tribo.stages import StudyOptions
 from tribo.temporary import PREFIX, clear_abandoned, place_of_temporary_files
 from tribo.traces.rules import named_rule
 from tribo.user_text import well_formed
@@ -42,21 +42,18 @@ class BuildError(TriboError):
 
 
 @dataclass(frozen=True)
-class BuildOptions:
-    """What a build may choose: ``settle_s`` is how long a file must rest, ``keep`` how many dated copies stay."""
+class BuildOptions(StudyOptions):
+    """What a build may choose besides the options of a study.
 
-    rule: str = "first_peak"
-    weights: Weights = "relative"
-    flat: str = ""  # as --flat of the commands
-    runs: int = 4
-    seed: int = 0
-    scheduler: str | None = None
-    jobs: int = 2
+    ``settle_s`` is how long a file must rest, ``keep`` how many dated copies stay, ``wait_s`` how long to wait for
+    another build, ``force`` whether to write into a folder that holds files of others.
+    """
+
     profile: str = "local"
     settle_s: float = 60.0
     keep: int = 10
     wait_s: float = 0.0
-    force: bool = False  # also into a folder that holds files of others
+    force: bool = False
 
     def of_commands(self) -> dict[str, str]:
         """Options of the commands of the workflow, and all of them in words for what a step is made from."""
@@ -68,12 +65,10 @@ class BuildOptions:
         parts = {"fit": fit, "model": [*model, *where], "diagnose": diagnosis, "words": model}
         return {name: shlex.join(words) for name, words in parts.items()}
 
-    def of_study(self, overrides: Path | None) -> StudyOptions:
-        """The same as options of a study of one campaign."""
-        return StudyOptions(
-            rule=self.rule, weights=self.weights, flat=self.flat, runs=self.runs, seed=self.seed, jobs=self.jobs,
-            overrides=overrides,
-        )  # fmt: skip
+    @property
+    def made_with(self) -> str:
+        """What every step of a build is made with, as one text: the sources of tribo and the options."""
+        return f"{package_sources()} {self.of_commands()['words']}"
 
 
 def _untold(*_: Any) -> None:
@@ -169,7 +164,9 @@ def _planned(drop: Path, state: Path, options: BuildOptions, checks: Callable[[s
     if said.returncode:
         raise BuildError(_failures(state, said.stdout))
     checked = {
-        c.name: check(c.path, options.of_study(c.overrides), "report", progress=partial(_of_campaign, c.name, checks))
+        c.name: check(
+            c.path, replace(options, overrides=c.overrides), "report", progress=partial(_of_campaign, c.name, checks)
+        )
         for c in found
         if c.name in due
     }
@@ -188,8 +185,9 @@ def _due(
     drop: Path, inputs: Path, options: BuildOptions
 ) -> tuple[tuple[Dropped, ...], dict[str, Any], dict[str, str]]:
     """The campaigns of a drop folder, what the workflow needs to know of each, and which are to be built and why."""
-    found, ready = inputs_of(scan(drop.resolve(), options.settle_s), inputs)
-    return found, ready, {c.name: why for c in found if c.is_ready and (why := _why_due(c, inputs.parent, options))}
+    found, ready = inputs_of(scan(drop.resolve(), options.settle_s), inputs, options.made_with)
+    whole = [c for c in found if c.is_ready]
+    return found, ready, {c.name: why for c in whole if (why := _why_due(c, inputs.parent, ready[c.name]["digest"]))}
 
 
 def _waiting(found: Sequence[Dropped]) -> dict[str, tuple[str, ...]]:
@@ -229,8 +227,7 @@ def _steps(
     state: Path, ready: Mapping[str, Any], due: Mapping[str, str], config: Path, options: BuildOptions
 ) -> list[Step]:
     """The steps of this build with their reasons; the index page is the last of them."""
-    digests = {name: step_digest(inputs["digest"], options) for name, inputs in ready.items()}
-    steps = due_steps(state, ready, digests, _by_cell(options.profile))
+    steps = due_steps(state, ready, _by_cell(options.profile))
     runs = {(step.name, step.campaign) for step in steps}
     steps += [Step("report", n, "its report is missing") for n in due if due[n] == GONE and ("report", n) not in runs]
     index = read_record(state / f"{INDEX}.json", "digest")
@@ -254,7 +251,7 @@ def _profile_folder(profile: str) -> Path:
     return (workflow_dir() / "profiles" / profile if profile in PROFILES else Path(profile)).resolve()
 
 
-def _why_due(campaign: Dropped, state: Path, options: BuildOptions) -> str:
+def _why_due(campaign: Dropped, state: Path, digest: str) -> str:
     """Why a campaign is to be built, in words; empty where its report is of exactly these files and options."""
     record = read_record(state / "steps" / campaign.name / "report.json", *OF_A_REPORT, "files")
     if record is None:
@@ -263,10 +260,9 @@ def _why_due(campaign: Dropped, state: Path, options: BuildOptions) -> str:
     changed = difference(record["files"], campaign.files)
     if changed:
         return changed
-    if _report_is_gone(campaign.name, record, state):
+    if record["status"] != "unusable" and not (state.parent / CURRENT / campaign.name / "report.html").is_file():
         return GONE
-    same = record["digest"] == step_digest(campaign.digest, options)
-    return "" if same else "options or code of tribo changed"
+    return "" if record["digest"] == digest else "options or code of tribo changed"
 
 
 def _forced(due: Mapping[str, str], state: Path) -> tuple[str, ...]:
@@ -278,28 +274,18 @@ def _forced(due: Mapping[str, str], state: Path) -> tuple[str, ...]:
     return ("--forcerun", *lost) if lost else ()
 
 
-def _report_is_gone(name: str, record: Mapping[str, Any], state: Path) -> bool:
-    return record["status"] != "unusable" and not (state.parent / CURRENT / name / "report.html").is_file()
-
-
-def step_digest(digest: str, options: BuildOptions) -> str:
-    """What every step of a campaign is made from, as one text: contents, sources of tribo, options."""
-    return f"{digest} {package_sources()} {options.of_commands()['words']}"
-
-
 def _configuration(found: Sequence[Dropped], ready: Mapping[str, Any], file: Path, options: BuildOptions) -> Path:
     """Write what the workflow needs to know; returns the file."""
     campaigns = {
         c.name: {"path": well_formed(str(c.path)), "waiting": list(c.waiting), "refused": list(c.refused)}
         for c in found
     }
-    listing = json.dumps([campaigns, {n: r["digest"] for n, r in ready.items()}, step_digest("", options)])
+    listing = json.dumps([campaigns, {n: r["digest"] for n, r in ready.items()}, options.made_with])
     config = {
         "ready": ready,
         "campaigns": campaigns,
         "digest": hashlib.sha256(listing.encode()).hexdigest(),
         "options": options.of_commands(),
-        "sources": package_sources(),
         "python": sys.executable,
         "threads": options.jobs,
     }
@@ -335,11 +321,8 @@ def _failures(state: Path, said: str) -> list[Problem]:
     what = "a step failed; all other steps are complete, and the next build will try this one again"
     if not logs:
         return [Problem("workflow_failed", "the workflow could not be run", found=_last_lines(said))]
-    return [Problem("step_failed", what, file=str(log), found=_tail(log)) for log in sorted(logs)]
-
-
-def _tail(path: Path) -> str:
-    return _last_lines(text_of(path, errors="replace")) if path.is_file() else "no log"
+    ends = {log: _last_lines(text_of(log, errors="replace")) if log.is_file() else "no log" for log in sorted(logs)}
+    return [Problem("step_failed", what, file=str(log), found=end) for log, end in ends.items()]
 
 
 def _last_lines(text: str, most: int = 8) -> str:

@@ -7,7 +7,7 @@ import io
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -23,21 +23,8 @@ PARAMETERS = {
 }  # value, interval of the combined uncertainty, and that of the fit alone where a report has no other
 
 
-@dataclass(frozen=True)
-class FittedParameter:
-    """One fitted parameter of one sample in one regime, with its 95 % interval; tau0 in kPa."""
-
-    sample: str
-    regime: str
-    parameter: str
-    value: float
-    low: float
-    high: float
-
-    @property
-    def key(self) -> tuple[str, str, str]:
-        """Sample, regime and parameter."""
-        return self.sample, self.regime, self.parameter
+Key = tuple[str, str, str]  # sample, regime, parameter
+Interval = tuple[float, float, float]  # value and its 95 % interval; tau0 in kPa
 
 
 @dataclass(frozen=True)
@@ -45,7 +32,8 @@ class CampaignRow:
     """One campaign as the index page shows it: its verdict, its counts and its next test are those of its card.
 
     ``state`` is done, some set aside, unusable, failed, waiting or gone (no longer in the folder of campaigns); ``why``
-    the reason. ``measured`` is when the first pull started, ``built`` when the report was made.
+    the reason. ``measured`` is when the first pull started, ``built`` when the report was made. ``laws`` are its fitted
+    parameters.
     """
 
     name: str
@@ -61,7 +49,7 @@ class CampaignRow:
     counts: str = ""
     next_test: str = ""
     has_report: bool = False
-    laws: tuple[FittedParameter, ...] = ()
+    laws: Mapping[Key, Interval] = field(default_factory=dict)
     measured_s: float = math.inf  # the same moment in seconds since 1970
 
 
@@ -80,7 +68,7 @@ def _row(name: str, site: Path, config: Mapping[str, Any]) -> CampaignRow:
     record = read_record(site / ".tribo" / "steps" / name / "report.json", *OF_A_REPORT)
     state, why = _state(name, record, config)
     verdict, card = (read_record(out / f"{name}.json") or {} for name in ("verdict", "card"))
-    tests = _table(out / "tests.csv")
+    step, tests = card.get("next_test"), _table(out / "tests.csv")
     started = sorted(moment for t in tests if (moment := _moment(t.get("started_at", ""))))
     return CampaignRow(
         name=name,
@@ -94,9 +82,9 @@ def _row(name: str, site: Path, config: Mapping[str, Any]) -> CampaignRow:
         verdict=str(verdict.get("verdict", "")),
         verdict_text=str(card.get("sentence") or verdict.get("text") or ""),
         counts=str(card.get("counts") or ""),
-        next_test=_next_test(card),
+        next_test=str(step.get("line") or "") if isinstance(step, dict) else "",
         has_report=(out / "report.html").is_file(),
-        laws=tuple(_laws(_table(out / "fits.csv"))),
+        laws=_laws(_table(out / "fits.csv")),
         measured_s=started[0].timestamp() if started else math.inf,
     )
 
@@ -110,17 +98,11 @@ def _state(name: str, record: Mapping[str, Any] | None, config: Mapping[str, Any
     waiting = config["campaigns"][name]["waiting"]
     if waiting:
         return "waiting", tuple(waiting)
-    expected = f"{config['ready'][name]['digest']} {config['sources']} {config['options']['words']}"
-    if record is None or record["digest"] != expected:
+    if record is None or record["digest"] != config["ready"][name]["digest"]:
         return "failed", ("a step failed; see its log in .tribo/log; the next build will try it again",)
     if record["status"] == "unusable":
         return "unusable", tuple(_problem(p) for p in record["problems"])
     return record["status"].replace("_", " "), ()
-
-
-def _next_test(card: Mapping[str, Any]) -> str:
-    step = card.get("next_test")
-    return str(step.get("line") or "") if isinstance(step, dict) else ""
 
 
 def _problem(problem: Any) -> str:
@@ -165,14 +147,14 @@ def _table(path: Path) -> list[dict[str, str]]:
         return []
 
 
-def _laws(fits: Sequence[Mapping[str, str]]) -> list[FittedParameter]:
-    found = []
+def _laws(fits: Sequence[Mapping[str, str]]) -> dict[Key, Interval]:
+    found = {}
     for fit in fits:
         for parameter, columns in PARAMETERS.items():
             value, low, high, fit_low, fit_high = (_number(fit.get(column, "")) for column in columns)
             low, high = (low, high) if math.isfinite(low) else (fit_low, fit_high)
             if {"sample", "regime"} <= set(fit) and math.isfinite(value):
-                found.append(FittedParameter(fit["sample"], fit["regime"], parameter, value, low, high))
+                found[fit["sample"], fit["regime"], parameter] = value, low, high
     return found
 
 

@@ -19,11 +19,10 @@ import json
 import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import quote
 
 import numpy as np
@@ -32,9 +31,10 @@ from tribo import __version__
 from tribo.errors import unexpected
 from tribo.files import bytes_of
 from tribo.records import FloatArray
-from tribo.site.history import CampaignRow, FittedParameter, answers_of, history, laws_csv, laws_in_words
+from tribo.site.history import CampaignRow, Interval, Key, answers_of, history, laws_csv, laws_in_words
 from tribo.site.steps import INDEX, Step, noted, read_record
 from tribo.user_text import for_spreadsheet
+from tribo.wording.numerals import p_text
 
 if TYPE_CHECKING:
     from tribo.report.compare_reports import Reported
@@ -92,23 +92,16 @@ FEWEST = 8  # campaigns in a series; with fewer, no order of them is rare enough
 SHORTEST = 3  # campaigns on either side of a change, so that one odd campaign makes none
 LEVEL = 0.05
 PERMUTATIONS = 2000
+Name = TypeVar("Name")
 
 
-@dataclass(frozen=True)
-class Change:
-    """A change of one series before its campaign ``at`` (an index into the series' campaigns)."""
-
-    series: str
-    at: int
-    before: float
-    after: float
-    p: float
+Change = tuple[int, float, float, float]  # campaign before which a series changes, mean before, mean after, p
 
 
 def change_points(
-    series: Mapping[str, Sequence[float]], *, level: float = LEVEL, seed: int = 0, permutations: int = PERMUTATIONS
-) -> tuple[Change, ...]:
-    """Changes in any of several series over the same campaigns, in order.
+    series: Mapping[Name, Sequence[float]], *, level: float = LEVEL, seed: int = 0, permutations: int = PERMUTATIONS
+) -> dict[Name, list[Change]]:
+    """Changes of several series over the same campaigns, in order.
 
     Parameters
     ----------
@@ -117,15 +110,16 @@ def change_points(
 
     Returns
     -------
-    tuple of Change
-        By series and place. ``p`` is adjusted for all splits and series examined.
+    dict
+        The changes of each series that has any, by its name: the campaign before which it changes (an index into the
+        series), the means before and after, and p, adjusted for all splits and series examined.
     """
     values = {name: np.asarray(v, float) for name, v in series.items()}
     if not values:
-        return ()
+        return {}
     rng = np.random.default_rng(seed)
     keys = rng.random((permutations, len(next(iter(values.values())))))
-    found: list[Change] = []
+    found: dict[Name, list[Change]] = {name: [] for name in values}
     spans = [(name, np.flatnonzero(np.isfinite(v))) for name, v in values.items()]
     while spans := [(name, places) for name, places in spans if places.size >= FEWEST]:
         next_spans = []
@@ -133,15 +127,14 @@ def change_points(
             if p <= level:
                 y = values[name]
                 left, right = places[:cut], places[cut:]
-                found.append(Change(name, int(right[0]), float(y[left].mean()), float(y[right].mean()), p))
+                found[name].append((int(right[0]), float(y[left].mean()), float(y[right].mean()), p))
                 next_spans += [(name, left), (name, right)]
         spans = next_spans
-    order = list(values)
-    return tuple(sorted(found, key=lambda c: (order.index(c.series), c.at)))
+    return {name: sorted(changes) for name, changes in found.items() if changes}
 
 
 def _adjusted(
-    values: Mapping[str, FloatArray], spans: Sequence[tuple[str, np.ndarray]], keys: FloatArray
+    values: Mapping[Name, FloatArray], spans: Sequence[tuple[Name, np.ndarray]], keys: FloatArray
 ) -> list[tuple[int, float]]:
     """For each span its best split and the adjusted p of that split."""
     smallest = np.ones(len(keys))
@@ -184,15 +177,13 @@ SYMBOLS = {"mu": ("μ", ""), "tau0": ("τ₀", "kPa")}
 WIDE = 6.0  # times the median arm of the intervals: a wider one is cut off, so that the others stay readable
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 300.0, 136.0, 44.0, 8.0, 16.0, 18.0
 
-Key = tuple[str, str, str]  # sample, regime, parameter
-
 
 def write_index(site: Path) -> str:
     """Write SITE/current/index.html, trend.csv and laws.csv where they differ from what is there; their SHA-256."""
     from tribo.files import write_text
 
     rows = history(site)
-    changes = change_points({series_name(key): values for key, values in series(rows).items()})
+    changes = change_points(series(rows))
     digest = hashlib.sha256()
     current = site / "current"
     answers = answers_of(current)
@@ -210,9 +201,8 @@ def write_index(site: Path) -> str:
 
 def series(rows: Sequence[CampaignRow]) -> dict[Key, list[float]]:
     """Values of each parameter of each sample, one a campaign, NaN where it has none."""
-    laws = [{law.key: law.value for law in row.laws} for row in rows]
-    keys = sorted({key for found in laws for key in found}, key=lambda k: (k[0], k[1] != "static", k[2]))
-    return {key: [found.get(key, math.nan) for found in laws] for key in keys}
+    keys = sorted({key for row in rows for key in row.laws}, key=lambda k: (k[0], k[1] != "static", k[2]))
+    return {key: [row.laws[key][0] if key in row.laws else math.nan for row in rows] for key in keys}
 
 
 def trend_csv(rows: Sequence[CampaignRow]) -> str:
@@ -221,27 +211,16 @@ def trend_csv(rows: Sequence[CampaignRow]) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["campaign", "measured", "sample", "regime", "parameter", "value", "low", "high"])
     for row in rows:
-        for law in row.laws:
-            numbers = ["" if math.isnan(v) else f"{v:.8g}" for v in (law.value, law.low, law.high)]
-            words = map(for_spreadsheet, (row.name, row.measured, law.sample, law.regime, law.parameter))
+        for key, interval in row.laws.items():
+            numbers = ["" if math.isnan(v) else f"{v:.8g}" for v in interval]
+            words = map(for_spreadsheet, (row.name, row.measured, *key))
             writer.writerow([*words, *numbers])
     return text.getvalue()
 
 
-def series_name(key: Key) -> str:
-    """Sample, regime and parameter as one text; :func:`key_of` gives them back, whatever the sample is called."""
-    return json.dumps(key)
-
-
-def key_of(name: str) -> Key:
-    """The key of a :func:`series_name`."""
-    sample, regime, parameter = json.loads(name)
-    return sample, regime, parameter
-
-
 def page(
     rows: Sequence[CampaignRow],
-    changes: Sequence[Change],
+    changes: Mapping[Key, Sequence[Change]],
     laws: Sequence[str] = (),
     compared: Mapping[str, Any] = MappingProxyType({}),
 ) -> str:
@@ -251,12 +230,13 @@ def page(
     templates = environment("tribo.site")
     by_sample: dict[str, list[dict[str, Any]]] = {}
     for key in series(rows):
-        by_sample.setdefault(key[0], []).append(panel(key, rows, [c for c in changes if key_of(c.series) == key]))
+        by_sample.setdefault(key[0], []).append(panel(key, rows, changes.get(key, ())))
     longest = max((sum(map(math.isfinite, v)) for v in series(rows).values()), default=0)
     return templates.get_template("index.html").render(
         rows=list(reversed(rows)), states=STATES, verdicts=VERDICTS, link=report_link, panels=by_sample,
-        sentences=[change_sentence(c, rows) for c in changes], looked=longest >= FEWEST, fewest=FEWEST,
-        shortest=SHORTEST, level=LEVEL, width=WIDTH, height=HEIGHT, left=LEFT, right=RIGHT, top=TOP, bottom=BOTTOM,
+        sentences=[change_sentence(key, change, rows) for key, found in changes.items() for change in found],
+        looked=longest >= FEWEST, fewest=FEWEST, shortest=SHORTEST, level=LEVEL, width=WIDTH, height=HEIGHT,
+        left=LEFT, right=RIGHT, top=TOP, bottom=BOTTOM,
         version=__version__, laws=laws, comparable=set(compared.get("campaigns", ())),
         compared=script_json(dict(compared)),
         **style_and_script(templates, [STYLE, "index.css"], [*WORKING, "index.js"]),
@@ -277,8 +257,8 @@ def panel(key: Key, rows: Sequence[CampaignRow], changes: Sequence[Change]) -> d
     symbol, unit = SYMBOLS[parameter]
     fitted = [k for k, row in enumerate(rows) if row.laws]
     place = {k: at for at, k in enumerate(fitted)}  # campaigns without a fit take no room
-    placed = [(k, row, law) for k, row in enumerate(rows) for law in row.laws if law.key == key]
-    low, high = _range([law for _, _, law in placed])
+    placed = [(k, row, row.laws[key]) for k, row in enumerate(rows) if key in row.laws]
+    low, high = _range([interval for _, _, interval in placed])
     step = (WIDTH - LEFT - RIGHT) / len(fitted)
 
     def x(k: int, aside: float = 0.0) -> float:
@@ -288,32 +268,29 @@ def panel(key: Key, rows: Sequence[CampaignRow], changes: Sequence[Change]) -> d
         share = min(max((value - low) / (high - low), 0.0), 1.0)
         return round(HEIGHT - BOTTOM - share * (HEIGHT - TOP - BOTTOM), 1)
 
-    def end(value: float, law: FittedParameter) -> float:
-        return y(value if math.isfinite(value) else law.value)
-
-    points: list[dict[str, Any]] = [
-        {
-            "x": x(k), "y": y(law.value), "y_low": end(law.low, law), "y_high": end(law.high, law),
-            "text": _hover(row, law), "link": report_link(row.name) if row.has_report else "",
-        }
-        for k, row, law in placed
-    ]  # fmt: skip
+    points: list[dict[str, Any]] = []
+    for k, row, (value, *ends) in placed:
+        y_low, y_high = (y(end if math.isfinite(end) else value) for end in ends)
+        interval = f" ({_short(ends[0])} to {_short(ends[1])})" if math.isfinite(ends[0]) else ""
+        text = f"{row.name}: {_short(value)}{interval}{f' {unit}' if unit else ''}"
+        link = report_link(row.name) if row.has_report else ""
+        points.append({"x": x(k), "y": y(value), "y_low": y_low, "y_high": y_high, "text": text, "link": link})
     return {
         "title": f"{regime} {symbol}{f' in {unit}' if unit else ''}",
         "label": f"{regime} {symbol} of {sample} in {len(points)} campaigns: " + "; ".join(p["text"] for p in points),
         "points": points,
         "ticks": [(y(v), text) for v, text in ticks(low, high)],
         "dates": (rows[fitted[0]].measured, rows[fitted[-1]].measured) if len(fitted) > 1 else ("", ""),
-        "changes": [(x(c.at, -0.5), f"{_short(c.before)} to {_short(c.after)}") for c in changes],
+        "changes": [(x(at, -0.5), f"{_short(before)} to {_short(after)}") for at, before, after, _ in changes],
     }
 
 
-def _range(laws: Sequence[FittedParameter]) -> tuple[float, float]:
+def _range(intervals: Sequence[Interval]) -> tuple[float, float]:
     """Lowest and highest number shown: all values, and every interval but those far wider than most."""
-    values = [law.value for law in laws]
-    arms = [abs(e - law.value) for law in laws for e in (law.low, law.high) if math.isfinite(e)]
-    widest = WIDE * median(arms) if arms else 0.0
-    ends = [e for law in laws for e in (law.low, law.high) if math.isfinite(e) and abs(e - law.value) <= widest]
+    values = [value for value, _, _ in intervals]
+    arms = [(end, abs(end - value)) for value, *ends in intervals for end in ends if math.isfinite(end)]
+    widest = WIDE * median(arm for _, arm in arms) if arms else 0.0
+    ends = [end for end, arm in arms if arm <= widest]
     low, high = min(values + ends), max(values + ends)
     return (low, high) if high > low else (low - 1.0, high + 1.0)
 
@@ -324,25 +301,17 @@ def ticks(low: float, high: float) -> tuple[tuple[float, str], ...]:
     return tuple((v, f"{v:.{decimals}f}".replace("-", "−")) for v in (low, (low + high) / 2, high))
 
 
-def _hover(row: CampaignRow, law: FittedParameter) -> str:
-    unit = f" {SYMBOLS[law.parameter][1]}".rstrip()
-    interval = f" ({_short(law.low)} to {_short(law.high)})" if math.isfinite(law.low) else ""
-    return f"{row.name}: {_short(law.value)}{interval}{unit}"
-
-
 def _short(value: float) -> str:
     return f"{value:.3g}".replace("-", "−")
 
 
-def change_sentence(change: Change, rows: Sequence[CampaignRow]) -> str:
+def change_sentence(key: Key, change: Change, rows: Sequence[CampaignRow]) -> str:
     """A change in words."""
-    sample, regime, parameter = key_of(change.series)
+    (sample, regime, parameter), (at, before, after, p) = key, change
     symbol, unit = SYMBOLS[parameter]
-    verb = "rises" if change.after > change.before else "falls"
-    p = "below 0.001" if change.p < 0.001 else f"{change.p:.3f}"
     return (
-        f"{regime.capitalize()} {symbol} of {sample} {verb} from {_short(change.before)} to {_short(change.after)}"
-        f"{f' {unit}' if unit else ''} at {rows[change.at].name} (adjusted p {p})."
+        f"{regime.capitalize()} {symbol} of {sample} {'rises' if after > before else 'falls'} from {_short(before)} to "
+        f"{_short(after)}{f' {unit}' if unit else ''} at {rows[at].name} (adjusted p {p_text(p)})."
     )
 
 

@@ -7,8 +7,7 @@ import re
 import shlex
 import sys
 import unicodedata
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from tribo.errors import Problem, TriboError
@@ -20,57 +19,59 @@ _TIME = re.compile(r"([01]?[0-9]|2[0-3]):([0-5][0-9])")
 _BREAKS_LINES = ("Cc", "Cs", "Zl", "Zp")  # control characters, bytes that are no UTF-8, line and paragraph separators
 
 
-@dataclass(frozen=True)
-class Schedule:
-    """A daily build: absolute folders, hour and minute, number of dated builds, and a shell command on failure."""
+def daily_build(
+    drop: Path, site: Path, *, at: str = "06:00", keep: int = 10, notify: str = "", mail: str = ""
+) -> dict[str, str]:
+    """Texts that build a folder of campaigns every day: the systemd units by file name, and the line for "crontab".
 
-    drop: Path
-    site: Path
-    hour: int
-    minute: int
-    keep: int
-    notify: str
+    Parameters
+    ----------
+    drop, site : Path
+        Folder of campaigns, and folder of the site.
+    at : str
+        Time of day, HH:MM.
+    keep : int
+        Number of dated builds that stay.
+    notify : str
+        Shell command on failure.
+    mail : str
+        Address that is told of a failure, instead of ``notify``.
 
-    @classmethod
-    def checked(
-        cls, drop: Path, site: Path, *, at: str = "06:00", keep: int = 10, notify: str = "", mail: str = ""
-    ) -> Schedule:
-        """A schedule from the options of the user.
+    Raises
+    ------
+    TriboError
+        ``at`` is no time of day, ``mail`` no address, ``notify`` no complete command, both a command and a mail address
+        are given, or one of the texts contains a character that would end a line.
+    """
+    time = _TIME.fullmatch(at)
+    problems = [] if time else [_wrong("not_a_time", "not a time of day", "--at", at, "00:00 to 23:59")]
+    drop, site = drop.resolve(), site.resolve()
+    texts = {"DROP": str(drop), "--site": str(site), "--notify": notify, "--mail": mail}
+    problems += [p for option, text in texts.items() for p in _line_breaks(option, text)]
+    if mail and not _ADDRESS.fullmatch(mail):
+        problems.append(_wrong("not_an_address", "not a mail address", "--mail", mail, "name@domain"))
+    if not _is_whole_command(notify):
+        what, allowed = "not a complete command", "a command with all its quotes closed"
+        problems.append(_wrong("not_a_command", what, "--notify", notify, allowed))
+    if mail and notify:
+        problems.append(Problem("two_notices", "give only one of these options", allowed="--notify or --mail"))
+    if problems or time is None:
+        raise TriboError(problems)
+    notice = f'mail -s "tribo: $1 failed" {mail}' if mail else notify
+    stem = re.sub(r"[^A-Za-z0-9]+", "-", site.name).strip("-") or "site"
+    name = f"tribo-{stem}-{hashlib.sha256(str(site).encode()).hexdigest()[:6]}"  # one for each site
+    command, hour, minute = build_command(drop, site, keep), int(time[1]), int(time[2])
+    build = f"Description=Friction reports of {_unit_text(str(drop))}"
+    return {
+        **_units(name, build, command, f"{hour:02d}:{minute:02d}", notice),
+        "crontab": f"{minute} {hour} * * * {_for_cron(_build_and_tell(name, site, command, notice))}\n",
+    }
 
-        Raises
-        ------
-        TriboError
-            ``at`` is no time of day, ``mail`` no address, ``notify`` no complete command, both a command and a mail
-            address are given, or one of the texts contains a character that would end a line.
-        """
-        time = _TIME.fullmatch(at)
-        problems = [] if time else [_wrong("not_a_time", "not a time of day", "--at", at, "00:00 to 23:59")]
-        drop, site = drop.resolve(), site.resolve()
-        texts = {"DROP": str(drop), "--site": str(site), "--notify": notify, "--mail": mail}
-        problems += [p for option, text in texts.items() for p in _line_breaks(option, text)]
-        if mail and not _ADDRESS.fullmatch(mail):
-            problems.append(_wrong("not_an_address", "not a mail address", "--mail", mail, "name@domain"))
-        if not _is_whole_command(notify):
-            what, allowed = "not a complete command", "a command with all its quotes closed"
-            problems.append(_wrong("not_a_command", what, "--notify", notify, allowed))
-        if mail and notify:
-            problems.append(Problem("two_notices", "give only one of these options", allowed="--notify or --mail"))
-        if problems or time is None:
-            raise TriboError(problems)
-        told = f'mail -s "tribo: $1 failed" {mail}' if mail else notify
-        return cls(drop, site, int(time[1]), int(time[2]), keep, told)
 
-    @property
-    def name(self) -> str:
-        """Name of the units: the same for the same site, another for another one."""
-        stem = re.sub(r"[^A-Za-z0-9]+", "-", self.site.name).strip("-") or "site"
-        return f"tribo-{stem}-{hashlib.sha256(str(self.site).encode()).hexdigest()[:6]}"
-
-    @property
-    def command(self) -> list[str]:
-        """The build command, with this installation of tribo. The lock of the site prevents simultaneous builds."""
-        tribo = [sys.executable, "-P", "-m", "tribo"]  # -P: nothing is imported from the folder it happens to start in
-        return [*tribo, "build", str(self.drop), "-o", str(self.site), "--keep", str(self.keep), "--quiet"]
+def build_command(drop: Path, site: Path, keep: int) -> list[str]:
+    """The build command, with this installation of tribo. The lock of the site prevents simultaneous builds."""
+    tribo = [sys.executable, "-P", "-m", "tribo"]  # -P: nothing is imported from the folder it happens to start in
+    return [*tribo, "build", str(drop), "-o", str(site), "--keep", str(keep), "--quiet"]
 
 
 def _wrong(kind: str, what: str, option: str, found: str, allowed: str) -> Problem:
@@ -91,25 +92,24 @@ def _is_whole_command(notify: str) -> bool:
         return False
 
 
-def units(schedule: Schedule) -> dict[str, str]:
+def _units(name: str, build: str, command: Sequence[str], at: str, notice: str) -> dict[str, str]:
     """Texts of the systemd units by file name: service, timer, and the failure notice where one is wanted."""
-    name = schedule.name
-    told = f"OnFailure={name}-failed.service\n" if schedule.notify else ""
+    told = f"OnFailure={name}-failed.service\n" if notice else ""
     service = (
-        f"[Unit]\nDescription=Friction reports of {_unit_text(str(schedule.drop))}\n{told}\n"
-        f"[Service]\nType=oneshot\nExecStart={' '.join(map(_unit_quoted, schedule.command))}\n"
+        f"[Unit]\n{build}\n{told}\n"
+        f"[Service]\nType=oneshot\nExecStart={' '.join(map(_unit_quoted, command))}\n"
         f"SuccessExitStatus={LEFT_OR_SET_ASIDE}\nNice=10\nTimeoutStartSec=12h\n"
     )
     timer = (
         f"[Unit]\nDescription=Friction reports every day\n\n"
-        f"[Timer]\nOnCalendar=*-*-* {schedule.hour:02d}:{schedule.minute:02d}:00\nPersistent=true\n\n"
+        f"[Timer]\nOnCalendar=*-*-* {at}:00\nPersistent=true\n\n"
         "[Install]\nWantedBy=timers.target\n"
     )
     found = {f"{name}.service": service, f"{name}.timer": timer}
-    if schedule.notify:
+    if notice:
         # the command gets the unit's name as $1 and its last lines on standard input
         hook = 'journalctl --user -u "$1" -n 40 --no-pager | /bin/sh -c "$2" sh "$1"'
-        words = ["/bin/sh", "-c", hook, "sh", f"{name}.service", schedule.notify]
+        words = ["/bin/sh", "-c", hook, "sh", f"{name}.service", notice]
         found[f"{name}-failed.service"] = (
             f"[Unit]\nDescription=Notice that {name} failed\n\n"
             f"[Service]\nType=oneshot\nExecStart={' '.join(map(_unit_quoted, words))}\n"
@@ -128,14 +128,12 @@ def _unit_quoted(word: str) -> str:
     return f'"{escaped}"'
 
 
-def cron_line(schedule: Schedule) -> str:
-    """One line for `crontab -e`; the notice gets the build's last lines on standard input."""
-    log = schedule.site / ".tribo" / "cron.log"
-    build = f"mkdir -p {_shell(log.parent)}; {shlex.join(schedule.command)} > {_shell(log)} 2>&1; s=$?"
-    told = f"tail -n 40 {_shell(log)} | /bin/sh -c {shlex.quote(schedule.notify)} sh {schedule.name}"
-    notice = told if schedule.notify else "exit $s"
-    line = f"{build}; case $s in 0|3|75) ;; *) {notice};; esac"
-    return f"{schedule.minute} {schedule.hour} * * * {_for_cron(line)}\n"
+def _build_and_tell(name: str, site: Path, command: Sequence[str], notice: str) -> str:
+    """A build for the shell; the notice of a failure gets its last lines on standard input."""
+    log = site / ".tribo" / "cron.log"
+    folder, file = shlex.quote(str(log.parent)), shlex.quote(str(log))
+    told = f"tail -n 40 {file} | /bin/sh -c {shlex.quote(notice)} sh {name}" if notice else "exit $s"
+    return f"mkdir -p {folder}; {shlex.join(command)} > {file} 2>&1; s=$?; case $s in 0|3|75) ;; *) {told};; esac"
 
 
 def _for_cron(line: str) -> str:
@@ -147,10 +145,6 @@ def _for_cron(line: str) -> str:
     if r"\%" not in line:
         return line.replace("%", r"\%")
     return "/bin/sh -c " + shlex.quote(line).replace("%", r"''\%")
-
-
-def _shell(path: Path) -> str:
-    return shlex.quote(str(path))
 
 
 def in_words(texts: Mapping[str, str]) -> str:

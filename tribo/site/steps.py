@@ -107,7 +107,7 @@ def steps_of(cells: Iterable[str], by_cell: bool) -> list[str]:
     return ["fit", "calibrate", *(f"simulate-{cell}" for cell in cells), "diagnose", "report"]
 
 
-def due_steps(state: Path, ready: Mapping[str, Any], digests: Mapping[str, str], by_cell: bool) -> list[Step]:
+def due_steps(state: Path, ready: Mapping[str, Any], by_cell: bool) -> list[Step]:
     """The steps whose records are missing or are of other contents, options or sources, and those after them."""
     due = []
     for campaign, inputs in ready.items():
@@ -117,7 +117,7 @@ def due_steps(state: Path, ready: Mapping[str, Any], digests: Mapping[str, str],
             needed = [r for r in runs if not (name.startswith("simulate-") and r.startswith("simulate-"))]
             if record is None:
                 why = "not finished before"
-            elif record["digest"] != digests[campaign]:
+            elif record["digest"] != inputs["digest"]:
                 why = "contents of its inputs or its options changed"
             elif needed:
                 why = "an earlier step runs again"
@@ -128,8 +128,13 @@ def due_steps(state: Path, ready: Mapping[str, Any], digests: Mapping[str, str],
     return due
 
 
-def inputs_of(found: Iterable[Dropped], folder: Path) -> tuple[tuple[Dropped, ...], dict[str, dict[str, Any]]]:
+def inputs_of(
+    found: Iterable[Dropped], folder: Path, made_with: str = ""
+) -> tuple[tuple[Dropped, ...], dict[str, dict[str, Any]]]:
     """The campaigns, and the inputs of the steps of each that can be built, by name.
+
+    ``digest`` of the inputs is what every step of the campaign is made from, as one text: the contents of its files,
+    and ``made_with``, the sources of tribo and the options.
 
     A campaign that the system cannot read now is refused with path and cause; the next build tries it again. What was
     listed is kept in ``folder``, a file for each campaign, until the campaign changes.
@@ -142,17 +147,13 @@ def inputs_of(found: Iterable[Dropped], folder: Path) -> tuple[tuple[Dropped, ..
             except CampaignError as why:
                 campaigns.append(replace(campaign, refused=tuple(map(str, why.problems))))
                 continue
-            inputs[campaign.name] = _inputs(campaign, samples, cells)
+            overrides = ["--overrides", str(campaign.overrides)] if campaign.overrides else []
+            inputs[campaign.name] = {
+                "path": str(campaign.path), "digest": f"{campaign.digest} {made_with}", "samples": samples,
+                "cells": cells, "files": f"inputs/{campaign.name}.json", "overrides": shlex.join(overrides),
+            }  # fmt: skip
         campaigns.append(campaign)
     return tuple(campaigns), inputs
-
-
-def _inputs(campaign: Dropped, samples: list[str], cells: list[str]) -> dict[str, Any]:
-    return {
-        "path": str(campaign.path), "digest": campaign.digest, "samples": samples, "cells": cells,
-        "files": f"inputs/{campaign.name}.json",
-        "overrides": shlex.join(["--overrides", str(campaign.overrides)]) if campaign.overrides else "",
-    }  # fmt: skip
 
 
 def _listed(campaign: Dropped, folder: Path) -> tuple[list[str], list[str]]:
