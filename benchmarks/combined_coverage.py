@@ -17,15 +17,14 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.stats import t
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from interval_coverage import AREA_M2, STANDARD, Design, campaign, laws
 
 from tribo.fitting import fit_samples, uncertainty_budget
-from tribo.fitting.budget import DEFAULTS, PRESSURE_PA, PRIOR_DOF, Budget, partly_pooled
+from tribo.fitting.budget import DEFAULTS, PRESSURE_PA, PRIOR_DOF, partly_pooled
 from tribo.fitting.linear import sample_rows
-from tribo.records import STANDARD_GRAVITY
+from tribo.records import STANDARD_GRAVITY, LawFit
 
 NUMBERS = ("mu", "tau0_kPa", "T_N")
 LUCKY = 0.1
@@ -95,12 +94,12 @@ def measured(design: Design, instrument: Mapping[str, float], rng: np.random.Gen
     return table
 
 
-def budgets(table: pd.DataFrame, instrument: Mapping[str, float], prior_dof: float) -> list[Budget]:
-    """The budgets of one campaign; ``prior_dof`` of zero leaves every sample its own scatter."""
+def budgets(table: pd.DataFrame, instrument: Mapping[str, float], prior_dof: float) -> list[LawFit]:
+    """The combined fits of one campaign; ``prior_dof`` of zero leaves every sample its own scatter."""
     fits = fit_samples(table, "static", AREA_M2)
     if prior_dof:
         fits = partly_pooled(fits, {r.sample: r for r in sample_rows(table, "static")}, prior_dof)
-    return [uncertainty_budget(table, fit, dict(instrument)) for fit in fits]
+    return [uncertainty_budget(table, fit, dict(instrument))[0] for fit in fits]
 
 
 def truth(law: tuple[float, float]) -> np.ndarray:
@@ -109,14 +108,15 @@ def truth(law: tuple[float, float]) -> np.ndarray:
     return np.array([mu, tau0_Pa / 1e3, (mu * PRESSURE_PA + tau0_Pa) * AREA_M2])
 
 
-def judged(budget: Budget, law: tuple[float, float]) -> dict[str, np.ndarray | float]:
+def judged(fit: LawFit, law: tuple[float, float]) -> dict[str, np.ndarray | float]:
     """Whether the combined interval, and that of the fit alone, hold the law; the scatter of T over the specimens."""
-    found, true = np.array([budget.value(n) for n in NUMBERS]), truth(law)
-    half = np.array([budget.expanded_uncertainty(n) for n in NUMBERS])
-    fit = budget.fit
-    own_u = np.array([fit.standard_uncertainty("mu"), fit.standard_uncertainty("tau0_Pa") / 1e3,
-                      float(fit.force_u_N(PRESSURE_PA * AREA_M2))])  # fmt: skip
-    alone = t.ppf(0.975, fit.dof) * own_u
+    load_N = PRESSURE_PA * AREA_M2
+    found, true = np.array([fit.mu, fit.tau0_Pa / 1e3, float(fit.force_N(load_N))]), truth(law)
+    half, alone = (
+        np.array([np.diff(f.interval("mu"))[0] / 2, np.diff(f.interval("tau0_Pa"))[0] / 2e3,
+                  float(f.force_half_width_N(load_N)[0])])
+        for f in (fit, fit.by_itself)
+    )  # fmt: skip
     forces = [(v[0] * PRESSURE_PA + v[1]) * AREA_M2 for v in fit.specimens.values()]
     return {
         "combined": np.abs(found - true) <= half, "type A": np.abs(found - true) <= alone,
@@ -128,7 +128,7 @@ def coverage(design: str, instrument: str, campaigns: int, seed: int, prior_dof:
     """One row per class of samples and interval: share (percent) that holds mu, tau0 and T."""
     d, stated = DESIGNS[design], INSTRUMENTS[instrument]
     rng, true = np.random.default_rng([seed, *design.encode(), *instrument.encode()]), laws(DESIGNS[design].laws)
-    found = [judged(b, true[b.fit.sample]) | {"sample": b.fit.sample} for _ in range(campaigns)
+    found = [judged(b, true[b.sample]) | {"sample": b.sample} for _ in range(campaigns)
              for b in budgets(measured(d, stated, rng), stated, prior_dof)]  # fmt: skip
     scatter = np.array([f["scatter"] for f in found])
     classes = {"all": np.ones(len(found), bool), "alike by luck": scatter <= np.quantile(scatter, LUCKY)}

@@ -8,7 +8,6 @@ writes ``kept_fits.json`` anew. Do so where a change of a fit is meant, and say 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from kept_numbers import scatter, write
 from other_fits import fit_errors_in_both, fit_power_law, pool_specimen_scatter
 
 from tribo.fitting import fit_samples, fit_three_term, power_of_campaign, uncertainty_budget
-from tribo.fitting.assessment import outlying_pulls, outlying_specimens
+from tribo.fitting.assessment import outlying_pulls, outlying_sentences, outlying_specimens, power_sentences
 from tribo.fitting.differences import paired_differences, smallest_difference
 from tribo.fitting.linear import WEIGHTS, repeat_scatter, sample_rows
 from tribo.records import REGIMES, LawFit, Regime
@@ -95,25 +94,40 @@ def judged(table: pd.DataFrame, regime: Regime) -> dict[str, Any]:
     fits = fit_samples(table, regime, AREA)
     samples = tuple(rows for rows in sample_rows(table, regime) if len(rows.specimens) > 1)
     whole = [fit for fit in fits if np.isfinite(fit.covariance).all()]
-    few, many = (power_of_campaign(table, regime, AREA, wanted_pct=wanted) for wanted in (60.0, 10.0))
+    power = pd.concat([power_of_campaign(table, regime, AREA, wanted_pct=wanted) for wanted in (60.0, 10.0)])
+    pulls, specimens = (look(table, regime, AREA) for look in (outlying_pulls, outlying_specimens))
+    budgets = [
+        (load_N, uncertainty_budget(table, fit, instrument, load_N=load_N, **signal))
+        for fit in whole
+        for load_N, instrument, signal in (
+            (10e3 * AREA, INSTRUMENT, {"rise_N_per_s": 1.5, "sampling_rate_Hz": 50.0}), (4e3 * AREA, {}, {}),
+        )
+    ]  # fmt: skip
     return {
-        "repeats": vars(repeat_scatter(samples)),
-        "outlying": [[asdict(o), o.text()] for o in outlying_pulls(table, regime, AREA)],
-        "outlying specimens": [[asdict(o), o.text()] for o in outlying_specimens(table, regime, AREA)],
-        "power": [[asdict(p), p.text()] for p in (*few, *many)],
-        "paired": [[asdict(d), d.text()] for d in paired_differences(fits)],
+        "repeats": dict(zip(("constant_N", "share", "dof"), repeat_scatter(samples) or (), strict=True)),
+        "outlying": said(pulls, outlying_sentences(pulls)),
+        "outlying specimens": said(specimens, outlying_sentences(specimens)),
+        "power": said(power, power_sentences(power)),
+        "paired": paired_differences(fits).to_dict("records"),
         "pooled": records(pool_specimen_scatter(fits)),
         "budgets": [
-            [b.table().to_dict("list"), b.notes,
-             [[b.effective_dof(n), b.expanded_uncertainty(n)] for n in BY]]
-            for fit in whole
-            for b in (uncertainty_budget(table, fit, INSTRUMENT, rise_N_per_s=1.5, sampling_rate_Hz=50.0),
-                      uncertainty_budget(table, fit, {}, load_N=4e3 * AREA))
+            [budget.to_dict("list"), budget.attrs["notes"], combined(fit, load_N)] for load_N, (fit, budget) in budgets
         ],
-    }  # fmt: skip
+    }
 
 
-BY = ("mu", "tau0_kPa", "T_N")
+def said(rows: pd.DataFrame, sentences: list[str]) -> list[Any]:
+    """Every row with its sentence; None where a number is missing."""
+    found = rows.astype(object).where(rows.notna(), None).to_dict("records")
+    return [[row, sentence] for row, sentence in zip(found, sentences, strict=True)]
+
+
+def combined(fit: LawFit, load_N: float) -> list[list[float]]:
+    """Degrees of freedom and half width of the 95 % interval of mu, tau0 in kPa, and T."""
+    mu, tau0_Pa = (np.diff(fit.interval(name))[0] / 2 for name in fit.parameters)
+    halves = (mu, tau0_Pa / 1e3, float(fit.force_half_width_N(load_N)[0]))
+    by = (*np.eye(2), np.array([load_N, AREA]))
+    return [[fit.effective_dof(row), width] for row, width in zip(by, halves, strict=True)]
 
 
 def records(fits: Iterable[LawFit]) -> list[Mapping[str, Any]]:

@@ -9,7 +9,7 @@ from other_fits import fit_power_law, pool_specimen_scatter
 
 from tribo.errors import FitError
 from tribo.fitting import fit_samples, repeat_scatter
-from tribo.fitting.linear import sample_rows, weights_of
+from tribo.fitting.linear import sample_rows, weights_by_repeats, weights_of
 from tribo.records import LawFit
 
 AREA = 55e-6
@@ -96,6 +96,6 @@ def test_the_scatter_of_repeats_is_a_share_of_the_force_in_any_unit() -> None:
         table = pd.DataFrame({"sample": "F", "specimen": "F1", "normal_load_N": load, "static_N": scale * force})
         scatter = repeat_scatter(sample_rows(table, "static"))
         assert scatter is not None
-        found.append(scatter.variance(np.array([6.0 * scale]))[0] / scale**2)
+        found.append(1 / weights_by_repeats(np.array([6.0 * scale]), scatter)[0] / scale**2)
     assert found[1] == pytest.approx(found[0])
     assert np.sqrt(found[0]) / 6.0 == pytest.approx(0.05, rel=0.25)

@@ -16,6 +16,7 @@ from support.sled import SledLaw
 
 from tribo.campaign import load_campaign
 from tribo.fitting import campaign_budgets, fit_samples, fit_three_term, power_of_campaign
+from tribo.fitting.budget import PRESSURE_PA
 from tribo.records import Ingested, LawFit, Regime
 from tribo.stages import ingest
 
@@ -138,15 +139,15 @@ def test_every_fit_of_a_campaign_gets_a_budget_with_the_clip_from_its_own_traces
     fits = tuple(f for r in ("static", "sliding") for f in fit_samples(ingested.table(), r, area))
     budgets = campaign_budgets(ingested, fits)
     assert len(budgets) == len(fits) == 12
-    for budget in budgets:
-        clip = [c for c in budget.components if c.name == "sampling clip"]
-        assert len(clip) == (budget.fit.regime == "static")
-        assert all(0 < c.u["T_N"] < 0.05 * budget.value("T_N") for c in clip)
-        assert np.isfinite(budget.expanded_uncertainty("mu"))
+    for fit, budget in budgets:
+        clip = budget.loc[budget["component"] == "sampling clip", "u_T_N"]
+        assert len(clip) == (fit.regime == "static")
+        assert clip.between(0, 0.05 * float(fit.force_N(PRESSURE_PA * area)), inclusive="neither").all()
+        assert np.isfinite(fit.interval("mu")).all()
 
 
 def test_the_power_of_a_campaign_follows_from_its_own_table(read: Read) -> None:
     ingested = read("bluehill")
     found = power_of_campaign(ingested.table(), "static", ingested.campaign.nominal_area_m2)
-    assert [p.number for p in found] == ["mu", "tau0_kPa", "T_N"]
-    assert all(5 < p.smallest_difference_pct < 100 for p in found)
+    assert list(found["number"]) == ["mu", "tau0_kPa", "T_N"]
+    assert found["smallest_difference_pct"].between(5, 100).all()

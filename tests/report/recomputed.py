@@ -6,7 +6,7 @@ Every check takes away what it has recomputed from the text of the page; whateve
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from html.parser import HTMLParser
@@ -17,6 +17,8 @@ import pandas as pd
 
 from tribo.comparison.study_lookup import load_levels
 from tribo.fitting import outlying_pulls, outlying_specimens, power_of_campaign
+from tribo.fitting.assessment import outlying_sentences, power_sentences
+from tribo.records import REGIMES
 from tribo.wording.study_sentences import FLAGS
 
 WORDS = {"p", "li", "td", "th", "dt", "dd", "h3", "caption"}
@@ -269,23 +271,23 @@ def detectable(w: Written, text: str, context: dict[str, str]) -> str:
         for printed in sizes_here:
             w.equal("smallest effect", printed, printed if printed in sizes else "none of power.csv")
         text = head + re.sub(r"\d+ %(?=[,.])", "", tail)
-    power = {p.text() for regime in ("static", "sliding") for p in _power(w, regime)}
+    power = [
+        said
+        for regime in REGIMES
+        for said in power_sentences(power_of_campaign(w.used, regime, w.area_m2))  # type: ignore[arg-type]
+    ]
     if "would be detected with probability" in text:
         w.equal("power", text, text if text in power else "another sentence")
         return ""
-    outlying = {o.text() for regime in ("static", "sliding") for o in _outlying(w, regime)}
+    outlying = [
+        said
+        for regime in REGIMES
+        for search in (outlying_pulls, outlying_specimens)
+        for said in outlying_sentences(search(w.used, regime, w.area_m2))
+    ]
     if text and text in outlying:
         return w.equal("outlying", text, text)
     return text
-
-
-def _power(w: Written, regime: str) -> Iterator[object]:
-    yield from power_of_campaign(w.used, regime, w.area_m2)  # type: ignore[arg-type]
-
-
-def _outlying(w: Written, regime: str) -> Iterator[object]:
-    for look in (outlying_pulls, outlying_specimens):
-        yield from look(w.used, regime, w.area_m2)  # type: ignore[arg-type]
 
 
 def odd_pulls(w: Written) -> None:

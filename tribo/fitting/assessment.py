@@ -6,8 +6,7 @@ Outlying pulls and specimens are found by robust fits. They are reported and nev
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,7 +15,7 @@ from tribo.errors import FitError
 from tribo.fitting.alternatives import compared_laws, fit_three_term, mixed_model
 from tribo.fitting.budget import campaign_budgets
 from tribo.fitting.dependence import dependence
-from tribo.fitting.differences import differences_table, paired_differences, power_of_campaign
+from tribo.fitting.differences import MOST_SPECIMENS, paired_differences, power_of_campaign
 from tribo.fitting.linear import (
     WEIGHTS,
     Rows,
@@ -24,6 +23,7 @@ from tribo.fitting.linear import (
     least_squares,
     repeat_scatter,
     sample_rows,
+    weights_by_repeats,
     weights_of,
 )
 from tribo.fitting.samples import fit_samples
@@ -38,16 +38,17 @@ def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> di
     """The results that complete the fits of a study, by the name of their field in ``Study``."""
     table, area = ingested.table(), ingested.campaign.nominal_area_m2
     budgets = campaign_budgets(ingested, fits, weights=weights) if area is not None and fits else ()
-    parts = [b.table().assign(sample=b.fit.sample, regime=b.fit.regime) for b in budgets]
+    parts = [budget.assign(sample=fit.sample, regime=fit.regime) for fit, budget in budgets]
     power: list[str] = []
     outlying: list[str] = []
     for regime in REGIMES:
         if area is not None:
             with suppress(FitError):
-                power += [p.text() for p in power_of_campaign(table, regime, area, weights=weights)]
+                power += power_sentences(power_of_campaign(table, regime, area, weights=weights))
         for search in (outlying_pulls, outlying_specimens):
             with suppress(FitError):
-                outlying += [found.text() for found in search(table, regime, area)]
+                outlying += outlying_sentences(search(table, regime, area))
+    paired = paired_differences(fits)
     return {
         "other_fits": _other_fits(ingested, fits, weights),
         "budget": pd.concat(parts, ignore_index=True) if parts else None,
@@ -55,7 +56,7 @@ def assessment(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> di
         "outlying": tuple(outlying),
         "laws": compared_laws(table),
         "dependence": dependence(ingested),
-        "differences": differences_table(paired) if (paired := paired_differences(fits)) else None,
+        "differences": paired if len(paired) else None,
     }
 
 
@@ -77,89 +78,90 @@ def _other_fits(ingested: Ingested, fits: tuple[LawFit, ...], weights: str) -> t
     return tuple(found)
 
 
-@dataclass(frozen=True)
-class Outlying:
-    """An outlying pull or specimen: deviation ``deviation_pct`` of T, ``score`` robust standard deviations.
-
-    ``name`` is the test_id of a pull or the specimen; ``limit`` the score that chance exceeds in 5 % of
-    campaigns, all comparisons counted.
-    """
-
-    kind: Literal["pull", "specimen"]
-    name: str
-    sample: str
-    regime: Regime
-    deviation_pct: float
-    score: float
-    limit: float
-
-    def text(self) -> str:
-        """One sentence."""
-        where = "above" if self.deviation_pct > 0 else "below"
-        siblings = "the line of its specimen" if self.kind == "pull" else "the other specimens of its sample"
-        return (
-            f"{self.kind} {self.name} ({self.sample}, {self.regime}): {abs(self.deviation_pct):.0f} % "
-            f"{where} {siblings}, {self.score:.1f} robust standard deviations (limit {self.limit:.1f})"
+def power_sentences(power: pd.DataFrame) -> list[str]:
+    """What :func:`tribo.fitting.power_of_campaign` found, a sentence for each number."""
+    found = []
+    for row in power.to_dict("records"):
+        number = {"mu": "mu", "tau0_kPa": "tau0", "T_N": f"T at {row['pressure_Pa'] / 1e3:g} kPa"}[row["number"]]
+        specimens, repeats = row["specimens_needed"], row["repeats_needed"]
+        enough = f"more than {MOST_SPECIMENS}" if pd.isna(specimens) else f"{specimens}"
+        more = "; more repeats alone are not sufficient" if pd.isna(repeats) else f" or {repeats} repeats at each load"
+        found.append(
+            f"{row['regime']} {number}: a difference of {row['smallest_difference_pct']:.0f} % between two samples "
+            f"would be detected with probability {row['power']:g} at significance level {row['level']:g}. Detecting "
+            f"{row['wanted_pct']:g} % requires {enough} specimens per sample{more}."
         )
+    return found
 
 
-def outlying_pulls(table: pd.DataFrame, regime: Regime, nominal_area_m2: float | None) -> tuple[Outlying, ...]:
-    """Pulls far from the robust line (Tukey's biweight) of their specimen, furthest first.
+OUTLYING = ["kind", "name", "sample", "regime", "deviation_pct", "score", "limit"]
 
-    Deviations are judged against the scatter of repeats as a function of force (:mod:`tribo.fitting.linear`), the
-    same for all samples. Specimens with fewer than five pulls are skipped: they determine no line.
+
+def outlying_sentences(outlying: pd.DataFrame) -> list[str]:
+    """What :func:`outlying_pulls` or :func:`outlying_specimens` found, a sentence each."""
+    siblings = {"pull": "the line of its specimen", "specimen": "the other specimens of its sample"}
+    return [
+        f"{o['kind']} {o['name']} ({o['sample']}, {o['regime']}): {abs(o['deviation_pct']):.0f} % "
+        f"{'above' if o['deviation_pct'] > 0 else 'below'} {siblings[o['kind']]}, {o['score']:.1f} robust standard "
+        f"deviations (limit {o['limit']:.1f})"
+        for o in outlying.to_dict("records")
+    ]
+
+
+def outlying_pulls(table: pd.DataFrame, regime: Regime, nominal_area_m2: float | None) -> pd.DataFrame:
+    """Pulls far from the robust line (Tukey's biweight) of their specimen, one row each, furthest first.
+
+    ``name`` is the test_id, ``deviation_pct`` that of T from the line, ``score`` the same in robust standard
+    deviations, and ``limit`` the score that chance exceeds in 5 % of campaigns, all comparisons counted. Deviations are
+    judged against the scatter of repeats as a function of force (:mod:`tribo.fitting.linear`), the same for all
+    samples. Specimens with fewer than five pulls are skipped: they determine no line.
     """
     samples = [rows for rows in sample_rows(table, regime) if len(np.unique(rows.load_N)) > 1]
     scatter = repeat_scatter(tuple(samples)) if samples else None
     lines = []
     for rows in samples:
         expected = expected_force_N(rows, nominal_area_m2)
-        weight = expected**-2.0 if scatter is None else 1 / scatter.variance(expected)
+        weight = weights_by_repeats(expected, scatter)
         for name in rows.specimens:
             keep = rows.specimen == name
             if keep.sum() >= 5 and len(np.unique(rows.load_N[keep])) > 1:
                 lines.append(_robust_line(rows.take(keep), weight[keep], nominal_area_m2))
     if not lines:
-        return ()
+        return pd.DataFrame(columns=OUTLYING)
     bulk = np.concatenate([residual / np.sqrt(1 - leverage) for _, _, residual, leverage in lines])
     scale = _MEDIAN_TO_SD * float(np.median(np.abs(bulk)))
     if scale == 0:
-        return ()
+        return pd.DataFrame(columns=OUTLYING)
     limit = _limit(len(bulk), float(sum((1 - leverage).sum() for *_, leverage in lines)))
     found = []
     for rows, force_N, residual, leverage in lines:
         # a far pull has next to no weight in its line: its residual is that of a pull left out, wider by 1/(1 - h)
         score = np.abs(residual) * np.sqrt(1 - leverage) / scale
         found += [
-            Outlying(
+            (
                 "pull", str(rows.test_id[k]), rows.sample, regime,
                 100 * float(rows.force_N[k] / force_N[k] - 1), float(score[k]), limit,
             )
             for k in np.flatnonzero(score > limit)
         ]  # fmt: skip
-    return tuple(sorted(found, key=lambda o: -o.score))
+    return pd.DataFrame(found, columns=OUTLYING).sort_values("score", ascending=False, kind="stable", ignore_index=True)
 
 
-def outlying_specimens(table: pd.DataFrame, regime: Regime, nominal_area_m2: float | None) -> tuple[Outlying, ...]:
-    """Specimens whose force deviates from that of the other specimens of their sample, furthest first.
+def outlying_specimens(table: pd.DataFrame, regime: Regime, nominal_area_m2: float | None) -> pd.DataFrame:
+    """Specimens whose force deviates from that of the other specimens of their sample, one row each, furthest first.
 
-    Judged at the lowest and the highest load of the campaign by a robust fit (Huber) of log T on the sample;
-    needs samples of three specimens or more. With three, one that differs is found only if the specimens of
-    the other samples agree well among themselves.
+    Columns are those of :func:`outlying_pulls`. Judged at the lowest and the highest load of the campaign by a robust
+    fit (Huber) of log T on the sample; needs samples of three specimens or more. With three, one that differs is found
+    only if the specimens of the other samples agree well among themselves.
     """
     names, samples, forces = _specimen_forces(table, regime, nominal_area_m2)
-    if len(names) == 0:
-        return ()
-    found = [o for column in np.log(forces).T for o in _apart(names, samples, column, regime, forces.shape[1])]
-    worst: dict[str, Outlying] = {}
-    for o in sorted(found, key=lambda o: o.score):
-        worst[f"{o.sample}/{o.name}"] = o
-    return tuple(sorted(worst.values(), key=lambda o: -o.score))
+    columns = np.log(forces).T if len(names) else ()
+    found = [row for column in columns for row in _apart(names, samples, column, regime, len(columns))]
+    table = pd.DataFrame(found, columns=OUTLYING).sort_values("score", ascending=False, kind="stable")
+    return table.drop_duplicates(["sample", "name"], ignore_index=True)
 
 
-def _robust_line(
-    rows: Rows, weight: FloatArray, area: float | None
-) -> tuple[Rows, FloatArray, FloatArray, FloatArray]:
+def _robust_line(rows: Rows, weight: FloatArray, area: float | None) -> tuple[Rows, FloatArray, FloatArray, FloatArray]:
     """Robust line of one specimen: its pulls, fitted force, weighted residual and leverage, arrays (n,)."""
     from statsmodels.robust.norms import TukeyBiweight
     from statsmodels.robust.robust_linear_model import RLM
@@ -204,7 +206,8 @@ def _specimen_forces(
 
 def _apart(
     names: np.ndarray, samples: np.ndarray, log_force: FloatArray, regime: Regime, comparisons: int
-) -> list[Outlying]:
+) -> list[tuple[object, ...]]:
+    """Rows of OUTLYING: specimens whose log force (g,) is far from that of their sample."""
     from statsmodels.robust.norms import HuberT
     from statsmodels.robust.robust_linear_model import RLM
 
@@ -220,7 +223,7 @@ def _apart(
     score = np.abs(residual) / (scale * np.sqrt(1 - leverage))
     limit = _limit(comparisons * len(names), dof)
     return [
-        Outlying(
+        (
             "specimen", str(names[k]), str(samples[k]), regime,
             100 * float(np.expm1(residual[k])), float(score[k]), limit,
         )

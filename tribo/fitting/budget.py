@@ -15,7 +15,7 @@ They are taken from ``[instrument]`` of campaign.toml or from the stated default
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,93 +44,6 @@ DEFAULTS: dict[str, tuple[float, str]] = {  # used where campaign.toml gives non
 }
 
 
-@dataclass(frozen=True)
-class Component:
-    """One source of uncertainty: the standard uncertainty it gives each number, type, dof and origin."""
-
-    name: str
-    kind: str
-    u: Mapping[str, float]
-    dof: float
-    origin: str
-
-
-@dataclass(frozen=True)
-class Budget:
-    """All components of one fitted law and their combination, for mu, tau0_kPa (T0_N without an area) and T_N.
-
-    ``T_N`` is the friction force at ``load_N``. ``covariance`` (2, 2) of the parameters is that of the fit plus every
-    type B component. The type A rows share out the variance of the fit: what single readings and repeats explain,
-    never more than there is, and the rest to the specimens.
-    """
-
-    fit: LawFit
-    components: tuple[Component, ...]
-    covariance: FloatArray
-    load_N: float
-    notes: tuple[str, ...] = ()
-
-    def value(self, number: str) -> float:
-        """The number itself."""
-        return float(sensitivities(self.fit, self.load_N)[number] @ self.fit.values)
-
-    def standard_uncertainty(self, number: str) -> float:
-        """Combined standard uncertainty."""
-        return _u(self.covariance, sensitivities(self.fit, self.load_N)[number])
-
-    def effective_dof(self, number: str) -> float:
-        """Welch and Satterthwaite (GUM, G.4): type B components have infinitely many."""
-        type_a = _u(self.fit.covariance, sensitivities(self.fit, self.load_N)[number])
-        if type_a == 0:
-            return float("inf")
-        return self.fit.dof * (self.standard_uncertainty(number) / type_a) ** 4
-
-    def expanded_uncertainty(self, number: str, level: float = 0.95) -> float:
-        """Half width of the interval at ``level``, by t of the effective degrees of freedom."""
-        from scipy.stats import t
-
-        factor = t.ppf(0.5 + level / 2, self.effective_dof(number))
-        return float(factor) * self.standard_uncertainty(number)
-
-    def share_pct(self, component: Component, number: str) -> float:
-        """Share of a component in the combined variance of a number."""
-        return 100 * (component.u[number] / self.standard_uncertainty(number)) ** 2
-
-    def dominant(self, number: str) -> Component:
-        """The component with the largest share in a number."""
-        return max(self.components, key=lambda component: component.u[number])
-
-    def combined(self) -> LawFit:
-        """The fit with the combined covariance, and the component that dominates each number."""
-        largest = {}
-        for number in sensitivities(self.fit, self.load_N):
-            top = self.dominant(number)
-            key = {"tau0_kPa": "tau0_Pa", "T_N": "T"}.get(number, number)
-            largest[key] = (top.name, self.share_pct(top, number))
-        return replace(
-            self.fit, covariance=self.covariance, type_a=self.fit.covariance, largest=largest, alone=self.fit.by_itself
-        )
-
-    def table(self) -> pd.DataFrame:
-        """One row per component and a last one "combined": type, dof, origin, u_NUMBER, share_pct_NUMBER."""
-        import pandas as pd
-
-        numbers = tuple(sensitivities(self.fit, self.load_N))
-        combined = {number: self.standard_uncertainty(number) for number in numbers}
-        last = Component("combined", "", combined, float("nan"), "")
-        return pd.DataFrame(
-            {
-                "component": c.name,
-                "type": c.kind,
-                **{f"u_{number}": c.u[number] for number in numbers},
-                **{f"share_pct_{number}": self.share_pct(c, number) for number in numbers},
-                "dof": c.dof,
-                "origin": c.origin,
-            }
-            for c in (*self.components, last)
-        )
-
-
 def combined_fits(ingested: Ingested, fits: tuple[LawFit, ...], *, weights: str = "relative") -> Fits:
     """The fits with their combined uncertainty; those without values as they are.
 
@@ -141,7 +54,7 @@ def combined_fits(ingested: Ingested, fits: tuple[LawFit, ...], *, weights: str 
     weights : the weights of these fits
     """
     budgets = campaign_budgets(ingested, fits, weights=weights) if fits else ()
-    combined = {(b.fit.sample, b.fit.regime): b.combined() for b in budgets}
+    combined = {(fit.sample, fit.regime): fit for fit, _ in budgets}
     return Fits(combined.get((fit.sample, fit.regime), fit) for fit in fits)
 
 
@@ -151,8 +64,8 @@ def campaign_budgets(
     *,
     weights: str = "relative",
     load_N: float | None = None,
-) -> tuple[Budget, ...]:
-    """Budgets of all ``fits`` that hold values, rise and sampling rate taken from pulls and traces.
+) -> tuple[tuple[LawFit, pd.DataFrame], ...]:
+    """:func:`uncertainty_budget` of all ``fits`` that hold values, rise and sampling rate from pulls and traces.
 
     The covariance of specimens is partly pooled over the samples first. T is judged at ``load_N``; where that is not
     given, at a pressure of 10 kPa, or without a nominal area at the middle load of the campaign.
@@ -195,8 +108,8 @@ def uncertainty_budget(
     rise_N_per_s: float = float("nan"),
     sampling_rate_Hz: float = float("nan"),
     load_N: float | None = None,
-) -> Budget:
-    """Budget of one fit of ``fit_samples(table, ..., weights=weights)``.
+) -> tuple[LawFit, pd.DataFrame]:
+    """One fit of ``fit_samples(table, ..., weights=weights)`` with its combined uncertainty, and the budget of that.
 
     Parameters
     ----------
@@ -209,11 +122,24 @@ def uncertainty_budget(
         rise/(2 f_s) = k v/(2 f_s), taken as rectangular about zero because it is not corrected.
     load_N : where T is judged; a pressure of 10 kPa where it is not given
 
+    Returns
+    -------
+    LawFit
+        ``covariance`` is that of the fit plus every type B component, ``type_a`` that of the fit; ``largest`` names the
+        component that dominates each number.
+    DataFrame
+        One row per component and a last one "combined": component, type, ``u_NUMBER`` and ``share_pct_NUMBER`` of mu,
+        tau0_kPa (T0_N without an area) and T_N at ``load_N``, dof, origin. The type A rows share out the variance of
+        the fit: what single readings and repeats explain, never more than there is, and the rest to the specimens.
+        ``attrs["notes"]`` says what could not be told apart or is left out.
+
     Raises
     ------
     FitError
         The fit is not of T over the load, or holds no values.
     """
+    import pandas as pd
+
     law = law_over_load(fit.nominal_area_m2).name
     if fit.law != law or not np.isfinite(fit.covariance).all():
         found = f"{fit.law}, sample {fit.sample}"
@@ -222,16 +148,35 @@ def uncertainty_budget(
     if load_N is None:
         load_N = PRESSURE_PA * fit.nominal_area_m2 if fit.nominal_area_m2 else float(np.median(rows.load_N))
     by = sensitivities(fit, load_N)
-    random, notes = _type_a(rows, fit, weights, by)
+    rows_a, notes = _type_a(rows, fit, weights, by)
     changes = _type_b(fit, instrument, rise_N_per_s, sampling_rate_Hz)
     if fit.regime == "static" and not np.isfinite(rise_N_per_s * sampling_rate_Hz):
         notes += ("component sampling clip left out: the rise before the peak or the sampling rate is not known",)
-    shared = tuple(
-        Component(name, "B", {k: abs(float(s @ change)) for k, s in by.items()}, float("inf"), origin)
+    rows_b = [
+        (name, "B", {k: abs(float(s @ change)) for k, s in by.items()}, float("inf"), origin)
         for name, change, origin in changes
+    ]
+    covariance = fit.covariance + sum((np.outer(change, change) for _, change, _ in changes), np.zeros((2, 2)))
+    combined = {number: _u(covariance, s) for number, s in by.items()}
+    components = [*rows_a, *rows_b, ("combined", "", combined, float("nan"), "")]
+    table_of_parts = pd.DataFrame(
+        {
+            "component": name,
+            "type": kind,
+            **{f"u_{number}": u[number] for number in by},
+            **{f"share_pct_{number}": 100 * (u[number] / combined[number]) ** 2 for number in by},
+            "dof": dof,
+            "origin": origin,
+        }
+        for name, kind, u, dof, origin in components
     )
-    common = sum((np.outer(change, change) for _, change, _ in changes), np.zeros((2, 2)))
-    return Budget(fit, (*random, *shared), fit.covariance + common, load_N, notes)
+    table_of_parts.attrs["notes"] = notes
+    largest = {}
+    for number, parameter in zip(by, (*fit.parameters, "T"), strict=True):
+        name, _, u, _, _ = max(components[:-1], key=lambda component: component[2][number])
+        largest[parameter] = (name, 100 * (u[number] / combined[number]) ** 2)
+    whole = replace(fit, covariance=covariance, type_a=fit.covariance, largest=largest, alone=fit.by_itself)
+    return whole, table_of_parts
 
 
 def sensitivities(fit: LawFit, load_N: float) -> dict[str, FloatArray]:
@@ -248,7 +193,8 @@ def _u(covariance: FloatArray, by: FloatArray) -> float:
 
 def _type_a(
     rows: Rows, fit: LawFit, weights: str, sensitivity: Mapping[str, FloatArray]
-) -> tuple[tuple[Component, ...], tuple[str, ...]]:
+) -> tuple[list[tuple[str, str, dict[str, float], float, str]], tuple[str, ...]]:
+    """(name, type, standard uncertainty of each number, dof, origin) of what the pulls show; and notes."""
     pulls, read, dof = _within(rows, fit, weights)
     u: dict[str, dict[str, float]] = {"specimens": {}, "repeats": {}, "reading": {}}
     capped = False
@@ -264,11 +210,11 @@ def _type_a(
         notes += ("the reading uncertainty of single traces is not known",)
     if capped and fit.n_specimens > 1:
         notes += ("specimens differ by less than the scatter of their repeats",)
-    parts = (
-        Component("specimens", "A", u["specimens"], fit.dof, f"{fit.n_specimens} specimens"),
-        Component("repeats", "A", u["repeats"], float(dof), f"scatter of {fit.n_tests} pulls about the fitted lines"),
-        Component("reading of the trace", "A", u["reading"], float("inf"), "noise within each trace"),
-    )
+    parts = [
+        ("specimens", "A", u["specimens"], fit.dof, f"{fit.n_specimens} specimens"),
+        ("repeats", "A", u["repeats"], float(dof), f"scatter of {fit.n_tests} pulls about the fitted lines"),
+        ("reading of the trace", "A", u["reading"], float("inf"), "noise within each trace"),
+    ]
     return parts, notes
 
 
@@ -304,31 +250,24 @@ def _type_b(
     # relative change of T by one standard uncertainty of the wire angle: T falls as 1/(cos f + mu sin f)
     slope = (mu * np.cos(angle) - np.sin(angle)) / (np.cos(angle) + mu * np.sin(angle))
     wire = float(slope * np.radians(settings["wire_angle_u_deg"]))
-    effects = [
+    relative_N = np.array([mu, 0.0]) * settings["normal_load_u_percent"] / 100
+    changes = []
+    for name, change, setting in (
         ("load cell, gain", gain * settings["load_cell_u_percent"] / 100, "load_cell_u_percent"),
         ("load cell, offset", as_adhesion * settings["load_cell_u_N"], "load_cell_u_N"),
         ("mass", as_adhesion * mu * mass_N, "mass_u_g"),
-        (
-            "normal load",
-            np.array([mu, 0.0]) * settings["normal_load_u_percent"] / 100,
-            "normal_load_u_percent",
-        ),
+        ("normal load", relative_N, "normal_load_u_percent"),
         ("nominal area", np.array([0.0, adhesion]) * settings["area_u_percent"] / 100, "area_u_percent"),
         ("wire angle", gain * wire, "wire_angle_u_deg"),
-    ]
-    changes = [(name, change, _origin(setting, instrument)) for name, change, setting in effects]
+    ):
+        value, reason = DEFAULTS[setting]
+        stated = f"campaign.toml: {setting} = {instrument[setting]:g}" if setting in instrument else ""
+        changes.append((name, change, stated or f"default {setting} = {value:g}: {reason}"))
     low_N = rise_N_per_s / (2 * sampling_rate_Hz)
     if fit.regime == "static" and np.isfinite(low_N):
         origin = f"rise of {rise_N_per_s:.3g} N/s sampled at {sampling_rate_Hz:.3g} Hz"
         changes.append(("sampling clip", as_adhesion * low_N / np.sqrt(3), origin))
     return changes
-
-
-def _origin(setting: str, instrument: Mapping[str, float]) -> str:
-    if setting in instrument:
-        return f"campaign.toml: {setting} = {instrument[setting]:g}"
-    value, reason = DEFAULTS[setting]
-    return f"default {setting} = {value:g}: {reason}"
 
 
 def partly_pooled(

@@ -94,26 +94,24 @@ def sample_rows(table: pd.DataFrame, regime: Regime) -> tuple[Rows, ...]:
     load = table["normal_load_N"].to_numpy(float)
     ids = (table["test_id"] if "test_id" in table else table.index.to_series()).astype(str).to_numpy(str)
     if len(bad := np.flatnonzero(~np.isfinite(load) | (load < 0))):
-        raise FitError([_bad_load(str(ids[k]), float(load[k])) for k in bad])
+        raise FitError(
+            Problem(
+                "bad_load", "not a possible normal load", column="normal_load_N",
+                found=f"{load[k]:g}", allowed="0 N or more", test_id=str(ids[k]),
+            )
+            for k in bad
+        )  # fmt: skip
     force = table[f"{regime}_N"].to_numpy(float)
     u_name = f"{regime}_u_N"
     u = table[u_name].to_numpy(float) if u_name in table else np.full(len(table), np.nan)
     sample = table["sample"].astype(str).to_numpy(str)
     everything = Rows("", load, force, u, table["specimen"].fillna("").astype(str).to_numpy(str), ids)
-    return tuple(_one_sample(everything, sample == name, str(name)) for name in np.unique(sample))
-
-
-def _one_sample(everything: Rows, own: NDArray[np.bool_], name: str) -> Rows:
-    found = np.isfinite(everything.force_N)
-    kept = everything.take(own & found)
-    return replace(kept, sample=name, n_missing=int((own & ~found).sum()))
-
-
-def _bad_load(test_id: str, found: float) -> Problem:
-    return Problem(
-        "bad_load", "not a possible normal load", column="normal_load_N",
-        found=f"{found:g}", allowed="0 N or more", test_id=test_id,
-    )  # fmt: skip
+    found = np.isfinite(force)
+    return tuple(
+        replace(everything.take(own & found), sample=str(name), n_missing=int((own & ~found).sum()))
+        for name in np.unique(sample)
+        for own in [sample == name]
+    )
 
 
 @dataclass(frozen=True)
@@ -175,22 +173,10 @@ _ROUNDING = 1e-24  # relative variance that rounding alone gives
 _TOO_FAR = 1e-3  # a cell of repeats that chance gives so rarely holds an outlier and does not count
 
 
-@dataclass(frozen=True)
-class RepeatScatter:
-    """Standard deviation of repeats: ``constant_N`` and ``share`` of T added in squares; dof of the estimate."""
+def repeat_scatter(samples: tuple[Rows, ...]) -> tuple[float, float, int] | None:
+    """Scatter of the repeats (same specimen, same load) of ``samples``; None without any.
 
-    constant_N: float
-    share: float
-    dof: int
-
-    def variance(self, force_N: FloatArray) -> FloatArray:
-        """Variance of a pull whose expected force is ``force_N``, in N^2."""
-        return np.asarray(self.constant_N**2 + (self.share * force_N) ** 2)
-
-
-def repeat_scatter(samples: tuple[Rows, ...]) -> RepeatScatter | None:
-    """Variance function of the repeats (same specimen, same load) of ``samples``; None without scatter.
-
+    Returns a standard deviation in N and one as a share of T, to be added in squares, and their degrees of freedom.
     Weighted least squares of the cell variances on the squared cell means, the weights their own expected
     scatter 2 sigma^4 / dof, both terms held at zero or above. Cells with too much scatter are left out.
     """
@@ -206,7 +192,15 @@ def repeat_scatter(samples: tuple[Rows, ...]) -> RepeatScatter | None:
         expected = terms[0] + terms[1] * mean**2
         keep = variance <= limit * expected
         terms = _not_negative(mean[keep] ** 2, variance[keep], dof[keep] / expected[keep] ** 2)
-    return RepeatScatter(float(np.sqrt(terms[0])), float(np.sqrt(terms[1])), int(dof[keep].sum()))
+    return float(np.sqrt(terms[0])), float(np.sqrt(terms[1])), int(dof[keep].sum())
+
+
+def weights_by_repeats(expected_N: FloatArray, scatter: tuple[float, float, int] | None) -> FloatArray:
+    """1 over the variance (n,) of pulls of these expected forces, by :func:`repeat_scatter`; without it, relative."""
+    if scatter is None:
+        return expected_N**-2.0
+    constant_N, share, _ = scatter
+    return np.asarray(1 / (constant_N**2 + (share * expected_N) ** 2))
 
 
 def _cells(rows: Rows) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -263,9 +257,7 @@ def weights_of(rows: Rows, nominal_area_m2: float | None, weights: str) -> Float
     if weights == "relative":
         return expected_force_N(rows, nominal_area_m2) ** -2.0
     if weights == "repeats":
-        expected = expected_force_N(rows, nominal_area_m2)
-        scatter = repeat_scatter((rows,))
-        return expected**-2.0 if scatter is None else 1 / scatter.variance(expected)
+        return weights_by_repeats(expected_force_N(rows, nominal_area_m2), repeat_scatter((rows,)))
     allowed = ", ".join(WEIGHTS)
     raise FitError(Problem("unknown_weights", "unknown weights", found=weights, allowed=allowed))
 
