@@ -14,6 +14,9 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check -c constraints.txt
+# The same packages in a tenth of the time. It does not read the settings of pip: pip installs where these are needed.
+UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python -c constraints.txt
+unexport PYTHONDONTWRITEBYTECODE  # without bytecode in .venv every process compiles all that it imports
 
 .PHONY: demo test lint types pytest docs links bench blind blind-laws blind-layers mutants release hashes audit torture clean
 
@@ -24,7 +27,8 @@ $(VENV)/.run: pyproject.toml constraints.txt
 
 $(VENV)/.dev: pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(PIP) -e '.[dev]'
+	$(PIP) uv
+	$(UV) -e '.[dev]' || $(PIP) -e '.[dev]'
 	touch $(VENV)/.run $@
 
 demo: $(VENV)/.run
