@@ -1,0 +1,100 @@
+"""What the diagnosis answers about a campaign of a virtual laboratory, as a row of plain values.
+
+The campaign goes the way of ``tribo diagnose``: causes, laws of what they leave, laws across patterns, sentences.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from tribo.diagnostics.diagnosis import Diagnosis, examine
+from tribo.diagnostics.verdict import Verdict
+from tribo.lawsearch.diagnosis_with_laws import with_law_across, with_laws
+from tribo.lawsearch.grammar import LOAD_TERM
+from tribo.lawsearch.model_choice import FoundLaw, centred
+from tribo.lawsearch.scoring import terms_of
+from tribo.records import Ingested
+from tribo.wording.verdict_sentences import worded
+
+Row = dict[str, Any]
+
+
+def diagnosed(ingested: Ingested, seed: int) -> Diagnosis:
+    """The diagnosis of a campaign with its sentences."""
+    d = with_law_across(with_laws(examine(ingested, seed=seed), seed=seed), seed=seed)
+    return replace(d, verdict=worded(d.verdict))
+
+
+def answer(v: Verdict) -> Row:
+    """All of a verdict that tables are made from."""
+    return {
+        "verdict": v.verdict,
+        "causes": [_cause(c) for c in v.causes],
+        "equivalent": [sorted(names) for names in v.equivalent],
+        "layers": [_layer(x) for x in v.layers],
+        "misfits": [
+            {"observable": m.observable, "sample": m.sample, "column": m.covariate, "p": _short(m.p_adjusted),
+             "effect": [_short(x) for x in (m.effect_percent, m.low, m.high)]}
+            for m in v.misfits
+        ],
+        "within_chance": getattr(v.shows, "within_chance", None),
+        "next_test": v.next_test.text if v.next_test else "",
+        "text": v.text,
+    }  # fmt: skip
+
+
+def _cause(c: Any) -> Row:
+    sizes = {name: [_short(e.low), _short(e.value), _short(e.high), e.unit] for name, e in c.parameters.items()}
+    return {"mechanism": c.mechanism, "choice": c.choice, "parameters": sizes, "text": c.text}
+
+
+def _layer(x: Any) -> Row:
+    """A layer without its sentence, which the text of the verdict repeats."""
+    sizes = {name: [_short(e.low), _short(e.value), _short(e.high), e.unit] for name, e in x.parameters.items()}
+    levels = {
+        str(name): [_short(e.low), _short(e.value), _short(e.high)]
+        for name, e in (getattr(x, "levels", None) or {}).items()
+    }
+    row = {
+        "kind": x.kind, "name": x.name, "samples": list(x.samples), "regimes": list(x.regimes), "choice": x.choice,
+        "p": _short(x.p_adjusted), "effect": _short(x.effect_percent), "low": _short(x.low), "high": _short(x.high),
+        "formula": x.formula, "tied_with": list(x.tied_with), "parameters": sizes,
+    }  # fmt: skip
+    return row | ({"levels": levels} if levels else {})
+
+
+def _short(x: float) -> float | None:
+    return float(f"{x:.5g}") if math.isfinite(x) else None
+
+
+def values_at_levels(d: Diagnosis, bench: Any, column: str, change: np.ndarray) -> list[list[Any]]:
+    """Of the laws of a column of few values: level, regime, hidden change, its 90 % band, all of ln T.
+
+    Each is the mean over the tests at the level on which the law acts, beyond what flat law and patterns can absorb.
+    """
+    known_as = {"speed_mm_s": "speed_m_s"}.get(column, column)
+    told = [law for law in (d.laws.laws if d.laws else ()) if law.law.columns == (known_as,)]
+    found: list[list[Any]] = []
+    for law in told[:1]:
+        true, low, high, acts = hidden_and_band(law, change)
+        for level in np.unique(bench.column(column)):
+            here = bench.column(column) == level
+            for k, regime in enumerate(("static", "sliding")):
+                chosen = here & acts[:, k]
+                if chosen.any():
+                    sizes = [round(float(x[chosen, k].mean()), 5) for x in (true, low, high)]
+                    found.append([str(level), regime, *sizes])
+    return found
+
+
+def hidden_and_band(law: FoundLaw, change: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The hidden change beyond what flat law and patterns can absorb, both ends of the 90 % band of a law, and where it
+    acts; each (n, 2)."""
+    c = law.model.setup.observations.conditions
+    true = centred(change, c, terms_of(law.model)[LOAD_TERM])
+    regimes = np.array([law.law.regime != "sliding", law.law.regime != "static"])
+    return true, law.band[1], law.band[2], np.asarray((law.law.weight(c) != 0)[:, None] * regimes)

@@ -1,0 +1,306 @@
+"""What the exams in virtual laboratories showed, counted: what has to hold, by cell, in Markdown."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from blind_tables import CAUSES_CERTAIN, share, wilson
+
+Row = dict[str, Any]
+Line = tuple[object, ...]
+# Layers that tell the size of a nuisance, and the name of the hidden one
+TOLD_AS = {"days": "all days", "drift": "drift", "specimen_drift": "specimen drift"}
+NOISY_PERCENT = (2.0, 4.0, 6.0, 8.0, 10.5)
+ALIASES = {"mass_g": "normal_load_N", "date": "started_at"}
+
+
+def tables(rows: list[Row]) -> str:
+    """All tables of a run, each under its heading."""
+    unique = list({(r["cell"], r["seed"], str(r["what"])): r for r in rows}.values())
+    parts = (
+        ("What has to hold", must_hold(unique)), ("Nuisance by kind and order", by_nuisance(unique)),
+        ("Nuisance by size", by_size(unique)), ("Causes of one value", by_value(unique)),
+        ("Levels", by_level(unique)), ("What was said wrongly", confusion(unique)),
+    )  # fmt: skip
+    return "\n\n".join(f"## {title}\n\n{text}" for title, text in parts if text) + "\n"
+
+
+def table(head: Line, lines: list[Line]) -> str:
+    made = [head, ("---",) * len(head), *lines]
+    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in made) if lines else ""
+
+
+def of(rows: list[Row], cell: str) -> list[Row]:
+    return [r for r in rows if r["cell"] == cell]
+
+
+def share_of(counts: list[bool]) -> str:
+    """Count and share, with the 90 % interval of Wilson's score."""
+    if not counts:
+        return "none"
+    low, high = wilson(sum(counts), len(counts))
+    return f"{sum(counts)}/{len(counts)} = {100 * np.mean(counts):.1f} % ({100 * low:.0f} to {100 * high:.0f})"
+
+
+def causes(row: Row) -> list[Row]:
+    """Every cause that is given, alone or as one of several."""
+    return list(row["causes"])
+
+
+def certain(row: Row) -> list[Row]:
+    return list(row["causes"]) if row["verdict"] in CAUSES_CERTAIN else []
+
+
+def laws(row: Row) -> list[Row]:
+    return [x for x in row["layers"] if x["kind"] == "law"]
+
+
+def must_hold(rows: list[Row]) -> str:
+    """Every row of the promise that this run has campaigns for: what was asked, and what was counted."""
+    lines = [*nuisance_lines(rows), *one_value_lines(rows), *level_lines(rows), *cost_lines(rows)]
+    return table(("what", "asked", "counted"), lines)
+
+
+def cost_lines(rows: list[Row]) -> list[Line]:
+    seconds = {cell: np.mean([r["seconds"] for r in of(rows, cell)]) for cell in dict.fromkeys(r["cell"] for r in rows)}
+    return [(f"{cell}: processor time, mean", "", f"{mean:.1f} s") for cell, mean in seconds.items()]
+
+
+# nuisance
+
+
+def nuisance_lines(rows: list[Row]) -> list[Line]:
+    own = of(rows, "nuisance")
+    if not own:
+        return []
+    told, absent = told_sizes(own)
+    return [
+        ("nuisance only: a physical cause", "at most 1 %", share(own, lambda r: bool(causes(r)))),
+        ("nuisance only: a law", "at most 2 %", share(own, lambda r: bool(laws(r)))),
+        ("nuisance only: the hidden size within its 90 % interval", "85 to 95 %", share_of([h for *_, h in told])),
+        ("the same: kinds that are hidden and not told of", "", share_of(absent)),
+    ]
+
+
+def told_sizes(rows: list[Row]) -> tuple[list[tuple[str, float, bool]], list[bool]]:
+    """Name, hidden size and whether its interval holds it, of every nuisance that is hidden and told of; and for each
+    hidden one whether it is not told of."""
+    told, absent = [], []
+    for row in rows:
+        layers = {x["name"]: x for x in row["layers"] if x["kind"] == "remainder"}
+        for name, kind in TOLD_AS.items():
+            hidden = row["truth"]["nuisance"].get(kind)
+            if hidden is None:
+                continue
+            layer = layers.get(name)
+            known = layer is not None and layer["low"] is not None and layer["high"] is not None
+            absent.append(not known)
+            if known:
+                told.append((name, hidden, layer["low"] <= hidden <= layer["high"]))
+    return told, absent
+
+
+def by_nuisance(rows: list[Row]) -> str:
+    own, lines = of(rows, "nuisance"), []
+    kinds = sorted({" + ".join(r["truth"]["forms"]) for r in own}, key=lambda k: (k.count("+"), k))
+    for kind in kinds:
+        for order in ("random", "in order"):
+            g = [r for r in own if " + ".join(r["truth"]["forms"]) == kind and r["design"]["order"] == order]
+            if g:
+                told, absent = told_sizes(g)
+                lines.append((kind, order, len(g), sum(bool(causes(r)) for r in g), sum(bool(laws(r)) for r in g),
+                              share_of([h for *_, h in told]), sum(absent)))  # fmt: skip
+    for name in TOLD_AS:
+        told = [h for n, _, h in told_sizes(own)[0] if n == name]
+        if told:
+            lines.append((f"layer {name}", "", len(told), "", "", share_of(told), ""))
+    head = ("nuisance", "order", "campaigns", "a cause", "a law", "size within interval", "not told of")
+    return table(head, lines)
+
+
+def by_size(rows: list[Row]) -> str:
+    """Causes and laws over the size of the largest nuisance."""
+    lines: list[Line] = []
+    for low, high in pairwise(NOISY_PERCENT):
+        g = [r for r in of(rows, "nuisance") if low <= max(r["truth"]["nuisance"].values()) < high]
+        if g:
+            lines.append((f"{low:g} to {high:g} %", len(g), share(g, lambda r: bool(causes(r))),
+                          share(g, lambda r: bool(laws(r)))))  # fmt: skip
+    return table(("largest nuisance", "campaigns", "a cause", "a law"), lines)
+
+
+# one value
+
+
+def says_value(text: str, value: str, column: str) -> bool:
+    """Whether a text names a value of a column; a mass in grams also as the load in newtons."""
+    if column != "mass_g":
+        return re.search(rf"(?<![\w-]){re.escape(value)}(?![\w])", text) is not None
+    mass = float(value)
+    meant = (mass, mass + 1.5, (mass + 1.5) * 9.80665e-3)
+    found = [float(x) for x in re.findall(r"\d+(?:\.\d+)?", text)]
+    return any(abs(x - m) <= 0.006 * m for x in found for m in meant)
+
+
+def names_value(row: Row, cause: Row) -> bool:
+    """Whether a cause or a law is the hidden one: bound to its value, and not a wrong label or another mechanism."""
+    truth = row["truth"]
+    name = str(cause.get("mechanism") or cause.get("name"))
+    if name == "covariate:operator":
+        return bool(truth["column"] == "operator")
+    if name == "mislabelled_specimen":
+        return False
+    text = " ".join(str(cause.get(k, "")) for k in ("mechanism", "name", "choice", "formula", "text"))
+    column = truth["column"]
+    about = any(w in text for w in (column, ALIASES.get(column, column), column.split("_")[0]))
+    return says_value(text, truth["value"], column) and (about or bool(cause.get("choice")))
+
+
+def value_named(row: Row) -> bool:
+    return any(names_value(row, c) for c in (*certain(row), *laws(row)))
+
+
+def other_named(row: Row) -> bool:
+    tied = [set(names) for names in row["equivalent"]]
+    right = {c["mechanism"] for c in certain(row) if names_value(row, c)}
+    wrong = [
+        c for c in certain(row)
+        if not names_value(row, c) and not any(c["mechanism"] in names and names & right for names in tied)
+    ]  # fmt: skip
+    return bool(wrong) or any(not names_value(row, x) for x in laws(row))
+
+
+def one_value_lines(rows: list[Row]) -> list[Line]:
+    own, clean = of(rows, "one value"), of(rows, "one value, clean")
+    lines: list[Line] = []
+    if own:
+        lines += [
+            ("one value, patterns off by 15 %: named", "95 %", share(own, value_named)),
+            ("the same: another cause or law named", "at most 2 %", share(own, other_named)),
+        ]
+    if clean:
+        blamed = share(clean, lambda r: bool(causes(r) or laws(r)))
+        lines.append(("nothing hidden, patterns off by 15 %: a cause or law", "at most 1 %", blamed))
+    return lines
+
+
+def by_value(rows: list[Row]) -> str:
+    own, lines = of(rows, "one value"), []
+    for kind in dict.fromkeys(r["truth"]["kind"] for r in own):
+        g = [r for r in own if r["truth"]["kind"] == kind]
+        sizes = sorted(abs(r["truth"]["size"]) for r in g)
+        lines.append((kind, f"{sizes[0]:.3g} to {sizes[-1]:.3g} {g[0]['truth']['unit']}", len(g),
+                      sum(map(value_named, g)), sum(map(other_named, g)),
+                      f"{np.median([r['truth']['strength'] for r in g]):.1f}"))  # fmt: skip
+    return table(("hidden", "sizes", "campaigns", "named", "another", "strength, median"), lines)
+
+
+# levels
+
+
+def level_lines(rows: list[Row]) -> list[Line]:
+    own = of(rows, "levels")
+    if not own:
+        return []
+    return [
+        ("levels: values hold the truth", "85 to 95 %", share_of([h for r in own for h in levels_held(r)])),
+        ("levels: campaigns in which values are told", "", share(own, lambda r: bool(levels_held(r)))),
+        ("levels: the true shape among those listed", "95 %", share(own, shape_listed)),
+        ("levels: no misfit left beyond chance", "95 %", share(own, nothing_left)),
+        ("levels: the column named", "", share(own, column_named)),
+    ]
+
+
+def levels_held(row: Row) -> list[bool]:
+    """For every level that is told of whether its interval holds the hidden value.
+
+    From ``levels`` of a layer of the column (percent of T relative to the mean over the levels), else from the band of
+    its law.
+    """
+    truth = {float_or(name): 100 * np.expm1(x) for name, x in row["truth"]["levels"]}
+    for layer in row["layers"]:
+        if layer.get("levels") and named_column(row) in layer["name"]:
+            told = {float_or(name): x for name, x in layer["levels"].items()}
+            return [bool(told[n][0] <= t <= told[n][2]) for n, t in truth.items() if n in told]
+    return [low <= true <= high for _, _, true, low, high in row.get("at_levels", ())]
+
+
+def float_or(name: str) -> float | str:
+    try:
+        return float(f"{float(name):.4g}")
+    except ValueError:
+        return name
+
+
+def named_column(row: Row) -> str:
+    return {"speed_mm_s": "speed"}.get(row["truth"]["column"], row["truth"]["column"])
+
+
+CAUSES_OF = {"velocity_dependence": "speed_mm_s", "contact_ageing": "hold_s"}
+
+
+def column_named(row: Row) -> bool:
+    column = named_column(row)
+    by_cause = any(CAUSES_OF.get(c["mechanism"]) == row["truth"]["column"] for c in certain(row))
+    by_value = any(column in f"{c['mechanism']} {c['choice']}" for c in certain(row))
+    return by_cause or by_value or any(column in x["name"] for x in laws(row))
+
+
+# how each hidden shape may be written, by words of a formula
+WRITTEN = {
+    "line": ("linear", "line", "proportion"), "line of ln": ("ln", "log"), "parabola of ln": ("ln", "parabola"),
+    "step": ("above", "step", "level"), "one apart": ("level", "=", "at "), "rising": (), "any": (),
+}  # fmt: skip
+
+
+def shape_listed(row: Row) -> bool:
+    """The values at the levels are told, or a formula of the hidden shape is among those listed.
+
+    A table of levels holds every shape.
+    """
+    if not column_named(row):
+        return False
+    own = [x for x in row["layers"] if named_column(row) in x["name"]]
+    if any(x.get("levels") for x in own):
+        return True
+    words = WRITTEN[row["truth"]["shape"]]
+    listed = " ".join(f for x in own for f in (x["formula"], *x["tied_with"]))
+    return any(w in listed for w in words)
+
+
+def nothing_left(row: Row) -> bool:
+    """Nothing but the column is beyond chance."""
+    other = [m for m in row["misfits"] if named_column(row) not in m["column"]]
+    return column_named(row) and not other and row["within_chance"] is not False
+
+
+def by_level(rows: list[Row]) -> str:
+    own, lines = of(rows, "levels"), []
+    tests: tuple[Callable[[Row], bool], ...] = (column_named, shape_listed, nothing_left)
+    for part in ("column", "shape"):
+        for name in sorted({r["truth"][part] for r in own}):
+            g = [r for r in own if r["truth"][part] == name]
+            held = share_of([h for r in g for h in levels_held(r)])
+            lines.append((f"{part} {name}", len(g), *(sum(map(test, g)) for test in tests), held))
+    head = ("hidden", "campaigns", "column named", "shape listed", "nothing left", "values hold")
+    return table(head, lines)
+
+
+def confusion(rows: list[Row]) -> str:
+    """Causes and laws that are said where nothing of the kind is hidden, numbers left out."""
+    said: Counter[tuple[str, str]] = Counter()
+    for row in rows:
+        told = [*causes(row), *laws(row)]
+        if row["cell"] == "one value":
+            told = [c for c in (*certain(row), *laws(row)) if not names_value(row, c)]
+        elif row["cell"] not in ("nuisance", "one value, clean"):
+            continue
+        hidden = f"{row['cell']}: {row['truth']['kind']}" if row["cell"] == "one value" else row["cell"]
+        for one in told:
+            said[hidden, re.sub(r"\d[\d.]*(e[+-]?\d+)?", "#", str(one.get("mechanism") or one["formula"]))] += 1
+    return table(("hidden", "said", "times"), [(*key, n) for key, n in said.most_common(40)])
