@@ -183,21 +183,16 @@ def _to_the_end(values: FloatArray, step: FloatArray, large: NDArray[np.int64]) 
         change = _typical(np.abs(step[max(k - _ROWS_BESIDE, 0) : k])), _typical(np.abs(step[k + 1 :][:_ROWS_BESIDE]))
         for rows in _LEVEL_ROWS:
             before, after = _typical(values[max(k + 1 - rows, 0) : k + 1]), _typical(values[k + 1 :][:rows])
-            times = _power_of_ten(after / before) if before else None
-            if times and _scaled_as(times, *change):
-                return k + 1, values.size - k - 1, times
+            ratio = after / before if before else 0.0
+            power = round(math.log10(ratio)) if ratio > 0 else 0
+            near = 1 <= abs(power) <= 3 and _TEN_TIMES[0] / 10 < ratio / 10.0**power < _TEN_TIMES[1] / 10
+            if near and _scaled_as(10.0**power, *change):
+                return k + 1, values.size - k - 1, 10.0**power
     return None
 
 
 def _typical(values: FloatArray) -> float:
     return float(np.median(values))
-
-
-def _power_of_ten(ratio: float) -> float | None:
-    """10, 100, 1000 or one part in so many where a ratio is about that, else None."""
-    power = round(math.log10(ratio)) if ratio > 0 else 0
-    near = 1 <= abs(power) <= 3 and _TEN_TIMES[0] / 10 < ratio / 10.0**power < _TEN_TIMES[1] / 10
-    return 10.0**power if near else None
 
 
 def _scaled_as(times: float, before: float, after: float) -> bool:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -119,10 +119,21 @@ def parse_columns(columns: Columns | None, correction: Correction | None = None,
     ReadError
         unknown_quantity for every key that names none, unknown_decimal for a mark that is no decimal mark.
     """
-    faults = {key: list(_entry_faults(key, value)) for key, value in (columns or {}).items()}
-    if strict and any(faults.values()):
-        raise ReadError(problem for found in faults.values() for problem in found)
-    stated = {key: value for key, value in (columns or {}).items() if not faults[key]}
+    stated: dict[str, str | Sequence[str]] = {}
+    problems = []
+    for key, value in (columns or {}).items():
+        if key == IGNORE or (key == DECIMAL and value in (".", ",")) or quantity_named(key) is not None:
+            stated[key] = value
+        elif key == DECIMAL:
+            what, allowed = "not a decimal mark", '"." or ","'
+            problems.append(Problem("unknown_decimal", what, found=str(value), allowed=allowed))
+        else:
+            names = [name.replace(" ", "_") for name in QUANTITIES]
+            meant = did_you_mean(key, [*names, IGNORE, DECIMAL])
+            allowed = f"{', '.join(names)}; {IGNORE}, {DECIMAL}{f' ({meant})' if meant else ''}"
+            problems.append(Problem("unknown_quantity", "not a known quantity", found=key, allowed=allowed))
+    if strict and problems:
+        raise ReadError(problems)
     wanted = [(quantity, str(value).strip()) for key, value in stated.items() if (quantity := quantity_named(key))]
     ignored = stated.get(IGNORE, ())
     listed = re.split(r"\s*;\s*", ignored) if isinstance(ignored, str) else ignored
@@ -133,20 +144,6 @@ def parse_columns(columns: Columns | None, correction: Correction | None = None,
         str(stated.get(DECIMAL, "")),
         correction or UNCORRECTED,
     )
-
-
-def _entry_faults(key: str, value: object) -> Iterator[Problem]:
-    """Why one entry of columns cannot be used."""
-    if key == IGNORE:
-        return
-    if key == DECIMAL:
-        if value not in (".", ","):
-            yield Problem("unknown_decimal", "not a decimal mark", found=str(value), allowed='"." or ","')
-    elif quantity_named(key) is None:
-        names = [name.replace(" ", "_") for name in QUANTITIES]
-        meant = did_you_mean(key, [*names, IGNORE, DECIMAL])
-        allowed = f"{', '.join(names)}; {IGNORE}, {DECIMAL}{f' ({meant})' if meant else ''}"
-        yield Problem("unknown_quantity", "not a known quantity", found=key, allowed=allowed)
 
 
 def columns_from_text(text: str) -> dict[str, str]:
@@ -250,7 +247,13 @@ def _columns(
         try:
             columns.append(_column(quantity, index, unit, reason, (names, units)))
         except ReadError as why:
-            found = [_placed(p, quantity, _called(names, index)) for p in why.problems]
+            called = _called(names, index)
+            way = f'{quantity.replace(" ", "_")} = "{split_unit(called)[0]} [unit]" in columns, the unit such as '
+            units_of = {"ambiguous_unit": "gf or N"}
+            found = [
+                replace(p, column=called, allowed=way + units_of.get(p.kind, QUANTITIES[quantity].si_unit))
+                for p in why.problems
+            ]
             replaced = quantity == "time" and correction.sampling_rate_Hz is not None
             optional = quantity not in NEEDED or replaced
             left_out = optional and all(p.kind in ("missing_unit", "ambiguous_unit") for p in found)
@@ -312,22 +315,11 @@ def _column(
     return Column(quantity, index, label, factor, offset, reason)
 
 
-def _placed(problem: Problem, quantity: str, name: str) -> Problem:
-    """A fault of a unit with its column, and how to give the unit."""
-    si = "gf or N" if problem.kind == "ambiguous_unit" else QUANTITIES[quantity].si_unit
-    way = f'{_key(quantity)} = "{split_unit(name)[0]} [unit]" in columns, the unit such as {si}'
-    return replace(problem, column=name, allowed=way)
-
-
-def _key(quantity: str) -> str:
-    return quantity.replace(" ", "_")
-
-
 def _missing(quantity: str, names: Sequence[str], there: set[str]) -> Problem:
     here = f"columns here: {_listed(names)}" if any(names) else f"{len(names)} columns without names"
     example = '"NAME [unit]"' if any(names) else '"#2 [unit]"'
     what = f"no column was recognised as the {quantity}"
-    ways = [f"{_key(quantity)} = {example} in columns"]
+    ways = [f"{quantity.replace(' ', '_')} = {example} in columns"]
     if quantity == "time":
         ways += ["a counter takes the sampling interval as its unit, [0.01 s]", "or sampling_rate_Hz = 100"]
     elif "torque" in there:

@@ -15,8 +15,8 @@ from tribo.input_files import MAPPED_BYTES
 from tribo.readers.columns import NEEDED, Column, Columns, Given, assign, match_column, parse_columns
 from tribo.readers.layout import Layout, first_table
 from tribo.readers.reading import FATAL, Reading, machine_of, open_sources, read_tables, split_at_restarts
-from tribo.readers.text_machines import Machine
-from tribo.records import Correction, FloatArray
+from tribo.readers.source import HEAD_BYTES
+from tribo.records import Correction
 
 _BASELINE_SHARE = 0.05  # of the largest force: a pull that starts above it has no zero phase
 _FLAT_TOP = 5  # equal samples at an extreme in a row
@@ -152,18 +152,14 @@ def inspect_export(
     except ReadError as why:
         return _refused(path, file, why.problems, parse_columns(columns, correction, strict=False))
     seen = _read(file, readings, others, footer)
-    return replace(seen, doubts=(*_unseen(path, file), *seen.doubts))
-
-
-def _unseen(path: Path, file: str) -> tuple[Problem, ...]:
-    """The doubt about a large file of which only the beginning was checked; with its last line."""
     is_mapped = path.is_file() and path.stat().st_size > MAPPED_BYTES  # PATH.zip/ENTRY is no file, and never mapped
     source = open_sources(path, file)[0] if is_mapped else None
     if source is None or not source.is_large:
-        return ()
-    seen, everything = len(source.beginning_only().data), len(source.data)
-    what = f"only the first {seen / 1e6:.0f} of {everything / 1e6:.0f} MB were checked; found: the last line"
-    return (Problem("only_beginning", what, file, found=source.last_line()[:60]),)
+        return seen
+    checked, everything = len(source.beginning_only().data), len(source.data)
+    what = f"only the first {checked / 1e6:.0f} of {everything / 1e6:.0f} MB were checked; found: the last line"
+    end = source.text(bytes(source.data[-HEAD_BYTES:])).rstrip().rpartition("\n")[2].strip()
+    return replace(seen, doubts=(Problem("only_beginning", what, file, found=end[:60]), *seen.doubts))
 
 
 def _refused(path: Path, file: str, problems: tuple[Problem, ...], given: Given) -> Inspection:
@@ -183,6 +179,9 @@ def _refused(path: Path, file: str, problems: tuple[Problem, ...], given: Given)
         taken, _ = assign(layout.names, layout.units, layout.filled, with_hints)
     except ReadError:
         taken = ()
+    of_columns = all(p.kind in ("missing_column", "missing_unit", "unknown_unit") for p in problems)
+    time, force = ("NAME", "NAME") if any(layout.names) else ("#1", "#2")
+    advice = f'in columns: time = "{time} [unit]", friction_force = "{force} [unit]"'
     return replace(
         seen,
         delimiter=layout.delimiter,
@@ -190,19 +189,8 @@ def _refused(path: Path, file: str, problems: tuple[Problem, ...], given: Given)
         header_rows=layout.header_rows,
         columns=_columns(layout, taken),
         metadata=layout.metadata,
-        advice=_advice(problems, machine, layout),
+        advice=(machine.advice or advice) if of_columns else "",
     )
-
-
-def _advice(problems: tuple[Problem, ...], machine: Machine, layout: Layout) -> str:
-    """What to give so that the export can be read, where that is a matter of names and units."""
-    if not all(p.kind in ("missing_column", "missing_unit", "unknown_unit") for p in problems):
-        return ""
-    if machine.advice:
-        return machine.advice
-    name = "NAME [unit]" if any(layout.names) else "#1 [unit]"
-    other = "NAME [unit]" if any(layout.names) else "#2 [unit]"
-    return f'in columns: time = "{name}", friction_force = "{other}"'
 
 
 def _read(file: str, readings: list[Reading], others: list[str], footer: list[str]) -> Inspection:
@@ -294,10 +282,11 @@ def _doubts(reading: Reading, file: str) -> list[Problem]:
         what = "the force does not start near zero, so the zero cannot be determined"
         place = (file, reading.row_of(0), label["friction force"], f"{start:.4g} N")
         doubts.append(Problem("no_zero_phase", what, *place))
-    top = _flat_top(force)
-    if top is not None:
-        what = f"{top[1]} equal data points at the largest force: possibly clipped"
-        place = (file, reading.row_of(top[0]), label["friction force"], f"{force[top[0]]:.5g} N")
+    at_top = np.flatnonzero(force == force.max())
+    top = max(np.split(at_top, np.flatnonzero(np.diff(at_top) > 1) + 1), key=len)
+    if len(top) >= _FLAT_TOP and np.ptp(force):
+        what = f"{len(top)} equal data points at the largest force: possibly clipped"
+        place = (file, reading.row_of(int(top[0])), label["friction force"], f"{force[top[0]]:.5g} N")
         doubts.append(Problem("flat_top", what, *place))
     for quantity, values in reading.arrays.items():
         if quantity not in NEEDED and values.size > 1 and not np.ptp(values) and not values[0]:
@@ -324,14 +313,6 @@ def _other_candidates(reading: Reading) -> list[Problem]:
             place = (reading.source.file, layout.names_row, column.label)
             doubts.append(Problem("other_candidate", what, *place))
     return doubts
-
-
-def _flat_top(force: FloatArray) -> tuple[int, int] | None:
-    """(first sample, length) of the longest run of equal samples at the largest force, or None if it is short."""
-    at_top = np.flatnonzero(force == force.max())
-    runs = np.split(at_top, np.flatnonzero(np.diff(at_top) > 1) + 1)
-    longest = max(runs, key=len)
-    return (int(longest[0]), len(longest)) if len(longest) >= _FLAT_TOP and np.ptp(force) else None
 
 
 def _table_in_words(table: TableSeen) -> str:

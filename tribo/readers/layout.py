@@ -183,15 +183,13 @@ def _first_row_of_numbers(lines: Sequence[str]) -> int | None:
         if not _ROW_OF_NUMBERS.fullmatch(line):
             continue
         following = next((other for other in lines[k + 1 :] if other.strip(BLANK)), None)
-        if following is None or _ROW_OF_NUMBERS.fullmatch(following) or _mostly_numbers(line, following):
+        if following is None or _ROW_OF_NUMBERS.fullmatch(following):
+            return k
+        # a whole row of numbers followed by a damaged one is still the first row of a table
+        starts = [bool(_NUMBER_START.match(cell.strip(' "'))) for cell in re.split(r"[\t;,|]", following)]
+        if len(starts) > 1 and starts[0] and 2 * sum(starts) >= len(starts) and line[:1] == following[:1]:
             return k
     return None
-
-
-def _mostly_numbers(line: str, following: str) -> bool:
-    """A whole row of numbers followed by a damaged one is still the first row of a table."""
-    starts = [bool(_NUMBER_START.match(cell.strip(' "'))) for cell in re.split(r"[\t;,|]", following)]
-    return len(starts) > 1 and starts[0] and 2 * sum(starts) >= len(starts) and line[:1] == following[:1]
 
 
 def _first_row_with_words(lines: Sequence[str]) -> int | None:
@@ -365,11 +363,7 @@ def _names_beside(path: Path) -> Iterator[tuple[tuple[str, ...], str]]:
             except (ValueError, RecursionError):
                 continue
             if isinstance(listed, Sequence) and not isinstance(listed, str):
-                yield tuple(map(_name_and_unit, listed)), beside.name
-
-
-def _name_and_unit(column: object) -> str:
-    if not isinstance(column, dict):
-        return str(column)
-    unit = column.get("unit", "")
-    return f"{column.get('name', '')} [{unit}]" if unit else str(column.get("name", ""))
+                tables = [c if isinstance(c, dict) else {"name": c} for c in listed]
+                units = [f" [{c['unit']}]" if c.get("unit") else "" for c in tables]
+                names = tuple(f"{c.get('name', '')}{unit}" for c, unit in zip(tables, units, strict=True))
+                yield names, beside.name

@@ -45,8 +45,13 @@ def parse_block(source: Source, table: Layout, used: Sequence[int]) -> tuple[Flo
         all at once.
     """
     if source.arrays:
-        return _end_of_arrays(np.array([source.arrays[index] for index in used], dtype=float), source)
-    rows = source.line_ends(table.start, table.end) + 1
+        # arrays of one length are padded: rows at the end in which one has no number are left out
+        columns = np.array([source.arrays[index] for index in used], dtype=float)
+        finite = np.isfinite(columns).all(axis=0)
+        last = int(np.flatnonzero(finite)[-1]) + 1 if finite.any() else 0
+        padded = finite.size - last
+        return columns[:, :last], _empty_end(padded, source.file, last + 1) if padded else None
+    rows = sum(chunk.count(b"\n") for chunk in source.chunks(table.start, table.end)) + 1
     if rows > LARGEST_TABLE_ROWS:
         allowed = f"at most {LARGEST_TABLE_ROWS} rows: split the export, or record at a lower rate"
         what = "too many rows for one table"
@@ -69,7 +74,7 @@ def parse_block(source: Source, table: Layout, used: Sequence[int]) -> tuple[Flo
             values = None if found else _parse_slowly(text, table, used)
             if found and all(p.kind in ("two_decimal_marks", "more") for p in found):
                 values = _parse_grouped(text, table, used)
-                found = [] if values is not None else found
+                found = found if values is None else []
             if values is None and not found:
                 found = [Problem("unreadable", "the table does not consist of numbers", source.file, row)]
             problems += found
@@ -142,15 +147,6 @@ def _same_cells_in_all_rows(rows: bytes, delimiter: str, n_cells: int) -> bool:
     return bool(np.all(np.diff(cuts, prepend=0) == n_cells - 1))
 
 
-def _end_of_arrays(values: FloatArray, source: Source) -> tuple[FloatArray, Problem | None]:
-    """Named arrays without the rows at their end in which one has no number, as arrays of one length are padded."""
-    finite = np.isfinite(values).all(axis=0)
-    last = int(np.flatnonzero(finite)[-1]) + 1 if finite.any() else 0
-    if last == finite.size:
-        return values, None
-    return values[:, :last], _empty_end(finite.size - last, source.file, last + 1)
-
-
 def _parse_slowly(text: str, table: Layout, used: Sequence[int]) -> FloatArray | None:
     """Row by row, for what the quick way cannot cut: blank lines inside, delimiters inside quotes."""
     rows = [cut(line, table.delimiter) for line in text.split("\n") if line.strip(BLANK)]
@@ -186,15 +182,10 @@ def _numbers(cells: Sequence[str], decimal: str) -> list[float] | None:
     # one cell without decimals among cells that have them is a slipped mark, not a thousand
     if len(whole) < len(numbers) or len(decimals) > 1:
         return None
-    return whole if _stand_among_their_like(whole, [mark in cell for cell in cells]) else None
-
-
-def _stand_among_their_like(numbers: Sequence[float], grouped: Sequence[bool]) -> bool:
-    """Whether each grouped number has a neighbour of its order; a slipped mark makes one that stands out."""
-    sizes = [0.0, *map(abs, numbers), 0.0]
-    return all(
-        max(sizes[k], sizes[k + 2]) >= _LEAST_NEIGHBOUR * sizes[k + 1] for k, there in enumerate(grouped) if there
-    )
+    sizes = [0.0, *map(abs, whole), 0.0]
+    grouped = [k for k, cell in enumerate(cells) if mark in cell]
+    alike = [max(sizes[k], sizes[k + 2]) >= _LEAST_NEIGHBOUR * sizes[k + 1] for k in grouped]
+    return whole if all(alike) else None  # a number without a neighbour of its order has a slipped mark
 
 
 def _number(cell: str, mark: str, decimal: str) -> float | None:
@@ -276,6 +267,8 @@ def _damage(
         last_cell = cut(lines[-1], table.delimiter)[-1]
         breaks_off = breaks_off or _not_a_number(last_cell, table.decimal) is not None
     last = max((k for k, line in enumerate(lines) if line.strip(BLANK)), default=-1)
+    whole_row = f"{table.n_cells} cells"
+    number = f"a number with decimal {'comma' if table.decimal == ',' else 'point'}"
     gaps: dict[int, list[int]] = {}
     problems: list[Problem] = []
     for k in range(last + 1):
@@ -284,11 +277,21 @@ def _damage(
         if len(problems) >= _MOST_COUNTED:
             problems.append(Problem("more", "there are further errors in the rows below", file=file, row=first_row + k))
             break
-        row_fault = _row_fault(lines[k], table, file, first_row + k, ends_file and k == last, breaks_off)
-        if row_fault:
-            problems.append(row_fault)
-        else:
-            problems += _cell_faults(lines[k], table, used, file, first_row + k, gaps)
+        line, row, cells = lines[k], first_row + k, cut(lines[k], table.delimiter)
+        incomplete = len(cells) < table.n_cells or line.count('"') % 2 or breaks_off
+        if ends_file and k == last and incomplete:
+            what, column = "the last row is incomplete", table.name(len(cells) - 1)
+            problems.append(Problem("truncated_mid_row", what, file, row, column, line[-60:], whole_row))
+            continue
+        if len(cells) != table.n_cells:
+            what = f"this row has {len(cells)} cells instead of {table.n_cells}"
+            problems.append(Problem("wrong_number_of_cells", what, file, row, None, line[-60:], whole_row))
+            continue
+        for index in used:
+            if cells[index].lower().lstrip("+-") in _NOTHING:
+                gaps.setdefault(index, []).append(row)
+            elif fault := _not_a_number(cells[index], table.decimal):
+                problems.append(Problem(*fault, file, row, table.name(index), cells[index], number))
     problems = _grouped(problems)
     for index, rows in gaps.items():
         what = f"{len(rows)} row{'s' if len(rows) > 1 else ''} without a number; this is the first"
@@ -343,35 +346,6 @@ def _grouped(problems: Sequence[Problem]) -> list[Problem]:
         else:
             found.append(replace(alike[0], what=f"{alike[0].what}, in {len(alike)} rows; this is the first"))
     return found
-
-
-def _row_fault(line: str, table: Layout, file: str, row: int, is_last: bool, breaks_off: bool) -> Problem | None:
-    cells = cut(line, table.delimiter)
-    allowed = f"{table.n_cells} cells"
-    if is_last and (len(cells) < table.n_cells or line.count('"') % 2 or breaks_off):
-        what, column = "the last row is incomplete", table.name(len(cells) - 1)
-        return Problem("truncated_mid_row", what, file, row, column, line[-60:], allowed)
-    if len(cells) != table.n_cells:
-        what = f"this row has {len(cells)} cells instead of {table.n_cells}"
-        return Problem("wrong_number_of_cells", what, file, row, None, line[-60:], allowed)
-    return None
-
-
-def _cell_faults(
-    line: str, table: Layout, used: Sequence[int], file: str, row: int, gaps: dict[int, list[int]]
-) -> list[Problem]:
-    cells = cut(line, table.delimiter)
-    problems = []
-    for index in used:
-        cell = cells[index]
-        if cell.lower().lstrip("+-") in _NOTHING:
-            gaps.setdefault(index, []).append(row)
-            continue
-        fault = _not_a_number(cell, table.decimal)
-        if fault is not None:
-            allowed = f"a number with decimal {'comma' if table.decimal == ',' else 'point'}"
-            problems.append(Problem(*fault, file, row, table.name(index), cell, allowed))
-    return problems
 
 
 def _not_a_number(cell: str, decimal: str) -> tuple[str, str] | None:

@@ -20,7 +20,7 @@ from tribo.readers.parsing import parse_block, refuse_ambiguous_marks
 from tribo.readers.source import HEAD_BYTES, Source, export_bytes, is_workbook_archive, open_text
 from tribo.readers.text_machines import TEXT_MACHINES, Machine
 from tribo.readers.wide_tables import looks_wide, records_side_by_side
-from tribo.records import Correction, ExportFormat, FloatArray, Trace
+from tribo.records import Correction, ExportFormat, Trace
 from tribo.units import QUANTITIES
 
 READERS: dict[str, Machine] = {machine.name: machine for machine in (*BINARY_MACHINES, *TEXT_MACHINES)}
@@ -28,6 +28,9 @@ FATAL = ("time_goes_back", "scale_jump")  # damage for which a table is set asid
 _FLAGS = {"missing_unit": "column_without_unit"}  # of a trace, where it is not the kind of the problem
 _CHOICE = re.compile(r"(.+)#(\d+)")
 _WIDE = 'for several records side by side: friction_force = "* [N]", or "F* [N]" for the columns whose names begin so'
+_INSTEAD_OF_A_CLOCK = (
+    'a column in seconds, or a row counter with the sampling interval as its unit: time = "NAME [0.01 s]" in columns'
+)
 _CLOCK = re.compile(r"(?<!\d)\d{1,2}:\d\d:\d\d(?!\d)")
 
 
@@ -135,19 +138,10 @@ def _traces(readings: Sequence[Reading], name: str, file: str, *, split: bool) -
     if fatal:
         raise ReadError(fatal)
     names = [name] if len(readings) == 1 else [f"{name}#{k + 1}" for k in range(len(readings))]
-    return tuple(_trace(reading, one, file) for one, reading in zip(names, readings, strict=True))
-
-
-def _trace(reading: Reading, name: str, file: str) -> Trace:
-    arrays, layout = dict(reading.arrays), reading.layout
-    return Trace(
-        name=name,
-        time_s=arrays.pop("time"),
-        force_N=arrays.pop("friction force"),
-        displacement_m=arrays.pop("displacement", None),
-        columns={QUANTITIES[quantity].column: values for quantity, values in arrays.items()},
-        metadata=layout.metadata,
-        source=ExportFormat(
+    traces = []
+    for one, reading in zip(names, readings, strict=True):
+        arrays, layout = dict(reading.arrays), reading.layout
+        source = ExportFormat(
             family=reading.machine.name,
             encoding=reading.source.encoding,
             delimiter=layout.delimiter,
@@ -155,12 +149,22 @@ def _trace(reading: Reading, name: str, file: str) -> Trace:
             header_rows=layout.header_rows,
             columns={c.quantity: c.label for c in reading.columns},
             reasons={c.quantity: c.reason for c in reading.columns},
-        ),
-        file=file,
-        flags=tuple(dict.fromkeys(_FLAGS.get(p.kind, p.kind) for p in reading.findings)),
-        problems=reading.findings,
-        first_row=layout.header_rows + 1 + reading.skipped,
-    )
+        )
+        trace = Trace(
+            name=one,
+            time_s=arrays.pop("time"),
+            force_N=arrays.pop("friction force"),
+            displacement_m=arrays.pop("displacement", None),
+            columns={QUANTITIES[quantity].column: values for quantity, values in arrays.items()},
+            metadata=layout.metadata,
+            source=source,
+            file=file,
+            flags=tuple(dict.fromkeys(_FLAGS.get(p.kind, p.kind) for p in reading.findings)),
+            problems=reading.findings,
+            first_row=layout.header_rows + 1 + reading.skipped,
+        )
+        traces.append(trace)
+    return tuple(traces)
 
 
 def read_tables(
@@ -286,7 +290,11 @@ def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -
     if not written.size:
         problem = Problem("header_only", "a header without data rows", source.file, layout.header_rows)
         return ReadError(problem)
-    arrays = {c.quantity: _in_si(row, c) for c, row in zip(columns, written, strict=True)}
+    arrays = {c.quantity: numbers for c, numbers in zip(columns, written, strict=True)}
+    for c in columns:
+        if (c.factor, c.offset) != (1.0, 0.0):  # in their own memory: a long record is not held twice
+            arrays[c.quantity] *= c.factor
+            arrays[c.quantity] += c.offset
     arrays, columns, completed = complete(arrays, columns, given.correction, source.file)
     labels, row_of = {c.quantity: c.label for c in columns}, partial(_row_of, source, layout)
     impossible = beyond_measurement(arrays, source.file, labels, row_of)
@@ -310,33 +318,17 @@ def _explained(why: ReadError, machine: Machine, source: Source, layout: Layout)
     problems = [replace(p, file=source.file, row=row) for p in why.problems]
     if layout.misfit:
         problems.insert(0, Problem("names_do_not_fit", layout.misfit, source.file, layout.names_row))
-    problems = [_of_a_clock(p, source, layout) for p in problems]
+    cells = [] if source.arrays else cut(source.lines(layout.start, HEAD_BYTES)[0][0], layout.delimiter)
+    for k, problem in enumerate(problems):
+        at = layout.names.index(problem.column) if problem.column in layout.names else len(cells)
+        if problem.kind == "missing_unit" and at < len(cells) and _CLOCK.search(cells[at]):
+            what = "a time of day, not a time in seconds"
+            problems[k] = replace(problem, kind="time_of_day", what=what, found=cells[at], allowed=_INSTEAD_OF_A_CLOCK)
     if machine.advice:
         problems = [replace(p, allowed=machine.advice) for p in problems]
     elif looks_wide(layout):
         problems = [replace(p, allowed=f"{_WIDE}; {p.allowed}") for p in problems]
     return problems
-
-
-def _of_a_clock(problem: Problem, source: Source, layout: Layout) -> Problem:
-    """A clearer problem where a time without a unit is a time of day."""
-    if problem.kind != "missing_unit" or source.arrays or problem.column not in layout.names:
-        return problem
-    cells = cut(source.lines(layout.start, HEAD_BYTES)[0][0], layout.delimiter)
-    index = layout.names.index(problem.column)
-    if index >= len(cells) or not _CLOCK.search(cells[index]):
-        return problem
-    what = "a time of day, not a time in seconds"
-    allowed = 'a column in seconds, or a row counter with the sampling interval as its unit: time = "NAME [0.01 s]"'
-    return replace(problem, kind="time_of_day", what=what, found=cells[index], allowed=f"{allowed} in columns")
-
-
-def _in_si(numbers: FloatArray, column: Column) -> FloatArray:
-    """Numbers as written in SI units, in their own memory: a long record is not held twice."""
-    if (column.factor, column.offset) != (1.0, 0.0):
-        numbers *= column.factor
-        numbers += column.offset
-    return numbers
 
 
 def _row_of(source: Source, layout: Layout, sample: int) -> int:

@@ -131,15 +131,6 @@ class Source:
         piece = bytes(self.data[: max(LARGEST_HEAD_BYTES, CHUNK_BYTES // 4)])
         return _with_one_line_ending(self, piece[: piece.rfind(b"\n") + 1] or piece)
 
-    def last_line(self) -> str:
-        """The last line of the file that is not blank."""
-        lines = self.text(bytes(self.data[-HEAD_BYTES:])).split("\n")
-        return next((line.strip() for line in reversed(lines) if line.strip()), "")
-
-    def line_ends(self, start: int, end: int) -> int:
-        """Line ends from ``start`` to ``end``, counted piece by piece."""
-        return sum(chunk.count(b"\n") for chunk in self.chunks(start, end))
-
     def chunks(self, start: int, end: int) -> Iterator[bytes]:
         """Whole lines from ``start`` to ``end`` in pieces of bounded size."""
         while start < end:
@@ -161,7 +152,9 @@ def export_bytes(path: Path, file: str) -> bytes | mmap.mmap:
     ReadError
         missing, unreadable, not_a_file, too_large, bad_archive, encrypted, several_entries or unknown_entry.
     """
-    path, entry = _archive_and_entry(path)
+    archive = None if path.exists() else next((p for p in path.parents if p.is_file()), None)
+    entry = "" if archive is None else path.relative_to(archive).as_posix()
+    path = archive or path
     try:
         raw = read_or_map(path, LARGEST_FILE_BYTES, MAPPED_BYTES)
     except FileNotFoundError as why:
@@ -179,12 +172,6 @@ def export_bytes(path: Path, file: str) -> bytes | mmap.mmap:
     if raw[:2] == _GZIP:
         raw = _unpacked("gz", partial(gzip.GzipFile, fileobj=_stream(raw)), file)
     return raw
-
-
-def _archive_and_entry(path: Path) -> tuple[Path, str]:
-    """(archive, entry) where a parent of the path is a file; the path itself and "" otherwise."""
-    parent = None if path.exists() else next((p for p in path.parents if p.is_file()), None)
-    return (path, "") if parent is None else (parent, path.relative_to(parent).as_posix())
 
 
 def entries_of(path: Path) -> tuple[str, ...]:
@@ -280,8 +267,11 @@ def open_text(path: Path, file: str, raw: bytes | mmap.mmap) -> Source:
         encoding = _WIDE_BOMS[bom]
         data: bytes | mmap.mmap = raw.decode(encoding, errors="replace").encode("utf-8")
     elif b"\0" in raw[:HEAD_BYTES]:
-        encoding = _wide_without_bom(raw[:HEAD_BYTES])
-        if not encoding or isinstance(raw, mmap.mmap):
+        even, odd = raw[:HEAD_BYTES:2], raw[1:HEAD_BYTES:2]  # UTF-16 of a western text: every other byte is zero
+        big = len(even) > 8 and not any(even) and all(odd)
+        little = len(odd) > 8 and not any(odd) and all(even)
+        encoding = "utf-16-le" if little else "utf-16-be"
+        if not (big or little) or isinstance(raw, mmap.mmap):
             raise ReadError(Problem("binary", "this is not a text file", file=file, allowed="a text export"))
         data = raw.decode(encoding, errors="replace").encode("utf-8")
     else:
@@ -290,14 +280,6 @@ def open_text(path: Path, file: str, raw: bytes | mmap.mmap) -> Source:
             data = raw[:].decode(encoding, errors="replace").encode("utf-8")
     source = Source(path, file, data, encoding, start=len(bom) if bom == codecs.BOM_UTF8 else 0)
     return source if isinstance(data, mmap.mmap) else _with_one_line_ending(source, data)
-
-
-def _wide_without_bom(head: bytes) -> str:
-    """UTF-16 tells itself in a western text: every other byte is zero."""
-    for encoding, zeros, letters in (("utf-16-le", head[1::2], head[::2]), ("utf-16-be", head[::2], head[1::2])):
-        if len(zeros) > 8 and not any(zeros) and all(letters):
-            return encoding
-    return ""
 
 
 def _with_one_line_ending(source: Source, data: bytes) -> Source:
@@ -314,20 +296,6 @@ def _too_large(size: int, limit: int, file: str) -> ReadError:
     return ReadError(Problem("too_large", "the file is too large", file=file, found=found, allowed=allowed))
 
 
-def _encoding_of_names(head: bytes) -> str:
-    """The code page in which more cells of the beginning are names of quantities than in cp1252, or ""."""
-    best, most = "", _names_in(head, "cp1252")
-    for encoding in _BY_NAMES:
-        if (found := _names_in(head, encoding)) > most:
-            best, most = encoding, found
-    return best
-
-
-def _names_in(head: bytes, encoding: str) -> int:
-    text = head.decode(encoding, errors="replace")
-    return sum(match_quantity(cell.strip()) is not None for cell in _CELL.findall(text) if not cell.isascii())
-
-
 def _narrow_encoding(raw: bytes | mmap.mmap) -> str:
     looked_at = raw if isinstance(raw, bytes) else raw[:CHUNK_BYTES]
     if looked_at.isascii():
@@ -337,7 +305,14 @@ def _narrow_encoding(raw: bytes | mmap.mmap) -> str:
         return "utf-8"
     except UnicodeDecodeError:
         pass
-    if by_names := _encoding_of_names(looked_at[:HEAD_BYTES]):
+
+    def names_in(encoding: str) -> int:
+        """Cells of the beginning that are names of quantities, beyond ASCII."""
+        cells = _CELL.findall(looked_at[:HEAD_BYTES].decode(encoding, errors="replace"))
+        return sum(match_quantity(cell.strip()) is not None for cell in cells if not cell.isascii())
+
+    by_names = max(("cp1252", *_BY_NAMES), key=names_in)  # the first of equal ones
+    if by_names != "cp1252":
         return by_names
     strange = looked_at.translate(None, delete=_ASCII)
     try:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -96,23 +97,16 @@ def _lvm_as_table(source: Source) -> Source:
             row = 0 if key == "X_Value" else None
             width = cells.index("Comment") if "Comment" in cells else 0
         elif row is not None and any(rest) and all(map(_LVM_NUMBER_OR_NOTHING.fullmatch, cells[:2])):
-            first = _lvm_time(header, row) if not key.strip() and header.get("X_Columns") == "No" else key
-            lines[k] = "\t".join([first, *(rest[: width - 1] if width else rest)])
+            if not key.strip() and header.get("X_Columns") == "No":  # X0 + row Delta_X, where the header gives them
+                with suppress(ValueError):
+                    start, step = (float(header.get(name, "").replace(",", ".")) for name in ("X0", "Delta_X"))
+                    key = f"{start + row * step:.9f}".replace(".", header.get("Decimal_Separator") or ".")
+            lines[k] = "\t".join([key, *(rest[: width - 1] if width else rest)])
             row += 1
         elif key.strip():
             header[key] = rest[0] if rest else ""
             row = None
     return replace(source, data="\n".join(lines).encode(source.codec, errors="replace"))
-
-
-def _lvm_time(header: dict[str, str], row: int) -> str:
-    """X0 + row Delta_X in the decimal mark of the file; "" where the header does not give them."""
-    try:
-        start, step = (float(header.get(key, "").replace(",", ".")) for key in ("X0", "Delta_X"))
-    except ValueError:
-        return ""
-    mark = header.get("Decimal_Separator", ".") or "."
-    return f"{start + row * step:.9f}".replace(".", mark)
 
 
 def _lvm_hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
@@ -196,7 +190,10 @@ def _te67_hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
             return np.array([])
 
     found = []
-    if _runs_with_the_clock(numbers("Test Time"), columns.get("Time", [])):
+    time, clock = numbers("Test Time"), [_TE67_CLOCK.fullmatch(cell) for cell in columns.get("Time", [])]
+    seconds = [int(c[1]) * 3600 + int(c[2]) * 60 + int(c[3]) for c in clock if c]
+    of_all_rows = len(seconds) >= 10 and len(seconds) == len(clock) == time.size
+    if of_all_rows and abs((seconds[-1] - seconds[0]) % 86400 - (time[-1] - time[0])) < 2.0:
         found.append(Hint("time", "Test Time [s]", "no unit in the file; it agrees with the clock column"))
     velocity, radius, turns = numbers("Sliding Velocity"), numbers("Radius"), numbers("Speed")
     if velocity.any() and velocity.size == radius.size == turns.size:
@@ -216,14 +213,6 @@ def _te67_hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
             reason += ", and the friction force equals friction coefficient times load"
             found.append(Hint("friction force", "Friction Force [N]", reason))
     return tuple(found)
-
-
-def _runs_with_the_clock(time: np.ndarray, cells: list[str]) -> bool:
-    clock = [_TE67_CLOCK.fullmatch(cell) for cell in cells]
-    if len(clock) < 10 or not all(clock) or time.size != len(clock):
-        return False
-    seconds = np.array([int(c[1]) * 3600 + int(c[2]) * 60 + int(c[3]) for c in clock if c])
-    return bool(abs((seconds[-1] - seconds[0]) % 86400 - (time[-1] - time[0])) < 2.0)
 
 
 # Tried in this order; the last one accepts everything the others do not recognise.

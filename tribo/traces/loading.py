@@ -107,21 +107,17 @@ def loading_of(signal: Signal, zero: Zero | None = None) -> Loading:
     width = 1 + 2 * ((rise.last - rise.first) // _RISE_OVER_SMOOTHING)
     zeroed = replace(signal, force_N=force, calm_N=calm, smooth_N=running_mean(calm, width))
     rise = replace(rise, force_N=rise.force_N - known.force_N)
-    return _to_first_maximum(zeroed, known, rise, signal.noise_N / math.sqrt(width))
-
-
-def _to_first_maximum(signal: Signal, zero: Zero, rise: Rise, noise: float) -> Loading:
-    """The climb along the loading line and beyond it; ``noise`` is that of the smoothed force."""
-    time, smooth = signal.time_s, signal.smooth_N
+    # the climb along the loading line and beyond it
+    time, smooth, noise = zeroed.time_s, zeroed.smooth_N, signal.noise_N / math.sqrt(width)
     margin = max(5.0 * noise, 0.02 * float(smooth[rise.last]))
     depart = departure(time, smooth, rise, margin)
     per_sample = rise.rate * (float(time[rise.last] - time[rise.first]) / max(rise.last - rise.first, 1))
     top = first_maximum(smooth, rise, depart, per_sample, noise)
     end = _before_unloading(smooth, top)
     if end - top < 3 and end == smooth.size:
-        raise TraceError([*_no_pull(signal, 0.0, None), *signal.problems])
+        raise TraceError([*_no_pull(zeroed, 0.0, None), *signal.problems])
     reach = min(margin / per_sample, smooth.size) if per_sample > 0 else 0
-    return Loading(signal, zero, rise, depart, math.ceil(reach) + 2, top, end)
+    return Loading(zeroed, known, rise, depart, math.ceil(reach) + 2, top, end)
 
 
 def _no_pull(signal: Signal, start: float, rise: Rise | None) -> list[Problem]:
@@ -155,7 +151,11 @@ def first_rise(signal: Signal, start: float) -> Rise | None:
     full = float(smooth.max()) - start
     if full < _DETECTABLE * noise:
         return None
-    full = _first_height(smooth - start, full, noise)
+    height = smooth - start
+    highest = np.maximum.accumulate(height)
+    clear_fall = np.maximum(_CLEAR_FALL * highest, _DETECTABLE * noise)
+    fallen = (highest > _SUBSTANTIAL * full) & (highest - height > clear_fall)
+    full = float(highest[np.argmax(fallen)]) if fallen.any() else full  # before the first clear fall
     for _ in range(2):
         high = int(np.argmax(smooth >= start + _HIGH * full))
         below = np.flatnonzero(smooth[:high] <= start + _LOW * full)
@@ -170,15 +170,6 @@ def first_rise(signal: Signal, start: float) -> Rise | None:
             break
         full = reached
     return rise
-
-
-def _first_height(height: FloatArray, full: float, noise: float) -> float:
-    """Highest force before the first clear fall from a substantial height; ``full`` if it never falls."""
-    highest = np.maximum.accumulate(height)
-    fallen = (highest > _SUBSTANTIAL * full) & (
-        highest - height > np.maximum(_CLEAR_FALL * highest, _DETECTABLE * noise)
-    )
-    return float(highest[np.argmax(fallen)]) if fallen.any() else full
 
 
 def departure(time_s: FloatArray, smooth: FloatArray, rise: Rise, margin: float) -> int:

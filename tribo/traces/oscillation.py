@@ -59,7 +59,9 @@ def oscillation_of(
             time, force = condense(time, factor), condense(force, factor)
             peaks, troughs = turning_points(force, least)
     if peaks.size <= _FEWEST:
-        return Oscillation("steady" if _is_steady(force_N) else "irregular", int(max(peaks.size - 1, 0)))
+        spread = _MAD * float(np.median(np.abs(force_N - np.median(force_N))))
+        keeps_level = spread < max(5.0 * sample_noise(force_N), 0.1 * abs(float(np.median(force_N))))
+        return Oscillation("steady" if keeps_level else "irregular", int(max(peaks.size - 1, 0)))
     troughs = np.array([a + int(np.argmin(force[a:b])) for a, b in pairwise(peaks)])
     periods, spent = np.diff(time[peaks]), time[peaks[1:]] - time[troughs]
     loading, loading_u = _loading(time, force, troughs, peaks[1:], spent)
@@ -95,13 +97,6 @@ def _smallest_drop(force: FloatArray) -> float:
         return first_look
     about = peaks[::_CYCLES_ABOUT]
     return max(SMALLEST_DROP * float(np.median([spread(force[a:b]) for a, b in pairwise(about)])), felt)
-
-
-def _is_steady(force_N: FloatArray) -> bool:
-    """Whether a force without cycles keeps its level to within its noise, its trend and a tenth of itself."""
-    noise, level = sample_noise(force_N), abs(float(np.median(force_N)))
-    spread = _MAD * float(np.median(np.abs(force_N - np.median(force_N))))
-    return spread < max(5.0 * noise, 0.1 * level)
 
 
 def _regime(

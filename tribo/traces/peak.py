@@ -74,7 +74,10 @@ def find_apex(loading: Loading) -> Apex:
     time_s, force, smooth = loading.signal.time_s[held], loading.signal.force_N[held], loading.signal.smooth_N[held]
     depart, peak, noise = loading.depart, loading.top, loading.signal.noise_N
     long = max(depart - loading.rise.first, 2 * FEWEST_SAMPLES)
-    length = _fall_length(smooth, peak, loading.level_N, 2 * FEWEST_SAMPLES, max(long, 3 * FEWEST_SAMPLES))
+    # the fall lasts until 80 % of the way down is gone, within bounds
+    shortest, longest, left = 2 * FEWEST_SAMPLES, max(long, 3 * FEWEST_SAMPLES), smooth.size - 1 - peak
+    down = smooth[peak : peak + longest + 1] <= loading.level_N + 0.2 * (smooth[peak] - loading.level_N)
+    length = max(min(int(np.argmax(down)) if down.any() else longest, longest, left), min(shortest, left))
     low, high = min(depart, peak + 1) - loading.lag, min(depart, peak + 1) + 2
     candidates = [_resolved(time_s, force, (max(low - long, 0), low, high, high + length), noise)]
     if not (candidates[0] and candidates[0].fits) and not low <= peak < high:
@@ -95,14 +98,6 @@ def with_peak_near(loading: Loading, peak_s: float) -> Loading:
     time = loading.signal.time_s
     top = min(max(int(np.searchsorted(time, peak_s)), FEWEST_SAMPLES), time.size - FEWEST_SAMPLES - 1)
     return replace(loading, depart=top, lag=2, top=top, end=max(loading.end, top + FEWEST_SAMPLES))
-
-
-def _fall_length(smooth: FloatArray, peak: int, level: float, shortest: int, longest: int) -> int:
-    """Samples after ``peak`` until 80 % of the way down to ``level`` is gone, within the given bounds."""
-    target = level + 0.2 * (smooth[peak] - level)
-    down = smooth[peak : peak + longest + 1] <= target
-    length = int(np.argmax(down)) if down.any() else longest
-    return max(min(length, longest, smooth.size - 1 - peak), min(shortest, smooth.size - 1 - peak))
 
 
 def _resolved(time_s: FloatArray, force: FloatArray, search: Search, noise: float) -> Apex | None:
@@ -146,18 +141,12 @@ def _smooth_from(t: FloatArray, f: FloatArray, end: int, noise: float) -> int:
         first = round(end * (1.0 - share))
         if end - first <= _FEWEST_FOR_PARABOLA:
             return max(min(first, end - FEWEST_SAMPLES), 0)
-        if _parabola_misfit(t[first:end], f[first:end]) < 2.0 * noise**2 * (end - first):
+        x = (t[first:end] - t[first]) / (t[end - 1] - t[first])
+        basis = np.stack((np.ones_like(x), x, x * x))
+        away = f[first:end] - np.linalg.solve(basis @ basis.T, basis @ f[first:end]) @ basis
+        if float(away @ away) < 2.0 * noise**2 * (end - first):
             break
     return first
-
-
-def _parabola_misfit(t: FloatArray, f: FloatArray) -> float:
-    """Sum of squared departures from the least-squares parabola."""
-    x = (t - t[0]) / (t[-1] - t[0])
-    basis = np.stack((np.ones_like(x), x, x * x))
-    c = np.linalg.solve(basis @ basis.T, basis @ f)
-    away = f - c @ basis
-    return float(away @ away)
 
 
 def sharp_apex(time_s: FloatArray, force: FloatArray, first: int, last: int, noise: float) -> Apex | None:
@@ -283,14 +272,6 @@ def with_shape_left_open(
     return replace(sharp, shape_u_N=max(lower, 0.0) / math.sqrt(3.0))
 
 
-def _inverse(matrix: FloatArray) -> FloatArray:
-    """Inverse of a matrix of normal equations; where samples share their times, the pseudo-inverse."""
-    try:
-        return np.asarray(np.linalg.inv(matrix))
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.pinv(matrix))
-
-
 def _parabola_top(time_s: FloatArray, force: FloatArray, peak: int, half: int, noise: float) -> Apex:
     low, high = max(peak - half, 0), min(peak + half, force.size - 1)
     t, f = time_s[low : high + 1] - time_s[peak], force[low : high + 1]
@@ -299,7 +280,10 @@ def _parabola_top(time_s: FloatArray, force: FloatArray, peak: int, half: int, n
         return Apex(float(time_s[peak]), reach, float(f.mean()), noise / math.sqrt(t.size), math.inf, "rounded")
     x = t / reach
     basis = np.array((np.ones_like(x), x, x * x))
-    inverse = _inverse(basis @ basis.T)
+    try:
+        inverse = np.linalg.inv(basis @ basis.T)
+    except np.linalg.LinAlgError:  # samples share their times
+        inverse = np.linalg.pinv(basis @ basis.T)
     c = inverse @ (basis @ f)
     fitted = c @ basis
     chi2_red = float((f - fitted) @ (f - fitted)) / max(t.size - 3, 1) / noise**2

@@ -22,6 +22,7 @@ from tribo.traces.signal import (
     median_of_three,
     noise_of,
     running_mean,
+    runs_of,
     sample_noise,
     wander,
 )
@@ -144,8 +145,7 @@ def _moving(trace: Trace) -> Mask | None:
 
 def _drive_stops(moving: Mask, contact: Range) -> tuple[list[Range], int, list[Range]]:
     """Stops of the drive while the bodies touch, where motion ends for good, and all ranges at rest."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], ~moving, [False]))))
-    rests = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= _FEWEST_AT_REST]
+    rests = [(int(a), int(b)) for a, b in zip(*runs_of(~moving), strict=True) if b - a >= _FEWEST_AT_REST]
     if not moving.any():
         return [], contact[1], []
     first, last = int(np.argmax(moving)), int(np.flatnonzero(moving)[-1])
@@ -166,8 +166,9 @@ def force_stops(signal: Signal, contact: Range, *, in_motion: bool) -> list[Rang
     if height.size < 20 * _FEWEST_AT_REST or float(height.max()) < _FELT * signal.noise_N:
         return []
     top = float(np.percentile(height, 90))
-    low = np.flatnonzero(np.diff(np.concatenate(([False], height < _FALLEN * top, [False]))))
-    dips = [(int(a), int(b)) for a, b in zip(low[::2], low[1::2], strict=True) if a > 0 and b < height.size]
+    dips = [
+        (int(a), int(b)) for a, b in zip(*runs_of(height < _FALLEN * top), strict=True) if a > 0 and b < height.size
+    ]
     stops = [stop for dip in dips if (stop := _stop_in(height, dip))]
     if not stops and not in_motion:
         stops = _relaxations(signal.time_s[first:last], height, top, signal.noise_N)
@@ -368,10 +369,8 @@ def _steps_over(values: FloatArray, width: int, least: float, sharp: bool) -> li
     before, after = means[np.clip(index - width, 0, means.size - 1)], means[np.clip(index, 0, means.size - 1)]
     jump = np.abs(after - before)
     noise = max(sample_noise(values) * math.sqrt(2.0 / width), float(np.median(jump)))
-    over = np.concatenate(([False], jump > max(least, _OF_NOISE * noise), [False]))
-    edges = np.flatnonzero(np.diff(over))
     found = []
-    for a, b in ((int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)):
+    for a, b in (map(int, run) for run in zip(*runs_of(jump > max(least, _OF_NOISE * noise)), strict=True)):
         steepest = a + int(np.argmax(jump[a:b]))
         found.append((steepest, steepest) if sharp and b - a <= 2 * width else (a, b))
     return found

@@ -78,6 +78,12 @@ def median_of_three(values: FloatArray) -> FloatArray:
     return np.concatenate((middle[:1], middle, middle[-1:]))
 
 
+def runs_of(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Starts and ends (exclusive) of the runs of samples in which a mask holds."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False]))))
+    return edges[::2], edges[1::2]
+
+
 def running_mean(values: FloatArray, width: int) -> FloatArray:
     """Centred mean over ``width`` samples (made odd), shorter at the ends; same length as ``values``."""
     half = width // 2
@@ -262,21 +268,17 @@ def impulse_spikes(force: FloatArray, noise: float) -> NDArray[np.bool_]:
         back &= lower > SPIKE_OVER_NOISE * noise
         first, lower = first[back], lower[back]
         if first.size:
-            apart = first[lower > SPIKE_OVER_NEIGHBOURS * _largest_beside(size, first, width)]
+            beside = np.concatenate((np.arange(-_NEIGHBOURS, 0), width + np.arange(1, _NEIGHBOURS + 1)))
+            index = first[:, None] + beside
+            inside = (index >= 0) & (index < size.size)
+            largest = np.where(inside, size[np.clip(index, 0, size.size - 1)], 0.0).max(axis=1)
+            apart = first[lower > SPIKE_OVER_NEIGHBOURS * largest]
             mask[(apart[:, None] + 1 + np.arange(width)).ravel()] = True
     inner = force[1:-1]
     low, high = float(inner.min()), float(inner.max())
     for end in (0, -1):  # nothing shows whether the force came back: only what lies far beyond all else counts
         mask[end] = not low - (high - low) < force[end] < high + (high - low)
     return mask
-
-
-def _largest_beside(size: FloatArray, first: NDArray[np.int64], width: int) -> FloatArray:
-    """Largest of the steps within ``_NEIGHBOURS`` of a step ``first`` in and a step ``first + width`` out."""
-    beside = np.concatenate((np.arange(-_NEIGHBOURS, 0), width + np.arange(1, _NEIGHBOURS + 1)))
-    index = first[:, None] + beside
-    inside = (index >= 0) & (index < size.size)
-    return np.asarray(np.where(inside, size[np.clip(index, 0, size.size - 1)], 0.0).max(axis=1))
 
 
 def spike_problems(trace: Trace, spikes: NDArray[np.bool_]) -> tuple[Problem, ...]:
@@ -347,15 +349,14 @@ def flat_top(force: FloatArray) -> tuple[int, int] | None:
     top = force >= largest - 1e-9 * (largest - float(force.min()))
     if np.count_nonzero(top) < _SHORTEST_FLAT_TOP:
         return None
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], top, [False]))))
-    starts, lengths = edges[::2], edges[1::2] - edges[::2]
-    longest = int(np.argmax(lengths))
-    run = int(lengths[longest])
+    starts, ends = runs_of(top)
+    longest = int(np.argmax(ends - starts))
+    start, run = int(starts[longest]), int(ends[longest] - starts[longest])
     if run < _SHORTEST_FLAT_TOP:
         return None
     pairs = force[1:] == force[:-1]
     inside = top[1:] & top[:-1]
-    return (int(starts[longest]), run) if _beyond_chance(run, pairs[~inside], force.size) else None
+    return (start, run) if _beyond_chance(run, pairs[~inside], force.size) else None
 
 
 def _beyond_chance(run: int, pairs_elsewhere: NDArray[np.bool_], samples: int) -> bool:
@@ -373,10 +374,9 @@ def standstill(force: FloatArray) -> tuple[int, int] | None:
     equal = force[1:] == force[:-1]
     if np.count_nonzero(equal) < _SHORTEST_STANDSTILL:
         return None
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], equal, [False]))))
-    starts, lengths = edges[::2], edges[1::2] - edges[::2]
+    starts, ends = runs_of(equal)
     low, span = float(force.min()), float(np.ptp(force))
-    lengths = np.where(force[starts] - low > _AT_ZERO * span, lengths, 0)
+    lengths = np.where(force[starts] - low > _AT_ZERO * span, ends - starts, 0)
     longest = int(np.argmax(lengths))
     start, run = int(starts[longest]), int(lengths[longest]) + 1
     if run < _SHORTEST_STANDSTILL:
