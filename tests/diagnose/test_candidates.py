@@ -320,7 +320,7 @@ def steps(s: Setup) -> np.ndarray:
 
 def half_and_half(s: Setup) -> np.ndarray:
     """A little of the temperature and a little tilt of the specimens: either alone leaves no misfit beyond chance."""
-    return acting("temperature", 0.022)(s) + acting("tilt", 0.012)(s)
+    return acting("temperature", 0.026)(s) + acting("tilt", 0.012)(s)
 
 
 def suction_that_varies(s: Setup) -> np.ndarray:
@@ -334,7 +334,7 @@ def suction_that_varies(s: Setup) -> np.ndarray:
 def test_what_chance_would_give_a_mechanism_is_no_cause_however_certain_the_misfit() -> None:
     found = examine(made(steps, seed=0), replicates=FEW)
     assert found.verdict.verdict == "unknown"
-    assert found.screened.p_adjusted() < 1e-4
+    assert found.screened.p_adjusted() < 0.01
     assert found.named is not None
     assert found.named.causes == ()
 

@@ -59,7 +59,8 @@ def test_the_patterns_of_the_campaign_tell_how_wrong_the_model_is_about_them(fac
     Each of A, B and C is off by so many standard deviations of that error, alternately up and down.
     """
     moved = off_by(factor)
-    (_, low, high), (at_least, at_most) = recovered(moved, 0)[0], intervals(with_pattern_error(moved, 1.0), 0)[0]
+    low, high = intervals(moved, 0)[0]
+    at_least, at_most = intervals(with_pattern_error(moved, 1.0), 0)[0]
     assert (high - low < at_most - at_least) == (factor < 1)
 
 

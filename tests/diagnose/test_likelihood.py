@@ -25,7 +25,7 @@ from tribo.diagnostics.fit import (
     whitened,
     with_noise_estimated,
 )
-from tribo.diagnostics.model import FIXED, GAIN, PATTERN, SLOPE, Setup, Target, setup
+from tribo.diagnostics.model import FIXED, OF_A_SPECIMEN, PATTERN, SLOPE, Setup, Target, setup
 from tribo.diagnostics.normal_equations import Inverse, ModelColumns, model_columns
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
@@ -39,6 +39,7 @@ from tribo.diagnostics.replicates import (
     solved_at_once,
 )
 from tribo.diagnostics.scatter import (
+    FIRST_NUISANCE,
     REPEAT_PRIOR,
     SCATTER_SD,
     SIZE_PRIORS,
@@ -73,7 +74,8 @@ def noise_of(s: Setup, tail: float = NORMAL) -> Noise:
     repeat = np.array([[0.0081, 0.002], [0.002, 0.0049]])
     scatter = np.array([0.3, -0.1, -0.2, -0.15])
     assert len(scatter) == s.scatter.shape[1]
-    return Noise(repeat, np.array([0.06, 0.03]), np.array([0.02, 0.035]), 1.4, scatter, tail)
+    sizes = np.array([0.06, 0.03, 0.02, 0.035, 1.4, 0.021, 0.013, 0.044, 0.026, 0.051, 0.017])
+    return Noise(repeat, sizes, scatter, tail)
 
 
 def of_tests(s: Setup, noise: Noise) -> np.ndarray:
@@ -88,9 +90,8 @@ def of_tests(s: Setup, noise: Noise) -> np.ndarray:
 
 def of_effects(s: Setup, noise: Noise) -> np.ndarray:
     """Variance of every random effect, (q,)."""
-    sizes = {GAIN: noise.specimen[0], GAIN + 1: noise.specimen[1], SLOPE: noise.slope[0], SLOPE + 1: noise.slope[1]}
-    sizes |= {PATTERN: noise.pattern, FIXED: 1.0}
-    return np.array([(sizes[int(g)] * u) ** 2 for g, u in zip(s.group, s.unit, strict=True)])
+    sizes = [1.0 if g == FIXED else noise.sizes[g] for g in s.group]
+    return np.array([(size * u) ** 2 for size, u in zip(sizes, s.unit, strict=True)])
 
 
 def dense(s: Setup, noise: Noise) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -110,14 +111,15 @@ def residual_of(s: Setup) -> np.ndarray:
 def whole_inverse(inverse: Inverse, columns: ModelColumns) -> np.ndarray:
     """The whole matrices in the order of :meth:`ModelColumns.vector`, (r, p + q, p + q)."""
     r, specimens, _, m = inverse.across.shape
-    wide = inverse.across.reshape(r, 4 * specimens, m)
+    e = OF_A_SPECIMEN
+    wide = inverse.across.reshape(r, e * specimens, m)
     own = wide @ inverse.border @ wide.transpose(0, 2, 1)
     for k in range(specimens):
-        own[:, 4 * k : 4 * k + 4, 4 * k : 4 * k + 4] += inverse.own[:, k]
+        own[:, e * k : e * k + e, e * k : e * k + e] += inverse.own[:, k]
     side = -wide @ inverse.border
     whole = np.block([[own, side], [side.transpose(0, 2, 1), inverse.border]])
     numbers = np.arange(whole.shape[1], dtype=float)[None]
-    own, shared = numbers[:, : 4 * specimens].reshape(1, -1, 4), numbers[:, 4 * specimens :]
+    own, shared = numbers[:, : e * specimens].reshape(1, -1, e), numbers[:, e * specimens :]
     order = columns.vector(own, shared)[0].astype(int)
     return np.asarray(whole[:, order][:, :, order])
 
@@ -159,7 +161,8 @@ def test_the_penalised_density_falls_by_the_tests_and_by_the_effects() -> None:
 
 
 def test_the_noise_begins_as_expected() -> None:
-    assert first_noise().sizes == pytest.approx(SIZE_PRIORS[:, 0])
+    assert first_noise().sizes[: PATTERN + 1] == pytest.approx(SIZE_PRIORS[: PATTERN + 1, 0])
+    assert first_noise().sizes[PATTERN + 1 :] == pytest.approx(FIRST_NUISANCE)
     assert first_noise().repeat == pytest.approx(REPEAT_PRIOR[0] ** 2 * np.eye(2))
 
 
@@ -249,7 +252,7 @@ def test_the_density_of_the_sizes_is_a_scaled_inverse_chi_of_each_and_an_inverse
         found = noise.sizes[k]
         each = -weight * np.log(found) - 0.5 * weight * wanted**2 / found**2
         assert log_size_prior(k, np.array(found)) == pytest.approx(each)
-        expected += each
+        expected += each if k in s.group else 0.0
     assert noise.scatter is not None
     expected -= 0.5 * np.sum(noise.scatter**2) / SCATTER_SD**2
     assert log_prior(s, noise) == pytest.approx(expected)
@@ -261,9 +264,7 @@ def test_the_density_of_the_sizes_is_a_scaled_inverse_chi_of_each_and_an_inverse
 
 def test_the_sizes_of_a_noise_are_those_it_is_given() -> None:
     noise = noise_of(campaign())
-    assert noise.sizes.tolist() == [0.06, 0.03, 0.02, 0.035, 1.4]
-    again = noise.with_sizes(np.array([1.0, 2.0, 3.0, 4.0, 5.0]))
-    assert (again.specimen.tolist(), again.slope.tolist(), again.pattern) == ([1.0, 2.0], [3.0, 4.0], 5.0)
+    assert noise.pattern == 1.4
     s = campaign()
     assert prior_sd(s, noise.sizes) ** 2 == pytest.approx(of_effects(s, noise))
     both = prior_sd(s, np.array([noise.sizes, 2 * noise.sizes]))
@@ -280,8 +281,8 @@ def test_a_size_is_the_rms_of_its_effects_and_of_what_was_expected_before() -> N
     effects = np.arange(1.0, 1 + len(s.group)) * 0.01
     known = updated_sizes(s, sizes, effects, np.zeros(len(s.group)))
     unknown = updated_sizes(s, sizes, effects, prior_sd(s, sizes) ** 2)
-    for k, (wanted, worth) in enumerate(SIZE_PRIORS):
-        here = s.group == k
+    for k in np.unique(s.group):
+        (wanted, worth), here = SIZE_PRIORS[k], s.group == k
         total = np.sum((effects[here] / s.unit[here]) ** 2) + worth * wanted**2
         assert known[k] ** 2 == pytest.approx(total / (here.sum() + worth))
         assert unknown[k] ** 2 == pytest.approx(total / worth)
@@ -376,24 +377,25 @@ def test_many_replicates_are_weighed_and_solved_as_each_by_dense_matrices() -> N
     s, rng = campaign(), np.random.default_rng(4)
     noise, target = noise_of(s, tail=8.0), Target(s, ())
     n = s.observations.n
-    sizes = fitted_noise(s, noise, 2)
-    assert sizes.effects.tolist() == [noise.sizes.tolist()] * 2
-    assert sizes.precision == pytest.approx(np.array([1 / of_effects(s, noise)] * 2))
+    repeats = fitted_noise(s, noise, 2)
+    assert repeats[2].tolist() == [noise.sizes.tolist()] * 2
+    of_random = prior_sd(s, repeats[2]) ** -2
+    assert of_random == pytest.approx(np.array([1 / of_effects(s, noise)] * 2))
     inverse = np.linalg.inv(of_tests(s, noise))
-    for found in (*sizes.inverse, inverse_noise(s, noise.repeat, np.asarray(noise.scatter))):
+    for found in (*inverse_noise(s, *repeats[:2]), inverse_noise(s, noise.repeat, np.asarray(noise.scatter))):
         assert found == pytest.approx(np.array([inverse[:, 0, 0], inverse[:, 0, 1], inverse[:, 1, 1]]))
     residual = 0.1 * rng.normal(size=(2, 2, n))
     assert products_of(residual)[1] == pytest.approx(
         np.array([residual[1, 0] ** 2, residual[1, 0] * residual[1, 1], residual[1, 1] ** 2])
     )
-    weight = replicate_weights(sizes, residual, 8.0)
+    weight = replicate_weights(inverse_noise(s, *repeats[:2]), residual, 8.0)
     distance = np.einsum("ran,nab,rbn->rn", residual, inverse, residual)
     assert weight == pytest.approx(10.0 / (8.0 + distance))
     jacobian = target.jacobian(s.first_law, target.predict(s.first_law))
     along = np.concatenate([jacobian, s.dense], axis=2).transpose(1, 0, 2).copy()
     columns = model_columns(jacobian, s)
-    precision = sizes.inverse * weight[:, None]
-    inverted, (own, border) = solved_at_once(columns, precision, residual, sizes)
+    precision = inverse_noise(s, *repeats[:2]) * weight[:, None]
+    inverted, (own, border) = solved_at_once(columns, precision, residual, of_random)
     spread, solution = whole_inverse(inverted, columns), columns.vector(own, border)
     for r in range(2):
         whole = np.einsum("ank,n,nab,bnl->kl", along, weight[r], inverse, along)
@@ -408,7 +410,7 @@ def test_many_replicates_are_weighed_and_solved_as_each_by_dense_matrices() -> N
     moved = np.einsum("ank,rkl,bnl->rabn", along, spread, along)
     expected = np.stack([moved[:, 0, 0], moved[:, 0, 1], moved[:, 1, 1]], axis=1)
     assert inverted.spread(columns) == pytest.approx(expected, rel=1e-6)
-    ready = replicates_at(s, columns, sizes, residual, 2 * residual, 8.0)
+    ready = replicates_at(s, columns, repeats, residual, 2 * residual, 8.0)
     assert ready.precision == pytest.approx(precision)
     assert ready.group.tolist() == s.group.tolist()
     assert ready.residual == pytest.approx(2 * residual)
@@ -427,8 +429,9 @@ def test_the_normal_matrix_by_blocks_is_the_dense_one() -> None:
     found = columns.weighted(precision)
     normal = found.normal
     specimens = s.specimens
-    here = np.arange(4, 4 + 4 * specimens).reshape(specimens, 4)
-    border = np.concatenate([np.arange(4), np.arange(4 + 4 * specimens, whole.shape[0])])
+    last = 4 + OF_A_SPECIMEN * specimens
+    here = np.arange(4, last).reshape(specimens, OF_A_SPECIMEN)
+    border = np.concatenate([np.arange(4), np.arange(last, whole.shape[0])])
     for k, own in enumerate(here):
         assert normal.own[0, k] == pytest.approx(whole[np.ix_(own, own)])
         assert normal.across[0, k] == pytest.approx(whole[np.ix_(own, border)])
@@ -467,12 +470,12 @@ def test_the_covariance_of_predictions_is_that_of_the_whole_matrix_and_random_ef
 
 def test_steps_of_the_sizes_have_the_density_of_the_sizes_they_lead_to() -> None:
     s = campaign()
-    sizes = fitted_noise(s, noise_of(s), 3)
-    found = log_priors(s, sizes.effects, SIZE_STEPS)
+    sizes = fitted_noise(s, noise_of(s), 3)[2]
+    found = log_priors(s, sizes, SIZE_STEPS)
     assert found.shape == (len(SIZE_STEPS), 3)
     for step, row in zip(SIZE_STEPS, found, strict=True):
         stepped = noise_of(s).sizes * np.exp(step)
-        assert row == pytest.approx(sum(float(log_size_prior(k, v)) for k, v in enumerate(stepped)))
+        assert row == pytest.approx(sum(float(log_size_prior(k, v)) for k, v in enumerate(stepped) if k in s.group))
     only = replace(s, group=np.where(s.group == PATTERN, FIXED, s.group))
-    fewer = log_priors(only, sizes.effects, SIZE_STEPS[:1])[0]
+    fewer = log_priors(only, sizes, SIZE_STEPS[:1])[0]
     assert fewer == pytest.approx(found[0] - float(log_size_prior(PATTERN, noise_of(s).sizes[PATTERN])))

@@ -63,10 +63,10 @@ def test_mechanisms_whose_effects_are_alike_in_part_only_are_not_called_confused
 
 
 def test_four_times_the_tests_find_a_trend_of_half_the_size() -> None:
-    """Run-in depends on repeats only, so its detectable size falls with the square root of their number."""
+    """Humidity depends on repeats only, so its detectable size falls with the square root of their number."""
     campaign = hidden(design=Design(specimens=2)).campaign
     more = replace(campaign, tests=campaign.tests * 4)
-    one, four = (by_name(plan_design(c))["run_in"].amplitude for c in (campaign, more))
+    one, four = (by_name(plan_design(c))["humidity"].amplitude for c in (campaign, more))
     assert four / one == pytest.approx(0.5, abs=0.05)
 
 

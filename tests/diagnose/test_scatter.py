@@ -12,7 +12,7 @@ from blind.tribometer import Design
 from tribo.diagnostics import examine
 from tribo.diagnostics.contrasts import screen
 from tribo.diagnostics.fit import ModelFit, fit
-from tribo.diagnostics.model import setup
+from tribo.diagnostics.model import SLOPE, setup
 from tribo.diagnostics.observations import observe
 from tribo.diagnostics.predictor import tabled_predictor
 from tribo.diagnostics.replicates import drawn_residuals, refits
@@ -36,9 +36,9 @@ def off(pattern_error: float, **changes: object) -> Design:
 
 
 def test_the_slopes_of_specimens_are_recovered_within_a_third() -> None:
-    found = [baseline(seed, replace(LARGE, specimen_slope=0.06)).noise.slope for seed in (1, 2, 3)]
+    found = [baseline(seed, replace(LARGE, specimen_slope=0.06)).noise.sizes[SLOPE : SLOPE + 2] for seed in (1, 2, 3)]
     assert np.sqrt(np.mean(np.square(found))) == pytest.approx(0.06, rel=0.33)
-    without = [baseline(seed, LARGE).noise.slope for seed in (1, 2, 3)]
+    without = [baseline(seed, LARGE).noise.sizes[SLOPE : SLOPE + 2] for seed in (1, 2, 3)]
     assert np.sqrt(np.mean(np.square(without))) < 0.025
 
 
@@ -109,6 +109,6 @@ def precision(f: ModelFit) -> np.ndarray:
 def test_sizes_are_estimated_anew_in_every_simulated_campaign() -> None:
     """Replicates of a campaign with slopes of 8 % and patterns off by three times: sizes scatter about the fit's."""
     f = baseline(7, off(3.0, specimen_slope=0.08, specimens=8))
-    sizes = refits(f, drawn_residuals(f, np.random.default_rng(2), 60))[0].effects
+    sizes = refits(f, drawn_residuals(f, np.random.default_rng(2), 60))[0][2]
     assert np.exp(np.mean(np.log(sizes), axis=0)) == pytest.approx(f.noise.sizes, rel=0.25)
     assert np.all(np.std(np.log(sizes), axis=0) > 0.05)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -33,13 +35,13 @@ def one_replicate(s: Setup, noise: Noise) -> tuple[Replicates, np.ndarray]:
 def at_step(s: Setup, noise: Noise, flat: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Information (4, 4) and score (4,) of the columns beyond the law, and the log likelihood without them, the law
     integrated out, of a campaign whose random sizes are ``step`` e-folds larger."""
-    stepped = noise.with_sizes(noise.sizes * np.exp(step))
+    stepped = replace(noise, sizes=noise.sizes * np.exp(step))
     whole, contrast, r = dense(s, stepped)[0], columns(s).reshape(-1, 4), residual_of(s).ravel()
     inverse = np.linalg.inv(whole)
     of_law = flat.T @ inverse @ flat
     rest = inverse - inverse @ flat @ np.linalg.solve(of_law, flat.T @ inverse)
     likelihood = -0.5 * (np.linalg.slogdet(whole)[1] + np.linalg.slogdet(of_law)[1] + r @ rest @ r)
-    prior = sum(float(log_size_prior(k, size)) for k, size in enumerate(stepped.sizes))
+    prior = sum(float(log_size_prior(k, size)) for k, size in enumerate(stepped.sizes) if k in s.group)
     return contrast.T @ rest @ contrast, contrast.T @ rest @ r, likelihood + prior
 
 

@@ -71,20 +71,20 @@ def test_every_wrong_label_is_looked_for_as_a_whole_and_nothing_else_is() -> Non
 
 
 def test_an_effect_is_the_strongest_contrast_at_its_own_column() -> None:
-    f = baseline(("run_in", 2.5))
+    f = baseline(("temperature", 2.5))
     contrasts = contrasts_of(f)
     found = screen(f, contrasts, replicates=0, rng=np.random.default_rng(0))
     strongest = contrasts[int(found.strength.argmax())]
-    assert strongest.covariate in ("specimen_run", "run_in")
-    run_in = next(k for k, c in enumerate(contrasts) if c.acting is not None and c.acting.name == "run_in")
-    assert found.strength[run_in] > 0.98 * found.strength.max()
+    assert strongest.covariate in ("temperature_C", "temperature")
+    temperature = next(k for k, c in enumerate(contrasts) if c.acting is not None and c.acting.name == "temperature")
+    assert found.strength[temperature] > 0.98 * found.strength.max()
 
 
 def test_no_more_replicates_are_made_than_the_decision_needs() -> None:
     plain = baseline()
     contrasts = [contrast for contrast in contrasts_of(plain) if contrast.kind == "trend"]
     within = screen(plain, contrasts[1:2], replicates=200, rng=np.random.default_rng(2))
-    f = baseline(("run_in", 2.5))
+    f = baseline(("temperature", 2.5))
     beyond = screen(f, contrasts_of(f), replicates=200, rng=np.random.default_rng(2))
     assert len(within.chance) < 200
     assert np.sum(within.chance >= within.strength.max()) >= 10

@@ -11,7 +11,14 @@ from tribo.diagnostics.contrasts import Screen
 from tribo.diagnostics.direct_evidence import Evidence, stated_evidence
 from tribo.diagnostics.effect_sizes import effect_of_contrast, percent
 from tribo.diagnostics.fit import ModelFit, residual_on_flat
-from tribo.diagnostics.inference import estimates, gain, gain_of_zero, pattern_corrections, pattern_excess
+from tribo.diagnostics.inference import (
+    estimates,
+    gain,
+    gain_of_zero,
+    nuisance_layers,
+    pattern_corrections,
+    pattern_excess,
+)
 from tribo.diagnostics.model import effect_of
 from tribo.diagnostics.planning import next_test_of
 from tribo.diagnostics.score_statistics import StartEffects
@@ -242,6 +249,7 @@ def conclude(
         left = remain + misfits_of(named.left, level, model.residual, o.conditions, o.flat)
         misfits = [*left, *misfits] if named.causes and not patterns_apart(misfits) else [*misfits, *left]
         layers = [*patterns, *cause_layers(named, shown, screened, baseline, rng), *remainder_layers(remain)]
+    layers = [*layers, *nuisance_layers(model, level)]
     if excess is not None:
         misfits = [*misfits_of_patterns(patterns, level), *misfits]
     excluded = exclusions_beside(causes, barred, named.weighed if named is not None else ())

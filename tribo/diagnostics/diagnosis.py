@@ -10,17 +10,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tribo.diagnostics.candidates import Named, name_causes, weights_of
+from tribo.diagnostics.candidates import Named, best_beyond_chance, name_causes, weigh, weights_of
 from tribo.diagnostics.conclusion import conclude, exclusions
 from tribo.diagnostics.contrasts import Progress, Screen, all_contrasts, screen, screen_left
+from tribo.diagnostics.days_and_drift import session_of
 from tribo.diagnostics.direct_evidence import certain_evidence, direct_evidence
 from tribo.diagnostics.effect_sizes import percent
 from tribo.diagnostics.fit import ModelFit, fit, residual_on_flat
-from tribo.diagnostics.model import setup
+from tribo.diagnostics.model import PATTERN, Setup, effect_of, setup
 from tribo.diagnostics.observations import enough, observe
 from tribo.diagnostics.predictor import Predictor, tabled_predictor
-from tribo.diagnostics.score_statistics import start_effects
-from tribo.diagnostics.verdict import Verdict
+from tribo.diagnostics.scatter import held_still
+from tribo.diagnostics.score_statistics import StartEffects, start_effects
+from tribo.diagnostics.verdict import Excluded, Verdict
 from tribo.display import displayed
 from tribo.records import REGIMES, Ingested
 
@@ -105,12 +107,20 @@ def examine(
     rng = np.random.default_rng(seed)
     observations = enough(observe(ingested))
     s = setup(observations, predictor or tabled_predictor(observations.patterns))
-    baseline = fit(s)
-    effects = start_effects(baseline)
-    contrasts = all_contrasts(s, baseline.law, effects.acting, effects.courses)
-    screened = screen(baseline, contrasts, replicates=replicates[0], rng=rng, progress=progress)
     evidence = direct_evidence(observations)
-    barred = exclusions(observations.conditions, evidence, effects.absorbed)
+
+    def screened_at(s: Setup) -> tuple[StartEffects, Screen, list[Excluded]]:
+        effects = start_effects(fit(s))
+        contrasts = all_contrasts(s, effects.model.law, effects.acting, effects.courses)
+        screened = screen(effects.model, contrasts, replicates=replicates[0], rng=rng, progress=progress)
+        return effects, screened, exclusions(observations.conditions, evidence, effects.absorbed)
+
+    effects, screened, barred = screened_at(s)
+    if screened.p.min() >= level:
+        still, offset = held_still(s, s.group > PATTERN)
+        without = screened_at(still)
+        if without[1].p.min() < level and _a_cause_instead(effects.model, without, offset, level):
+            effects, screened, barred = without
     named = None
     if screened.p.min() < level:
 
@@ -119,7 +129,34 @@ def examine(
 
         named = name_causes(effects, screened, [e.mechanism for e in barred], level, screen_of)
     verdict = conclude(effects, screened, certain_evidence(evidence), barred, named, level, rng)
-    return Diagnosis(verdict, baseline, screened, named)
+    return Diagnosis(verdict, effects.model, screened, named)
+
+
+# Log likelihood, odds of 100 to 1, by which a mechanism alone has to explain a campaign better than days and drift do,
+# where either would do.
+FOR_A_CAUSE = 4.6
+
+
+def _a_cause_instead(
+    moving: ModelFit, still: tuple[StartEffects, Screen, list[Excluded]], offset: float, level: float
+) -> bool:
+    """Whether one mechanism, without any days and drift, explains what these would explain, and better, and leaves
+    nothing to them. What is the same within every session cannot be told from days.
+
+    ``offset`` raises the score of the fits without days and drift.
+    """
+    effects, screened, barred = still
+    best = best_beyond_chance(weigh(effects, [e.mechanism for e in barred]), screened, level)
+    if best is None:
+        return False
+    by_drift = moving.score - (effects.model.score + offset)
+    if best.gain - by_drift <= min(FOR_A_CAUSE, max(by_drift, 0.0)):
+        return False
+    session = session_of(moving.setup.observations.conditions)
+    change = effect_of(best.fit.setup, best.fit.law, best.acting, best.values)
+    if session.max() > 0 and all(np.ptp(change[session == k], axis=0).max() < 1e-9 for k in np.unique(session)):
+        return False
+    return fit(moving.setup, best.fit.acting, start=moving).score <= best.fit.score + offset + FOR_A_CAUSE
 
 
 def residual_table(d: Diagnosis) -> pd.DataFrame:

@@ -89,11 +89,6 @@ def precision_of(factor: FloatArray, weight: FloatArray) -> FloatArray:
     return (np.stack([first**2 + second**2, second * third, third**2]) * weight)[None]
 
 
-def prior_of(columns: ModelColumns, precision: FloatArray) -> Sides:
-    """Precision of the coefficients of a model: next to none for law and mechanisms, (q,) of the random effects."""
-    return columns.sides(np.concatenate([np.full(columns.parameters, 1e-12), precision])[None])
-
-
 def solved(
     state: FitState, columns: ModelColumns, weight: FloatArray, bounds: tuple[FloatArray, FloatArray]
 ) -> tuple[Inverse, FloatArray]:
@@ -101,7 +96,7 @@ def solved(
     leave it is held there."""
     x, p = state.x, len(state.x)
     weighted = columns.weighted(precision_of(state.factor, weight))
-    normal = weighted.normal.with_prior(*prior_of(columns, state.precision))
+    normal = weighted.normal.with_prior(*columns.sides(columns.prior(state.precision[None])))
     right = weighted.with_residual(state.residual.T[None])
     held = np.zeros(columns.border.shape[2], bool)
     for _ in range(3):
@@ -132,7 +127,7 @@ def with_noise_estimated(
     sizes = updated_sizes(s, noise.sizes, state.effects, variance)
     scatter = np.zeros(s.scatter.shape[1]) if noise.scatter is None else noise.scatter
     repeat, scatter = updated_repeats(s, (noise.repeat, scatter), squares, noise.tail)
-    estimated = replace(noise, repeat=repeat, scatter=scatter).with_sizes(sizes)
+    estimated = replace(noise, repeat=repeat, scatter=scatter, sizes=sizes)
     return state_at(s, state.x, state.effects, state.residual, estimated)
 
 
@@ -201,7 +196,7 @@ class ModelFit:
     @property
     def normal(self) -> Normal:
         """The normal matrix with the prior of the random effects."""
-        return self.weighted.normal.with_prior(*prior_of(self.columns, self.precision))
+        return self.weighted.normal.with_prior(*self.columns.sides(self.columns.prior(self.precision[None])))
 
     @property
     def right(self) -> Sides:
@@ -220,7 +215,7 @@ class ModelFit:
         each = [inverse.solution(own[..., k], border[..., k]) for k in range(others.shape[2])]
         fitted = np.concatenate([columns.on_tests(*c) for c in each]).transpose(2, 1, 0)
         rows = whitened(self.factor * np.sqrt(self.weight)[:, None, None], others - fitted)
-        root = np.sqrt(columns.vector(*prior_of(columns, self.precision)))
+        root = np.sqrt(columns.prior(self.precision[None]))
         penalty = [-root * columns.vector(*c) for c in each]
         left = np.concatenate([rows, np.concatenate(penalty).T])
         return left[:, :-1], left[:, -1]

@@ -11,17 +11,29 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import gammaln
 from scipy.stats import chi2, norm
 
 from tribo.diagnostics.effect_sizes import NORMAL_90, rms_percent
 from tribo.diagnostics.fit import ModelFit, fit, fit_without
-from tribo.diagnostics.model import FIXED, N_LAW, PATTERN, Acting, Setup, Target
+from tribo.diagnostics.model import (
+    DRIFT,
+    FIXED,
+    N_LAW,
+    OF_A_SPECIMEN,
+    PATTERN,
+    SESSION,
+    SPECIMEN_DRIFT,
+    Acting,
+    Setup,
+    Target,
+)
 from tribo.diagnostics.normal_equations import model_columns
 from tribo.diagnostics.observations import Observations
 from tribo.diagnostics.replicates import drawn_residuals, refits
-from tribo.diagnostics.scatter import Noise, log_size_prior
-from tribo.diagnostics.verdict import Estimate, Gain, Layer
+from tribo.diagnostics.scatter import Noise, held_still, log_size_prior
+from tribo.diagnostics.verdict import Estimate, Gain, Layer, Nuisance
 from tribo.records import REGIMES, FloatArray
 
 DROP_90 = 0.5 * NORMAL_90**2  # of the log likelihood at the ends of a 90 % interval
@@ -239,6 +251,56 @@ def pattern_corrections(f: ModelFit) -> list[Layer]:
                 )
             )  # fmt: skip
     return corrections
+
+
+NUISANCES: dict[Nuisance, int] = {"days": SESSION, "drift": DRIFT, "specimen_drift": SPECIMEN_DRIFT}
+DRAWS = 400  # of the random effects, for the interval of their size
+
+
+def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
+    """Days, drift of the series and drift of the specimens that are beyond chance, each with its size: the root mean
+    square in percent of what it adds to T over the tests of the campaign, about its mean, with a 90 % interval.
+
+    The chance is that of a likelihood ratio with the sizes of both regimes free or held still. The interval is that of
+    the random effects given the campaign, at the fitted sizes.
+    """
+    s, rng, layers = f.setup, np.random.default_rng(0), []
+    for name, group in NUISANCES.items():
+        here = (s.group == group) | (s.group == group + 1)
+        if not here.any():
+            continue
+        held, offset = held_still(s, here)
+        ratio = f.score - fit(held, f.acting, start=f, iterations=15).score - offset
+        p = float(chi2.sf(2.0 * max(ratio, 0.0), 2))
+        if p >= level:
+            continue
+        low, middle, high = 100.0 * np.expm1(np.quantile(_realised(f, here, rng), (0.05, 0.5, 0.95)))
+        layers.append(
+            Layer(
+                kind="nuisance", name=name, samples=(), regimes=tuple(REGIMES), p_adjusted=p,
+                effect_percent=float(middle), low=float(low), high=float(high),
+            )
+        )  # fmt: skip
+    return layers
+
+
+def _realised(f: ModelFit, here: NDArray[np.bool_], rng: np.random.Generator) -> FloatArray:
+    """Root mean square over the tests of what some random effects add to ln T, about its mean, in draws from what the
+    campaign tells of them, (draws,)."""
+    s, share = f.setup, informed_share(f.noise)
+    own, shared = np.zeros((s.specimens, OF_A_SPECIMEN), bool), here[s.of_specimens :]
+    own[:] = here[: s.of_specimens].reshape(s.specimens, OF_A_SPECIMEN)
+    drawn = np.repeat(np.where(here, f.effects, 0.0)[None], DRAWS, axis=0)
+    if shared.any():
+        places = np.flatnonzero(shared)
+        border = f.columns.parameters + places
+        covariance = f.inverse.border[0][np.ix_(border, border)] / share
+        drawn[:, s.of_specimens + places] += rng.multivariate_normal(np.zeros(len(places)), covariance, DRAWS)
+    if own.any():
+        sd = np.sqrt(f.inverse.variances[0][0] / share)
+        drawn[:, : s.of_specimens] += rng.normal(size=(DRAWS, s.of_specimens)) * np.where(own, sd, 0.0).ravel()
+    added = s.on_tests(drawn)
+    return np.asarray(np.sqrt(np.mean((added - added.mean(axis=1, keepdims=True)) ** 2, axis=(1, 2))))
 
 
 def gain(before: ModelFit, after: ModelFit, rng: np.random.Generator) -> Gain | None:

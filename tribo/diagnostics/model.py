@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tribo.diagnostics.days_and_drift import along_specimens, sessions, walks
 from tribo.diagnostics.observations import Observations
 from tribo.diagnostics.predictor import Predictor
 from tribo.display import displayed
@@ -22,7 +23,7 @@ from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import FloatArray
 
-OF_A_SPECIMEN = 4  # gain and slope, alike in both regimes and apart
+OF_A_SPECIMEN = 6  # gain, slope with the load and drift along its pulls, alike in both regimes and apart
 
 
 N_LAW = 4  # mu static, tau0 static (kPa), mu sliding, tau0 sliding (kPa)
@@ -30,9 +31,10 @@ FLOOR_N = 1e-6
 WITHIN_MEASURED = 3.0  # standard uncertainties: one measurement in 400 lies further off
 LAW_SCALE = np.array([1.0, 5.0, 1.0, 5.0])
 LAW_BOUNDS = (np.array([0.01, -200.0, 0.01, -200.0]), np.array([100.0, 1000.0, 100.0, 1000.0]))
-# Groups of random effects that share one size: gain and slope of the specimens, each in the mean of both regimes and
-# in their difference, which a specimen shares to an unknown degree; the patterns.
-GAIN, SLOPE, PATTERN = 0, 2, 4
+# Groups of random effects that share one size, each but the patterns in the mean of both regimes and in their
+# difference: gain and slope of the specimens, the patterns, the drift of each specimen along its pulls, the sessions,
+# the drift of the whole series.
+GAIN, SLOPE, PATTERN, SPECIMEN_DRIFT, SESSION, DRIFT = 0, 2, 4, 5, 7, 9
 ALIKE_IN_BOTH, APART = np.array([1.0, 1.0]) / np.sqrt(2.0), np.array([1.0, -1.0]) / np.sqrt(2.0)
 FIXED = -1  # the group of effects whose size is not estimated
 EVERY = -1  # in place of a specimen: all tests
@@ -75,7 +77,7 @@ class Acting:
 class Setup:
     """What every model of one campaign shares: shares, the design of the random effects, what the repeats depend on.
 
-    ``specimen`` (n,) is the number of the specimen of every test, below ``specimens``, and ``own`` (n, 2, 4) are the
+    ``specimen`` (n,) is the number of the specimen of every test, below ``specimens``, and ``own`` (n, 2, 6) are the
     columns of its random effects, without the zeros of all specimens that a test was not made on; ``shared`` (n, 2, c)
     are those that tests of several specimens show. A vector of all q effects holds those of the specimens one after the
     other, then the shared ones. The standard deviation of effect j is ``unit[j]`` times the size of its ``group[j]``
@@ -166,12 +168,13 @@ class Setup:
 
 
 def setup(observations: Observations, predictor: Predictor) -> Setup:
-    """Random effects in both regimes: gain and slope of a specimen; offset, slope and curve of a pattern."""
+    """Random effects in both regimes: gain, slope and drift of a specimen; offset, slope and curve of a pattern; the
+    gain of a session; the drift of the series."""
     o, c = observations, observations.conditions
     log_p = np.log(c.pressure_Pa)
     log_p = log_p - log_p.mean()
     names, specimen = np.unique(c.specimen, return_inverse=True)
-    shapes = [(np.ones(o.n), GAIN), (log_p, SLOPE)]
+    shapes = [(np.ones(o.n), GAIN), (log_p, SLOPE), (along_specimens(c), SPECIMEN_DRIFT)]
     kinds = [(shape[:, None] * r, group + k) for k, r in enumerate((ALIKE_IN_BOTH, APART)) for shape, group in shapes]
     own = np.stack([column for column, _ in kinds], axis=2)
     columns: list[FloatArray] = []
@@ -186,6 +189,11 @@ def setup(observations: Observations, predictor: Predictor) -> Setup:
                 columns[-1][:, regime] = (c.sample == sample) * shape
                 units.append(size)
                 groups.append(PATTERN)
+    for course, unit, group in (*((s, 1.0, SESSION) for s in sessions(c)), *((s, u, DRIFT) for s, u in walks(c))):
+        for k, regimes in enumerate((ALIKE_IN_BOTH, APART)):
+            columns.append(course[:, None] * regimes)
+            units.append(unit)
+            groups.append(group + k)
     shared = np.stack(columns, axis=2) if columns else np.zeros((o.n, 2, 0))
     bare = Setup(
         o, predictor, predictor.table(c.sample), specimen, len(names), own, shared, np.array(units), np.array(groups),

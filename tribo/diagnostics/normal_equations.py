@@ -1,9 +1,9 @@
 """Normal equations of a mixed model by blocks.
 
-A test shows the effects of its own specimen alone, so the normal matrix is one 4 x 4 block a specimen, bordered by the
-columns that tests share: law, mechanisms, patterns. Eliminating the blocks leaves a matrix of the size of the border
-(its Schur complement), so that the work grows with the number of specimens and not with its cube. All functions take a
-batch of replicates, r; one campaign is a batch of one.
+A test shows the effects of its own specimen alone, so the normal matrix is one small block a specimen, as large as it
+has effects (e), bordered by the columns that tests share: law, mechanisms, patterns. Eliminating the blocks leaves a
+matrix of the size of the border (its Schur complement), so that the work grows with the number of specimens and not
+with its cube. All functions take a batch of replicates, r; one campaign is a batch of one.
 
 The algebra stays by hand: 20 replicates of 324 tests (15 specimens, border 34) take 1.3 ms, by scipy's dense Cholesky
 factors 5 ms, by its sparse ones 14 ms, and as a band 40 ms.
@@ -27,7 +27,7 @@ Sides = tuple[FloatArray, FloatArray]  # of specimens (r, S, 4, ...) and of the 
 @displayed()
 @dataclass(frozen=True)
 class ModelColumns:
-    """The columns of a model: ``own`` (n, 2, 4) of the specimen of each test, ``border`` (n, 2, m) of all tests: those
+    """The columns of a model: ``own`` (n, 2, e) of the specimen of each test, ``border`` (n, 2, m) of all tests: those
     of ``parameters`` first, then of shared random effects. ``tests_of`` holds the tests of every specimen."""
 
     own: FloatArray
@@ -36,15 +36,20 @@ class ModelColumns:
     tests_of: tuple[NDArray[np.int64], ...]
 
     def vector(self, own: FloatArray, border: FloatArray) -> FloatArray:
-        """Values of specimens (r, S, 4) and of the border (r, m) in one order: parameters, specimens, shared."""
+        """Values of specimens (r, S, e) and of the border (r, m) in one order: parameters, specimens, shared."""
         p = self.parameters
         return np.concatenate([border[:, :p], own.reshape(len(own), -1), border[:, p:]], axis=1)
 
     def sides(self, values: FloatArray) -> Sides:
-        """The reverse: (r, p + q) as those of specimens (r, S, 4) and of the border (r, m)."""
-        p, q = self.parameters, 4 * len(self.tests_of)
-        own = values[:, p : p + q].reshape(len(values), -1, 4)
+        """The reverse: (r, p + q) as those of specimens (r, S, e) and of the border (r, m)."""
+        p, each = self.parameters, self.own.shape[2]
+        q = each * len(self.tests_of)
+        own = values[:, p : p + q].reshape(len(values), -1, each)
         return own, np.concatenate([values[:, :p], values[:, p + q :]], axis=1)
+
+    def prior(self, of_effects: FloatArray) -> FloatArray:
+        """Precision of all coefficients, (r, p + q): next to none of law and mechanisms, (r, q) of random effects."""
+        return np.concatenate([np.full((len(of_effects), self.parameters), 1e-12), of_effects], axis=1)
 
     @property
     def in_order(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -53,7 +58,7 @@ class ModelColumns:
         return np.concatenate(self.tests_of), np.repeat(np.arange(len(sizes)), sizes)
 
     def on_tests(self, own: FloatArray, border: FloatArray) -> FloatArray:
-        """What coefficients of specimens (r, S, 4) and of the border (r, m) add to every test, (r, 2, n)."""
+        """What coefficients of specimens (r, S, e) and of the border (r, m) add to every test, (r, 2, n)."""
         total = np.tensordot(border, self.border, axes=(1, 2))
         for k, tests in enumerate(self.tests_of):
             total[:, tests] += np.tensordot(own[:, k], self.own[tests], axes=(1, 2))
@@ -84,14 +89,14 @@ def _weighted(precision: FloatArray, columns: FloatArray) -> FloatArray:
 @displayed()
 @dataclass(frozen=True)
 class Weighted:
-    """The columns of a model times the precision of every test: ``own`` (r, n, 2, 4) and ``border`` (r, n, 2, m)."""
+    """The columns of a model times the precision of every test: ``own`` (r, n, 2, e) and ``border`` (r, n, 2, m)."""
 
     columns: ModelColumns
     own: FloatArray
     border: FloatArray
 
     def times(self, other: FloatArray) -> Sides:
-        """Products with other columns (n, 2, k): (r, S, 4, k) and (r, m, k)."""
+        """Products with other columns (n, 2, k): (r, S, e, k) and (r, m, k)."""
         blocks = [self.own_times(tests, other[tests]) for tests in self.columns.tests_of]
         return np.stack(blocks, axis=1), self.flat_border @ other.reshape(2 * len(other), other.shape[2])
 
@@ -102,13 +107,14 @@ class Weighted:
         return self.border.reshape(r, 2 * n, m).transpose(0, 2, 1)
 
     def own_times(self, tests: NDArray[np.int64], other: FloatArray) -> FloatArray:
-        """Of one specimen, its tests given: products of its own columns with others (its tests, 2, k), (r, 4, k)."""
+        """Of one specimen, its tests given: products of its own columns with others (its tests, 2, k), (r, e, k)."""
         r, k = len(self.own), other.shape[2]
-        own = self.own[:, tests].reshape(r, 2 * len(tests), 4).transpose(0, 2, 1).reshape(4 * r, -1)
-        return np.asarray((own @ other.reshape(2 * len(tests), k)).reshape(r, 4, k))
+        each = self.own.shape[3]
+        own = self.own[:, tests].reshape(r, 2 * len(tests), each).transpose(0, 2, 1).reshape(each * r, -1)
+        return np.asarray((own @ other.reshape(2 * len(tests), k)).reshape(r, each, k))
 
     def own_with(self, other: FloatArray) -> FloatArray:
-        """The same of every specimen: with others (n, 2, k), (r, S, 4, k)."""
+        """The same of every specimen: with others (n, 2, k), (r, S, e, k)."""
         if len(self.own) > 1:
             return np.stack([self.own_times(tests, other[tests]) for tests in self.columns.tests_of], axis=1)
         own = self.own[0]
@@ -126,7 +132,7 @@ class Weighted:
         return np.asarray(border.transpose(0, 2, 1) @ other.reshape(2 * len(tests), k))
 
     def with_residual(self, residual: FloatArray) -> Sides:
-        """Products with the residual (r, 2, n) of each replicate: (r, S, 4) and (r, m)."""
+        """Products with the residual (r, 2, n) of each replicate: (r, S, e) and (r, m)."""
         by_test = residual.transpose(0, 2, 1)
         each = np.einsum("rnik,rni->rnk", self.own, by_test)
         own = np.stack([each[:, tests].sum(axis=1) for tests in self.columns.tests_of], axis=1)
@@ -138,21 +144,21 @@ class Weighted:
         columns = self.columns
         own = self.own_with(np.concatenate([columns.own, columns.border], axis=2))
         n, _, m = columns.border.shape
-        return Normal(own[..., :4], own[..., 4:], self.flat_border @ columns.border.reshape(2 * n, m))
-
+        each = columns.own.shape[2]
+        return Normal(own[..., :each], own[..., each:], self.flat_border @ columns.border.reshape(2 * n, m))
 
 
 @displayed()
 @dataclass(frozen=True)
 class Normal:
-    """A normal matrix by blocks: ``own`` (r, S, 4, 4), ``across`` (r, S, 4, m) and ``border`` (r, m, m)."""
+    """A normal matrix by blocks: ``own`` (r, S, e, e), ``across`` (r, S, e, m) and ``border`` (r, m, m)."""
 
     own: FloatArray
     across: FloatArray
     border: FloatArray
 
     def with_prior(self, own: FloatArray, border: FloatArray) -> Normal:
-        """Precisions (r, S, 4) and (r, m) added to the diagonal, and a ridge in proportion to it."""
+        """Precisions (r, S, e) and (r, m) added to the diagonal, and a ridge in proportion to it."""
 
         def raised(matrix: FloatArray, prior: FloatArray) -> FloatArray:
             here = np.arange(matrix.shape[-1])
@@ -193,15 +199,15 @@ class Normal:
     def _eliminated(self, own: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What the blocks follow of the border, ``own`` being their inverses, and the border without them."""
         across = own @ self.across
-        r, specimens, _, m = across.shape
-        first, second = (side.reshape(r, 4 * specimens, m) for side in (self.across, across))
+        r, specimens, each, m = across.shape
+        first, second = (side.reshape(r, each * specimens, m) for side in (self.across, across))
         return across, self.border - first.transpose(0, 2, 1) @ second
 
 
 @displayed()
 @dataclass(frozen=True)
 class Inverse:
-    """The inverse of a normal matrix: ``own`` (r, S, 4, 4) of the blocks alone, ``across`` (r, S, 4, m) what a block
+    """The inverse of a normal matrix: ``own`` (r, S, e, e) of the blocks alone, ``across`` (r, S, e, m) what a block
     follows of the border, and ``border`` (r, m, m), the covariance of the border."""
 
     own: FloatArray
@@ -209,9 +215,9 @@ class Inverse:
     border: FloatArray
 
     def solution(self, own: FloatArray, border: FloatArray) -> Sides:
-        """Coefficients for right sides (r, S, 4) and (r, m)."""
-        r, specimens, _, m = self.across.shape
-        wide = self.across.reshape(r, 4 * specimens, m)
+        """Coefficients for right sides (r, S, e) and (r, m)."""
+        r, specimens, each, m = self.across.shape
+        wide = self.across.reshape(r, each * specimens, m)
         right = border - (own.reshape(r, 1, -1) @ wide)[:, 0]
         shared = self.border @ right[..., None]
         alone = (self.own @ own[..., None])[..., 0]
@@ -219,7 +225,7 @@ class Inverse:
 
     @property
     def variances(self) -> Sides:
-        """Of every coefficient, (r, S, 4) and (r, m)."""
+        """Of every coefficient, (r, S, e) and (r, m)."""
         moved = np.sum((self.across @ self.border[:, None]) * self.across, axis=3)
         return np.diagonal(self.own, axis1=2, axis2=3) + moved, np.diagonal(self.border, axis1=1, axis2=2)
 
@@ -238,7 +244,7 @@ class Inverse:
                 variance[0, i, order] = shared + np.einsum("nm,nm->n", alone[:, a], own[:, b])
             return variance
         for k, tests in enumerate(columns.tests_of):
-            own = columns.own[tests].reshape(-1, 4)  # the two rows of every test one after another
+            own = columns.own[tests].reshape(-1, columns.own.shape[2])  # the two rows of every test one after another
             free = columns.border[tests].reshape(len(own), columns.border.shape[2]) - own @ self.across[:, k]
             moved, alone = free @ self.border, own @ self.own[:, k]
             for i, (a, b) in entries:
@@ -261,7 +267,7 @@ class Inverse:
 class BlockCholesky:
     """The inverse Cholesky factor of a normal matrix by blocks, for orthogonal columns.
 
-    ``own`` (r, S, 4, 4) and ``border`` (r, m, m) are its diagonal blocks, ``across`` (r, S, 4, m) what the specimens
+    ``own`` (r, S, e, e) and ``border`` (r, m, m) are its diagonal blocks, ``across`` (r, S, e, m) what the specimens
     have of the border, ``right`` the right sides times the factor, ``log_root`` (r,) half the logarithm of the
     determinant.
     """
@@ -282,8 +288,8 @@ def block_cholesky(normal: Normal, right: Sides) -> BlockCholesky:
     own_root = np.linalg.cholesky(normal.own)
     own = np.linalg.inv(own_root)
     across = own @ normal.across
-    r, specimens, _, m = across.shape
-    flat = across.reshape(r, 4 * specimens, m)
+    r, specimens, each, m = across.shape
+    flat = across.reshape(r, each * specimens, m)
     scale = 1.0 / np.sqrt(np.diagonal(normal.border, axis1=1, axis2=2) + 1e-300)
     schur = (normal.border - flat.transpose(0, 2, 1) @ flat) * scale[:, :, None] * scale[:, None, :]
     root = np.linalg.cholesky(schur)

@@ -18,7 +18,7 @@ from tribo.diagnostics.model import Target, added, effect_of, predict, setup
 from tribo.diagnostics.normal_equations import model_columns
 from tribo.diagnostics.observations import NO_FLAT, Observations, conditions_of
 from tribo.diagnostics.predictor import Predictor, tabled_predictor
-from tribo.diagnostics.scatter import Noise
+from tribo.diagnostics.scatter import SIZE_PRIORS, Noise
 from tribo.diagnostics.score_statistics import start_effects
 from tribo.diagnostics.verdict import Misfit, NextTest, Outcome
 from tribo.display import displayed
@@ -27,7 +27,7 @@ from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray
 
 PAPER_LAW = np.array([4.78, 23.44, 2.879, 11.89])  # mu and tau0 in kPa of the flat sample, Berardo 2019, Table 2
-TYPICAL = Noise(repeat=np.diag([0.09**2, 0.07**2]), specimen=np.array([0.05, 0.05]))
+TYPICAL = Noise(np.diag([0.09**2, 0.07**2]), SIZE_PRIORS[:, 0])
 FOUND = 3.6  # strength that chance reaches in one campaign of a hundred, over all contrasts
 NINE_IN_TEN = FOUND + 1.28
 HOURS_PER_PULL = 7.0 / 60.0

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.diagnostics.fit import ModelFit
-from tribo.diagnostics.model import Setup
+from tribo.diagnostics.model import PATTERN, Setup
 from tribo.diagnostics.normal_equations import Inverse, ModelColumns, Normal, Sides, Weighted
 from tribo.diagnostics.scatter import (
     SIZE_PRIORS,
@@ -30,36 +30,24 @@ from tribo.display import displayed
 from tribo.records import FloatArray
 
 ITERATIONS = 4
-# Of the logarithms of the sizes (GAIN, SLOPE: two each; PATTERN): what a contrast explains of the patterns makes their
-# error smaller, and what it explains of a specimen makes the spread of the specimens smaller.
-SIZE_STEPS = np.array([[0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, -0.7], [-0.7, -0.7, -0.7, -0.7, 0.0]])
+# The noise of every replicate: of the repeats (r, 2, 2), what they depend on, (r, k), and of the random effects (r, 11)
+RandomSizes = tuple[FloatArray, FloatArray, FloatArray]
+# Of the logarithms of the sizes of all groups: what a contrast explains of the patterns makes their error smaller, and
+# what it explains of a specimen, or of the course of the series, makes the spread of these smaller.
+SIZE_STEPS = np.zeros((5, len(SIZE_PRIORS)))
+SIZE_STEPS[1, PATTERN] = -0.7
+SIZE_STEPS[2, :PATTERN] = -0.7
+SIZE_STEPS[3, PATTERN + 1 :] = -0.7
+SIZE_STEPS[4, PATTERN + 1 :] = -2.0
 
 
-@displayed()
-@dataclass(frozen=True)
-class ReplicateNoise:
-    """The noise of every replicate: ``repeat`` (r, 2, 2), what the repeats depend on, ``scatter`` (r, k), and sizes of
-    the random ``effects`` (r, 5); with the ``inverse`` (r, 3, n) of the noise of every test and the ``precision``
-    (r, q) of the random effects at these sizes.
-    """
-
-    repeat: FloatArray
-    scatter: FloatArray
-    effects: FloatArray
-    inverse: FloatArray
-    precision: FloatArray
-
-
-def noise_at(s: Setup, repeat: FloatArray, scatter: FloatArray, effects: FloatArray) -> ReplicateNoise:
-    """The noise of every replicate at these sizes."""
-    return ReplicateNoise(repeat, scatter, effects, inverse_noise(s, repeat, scatter), prior_sd(s, effects) ** -2)
-
-
-def fitted_noise(s: Setup, noise: Noise, replicates: int) -> ReplicateNoise:
+def fitted_noise(s: Setup, noise: Noise, replicates: int) -> RandomSizes:
     """The noise of a fit, once per replicate."""
     scatter = np.zeros(s.scatter.shape[1]) if noise.scatter is None else noise.scatter
-    parts = (noise.repeat, scatter, noise.sizes)
-    return noise_at(s, *(np.repeat(part[None], replicates, axis=0) for part in parts))
+    repeat, scatter, effects = (
+        np.repeat(part[None], replicates, axis=0) for part in (noise.repeat, scatter, noise.sizes)
+    )
+    return repeat, scatter, effects
 
 
 def products_of(left: FloatArray) -> FloatArray:
@@ -67,28 +55,26 @@ def products_of(left: FloatArray) -> FloatArray:
     return np.stack([left[:, 0] ** 2, left[:, 0] * left[:, 1], left[:, 1] ** 2], axis=1)
 
 
-def replicate_weights(noise: ReplicateNoise, left: FloatArray, tail: float) -> FloatArray:
-    """Weight of every test of every replicate under the bivariate t, (r, n)."""
-    distance = np.einsum("ran,ran,a->rn", noise.inverse, products_of(left), [1.0, 2.0, 1.0])
+def replicate_weights(inverse: FloatArray, left: FloatArray, tail: float) -> FloatArray:
+    """Weight of every test of every replicate under the bivariate t, (r, n), by the inverse (r, 3, n) of its noise."""
+    distance = np.einsum("ran,ran,a->rn", inverse, products_of(left), [1.0, 2.0, 1.0])
     return np.asarray((tail + 2.0) / (tail + distance))
 
 
 def log_priors(s: Setup, sizes: FloatArray, steps: FloatArray) -> FloatArray:
-    """Log density of sizes (r, 5) after each of ``steps`` (steps, 5) of their logarithms, (steps, r)."""
+    """Log density of sizes (r, 11) after each of ``steps`` (steps, 11) of their logarithms, (steps, r)."""
     there = [group for group in range(len(SIZE_PRIORS)) if group in s.group]
     each = [sum(log_size_prior(g, sizes[:, g] * np.exp(step[g])) for g in there) for step in steps]
     return np.array(each).reshape(len(steps), -1)
 
 
 def solved_at_once(
-    columns: ModelColumns, precision: FloatArray, residual: FloatArray, noise: ReplicateNoise
+    columns: ModelColumns, precision: FloatArray, residual: FloatArray, of_effects: FloatArray
 ) -> tuple[Inverse, Sides]:
-    """Inverse normal matrices and solutions for the residuals (r, 2, n) at the precision (r, 3, n) of every test; law
-    and mechanisms have next to no prior."""
+    """Inverse normal matrices and solutions for the residuals (r, 2, n) at the precision (r, 3, n) of every test and
+    ``of_effects`` (r, q) of the random effects."""
     weighted = columns.weighted(precision)
-    known = np.full((len(noise.effects), columns.parameters), 1e-12)
-    prior = columns.sides(np.concatenate([known, noise.precision], axis=1))
-    inverse = weighted.normal.with_prior(*prior).inverse()
+    inverse = weighted.normal.with_prior(*columns.sides(columns.prior(of_effects))).inverse()
     return inverse, inverse.solution(*weighted.with_residual(residual))
 
 
@@ -97,15 +83,15 @@ def solved_at_once(
 class Replicates:
     """Fitted replicates: ``precision`` (r, 3, n) of every test, robust weight included, as static, mixed, sliding;
     ``residual`` (r, 2, n) of ln T. ``weighted`` are the model's columns times that precision, and ``normal`` their
-    products without the prior. ``noise`` holds the precision of the random effects, ``group`` (q,) the group of the
-    size of each, and ``log_priors`` (steps, r) the log density of the sizes after each of SIZE_STEPS.
+    products without the prior. ``of_effects`` (r, q) is the precision of the random effects, ``group`` (q,) the group
+    of the size of each, and ``log_priors`` (steps, r) the log density of the sizes after each of SIZE_STEPS.
     """
 
     precision: FloatArray
     residual: FloatArray
     weighted: Weighted
     normal: Normal
-    noise: ReplicateNoise
+    of_effects: FloatArray
     group: NDArray[np.int64]
     log_priors: FloatArray
 
@@ -118,19 +104,23 @@ class Replicates:
 
         return Replicates(
             self.precision[k : k + 1], self.residual[k : k + 1], cut(self.weighted), cut(self.normal),
-            cut(self.noise), self.group, self.log_priors[:, k : k + 1],
+            self.of_effects[k : k + 1], self.group, self.log_priors[:, k : k + 1],
         )  # fmt: skip
 
 
 def replicates_at(
-    s: Setup, columns: ModelColumns, noise: ReplicateNoise, left: FloatArray, residual: FloatArray, tail: float
+    s: Setup, columns: ModelColumns, noise: RandomSizes, left: FloatArray, residual: FloatArray, tail: float
 ) -> Replicates:
     """Replicates fitted with the ``columns`` of a model at a given noise; ``left`` (r, 2, n) is what is left of every
     test and ``residual`` the same with the random effects."""
-    precision = noise.inverse * replicate_weights(noise, left, tail)[:, None]
+    repeat, scatter, sizes = noise
+    inverse = inverse_noise(s, repeat, scatter)
+    precision = inverse * replicate_weights(inverse, left, tail)[:, None]
     weighted = columns.weighted(precision)
-    priors = log_priors(s, noise.effects, SIZE_STEPS)
-    return Replicates(precision, residual, weighted, weighted.normal, noise, s.group, priors)
+    priors = log_priors(s, sizes, SIZE_STEPS)
+    return Replicates(
+        precision, residual, weighted, weighted.normal, prior_sd(s, sizes) ** -2, s.group, priors
+    )
 
 
 def as_measured(f: ModelFit) -> Replicates:
@@ -174,18 +164,20 @@ def refit(f: ModelFit, residual: FloatArray) -> Replicates:
     return replicates_at(f.setup, columns, noise, left, residual - law, f.noise.tail)
 
 
-def refits(f: ModelFit, residual: FloatArray) -> tuple[ReplicateNoise, FloatArray, FloatArray, FloatArray]:
+def refits(f: ModelFit, residual: FloatArray) -> tuple[RandomSizes, FloatArray, FloatArray, FloatArray]:
     """Each of these campaigns fitted, linear about ``f``: the noise, the coefficients (r, p) of law and mechanisms with
     their variances (r, p), and what is left of every test, (r, 2, n)."""
     s, columns, tail = f.setup, f.columns, f.noise.tail
     p = columns.parameters
-    noise, left = fitted_noise(s, f.noise, len(residual)), residual
+    (repeat, scatter, sizes), left = fitted_noise(s, f.noise, len(residual)), residual
     for _ in range(ITERATIONS):
-        weight = replicate_weights(noise, left, tail)
-        inverse, (own, border) = solved_at_once(columns, noise.inverse * weight[:, None], residual, noise)
+        of_tests = inverse_noise(s, repeat, scatter)
+        weight = replicate_weights(of_tests, left, tail)
+        precision = of_tests * weight[:, None]
+        inverse, (own, border) = solved_at_once(columns, precision, residual, prior_sd(s, sizes) ** -2)
         left = residual - columns.on_tests(own, border)
         squares = weight[:, None] * (products_of(left) + inverse.spread(columns))
         effects, variances = (columns.vector(*sides)[:, p:] for sides in ((own, border), inverse.variances))
-        sizes = updated_sizes(s, noise.effects, effects, variances)
-        noise = noise_at(s, *updated_repeats(s, (noise.repeat, noise.scatter), squares, tail), sizes)
-    return noise, border[:, :p], np.diagonal(inverse.border, axis1=1, axis2=2)[:, :p], left
+        sizes = updated_sizes(s, sizes, effects, variances)
+        repeat, scatter = updated_repeats(s, (repeat, scatter), squares, tail)
+    return (repeat, scatter, sizes), border[:, :p], np.diagonal(inverse.border, axis1=1, axis2=2)[:, :p], left

@@ -7,17 +7,23 @@ Functions with ``...`` in a shape take one campaign or a batch of replicates.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tribo.diagnostics.model import GAIN, PATTERN, SLOPE, Setup
+from tribo.diagnostics.model import FIXED, PATTERN, Setup
 from tribo.display import displayed
 from tribo.records import FloatArray
 
-# Expected size, and how many effects that is worth: specimen gains and slopes, pattern factor
+# Expected size, and how many effects that is worth: specimen gains and slopes, pattern factor; drift of specimens,
+# sessions and drift of the series
 SPECIMEN_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR = (0.05, 4.0), (0.01, 2.0), (1.0, 1.0)
-SIZE_PRIORS = np.array([SPECIMEN_PRIOR, SPECIMEN_PRIOR, SLOPE_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR])
+NUISANCE_PRIOR = (0.005, 1.0)
+SIZE_PRIORS = np.array(
+    [SPECIMEN_PRIOR, SPECIMEN_PRIOR, SLOPE_PRIOR, SLOPE_PRIOR, PATTERN_PRIOR, *(6 * [NUISANCE_PRIOR])]
+)
+FIRST_NUISANCE = 0.03  # size from which the estimation of each of the last six starts
 REPEAT_PRIOR = (0.08, 4.0)
 SCATTER_SD = 0.5  # of ln of the ratio of repeats between samples, and of the power of the force they follow
 SMALLEST_SD = 0.003  # of ln T: no reading repeats better
@@ -26,30 +32,23 @@ SMALLEST_SD = 0.003  # of ln T: no reading repeats better
 @displayed()
 @dataclass(frozen=True)
 class Noise:
-    """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance; specimen gains (2,) and
-    slopes (2,) per e-fold of load, along the mean of static and sliding friction and along their difference.
+    """Sizes of the random parts, standard deviations of ln T: repeats (2, 2) covariance, and ``sizes`` (11,) of the
+    groups of random effects, in the order of :mod:`tribo.diagnostics.model`.
 
-    ``pattern`` is the factor on the error that the predictor states for its patterns. The standard deviation of the
+    That of the patterns is the factor on the error that the predictor states. The standard deviation of the
     repeats of a test is multiplied by exp(``scatter`` @ setup.scatter). ``tail`` is the number of degrees of freedom of
     the t distribution of the repeats.
     """
 
     repeat: FloatArray
-    specimen: FloatArray
-    slope: FloatArray = field(default_factory=lambda: np.array([0.02, 0.02]))
-    pattern: float = 1.0
+    sizes: FloatArray
     scatter: FloatArray | None = None
     tail: float = 8.0
 
     @property
-    def sizes(self) -> FloatArray:
-        """Of every group of random effects, (5,)."""
-        return np.array([*self.specimen, *self.slope, self.pattern])
-
-    def with_sizes(self, sizes: FloatArray) -> Noise:
-        return replace(
-            self, specimen=sizes[GAIN:SLOPE], slope=sizes[SLOPE:PATTERN], pattern=float(sizes[PATTERN])
-        )
+    def pattern(self) -> float:
+        """The factor on the error of the patterns."""
+        return float(self.sizes[PATTERN])
 
     def per_test(self, s: Setup) -> FloatArray:
         """Covariance of the repeats of every test, (n, 2, 2)."""
@@ -60,7 +59,18 @@ class Noise:
 
 def first_noise() -> Noise:
     """Where the estimation of the noise starts."""
-    return Noise(np.diag([REPEAT_PRIOR[0] ** 2] * 2), np.zeros(2)).with_sizes(SIZE_PRIORS[:, 0])
+    sizes = SIZE_PRIORS[:, 0].copy()
+    sizes[PATTERN + 1 :] = FIRST_NUISANCE
+    return Noise(np.diag([REPEAT_PRIOR[0] ** 2] * 2), sizes)
+
+
+def held_still(s: Setup, nuisances: NDArray[np.bool_]) -> tuple[Setup, float]:
+    """The same with the random effects of ``nuisances`` (q,) held at the size that is expected of none; and the log
+    density of these sizes, by which the score of a fit is to be raised to be compared with one where they are free."""
+    groups = np.unique(s.group[nuisances])
+    sizes = SIZE_PRIORS[np.maximum(s.group, 0), 0]
+    held = replace(s, unit=np.where(nuisances, sizes * s.unit, s.unit), group=np.where(nuisances, FIXED, s.group))
+    return held, float(sum(log_size_prior(int(g), np.asarray(SIZE_PRIORS[g, 0])) for g in groups))
 
 
 def whitener(s: Setup, noise: Noise) -> FloatArray:
@@ -86,13 +96,13 @@ def log_prior(s: Setup, noise: Noise) -> float:
 
 
 def prior_sd(s: Setup, sizes: FloatArray) -> FloatArray:
-    """Standard deviation of every random effect for sizes (..., 5), shape (..., q)."""
+    """Standard deviation of every random effect for sizes (..., 11), shape (..., q)."""
     known = np.ones((*sizes.shape[:-1], 1))
     return np.asarray(s.unit * np.concatenate([sizes, known], axis=-1)[..., s.group])
 
 
 def updated_sizes(s: Setup, sizes: FloatArray, effects: FloatArray, variance: FloatArray) -> FloatArray:
-    """Sizes (..., 5) from predicted effects (..., q) and their variances (..., q)."""
+    """Sizes (..., 11) from predicted effects (..., q) and their variances (..., q)."""
     known = 1.0 - variance / prior_sd(s, sizes) ** 2
     squares = (effects / s.unit) ** 2
     updated = sizes.copy()

@@ -204,8 +204,7 @@ def informations(fitted: Replicates, terms: Terms) -> tuple[FloatArray, FloatArr
 def _at_step(fitted: Replicates, right: Sides, index: int) -> tuple[BlockCholesky, FloatArray]:
     """The normal matrix at one of SIZE_STEPS, and the log likelihood (r,) of the model without contrasts."""
     columns = fitted.weighted.columns
-    precision = fitted.noise.precision * np.exp(-2.0 * np.append(SIZE_STEPS[index], 0.0))[fitted.group]
-    prior = np.concatenate([np.full((len(precision), columns.parameters), 1e-12), precision], axis=1)
+    prior = columns.prior(fitted.of_effects * np.exp(-2.0 * np.append(SIZE_STEPS[index], 0.0))[fitted.group])
     roots = block_cholesky(fitted.normal.with_prior(*columns.sides(prior)), right)
     squares = sum(np.sum(side**2, axis=tuple(range(1, side.ndim))) for side in roots.right)
     likelihood = 0.5 * np.log(prior).sum(axis=1) - roots.log_root + 0.5 * squares + fitted.log_priors[index]
@@ -272,11 +271,11 @@ def _one_column(
 def _shared_beyond(product: TermProducts, roots: BlockCholesky) -> tuple[FloatArray, FloatArray]:
     """What the model's own columns have in common with shared terms, (r, 4 S + m, k), and the scores beyond them."""
     own = roots.own @ product.own
-    r, specimens, _, k = own.shape
-    flat = own.reshape(r, 4 * specimens, k)
-    taken = roots.across.reshape(r, 4 * specimens, roots.across.shape[3]).transpose(0, 2, 1) @ flat
+    r, specimens, each, k = own.shape
+    flat = own.reshape(r, each * specimens, k)
+    taken = roots.across.reshape(r, each * specimens, roots.across.shape[3]).transpose(0, 2, 1) @ flat
     crossed = np.concatenate([flat, roots.border_of(product.border, taken)], axis=1)
-    right = np.concatenate([roots.right[0].reshape(r, 4 * specimens), roots.right[1]], axis=1)
+    right = np.concatenate([roots.right[0].reshape(r, each * specimens), roots.right[1]], axis=1)
     return crossed, product.score - np.einsum("rpk,rp->rk", crossed, right, optimize=True)
 
 

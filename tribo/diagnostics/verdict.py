@@ -17,7 +17,8 @@ from tribo.records import SetAside
 
 SCHEMA = "tribo.verdict/2"
 Outcome = Literal["no_misfit", "named", "undetermined", "partly", "unknown"]
-LayerKind = Literal["pattern_correction", "cause", "law", "remainder", "baseline"]
+LayerKind = Literal["pattern_correction", "cause", "law", "remainder", "nuisance", "baseline"]
+Nuisance = Literal["days", "drift", "specimen_drift"]
 # why a mechanism is not among the causes
 Why = Literal[
     "zero subtracted", "absorbed", "not varied", "not certain", "only in traces", "wrong sign", "explains less",
@@ -116,7 +117,8 @@ class Layer:
     """One part of what explains a campaign, with its evidence beside all other layers.
 
     ``effect_percent`` is 100 (measured / model - 1) of a pattern correction, and the largest signed change of T by a
-    cause, with a 90 % interval from ``low`` to ``high``; of a remainder it is the peak-to-peak effect. ``tied_with``
+    cause, with a 90 % interval from ``low`` to ``high``; of a remainder it is the peak-to-peak effect, of a nuisance
+    the root mean square over the tests. ``tied_with``
     are mechanisms that the design cannot distinguish from it, ``gain`` what the layer gains on tests left out, ``at``
     the sample, regime and load at which a cause acts most, ``choice`` the specimen, pattern or value it concerns.
     """

@@ -11,7 +11,7 @@ import numpy as np
 from tribo.diagnostics.contrasts import screen_left
 from tribo.diagnostics.diagnosis import Diagnosis, examine
 from tribo.diagnostics.fit import ModelFit
-from tribo.diagnostics.inference import pattern_corrections
+from tribo.diagnostics.inference import nuisance_layers, pattern_corrections
 from tribo.diagnostics.planning import HOURS_PER_PULL, PULLS, first_test_of
 from tribo.diagnostics.verdict import CERTAIN_CAUSES, Excluded, Layer, Misfit, NextTest, Outcome, Verdict
 from tribo.lawsearch.across_patterns import CERTAIN, across_patterns, deviations_of
@@ -71,6 +71,7 @@ def with_laws(
     layers = (
         *pattern_corrections(model), *(x for x in verdict.layers if x.kind == "cause"), *held, *law_layers(found),
         *(x for x in verdict.layers if x.kind == "remainder" and x.name in open_columns),
+        *nuisance_layers(model, level),
     )  # fmt: skip
     next_test = verdict.next_test
     ties = [(law.law, law.ties[0]) for law in found.laws if law.ties]

@@ -157,7 +157,7 @@ class Projection:
     def _taken(self, white: FloatArray) -> FloatArray:
         """What the model absorbs of whitened columns, (2n, k)."""
         specimen = np.tile(self.specimen, 2)
-        own = np.zeros((int(self.specimen.max()) + 1, 4, white.shape[1]))
+        own = np.zeros((int(self.specimen.max()) + 1, self.own.shape[1], white.shape[1]))
         np.add.at(own, specimen, self.own[:, :, None] * white[:, None])
         return np.einsum("na,nak->nk", self.own, own[specimen]) + self.border @ (self.border.T @ white)
 
@@ -213,12 +213,12 @@ class Projection:
     def _taken_by_specimens(self, tests: Index, white: FloatArray, columns: FloatArray) -> FloatArray:
         """Products of what the specimens of a sample absorb of columns (t, k) times each two of its courses,
         (b b, k)."""
-        own, found = self.own.reshape(2, self.n, 4)[:, tests], 0.0
+        own, found = self.own.reshape(2, self.n, -1)[:, tests], 0.0
         b, k = len(white), columns.shape[1]
         for specimen in np.unique(self.specimen[tests]):
             here = np.flatnonzero(self.specimen[tests] == specimen)
-            rows = np.einsum("bit,ita->bat", white[:, :, here], own[:, here]).reshape(4 * b, -1)
-            taken = (rows @ columns[here]).reshape(b, 4, k)
+            rows = np.einsum("bit,ita->bat", white[:, :, here], own[:, here]).reshape(own.shape[2] * b, -1)
+            taken = (rows @ columns[here]).reshape(b, own.shape[2], k)
             found = found + np.einsum("bak,cak->bck", taken, taken)
         return np.asarray(found).reshape(b * b, k)
 

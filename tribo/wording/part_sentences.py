@@ -26,6 +26,10 @@ BETWEEN = {
     "mean": "mean", "bend": "the ends above the middle", "ends": "from the low to the high end",
     "groups": "ratio of geometric means", "extremes": "between its extremes",
 }  # fmt: skip
+NUISANCES = {
+    "days": "friction differs between days or sessions", "drift": "the series drifts",
+    "specimen_drift": "the specimens drift, each at its own rate,",
+}  # fmt: skip
 COURSES = {
     "rising": "rising throughout", "falling": "falling throughout", "hump": "highest in the middle",
     "hollow": "lowest in the middle",
@@ -164,6 +168,8 @@ def layer_sentence(layer: Layer) -> str:
         )
     if layer.kind == "baseline":
         return _own_law(layer)
+    if layer.kind == "nuisance":
+        return f"{sentence_case(NUISANCES[layer.name])} by {value:.0f} % (root mean square; {low:.0f} to {high:.0f} %)."
     if isinstance(shows, FoundLaw):
         return law_sentence(shows)
     if isinstance(shows, KnownLaw):

@@ -123,9 +123,10 @@ def _no_misfit(v: Verdict) -> str:
     said = f"The model calibrated on {flat} describes static and sliding friction of all samples within its own error"
     corrections = of_kind(v, "pattern_correction")
     if not corrections:
-        return f"{said}."
+        return " ".join([f"{said}.", *(layer.text for layer in of_kind(v, "nuisance"))])
     most = max(corrections, key=lambda layer: abs(layer.effect_percent))
-    return f"{said}: the largest mean difference, {most.regimes[0]} friction of {most.name}, is {size_in_words(most)}."
+    said = f"{said}: the largest mean difference, {most.regimes[0]} friction of {most.name}, is {size_in_words(most)}."
+    return " ".join([said, *(layer.text for layer in of_kind(v, "nuisance"))])
 
 
 def _caused(v: Verdict, layers: Sequence[Layer]) -> str:
@@ -246,6 +247,8 @@ def _evidence(v: Verdict) -> Iterator[str]:
             f"{joined(apart)} differ from the model independently of each other, and no recorded column explains the "
             "differences."
         )
+    if v.verdict != "no_misfit":
+        yield from (layer.text for layer in of_kind(v, "nuisance"))
     if v.equivalent:
         yield 'This design cannot distinguish the mechanisms joined by "or".'
     if shows.wrong_in_form and v.verdict in ("unknown", "partly"):

@@ -1,0 +1,91 @@
+"""Days, drift of the series and drift of specimens are found as what they are, with their sizes, and are no cause."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from blind.bench import Bench, Design
+from blind.direct import ingested
+from blind.tribometer import hide
+
+from tribo.diagnostics.days_and_drift import place_in_series, session_of, walks
+from tribo.diagnostics.diagnosis import Diagnosis, examine
+from tribo.diagnostics.observations import observe
+from tribo.wording.verdict_sentences import worded
+
+SIZE = 0.06  # of ln T, root mean square
+Course = Callable[[Bench, np.random.Generator], np.ndarray]
+
+
+def of_one_size(change: np.ndarray) -> np.ndarray:
+    centred = change - change.mean()
+    return SIZE * centred / np.sqrt(np.mean(centred**2))
+
+
+def days(b: Bench, rng: np.random.Generator) -> np.ndarray:
+    day = b.tests["started_at"].str[:10].factorize()[0]
+    return of_one_size(rng.normal(size=day.max() + 1)[day])
+
+
+def drift(b: Bench, rng: np.random.Generator) -> np.ndarray:
+    return of_one_size(np.cumsum(rng.standard_t(4, size=len(b.tests))))
+
+
+def specimen_drift(b: Bench, rng: np.random.Generator) -> np.ndarray:
+    rates = {name: rng.normal() for name in sorted(set(b.tests["specimen"]))}
+    run = b.tests["specimen_run"] - b.tests.groupby("specimen")["specimen_run"].transform("mean")
+    return of_one_size(run.to_numpy() * b.tests["specimen"].map(rates).to_numpy())
+
+
+def diagnosed(seed: int, course: Course | None, effects: tuple[tuple[str, float], ...] = ()) -> Diagnosis:
+    b = hide(seed, list(effects), Design(repeats=2))
+    if course is not None:
+        b.scale(np.exp(course(b, np.random.default_rng([seed, 31]))))
+    return examine(ingested(b, seed), replicates=(60, 40))
+
+
+@pytest.mark.parametrize(
+    ("name", "course"), [("days", days), ("drift", drift), ("specimen_drift", specimen_drift)]
+)
+def test_what_moves_is_told_with_its_size_and_is_no_cause(name: str, course: Course) -> None:
+    found = {seed: diagnosed(seed, course).verdict for seed in (1, 3, 4)}
+    assert all(v.verdict == "no_misfit" and not v.causes for v in found.values())
+    layers = [layer for v in found.values() for layer in v.layers if layer.kind == "nuisance"]
+    assert {layer.name for layer in layers} == {name}
+    assert len(layers) == 3
+    assert sum(layer.low <= 100 * SIZE <= layer.high for layer in layers) >= 2
+    assert all(layer.effect_percent == pytest.approx(100 * SIZE, rel=0.4) for layer in layers)
+
+
+def test_the_finding_tells_the_drift() -> None:
+    assert "The series drifts by 6 % (root mean square; " in worded(diagnosed(3, drift).verdict).sentence
+
+
+def test_without_days_and_drift_none_are_told() -> None:
+    assert not [x for seed in (1, 3, 4) for x in diagnosed(seed, None).verdict.layers if x.kind == "nuisance"]
+
+
+def test_a_cause_beside_days_is_found_with_them() -> None:
+    v = diagnosed(4, days, (("suction", 1.2),)).verdict
+    assert {c.mechanism for c in v.causes} <= {"suction", "normal_load_error"}
+    assert v.causes
+    assert "days" in {layer.name for layer in v.layers if layer.kind == "nuisance"}
+
+
+def test_a_run_in_is_not_taken_for_drift() -> None:
+    assert [c.mechanism for c in diagnosed(4, None, (("run_in", 1.5),)).verdict.causes] == ["run_in"]
+
+
+def test_a_session_ends_where_no_pull_is_made_for_hours() -> None:
+    c = observe(ingested(hide(1, [], Design(repeats=2)), 1)).conditions
+    date = np.unique(c.columns["date"], return_inverse=True)[1]
+    assert (session_of(c) == date).all()
+
+
+def test_the_courses_of_a_walk_add_up_to_one() -> None:
+    c = observe(ingested(hide(1, [], Design(repeats=2)), 1)).conditions
+    variance = sum(sd**2 * course**2 for course, sd in walks(c))
+    assert np.mean(variance) == pytest.approx(1.0, rel=1e-2)
+    assert variance[np.argmin(place_in_series(c))] > np.median(variance)
