@@ -105,7 +105,7 @@ def judged_cause(hidden: Hidden, cause: str, forms: tuple[WrittenLaw, ...]) -> d
 def judged(hidden: Hidden, found: Discovery, kept: np.ndarray, seed: int) -> dict[str, Any]:
     """What the first law says, whether that is right, its band, and its error on pulls that were not searched."""
     law, truth = found.laws[0], hidden.truth
-    acts = _acts(law)
+    acts = acts_of_law(law)
     inside, width = _band(law, hidden.change[kept])
     true, own, none = _held_out(hidden, law, seed)
     return {
@@ -129,7 +129,7 @@ def _same_columns(found: tuple[str, ...], true: tuple[frozenset[str], ...]) -> b
     return len(found) == len(true) and all(any(f in t for f in found) for t in true)
 
 
-def _acts(law: FoundLaw) -> np.ndarray:
+def acts_of_law(law: FoundLaw) -> np.ndarray:
     """Where the law acts, (n, 2)."""
     c = law.model.setup.observations.conditions
     regimes = np.array([law.law.regime != "sliding", law.law.regime != "static"])
@@ -145,7 +145,7 @@ def _band(law: FoundLaw, change: np.ndarray) -> tuple[float, float]:
     """Share of the tests at which the 90 % band holds the hidden change, both beyond what flat law and patterns can
     absorb; and the mean half width of the band."""
     true = centred(change, law.model.setup.observations.conditions, terms_of(law.model)[LOAD_TERM])
-    either = (change != 0) | _acts(law)
+    either = (change != 0) | acts_of_law(law)
     _, low, high = law.band
     held = (low <= true) & (true <= high)
     return float(held[either].mean()), float((0.5 * (high - low))[either].mean())
@@ -161,11 +161,11 @@ def _held_out(hidden: Hidden, law: FoundLaw, seed: int) -> tuple[float, float, f
     without = replace(o, log_force=o.log_force - hidden.change)
     acting, predictor = law.model.acting, law.model.setup.predictor
     models = ((without, acting[:-1]), (o, acting), (o, acting[:-1]))
-    errors = [_error(setup(data, predictor), model, out) for data, model in models]
+    errors = [error_left_out(setup(data, predictor), model, out) for data, model in models]
     return errors[0], errors[1], errors[2]
 
 
-def _error(s: Setup, acting: tuple[Acting, ...], out: np.ndarray) -> float:
+def error_left_out(s: Setup, acting: tuple[Acting, ...], out: np.ndarray) -> float:
     trained = fit(s.take(~out), acting)
     residual = s.observations.log_force - predict(s, trained.law, trained.acting, trained.values)
     return float(np.sqrt(np.mean((residual - s.dense @ trained.effects)[out] ** 2)))

@@ -10,10 +10,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from blind_laws import acts_of_law, error_left_out
 
 from tribo.diagnostics.diagnosis import Diagnosis, examine
+from tribo.diagnostics.model import setup
+from tribo.diagnostics.observations import observe
 from tribo.diagnostics.verdict import Verdict
-from tribo.lawsearch.diagnosis_with_laws import with_law_across, with_laws
+from tribo.lawsearch.diagnosis_with_laws import explained, with_law_across, with_laws
 from tribo.lawsearch.grammar import LOAD_TERM
 from tribo.lawsearch.model_choice import FoundLaw, centred
 from tribo.lawsearch.scoring import terms_of
@@ -95,6 +98,27 @@ def hidden_and_band(law: FoundLaw, change: np.ndarray) -> tuple[np.ndarray, np.n
     """The hidden change beyond what flat law and patterns can absorb, both ends of the 90 % band of a law, and where it
     acts; each (n, 2)."""
     c = law.model.setup.observations.conditions
-    true = centred(change, c, terms_of(law.model)[LOAD_TERM])
-    regimes = np.array([law.law.regime != "sliding", law.law.regime != "static"])
-    return true, law.band[1], law.band[2], np.asarray((law.law.weight(c) != 0)[:, None] * regimes)
+    return centred(change, c, terms_of(law.model)[LOAD_TERM]), law.band[1], law.band[2], acts_of_law(law)
+
+
+def band_of_first_law(d: Diagnosis, change: np.ndarray) -> Row:
+    """Share of the tests at which the 90 % band of the first law holds the hidden change, and its mean half width."""
+    if d.laws is None or not d.laws.laws:
+        return {}
+    true, low, high, acts = hidden_and_band(d.laws.laws[0], change)
+    either = (change != 0) | acts
+    held = ((low <= true) & (true <= high))[either].mean()
+    return {"band": round(float(held), 4), "band_width": round(float((0.5 * (high - low))[either].mean()), 4)}
+
+
+def errors_left_out(d: Diagnosis, whole: Ingested, change: np.ndarray, out: np.ndarray) -> Row:
+    """RMS error of ln T of the tests that were left ``out``: with the true law, with all that was found, with nothing.
+
+    All are fitted to the other tests; the true law is taken off the forces as it was hidden.
+    """
+    model, o = explained(d), observe(whole)
+    without = replace(o, log_force=o.log_force - change)
+    tried = {"true": (without, ()), "found": (o, model.acting), "nothing": (o, ())}
+    predictor = model.setup.predictor
+    errors = {key: error_left_out(setup(data, predictor), acting, out) for key, (data, acting) in tried.items()}
+    return {f"error_{key}": round(x, 5) for key, x in errors.items()}

@@ -25,7 +25,9 @@ def tables(rows: list[Row]) -> str:
     parts = (
         ("What has to hold", must_hold(unique)), ("Nuisance by kind and order", by_nuisance(unique)),
         ("Nuisance by size", by_size(unique)), ("Causes of one value", by_value(unique)),
-        ("Levels", by_level(unique)), ("What was said wrongly", confusion(unique)),
+        ("Levels", by_level(unique)), ("Effects and laws under nuisance", by_effect(unique)),
+        ("Gaps", by_gap(unique)), ("Laws as free functions", by_class(unique)), ("Sizes", by_size_of(unique)),
+        ("What was said wrongly", confusion(unique)),
     )  # fmt: skip
     return "\n\n".join(f"## {title}\n\n{text}" for title, text in parts if text) + "\n"
 
@@ -62,7 +64,10 @@ def laws(row: Row) -> list[Row]:
 
 def must_hold(rows: list[Row]) -> str:
     """Every row of the promise that this run has campaigns for: what was asked, and what was counted."""
-    lines = [*nuisance_lines(rows), *one_value_lines(rows), *level_lines(rows), *cost_lines(rows)]
+    lines = [
+        *nuisance_lines(rows), *disturbed_lines(rows), *gap_lines(rows), *one_value_lines(rows), *level_lines(rows),
+        *free_law_lines(rows), *size_lines(rows), *cost_lines(rows),
+    ]  # fmt: skip
     return table(("what", "asked", "counted"), lines)
 
 
@@ -289,6 +294,254 @@ def by_level(rows: list[Row]) -> str:
             lines.append((f"{part} {name}", len(g), *(sum(map(test, g)) for test in tests), held))
     head = ("hidden", "campaigns", "column named", "shape listed", "nothing left", "values hold")
     return table(head, lines)
+
+
+# effects and laws under nuisance
+
+FOUND = 4.5  # strength from which an observer who knows all covariances finds a change
+MOST_TIED = 3
+SERIES = {"run_order", "elapsed_s", "date", "started_at", "time of day", "specimen_run"}
+# The recorded columns that an effect follows, by all names that an answer may use
+FOLLOWS = {
+    "temperature": {"temperature_C"}, "outside:temperature": {"temperature_C"}, "humidity": {"humidity_pct"},
+    "outside:humidity": {"humidity_pct"}, "velocity_dependence": {"speed_m_s", "speed_mm_s"},
+    "contact_ageing": {"hold_s"}, "covariate:operator": {"operator"}, "run_in": {"specimen_run"},
+    "outside:day": {"time of day", "time_of_day", "hour", "elapsed_s", "run_order", "started_at"},
+    "outside:counterface": {"run_order", "elapsed_s", "date", "started_at"},
+}  # fmt: skip
+
+
+def columns_of_cause(mechanism: str) -> set[str]:
+    return FOLLOWS.get(mechanism, {mechanism.removeprefix("covariate:")} if ":" in mechanism else set())
+
+
+def columns_of_law(layer: Row) -> set[str]:
+    return set(layer["name"].split(" and "))
+
+
+def effect_found(row: Row) -> bool:
+    """Named alone or in its inseparable set, among at most three that are undecided, or by a law or a misfit of the
+    column that it follows."""
+    name = row["truth"]["effect"]
+    follows = FOLLOWS.get(name, set())
+    sure = {c["mechanism"] for c in certain(row)}
+    tied = {n for names in row["equivalent"] if set(names) & sure for n in names}
+    listed = {c["mechanism"] for c in causes(row)}
+    by_law = any(columns_of_law(x) <= follows for x in laws(row))
+    by_misfit = name.startswith("outside") and any(m["column"] in follows for m in row["misfits"])
+    return name in sure | tied or (name in listed and len(listed) <= MOST_TIED) or by_law or by_misfit
+
+
+def effect_wrong(row: Row) -> bool:
+    """A certain cause that neither is the hidden one, nor inseparable from it, nor follows its column."""
+    name = row["truth"]["effect"]
+    tied = {n for names in row["equivalent"] if name in names for n in names}
+    follows = FOLLOWS.get(name, set())
+    return any(
+        c["mechanism"] not in {name, *tied} and not (columns_of_cause(c["mechanism"]) & follows) for c in certain(row)
+    )
+
+
+def interval_held(row: Row) -> bool:
+    truth, low, _, high = row["interval"]
+    return bool(low <= truth <= high)
+
+
+def said_columns(row: Row) -> set[str]:
+    """Columns of all laws and of all certain causes, speeds and dates under one name each."""
+    found = {c for x in laws(row) for c in columns_of_law(x)}
+    found |= {n for c in certain(row) for n in columns_of_cause(c["mechanism"]) or {c["mechanism"]}}
+    return {"speed_mm_s" if c == "speed_m_s" else c for c in found}
+
+
+def columns_right(row: Row) -> bool:
+    return set(row["truth"]["columns"]) <= said_columns(row)
+
+
+def other_physical(row: Row) -> bool:
+    return bool(said_columns(row) - set(row["truth"]["columns"]) - SERIES)
+
+
+def observer_finds(row: Row) -> bool:
+    return float(row["strength"]) > FOUND
+
+
+def disturbed_lines(rows: list[Row]) -> list[Line]:
+    lines: list[Line] = []
+    for under in ("5 %", "none"):
+        effects, hidden_laws = of(rows, f"effects, {under}"), of(rows, f"laws, {under}")
+        seen, clear = [r for r in effects if observer_finds(r)], [r for r in hidden_laws if observer_finds(r)]
+        if effects:
+            sized = [r for r in effects if "interval" in r]
+            lines += [
+                (f"effects, nuisance {under}: found, of those the observer finds", "90 %", share(seen, effect_found)),
+                ("the same: the observer finds", "", share(effects, observer_finds)),
+                ("the same: found, of those that one finds who knows the errors of the patterns too", "",
+                 share([r for r in effects if r["patterns_known"] > FOUND], effect_found)),
+                ("the same: a wrong cause", "", share(effects, effect_wrong)),
+                ("the same: intervals hold", "85 to 95 %", share(sized, interval_held)),
+            ]  # fmt: skip
+        if hidden_laws:
+            lines += [
+                (f"laws, nuisance {under}: columns right, of those the observer finds", "90 %",
+                 share(clear, columns_right)),
+                ("the same: another physical column", "", share(hidden_laws, other_physical)),
+                ("the same: 90 % band holds the change, mean share of tests", "85 to 95 %", mean_band(hidden_laws)),
+            ]  # fmt: skip
+    return lines
+
+
+def mean_band(rows: list[Row]) -> str:
+    bands = [r["band"] for r in rows if "band" in r]
+    return f"{100 * np.mean(bands):.1f} % ({len(bands)} campaigns)" if bands else "none"
+
+
+def by_effect(rows: list[Row]) -> str:
+    lines: list[Line] = []
+    for cell in ("effects, none", "effects, 5 %"):
+        for name in sorted({r["truth"]["effect"] for r in of(rows, cell)}):
+            g = [r for r in of(rows, cell) if r["truth"]["effect"] == name]
+            seen = [r for r in g if observer_finds(r)]
+            sized = [r for r in g if "interval" in r]
+            plain = f"{np.median([r['truth']['rms_percent'] for r in g]):.1f} %"
+            lines.append((cell, name, plain, len(g), len(seen), sum(map(effect_found, seen)),
+                          sum(map(effect_found, g)), sum(map(effect_wrong, g)),
+                          f"{sum(map(interval_held, sized))}/{len(sized)}"))  # fmt: skip
+    for cell in ("laws, none", "laws, 5 %"):
+        for name in sorted({r["truth"]["class"] for r in of(rows, cell)}):
+            g = [r for r in of(rows, cell) if r["truth"]["class"] == name]
+            seen = [r for r in g if observer_finds(r)]
+            plain = f"{np.median([r['truth']['rms_percent'] for r in g]):.1f} %"
+            lines.append((cell, name, plain, len(g), len(seen), sum(map(columns_right, seen)),
+                          sum(map(columns_right, g)), sum(map(other_physical, g)), mean_band(g)))  # fmt: skip
+    head = ("cell", "hidden", "rms of T, median", "campaigns", "the observer finds", "of these found", "found", "wrong",
+            "interval or band holds")  # fmt: skip
+    return table(head, lines)
+
+
+# gaps
+
+
+def gap_lines(rows: list[Row]) -> list[Line]:
+    own = of(rows, "gaps")
+    if not own:
+        return []
+    gappy = [r for r in own if r["what"]["share"] > 0]
+    found = [
+        (f"gaps, {100 * share_missing:.0f} % missing: found, of those found at 0 %",
+         "90 %" if share_missing == 0.3 else "", share(still_found(own, share_missing), effect_found))
+        for share_missing in sorted({r["what"]["share"] for r in gappy})
+    ]  # fmt: skip
+    sized = [r for r in gappy if "interval" in r]
+    return [
+        *found,
+        ("gaps: a wrong cause", "at most 2 %", share(gappy, effect_wrong)),
+        ("gaps: intervals hold", "85 to 95 %", share(sized, interval_held)),
+    ]
+
+
+def still_found(rows: list[Row], missing: float) -> list[Row]:
+    """Campaigns with this share missing whose effect was found in the same campaign without gaps."""
+    whole = {(r["what"]["effect"], r["seed"]) for r in rows if r["what"]["share"] == 0 and effect_found(r)}
+    return [r for r in rows if r["what"]["share"] == missing and (r["what"]["effect"], r["seed"]) in whole]
+
+
+def by_gap(rows: list[Row]) -> str:
+    own, lines = of(rows, "gaps"), []
+    for part in ("how", "effect"):
+        for name in sorted({r["what"][part] for r in own}):
+            for missing in sorted({r["what"]["share"] for r in own}):
+                g = [r for r in own if r["what"][part] == name]
+                at = [r for r in g if r["what"]["share"] == missing]
+                sized = [r for r in at if "interval" in r]
+                kept = still_found(g, missing)
+                lines.append((name, f"{100 * missing:.0f} %", len(at), sum(map(effect_found, at)),
+                              f"{sum(map(effect_found, kept))}/{len(kept)}", sum(map(effect_wrong, at)),
+                              f"{sum(map(interval_held, sized))}/{len(sized)}"))  # fmt: skip
+    head = ("gaps or effect", "missing", "campaigns", "found", "of those found at 0 %", "wrong", "intervals hold")
+    return table(head, lines)
+
+
+# laws as free functions
+
+WITHIN = 1.10  # of the error of the true law on tests left out
+
+
+def error_within(row: Row) -> bool:
+    return bool(row["error_found"] <= WITHIN * row["error_true"])
+
+
+def free_law_lines(rows: list[Row]) -> list[Line]:
+    own = of(rows, "free laws")
+    if not own:
+        return []
+    classes = {name: [r for r in own if r["truth"]["class"] == name] for name in {r["truth"]["class"] for r in own}}
+    bands = {name: np.mean([r["band"] for r in g if "band" in r]) for name, g in classes.items()
+             if any("band" in r for r in g)}  # fmt: skip
+    worst = min(bands, key=lambda name: bands[name], default="")
+    return [
+        ("free laws: column or columns right", "90 %", share(own, columns_right)),
+        ("free laws: another physical column", "at most 2 %", share(own, other_physical)),
+        ("free laws: error on tests left out within 10 % of that of the true law", "90 %", share(own, error_within)),
+        ("free laws: 90 % band holds the change, mean share of tests", "85 to 95 %", mean_band(own)),
+        ("the same in the class where it holds least", "80 %",
+         f"{worst}: {100 * bands[worst]:.1f} %" if worst else "none"),
+    ]  # fmt: skip
+
+
+def by_class(rows: list[Row]) -> str:
+    own, lines = of(rows, "free laws"), []
+    parts: dict[str, Callable[[Row], str]] = {
+        "class": lambda r: str(r["truth"]["class"]), "term": lambda r: r["truth"]["term"] or "T",
+        "order": lambda r: str(r["design"]["order"]), "column": lambda r: " and ".join(sorted(r["truth"]["columns"])),
+    }  # fmt: skip
+    for part, told in parts.items():
+        for name in sorted(set(map(told, own))):
+            g = [r for r in own if told(r) == name]
+            counts = (sum(map(test, g)) for test in (columns_right, other_physical, error_within))
+            lines.append((f"{part} {name}", len(g), *counts, mean_band(g)))
+    return table(("hidden", "campaigns", "columns right", "another physical", "error within 10 %", "band holds"), lines)
+
+
+# sizes
+
+
+def sized_rows(rows: list[Row]) -> list[tuple[str, float, bool, float]]:
+    """What was hidden, how much its form is off, whether the interval holds the size, and told over true, where the
+    cause or the law was named."""
+    found = []
+    for r in of(rows, "sizes of effects"):
+        if "interval" in r:
+            truth, _, value, _ = r["interval"]
+            found.append((r["truth"]["effect"], r["truth"]["off"], interval_held(r), value / truth))
+    for r in of(rows, "sizes of laws"):
+        truth = r["truth"]["percent"]
+        own = [x for x in r["layers"] if x["kind"] == "law" and x["name"] == r["truth"]["column"]]
+        if own and None not in (own[0]["low"], own[0]["high"]):
+            name = f"{r['truth']['form']} of {r['truth']['column']}"
+            held = own[0]["low"] <= truth <= own[0]["high"]
+            found.append((name, r["truth"]["off"], held, own[0]["effect"] / truth))
+    return found
+
+
+def size_lines(rows: list[Row]) -> list[Line]:
+    found = sized_rows(rows)
+    exact, nearly = [h for _, off, h, _ in found if not off], [h for _, off, h, _ in found if off]
+    return [
+        ("sizes, form right: 90 % intervals hold", "87 to 93 %", share_of(exact)),
+        ("sizes, form 12 % off: 90 % intervals hold", "80 %", share_of(nearly)),
+    ] if found else []  # fmt: skip
+
+
+def by_size_of(rows: list[Row]) -> str:
+    found, lines = sized_rows(rows), []
+    for name in sorted({n for n, *_ in found}):
+        for off in sorted({o for _, o, *_ in found}):
+            g = [(h, ratio) for n, o, h, ratio in found if n == name and o == off]
+            if g:
+                ratio = f"{np.median([x for _, x in g]):.2f}"
+                lines.append((name, f"{100 * off:.0f} %", share_of([h for h, _ in g]), ratio))
+    return table(("hidden", "form off by", "interval holds", "told over hidden, median"), lines)
 
 
 def confusion(rows: list[Row]) -> str:

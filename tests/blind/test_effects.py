@@ -54,6 +54,9 @@ COINCIDE = {
         "5.5": "largest static coefficient", "2.5": "smallest sliding coefficient",
         "3.5": "largest sliding coefficient",
     },
+    ("laboratories", "free_laws.py"): {
+        "0.15": "shortest length of a smooth course", "2.5": "fewest turns of a periodic course",
+    },
     ("laboratories", "laboratory.py"): {
         "0.012": "usual odd curve of a pattern or specimen", "1.2": "the largest scatter of repeats, of the usual",
     },

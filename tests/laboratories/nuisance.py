@@ -56,7 +56,8 @@ def draw_nuisance(kinds: Sequence[str], rng: np.random.Generator, whole: float |
 def mixture(rng: np.random.Generator) -> tuple[str, ...]:
     """One kind in two campaigns of five, two in two of five, three or four in the fifth."""
     number = int(rng.choice([1, 2, 3, 4], p=[2 / 5, 2 / 5, 1 / 10, 1 / 10]))
-    return tuple(k for k in KINDS if k in set(rng.choice(KINDS, number, replace=False)))
+    chosen = set(rng.choice(KINDS, number, replace=False))
+    return tuple(k for k in KINDS if k in chosen)
 
 
 def course_of(nuisance: Nuisance, tests: pd.DataFrame, rng: np.random.Generator) -> np.ndarray:

@@ -11,7 +11,7 @@ from .campaign import Made, bare_bench, both, make, stream
 from .handed_over import handed_over
 from .laboratory import Laboratory, day_of, drawn_laboratory
 from .levels import COLUMNS as LEVEL_COLUMNS, MOST, OF_NUMBERS, hide_levels, level_laboratory, shape_at
-from .nuisance import DAYS, DAYS_APART, DRIFT, FORMS, KINDS, SPECIMEN_DRIFT, Nuisance, course_of, draw_nuisance
+from .nuisance import DAYS, DAYS_APART, DRIFT, FORMS, KINDS, SPECIMEN_DRIFT, Nuisance, course_of, draw_nuisance, mixture
 from .observer import Observer
 from .odd_shapes import odd_course, pattern_deviations, repeat_deviations, specimen_deviations
 from .one_value import SIZES, STRENGTH, hide_one_value
@@ -74,6 +74,15 @@ def test_sizes_are_drawn_between_2_and_10_percent_or_add_to_the_whole() -> None:
     assert 0.02 <= min(drawn) < 0.025
     assert 0.095 < max(drawn) <= 0.10
     assert np.linalg.norm([one.rms for one in draw_nuisance(KINDS, rng, 0.05)]) == pytest.approx(0.05)
+
+
+def test_a_mixture_has_one_kind_or_more_and_all_kinds_alike() -> None:
+    rng = np.random.default_rng(2)
+    drawn = [mixture(rng) for _ in range(500)]
+    numbers = np.bincount([len(kinds) for kinds in drawn], minlength=5) / len(drawn)
+    assert numbers == pytest.approx([0, 0.4, 0.4, 0.1, 0.1], abs=0.06)
+    shares = [np.mean([kind in kinds for kinds in drawn]) for kind in KINDS]
+    assert np.ptp(shares) < 0.1
 
 
 def test_nothing_hidden_leaves_flat_law_and_patterns_alone() -> None:
