@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from kept_numbers import scatter, write
 
-from tribo.mechanisms.record import Conditions, Contact, Mechanism, Readings, Values
+from tribo.mechanisms.record import Conditions, Mechanism, Values
 from tribo.mechanisms.table import MECHANISMS
 
 from .test_contract import RECORDED, base, conditions, one_run
 
 KEPT = Path(__file__).with_name("kept_laws.json")
-CONTACTS = (Contact(8e3, 0.65, 4.0, 2.5), Contact(25e3, 1.0, 2.0, 1.5), Contact(3e3, 0.9, 6.0, 4.0))
+PULLED = (((4.0, 2.5), 4.0 * 8e3 / 0.65), ((2.0, 1.5), 2.0 * 25e3), ((6.0, 4.0), 6.0 * 3e3 / 0.9))
 
 
 def recorded() -> Conditions:
@@ -79,8 +79,8 @@ def placed(m: Mechanism, values: Values) -> list[Any]:
     p, place, one = m.placement, np.linspace(-0.5, 0.5, 7), one_run()
     rise = [] if m.rise is None else m.rise(values, np.array([4e3, 9e3]), one)
     return [
-        [p.thresholds(values, contact) for contact in CONTACTS] if p.thresholds else [],
-        [p.load(values, contact) for contact in CONTACTS] if p.load else [],
+        [p.thresholds(values, *pulled) for pulled in PULLED] if p.thresholds else [],
+        [p.load(values, *pulled) for pulled in PULLED] if p.load else [],
         [p.springs(values, one)] if p.springs else [],
         [p.floors(values, one)] if p.floors else [],
         [p.rims(values)] if p.rims else [],
@@ -95,7 +95,7 @@ def said(m: Mechanism) -> list[str]:
     if m.in_table.finding is None:
         return []
     cases = (((0.0, 4.0), (0.0, 0.1)), ((3.5, 6.0), (0.05, 0.2)), ((-1.0, -0.5), (-0.1, 0.0)))
-    return [m.in_table.finding(Readings(gains, sizes, lambda: 0.2, 6e4)) for gains, sizes in cases]
+    return [m.in_table.finding(gains, sizes, lambda: 0.2, 6e4) for gains, sizes in cases]
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tribo.mechanisms.record import Base, Conditions, Contact, Mechanism, Readings, Values
+from tribo.mechanisms.record import Base, Conditions, Mechanism, Values
 from tribo.mechanisms.table import MECHANISMS, NAMES, mechanism
 
 LAWS = {"F": (4.8, 1.29, 2.9, 0.62), "B": (4.2, 0.59, 3.0, 0.38), "Sx": (3.7, 0.69, 2.95, 0.47)}
@@ -172,11 +172,11 @@ def test_on_one_test_it_changes_the_force_as_its_law_does_over_the_campaign(m: M
 
 @ALL
 def test_its_placement_is_neutral_at_zero_amplitude_and_acts_at_the_start(m: Mechanism) -> None:
-    p, contact, one = m.placement, Contact(8e3, 0.65, 4.0, 2.5), one_run()
+    p, pulled, one = m.placement, ((4.0, 2.5), 49e3), one_run()
     place = np.linspace(-0.5, 0.5, 11)
     neutral: list[tuple[object, list[float], float]] = [
-        (p.thresholds, [v for values in both(m) for v in (p.thresholds(values, contact) if p.thresholds else ())], 1.0),
-        (p.load, [v for values in both(m) for v in (p.load(values, contact) if p.load else ())], 1.0),
+        (p.thresholds, [v for values in both(m) for v in (p.thresholds(values, *pulled) if p.thresholds else ())], 1.0),
+        (p.load, [v for values in both(m) for v in (p.load(values, *pulled) if p.load else ())], 1.0),
         (p.springs, [p.springs(values, one) for values in both(m)] if p.springs else [], 1.0),
         (p.floors, [p.floors(values, one) for values in both(m)] if p.floors else [], 0.0),
         (p.rims, [p.rims(values)[0] for values in both(m)] if p.rims else [], 0.0),
@@ -211,8 +211,8 @@ RECORDED = {"elapsed_s": 3600.0, "samples_in_rise": 100.0}
 @ALL
 def test_what_depends_on_the_friction_it_changes_says_so(m: Mechanism) -> None:
     p, place = m.placement, np.linspace(-0.5, 0.5, 11)
-    low, high = Contact(8e3, 0.65, 1.0, 1.0), Contact(8e3, 0.65, 5.0, 5.0)
-    moved = [gains(m.start(), low) != gains(m.start(), high) for gains in (p.thresholds, p.load) if gains is not None]
+    low, high = ((1.0, 1.0), 12e3), ((5.0, 5.0), 60e3)
+    moved = [gains(m.start(), *low) != gains(m.start(), *high) for gains in (p.thresholds, p.load) if gains is not None]
     if p.along is not None:
         moved.append(not np.array_equal(p.along(m.start(), 1.0, place)[0], p.along(m.start(), 5.0, place)[0]))
     assert p.own_friction == any(moved)
@@ -234,7 +234,7 @@ def test_what_it_states_of_evidence_tests_and_tables_is_complete(m: Mechanism) -
     assert bool(t.finding) <= bool(t.guess)
     assert set(t.separates) <= set(NAMES)
     if t.finding is not None:
-        text = t.finding(Readings((0.0, 4.0), (0.0, 0.1), lambda: 0.2, 6e4))
+        text = t.finding((0.0, 4.0), (0.0, 0.1), lambda: 0.2, 6e4)
         assert text.endswith(".")
         assert "nan" not in text
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from tribo.mechanisms.record import (
@@ -13,7 +15,6 @@ from tribo.mechanisms.record import (
     Mechanism,
     MechanismParameter,
     Placement,
-    Readings,
     Values,
     amplitude,
 )
@@ -50,9 +51,11 @@ def floors(values: Values, conditions: Conditions) -> float:
     return float(share_down(values, conditions)[0])
 
 
-def finding(readings: Readings) -> str:
+def finding(
+    gains: Sequence[float], sizes: Sequence[float], limit: Callable[[], float], flat_traction_Pa: float
+) -> str:
     """What the table says about cavities whose floors touch down."""
-    most = max(readings.gains)
+    most = max(gains)
     worth = f"earn at most {most:.1f} units of log likelihood" if most > 0 else "do not improve the fit"
     return f"Cavity floors that touch the counterface would raise friction, and {worth}."
 

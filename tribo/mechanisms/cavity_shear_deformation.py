@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from tribo.mechanisms.record import (
@@ -10,7 +12,6 @@ from tribo.mechanisms.record import (
     Forces,
     InTable,
     Mechanism,
-    Readings,
     Values,
     amplitude,
 )
@@ -23,9 +24,11 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
     return Forces(before.static_N * gain, before.sliding_N * gain)
 
 
-def finding(readings: Readings) -> str:
+def finding(
+    gains: Sequence[float], sizes: Sequence[float], limit: Callable[[], float], flat_traction_Pa: float
+) -> str:
     """What the table says about a difference between the pull directions."""
-    low, high = min(readings.gains), max(readings.gains)
+    low, high = min(gains), max(gains)
     return (
         f"Deformed patterns are {'supported' if low > 3.0 else 'possible'}: friction that differs along and across the "
         f"long cavities of S earns {low:.1f} to {high:.1f} units of log likelihood over these readings."

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from tribo.mechanisms.record import (
     Base,
     Conditions,
-    Contact,
     Forces,
     InTable,
     Mechanism,
     Placement,
-    Readings,
     Values,
     amplitude,
 )
@@ -30,19 +30,20 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
     return Forces(before.static_N * kept, before.sliding_N * kept)
 
 
-def area_left(values: Values, contact: Contact) -> tuple[float, float]:
+def area_left(values: Values, pulled: tuple[float, float], traction_Pa: float) -> tuple[float, float]:
     """Share of the contact left at the traction of the peak, 1 - c (T / (AF A))^2, in both regimes."""
-    traction_Pa = contact.static * contact.pressure_Pa / contact.area_fraction
     left = float(np.clip(1.0 - values[0] * traction_Pa**2, 0.05, 1.0))
     return left, left
 
 
-def finding(readings: Readings) -> str:
+def finding(
+    gains: Sequence[float], sizes: Sequence[float], limit: Callable[[], float], flat_traction_Pa: float
+) -> str:
     """What the table says about a loss of contact area."""
-    lost = 100 * readings.limit() * readings.flat_traction_Pa**2
+    lost = 100 * limit() * flat_traction_Pa**2
     return (
-        f"A contact area that shrinks with traction is {'not supported' if max(readings.gains) < 3.0 else 'possible'}: "
-        f"it would lower the flat sample too, earns at most {max(readings.gains):.1f} units of log likelihood and "
+        f"A contact area that shrinks with traction is {'not supported' if max(gains) < 3.0 else 'possible'}: "
+        f"it would lower the flat sample too, earns at most {max(gains):.1f} units of log likelihood and "
         f"takes at most {lost:.0f} % of the flat contact at 10 kPa (95 %)."
     )
 

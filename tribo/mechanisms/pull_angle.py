@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from tribo.mechanisms.record import Base, Conditions, Contact, Forces, Mechanism, Placement, Values, amplitude
+from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Placement, Values, amplitude
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -16,10 +16,10 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
     return Forces(before.static_N / (cos + base.static_mu * sin), before.sliding_N / (cos + base.sliding_mu * sin))
 
 
-def lifted(values: Values, contact: Contact) -> tuple[float, float]:
+def lifted(values: Values, pulled: tuple[float, float], traction_Pa: float) -> tuple[float, float]:
     """Share of the normal force that the wire leaves, while the sled sticks and while it slides."""
     lift = np.tan(values[0])
-    return 1.0 - contact.static * lift, 1.0 - contact.sliding * lift
+    return 1.0 - pulled[0] * lift, 1.0 - pulled[1] * lift
 
 
 def in_chain(values: Values, recorded: Mapping[str, float]) -> dict[str, float]:

@@ -7,7 +7,7 @@ meaning for a published table that prints neither pulls nor conditions, and :cla
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -101,18 +101,7 @@ class Choosing:
 NO_CHOICE = Choosing()
 
 
-@displayed()
-@dataclass(frozen=True)
-class Contact:
-    """The sample in the model: pressure and area fraction, and its own T/N so far, static and sliding."""
-
-    pressure_Pa: float
-    area_fraction: float
-    static: float = 0.0
-    sliding: float = 0.0
-
-
-Gains = Callable[[Values, Contact], tuple[float, float]]  # static and sliding
+Gains = Callable[[Values, tuple[float, float], float], tuple[float, float]]
 Profile = Callable[[Values, float, FloatArray], tuple[FloatArray, FloatArray]]
 
 
@@ -126,7 +115,8 @@ class Placement:
     by_law
         Every contact block follows the law of the mechanism, with the pressure and the area of the contact.
     thresholds, load
-        Gains of the thresholds, and of the normal force, of every block, (static, sliding).
+        Gains of the thresholds, and of the normal force, of every block, (static, sliding), given T/N of the sample so
+        far, static and sliding, and the static traction of its contact, Pa.
     springs
         Gain of the elastic modulus.
     floors
@@ -219,19 +209,7 @@ class Variation:
     values: tuple[float, ...]
 
 
-@displayed()
-@dataclass(frozen=True)
-class Readings:
-    """A mechanism over all readings of the table that are possible for a line fit.
-
-    ``gains`` are log likelihoods earned and ``sizes`` amplitudes, one a reading; ``limit()`` is the largest
-    amplitude within 95 % in the first reading, ``flat_traction_Pa`` the static traction of the flat sample at 10 kPa.
-    """
-
-    gains: tuple[float, ...]
-    sizes: tuple[float, ...]
-    limit: Callable[[], float]
-    flat_traction_Pa: float
+Finding = Callable[[Sequence[float], Sequence[float], Callable[[], float], float], str]
 
 
 @displayed()
@@ -248,7 +226,9 @@ class InTable:
     guess
         The explanation proposed by the authors that it stands for.
     finding
-        What the table says about that explanation, in sentences.
+        What the table says about that explanation, in sentences. It is given, of all readings of the table that are
+        possible for a line fit, the log likelihoods earned and the amplitudes; a function for the largest amplitude
+        within 95 % in the first of them; and the static traction of the flat sample at 10 kPa, Pa.
     next_test, separates, design
         The test at the bench that would decide what the table leaves open, in words; the mechanisms it separates; its
         conditions. Empty without one.
@@ -257,7 +237,7 @@ class InTable:
     missing: str = ""
     barred: str = ""
     guess: str = ""
-    finding: Callable[[Readings], str] | None = None
+    finding: Finding | None = None
     next_test: str = ""
     separates: tuple[str, ...] = ()
     design: Mapping[str, Any] = field(default_factory=dict)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from tribo.mechanisms.record import Base, Conditions, Forces, InTable, Mechanism, Readings, Values, amplitude
+from collections.abc import Callable, Sequence
+
+from tribo.mechanisms.record import Base, Conditions, Forces, InTable, Mechanism, Values, amplitude
 
 
 def law(values: Values, base: Base, conditions: Conditions, choice: str = "") -> Forces:
@@ -11,13 +13,15 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str = "") ->
     return base.forces(conditions.normal_load_N + pull_down_N)
 
 
-def finding(readings: Readings) -> str:
+def finding(
+    gains: Sequence[float], sizes: Sequence[float], limit: Callable[[], float], flat_traction_Pa: float
+) -> str:
     """What the table says about suction."""
-    none = sum(size < 1.0 for size in readings.sizes)
+    none = sum(size < 1.0 for size in sizes)
     return (
-        f"Suction cups are {'excluded' if none == len(readings.sizes) else 'not excluded'}: suction can only increase "
-        f"friction, and its best-fitting size is zero in {none} of {len(readings.sizes)} readings "
-        f"(at most {readings.limit() / 1e3:.1f} kPa, 95 %)."
+        f"Suction cups are {'excluded' if none == len(sizes) else 'not excluded'}: suction can only increase "
+        f"friction, and its best-fitting size is zero in {none} of {len(sizes)} readings "
+        f"(at most {limit() / 1e3:.1f} kPa, 95 %)."
     )
 
 

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from tribo.errors import Problem, SimulationError
-from tribo.mechanisms.record import Base, Conditions, Contact, Forces, Mechanism, Placement, Values
+from tribo.mechanisms.record import Base, Conditions, Forces, Mechanism, Placement, Values
 from tribo.mechanisms.table import MECHANISMS
 from tribo.mechanisms_in_model.measuring_chain import SLED_AREA_M2
 from tribo.records import FloatArray, Pattern, Run
@@ -66,14 +66,14 @@ def on_every_block(
     config: SimConfig, acting: Mapping[str, Values], recorded: Mapping[str, float], pulled: Pulled
 ) -> SimConfig:
     """The configuration with the local friction and the springs that the mechanisms give every block alike."""
-    contact = Contact(config.pressure_Pa, config.cavities.area_fraction, *pulled)
+    traction_Pa = pulled[0] * config.pressure_Pa / config.cavities.area_fraction
     friction, stiffening = config.friction, 1.0
     for name, values in acting.items():
         placement = MECHANISMS[name].placement
         if placement.thresholds is not None:
-            friction = scaled(friction, *placement.thresholds(values, contact))
+            friction = scaled(friction, *placement.thresholds(values, pulled, traction_Pa))
         if placement.load is not None:
-            friction = lighter(friction, *placement.load(values, contact))
+            friction = lighter(friction, *placement.load(values, pulled, traction_Pa))
         if placement.by_law:
             friction = by_law(config, friction, MECHANISMS[name], values, recorded)
         if placement.springs is not None:

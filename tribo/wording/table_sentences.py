@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from tribo.berardo2019.table_diagnosis import LEVEL, TableContrast, TableReading
 from tribo.berardo2019.table_model import TableFit, estimate_of, upper_limit
 from tribo.diagnostics.verdict import Gain, Verdict
-from tribo.mechanisms.record import Readings
 from tribo.mechanisms.table import MECHANISMS
 from tribo.vocabulary import OBSERVABLES
 from tribo.wording.numerals import p_text
@@ -62,22 +62,15 @@ def _against_the_model(outlooks: Sequence[TableReading]) -> str:
 def _guesses(outlooks: Sequence[TableReading]) -> list[str]:
     """What the numbers say of each explanation that the authors propose, and of errors of the instrument instead."""
     possible = [o for o in outlooks if o.correlation < -LEAST_ALIKE]
-    found = [
-        m.in_table.finding(_readings_of(name, outlooks[0], possible))
-        for name, m in MECHANISMS.items()
-        if m.in_table.finding is not None
-    ]
+    main, found = outlooks[0], []
+    for name, m in MECHANISMS.items():
+        if m.in_table.finding is None:
+            continue
+        weighed = [next(w for w in o.weighed if w.name == name) for o in possible]
+        gains, sizes = [w.gain for w in weighed], [float(w.parameters[0][0]) for w in weighed]
+        limit = partial(upper_limit, main.baseline, name)
+        found.append(m.in_table.finding(gains, sizes, limit, _flat_traction_Pa(main)))
     return [*found, _adhesion_along_y(outlooks[0]), *_instrument_instead(possible)]
-
-
-def _readings_of(name: str, main: TableReading, outlooks: Sequence[TableReading]) -> Readings:
-    weighed = [next(w for w in o.weighed if w.name == name) for o in outlooks]
-    return Readings(
-        gains=tuple(w.gain for w in weighed),
-        sizes=tuple(float(w.parameters[0][0]) for w in weighed),
-        limit=lambda: upper_limit(main.baseline, name),
-        flat_traction_Pa=_flat_traction_Pa(main),
-    )
 
 
 def _instrument_instead(outlooks: Sequence[TableReading]) -> list[str]:
