@@ -5,7 +5,7 @@ The ratio of measured to simulated force at each load is that of :mod:`tribo.com
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 from matplotlib.transforms import Transform
 
 from tribo.comparison import study_lookup
@@ -34,6 +33,7 @@ RATIO_COLUMNS = [
     "n_pulls",
 ]
 CURVE_POINTS = 80
+LOAD = "Normal load N (N)"
 
 
 def ratio_numbers(study: Study) -> pd.DataFrame:
@@ -88,11 +88,8 @@ def draw_ratio(numbers: pd.DataFrame) -> Figure:
         style.panel_title(ax, f"{regime.capitalize()} friction{kind}")
         ax.set_xlabel("Nominal pressure p (kPa)")
         ax.set_ylabel(f"{regime.capitalize()} T / N")
-    samples = numbers.drop_duplicates("sample_number")
-    handles = [
-        _sample_handle(number, name) for number, name in zip(samples["sample_number"], samples["sample"], strict=True)
-    ]
-    style.legend_below(figure, [*handles, Line2D([], [], color="0.4", label="fit T/N = μ + τ₀/p")], columns=8)
+    law = Line2D([], [], color="0.4", label="fit T/N = μ + τ₀/p")
+    style.legend_below(figure, [*style.sample_handles(numbers, lw=0.9), law], columns=8)
     return figure
 
 
@@ -107,11 +104,6 @@ def _ratio_panel(ax: Axes, part: pd.DataFrame) -> None:
         )  # fmt: skip
     ax.set_ylim(bottom=0)
     ax.set_xlim(left=0)
-
-
-def _sample_handle(number: int, name: str) -> Line2D:
-    colour, marker = style.sample_mark(number)
-    return Line2D([], [], color=colour, marker=marker, lw=0.9, label=name)
 
 
 FORCE_COLUMNS = [
@@ -195,23 +187,18 @@ def _fit_line(mark: str, fit: LawFit | None, loads_N: FloatArray, band: bool = F
 @style.in_house_style
 def draw_force(numbers: pd.DataFrame) -> Figure:
     """One panel per sample, all on the same axes, so that samples can be compared by eye."""
-    groups = style.by_sample(numbers)
-    figure, axes = style.panel_grid(len(groups), 52, sharex=True, sharey=True)
-    for ax, (_, sample) in zip(axes, groups, strict=True):
+    force = f"{str(numbers['regime'].iloc[0]).capitalize()} friction force T (N)"
+    figure, panels = style.sample_panels(numbers, 52, LOAD, force, sharex=True, sharey=True)
+    low, high = _force_limits(numbers)
+    for ax, sample in panels:
         _force_panel(ax, sample)
         first = sample.iloc[0]
         style.panel_title(ax, first["sample"], f"AF = {first['area_fraction']:.2f}")
-    low, high = _force_limits(numbers)
-    axes[0].set_ylim(low, high)
-    for ax, (_, sample) in zip(axes, groups, strict=True):
-        _say_cut_band(ax, sample, low, high)
-    axes[0].set_xlim(left=0)
-    regime = str(numbers["regime"].iloc[0]).capitalize()
-    for ax in axes:
-        if style.is_leftmost(ax):
-            ax.set_ylabel(f"{regime} friction force T (N)")
-        ax.set_xlabel("Normal load N (N)")
-        ax.tick_params(labelbottom=True)
+        lowest, highest = float(sample["T_low_N"].min()), float(sample["T_high_N"].max())
+        if highest > high or lowest < low:  # where a band leaves the panel, how far it reaches
+            text = f"95 % band from {lowest:.3g} to {highest:.3g} N".replace("-", "−")
+            ax.text(0.03, 0.97, text, transform=ax.transAxes, va="top", fontsize=6.5, color=style.VERMILLION)
+    panels[0][0].set(xlim=(0, None), ylim=(low, high))
     style.legend_below(figure, _force_legend(numbers), columns=4)
     return figure
 
@@ -258,14 +245,6 @@ def _force_limits(numbers: pd.DataFrame) -> tuple[float, float]:
     top = float(min(values.max(), 2.5 * (measured.max() if len(measured) else values.max())))
     low, high = float(min(numbers["T_low_N"].min(), 0.0)), float(max(numbers["T_high_N"].max(), top))
     return max(np.nan_to_num(low), -0.5 * top), 1.03 * min(np.nan_to_num(high, nan=top), WIDEST_BAND * top)
-
-
-def _say_cut_band(ax: Axes, sample: pd.DataFrame, low: float, high: float) -> None:
-    """Where a band leaves the panel, how far it reaches."""
-    lowest, highest = float(sample["T_low_N"].min()), float(sample["T_high_N"].max())
-    if highest > high or lowest < low:
-        text = f"95 % band from {lowest:.3g} to {highest:.3g} N".replace("-", "−")
-        ax.text(0.03, 0.97, text, transform=ax.transAxes, va="top", fontsize=6.5, color=style.VERMILLION)
 
 
 def _force_legend(numbers: pd.DataFrame) -> list[Line2D]:
@@ -339,8 +318,7 @@ def _drawn_at(study: Study, sample: str, mark: str) -> float:
         for run in study.example_runs:
             if run.sample == sample and "area_fraction" in run.parameters:
                 return float(run.parameters["area_fraction"])
-    pattern = study.ingested.campaign.samples.get(sample)
-    return pattern.area_fraction if pattern is not None else float("nan")
+    return _area_fraction(study, sample)
 
 
 def _line(points: pd.DataFrame) -> pd.DataFrame:
@@ -414,13 +392,8 @@ def _point(ax: Axes, point: pd.Series, aside: Transform) -> None:
 
 
 def _area_legend(numbers: pd.DataFrame) -> list[Line2D]:
-    points = numbers.dropna(subset="sample_number").drop_duplicates("sample_number").sort_values("sample_number")
-    samples = [
-        Line2D([], [], color="0.35", marker=style.sample_mark(int(number))[1], ls="", label=name)
-        for number, name in zip(points["sample_number"], points["sample"], strict=True)
-    ]
     return [
-        *samples,
+        *style.sample_handles(numbers, color="0.35", ls=""),
         Line2D([], [], color=style.VERMILLION, marker="o", label="measured, with straight line in AF"),
         Line2D([], [], color=style.GREEN, marker="o", mfc="white", ls="", label="spring-block model"),
         Line2D([], [], color=style.ORANGE, ls=":", lw=1.4, label="flat value · AF"),
@@ -441,50 +414,34 @@ MOST_BAR = 3.0  # an error bar beyond this factor runs off the panel, so that th
 @style.in_house_style
 def draw_agreement(numbers: pd.DataFrame) -> Figure:
     """One panel per sample, static beside sliding at each load; the line at 1 is perfect agreement."""
-    groups = style.by_sample(numbers)
-    figure, axes = style.panel_grid(len(groups), 45, sharex=True, sharey=True)
-    for ax, (_, sample) in zip(axes, groups, strict=True):
+    figure, panels = style.sample_panels(numbers, 45, LOAD, "Measured T / simulated T", sharex=True, sharey=True)
+    lowest, highest = float(numbers["normal_load_N"].min()), float(numbers["normal_load_N"].max())
+    for ax, sample in panels:
         ax.axhline(1, color="0.4", lw=0.8)
-        for regime, part in sample.groupby("regime"):
-            colour, marker, side = REGIME_STYLE[str(regime)]
-            aside = style.moved_aside(ax, side * AGREEMENT_DODGE_POINTS)
-            bars = np.abs(part[["ratio_low", "ratio_high"]].to_numpy(float) - part[["ratio"]].to_numpy(float)).T
-            style.cover(ax, part["normal_load_N"], part["ratio"], part["ratio"])
-            ax.errorbar(
-                part["normal_load_N"], part["ratio"], bars, fmt=marker, color=colour, elinewidth=0.8,
-                ms=3.5, transform=aside,
-            )  # fmt: skip
-        ax.set_xscale("log" if _load_span(numbers) > 5 else "linear")
+        for part, aside, look in _regimes_beside(ax, sample, "ratio"):
+            bars = style.error_bars(part, "ratio", "ratio_low", "ratio_high")
+            ax.errorbar(part["normal_load_N"], part["ratio"], bars, elinewidth=0.8, ms=3.5, transform=aside, **look)
+        ax.set_xscale("log" if lowest > 0 and highest / lowest > 5 else "linear")
         style.panel_title(ax, str(sample["sample"].iloc[0]))
-        ax.set_xlabel("Normal load N (N)")
-        ax.tick_params(labelbottom=True)
-        if style.is_leftmost(ax):
-            ax.set_ylabel("Measured T / simulated T")
-    _ratio_axis(axes, numbers)
-    style.legend_below(
-        figure,
-        [
-            Line2D(
-                [],
-                [],
-                color=REGIME_STYLE[r][0],
-                marker=REGIME_STYLE[r][1],
-                lw=0.8,
-                ms=3.5,
-                label=f"{r} friction, 95 %",
-            )
-            for r in REGIMES
-        ],
-    )
+    _ratio_axis([ax for ax, _ in panels], numbers)
+    style.legend_below(figure, [
+        Line2D([], [], color=colour, marker=marker, lw=0.8, ms=3.5, label=f"{regime} friction, 95 %")
+        for regime, (colour, marker, _) in REGIME_STYLE.items()
+    ])  # fmt: skip
     return figure
 
 
-def _load_span(numbers: pd.DataFrame) -> float:
-    lowest = float(numbers["normal_load_N"].min())
-    return float(numbers["normal_load_N"].max()) / lowest if lowest > 0 else 1.0
+def _regimes_beside(
+    ax: Axes, sample: pd.DataFrame, y: str
+) -> Iterator[tuple[pd.DataFrame, Transform, dict[str, Any]]]:
+    """The points of each regime of a sample, shifted on paper so that none hides another, with their look."""
+    for regime, part in sample.groupby("regime"):
+        colour, marker, side = REGIME_STYLE[str(regime)]
+        style.cover(ax, part["normal_load_N"], part[y], part[y])
+        yield part, style.moved_aside(ax, side * AGREEMENT_DODGE_POINTS), {"fmt": marker, "color": colour}
 
 
-def _ratio_axis(axes: list[Axes], numbers: pd.DataFrame) -> None:
+def _ratio_axis(axes: Iterable[Axes], numbers: pd.DataFrame) -> None:
     """A logarithmic axis on which twice and half lie equally far from 1."""
     lowest, highest = numbers["ratio"].min(), numbers["ratio"].max()
     low = np.nanmin([0.85, 0.95 * lowest, 0.97 * max(numbers["ratio_low"].min(), lowest / MOST_BAR)])
@@ -493,19 +450,11 @@ def _ratio_axis(axes: list[Axes], numbers: pd.DataFrame) -> None:
     for ax in axes:
         ax.set_yscale("log")
         ax.set_ylim(low, high)
-        ax.yaxis.set_major_locator(FixedLocator(ticks[(ticks >= low) & (ticks <= high)]))
-        ax.yaxis.set_minor_locator(NullLocator())
-        ax.yaxis.set_major_formatter(FuncFormatter(_plain))
+        style.plain_ticks(ax.yaxis, ticks[(ticks >= low) & (ticks <= high)])
         if ax.get_xscale() == "log":
-            ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            ax.xaxis.set_minor_locator(NullLocator())
-            ax.xaxis.set_major_formatter(FuncFormatter(_plain))
+            style.plain_ticks(ax.xaxis)
         else:
             ax.set_xlim(left=0)
-
-
-def _plain(value: float, _: int) -> str:
-    return f"{value:g}"
 
 
 def residuals_of_fits(study: Study) -> pd.DataFrame:
@@ -521,30 +470,20 @@ def residuals_of_fits(study: Study) -> pd.DataFrame:
 @style.in_house_style
 def draw_residuals_of_fits(numbers: pd.DataFrame) -> Figure:
     """One panel per sample, static beside sliding at each load; on the line at zero the fit is right."""
-    groups = style.by_sample(numbers)
-    figure, axes = style.panel_grid(len(groups), 45, sharex=True, sharey=True)
-    for ax, (_, sample) in zip(axes, groups, strict=True):
+    residual = "measured / fitted − 1 (%)"
+    figure, panels = style.sample_panels(numbers, 45, LOAD, residual, sharex=True, sharey=True)
+    for ax, sample in panels:
         ax.axhline(0, color="0.4", lw=0.8)
-        for regime, part in sample.groupby("regime"):
-            colour, marker, side = REGIME_STYLE[str(regime)]
-            style.cover(ax, part["normal_load_N"], part["residual_percent"], part["residual_percent"])
-            ax.plot(
-                part["normal_load_N"], part["residual_percent"], marker, color=colour, ms=2.8, mew=0.6, mfc="none",
-                transform=style.moved_aside(ax, side * AGREEMENT_DODGE_POINTS),
-            )  # fmt: skip
+        for part, aside, look in _regimes_beside(ax, sample, "residual_percent"):
+            points = part["normal_load_N"], part["residual_percent"]
+            ax.errorbar(*points, ms=2.8, mew=0.6, mfc="none", transform=aside, **look)
         style.panel_title(ax, str(sample["sample"].iloc[0]))
-        ax.set_xlabel("Normal load N (N)")
-        ax.tick_params(labelbottom=True)
-        if style.is_leftmost(ax):
-            ax.set_ylabel("measured / fitted − 1 (%)")
-    axes[0].set_xlim(left=0)
-    shown = [r for r in REGIMES if (numbers["regime"] == r).any()]
-    handles = [
-        Line2D([], [], color=REGIME_STYLE[r][0], marker=REGIME_STYLE[r][1], mfc="none", ls="", ms=3.5,
-               label=f"{r} friction")
-        for r in shown
-    ]  # fmt: skip
-    style.legend_below(figure, handles)
+    panels[0][0].set_xlim(left=0)
+    style.legend_below(figure, [
+        Line2D([], [], color=colour, marker=marker, mfc="none", ls="", ms=3.5, label=f"{regime} friction")
+        for regime, (colour, marker, _) in REGIME_STYLE.items()
+        if (numbers["regime"] == regime).any()
+    ])  # fmt: skip
     return figure
 
 

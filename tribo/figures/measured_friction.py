@@ -18,6 +18,7 @@ from tribo.fitting.dependence import SPEED, measured_points, test_values, variab
 from tribo.fitting.linear import meant_to_be_one
 from tribo.records import REGIMES, Study
 from tribo.vocabulary import label_with_unit
+from tribo.wording.numerals import sentence_case
 
 POINTS_COLUMNS = [
     "sample_number", "sample", "regime", "test_id", "variable", "label", "value", "T_over_N", "T_over_N_u",
@@ -143,10 +144,10 @@ def draw_dependence(numbers: pd.DataFrame) -> Figure:
                 points["value"], points["T_over_N"], points["T_over_N_u"].fillna(0.0), fmt=marker, ms=3,
                 color=colour, mfc=face, elinewidth=0.6,
             )  # fmt: skip
-        ax.set_xlabel(_sentence(str(part["label"].iloc[0])))
+        ax.set_xlabel(sentence_case(str(part["label"].iloc[0])))
         ax.set_ylabel("T / N")
         _spread(ax, part["value"])
-    style.legend_below(figure, [*_samples(numbers), *_regimes(numbers)], columns=8)
+    style.legend_below(figure, [*style.sample_handles(numbers, ls=""), *_regimes(numbers)], columns=8)
     return figure
 
 
@@ -167,7 +168,7 @@ def draw_forces(numbers: pd.DataFrame) -> Figure:
                 below = -LINE_POINTS * (len(ax.texts) + 1)
                 ax.annotate(str(formula), (0.02, 1.0), (0.0, below), xycoords="axes fraction",
                             textcoords="offset points", color=colour, fontsize=7)  # fmt: skip
-        style.panel_title(ax, _sentence(f"{regime} friction"))
+        style.panel_title(ax, sentence_case(f"{regime} friction"))
         ax.set_xlabel("Normal load N (N)")
         ax.set_ylabel("Friction force T (N)")
         if _over_a_decade(part["T_N"]):
@@ -176,7 +177,7 @@ def draw_forces(numbers: pd.DataFrame) -> Figure:
             style.plain_log_axis(ax.yaxis, part["T_N"])
         else:  # from zero, so that what does not depend on the load is seen
             ax.set(xlim=(0.0, None), ylim=(0.0, None))
-    style.legend_below(figure, _samples(numbers), columns=8)
+    style.legend_below(figure, style.sample_handles(numbers, ls=""), columns=8)
     return figure
 
 
@@ -190,7 +191,7 @@ def draw_records(numbers: pd.DataFrame) -> Figure:
             ax.plot(record["value"], record["T_over_N"], lw=0.7, color=style.sample_mark(number)[0])
         first = sample.iloc[0]
         style.panel_title(ax, first["sample"], f"{sample['test_id'].nunique()} records")
-        ax.set_xlabel(_sentence(str(first["way"])))
+        ax.set_xlabel(sentence_case(str(first["way"])))
         if style.is_leftmost(ax):
             ax.set_ylabel("T / N")
     return figure
@@ -207,8 +208,8 @@ def draw_oscillations(numbers: pd.DataFrame) -> Figure:
         for regime, points in part.groupby("regime"):
             marker, colour = marks[str(regime)]
             ax.errorbar(points["value"], points["y"], points["y_u"].fillna(0.0), fmt=marker, color=colour, ms=4)
-        ax.set_xlabel(_sentence(str(part["label"].iloc[0])))
-        ax.set_ylabel(_sentence(quantity))
+        ax.set_xlabel(sentence_case(str(part["label"].iloc[0])))
+        ax.set_ylabel(sentence_case(quantity))
         _spread(ax, part["value"])
         ax.set_ylim(bottom=0)
     handles = [
@@ -231,7 +232,7 @@ def draw_restarts(numbers: pd.DataFrame) -> Figure:
     ax.set_xlabel("Time of the hold (s)")
     ax.set_ylabel("Static T / N at the restart")
     _spread(ax, numbers["hold_s"])
-    style.legend_below(figure, _samples(numbers), columns=8)
+    style.legend_below(figure, style.sample_handles(numbers, ls=""), columns=8)
     return figure
 
 
@@ -246,16 +247,6 @@ def _spread(ax: Axes, values: pd.Series) -> None:
         style.plain_log_axis(ax.xaxis, values)
     else:
         ax.xaxis.set_major_locator(MaxNLocator(5))
-
-
-def _sentence(label: str) -> str:
-    return label[:1].upper() + label[1:]
-
-
-def _samples(numbers: pd.DataFrame) -> list[Line2D]:
-    found = numbers.drop_duplicates("sample_number").sort_values("sample_number")
-    marks = [(style.sample_mark(int(n)), s) for n, s in zip(found["sample_number"], found["sample"], strict=True)]
-    return [Line2D([], [], color=colour, marker=marker, ls="", label=str(s)) for (colour, marker), s in marks]
 
 
 def _regimes(numbers: pd.DataFrame) -> list[Line2D]:

@@ -71,36 +71,20 @@ def example_numbers(study: Study) -> pd.DataFrame:
     """Force over static peak against time (s, as recorded) of the example pulls, with peak and window."""
     order = study_lookup.sample_numbers(study)
     examples = sorted(example_tests(study).items(), key=lambda item: order[item[0]])
-    frames = [
-        _one_pull(order[sample], test, study.ingested.traces[test.test_id], study.ingested.pulls[test.test_id])
-        for sample, test in examples
-    ]
+    frames = []
+    for sample, test in examples:
+        pull = study.ingested.pulls[test.test_id]
+        numbers = pull_numbers(study.ingested.traces[test.test_id], pull)
+        of_test = {"sample_number": order[sample], "sample": sample, "normal_load_N": test.normal_load_N}
+        frames.append(numbers.assign(**of_test, T_over_peak=numbers["force_N"] / pull.static_N)[EXAMPLE_COLUMNS])
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=EXAMPLE_COLUMNS)
-
-
-def _one_pull(number: int, test: Test, trace: Trace, pull: Pull) -> pd.DataFrame:
-    time, force = thin_trace(trace.time_s, trace.force_N - pull.zero_N)
-    sliding = pull.sliding_N / pull.static_N
-    marks = [("trace", t, f) for t, f in zip(time, force / pull.static_N, strict=True)]
-    marks += [
-        ("peak", pull.peak_s, 1.0),
-        ("window", pull.window_s[0], sliding),
-        ("window", pull.window_s[1], sliding),
-    ]
-    frame = pd.DataFrame(marks, columns=["mark", "time_s", "T_over_peak"])
-    frame.insert(0, "sample_number", number)
-    frame.insert(1, "sample", test.sample)
-    frame.insert(2, "test_id", test.test_id)
-    frame.insert(3, "normal_load_N", test.normal_load_N)
-    return frame
 
 
 @style.in_house_style
 def draw_examples(numbers: pd.DataFrame) -> Figure:
     """One panel per sample: trace, static peak, sliding window with its mean."""
-    groups = style.by_sample(numbers)
-    figure, axes = style.panel_grid(len(groups), 42, sharey=True)
-    for ax, (_, pull) in zip(axes, groups, strict=True):
+    figure, panels = style.sample_panels(numbers, 42, "Time (s)", "T / static peak", sharey=True)
+    for ax, pull in panels:
         trace, peak, window = (pull[pull["mark"] == m] for m in ("trace", "peak", "window"))
         ax.plot(trace["time_s"], trace["T_over_peak"], color=style.BLUE, lw=0.7)
         ax.axvspan(*window["time_s"], color=style.GREEN, alpha=0.15, lw=0)
@@ -108,10 +92,6 @@ def draw_examples(numbers: pd.DataFrame) -> Figure:
         ax.plot(peak["time_s"], peak["T_over_peak"], "v", color=style.VERMILLION, ms=5, clip_on=False)
         first = pull.iloc[0]
         style.panel_title(ax, first["sample"], f"N = {first['normal_load_N']:.3g} N, test {first['test_id']}")
-        ax.set_xlabel("Time (s)")
-    for ax in axes:
-        if style.is_leftmost(ax):
-            ax.set_ylabel("T / static peak")
     style.legend_below(
         figure,
         [

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 from tribo.diagnostics.effect_sizes import percent
 from tribo.diagnostics.model import PATTERN
 from tribo.figures import style
-from tribo.figures.misfit import LOGARITHMIC, LOGARITHMIC_AXES, Covariate, covariate
+from tribo.figures.misfit import LOGARITHMIC, LOGARITHMIC_AXES, REGIMES as WEIGHTS, Covariate, covariate
 from tribo.records import REGIMES, FloatArray
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ RESIDUAL_COLUMNS = [
 MOST_PANELS = 6
 MOST_POINTS_OF_CURVE = 12
 BAND = 2.0  # standard deviations
-WEIGHTS = {"static": (1.0, 0.0), "sliding": (0.0, 1.0), "both": (0.5, 0.5), "drop": (1.0, -1.0)}
 NAMES = {
     "static": "Static friction", "sliding": "Sliding friction", "both": "Static and sliding friction",
     "drop": "Static / sliding friction",

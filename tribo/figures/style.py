@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -20,6 +20,7 @@ from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.textpath import TextPath
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 from matplotlib.transforms import ScaledTranslation, Transform
@@ -141,7 +142,7 @@ def panel_grid(
     n_panels: int, panel_height_mm: float, columns: int | None = None, **subplots: Any
 ) -> tuple[Figure, list[Axes]]:
     """A figure as wide as the page with ``n_panels`` axes in reading order; places left over stay empty."""
-    columns = across(columns or _columns_for(n_panels))
+    columns = across(columns or {0: 1, 1: 1, 2: 2, 3: 3, 4: 2}.get(n_panels, 3 if n_panels <= 9 else 4))
     rows = -(-n_panels // columns)
     legend_mm = 12.0
     figure = page_figure(rows * panel_height_mm + legend_mm)
@@ -151,26 +152,16 @@ def panel_grid(
     return figure, axes[:n_panels]
 
 
-def _columns_for(n_panels: int) -> int:
-    if n_panels <= 3:
-        return max(n_panels, 1)
-    return {4: 2}.get(n_panels, 3 if n_panels <= 9 else 4)
-
-
 def panel_title(ax: Axes, name: str, detail: str = "") -> None:
     """The name in bold at the left of a panel's head; what belongs to it in plain type at the right, or below it."""
-    if _text_mm(name, 8.0) + _text_mm(detail, DETAIL_POINTS) < _width_mm(ax):
-        ax.set_title(name, loc="left")
+    # letters of DejaVu Sans bold are 0.7 of their size wide in the mean
+    text_mm = sum(0.7 * points * MM_PER_INCH / 72 * len(text) for text, points in ((name, 8.0), (detail, DETAIL_POINTS)))
+    ax.set_title(name, loc="left", pad=None if text_mm < _width_mm(ax) else DETAIL_POINTS + 6)
+    if text_mm < _width_mm(ax):
         ax.set_title(detail, loc="right", fontweight="normal", fontsize=DETAIL_POINTS)
-        return
-    ax.set_title(name, loc="left", pad=DETAIL_POINTS + 6)
-    ax.annotate(detail, (1, 1), (0, 4), xycoords="axes fraction", textcoords="offset points", ha="right",
-                fontsize=DETAIL_POINTS)  # fmt: skip
-
-
-def _text_mm(text: str, points: float) -> float:
-    """At most about how wide a text is set: letters of DejaVu Sans bold are 0.7 of their size wide in the mean."""
-    return 0.7 * points * MM_PER_INCH / 72 * len(text)
+    else:
+        ax.annotate(detail, (1, 1), (0, 4), xycoords="axes fraction", textcoords="offset points", ha="right",
+                    fontsize=DETAIL_POINTS)  # fmt: skip
 
 
 def _width_mm(ax: Axes) -> float:
@@ -193,6 +184,35 @@ def is_leftmost(ax: Axes) -> bool:
     return spec is not None and spec.is_first_col()
 
 
+def sample_panels(
+    numbers: pd.DataFrame, height_mm: float, x_label: str, y_label: str, **subplots: Any
+) -> tuple[Figure, list[tuple[Axes, pd.DataFrame]]]:
+    """A figure with one panel per sample, each with its numbers; the axis of y is named at the first of every row."""
+    groups = by_sample(numbers)
+    figure, axes = panel_grid(len(groups), height_mm, **subplots)
+    for ax in axes:
+        ax.set_xlabel(x_label)
+        ax.tick_params(labelbottom=True)
+        if is_leftmost(ax):
+            ax.set_ylabel(y_label)
+    return figure, [(ax, sample) for ax, (_, sample) in zip(axes, groups, strict=True)]
+
+
+def sample_handles(numbers: pd.DataFrame, **look: Any) -> list[Any]:
+    """A handle for every sample, in the order of the campaign, with its colour and marker unless ``look`` has others."""
+    found = numbers.dropna(subset="sample_number").drop_duplicates("sample_number").sort_values("sample_number")
+    handles = []
+    for number, name in zip(found["sample_number"], found["sample"], strict=True):
+        colour, marker = sample_mark(int(number))
+        handles.append(Line2D([], [], **{"color": colour, "marker": marker, "label": str(name), **look}))
+    return handles
+
+
+def error_bars(points: pd.DataFrame, value: str, low: str, high: str) -> np.ndarray:
+    """Lengths of the bars below and above each value, (2, n)."""
+    return np.abs(points[[low, high]].to_numpy(float) - points[[value]].to_numpy(float)).T
+
+
 def moved_aside(ax: Axes, points: float) -> Transform:
     """Data coordinates shifted right on paper by so many points, for marks that would hide each other."""
     figure = ax.get_figure(root=True)
@@ -212,9 +232,21 @@ def plain_log_axis(axis: Axis, values: Any) -> None:
     """Plain numbers on a logarithmic axis: 1, 2 and 5 of each decade, or the values themselves where few."""
     distinct = np.unique([float(f"{v:.2g}") for v in values])
     few = len(distinct) <= 6 and (len(distinct) < 2 or np.diff(np.log10(distinct)).min() > 0.12)
-    axis.set_major_locator(FixedLocator(distinct.tolist()) if few else LogLocator(subs=(1.0, 2.0, 5.0)))
+    plain_ticks(axis, distinct.tolist() if few else ())
+
+
+def plain_ticks(axis: Axis, values: Sequence[float] = ()) -> None:
+    """Plain numbers at these values of an axis and nowhere else; without any, at 1, 2 and 5 of each decade."""
+    axis.set_major_locator(FixedLocator(values) if len(values) else LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
+def as_table(ax: Axes) -> None:
+    """Cells without grid, ticks and frame."""
+    ax.grid(visible=False)
+    ax.tick_params(length=0)
+    ax.spines[:].set_visible(False)
 
 
 def legend_below(figure: Figure, handles: list[Any], columns: int = 6) -> None:
