@@ -155,7 +155,7 @@ def panel_grid(
 def panel_title(ax: Axes, name: str, detail: str = "") -> None:
     """The name in bold at the left of a panel's head; what belongs to it in plain type at the right, or below it."""
     # letters of DejaVu Sans bold are 0.7 of their size wide in the mean
-    text_mm = sum(0.7 * points * MM_PER_INCH / 72 * len(text) for text, points in ((name, 8.0), (detail, DETAIL_POINTS)))
+    text_mm = 0.7 * MM_PER_INCH / 72 * (len(name) * 8.0 + len(detail) * DETAIL_POINTS)
     ax.set_title(name, loc="left", pad=None if text_mm < _width_mm(ax) else DETAIL_POINTS + 6)
     if text_mm < _width_mm(ax):
         ax.set_title(detail, loc="right", fontweight="normal", fontsize=DETAIL_POINTS)
@@ -199,7 +199,7 @@ def sample_panels(
 
 
 def sample_handles(numbers: pd.DataFrame, **look: Any) -> list[Any]:
-    """A handle for every sample, in the order of the campaign, with its colour and marker unless ``look`` has others."""
+    """A handle for every sample, in the order of the campaign, in its colour and marker unless ``look`` differs."""
     found = numbers.dropna(subset="sample_number").drop_duplicates("sample_number").sort_values("sample_number")
     handles = []
     for number, name in zip(found["sample_number"], found["sample"], strict=True):
