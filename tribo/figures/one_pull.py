@@ -75,8 +75,13 @@ def example_numbers(study: Study) -> pd.DataFrame:
     for sample, test in examples:
         pull = study.ingested.pulls[test.test_id]
         numbers = pull_numbers(study.ingested.traces[test.test_id], pull)
-        of_test = {"sample_number": order[sample], "sample": sample, "normal_load_N": test.normal_load_N}
-        frames.append(numbers.assign(**of_test, T_over_peak=numbers["force_N"] / pull.static_N)[EXAMPLE_COLUMNS])
+        numbers = numbers.assign(
+            sample_number=order[sample],
+            sample=sample,
+            normal_load_N=test.normal_load_N,
+            T_over_peak=numbers["force_N"] / pull.static_N,
+        )
+        frames.append(numbers[EXAMPLE_COLUMNS])
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=EXAMPLE_COLUMNS)
 
 
