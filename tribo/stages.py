@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from tribo.cache.kept_results import kept_or_made
 from tribo.campaign.load import required_flat_sample, with_flat_sample, with_zeros
 from tribo.display import displayed
-from tribo.errors import FitError
+from tribo.errors import FitError, Problem
 from tribo.records import (
     Campaign,
     Fits,
@@ -353,6 +353,18 @@ def naming_set_aside(ingested: Ingested) -> Iterator[None]:
         raise FitError((*why.problems, *problems)) from why
 
 
+def too_few_to_diagnose(ingested: Ingested) -> tuple[Problem, ...]:
+    """That the usable tests are too few for a diagnosis, and why tests were set aside; empty where they are enough."""
+    from tribo.diagnostics.observations import enough, observe
+
+    try:
+        with naming_set_aside(ingested):
+            enough(observe(ingested))
+    except FitError as why:
+        return why.problems
+    return ()
+
+
 def with_doubts(study: Study) -> Study:
     """The study with the numbers that lie outside their broad physical bounds."""
     from tribo.plausibility import doubts_of
@@ -421,7 +433,7 @@ def diagnose(
     kept: Path | None = None,
     laws: Path | None = None,
     progress: Progress = _silent,
-) -> Diagnosis:
+) -> Diagnosis | DiagnosisWithoutModel:
     """Where the calibrated model fails on a campaign and why, with the evidence.
 
     The model's prediction for each pattern comes from the simulations of the campaign if ``kept`` holds them, else from
@@ -447,19 +459,23 @@ def diagnose(
     -------
     Diagnosis
         ``verdict`` is the record behind verdict.json; ``baseline``, ``screened`` and ``named`` are what it rests on.
+        Of fewer than twelve usable tests, of one load or of one sample a DiagnosisWithoutModel, whose verdict is
+        "cannot_tell".
 
     Raises
     ------
     FitError
-        Fewer than twelve usable tests, fewer than two loads, or the name of a mechanism that there is not.
+        The name of a mechanism that there is not.
 
     Examples
     --------
     >>> found = tribo.diagnose(tribo.ingest(tribo.load_campaign("data/example")))
-    >>> found.verdict.verdict in ("no_misfit", "named", "undetermined", "partly", "unknown")
+    >>> found.verdict.verdict in ("no_misfit", "named", "undetermined", "partly", "unknown", "cannot_tell")
     True
     """
     from tribo.diagnostics import examine, predictor as pattern_table, with_simulation
+    from tribo.diagnostics.diagnosis import DiagnosisWithoutModel
+    from tribo.diagnostics.too_little import cannot_tell
     from tribo.lawsearch.diagnosis_with_laws import with_law_across, with_laws
     from tribo.lawsearch.known_laws import read_laws
     from tribo.wording.verdict_sentences import worded
@@ -473,12 +489,14 @@ def diagnose(
         examined = with_law_across(with_laws(examined, known, seed=seed, progress=progress), seed=seed)
         return with_simulation(examined, seed=seed, jobs=jobs, progress=progress).without_columns()
 
+    if (untold := cannot_tell(ingested)) is not None:
+        return DiagnosisWithoutModel(worded(untold))
     made_from = (ingested, seed, predictor, pattern_table.record(), known)
     diagnosed: Diagnosis = kept_or_made(kept, "diagnosis", made_from, found, DIAGNOSED_BY)
     return replace(diagnosed, verdict=worded(diagnosed.verdict))
 
 
-def diagnosis(ingested: Ingested, **options: Any) -> Diagnosis:
+def diagnosis(ingested: Ingested, **options: Any) -> Diagnosis | DiagnosisWithoutModel:
     """The old name of :func:`tribo.diagnose`."""
     warnings.warn("tribo.diagnosis is called tribo.diagnose now", FutureWarning, stacklevel=2)
     return diagnose(ingested, **options)

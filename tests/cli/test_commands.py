@@ -296,5 +296,7 @@ def test_where_too_few_tests_are_left_it_is_said_which_were_set_aside_and_why(
     result = run(command, spoiled, "-o", tmp_path / "out", "-q")
     assert result.exit_code == 1
     assert "too few usable tests" in result.stderr
+    if command == "diagnose":
+        assert json.loads((tmp_path / "out" / "verdict.json").read_text(encoding="utf-8"))["verdict"] == "cannot_tell"
     assert "T003: raw/T003.csv: the file is empty" in result.stderr
     assert "T005: tests.csv, row 6, column sample" in result.stderr

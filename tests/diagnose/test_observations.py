@@ -187,7 +187,7 @@ def test_a_part_of_the_tests_keeps_every_number_with_its_test() -> None:
 
 @pytest.mark.parametrize(("tests", "loads", "enough_of_it"), [(12, 2, True), (11, 2, False), (12, 1, False)])
 def test_twelve_tests_at_two_loads_are_the_least(tests: int, loads: int, enough_of_it: bool) -> None:
-    rows = [row(0, test_id=f"T{k}", normal_load_N=1.0 + k % loads) for k in range(tests)]
+    rows = [row(0, test_id=f"T{k}", sample="FC"[k // 2 % 2], normal_load_N=1.0 + k % loads) for k in range(tests)]
     o = seen(rows)
     if enough_of_it:
         assert enough(o) is o

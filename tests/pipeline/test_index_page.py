@@ -200,3 +200,12 @@ def test_a_campaign_shows_the_sentence_of_its_card_and_its_combined_interval(tmp
     assert row.laws == {("F", "static", "mu"): (2.0, 1.5, 2.5), ("A", "static", "mu"): (2.0, 1.9, 2.1)}
     shown = page([row], {})
     assert all(words in shown for words in ("Friction falls.", "9 tests used", "Next test: Weigh the sled."))
+
+
+def test_a_campaign_that_cannot_tell_is_not_green_in_the_index() -> None:
+    untold = CampaignRow("a", "a", "done", (), "2026-01-01", has_report=True, verdict="cannot_tell")
+    cells = re.findall(r'<span class="mark ([^"]*)">([^<]*)</span>', page([untold], {}))
+    assert [text for _, text in cells] == ["done", "? cannot tell"]
+    assert all("cannot-tell" in classes.split() for classes, _ in cells)
+    style = rendered([untold])
+    assert style.index(".mark.cannot-tell") > style.index(".mark.done")  # the later rule of two equals holds

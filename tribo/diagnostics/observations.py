@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from tribo.diagnostics.verdict import TooLittle
 from tribo.display import displayed
 from tribo.errors import FitError, Problem
 from tribo.mechanisms.conditions import names_in
@@ -16,7 +17,7 @@ from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray, Ingested, Pattern, Pull, SetAside, Test, Trace
 
 STATIC, SLIDING = 0, 1
-FEWEST_TESTS = 12
+FEWEST_TESTS, FEWEST_LOADS, FEWEST_SAMPLES = 12, 2, 2
 WITHOUT = "without"  # column of tests.csv: the mechanisms that were removed for a test
 NO_FLAT = "flat"  # stands for the flat law where no flat sample was measured or chosen
 
@@ -98,7 +99,21 @@ def observe(ingested: Ingested) -> Observations:
 
 
 def enough(o: Observations) -> Observations:
-    """The same observations. Raises FitError below twelve tests or two loads, or where a name is no mechanism."""
+    """The same observations. Raises FitError where they are :func:`too_little`, or where a name is no mechanism."""
+    if (lack := too_little(o)) is not None:
+        raise FitError(
+            Problem(
+                "too_few_tests", "too few usable tests to diagnose anything",
+                found=f"{lack.tests} tests at {lack.loads} loads of {lack.samples} samples",
+                allowed=f"at least {FEWEST_TESTS} tests at two loads of two samples",
+            )
+        )  # fmt: skip
+    return o
+
+
+def too_little(o: Observations) -> TooLittle | None:
+    """Why the model cannot be tested on these tests; None where it can. Raises FitError where a name is no mechanism.
+    """
     stated = {name.partition(":")[0] for name in o.measured} | {n for c in o.conditions.without for n in names_in(c)}
     allowed = ", ".join(MECHANISMS)
     unknown = [
@@ -107,15 +122,10 @@ def enough(o: Observations) -> Observations:
     ]
     if unknown:
         raise FitError(unknown)
-    loads = len(np.unique(o.conditions.normal_load_N))
-    if o.n < FEWEST_TESTS or loads < 2:
-        raise FitError(
-            Problem(
-                "too_few_tests", "too few usable tests to diagnose anything", found=f"{o.n} tests at {loads} loads",
-                allowed=f"at least {FEWEST_TESTS} tests at two loads",
-            )
-        )  # fmt: skip
-    return o
+    tests, loads, samples = o.n, len(np.unique(o.conditions.normal_load_N)), len(np.unique(o.conditions.sample))
+    if tests >= FEWEST_TESTS and loads >= FEWEST_LOADS and samples >= FEWEST_SAMPLES:
+        return None
+    return TooLittle(tests, loads, samples, FEWEST_TESTS, FEWEST_LOADS, FEWEST_SAMPLES)
 
 
 def conditions_of(

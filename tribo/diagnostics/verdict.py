@@ -16,7 +16,7 @@ from tribo.display import displayed
 from tribo.records import SetAside
 
 SCHEMA = "tribo.verdict/2"
-Outcome = Literal["no_misfit", "named", "undetermined", "partly", "unknown"]
+Outcome = Literal["no_misfit", "named", "undetermined", "partly", "unknown", "cannot_tell"]
 LayerKind = Literal["pattern_correction", "cause", "law", "remainder", "nuisance", "baseline"]
 Nuisance = Literal["days", "drift", "specimen_drift"]
 # why a mechanism is not among the causes
@@ -30,7 +30,7 @@ UNTESTED: frozenset[Why] = frozenset(
 # what a further test does
 NextKind = Literal[
     "measure", "remove", "pull further", "vary one column", "vary what was fixed", "part laws", "part columns",
-    "part from load", "at the bench",
+    "part from load", "at the bench", "measure more",
 ]  # fmt: skip
 CERTAIN_CAUSES: tuple[Outcome, ...] = ("named", "undetermined", "partly")  # verdicts that hold causes
 
@@ -174,6 +174,35 @@ class AgainstModel:
     known: tuple[Any, ...] = ()
     within_chance: bool | None = None
     across: tuple[Any, ...] = ()
+
+
+@displayed()
+@dataclass(frozen=True)
+class RepeatScatter:
+    """Repeats of one sample at one load (N): the largest force over the smallest of ``n`` tests."""
+
+    sample: str
+    regime: str
+    normal_load_N: float
+    n: int
+    factor: float
+
+
+@displayed()
+@dataclass(frozen=True)
+class TooLittle:
+    """Why a campaign cannot be tested: the usable tests, their loads and samples, with the fewest that are needed.
+
+    ``scatter`` is that of the repeats that scatter most, None where nothing was repeated.
+    """
+
+    tests: int
+    loads: int
+    samples: int
+    fewest_tests: int
+    fewest_loads: int
+    fewest_samples: int
+    scatter: RepeatScatter | None = None
 
 
 @displayed()

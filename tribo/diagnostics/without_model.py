@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from scipy.stats import t as t_distribution
@@ -15,10 +15,12 @@ from tribo.diagnostics.column_search import (
     FEWEST_TESTS,
     ColumnEffect,
     RegimeTests,
+    load_levels,
     regime_tests,
     search_columns,
 )
-from tribo.diagnostics.verdict import Cause, Estimate, Excluded, Layer, Misfit, NextTest, Verdict
+from tribo.diagnostics.too_little import more_tests, most_scattered
+from tribo.diagnostics.verdict import Cause, Estimate, Excluded, Layer, Misfit, NextTest, Outcome, TooLittle, Verdict
 from tribo.diagnostics.within_records import RunningIn, running_in, stroke_offset
 from tribo.mechanisms.record import ALONG_RECORDS, STROKES_APART
 from tribo.mechanisms.table import MECHANISMS
@@ -99,12 +101,10 @@ def name_of_column(column: str) -> str:
 
 @dataclass(frozen=True)
 class ColumnsTested:
-    """The ``columns`` that were tested without the model, or why none was: ``n_tests`` are fewer than ``needed``."""
+    """The ``columns`` that were tested without the model; ``lack`` says why none could be."""
 
     columns: tuple[str, ...]
-    untested: Literal["", "no tests", "no column varies", "too few tests"]
-    n_tests: int = 0
-    needed: int = 0
+    lack: TooLittle | None = None
 
 
 def diagnose_without_model(study: Study, *, seed: int = 0, level: float = 0.01) -> Verdict:
@@ -129,28 +129,31 @@ def diagnose_without_model(study: Study, *, seed: int = 0, level: float = 0.01) 
     shown = [_of_columns(effects), _of_records(records), (offsets, of_strokes, [])]
     causes = [cause for _, each, _ in shown for cause in each]
     tied = ((f.name, *f.alike) for f in effects if f.alike)
+    shows = _tested(study, tests, enough)
+    without_causes: Outcome = "no_misfit" if shows.lack is None else "cannot_tell"
     return Verdict(
-        verdict="named" if causes else "no_misfit",
+        verdict="named" if causes else without_causes,
         misfits=tuple(misfit for _, _, each in shown for misfit in each),
         causes=tuple(causes),
         equivalent=tuple(dict.fromkeys(tuple(map(name_of_column, names)) for names in tied)),
         not_testable=(*_not_testable(enough), *_inseparable(study, enough)),
         layers=(*law_layers(study), *(layer for each, _, _ in shown for layer in each)),
         set_aside=study.ingested.set_aside,
-        next_test=_next_test(enough, effects),
+        next_test=more_tests(shows.lack) if shows.lack is not None else _next_test(enough, effects),
         model={"baseline": BASELINE},
-        shows=_tested(tests, enough),
+        shows=shows,
     )
 
 
-def _tested(tests: list[RegimeTests], enough: list[RegimeTests]) -> ColumnsTested:
-    if enough or not tests:
-        columns = tuple(sorted({c.name for t in enough for c in t.columns}))
-        return ColumnsTested(columns, "" if enough else "no tests")
-    if not any(t.columns or t.only_with_load for t in tests):
-        return ColumnsTested((), "no column varies")
-    needed = max(FEWEST_TESTS, 2 * tests[-1].law.shape[1])
-    return ColumnsTested((), "too few tests", max(t.n for t in tests), needed)
+def _tested(study: Study, tests: list[RegimeTests], enough: list[RegimeTests]) -> ColumnsTested:
+    columns = tuple(sorted({c.name for t in enough for c in t.columns}))
+    if enough:
+        return ColumnsTested(columns)
+    needed = max([FEWEST_TESTS, *(2 * t.law.shape[1] for t in tests)])
+    n, loads, samples = max(
+        ((t.n, len(np.unique(load_levels(t.load_N))), len(np.unique(t.sample))) for t in tests), default=(0, 0, 0)
+    )
+    return ColumnsTested((), TooLittle(n, loads, samples, needed, 1, 1, most_scattered(study.ingested)))
 
 
 def _of_columns(effects: Sequence[ColumnEffect]) -> Shown:

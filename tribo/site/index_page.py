@@ -171,7 +171,8 @@ STATES = {
 }  # fmt: skip
 VERDICTS = {
     "no_misfit": "no misfit", "named": "cause identified", "undetermined": "several possible causes",
-    "partly": "cause identified, misfit left", "unknown": "misfit of unknown cause", "": "–",
+    "partly": "cause identified, misfit left", "unknown": "misfit of unknown cause",
+    "cannot_tell": "? cannot tell", "": "–",
 }  # fmt: skip
 SYMBOLS = {"mu": ("μ", ""), "tau0": ("τ₀", "kPa")}
 WIDE = 6.0  # times the median arm of the intervals: a wider one is cut off, so that the others stay readable

@@ -20,7 +20,7 @@ from tribo.mechanisms.record import Mechanism, TraceEvidence
 from tribo.mechanisms.table import MECHANISMS, mechanism
 from tribo.vocabulary import COLUMNS, OBSERVABLES, in_words
 from tribo.wording.law_sentences import law_sentence, law_test, size_sentence, tied_laws
-from tribo.wording.numerals import joined, p_text, sentence_case
+from tribo.wording.numerals import counted, joined, p_text, sentence_case
 
 BETWEEN = {
     "mean": "mean", "bend": "the ends above the middle", "ends": "from the low to the high end",
@@ -332,6 +332,9 @@ def next_test_sentence(t: NextTest) -> str:
     if t.kind == "vary what was fixed":
         varied = [v.text for name in t.separates if (v := mechanism(name).variation) is not None]
         return f"Vary {' and '.join(varied)} in random order: {pulls} pulls of the flat sample."
+    if t.kind == "measure more":
+        counts = [(design["pulls"], "pull"), (design["loads"], "load"), (design["samples"], "sample")]
+        return f"Measure at least {joined([counted(n, noun) for n, noun in counts if n > 1])}, in random order."
     if t.kind == "part laws":
         difference, law, other = t.shows
         return f"{law_test(difference, law, other, design)}: {pulls} pulls."

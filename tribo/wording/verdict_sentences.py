@@ -12,12 +12,24 @@ from dataclasses import replace
 from typing import Any
 
 from tribo.diagnostics.inference import WITHIN
-from tribo.diagnostics.verdict import AgainstModel, Cause, Estimate, Excluded, Gain, Layer, LayerKind, Misfit, Verdict
+from tribo.diagnostics.verdict import (
+    AgainstModel,
+    Cause,
+    Estimate,
+    Excluded,
+    Gain,
+    Layer,
+    LayerKind,
+    Misfit,
+    RepeatScatter,
+    TooLittle,
+    Verdict,
+)
 from tribo.diagnostics.without_model import ColumnsTested
 from tribo.mechanisms.record import TraceEvidence
 from tribo.vocabulary import OBSERVABLES, in_words, short_label
 from tribo.wording.law_sentences import across_sentence, held_sentence, tied_laws
-from tribo.wording.numerals import joined, p_text, sentence_case, significant
+from tribo.wording.numerals import counted, joined, p_text, sentence_case, significant
 from tribo.wording.part_sentences import (
     cause_sentence,
     layer_sentence,
@@ -32,11 +44,13 @@ from tribo.wording.part_sentences import (
 from tribo.wording.table_sentences import published_evidence, published_sentence
 
 MOST_LAWS = 4
+FACTOR = 1.1  # from which on a scatter is said as a factor instead of in percent
 HEADINGS = {
     "fails": "Where the model fails", "misfits": "Significant misfits", "none": "No statistically significant misfit.",
     "cause": "Cause", "causes": "Possible causes, in order of weight",
     "not_testable": "Mechanisms that this design cannot test",
 }  # fmt: skip
+NOTHING_TESTED = "Too little was measured to test for a misfit or a dependence."
 HEADINGS_WITHOUT_MODEL = {
     "fails": "What friction varies with", "misfits": "Significant dependences",
     "none": "No statistically significant dependence beyond the law of each sample.", "cause": "Result",
@@ -75,6 +89,12 @@ def worded(v: Verdict) -> Verdict:
         return replace(v, text=f"{v.sentence} {v.evidence}")
     if isinstance(v.shows, ColumnsTested):
         return _without_model(v)
+    if isinstance(v.shows, TooLittle):
+        v = replace(
+            v, sentence=f"Cannot tell whether friction differs from the model: {lacking(v.shows)}.",
+            evidence=scatter_in_words(v.shows.scatter),
+        )  # fmt: skip
+        return replace(v, text=f"{v.sentence} {v.evidence}".strip())
     v = replace(v, shows=v.shows or AgainstModel())
     if v.shows.known:
         v = replace(v, model={**v.model, "known_laws": _known_laws(v.shows.known)})
@@ -305,6 +325,34 @@ def _all(names: Sequence[str]) -> str:
     return " and ".join(map(name_in_words, names))
 
 
+# ------------------------------------------------------------------------------------------ too little measured
+
+
+def lacking(lack: TooLittle) -> str:
+    """ "too little was measured (5 usable tests, at least 12 are needed)"."""
+    counts = (
+        (lack.tests, lack.fewest_tests, "usable test"),
+        (lack.loads, lack.fewest_loads, "load"),
+        (lack.samples, lack.fewest_samples, "sample"),
+    )
+    short = [f"{counted(n, noun)}, at least {fewest} are needed" for n, fewest, noun in counts if n < fewest]
+    return f"too little was measured ({'; '.join(short)})"
+
+
+def scatter_in_words(scatter: RepeatScatter | None) -> str:
+    """How far the repeats that scatter most are apart, in one sentence; empty where nothing was repeated."""
+    if scatter is None:
+        return ""
+    if scatter.factor >= FACTOR:
+        apart = f"scatters by a factor of {scatter.factor:.2f} (the largest over the smallest)"
+    else:
+        apart = f"scatters by {significant(100 * (scatter.factor - 1), 2)} %"
+    return (
+        f"{sentence_case(scatter.regime)} friction of {scatter.sample} at {significant(scatter.normal_load_N)} N, "
+        f"measured {scatter.n} times, {apart}."
+    )
+
+
 # ------------------------------------------------------------------------------------------ without the model
 
 
@@ -314,23 +362,20 @@ def _without_model(v: Verdict) -> Verdict:
     laws = [layer.text for layer in of_kind(v, "baseline")]
     more = [f"The laws of {len(laws) - MOST_LAWS} more are listed below."] if len(laws) > MOST_LAWS else []
     evidence = []
-    if shows.untested == "no column varies":
-        evidence = ["No recorded column varies beside the load."]
-    elif shows.untested == "too few tests":
-        evidence = [
-            f"Dependence on recorded columns was not tested: there are {shows.n_tests} tests, and at least "
-            f"{shows.needed} are needed beside the laws of these samples."
-        ]
-    elif not shows.untested and not v.causes:
+    if shows.lack is not None:
+        evidence = list(filter(None, [scatter_in_words(shows.lack.scatter)]))
+    elif not v.causes:
         tested = joined(sorted(map(in_words, shows.columns)))
         evidence = [f"Tested: {tested}." if tested else "No further column varies."]
     if v.causes:
         names = "; ".join(dict.fromkeys(name_in_words(c.mechanism) for c in v.causes))
         found = [c.text for c in v.causes]
         sentence, said = found, [f"Found beside the law of each sample: {names}.", *found]
+    elif shows.lack is not None:
+        said = [f"Cannot tell what friction varies with beside the law of each sample: {lacking(shows.lack)}."]
+        sentence = [*said, *laws[:1]]
     else:
-        nothing = "nothing was tested" if shows.untested else "nothing exceeds chance"
-        said = [f"Beside the law of each sample, {nothing}."]
+        said = ["Beside the law of each sample, nothing exceeds chance."]
         sentence = [*laws[:1], *said]
     evidence += [e.reason for e in v.not_testable if e.why in ("only with the load", "vary together")]
     text = [*laws[:MOST_LAWS], *more, *said, *evidence]
@@ -349,6 +394,8 @@ def meanings(v: Verdict | None) -> tuple[tuple[str, str], ...]:
 def why_next(v: Verdict) -> str:
     """Why the next test is the one to make."""
     separates = list(v.next_test.separates) if v.next_test is not None else []
+    if v.verdict == "cannot_tell":
+        return "with fewer, nothing can be told from chance"
     if not separates:
         return "it is the most informative test"
     if v.verdict == "unknown" and not of_kind(v, "law"):
@@ -367,8 +414,9 @@ def why_next(v: Verdict) -> str:
 
 def verdict_in_words(v: Verdict) -> dict[str, Any]:
     """The parts of a worded verdict as text for the report; empty where the verdict has none."""
+    headings = HEADINGS_WITHOUT_MODEL if without_model(v) else HEADINGS
     return {
-        "headings": HEADINGS_WITHOUT_MODEL if without_model(v) else HEADINGS,
+        "headings": headings | ({"none": NOTHING_TESTED} if v.verdict == "cannot_tell" else {}),
         "own_laws": [layer.text for layer in of_kind(v, "baseline")],
         "evidence": v.evidence,
         "equivalent": [
