@@ -15,9 +15,9 @@ from scipy.linalg import cho_factor, cho_solve
 from .campaign import LaboratoryBench, both
 from .laboratory import Laboratory, day_of
 from .nuisance import DAYS, DAYS_APART, DRIFT, Nuisance, course_of
-from .odd_shapes import TOGETHER, of_samples, pattern_deviations, repeat_sds, specimen_deviations
+from .odd_shapes import TOGETHER, of_samples, one_specimen, pattern_deviations, repeat_sds
 
-DRAWS = 600
+DRAWS = 1000
 READING = {"zero": 0.001, "rise": 0.05}  # N, and ln of the stiffness: what one pull leaves open
 FOUND = 4.5  # strength from which the observer finds a change
 
@@ -50,8 +50,10 @@ class Observer:
         covariance = np.diag(sd**2)
         half = np.arange(n)
         covariance[half, half + n] = covariance[half + n, half] = TOGETHER * sd[:n] * sd[n:]
-        scatter = _products([specimen_deviations(laboratory, tests, rng) for _ in range(draws)])
-        covariance += scatter * (specimen[:, None] == specimen)
+        loads, at = np.unique(bench.column("N"), return_inverse=True)
+        of_one = _products([one_specimen(laboratory, rng)(np.log(loads)) for _ in range(draws)])
+        place = np.concatenate([at, at + len(loads)])
+        covariance += of_one[np.ix_(place, place)] * (specimen[:, None] == specimen)
         for one in nuisance:
             own = _products([course_of(one, tests, rng) for _ in range(draws)])
             if one.kind in (DAYS, DAYS_APART):
@@ -62,10 +64,14 @@ class Observer:
                 own *= specimen[:, None] == specimen
             covariance += own
         if patterns_known:
-            samples, load = list(tests["sample"]), bench.column("N")
-            covariance += _products(
+            names, which = np.unique(bench.column("sample").astype(str), return_inverse=True)
+            pairs = [(str(name), float(load)) for name in names for load in loads]
+            samples, load = [name for name, _ in pairs], np.array([load for _, load in pairs])
+            of_pairs = _products(
                 [of_samples(pattern_deviations(laboratory, rng), samples, load) for _ in range(draws)]
             )
+            place = np.concatenate([which * len(loads) + at, which * len(loads) + at + len(pairs)])
+            covariance += of_pairs[np.ix_(place, place)]
         self.factor = cho_factor(covariance)
         self.free = _free_laws(bench, patterns_known)
         self.solved = cho_solve(self.factor, self.free)

@@ -76,19 +76,23 @@ def _curve(rng: np.random.Generator, low: float, high: float) -> Course:
 def specimen_deviations(laboratory: Laboratory, tests: pd.DataFrame, rng: np.random.Generator) -> np.ndarray:
     """By how much ln T of every test (n, 2) deviates with its specimen."""
     x = np.log(tests["N"].to_numpy())
-    low, high = float(x.min()), float(x.max())
     found = np.zeros((len(tests), 2))
-    odd = laboratory.specimens_are == "odd"
     for name in sorted(set(tests["specimen"])):
         here = (tests["specimen"] == name).to_numpy()
-        gain = laboratory.specimen_sd * together(rng.normal(size=2))
-        slope = laboratory.specimen_slope * together(rng.normal(size=2))
-        if odd and rng.random() < FAR_OUT:
-            gain = FARTHER * gain
-        found[here] = gain + np.outer(x[here] - x.mean(), slope)
-        if odd:
-            found[here] += laboratory.specimen_curve * _curve(rng, low, high)(np.exp(x[here]))
+        found[here] = one_specimen(laboratory, rng)(x[here])
     return found
+
+
+def one_specimen(laboratory: Laboratory, rng: np.random.Generator) -> Course:
+    """The deviation of a random specimen, (n, 2), by ln N: gain and slope, and a curve where it is odd."""
+    loads = np.log((np.array(laboratory.masses_g) + SLIDER_G) * 1e-3 * GRAVITY)
+    odd = laboratory.specimens_are == "odd"
+    gain = laboratory.specimen_sd * together(rng.normal(size=2))
+    slope = laboratory.specimen_slope * together(rng.normal(size=2))
+    if odd and rng.random() < FAR_OUT:
+        gain = FARTHER * gain
+    curve = _curve(rng, float(loads[0]), float(loads[-1])) if odd else lambda N: np.zeros((len(N), 2))
+    return lambda x: gain + np.outer(x - loads.mean(), slope) + laboratory.specimen_curve * curve(np.exp(x))
 
 
 def repeat_deviations(laboratory: Laboratory, tests: pd.DataFrame, rng: np.random.Generator) -> np.ndarray:
