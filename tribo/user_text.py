@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import math
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 _DIRECTION_MARKS = "\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069\ufeff"
 _NOT_PRINTED = ("Cc", "Cs", "Zl", "Zp")
@@ -83,3 +84,29 @@ def did_you_mean(given: str, allowed: Iterable[str], cutoff: float = 0.6) -> str
 
 def _plain(name: str) -> str:
     return re.sub(r"[\W_]+", "_", name.strip().casefold()).strip("_")
+
+
+# What people write into a cell that has no value.
+NOT_RECORDED = frozenset(
+    {"", "-", "--", "–", "—", "?", "n/a", "n.a.", "na", "nan", "not recorded", "not measured", "missing"}
+)
+MOSTLY_NUMBERS = 0.8  # share of the cells with something in them from which on a column is one of numbers
+
+
+def is_recorded(cell: str) -> bool:
+    """Whether a cell holds anything but a word for a missing value."""
+    return cell.strip().casefold() not in NOT_RECORDED
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell is a finite number."""
+    try:
+        return math.isfinite(float(cell))
+    except ValueError:
+        return False
+
+
+def are_numbers(cells: Sequence[str]) -> bool:
+    """Whether a column is one of numbers, whatever words stand in a few of its cells."""
+    numbers = sum(map(is_number, cells))
+    return numbers > 0 and numbers >= MOSTLY_NUMBERS * sum(map(is_recorded, cells))

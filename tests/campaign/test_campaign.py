@@ -153,7 +153,6 @@ def test_a_hand_written_reason_excludes_a_test(folder: Path) -> None:
         ("T2,raw/T2.csv,F,F1,,-0.2,0.1,2,", "load_not_positive", "normal_load_N"),
         ("T2,raw/T2.csv,F,F1,-3,,0.1,2,", "load_not_positive", "mass_g"),
         ("T2,raw/T2.csv,F,F1,,,0.1,2,", "no_load", "mass_g or normal_load_N"),
-        ("T2,raw/T2.csv,F,F1,50,,fast,2,", "not_a_number", "speed_mm_s"),
         ("T2,raw/T2.csv,F,F1,50,,-1,2,", "negative", "speed_mm_s"),
         ("T2,raw/T2.csv,F,F1,50,,0.1,2.5,", "not_a_number", "repeat"),
         ("T2,raw/T9.csv,F,F1,50,,0.1,2,", "missing", "file"),
@@ -171,7 +170,7 @@ def test_a_fault_of_one_row_sets_that_test_aside(folder: Path, row: str, kind: s
 
 
 def test_all_faults_of_a_row_are_listed(folder: Path) -> None:
-    found = faults_of_a_row(folder, "T2,raw/T9.csv,Q,F1,heavy,,fast,2,")
+    found = faults_of_a_row(folder, "T2,raw/T9.csv,Q,F1,heavy,,0.1,2.5,")
     assert {p.kind for p in found} == {"unknown_sample", "load_not_a_number", "not_a_number", "missing"}
 
 
@@ -421,3 +420,50 @@ def test_a_measured_amplitude_without_an_uncertainty_is_a_fault(folder: Path, gi
     with pytest.raises(CampaignError) as caught:
         load_campaign(folder)
     assert {(p.file, p.row) for p in caught.value.problems} == {("campaign.toml", TOML.count("\n") + 3)}
+
+
+CONDITIONS = "test_id,file,sample,mass_g,speed_mm_s,temperature_C,humidity_pct,roughness_um"
+
+
+def conditions_and_notes(folder: Path, *conditions: str) -> tuple[Campaign, list[Problem]]:
+    """A campaign whose tests have these cells from the speed on, and its notes on cells."""
+    rows = [f"T{k},raw/T{k}.csv,F,50,{cells}" for k, cells in enumerate(conditions, 1)]
+    for k in range(1, len(rows) + 1):
+        (folder / "raw" / f"T{k}.csv").write_text("1,2\n3,4\n5,6\n")
+    write(folder, rows, header=CONDITIONS)
+    campaign = load_campaign(folder)
+    assert campaign.set_aside == ()
+    return campaign, [p for p in campaign.problems if p.kind != "not_listed"]
+
+
+@pytest.mark.parametrize("cell", ["n/a", "-", "<5", "dry", "80 F"])
+def test_a_word_in_place_of_a_condition_is_a_gap_with_a_note(folder: Path, cell: str) -> None:
+    campaign, (note,) = conditions_and_notes(folder, "0.1,22.5,41,1.5", f"0.1,22.5,{cell},1.5")
+    assert [t.humidity_pct for t in campaign.tests] == [41.0, None]
+    assert (note.kind, note.row, note.column, note.found) == ("not_recorded", 3, "humidity_pct", cell)
+
+
+def test_a_number_with_the_unit_of_its_column_is_that_number(folder: Path) -> None:
+    campaign, notes = conditions_and_notes(folder, "0.1 mm/s,22.5 °C,45 %,1.5")
+    (test,) = campaign.tests
+    assert (test.speed_m_s, test.temperature_C, test.humidity_pct) == (pytest.approx(1e-4), 22.5, 45.0)
+    assert notes == []
+
+
+def test_words_of_one_column_are_one_note_with_their_number(folder: Path) -> None:
+    _, (note,) = conditions_and_notes(folder, *(f"0.1,22,{cell},1.5" for cell in ("n/a", "-", "n/a", "40")))
+    assert (note.row, note.found) == (2, "n/a, -")
+    assert note.what.startswith("3 cells")
+
+
+def test_a_word_for_the_speed_is_not_the_speed_of_the_campaign(folder: Path) -> None:
+    campaign, _ = conditions_and_notes(folder, "fast,22,40,1.5", ",22,40,1.5")
+    assert [t.speed_m_s for t in campaign.tests] == [None, pytest.approx(2e-4)]
+
+
+def test_a_word_in_a_further_column_of_numbers_has_a_note_and_in_one_of_names_has_none(folder: Path) -> None:
+    numbers = [f"0.1,22,40,1.{k}" for k in range(1, 6)]
+    _, (note,) = conditions_and_notes(folder, *numbers, "0.1,22,40,<1")
+    assert (note.row, note.column, note.found) == (7, "roughness_um", "<1")
+    _, notes = conditions_and_notes(folder, *(cells + "x" for cells in numbers))
+    assert notes == []

@@ -65,7 +65,7 @@ def test_a_trend_follows_the_standardised_number_in_one_regime_both_or_their_dif
     assert found.shape == (48, 2, 1)
 
 
-def test_numbers_that_vary_and_are_complete_are_covariates() -> None:
+def test_numbers_that_vary_are_covariates_and_a_test_without_a_value_lies_at_the_mean() -> None:
     o = observed()
     names = set(numeric_covariates(setup_of(o)))
     recorded = {"run_order", "specimen_run", "started_at", "time of day", "temperature_C", "humidity_pct", "lamp"}
@@ -75,7 +75,9 @@ def test_numbers_that_vary_and_are_complete_are_covariates() -> None:
     speeds = np.where(np.arange(48) % 2, 2e-4, 8e-4)
     changed = replace(o, conditions=replace(o.conditions, temperature_C=gap, speed_m_s=speeds, hold_s=np.zeros(48)))
     found = numeric_covariates(setup_of(changed))
-    assert set(found) == recorded - {"temperature_C"} | {"speed_mm_s"}
+    assert set(found) == recorded | {"speed_mm_s"}
+    assert found["temperature_C"][3] == 0.0
+    assert np.delete(found["temperature_C"], 3).std() == pytest.approx(1.0)
     assert found["speed_mm_s"] == pytest.approx(np.where(np.arange(48) % 2, -1.0, 1.0))
     assert found["lamp"].mean() == pytest.approx(0.0)
     assert found["lamp"].std() == pytest.approx(1.0)

@@ -122,7 +122,11 @@ def test_runs_of_a_specimen_are_counted_in_the_order_of_the_series() -> None:
     assert seen(recorded).conditions.specimen_run.tolist() == [10, 11, 12, 13]
     partly = [replace(tests[0], specimen_run=4), *tests[1:]]
     assert seen(partly).conditions.specimen_run.tolist() == [3, 2, 4, 1]
-    assert np.isnan(seen([replace(tests[0], run_order=None), *tests[1:]]).conditions.specimen_run).all()
+    gap = [replace(tests[0], run_order=None), *tests[1:]]
+    assert np.isnan(seen([replace(t, started_at="2026-03-02") for t in gap]).conditions.specimen_run).all()
+    hours = (14, 11, 16, 9)
+    by_time = [replace(t, started_at=f"2026-03-02T{hour:02}:00") for t, hour in zip(gap, hours, strict=True)]
+    assert seen(by_time).conditions.specimen_run.tolist() == [3, 2, 4, 1]
 
 
 def test_further_columns_take_part_where_every_test_has_a_value_and_they_vary() -> None:

@@ -23,6 +23,7 @@ from tribo.campaign.rows import (
     pattern_of,
     relative_path,
     row_faults,
+    words_for_numbers,
 )
 from tribo.campaign.table import (
     COUNTS,
@@ -106,6 +107,7 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     area_m2 = None if general.nominal_area_mm2 is None else general.nominal_area_mm2 * _MM2
     problems += _unlisted(root, rows)
     problems += [note for row in usable if (note := _loads_disagree(row, described))]
+    problems += words_for_numbers(usable)
     tests = tuple(_test(row, described, order, area_m2) for row in usable)
     names = sorted({t.sample for t in tests}, key=lambda n: (list(patterns).index(pattern_of(n, patterns)), n))
     by_file = {key: value for key, value in described.columns.items() if isinstance(value, dict)}
@@ -176,7 +178,7 @@ def _test(row: TestRow, described: CampaignFile, order: str, area_m2: float | No
     cells, general = row.cells, described.campaign
     numbers: dict[str, Any] = {column: number(row, column) for column in NUMBERS}
     numbers |= {column: None if (v := number(row, column)) is None else int(v) for column in COUNTS}
-    speed = numbers["speed_mm_s"] if numbers["speed_mm_s"] is not None else general.pull_speed_mm_s
+    speed = numbers["speed_mm_s"] if cells.get("speed_mm_s") else general.pull_speed_mm_s  # a word hides another speed
     load, stress, mass = numbers["normal_load_N"], numbers["normal_stress_Pa"], numbers["mass_g"]
     given = {"normal_load_N": load, "normal_stress_Pa": stress, "mass_g": mass}  # the first of them counts
     if load is None and stress is not None and area_m2 is not None:

@@ -37,9 +37,11 @@ from tribo.input_files import (
 )
 from tribo.records import Correction, Pattern
 from tribo.units import CAMPAIGN_COLUMNS
-from tribo.user_text import did_you_mean
+from tribo.user_text import are_numbers, did_you_mean, is_number
 from tribo.zeroing import ALLOWED, zero_choice
 
+_CONDITIONS = of_kind("number", "count")
+_MOST_WORDS = 4  # of a column, in a note
 _NOT_NEGATIVE = ("speed_mm_s", "hold_s", "stiffness_N_per_m")
 _WITH_UNIT = re.compile(r"([-+]?\d+(?:[.,]\d+)?)\s*([^\d\s.,+-][^\d]{0,9})?")
 _ZEROS = of_kind("zero")
@@ -111,16 +113,62 @@ def _sample_faults(row: TestRow, patterns: Mapping[str, Pattern]) -> list[Proble
 
 
 def number(row: TestRow, column: str) -> float | None:
-    """A cell as a number; None where it is empty. ValueError where it is none."""
+    """A cell as a number; None where it is empty. ValueError where it is none.
+
+    A condition of a test may not have been recorded, so that a word in its place counts as an empty cell.
+    """
     cell = row.cells.get(column, "")
     if not cell:
         return None
+    try:
+        return _parsed(row, cell)
+    except ValueError:
+        if column not in _CONDITIONS:
+            raise
+        return _without_its_unit(row, column, cell)
+
+
+def _parsed(row: TestRow, cell: str) -> float:
     if "_" in cell:
         raise ValueError(cell)
     value = float(cell.replace(",", ".") if row.decimal_comma and "." not in cell else cell)
     if not math.isfinite(value):
         raise ValueError(cell)
     return value
+
+
+def _without_its_unit(row: TestRow, column: str, cell: str) -> float | None:
+    """The number of a cell that repeats the unit of its column ("45 %" in humidity_pct); None where it holds a word."""
+    found, unit = _WITH_UNIT.fullmatch(cell), CAMPAIGN_COLUMNS[column].unit
+    if not found or not unit or not found[2] or _plain(found[2]) != _plain(unit):
+        return None
+    try:
+        return _parsed(row, found[1])
+    except ValueError:
+        return None
+
+
+def _plain(unit: str) -> str:
+    return unit.strip().casefold().lstrip("°")
+
+
+def words_for_numbers(rows: Sequence[TestRow]) -> Iterator[Problem]:
+    """A note on each column of conditions, or of further numbers, in which words stand: they count as not recorded."""
+    further = [name for name in rows[0].cells if name and name not in CAMPAIGN_COLUMNS] if rows else []
+    further = [name for name in further if are_numbers([row.cells.get(name, "") for row in rows])]
+    for column in (*_CONDITIONS, *further):
+        words = [row for row in rows if (cell := row.cells.get(column)) and not _is_read(row, column, cell)]
+        if words:
+            cells = list(dict.fromkeys(row.cells[column] for row in words))
+            shown = ", ".join(cells[:_MOST_WORDS]) + (", ..." if len(cells) > _MOST_WORDS else "")
+            count = "1 cell holds" if len(words) == 1 else f"{len(words)} cells hold"
+            what = f"{count} no number; without one, the value counts as not recorded"
+            hint = _meant_number(column, cells[0]) if column in CAMPAIGN_COLUMNS else "a number"
+            yield Problem("not_recorded", what, words[0].file, words[0].row, column, shown, f"{hint}, or an empty cell")
+
+
+def _is_read(row: TestRow, column: str, cell: str) -> bool:
+    return number(row, column) is not None if column in _CONDITIONS else is_number(cell)
 
 
 def _numbers_and_faults(row: TestRow) -> tuple[dict[str, float], list[Problem]]:

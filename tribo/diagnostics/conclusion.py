@@ -21,6 +21,7 @@ from tribo.diagnostics.inference import (
 )
 from tribo.diagnostics.model import effect_of
 from tribo.diagnostics.planning import next_test_of
+from tribo.diagnostics.recorded_in_part import recorded_in_part
 from tribo.diagnostics.score_statistics import StartEffects
 from tribo.diagnostics.verdict import (
     CERTAIN_CAUSES,
@@ -35,7 +36,7 @@ from tribo.diagnostics.verdict import (
     Verdict,
     Why,
 )
-from tribo.mechanisms.record import Conditions
+from tribo.mechanisms.record import Conditions, Mechanism
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import REGIMES, FloatArray
 
@@ -135,12 +136,23 @@ def exclusions(
         elif name in absorbed:
             why = "absorbed"
         elif not m.applies(conditions):
-            why = "not varied"
+            why = "recorded in part" if _recorded_in_part(m, conditions) else "not varied"
         elif e is not None and not e.certain:
             why = "not certain"
         if why is not None:
-            excluded.append(Excluded(name, why, shows=evidence.get(name)))
+            shows = _recorded_in_part(m, conditions) if why == "recorded in part" else evidence.get(name)
+            excluded.append(Excluded(name, why, shows=shows))
     return excluded
+
+
+def _recorded_in_part(m: Mechanism, conditions: Conditions) -> tuple[str, int, int] | None:
+    """The column that a mechanism needs, the number of tests with a value and of all tests, where its gaps cannot be
+    filled."""
+    for name in m.needs:
+        known = int(np.isfinite(getattr(conditions, name)).sum())
+        if 0 < known < len(conditions.sample):
+            return name, known, len(conditions.sample)
+    return None
 
 
 def exclusions_beside(
@@ -266,7 +278,10 @@ def conclude(
         set_aside=o.set_aside,
         next_test=next_test_of(named, outcome, misfits, o.conditions),
         smallest_effects=_smallest_effects(effects, screened.chance, {e.mechanism for e in barred}, level),
-        shows=AgainstModel(tuple(sorted(set(o.conditions.sample.tolist()))), o.flat, excess, wrong_in_form),
+        shows=AgainstModel(
+            tuple(sorted(set(o.conditions.sample.tolist()))), o.flat, excess, wrong_in_form,
+            in_part=recorded_in_part(model, level),
+        ),
     )
 
 

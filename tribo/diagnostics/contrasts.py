@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, ndtri
 
 from tribo.diagnostics.fit import ModelFit, fit
+from tribo.diagnostics.gaps import enough_recorded
 from tribo.diagnostics.model import (
     MOST_PAIRS,
     Acting,
@@ -28,6 +29,7 @@ from tribo.diagnostics.model import (
 from tribo.diagnostics.replicates import Replicates, as_measured, drawn_residuals, refit
 from tribo.diagnostics.score_statistics import Terms, scores, terms_of
 from tribo.display import displayed
+from tribo.mechanisms.conditions import is_level, levels_of
 from tribo.records import FloatArray
 
 Progress = Callable[[str, int, int], None]
@@ -106,7 +108,13 @@ def all_contrasts(
 
 
 def numeric_covariates(s: Setup) -> dict[str, FloatArray]:
-    """Recorded numbers a residual may follow, standardised; only those that vary and are complete."""
+    """Recorded numbers a residual may follow, standardised, those that vary and have values enough; a test without a
+    value, and without an estimate of it, lies at the mean."""
+    return {name: values for name, (values, _) in _numbers_with_gaps(s).items()}
+
+
+def _numbers_with_gaps(s: Setup) -> dict[str, tuple[FloatArray, NDArray[np.bool_]]]:
+    """The same, each with the tests (n,) whose value was not recorded."""
 
     def log(values: FloatArray) -> FloatArray:
         return np.log(np.where(values > 0, values, np.nan))
@@ -125,7 +133,15 @@ def numeric_covariates(s: Setup) -> dict[str, FloatArray]:
     for name, column in c.columns.items():
         with suppress(ValueError):
             numbers.setdefault(name, np.asarray(column, float))
-    return {n: (v - v.mean()) / v.std() for n, v in numbers.items() if np.isfinite(v).all() and v.std() > 1e-9}
+    found = {}
+    for name, values in numbers.items():
+        here = np.isfinite(values)
+        known = values[here]
+        if len(known) and enough_recorded(len(known), len(values)) and known.std() > 1e-9:
+            gap = c.gaps.get("speed_m_s" if name == "speed_mm_s" else name)
+            missing = ~here if gap is None else gap.missing | ~here
+            found[name] = np.where(here, (values - known.mean()) / known.std(), 0.0), missing
+    return found
 
 
 def _contrast(
@@ -143,19 +159,21 @@ def _in_regimes(values: FloatArray, observable: str) -> FloatArray:
 
 def _of_columns(s: Setup) -> Iterator[Contrast]:
     """Trends and groups of every recorded number, up to BINS of alike size; of text columns one gain per name."""
-    for name, values in numeric_covariates(s).items():
+    for name, (values, missing) in _numbers_with_gaps(s).items():
         for observable in OBSERVABLES:
             yield _contrast(s, "trend", observable, name, values[:, None])
-        distinct = np.unique(values)
-        edges = distinct[1:] if len(distinct) <= BINS else np.unique(np.quantile(values, np.arange(1, BINS) / BINS))
+        known = values[~missing]
+        distinct = np.unique(known)
+        edges = distinct[1:] if len(distinct) <= BINS else np.unique(np.quantile(known, np.arange(1, BINS) / BINS))
         code = np.searchsorted(edges, values, side="right")
         groups = np.column_stack([code == k for k in range(1, len(edges) + 1)]).astype(float)  # the first is zero
+        groups[missing] = groups[~missing].mean(axis=0)
         for observable in ("static", "sliding", "both") if len(edges) > 1 else ():
             yield _contrast(s, "shape", observable, name, groups)
     for name, column in s.observations.conditions.columns.items():
-        names = np.unique(column)
+        names = levels_of(column)
         if 1 < len(names) <= min(s.observations.n // 8, MOST_LEVELS):
-            levels = np.column_stack([column == level for level in names[1:]]).astype(float)
+            levels = np.column_stack([is_level(column, level) for level in names[1:]])
             for observable in ("static", "sliding", "both"):
                 yield _contrast(s, "level", observable, name, levels)
 

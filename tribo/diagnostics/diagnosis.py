@@ -183,8 +183,9 @@ def residual_table(d: Diagnosis) -> pd.DataFrame:
                 {
                     "test_id": o.test_ids, "sample": c.sample, "specimen": c.specimen, "regime": regime,
                     "normal_load_N": c.normal_load_N, "run_order": c.run_order, "specimen_run": c.specimen_run,
-                    "temperature_C": c.temperature_C, "humidity_pct": c.humidity_pct, "speed_m_s": c.speed_m_s,
-                    "hold_s": c.hold_s, "measured_N": np.exp(measured), "baseline_N": np.exp(before),
+                    "temperature_C": c.recorded("temperature_C"), "humidity_pct": c.recorded("humidity_pct"),
+                    "speed_m_s": c.recorded("speed_m_s"), "hold_s": c.recorded("hold_s"),
+                    "measured_N": np.exp(measured), "baseline_N": np.exp(before),
                     "calibrated_N": np.exp(measured - on_flat[:, k]), "extended_N": np.exp(after),
                     "residual_percent": percent(measured - before),
                     "residual_calibrated_percent": percent(on_flat[:, k]),

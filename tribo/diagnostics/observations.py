@@ -8,13 +8,15 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from tribo.diagnostics.gaps import enough_recorded, with_gaps_filled
 from tribo.diagnostics.verdict import TooLittle
 from tribo.display import displayed
 from tribo.errors import FitError, Problem
-from tribo.mechanisms.conditions import names_in
+from tribo.mechanisms.conditions import levels_of, names_in, numbers_in
 from tribo.mechanisms.record import Conditions, StringArray
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Campaign, FloatArray, Ingested, Pattern, Pull, SetAside, Test, Trace
+from tribo.user_text import is_recorded
 
 STATIC, SLIDING = 0, 1
 FEWEST_TESTS, FEWEST_LOADS, FEWEST_SAMPLES = 12, 2, 2
@@ -62,7 +64,9 @@ class Observations:
             return {f.name: cut(getattr(record, f.name)) for f in fields(record)}  # type: ignore[arg-type]
 
         columns = {name: column[keep] for name, column in self.conditions.columns.items()}
-        conditions = replace(self.conditions, **{**cut_record(self.conditions), "columns": columns})  # type: ignore[arg-type]
+        gaps = {name: replace(gap, **cut_record(gap)) for name, gap in self.conditions.gaps.items()}  # type: ignore[arg-type]
+        own = {**cut_record(self.conditions), "columns": columns, "gaps": gaps}
+        conditions = replace(self.conditions, **own)  # type: ignore[arg-type]
         return replace(self, **{**cut_record(self), "conditions": conditions})  # type: ignore[arg-type]
 
 
@@ -134,14 +138,15 @@ def conditions_of(
     pulls: list[Pull] | None = None,
     traces: list[Trace | None] | None = None,
 ) -> Conditions:
-    """What tests.csv records about ``tests``, as arrays; without traces the peak loses nothing by sampling."""
+    """What tests.csv records about ``tests``, as arrays, gaps of columns of numbers filled; without traces the peak
+    loses nothing by sampling."""
     patterns = [campaign.samples[t.sample] for t in tests]
     speed = _numbers([t.speed_m_s or campaign.pull_speed_m_s for t in tests])
     clip = np.zeros(len(tests))
     if pulls is not None and traces is not None:
         clip = np.array([_clip(p, t) for p, t in zip(pulls, traces, strict=True)])
     started = _numbers([_seconds(t.started_at) for t in tests])
-    return Conditions(
+    recorded = Conditions(
         normal_load_N=_numbers([t.normal_load_N for t in tests]),
         nominal_area_m2=campaign.area_m2,
         area_fraction=np.array([p.area_fraction for p in patterns]),
@@ -162,6 +167,7 @@ def conditions_of(
         pattern=np.array([p.name for p in patterns], str),
         without=_without(tests),
     )
+    return with_gaps_filled(recorded, np.array([t.started_at[:10] for t in tests], str))
 
 
 def _without(tests: list[Test]) -> StringArray:
@@ -179,25 +185,40 @@ def _elongation(test: Test, pattern: Pattern) -> float:
 
 
 def _specimen_runs(tests: list[Test]) -> FloatArray:
-    """specimen_run as recorded, else counted along run_order; NaN where neither is known."""
+    """specimen_run as recorded, else counted along run_order or, where that has gaps, along the time; NaN where none
+    is known of every test."""
     if all(t.specimen_run is not None for t in tests):
         return _numbers([t.specimen_run for t in tests])
-    if any(t.run_order is None for t in tests):
+    order, when = (_numbers(each) for each in ([t.run_order for t in tests], [_moment(t.started_at) for t in tests]))
+    along = next((values for values in (order, when) if np.isfinite(values).all()), None)
+    if along is None:
         return np.full(len(tests), np.nan)
     runs, seen = np.zeros(len(tests)), dict[str, int]()
-    for i in sorted(range(len(tests)), key=lambda i: tests[i].run_order or 0):
+    for i in map(int, np.argsort(along, kind="stable")):
         seen[tests[i].specimen] = seen.get(tests[i].specimen, 0) + 1
         runs[i] = seen[tests[i].specimen]
     return runs
 
 
 def _further_columns(tests: list[Test]) -> dict[str, StringArray]:
-    """Recorded columns that take part only as covariates, where every test has a value."""
+    """Recorded columns that take part only as covariates; a cell without a value is empty.
+
+    Those with values enough, and with more than one: names, numbers, and every date.
+    """
     names = sorted({name for t in tests for name in t.covariates} - {WITHOUT})
     columns = {name: np.array([str(t.covariates.get(name, "")) for t in tests], str) for name in names}
     columns["operator"] = np.array([t.operator for t in tests], str)
     columns["date"] = np.array([t.started_at[:10] for t in tests], str)
-    return {n: c for n, c in columns.items() if (c != "").all() and len(np.unique(c)) > 1}
+    if not (columns["date"] != "").all():
+        del columns["date"]
+    found = {}
+    for name, column in columns.items():
+        numbers = numbers_in(column)
+        known = np.isfinite(numbers) if numbers is not None else np.array([*map(is_recorded, column)], bool)
+        cells = np.where(known, column, "")
+        if enough_recorded(int(known.sum()), len(tests)) and len(levels_of(cells)) > 1:
+            found[name] = cells
+    return found
 
 
 def _numbers(values: Sequence[float | None]) -> FloatArray:
@@ -210,6 +231,11 @@ def _seconds(stamp: str) -> float | None:
     except ValueError:
         return None
     return (when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp()  # not by the clock of this machine
+
+
+def _moment(stamp: str) -> float | None:
+    """The time of a test in seconds; None where only its day is known."""
+    return _seconds(stamp) if len(stamp) > 10 else None
 
 
 def _clock_h(stamp: str) -> float:

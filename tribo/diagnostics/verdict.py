@@ -22,10 +22,11 @@ Nuisance = Literal["days", "drift", "specimen_drift"]
 # why a mechanism is not among the causes
 Why = Literal[
     "zero subtracted", "absorbed", "not varied", "not certain", "only in traces", "wrong sign", "explains less",
-    "a law explains more", "not printed", "contradicted", "only with the load", "vary together",
+    "a law explains more", "not printed", "contradicted", "only with the load", "vary together", "recorded in part",
 ]  # fmt: skip
 UNTESTED: frozenset[Why] = frozenset(
-    {"absorbed", "not varied", "only in traces", "not printed", "only with the load", "vary together"}
+    {"absorbed", "not varied", "only in traces", "not printed", "only with the load", "vary together",
+     "recorded in part"}
 )
 # what a further test does
 NextKind = Literal[
@@ -164,7 +165,7 @@ class AgainstModel:
     the patterned samples differ from the model, and the chance of that; ``wrong_in_form`` are mechanisms that left a
     misfit in the column they depend on. Of the law search: the answers about ``known`` laws (pairs of KnownLaw and
     Validation), whether what its laws leave is ``within_chance`` (None without laws), and the searches ``across``
-    patterns (LawsAcross).
+    patterns (LawsAcross). ``in_part`` are the columns that are recorded for some tests only (RecordedInPart).
     """
 
     samples: tuple[str, ...] = ()
@@ -174,6 +175,7 @@ class AgainstModel:
     known: tuple[Any, ...] = ()
     within_chance: bool | None = None
     across: tuple[Any, ...] = ()
+    in_part: tuple[Any, ...] = ()
 
 
 @displayed()

@@ -92,8 +92,9 @@ def covariate(s: Setup, name: str) -> Covariate:
     o, c = s.observations, s.observations.conditions
     known = {
         "normal_load_N": c.normal_load_N, "specimen_run": c.specimen_run, "run_order": c.run_order,
-        "started_at": c.elapsed_s / 3600.0, "time of day": o.clock_h, "temperature_C": c.temperature_C,
-        "humidity_pct": c.humidity_pct, "speed_mm_s": c.speed_m_s * 1e3, "hold_s": c.hold_s,
+        "started_at": c.elapsed_s / 3600.0, "time of day": o.clock_h, "temperature_C": c.recorded("temperature_C"),
+        "humidity_pct": c.recorded("humidity_pct"), "speed_mm_s": c.recorded("speed_m_s") * 1e3,
+        "hold_s": c.recorded("hold_s"),
     }  # fmt: skip
     if name in known:
         return Covariate(name, known[name])

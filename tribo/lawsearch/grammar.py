@@ -14,7 +14,9 @@ from itertools import combinations, product
 import numpy as np
 from numpy.typing import NDArray
 
+from tribo.diagnostics.gaps import enough_recorded
 from tribo.display import displayed
+from tribo.mechanisms.conditions import is_level, levels_of
 from tribo.mechanisms.record import Base, Choosing, Conditions, Forces, Mechanism, Values, amplitude
 from tribo.records import REGIMES, FloatArray
 
@@ -56,11 +58,15 @@ class Shape:
         return self.low if math.isnan(self.place) else self.place
 
     def of(self, c: Conditions) -> FloatArray:
-        """Values of shape (n, 1), or (n, 2) of a wave; 0 where the column has no value."""
+        """Values of shape (n, 1), or (n, 2) of a wave; where the column has no value, what is expected of the shape
+        given what is known of the value, or the mean over the recorded ones where nothing is."""
         if self.kind == "level":
-            return np.asarray(c.columns[self.column] == self.level, float)[:, None]
+            return is_level(c.columns[self.column], self.level)[:, None]
+        if self.column in c.gaps:
+            return c.gaps[self.column].mean_of(self.of_numbers)
         x = column_values(c, self.column)
-        return np.nan_to_num(self.of_numbers(x), nan=0.0)
+        values, known = self.of_numbers(x), np.isfinite(x)
+        return np.where(known[:, None], values, values[known].mean(axis=0) if known.any() else 0.0)
 
     def of_numbers(self, x: FloatArray) -> FloatArray:
         """Values at numbers x (n,), NaN where x is."""
@@ -212,7 +218,7 @@ def _formula(s: Shape) -> str:
 
 
 def column_values(c: Conditions, name: str) -> FloatArray:
-    """A recorded column as numbers, NaN where it has no value.
+    """A column as numbers, gaps filled, NaN where neither a value nor an estimate of it is there.
 
     Raises
     ------
@@ -226,6 +232,13 @@ def column_values(c: Conditions, name: str) -> FloatArray:
         with suppress(ValueError):
             values[k] = float(text)
     return values
+
+
+def recorded_values(c: Conditions, name: str) -> FloatArray:
+    """The recorded values of a column of numbers, (values,)."""
+    values = column_values(c, name)
+    known = np.isfinite(values)
+    return values[known & ~c.gaps[name].missing] if name in c.gaps else values[known]
 
 
 DAY_S = 86400.0
@@ -247,23 +260,22 @@ ALIKE = (
 def shapes_of(c: Conditions, without: Collection[str] = ()) -> list[tuple[tuple[Shape, ...], float]]:
     """Shapes of one column and products of two, each with what its choice costs; ``without`` some columns.
 
-    A column of numbers has values for half of the tests at least, and two different ones; missing values stay NaN.
+    A column of numbers has values enough, and two different ones.
     """
     columns = {}
     for name in (*UNITS, *c.columns):
-        values = column_values(c, name)
-        known = values[np.isfinite(values)]
-        if name not in without and len(known) >= 0.5 * len(values) and len(np.unique(known)) > 1:
-            columns[name] = values
+        known = recorded_values(c, name)
+        if name not in without and enough_recorded(len(known), len(c.sample)) and len(np.unique(known)) > 1:
+            columns[name] = known
     found: list[tuple[tuple[Shape, ...], float]] = []
     monotone: dict[str, list[Shape]] = {}
     for name, values in columns.items():
-        each = list(_of_column(name, values[np.isfinite(values)]))
+        each = list(_of_column(name, values))
         monotone[name] = [replace(s, place=float("nan")) for s in each if s.kind in ("linear", "log")]
         kinds = [s.kind for s in each]
         found += [((s,), float(np.log(kinds.count(s.kind)))) for s in each]
     for name, column in c.columns.items():
-        names = [str(v) for v in np.unique(column) if v]
+        names = levels_of(column)
         if name not in without and 1 < len(names) <= LEVELS and np.isnan(column_values(c, name)).all():
             names = names if len(names) > 2 else names[1:]
             found += [((Shape("level", name, level=level),), float(np.log(len(names)))) for level in names]
@@ -334,8 +346,7 @@ def fine_shapes(s: Shape, c: Conditions) -> list[Shape]:
     """The shapes of the same kind on the same column with places and widths on a fine grid."""
     if s.kind in ("linear", "log", "level"):
         return [s]
-    values = column_values(c, s.column)
-    x = values[np.isfinite(values)]
+    x = recorded_values(c, s.column)
     low, high, distinct = float(x.min()), float(x.max()), np.unique(x)
     reach = high - low
     if s.kind == "step":
@@ -373,8 +384,7 @@ def refined_shapes(s: Shape, c: Conditions) -> list[Shape]:
     """Shapes about one of the fine grid, with places between its neighbours; none where the grid says all there is."""
     if s.kind not in ("step", "ramp", "optimum", "hump", "soft step", "window", "wave"):
         return []
-    values = column_values(c, s.column)
-    x = np.unique(values[np.isfinite(values)])
+    x = np.unique(recorded_values(c, s.column))
     near = 2.0 * float(np.ptp(x)) / (FINE - 1)
     if s.kind == "wave":
         return [replace(s, width=s.width / (1.0 + k)) for k in np.linspace(-0.1, 0.1, FINE) * s.width / np.ptp(x)]

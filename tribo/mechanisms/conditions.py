@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from tribo.display import displayed
 from tribo.records import FloatArray
+from tribo.user_text import are_numbers, is_number
 
 StringArray = NDArray[np.str_]
 Values = FloatArray  # the parameters of one mechanism, in the order of its record
@@ -63,6 +64,55 @@ class Base:
         )
 
 
+@displayed()
+@dataclass(frozen=True)
+class Gaps:
+    """The cells of a column of numbers that were not recorded, and what is known of them.
+
+    Parameters
+    ----------
+    missing : array (n,) of bool
+        The tests without a value.
+    expected : array (n,)
+        What stands there: the expectation given the other columns and the neighbours in time. Unit of the column.
+    draws : array (n, m)
+        Equally likely values of every test, those of a recorded one all the same.
+    """
+
+    missing: NDArray[np.bool_]
+    expected: FloatArray
+    draws: FloatArray
+
+    @property
+    def recorded_share(self) -> float:
+        """Share of the tests with a value."""
+        return float(1.0 - self.missing.mean())
+
+    def mean_of(self, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        """The mean over the draws of a function of numbers (n,), of any shape."""
+        return np.asarray(np.mean([function(draw) for draw in self.draws.T], axis=0))
+
+
+def numbers_in(column: StringArray) -> FloatArray | None:
+    """A column of text as numbers, NaN where a cell has none; None where most cells hold something else."""
+    if not are_numbers(column.tolist()):
+        return None
+    return np.array([number if is_number(cell) and np.isfinite(number := float(cell)) else np.nan for cell in column])
+
+
+def is_level(column: StringArray, level: str) -> FloatArray:
+    """1 where a column of names has this one, 0 where it has another, (n,); where it has none, the share of this one
+    among the names that were recorded."""
+    here, recorded = column == level, column != ""
+    share = float(here[recorded].mean()) if recorded.any() else 0.0
+    return np.where(recorded, here * 1.0, share)
+
+
+def levels_of(column: StringArray) -> list[str]:
+    """The names in a column, gaps left out, in alphabetical order."""
+    return [str(name) for name in np.unique(column) if name]
+
+
 def names_in(cell: str) -> list[str]:
     """The names in a cell that may hold several, separated by semicolons."""
     return [name.strip() for name in cell.split(";") if name.strip()]
@@ -77,9 +127,10 @@ class Conditions:
     sample), ``elongation`` ln(long/short) of the cavity, positive when pulled along its long side and
     negative across it, ``specimen_run`` counts the pulls of a specimen from 1, ``elapsed_s`` the time since
     the first pull, ``clip_N`` = k v / (2 f_s), the mean loss of a peak between two samples of the recorder.
-    ``columns`` holds every further recorded column as text. ``pattern`` names the pattern of each
-    test: ``Sx`` and ``Sy`` may be S along x and y, or patterns of these names. ``without`` names the mechanisms that
-    were removed for a test, separated by semicolons; it is empty where none was removed for any test.
+    ``columns`` holds every further recorded column as text, names that were not recorded being empty. ``gaps`` are the
+    cells of columns of numbers that were filled, by the name of the field or column. ``pattern`` names the pattern of
+    each test: ``Sx`` and ``Sy`` may be S along x and y, or patterns of these names. ``without`` names the mechanisms
+    that were removed for a test, separated by semicolons; it is empty where none was removed for any test.
     """
 
     normal_load_N: FloatArray
@@ -101,6 +152,12 @@ class Conditions:
     clip_N: FloatArray
     columns: Mapping[str, StringArray] = field(default_factory=dict)
     without: StringArray = field(default_factory=lambda: np.array([], str))
+    gaps: Mapping[str, Gaps] = field(default_factory=dict)
+
+    def recorded(self, name: str) -> FloatArray:
+        """A column of numbers by the name of its field, (n,), NaN where none was recorded."""
+        values = np.asarray(getattr(self, name), float)
+        return np.where(self.gaps[name].missing, np.nan, values) if name in self.gaps else values
 
     def present(self, mechanism: str) -> NDArray[np.bool_]:
         """Tests for which this mechanism was not removed, (n,)."""

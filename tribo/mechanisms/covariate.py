@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tribo.mechanisms.conditions import is_level, levels_of
 from tribo.mechanisms.record import (
     Base,
     Choosing,
@@ -30,22 +31,25 @@ def law(values: Values, base: Base, conditions: Conditions, choice: str) -> Forc
 
 
 def score(conditions: Conditions, choice: str) -> FloatArray:
-    """Numbers are standardised; of two names the first counts -1/2 and the second +1/2; one of several counts 1."""
+    """Numbers are standardised; of two names the first counts -1/2 and the second +1/2; one of several counts 1.
+
+    A test whose name was not recorded counts what the others do on average.
+    """
     if choice in conditions.columns:
         column = conditions.columns[choice]
         numbers = _numbers(column)
         if numbers is not None:
             return np.asarray((numbers - numbers.mean()) / max(float(numbers.std()), 1e-300))
-        return np.where(column == np.unique(column)[0], -0.5, 0.5)
+        return 0.5 - is_level(column, levels_of(column)[0])
     name, level = choice.split(IS, 1)
-    return np.asarray(conditions.columns[name] == level, float)
+    return is_level(conditions.columns[name], level)
 
 
 def choices(base: Base, conditions: Conditions) -> tuple[str, ...]:
     """Every column of numbers or of two names, and every name of a column of up to twelve."""
     found: list[str] = []
     for name, column in conditions.columns.items():
-        names = np.unique(column)
+        names = levels_of(column)
         if len(names) < 2:
             continue
         if len(names) == 2 or _numbers(column) is not None:

@@ -287,6 +287,9 @@ def why_not(e: Excluded) -> str:
             f"This design cannot tell the effect of {in_words(one)} from that of {in_words(other)}: they "
             f"vary together for {_listed(samples)}."
         )
+    if e.why == "recorded in part":
+        column, known, tests = e.shows
+        return f"{in_words(column)} is recorded for {known} of {tests} tests only"
     if isinstance(e.shows, str):
         return not_varied([e.shows])
     m = MECHANISMS[e.mechanism.partition(":")[0]]

@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from tribo.diagnostics.inference import WITHIN
+from tribo.diagnostics.recorded_in_part import RecordedInPart
 from tribo.diagnostics.verdict import (
     AgainstModel,
     Cause,
@@ -283,6 +284,7 @@ def _evidence(v: Verdict) -> Iterator[str]:
             f"The patterned samples differ from the model by about {factor:.1f} times the error that is "
             f"stated for it (p {p_text(p)} for a factor of at most {WITHIN:g})."
         )
+    yield from map(in_part_sentence, shows.in_part)
     if shows.known:
         held = sum(answer.answer == "held" for _, answer in shows.known)
         yield f"{held} of {len(shows.known)} known laws held."
@@ -354,6 +356,17 @@ def scatter_in_words(scatter: RepeatScatter | None) -> str:
 
 
 # ------------------------------------------------------------------------------------------ without the model
+
+
+def in_part_sentence(gaps: RecordedInPart) -> str:
+    """For how many tests a column is recorded, and whether its gaps follow the friction."""
+    said = f"{sentence_case(in_words(gaps.column))} is recorded for {100.0 * gaps.share:.0f} % of the tests."
+    if gaps.doubted:
+        said += (
+            f" Tests with and without a value differ in friction (p {p_text(gaps.p)}): what is missing may depend on "
+            "the friction, and so may all that is said of this column."
+        )
+    return said
 
 
 def _without_model(v: Verdict) -> Verdict:
