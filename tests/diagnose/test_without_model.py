@@ -98,6 +98,20 @@ def test_two_causes_are_named_beside_each_other(tmp_path: Path) -> None:
     assert "bath" in found.text
 
 
+def test_a_column_recorded_for_three_tests_of_five_is_named_with_its_size(tmp_path: Path) -> None:
+    def lid(row: dict[str, Any]) -> str:
+        return "on" if int(row["test_id"][1:]) % 2 else "off"
+
+    def recorded(row: dict[str, Any]) -> dict[str, Any]:
+        return {"lid": "" if int(row["test_id"][1:]) % 5 < 2 else lid(row)}
+
+    verdict = verdict_of(made(tmp_path / "c", lambda row: 0.1 * (lid(row) == "on"), columns=recorded))
+    (cause,) = verdict.causes
+    assert cause.mechanism == "covariate:lid"
+    (size,) = cause.parameters.values()
+    assert size.low < 100.0 * np.expm1(0.1) < size.high
+
+
 def test_columns_that_run_alike_are_named_as_tied_with_the_test_that_parts_them(tmp_path: Path) -> None:
     further: Further = lambda row: {"wear_m": 3 * row["run_order"]}  # noqa: E731
     found = verdict_of(made(tmp_path / "c", lambda row: 0.004 * row["run_order"], columns=further))

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from scipy.stats import f as f_distribution, t as t_distribution
 
 from tribo.diagnostics.contrasts import share_beyond
+from tribo.diagnostics.gaps import enough_recorded
+from tribo.mechanisms.conditions import is_level
 from tribo.mechanisms.record import StringArray
 from tribo.records import FloatArray, Ingested, Pull, Regime, Test
 
@@ -23,7 +25,6 @@ FEWEST_TESTS = 12
 SAME_LOAD = 0.02  # relative distance of loads that were meant to be one
 MOST_NAMES = 12
 BINS = 4
-PRESENT = 0.75  # share of the tests that must have a value in a column
 LOGARITHMIC = ("speed_mm_s", "hold_s")
 NUMBERS = ("hold_s", "temperature_C", "humidity_pct", "run_order", "specimen_run", "repeat")
 _LOAD_BY_ANOTHER_NAME = ("nominal_load_N",)
@@ -160,29 +161,35 @@ def _columns(tests: list[Test], pulls: list[Pull]) -> Iterator[Regressor]:
 
 
 def _of_numbers(name: str, values: FloatArray) -> Iterator[Regressor]:
-    """A trend, and the course over up to four groups; tests without a value lie at the mean."""
+    """A trend, and the course over up to four groups; tests without a value lie at the mean of the others, and in each
+    group by its share of them."""
     there = np.isfinite(values) & ((values > 0) | (name not in LOGARITHMIC))
-    if there.mean() < PRESENT or np.ptp(values[there]) <= 1e-9 * np.abs(values[there]).max():
+    if not there.any() or not enough_recorded(int(there.sum()), len(values)):
+        return
+    if np.ptp(values[there]) <= 1e-9 * np.abs(values[there]).max():
         return
     low, high = float(values[there].min()), float(values[there].max())
-    filled = np.where(there, values, values[there].mean())
-    along = np.log(filled) if name in LOGARITHMIC else filled
-    yield Regressor(name, "trend", ((along - along.mean()) / np.ptp(along))[:, None], low, high)
+    along = np.full(len(values), np.nan)
+    along[there] = np.log(values[there]) if name in LOGARITHMIC else values[there]
+    trend = np.where(there, (along - along[there].mean()) / np.ptp(along[there]), 0.0)
+    yield Regressor(name, "trend", trend[:, None], low, high)
     distinct = np.unique(values[there])
     edges = distinct[1:] if len(distinct) <= BINS else np.unique(np.quantile(values[there], np.arange(1, BINS) / BINS))
-    code = np.searchsorted(edges, filled, side="right")
+    code = np.searchsorted(edges, np.where(there, values, low), side="right")
     groups = [k for k in range(1, len(edges) + 1) if (there & (code == k)).any()]
     if len(groups) > 1:
         parts = [values[there & (code == k)] for k in (0, *groups)]
         levels = tuple(f"{x.min():.3g} to {x.max():.3g}" if np.ptp(x) else f"{x.min():.3g}" for x in parts)
-        yield Regressor(name, "course", np.column_stack([code == k for k in groups]).astype(float), low, high, levels)
+        columns = np.column_stack([code == k for k in groups]).astype(float)
+        columns[~there] = columns[there].mean(axis=0)
+        yield Regressor(name, "course", columns, low, high, levels)
 
 
 def _of_names(name: str, cells: list[str]) -> Iterator[Regressor]:
     names = sorted(set(cells) - {""})
-    if 1 < len(names) <= min(MOST_NAMES, len(cells) // 3) and sum(map(bool, cells)) >= PRESENT * len(cells):
+    if 1 < len(names) <= min(MOST_NAMES, len(cells) // 3) and enough_recorded(sum(map(bool, cells)), len(cells)):
         column = np.array(cells, str)
-        levels = np.column_stack([column == n for n in names[1:]]).astype(float)
+        levels = np.column_stack([is_level(column, level) for level in names[1:]])
         yield Regressor(name, "names", levels, levels=tuple(names))
 
 
