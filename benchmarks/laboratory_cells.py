@@ -12,7 +12,7 @@ from blind_cases import ALL_OR_NOTHING, UNSEEN, seed_of, times_half, true_parame
 import numpy as np  # after blind_cases, which says how many threads it may use  # isort: skip
 from blind.effects import EFFECTS
 from laboratories.campaign import HIDDEN, Made, bare_bench, make, stream
-from laboratories.effects import LADDERS as LADDERS_OF_EFFECTS, hide_effect, strengths
+from laboratories.effects import NEEDS, hide_effect, strengths
 from laboratories.free_laws import CLASSES, hide_free_law, law_laboratory
 from laboratories.gaps import HOW, gaps
 from laboratories.handed_over import FURTHER, handed_over
@@ -163,7 +163,7 @@ def effect_row(piece: Piece) -> Row:
     name, nuisance = piece.what["effect"], disturbance(piece)
     times = stream(piece.seed, PLAN + 4).uniform(*TIMES_HALF)
     size = times_half(name, half_found(), times)
-    laboratory = drawn_laboratory(piece.seed, **LADDERS_OF_EFFECTS.get(name, {}))
+    laboratory = drawn_laboratory(piece.seed, **NEEDS.get(name, {}))
     hide = hide_effect(name, size)
     made = make(piece.seed, laboratory, nuisance, hide)
     seen = strengths(piece.seed, laboratory, nuisance, hide, stream(piece.seed, HIDDEN))
@@ -204,7 +204,7 @@ def gap_pieces(cell: str, count: int, seed: int) -> Iterator[Piece]:
 
 def gaps_row(piece: Piece) -> Row:
     name, size = piece.what["effect"], times_half(piece.what["effect"], half_found(), 3)
-    laboratory = drawn_laboratory(piece.seed, **LADDERS_OF_EFFECTS.get(name, {}))
+    laboratory = drawn_laboratory(piece.seed, **NEEDS.get(name, {}))
     made = make(piece.seed, laboratory, hide=hide_effect(name, size))
     cells = gaps(made.bench.tests, piece.what["share"], piece.what["how"], stream(piece.seed, PLAN + 6))
     d = diagnosed(handed_over(made.bench, piece.seed, FURTHER, cells=cells), piece.seed)
@@ -231,7 +231,7 @@ def free_law_row(piece: Piece) -> Row:
 
 def effect_size_row(piece: Piece) -> Row:
     name, size = piece.what["effect"], times_half(piece.what["effect"], half_found(), 3)
-    laboratory = drawn_laboratory(piece.seed, **LADDERS_OF_EFFECTS.get(name, {}))
+    laboratory = drawn_laboratory(piece.seed, **NEEDS.get(name, {}))
     row, d = with_answer(piece, make(piece.seed, laboratory, hide=hide_effect(name, size, piece.what["off"])))
     return row | size_told(d.verdict, name, size)
 

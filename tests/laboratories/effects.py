@@ -8,14 +8,14 @@ import numpy as np
 from blind.effects import EFFECTS
 
 from .campaign import Hide, LaboratoryBench, bare_bench, both, multiply, rms_percent
-from .laboratory import HOLDS_S, SPEEDS_MM_S, Laboratory
+from .laboratory import HOLDS_S, SETS, SPEEDS_MM_S, Laboratory
 from .nuisance import Nuisance
 from .observer import Observer, seen_in_traces
 
-# Effects that need a ladder of speeds or holds to be seen
-LADDERS: dict[str, dict[str, Any]] = {
+# What a laboratory needs for an effect to act: a ladder of speeds or of holds, long cavities
+NEEDS: dict[str, dict[str, Any]] = {
     "velocity_dependence": {"speeds_mm_s": SPEEDS_MM_S}, "bulk_viscoelasticity": {"speeds_mm_s": SPEEDS_MM_S},
-    "contact_ageing": {"holds_s": HOLDS_S},
+    "contact_ageing": {"holds_s": HOLDS_S}, "cavity_shear_deformation": {"samples": SETS[0]},
 }  # fmt: skip
 # The column along which the form of an effect may be off; the load for all others
 ALONG = {

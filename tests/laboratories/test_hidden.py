@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from .campaign import HIDDEN, bare_bench, both, make, stream
-from .effects import ALONG, bent, hide_effect, strengths
+from .effects import ALONG, EFFECTS, NEEDS, bent, hide_effect, strengths
 from .free_laws import CLASSES, STRENGTHS, draw_course, hide_free_law, law_laboratory
 from .gaps import COLUMNS as GAP_COLUMNS, HOW, WORDED, gaps, missing
 from .laboratory import Laboratory, day_of
@@ -105,6 +105,15 @@ def test_gaps_take_whole_days_or_the_tests_of_one_operator() -> None:
     assert len(partly) <= 1
     gone = missing(tests, 0.2, "one operator", "op1", np.random.default_rng(2))
     assert set(tests["operator"][gone]) == {"op1"}
+
+
+@pytest.mark.parametrize("name", sorted(set(EFFECTS) - {"pull_angle", "pulley_friction", "sampling_clip"}))
+def test_every_effect_acts_in_the_laboratory_that_it_needs(name: str) -> None:
+    laboratory = replace(SMALL, **NEEDS.get(name, {}))
+    plain, changed = bare_bench(30, laboratory), bare_bench(30, laboratory)
+    truth = hide_effect(name, 0.5)(changed, stream(30, HIDDEN))
+    in_traces = np.any(changed.zero != plain.zero) or np.any(changed.stiffness_N_per_mm != plain.stiffness_N_per_mm)
+    assert truth["rms_percent"] > 0.1 or in_traces
 
 
 def test_an_effect_in_a_laboratory_changes_no_other_draw() -> None:
