@@ -36,6 +36,7 @@ TAIL = 8.0  # degrees of freedom of the scatter, whose outliers count less
 _VARIANCES = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)  # of specimen gains over that of repeats
 _ROUNDS = 4
 _NOTHING_LEFT = 1e-9
+UNSTATED_READING = 1e-3 / 3**0.5  # one in a thousand, evenly distributed: half of the last of three digits
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,8 @@ class Regressor:
     """One way to follow a recorded column: ``columns`` (n, d) beside the law, and where its values run from and to.
 
     ``kind`` is trend, course (groups of a number) or names. ``levels`` are the names of groups, the first being the
-    reference.
+    reference. ``order`` (n,) holds the rank of each test among the values of a number, or the number of its name in
+    order of appearance; -1 without a value.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Regressor:
     low: float = float("nan")
     high: float = float("nan")
     levels: tuple[str, ...] = ()
+    order: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,8 @@ class RegimeTests:
     """The tests of one regime with a positive force: ln T, (n,), and ``law`` (n, p), the law of every sample alone.
 
     The law of a sample is its mean at every load where loads are repeated, else a parabola of ln T in ln N as far as
-    the loads determine it.
+    the loads determine it. ``same`` are the names of columns that are one and the same, of which ``columns`` has the
+    first. ``reading`` is the relative standard uncertainty of each force, (n,).
     """
 
     regime: Regime
@@ -70,6 +74,8 @@ class RegimeTests:
     law: FloatArray
     columns: tuple[Regressor, ...]
     only_with_load: tuple[str, ...]
+    same: tuple[tuple[str, ...], ...]
+    reading: FloatArray
 
     @property
     def n(self) -> int:
@@ -93,15 +99,63 @@ def regime_tests(ingested: Ingested, regime: Regime) -> RegimeTests:
     sample = np.array([t.sample for t in tests], str)
     load = np.array([t.normal_load_N for t in tests], float)
     law = _laws(sample, load)
-    found = [c for c in _columns(tests, pulls) if np.ptp(c.columns) > 0] if tests else []
+    varying = [c for c in _columns(tests, pulls) if np.ptp(c.columns) > 0] if tests else []
+    same = same_columns(varying)
+    copies = {name for names in same for name in names[1:]}
+    found = [c for c in varying if c.name not in copies]
     told = [c for c in found if _beyond(law, c.columns) > LEFT_OVER]
     samples = (sample[:, None] == np.unique(sample)[None]).astype(float)
     names = {c.name for c in told} | {c.name for c in found if _beyond(samples, c.columns) <= LEFT_OVER}
     return RegimeTests(
         regime, sample, np.array([t.specimen for t in tests], str), load,
         np.log([getattr(p, f"{regime}_N") for p in pulls]), law, tuple(told),
-        tuple(dict.fromkeys(c.name for c in found if c.name not in names)),
+        tuple(dict.fromkeys(c.name for c in found if c.name not in names)), same, _readings(pulls, regime),
     )  # fmt: skip
+
+
+def _readings(pulls: Sequence[Pull], regime: Regime) -> FloatArray:
+    """Relative standard uncertainty of each force, (n,); of a force stated without one, that of three digits."""
+    force, u = (np.array([getattr(p, f"{regime}_{part}") for p in pulls], float) for part in ("N", "u_N"))
+    return np.where(np.isfinite(u) & (u > 0), u / np.maximum(force, 1e-300), UNSTATED_READING)
+
+
+def same_columns(columns: Sequence[Regressor]) -> tuple[tuple[str, ...], ...]:
+    """The names of recorded columns of which each follows from the other in every test, in the order of the columns.
+
+    Two numbers are the same column if one rises, or falls, strictly with the other (a copy, another unit, a power);
+    names, and a number beside names, if each value of one stands beside one value of the other.
+    """
+    groups: list[list[str]] = []
+    first: list[Regressor] = []
+    seen: set[str] = set()
+    for column in columns:
+        if column.name in seen:
+            continue
+        seen.add(column.name)
+        for k, other in enumerate(first):
+            if _is_same(column, other):
+                groups[k].append(column.name)
+                break
+        else:
+            first.append(column)
+            groups.append([column.name])
+    return tuple(tuple(names) for names in groups if len(names) > 1)
+
+
+def _is_same(one: Regressor, other: Regressor) -> bool:
+    if "names" in (one.kind, other.kind):
+        return _appearance(one.order) == _appearance(other.order)
+    highest = max(one.order)
+    falling = tuple(highest - rank if rank >= 0 else rank for rank in one.order)
+    return other.order in (one.order, falling)
+
+
+def _appearance(order: Sequence[int]) -> tuple[int, ...]:
+    """The same groups numbered as they appear."""
+    places: dict[int, int] = {-1: -1}
+    for rank in order:
+        places.setdefault(rank, len(places) - 1)
+    return tuple(places[rank] for rank in order)
 
 
 def _laws(sample: StringArray, load_N: FloatArray) -> FloatArray:
@@ -172,7 +226,10 @@ def _of_numbers(name: str, values: FloatArray) -> Iterator[Regressor]:
     along = np.full(len(values), np.nan)
     along[there] = np.log(values[there]) if name in LOGARITHMIC else values[there]
     trend = np.where(there, (along - along[there].mean()) / np.ptp(along[there]), 0.0)
-    yield Regressor(name, "trend", trend[:, None], low, high)
+    ranks = np.full(len(values), -1)
+    ranks[there] = np.unique(_rounded(values[there]), return_inverse=True)[1]
+    order = tuple(int(rank) for rank in ranks)
+    yield Regressor(name, "trend", trend[:, None], low, high, order=order)
     distinct = np.unique(values[there])
     edges = distinct[1:] if len(distinct) <= BINS else np.unique(np.quantile(values[there], np.arange(1, BINS) / BINS))
     code = np.searchsorted(edges, np.where(there, values, low), side="right")
@@ -182,7 +239,13 @@ def _of_numbers(name: str, values: FloatArray) -> Iterator[Regressor]:
         levels = tuple(f"{x.min():.3g} to {x.max():.3g}" if np.ptp(x) else f"{x.min():.3g}" for x in parts)
         columns = np.column_stack([code == k for k in groups]).astype(float)
         columns[~there] = columns[there].mean(axis=0)
-        yield Regressor(name, "course", columns, low, high, levels)
+        yield Regressor(name, "course", columns, low, high, levels, order)
+
+
+def _rounded(values: FloatArray) -> FloatArray:
+    """Values to nine digits of the largest: another unit may move the last ones."""
+    scale = float(np.abs(values).max()) or 1.0
+    return np.asarray(np.round(values / scale, 9))
 
 
 def _of_names(name: str, cells: list[str]) -> Iterator[Regressor]:
@@ -190,14 +253,16 @@ def _of_names(name: str, cells: list[str]) -> Iterator[Regressor]:
     if 1 < len(names) <= min(MOST_NAMES, len(cells) // 3) and enough_recorded(sum(map(bool, cells)), len(cells)):
         column = np.array(cells, str)
         levels = np.column_stack([is_level(column, level) for level in names[1:]])
-        yield Regressor(name, "names", levels, levels=tuple(names))
+        order = tuple(names.index(cell) if cell else -1 for cell in cells)
+        yield Regressor(name, "names", levels, levels=tuple(names), order=order)
 
 
 @dataclass(frozen=True)
 class ColumnEffect:
     """A column that friction follows: the change of T over its range with a 90 % interval, in percent.
 
-    ``where`` says between which values. ``alike`` are columns that this design cannot tell from it.
+    ``where`` says between which values. ``alike`` are columns that this design cannot tell from it, ``same`` those that
+    are this very column by another name.
     """
 
     name: str
@@ -209,6 +274,7 @@ class ColumnEffect:
     high_percent: float
     where: tuple[str, str]
     alike: tuple[str, ...] = ()
+    same: tuple[str, ...] = ()
 
 
 class Whitening:
@@ -266,7 +332,8 @@ class ColumnFit:
 
     def __init__(self, tested: RegimeTests, taken: Sequence[Regressor]) -> None:
         self.tested = tested
-        design = np.column_stack([tested.law, *(c.columns for c in taken)])
+        self.floor = max(float(np.mean(tested.reading**2)), _NOTHING_LEFT**2)
+        self.design = design = np.column_stack([tested.law, *(c.columns for c in taken)])
         names = np.unique(tested.specimen)
         groups = (tested.specimen[:, None] == names[None]).astype(float)
         spreads = _VARIANCES if len(names) > len(np.unique(tested.sample)) else _VARIANCES[:1]
@@ -277,7 +344,7 @@ class ColumnFit:
             self.at = int(np.argmax([w.score(left @ left) for w, left in zip(self.whitenings, lefts, strict=True)]))
             self.left = lefts[self.at]
             variance = float(self.left @ self.left) / max(self.dof, 1)
-            self.variance = max(variance, _NOTHING_LEFT**2)
+            self.variance = max(variance, self.floor)
             standard = (self.left / root) ** 2 / self.variance
             root = np.sqrt((TAIL + 1.0) / (TAIL + standard))
         self.root = root
@@ -285,6 +352,11 @@ class ColumnFit:
     @property
     def dof(self) -> int:
         return self.tested.n - self.whitenings[self.at].basis.shape[1]
+
+    def can_tell(self, c: Regressor) -> bool:
+        """Whether enough of a column is left beside the laws and the columns taken: what little is left of a near copy
+        would be extrapolated far beyond the values measured."""
+        return _beyond(self.design, c.columns) > LEFT_OVER
 
     def basis(self, c: Regressor, at: int) -> FloatArray:
         """Orthonormal basis of a column beyond the law, (n, d); columns that the law takes up have none."""
@@ -302,7 +374,7 @@ def search_columns(t: RegimeTests, regimes: int, level: float, rng: np.random.Ge
     taken: list[Regressor] = []
     while len(taken) < MOST_FOUND:
         fitted = ColumnFit(t, taken)
-        others = [c for c in t.columns if c.name not in {k.name for k in taken}]
+        others = [c for c in t.columns if c.name not in {k.name for k in taken} and fitted.can_tell(c)]
         chances = _chances(fitted, others, rng)
         if not chances:
             break
@@ -313,6 +385,8 @@ def search_columns(t: RegimeTests, regimes: int, level: float, rng: np.random.Ge
     found = []
     for column in taken:
         beside = ColumnFit(t, [c for c in taken if c is not column])
+        if not beside.can_tell(column):
+            continue
         rivals = [c for c in t.columns if c.name not in {k.name for k in taken}]
         p = min(_chances(beside, [column, *rivals], rng).get(0, 1.0) * regimes, 1.0)
         if p < level:
@@ -328,21 +402,24 @@ def _chances(f: ColumnFit, columns: Sequence[Regressor], rng: np.random.Generato
     bases = {k: b for k, c in enumerate(columns) if (b := f.basis(c, f.at)).shape[1]}
     if not bases or f.dof < 3:
         return {}
-    strength = _strengths(f.left[:, None], list(bases.values()), f.dof)[0]
+    strength = _strengths(f.left[:, None], list(bases.values()), f.dof, f.floor)[0]
     chance = _by_chance(f, [columns[k] for k in bases], rng)
     # the strongest first: equal p values keep that order
     found = {k: share_beyond(chance, float(s)) for k, s in zip(bases, strength, strict=True)}
     return dict(sorted(found.items(), key=lambda item: -float(strength[list(bases).index(item[0])])))
 
 
-def _strengths(left: FloatArray, bases: Sequence[FloatArray], dof: int) -> FloatArray:
-    """Minus the log of the p value of the F test of every column, (replicates, columns)."""
+def _strengths(left: FloatArray, bases: Sequence[FloatArray], dof: int, floor: float) -> FloatArray:
+    """Minus the log of the p value of the F test of every column, (replicates, columns).
+
+    The variance of the scatter is at least ``floor``.
+    """
     total = np.sum(left**2, axis=0)
     found = []
     for base in bases:
         d = base.shape[1]
         explained = np.sum((base.T @ left) ** 2, axis=0)
-        ratio = (explained / d) / np.maximum((total - explained) / max(dof - d, 1), 1e-300)
+        ratio = (explained / d) / np.maximum((total - explained) / max(dof - d, 1), floor)
         found.append(-f_distribution.logsf(ratio, d, max(dof - d, 1)))
     return np.column_stack(found)
 
@@ -351,6 +428,8 @@ def _by_chance(f: ColumnFit, columns: Sequence[Regressor], rng: np.random.Genera
     """The strongest column in every campaign that the fitted law makes, (replicates,)."""
     n = f.tested.n
     drawn = f.left[rng.integers(0, n, (n, REPLICATES))] * np.sqrt(n / max(f.dof, 1))
+    if (lacking := f.floor - float(f.left @ f.left) / max(f.dof, 1)) > 0:
+        drawn = drawn + rng.normal(0.0, np.sqrt(lacking), drawn.shape)
     spread = np.sqrt(_VARIANCES[f.at] * f.variance)
     groups = f.whitenings[f.at].groups
     drawn = drawn + groups @ rng.normal(0.0, spread, (groups.shape[1], REPLICATES)) if spread else drawn
@@ -360,7 +439,7 @@ def _by_chance(f: ColumnFit, columns: Sequence[Regressor], rng: np.random.Genera
     strongest = np.zeros(REPLICATES)
     for at in np.unique(chosen):
         bases = [b for c in columns if (b := f.basis(c, int(at))).shape[1]]
-        strongest[chosen == at] = _strengths(lefts[at][:, chosen == at], bases, f.dof).max(axis=1)
+        strongest[chosen == at] = _strengths(lefts[at][:, chosen == at], bases, f.dof, f.floor).max(axis=1)
     return strongest
 
 
@@ -370,7 +449,7 @@ def _described(f: ColumnFit, column: Regressor, p: float) -> ColumnEffect:
     inverse = np.linalg.pinv(white.T @ white)
     size = inverse @ (white.T @ f.left)
     dof = max(f.dof - len(size), 1)
-    variance = float(np.sum((f.left - white @ size) ** 2)) / dof
+    variance = max(float(np.sum((f.left - white @ size) ** 2)) / dof, f.floor)
     first, last, where = _ends(column, size)
     contrast = last - first
     value = float(contrast @ size)
@@ -385,7 +464,8 @@ def _described(f: ColumnFit, column: Regressor, p: float) -> ColumnEffect:
         if float(np.sum((f.basis(other, f.at).T @ effect) ** 2)) > ALIKE * length:
             alike.append(other.name)
     names = tuple(dict.fromkeys(alike))
-    return ColumnEffect(column.name, column.kind, f.tested.regime, p, middle, low, high, where, names)
+    same = next((group for group in f.tested.same if column.name in group), (column.name,))[1:]
+    return ColumnEffect(column.name, column.kind, f.tested.regime, p, middle, low, high, where, names, same)
 
 
 def _first_alike(f: ColumnFit, column: Regressor) -> Regressor:

@@ -24,7 +24,7 @@ from tribo.diagnostics.verdict import Cause, Estimate, Excluded, Layer, Misfit, 
 from tribo.diagnostics.within_records import RunningIn, running_in, stroke_offset
 from tribo.mechanisms.record import ALONG_RECORDS, STROKES_APART
 from tribo.mechanisms.table import MECHANISMS
-from tribo.records import REGIMES, Study
+from tribo.records import REGIMES, Ingested, Study
 from tribo.vocabulary import label_with_unit
 
 UNITS = {"constant": ("N", ""), "linear": ("", "N"), "three_term": ("", "N")}
@@ -101,10 +101,15 @@ def name_of_column(column: str) -> str:
 
 @dataclass(frozen=True)
 class ColumnsTested:
-    """The ``columns`` that were tested without the model; ``lack`` says why none could be."""
+    """The ``columns`` that were tested without the model; ``lack`` says why none could be.
+
+    ``same`` are groups of columns that are one and the same, ``copied`` groups of tests with exactly the same forces.
+    """
 
     columns: tuple[str, ...]
     lack: TooLittle | None = None
+    same: tuple[tuple[str, ...], ...] = ()
+    copied: tuple[tuple[str, ...], ...] = ()
 
 
 def diagnose_without_model(study: Study, *, seed: int = 0, level: float = 0.01) -> Verdict:
@@ -128,7 +133,7 @@ def diagnose_without_model(study: Study, *, seed: int = 0, level: float = 0.01) 
     of_strokes = [Cause(layer.name, 1.0, layer.parameters, shows=layer) for layer in offsets]
     shown = [_of_columns(effects), _of_records(records), (offsets, of_strokes, [])]
     causes = [cause for _, each, _ in shown for cause in each]
-    tied = ((f.name, *f.alike) for f in effects if f.alike)
+    tied = ((f.name, *f.same, *f.alike) for f in effects if f.same or f.alike)
     shows = _tested(study, tests, enough)
     without_causes: Outcome = "no_misfit" if shows.lack is None else "cannot_tell"
     return Verdict(
@@ -146,14 +151,34 @@ def diagnose_without_model(study: Study, *, seed: int = 0, level: float = 0.01) 
 
 
 def _tested(study: Study, tests: list[RegimeTests], enough: list[RegimeTests]) -> ColumnsTested:
-    columns = tuple(sorted({c.name for t in enough for c in t.columns}))
+    same, copied = tuple(dict.fromkeys(names for t in tests for names in t.same)), copied_readings(study.ingested)
     if enough:
-        return ColumnsTested(columns)
+        return ColumnsTested(tuple(sorted({c.name for t in enough for c in t.columns})), None, same, copied)
     needed = max([FEWEST_TESTS, *(2 * t.law.shape[1] for t in tests)])
     n, loads, samples = max(
         ((t.n, len(np.unique(load_levels(t.load_N))), len(np.unique(t.sample))) for t in tests), default=(0, 0, 0)
     )
-    return ColumnsTested((), TooLittle(n, loads, samples, needed, 1, 1, most_scattered(study.ingested)))
+    return ColumnsTested((), TooLittle(n, loads, samples, needed, 1, 1, most_scattered(study.ingested)), same, copied)
+
+
+def copied_readings(ingested: Ingested) -> tuple[tuple[str, ...], ...]:
+    """Tests of one sample at one load whose forces are equal to the last digit, where equality is no rounding.
+
+    Forces of three digits or fewer may be equal by rounding, unless most of all tests are.
+    """
+    groups: dict[tuple[object, ...], list[str]] = {}
+    rounded = set()
+    for test in ingested.campaign.tests:
+        if (pull := ingested.pulls.get(test.test_id)) is None:
+            continue
+        forces = tuple(float(f) if np.isfinite(f) else None for f in (pull.static_N, pull.sliding_N))
+        key = (test.sample, test.normal_load_N, forces)
+        groups.setdefault(key, []).append(test.test_id)
+        if all(f is None or f == float(f"{f:.3g}") for f in forces):
+            rounded.add(key)
+    equal = {key: ids for key, ids in groups.items() if len(ids) > 1}
+    most = 2 * sum(map(len, equal.values())) > sum(map(len, groups.values()))
+    return tuple(tuple(ids) for key, ids in equal.items() if most or key not in rounded)
 
 
 def _of_columns(effects: Sequence[ColumnEffect]) -> Shown:
@@ -162,7 +187,7 @@ def _of_columns(effects: Sequence[ColumnEffect]) -> Shown:
         Layer(
             kind="cause", name=name_of_column(f.name), samples=(), regimes=(f.regime,), p_adjusted=f.p,
             effect_percent=f.change_percent, low=f.low_percent, high=f.high_percent,
-            tied_with=tuple(map(name_of_column, f.alike)), shows=(f,),
+            tied_with=tuple(map(name_of_column, (*f.same, *f.alike))), shows=(f,),
         )
         for f in effects
     ]  # fmt: skip
@@ -207,8 +232,9 @@ def _inseparable(study: Study, enough: list[RegimeTests]) -> list[Excluded]:
     for row in [] if table is None else table.to_dict("records"):
         for other in row["inseparable_from"]:
             one, two = sorted((str(row["variable"]), other), key=label_with_unit)
-            if "normal_load_N" in (one, two):
-                continue  # said of the columns that vary only with the load
+            same = any({one, two} <= set(names) for t in enough for names in t.same)
+            if same or "normal_load_N" in (one, two):
+                continue  # said of the columns that are the same, and of those that vary only with the load
             samples = pairs.setdefault((one, two), [])
             if row["sample"] not in samples:
                 samples.append(str(row["sample"]))
@@ -226,7 +252,7 @@ def _only_with_load(enough: list[RegimeTests]) -> list[str]:
 
 def _not_testable(enough: list[RegimeTests]) -> list[Excluded]:
     """Mechanisms whose column does not vary, or was not recorded."""
-    there = {name for t in enough for name in (*(c.name for c in t.columns), *t.only_with_load)}
+    there = {name for t in enough for name in (*(c.name for c in t.columns), *t.only_with_load, *sum(t.same, ()))}
     return [
         Excluded(mechanism, "not varied", shows=column)
         for column, mechanism in MECHANISMS_OF_COLUMNS.items()
@@ -235,10 +261,12 @@ def _not_testable(enough: list[RegimeTests]) -> list[Excluded]:
 
 
 def _next_test(enough: list[RegimeTests], effects: Sequence[ColumnEffect]) -> NextTest | None:
+    design: dict[str, Any]
     if columns := _only_with_load(enough):
-        design: dict[str, Any] = {"loads": 4, "repeats": 3, "order": "random", "pulls": 12, "hours": 1.4}
+        design = {"loads": 4, "repeats": 3, "order": "random", "pulls": 12, "hours": 1.4}
         return NextTest("part from load", (*columns, "normal_load_N"), design)
-    tied = next((f for f in effects if f.alike), None)
+    tied = next((f for f in effects if f.same or f.alike), None)
     if tied is None:
         return None
-    return NextTest("part columns", (tied.name, *tied.alike), {"covariate": tied.name, "pulls": 12, "hours": 1.4})
+    design = {"covariate": tied.name, "pulls": 12, "hours": 1.4}
+    return NextTest("part columns", (tied.name, *tied.same, *tied.alike), design)

@@ -50,7 +50,10 @@ def meant_to_be_one(load_N: FloatArray) -> bool:
 
 @dataclass(frozen=True)
 class Rows:
-    """Normal load, friction force, its reading uncertainty and the specimen of n tests; arrays (n,)."""
+    """Normal load, friction force, its reading uncertainty and the specimen of n tests; arrays (n,).
+
+    ``n_missing`` tests have no force. ``without_force`` are tests whose force is exactly 0 N: nothing was measured.
+    """
 
     sample: str
     load_N: FloatArray
@@ -59,6 +62,7 @@ class Rows:
     specimen: NDArray[np.str_]
     test_id: NDArray[np.str_]
     n_missing: int = 0
+    without_force: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.load_N)
@@ -78,8 +82,8 @@ class Rows:
 def sample_rows(table: pd.DataFrame, regime: Regime) -> tuple[Rows, ...]:
     """One :class:`Rows` a sample, samples in alphabetical order.
 
-    ``table`` is that of ``Ingested.table()``. Tests without a force in ``regime`` are left out. Tests whose
-    specimen is not named count as one specimen.
+    ``table`` is that of ``Ingested.table()``. Tests without a force in ``regime``, and those of exactly 0 N, are left
+    out. Tests whose specimen is not named count as one specimen.
 
     Raises
     ------
@@ -106,9 +110,12 @@ def sample_rows(table: pd.DataFrame, regime: Regime) -> tuple[Rows, ...]:
     u = table[u_name].to_numpy(float) if u_name in table else np.full(len(table), np.nan)
     sample = table["sample"].astype(str).to_numpy(str)
     everything = Rows("", load, force, u, table["specimen"].fillna("").astype(str).to_numpy(str), ids)
-    found = np.isfinite(force)
+    found, read = np.isfinite(force), force != 0
     return tuple(
-        replace(everything.take(own & found), sample=str(name), n_missing=int((own & ~found).sum()))
+        replace(
+            everything.take(own & found & read), sample=str(name), n_missing=int((own & ~found).sum()),
+            without_force=tuple(ids[own & found & ~read]),
+        )
         for name in np.unique(sample)
         for own in [sample == name]
     )

@@ -116,6 +116,9 @@ def _fit_sample(rows: Rows, regime: Regime, area: float | None, weights: str, by
     notes: tuple[str, ...] = ()
     if rows.n_missing:
         notes = (f"{rows.n_missing} of {rows.n_missing + len(rows)} tests have no {regime} force",)
+    if rows.without_force:
+        ids, number = ", ".join(rows.without_force), len(rows.without_force)
+        notes += (f"{number} tests set aside: a {regime} force of exactly 0 N is no measurement ({ids})",)
     law = law_over_load(area)
     empty = LawFit(
         rows.sample, regime, law.name, law.parameter_names, np.full(2, np.nan), np.full((2, 2), np.nan),

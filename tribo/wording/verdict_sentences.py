@@ -45,6 +45,7 @@ from tribo.wording.part_sentences import (
 from tribo.wording.table_sentences import published_evidence, published_sentence
 
 MOST_LAWS = 4
+MOST_COPIED = 3  # groups of tests with equal forces that are listed
 FACTOR = 1.1  # from which on a scatter is said as a factor instead of in percent
 HEADINGS = {
     "fails": "Where the model fails", "misfits": "Significant misfits", "none": "No statistically significant misfit.",
@@ -380,6 +381,7 @@ def _without_model(v: Verdict) -> Verdict:
     elif not v.causes:
         tested = joined(sorted(map(in_words, shows.columns)))
         evidence = [f"Tested: {tested}." if tested else "No further column varies."]
+    evidence += [same_columns_sentence(names) for names in shows.same] + copied_sentence(shows.copied)
     if v.causes:
         names = "; ".join(dict.fromkeys(name_in_words(c.mechanism) for c in v.causes))
         found = [c.text for c in v.causes]
@@ -393,6 +395,26 @@ def _without_model(v: Verdict) -> Verdict:
     evidence += [e.reason for e in v.not_testable if e.why in ("only with the load", "vary together")]
     text = [*laws[:MOST_LAWS], *more, *said, *evidence]
     return replace(v, sentence=" ".join(sentence), evidence=" ".join(evidence), text=" ".join(text))
+
+
+def same_columns_sentence(names: Sequence[str]) -> str:
+    """ "The pull speed and speed_rps are the same column: each follows from the other. It was tested once."."""
+    return (
+        f"{sentence_case(joined(list(map(in_words, names))))} are the same column: each follows from the other in "
+        "every test. It was tested once."
+    )
+
+
+def copied_sentence(copied: Sequence[Sequence[str]]) -> list[str]:
+    """The tests whose forces are exactly those of another one, in one sentence; none where there are none."""
+    if not copied:
+        return []
+    shown = "; ".join(joined(list(ids)) for ids in copied[:MOST_COPIED])
+    more = f" and {len(copied) - MOST_COPIED} more groups" if len(copied) > MOST_COPIED else ""
+    return [
+        f"Forces are equal to the last digit in {shown}{more}: these are copies of one reading, or of rounded ones. "
+        "The scatter was taken to be no smaller than the uncertainty of a reading."
+    ]
 
 
 # ------------------------------------------------------------------------------------ its parts, for a report
