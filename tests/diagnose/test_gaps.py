@@ -13,11 +13,14 @@ import pytest
 from tribo.diagnostics.diagnosis import examine
 from tribo.diagnostics.fit import ModelFit, fit
 from tribo.diagnostics.gaps import gaps_of
-from tribo.diagnostics.model import setup
+from tribo.diagnostics.model import Acting, setup
 from tribo.diagnostics.observations import Observations, observe
 from tribo.diagnostics.predictor import tabled_predictor
 from tribo.diagnostics.recorded_in_part import recorded_in_part
-from tribo.lawsearch.grammar import Shape, shapes_of
+from tribo.figures.extended_model import law_numbers_of
+from tribo.lawsearch.grammar import Shape, WrittenLaw, shapes_of
+from tribo.lawsearch.model_choice import FoundLaw
+from tribo.lawsearch.search import Discovery
 from tribo.mechanisms.conditions import Conditions
 from tribo.mechanisms.covariate import score
 from tribo.mechanisms.table import MECHANISMS
@@ -171,6 +174,16 @@ def test_a_column_of_a_few_values_is_said_to_be_recorded_for_these() -> None:
     (left_out,) = [e for e in v.not_testable if e.mechanism == "temperature"]
     assert "the temperature is recorded for 7 of 96 tests only" in left_out.reason
     assert "not vary" not in left_out.reason
+
+
+def test_a_law_is_drawn_over_recorded_values_alone() -> None:
+    o = in_part()
+    law = WrittenLaw((Shape("linear", "temperature_C", 20.0, 26.0),))
+    model = fit(setup(o, tabled_predictor(o.patterns)), [Acting(law.mechanism())])
+    found = FoundLaw(law, {}, (0.0, 0.0, 0.0), 0.0, None, (), model, np.zeros((3, o.n, 2)))
+    x = law_numbers_of(Discovery((found,), (), 1))["x"].to_numpy()
+    recorded = o.conditions.recorded("temperature_C")
+    assert x.tolist() == 2 * recorded[np.isfinite(recorded)].tolist()
 
 
 def test_the_mean_of_a_shape_over_a_gap_lies_between_its_ends() -> None:

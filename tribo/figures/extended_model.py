@@ -141,7 +141,7 @@ def law_numbers(d: Diagnosis) -> pd.DataFrame:
 
 
 def law_numbers_of(found: Discovery) -> pd.DataFrame:
-    """One row per law, regime and test that the law acts on, in percent of T.
+    """One row per law, regime and test that the law acts on and whose columns were recorded, in percent of T.
 
     ``partial_percent`` is what the model without the law leaves of a test, ``law_percent`` the law with its 90 % band,
     both about the mean of the law over these tests. ``x`` is the column of the law, or the product of
@@ -159,6 +159,9 @@ def _of_law(number: int, found: FoundLaw) -> pd.DataFrame:
     half = 0.5 * (found.band[2] - found.band[1])
     x, names = _abscissa(found)
     acts = law.weight(c) != 0
+    for name in law.columns:
+        unknown = c.gaps[name].missing if name in c.gaps else c.columns[name] == "" if name in c.columns else False
+        acts = acts & ~np.asarray(unknown)
     parts = []
     for k in (k for k, regime in enumerate(REGIMES) if law.regime in (regime, "both")):
         course = change[acts, k] - change[acts, k].mean()
