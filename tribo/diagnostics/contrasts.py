@@ -224,6 +224,10 @@ def _of_series(s: Setup) -> Iterator[Contrast]:
             yield _contrast(s, "block", "both", "run_order", inside[:, None], detail=where)
 
 
+# Where so many replicates leave the chance of the strongest contrast in this range, about one percent, more are made.
+MANY, MOST_REPLICATES, UNCERTAIN = 100, 1000, (0.003, 0.03)
+
+
 @displayed()
 @dataclass(frozen=True)
 class Screen:
@@ -304,6 +308,9 @@ def screen(
             progress("diagnose", len(chance), replicates)
         if decided(chance[:, 0], float(strength.max())):
             break
+        near = UNCERTAIN[0] < share_beyond(chance[:, 0], float(strength.max())) < UNCERTAIN[1]
+        if len(chance) >= replicates >= MANY and near:
+            replicates = min(replicates + AT_ONCE, MOST_REPLICATES)
     pairs = [k for k, contrast in enumerate(contrasts) if len(contrast.courses) > 1]
     weaker = set(sorted(pairs, key=lambda k: -strength[k])[MOST_PAIRS:])  # chance counts them, nothing shows them
     shown = [k for k in range(len(contrasts)) if k not in weaker]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 from scipy.stats import chi2, norm
 
+from tribo.diagnostics.days_and_drift import session_of
 from tribo.diagnostics.effect_sizes import NORMAL_90, rms_percent
 from tribo.diagnostics.fit import ModelFit, fit, fit_without
 from tribo.diagnostics.model import (
@@ -254,7 +255,8 @@ def pattern_corrections(f: ModelFit) -> list[Layer]:
 
 
 NUISANCES: dict[Nuisance, int] = {"days": SESSION, "drift": DRIFT, "specimen_drift": SPECIMEN_DRIFT}
-DRAWS = 400  # of the random effects, for the interval of their size
+DRAWS = 1000  # of the random effects, for the interval of their size
+NUISANCE_STEPS = np.linspace(-2.0, 1.0, 7)  # of the logarithm of a size about its estimate, to average over
 
 
 def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
@@ -262,7 +264,7 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
     square in percent of what it adds to T over the tests of the campaign, about its mean, with a 90 % interval.
 
     The chance is that of a likelihood ratio with the sizes of both regimes free or held still. The interval is that of
-    the random effects given the campaign, at the fitted sizes.
+    the random effects given the campaign, averaged over their sizes.
     """
     s, rng, layers = f.setup, np.random.default_rng(0), []
     for name, group in NUISANCES.items():
@@ -274,7 +276,8 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
         p = float(chi2.sf(2.0 * max(ratio, 0.0), 2))
         if p >= level:
             continue
-        low, middle, high = 100.0 * np.expm1(np.quantile(_realised(f, here, rng), (0.05, 0.5, 0.95)))
+        drawn = np.concatenate([_realised(g, here, int(DRAWS * share), rng) for g, share in _over_sizes(f, here)])
+        low, middle, high = 100.0 * np.expm1(np.quantile(drawn, (0.05, 0.5, 0.95)))
         layers.append(
             Layer(
                 kind="nuisance", name=name, samples=(), regimes=tuple(REGIMES), p_adjusted=p,
@@ -284,21 +287,37 @@ def nuisance_layers(f: ModelFit, level: float) -> list[Layer]:
     return layers
 
 
-def _realised(f: ModelFit, here: NDArray[np.bool_], rng: np.random.Generator) -> FloatArray:
+def _over_sizes(f: ModelFit, here: NDArray[np.bool_]) -> list[tuple[ModelFit, float]]:
+    """The fit with the sizes of some random effects held at several multiples, all others estimated anew, and how
+    likely each makes the campaign, adding to one."""
+    s, fits, log_weight = f.setup, [], []
+    for step in NUISANCE_STEPS:
+        sizes = f.noise.sizes * np.exp(step)
+        held = replace(
+            s, unit=np.where(here, s.unit * sizes[np.maximum(s.group, 0)], s.unit), group=np.where(here, FIXED, s.group)
+        )
+        fits.append(fit(held, f.acting, start=f, iterations=15))
+        prior = sum(float(log_size_prior(int(g), sizes[g])) for g in np.unique(s.group[here]))
+        log_weight.append(fits[-1].score + prior)
+    weight = np.exp(np.array(log_weight) - max(log_weight))
+    return list(zip(fits, (weight / weight.sum()).tolist(), strict=True))
+
+
+def _realised(f: ModelFit, here: NDArray[np.bool_], draws: int, rng: np.random.Generator) -> FloatArray:
     """Root mean square over the tests of what some random effects add to ln T, about its mean, in draws from what the
     campaign tells of them, (draws,)."""
     s, share = f.setup, informed_share(f.noise)
     own, shared = np.zeros((s.specimens, OF_A_SPECIMEN), bool), here[s.of_specimens :]
     own[:] = here[: s.of_specimens].reshape(s.specimens, OF_A_SPECIMEN)
-    drawn = np.repeat(np.where(here, f.effects, 0.0)[None], DRAWS, axis=0)
+    drawn = np.repeat(np.where(here, f.effects, 0.0)[None], draws, axis=0)
     if shared.any():
         places = np.flatnonzero(shared)
         border = f.columns.parameters + places
         covariance = f.inverse.border[0][np.ix_(border, border)] / share
-        drawn[:, s.of_specimens + places] += rng.multivariate_normal(np.zeros(len(places)), covariance, DRAWS)
+        drawn[:, s.of_specimens + places] += rng.multivariate_normal(np.zeros(len(places)), covariance, draws)
     if own.any():
         sd = np.sqrt(f.inverse.variances[0][0] / share)
-        drawn[:, : s.of_specimens] += rng.normal(size=(DRAWS, s.of_specimens)) * np.where(own, sd, 0.0).ravel()
+        drawn[:, : s.of_specimens] += rng.normal(size=(draws, s.of_specimens)) * np.where(own, sd, 0.0).ravel()
     added = s.on_tests(drawn)
     return np.asarray(np.sqrt(np.mean((added - added.mean(axis=1, keepdims=True)) ** 2, axis=(1, 2))))
 
@@ -335,6 +354,21 @@ def gain(before: ModelFit, after: ModelFit, rng: np.random.Generator) -> Gain | 
         rmse_percent_before=rmse_before,
         rmse_percent_after=rmse_after,
     )
+
+
+def gain_on_sessions(before: ModelFit, after: ModelFit) -> tuple[float, float]:
+    """What ``after`` gains over ``before`` in log score per test on whole sessions left out, and its standard error
+    between sessions; NaN where there are fewer than three."""
+    session = session_of(after.setup.observations.conditions)
+    gained = []
+    for number in np.unique(session) if session.max() > 1 else ():
+        out = session == number
+        without, extended = _held_out(before, out), _held_out(after, out)
+        if without is not None and extended is not None:
+            gained.append(float(np.sum(extended[0] - without[0])))
+    if len(gained) < 3:
+        return float("nan"), float("nan")
+    return float(np.sum(gained)) / len(session), float(np.std(gained, ddof=1) * np.sqrt(len(gained))) / len(session)
 
 
 def _folds(s: Setup, acting: Sequence[Acting]) -> tuple[str, np.ndarray]:

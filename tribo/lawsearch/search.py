@@ -10,6 +10,7 @@ from scipy.special import chdtrc
 
 from tribo.diagnostics.contrasts import allowed_wrong_form, decided, share_beyond
 from tribo.diagnostics.fit import ModelFit
+from tribo.diagnostics.inference import gain_on_sessions
 from tribo.diagnostics.replicates import as_measured, drawn_residuals, refit
 from tribo.lawsearch.grammar import WrittenLaw
 from tribo.lawsearch.model_choice import FoundLaw, choose_form
@@ -21,6 +22,8 @@ CAMPAIGNS_AT_ONCE = 20
 RESCORED, RESCORED_MEASURED = 60, 400  # best laws at the fitted noise that are scored with each campaign's own noise
 SHOWN = 25  # of the best laws, in the table
 MOST_LAWS = 3
+TIMES = {"run_order", "elapsed_s", "date"}  # what days and drift follow as well
+BEYOND_DRIFT = 2.0  # standard errors by which a law of time has to predict sessions left out better than drift
 
 
 @dataclass(frozen=True)
@@ -90,9 +93,18 @@ def discover_laws(
         if p >= level:
             break
         law = choose_form(model, grammar, best, p, rng)
+        if set(law.law.columns) <= TIMES and not _predicts_sessions(model, law.model):
+            break
         found.append(law)
         model = law.model
     return Discovery(tuple(found), table, searched)
+
+
+def _predicts_sessions(model: ModelFit, with_law: ModelFit) -> bool:
+    """Whether a law of time predicts sessions that were left out better than days and drift do; where there are too few
+    sessions to tell, it does not."""
+    gained, se = gain_on_sessions(model, with_law)
+    return gained > BEYOND_DRIFT * se
 
 
 def _scored(model: ModelFit, grammar: Grammar) -> list[tuple[WrittenLaw, float, float]]:
