@@ -29,6 +29,7 @@ def recorded() -> Conditions:
     n = len(c.sample)
     columns = {
         "operator": np.where(np.arange(n) % 3 == 0, "ann", "bo"),
+        "date": np.where(np.arange(n) % 24 < 13, "2026-03-04", "2026-03-05"),
         "batch": np.array(["a", "b", "c"] * (n // 3)),
         "oven_C": np.array(["70", "80", "95", "60"] * (n // 4)),
         "one": np.array(["same"] * n),

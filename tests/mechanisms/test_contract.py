@@ -36,7 +36,10 @@ def conditions() -> Conditions:
         temperature_C=rng.normal(23.0, 1.0, n),
         humidity_pct=rng.normal(50.0, 4.0, n),
         clip_N=np.full(n, 0.02),
-        columns={"operator": np.where(np.arange(n) % 2 == 0, "ann", "bo")},
+        columns={
+            "operator": np.where(np.arange(n) % 2 == 0, "ann", "bo"),
+            "date": np.where(np.arange(n) % 24 < 13, "2026-03-04", "2026-03-05"),
+        },
     )
 
 
@@ -158,7 +161,7 @@ def test_on_one_test_it_changes_the_force_as_its_law_does_over_the_campaign(m: M
         if here is None:
             assert whole[test] == pytest.approx(plain[test])
             continue
-        arrays = {f.name for f in fields(c)} - {"nominal_area_m2", "columns", "without", "gaps"}
+        arrays = {f.name for f in fields(c)} - {"nominal_area_m2", "columns", "without", "gaps", "mass_kg"}
         one = replace(c, **{name: getattr(c, name)[[test]] for name in arrays}, columns={"column": np.array(["this"])})
         alone = np.array([[v[test] for v in (b.static_mu, b.static_adhesion_N, b.sliding_mu, b.sliding_adhesion_N)]])
         single = Base(*alone.T, by_sample=LAWS, flat="F")
@@ -201,7 +204,7 @@ def one_run() -> Conditions:
     from dataclasses import fields, replace
 
     c = conditions()
-    arrays = {f.name for f in fields(c)} - {"nominal_area_m2", "columns", "without", "gaps"}
+    arrays = {f.name for f in fields(c)} - {"nominal_area_m2", "columns", "without", "gaps", "mass_kg"}
     return replace(c, **{name: getattr(c, name)[[23]] for name in arrays})
 
 

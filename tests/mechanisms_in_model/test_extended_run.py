@@ -31,8 +31,13 @@ ALIKE = 1e-3
 # the strength of all blocks changes by one factor; up to 0.3 % where load and adhesion change differently, because the
 # law is then extrapolated from runs at three loads. The latter are compared as means of several runs.
 SD, SD_OF_LOADED = 1e-3, 3e-3
-LOADED = {"pressure_dependent_friction", "pattern_geometry", "normal_load_error", "bulk_viscoelasticity", "humidity"}
-NO_OTHER_SLIPS = {"load_cell_offset", "load_cell_drift", "pulley_friction", "machine_compliance", "sampling_clip"}
+LOADED = {
+    "pressure_dependent_friction", "pattern_geometry", "normal_load_error", "bulk_viscoelasticity", "humidity",
+    "wrong_weight", "load_of_one_day", "area_of_one_specimen",
+}  # fmt: skip
+NO_OTHER_SLIPS = {
+    "load_cell_offset", "tare_of_one_day", "load_cell_drift", "pulley_friction", "machine_compliance", "sampling_clip",
+}  # fmt: skip
 SEEDS = range(3, 8)
 BLOCK_BY_BLOCK = {
     "velocity_dependence": 0.02,  # blocks slide faster and slower than they are pulled
@@ -99,7 +104,8 @@ def quick(key: str, config: SimConfig, base: Base, before: Run) -> tuple[float, 
 
 def _choice(key: str, config: SimConfig, conditions: Conditions) -> str:
     return {
-        "pattern_geometry": config.sample[0], "covariate": "column is this",
+        "pattern_geometry": config.sample[0], "covariate": "column is this", "load_of_one_day": "column is this",
+        "tare_of_one_day": "column is this", "wrong_weight": MECHANISMS["wrong_weight"].choosing.in_one_run(conditions),
         "mislabelled_specimen(C)": f" of {config.sample} behaves as C",
     }.get(key, "")  # fmt: skip
 

@@ -166,6 +166,7 @@ def conditions_of(
         columns=_further_columns(tests),
         pattern=np.array([p.name for p in patterns], str),
         without=_without(tests),
+        mass_kg=_numbers([t.mass_kg for t in tests] if any(t.mass_kg for t in tests) else []),
     )
     return with_gaps_filled(recorded, np.array([t.started_at[:10] for t in tests], str))
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.display import displayed
-from tribo.records import FloatArray
+from tribo.records import STANDARD_GRAVITY, FloatArray
 from tribo.user_text import are_numbers, is_number
 
 StringArray = NDArray[np.str_]
@@ -131,6 +131,7 @@ class Conditions:
     cells of columns of numbers that were filled, by the name of the field or column. ``pattern`` names the pattern of
     each test: ``Sx`` and ``Sy`` may be S along x and y, or patterns of these names. ``without`` names the mechanisms
     that were removed for a test, separated by semicolons; it is empty where none was removed for any test.
+    ``mass_kg`` is what was put on the slider; it is empty where no test states it.
     """
 
     normal_load_N: FloatArray
@@ -153,6 +154,7 @@ class Conditions:
     columns: Mapping[str, StringArray] = field(default_factory=dict)
     without: StringArray = field(default_factory=lambda: np.array([], str))
     gaps: Mapping[str, Gaps] = field(default_factory=dict)
+    mass_kg: FloatArray = field(default_factory=lambda: np.array([]))
 
     def recorded(self, name: str) -> FloatArray:
         """A column of numbers by the name of its field, (n,), NaN where none was recorded."""
@@ -164,6 +166,13 @@ class Conditions:
         if not len(self.without):
             return np.ones(len(self.normal_load_N), bool)
         return np.array([mechanism not in names_in(cell) for cell in self.without])
+
+    @property
+    def weight_N(self) -> FloatArray:
+        """Weight of what was put on the slider, (n,); the whole normal load where no mass is stated."""
+        if not len(self.mass_kg):
+            return self.normal_load_N
+        return np.where(np.isfinite(self.mass_kg), self.mass_kg * STANDARD_GRAVITY, self.normal_load_N)
 
     @property
     def pressure_Pa(self) -> FloatArray:

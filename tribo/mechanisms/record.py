@@ -61,6 +61,11 @@ def one_part(choice: str) -> tuple[str, ...]:
     return (choice,)
 
 
+def no_remedy(choice: str) -> str:
+    """What settles the mechanism does not depend on the choice."""
+    return ""
+
+
 @displayed()
 @dataclass(frozen=True)
 class Choosing:
@@ -86,6 +91,8 @@ class Choosing:
         default.
     all_or_nothing_sd
         Standard deviation of the amplitude around its start value, where the effect is present as a whole or absent.
+    remedy
+        The sentence that says what to do about a choice: "Weigh the 50 g weight."
     """
 
     label: Callable[[str], str] = unnamed
@@ -96,6 +103,7 @@ class Choosing:
     held_out: Literal["samples", "loads"] = "samples"
     parts: Callable[[str], tuple[str, ...]] = one_part
     all_or_nothing_sd: float | None = None
+    remedy: Callable[[str], str] = no_remedy
 
 
 NO_CHOICE = Choosing()

@@ -29,6 +29,10 @@ NAMES = (
     "humidity",
     "tilt",
     "mislabelled_specimen",
+    "wrong_weight",
+    "load_of_one_day",
+    "tare_of_one_day",
+    "area_of_one_specimen",
     "covariate",
 )
 

@@ -154,7 +154,8 @@ def cause_sentence(c: Cause) -> str:
     if c.changes is None:
         return f"{name}. {signs_of(m)}"
     low, high = c.changes
-    return f"{name}: {size}. With it, the calibrated model changes by {low:+.0f} to {high:+.0f} %. {signs_of(m)}"
+    said = f"{name}: {size}. With it, the calibrated model changes by {low:+.0f} to {high:+.0f} %. {signs_of(m)}"
+    return f"{said} {m.choosing.remedy(c.choice)}".rstrip() if c.choice else said
 
 
 def layer_sentence(layer: Layer) -> str:

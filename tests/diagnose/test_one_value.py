@@ -1,0 +1,69 @@
+"""Causes that are bound to one value of a recorded quantity: each is named with its value, and nothing else is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from laboratories.campaign import make
+from laboratories.handed_over import handed_over
+from laboratories.laboratory import Laboratory
+from laboratories.one_value import hide_one_value
+from mechanisms.test_contract import base, conditions
+
+from tribo.diagnostics import examine
+from tribo.diagnostics.verdict import Verdict
+from tribo.mechanisms.table import MECHANISMS
+from tribo.wording.verdict_sentences import worded
+
+PATTERNS_OFF = Laboratory(samples=("F", "A", "B", "C"), days=6, pattern_rms=0.15)
+NAMES = {
+    "weight": "wrong_weight", "tare of a day": "tare_of_one_day", "area of a specimen": "area_of_one_specimen",
+}  # fmt: skip
+
+
+@cache
+def told_of(kind: str) -> tuple[Verdict, str]:
+    """The verdict on a campaign in which a cause of this kind is hidden, and the value that it is bound to."""
+    made = make(10, PATTERNS_OFF, hide=hide_one_value(10, PATTERNS_OFF, kind))
+    return worded(examine(handed_over(made.bench, 10), seed=10, replicates=(40, 20)).verdict), made.truth["value"]
+
+
+@pytest.mark.parametrize("kind", NAMES)
+def test_the_value_that_is_off_is_named_and_no_other_cause_beside_what_cannot_be_told_from_it(kind: str) -> None:
+    v, value = told_of(kind)
+    right = {c.mechanism: c.choice for c in v.causes}
+    assert NAMES[kind] in right
+    assert f" {value.removesuffix('.0')} " in f" {right[NAMES[kind]]} "
+    assert all({NAMES[kind], name} <= set(v.equivalent[0]) for name in right if name != NAMES[kind])
+
+
+def test_the_remedy_says_which_weight_to_weigh() -> None:
+    v, value = told_of("weight")
+    assert v.causes[0].text.endswith(f"Weigh the {value.removesuffix('.0')} g weight.")
+
+
+def test_with_patterns_off_and_nothing_hidden_no_value_is_named() -> None:
+    made = make(6, PATTERNS_OFF)
+    assert examine(handed_over(made.bench, 6), seed=6, replicates=(40, 20)).verdict.causes == ()
+
+
+def test_of_three_loads_no_weight_is_said_to_be_wrong() -> None:
+    c = conditions()
+    m, b = MECHANISMS["wrong_weight"], base(c)
+    assert len(m.choices(b, c)) == 4
+    three = replace(c, normal_load_N=np.where(c.normal_load_N < 0.1, 0.25, c.normal_load_N))
+    assert m.choices(base(three), three) == ()
+
+
+def test_a_step_is_called_by_its_mass_and_the_weight_of_the_slider_stays() -> None:
+    c = conditions()
+    weighed = replace(c, mass_kg=(c.normal_load_N - 0.02) / 9.80665)
+    m, b = MECHANISMS["wrong_weight"], base(weighed)
+    choice = m.choices(b, weighed)[0]
+    assert choice.startswith("mass 4.0")
+    half = m.law(np.array([-0.5]), b, weighed, choice)
+    expected = b.static_mu * np.where(c.normal_load_N < 0.1, 0.02 + 0.04 / 2, c.normal_load_N) + b.static_adhesion_N
+    assert half.static_N == pytest.approx(expected)
