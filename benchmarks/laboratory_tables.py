@@ -97,7 +97,7 @@ def told_sizes(rows: list[Row]) -> tuple[list[tuple[str, float, bool]], list[boo
     hidden one whether it is not told of."""
     told, absent = [], []
     for row in rows:
-        layers = {x["name"]: x for x in row["layers"] if x["kind"] == "remainder"}
+        layers = {x["name"]: x for x in row["layers"] if x["kind"] == "nuisance"}
         for name, kind in TOLD_AS.items():
             hidden = row["truth"]["nuisance"].get(kind)
             if hidden is None:

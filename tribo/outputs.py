@@ -291,7 +291,7 @@ RESIDUALS = {
     "simulated_N": "force of the extended model where it was run in the simulator itself",
 }
 LAYERS = {
-    "kind": "pattern correction, cause, law, remainder, misfit, gain or rms",
+    "kind": "pattern correction, cause, law, remainder, nuisance, misfit, gain or rms",
     "name": "its name",
     "samples": "where it acts",
     "regimes": "static, sliding or both",
