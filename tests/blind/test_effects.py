@@ -28,9 +28,12 @@ sys.path.append(str(ROOT / "benchmarks"))
 
 from blind_tables import both_tied, covariate_right, part, right, share, wrong  # noqa: E402
 
+# hidden by tests/laboratories/one_value.py
+OF_ONE_VALUE = {"wrong_weight", "load_of_one_day", "tare_of_one_day", "area_of_one_specimen"}
+
 
 def test_every_mechanism_of_the_library_can_be_hidden() -> None:
-    assert {name.split(":")[0] for name in EFFECTS} - {"outside"} == set(NAMES)
+    assert {name.split(":")[0] for name in EFFECTS} - {"outside"} == set(NAMES) - OF_ONE_VALUE
     assert set(EFFECTS) - set(LARGEST) == {"covariate:operator", "load_cell_offset", "load_cell_drift"}
 
 

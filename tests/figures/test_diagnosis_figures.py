@@ -99,7 +99,8 @@ def test_what_is_expected_of_a_right_model_does_not_grow_with_how_wrong_the_camp
     found = []
     for factor in (1.0, 10.0):
         precision = np.where(patterned, factor**-2.0, f.precision)
-        wrong = replace(f, noise=replace(f.noise, pattern=factor), precision=precision)
+        sizes = np.where(np.arange(len(f.noise.sizes)) == PATTERN, factor, f.noise.sizes)
+        wrong = replace(f, noise=replace(f.noise, sizes=sizes), precision=precision)
         found.append(residuals.variance_of_mean(replace(nothing, baseline=wrong), np.array([1.0, 0.0]), sample))
     assert found[1] == pytest.approx(found[0])
 

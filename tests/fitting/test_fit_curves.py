@@ -9,7 +9,7 @@ from other_fits import POWER_LAWS, fit_errors_in_both, fit_power_law, starting_v
 
 from tribo.errors import FitError
 from tribo.fitting import fit_samples
-from tribo.fitting.linear import sample_rows, weights_of
+from tribo.fitting.linear import sample_rows
 
 AREA = 55e-6
 LOADS = np.array([0.06, 0.13, 0.26, 0.5, 0.9, 1.4])
@@ -100,11 +100,12 @@ def test_no_error_of_the_load_is_refused(constant: float, share: float) -> None:
         fit_errors_in_both(pulls(), "static", AREA, load_u_N=constant, load_u_share=share)
 
 
-def test_forces_that_are_all_zero_are_weighed_alike_and_give_a_law_of_zeros() -> None:
+def test_forces_that_are_all_zero_are_no_measurements_and_give_no_law() -> None:
     table = pulls().assign(static_N=0.0)
     rows = sample_rows(table, "static")[0]
-    np.testing.assert_array_equal(weights_of(rows, AREA, "relative"), 1.0)
-    (line,) = fit_samples(table, "static", AREA)
-    np.testing.assert_allclose(line.values, 0.0, atol=1e-12)
-    law, load, force = POWER_LAWS["pressure_power_adhesion"], rows.load_N, rows.force_N
-    np.testing.assert_array_equal(starting_values(law, load, force, AREA, 10e3), [1.0, 0.0, 0.0])
+    assert len(rows) == 0
+    assert len(rows.without_force) == len(table)
+    with pytest.raises(FitError):
+        fit_samples(table, "static", AREA)
+    law, load = POWER_LAWS["pressure_power_adhesion"], sample_rows(pulls(), "static")[0].load_N
+    np.testing.assert_array_equal(starting_values(law, load, np.zeros(len(load)), AREA, 10e3), [1.0, 0.0, 0.0])

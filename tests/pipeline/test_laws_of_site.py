@@ -41,7 +41,7 @@ def test_every_law_is_told_with_the_campaigns_it_held_in(current: Path) -> None:
     assert [(a["tested_in"], a["answer"]) for a in answers] == [("july", "not held"), ("june", "held")]
     (said,) = laws_in_words(answers)
     assert said == "may/law-1.toml (=T * exp(a x)): held in june; not held in july."
-    assert said in page([], [], [said]).replace("&#39;", "'")
+    assert said in page([], {}, [said]).replace("&#39;", "'")
 
 
 def test_a_cell_that_a_spreadsheet_would_compute_is_escaped(current: Path) -> None:
