@@ -18,9 +18,10 @@ from tribo.diagnostics import (
     weighing_table,
 )
 from tribo.diagnostics.candidates import CauseCandidate, weigh
-from tribo.diagnostics.model import Acting, candidates, effect_of
+from tribo.diagnostics.model import PATTERN, Acting, candidates, effect_of
 from tribo.diagnostics.observations import enough, observe
 from tribo.diagnostics.planning import Finding, Plan, next_test
+from tribo.diagnostics.scatter import first_noise
 from tribo.diagnostics.score_statistics import start_effects
 from tribo.errors import FitError
 from tribo.mechanisms.table import MECHANISMS
@@ -47,6 +48,16 @@ def test_a_ladder_of_speeds_and_holds_shows_both() -> None:
     found = by_name(plan_design(hidden(design=LADDER).campaign))
     assert 0 < found["velocity_dependence"].effect_percent < 30
     assert 0 < found["contact_ageing"].amplitude < 0.05
+
+
+def test_the_flat_sample_is_said_to_absorb_only_what_acts_on_a_flat_sample() -> None:
+    """Where the model for the patterns may be wrong by any amount, that looks like what acts in the cavities."""
+    noise = first_noise()
+    sizes = np.where(np.arange(len(noise.sizes)) <= PATTERN, 100.0, noise.sizes)
+    campaign = hidden(design=Design(masses_g=(25.0, 90.0))).campaign
+    found = by_name(plan_design(campaign, noise=replace(noise, sizes=sizes)))
+    assert found["pulley_friction"].why == "absorbed"
+    assert {found[name].why for name in ("suction", "edge_adhesion")} == {"hidden"}
 
 
 def test_suction_is_confused_with_a_load_error_and_named_so() -> None:

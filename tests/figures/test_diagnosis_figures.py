@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from diagnose.synthetic import hidden
+from diagnose.test_scatter import off
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -34,6 +35,12 @@ def nothing() -> Diagnosis:
     return examine(hidden(), replicates=FEW)
 
 
+@pytest.fixture(scope="module")
+def patterns_off() -> Diagnosis:
+    """Patterns six times as far from the model as its stated error, and nothing else hidden."""
+    return examine(hidden(seed=3, design=off(6.0)), replicates=FEW)
+
+
 def shown_points(figure: Figure) -> set[tuple[float, float]]:
     lines = [np.asarray(line.get_xydata(), float) for ax in figure.axes for line in ax.lines]
     xy = np.concatenate([line for line in lines if len(line)])
@@ -52,6 +59,40 @@ def test_the_heat_map_of_a_campaign_without_effect_marks_nothing(nothing: Diagno
     cells = misfit.misfit_numbers(nothing)
     assert (cells["mark"] == "").all()
     assert set(cells["observable"]) >= {"both", "static", "sliding", "drop"}
+
+
+def test_the_heat_map_marks_the_samples_that_the_verdict_says_differ_and_no_other_mean(patterns_off: Diagnosis) -> None:
+    cells = misfit.misfit_numbers(patterns_off)
+    means = cells[(cells["covariate"] == "mean") & cells["observable"].isin(["static", "sliding"])]
+    marked = means[means["p_adjusted"] < 0.01]
+    said = {(m.sample, m.observable) for m in patterns_off.verdict.misfits if m.covariate == "sample"}
+    assert said
+    assert set(zip(marked["row"], marked["observable"], strict=True)) == said
+    assert misfit.draw_misfit(cells).axes[-2].get_xticklabels()[0].get_text() == "mean"
+
+
+def test_samples_that_differ_come_first_among_the_residuals_and_points_outside_their_band_have_a_small_p(
+    patterns_off: Diagnosis,
+) -> None:
+    rows = residuals.residual_numbers(patterns_off)
+    outside = {}
+    for panel, part in rows.groupby("panel"):
+        means, bands = (part[part["mark"] == mark].set_index("x") for mark in ("mean", "band"))
+        beyond = (means["y"] < bands["y_low"]) | (means["y"] > bands["y_high"])
+        outside[part["detail"].iloc[0]] = beyond.mean()
+        assert (panel == 0) == (part["axis"].iloc[0] == "Sample")
+    assert all((share > 0.3) == (detail == "p < 0.001") for detail, share in outside.items()), outside
+    assert outside["p < 0.001"] > 0.3
+
+
+def test_the_picture_of_chance_does_not_deny_a_misfit_of_the_samples(
+    patterns_off: Diagnosis, nothing: Diagnosis
+) -> None:
+    def answer(d: Diagnosis) -> str:
+        return evidence.draw_power(evidence.power_numbers(d)).axes[0].get_title("right")
+
+    assert answer(nothing) == "no"
+    assert answer(patterns_off) == "means: yes, else: no"
 
 
 def test_the_mean_of_a_pattern_that_rubs_more_is_that_much_higher_and_no_other_is(nothing: Diagnosis) -> None:
@@ -86,8 +127,8 @@ def test_the_grey_band_is_that_of_the_means_beside_it(nothing: Diagnosis) -> Non
     inside = ((means["y"] > means["y_low_band"]) & (means["y"] < means["y_high_band"])).mean()
     assert inside > 0.9
     weight, every = np.array([1.0, 0.0]), np.arange(nothing.baseline.setup.observations.n)
-    single = np.mean([residuals.variance_of_mean(nothing, weight, every[k : k + 1]) for k in every])
-    assert residuals.variance_of_mean(nothing, weight, every) < single / 3
+    single = np.mean([residuals.variance_of_mean(nothing, weight, every[k : k + 1], stated=False) for k in every])
+    assert residuals.variance_of_mean(nothing, weight, every, stated=False) < single / 3
 
 
 def test_what_is_expected_of_a_right_model_does_not_grow_with_how_wrong_the_campaign_shows_it_to_be(
@@ -101,7 +142,8 @@ def test_what_is_expected_of_a_right_model_does_not_grow_with_how_wrong_the_camp
         precision = np.where(patterned, factor**-2.0, f.precision)
         sizes = np.where(np.arange(len(f.noise.sizes)) == PATTERN, factor, f.noise.sizes)
         wrong = replace(f, noise=replace(f.noise, sizes=sizes), precision=precision)
-        found.append(residuals.variance_of_mean(replace(nothing, baseline=wrong), np.array([1.0, 0.0]), sample))
+        wrong_in = replace(nothing, baseline=wrong)
+        found.append(residuals.variance_of_mean(wrong_in, np.array([1.0, 0.0]), sample, stated=True))
     assert found[1] == pytest.approx(found[0])
 
 

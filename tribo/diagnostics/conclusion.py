@@ -22,7 +22,7 @@ from tribo.diagnostics.inference import (
 from tribo.diagnostics.model import effect_of
 from tribo.diagnostics.planning import next_test_of
 from tribo.diagnostics.recorded_in_part import recorded_in_part
-from tribo.diagnostics.score_statistics import StartEffects
+from tribo.diagnostics.score_statistics import Absorption, StartEffects
 from tribo.diagnostics.verdict import (
     CERTAIN_CAUSES,
     UNTESTED,
@@ -124,7 +124,7 @@ def causes_from_evidence(certain: Mapping[str, tuple[Evidence, float]]) -> list[
 
 
 def exclusions(
-    conditions: Conditions, evidence: Mapping[str, Evidence], absorbed: Collection[str]
+    conditions: Conditions, evidence: Mapping[str, Evidence], absorbed: Mapping[str, Absorption]
 ) -> list[Excluded]:
     """What is not weighed: mechanisms that the design cannot show, and those that direct evidence decides."""
     excluded = []
@@ -134,7 +134,7 @@ def exclusions(
         if e is not None and m.evidence is not None and m.evidence.corrected:
             why = "zero subtracted"
         elif name in absorbed:
-            why = "absorbed"
+            why = absorbed[name]
         elif not m.applies(conditions):
             why = "recorded in part" if _recorded_in_part(m, conditions) else "not varied"
         elif e is not None and not e.certain:

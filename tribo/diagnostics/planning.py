@@ -34,7 +34,7 @@ HOURS_PER_PULL = 7.0 / 60.0
 PULLS = 18
 
 
-WhyNot = Literal["", "absorbed", "not varied", "in the trace"]
+WhyNot = Literal["", "absorbed", "hidden", "not varied", "in the trace"]
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def plan_design(
     for k in np.argsort(-length / np.maximum(size, 1e-12)):
         name, m = acting[k].name, acting[k].mechanism
         if name in effects.absorbed:
-            findings.append(_not_found(name, m, "absorbed"))
+            findings.append(_not_found(name, m, effects.absorbed[name]))
             continue
         times = NINE_IN_TEN / max(float(length[k]), 1e-12)
         alike = [acting[j].name for j in np.flatnonzero(np.abs(cosine[k]) >= ALIKE) if j != k]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,9 @@ from tribo.records import FloatArray
 
 AS_FITTED = 1  # of the steps of the sizes, the first
 TAKEN_UP = 1e-6  # share of a column's information below which nothing of it is left to see
-SEEN = 1e-3  # share of a mechanism's effect that must be left once the flat law is free
+SEEN = 1e-3  # share of a mechanism's effect that must be left once all else is free
 Index = NDArray[np.int64]
+Absorption = Literal["absorbed", "hidden"]
 
 
 @displayed()
@@ -297,8 +299,9 @@ class StartEffects:
     ``courses`` are those of the candidates ``acting`` (:func:`tribo.diagnostics.model.start_changes`), both (k,).
     ``length`` (k,) is the strength with which each would show beside the model's own columns, as a standard normal
     deviate, ``pull`` (k,) its score there and ``size`` (k,) its peak-to-peak effect in ln T beyond the law, where it
-    was computed. ``absorbed`` are the names of the mechanisms whose effect the calibration on the flat sample absorbs
-    almost wholly, at every size that a fit would start from.
+    was computed. ``absorbed`` holds the mechanisms of which almost nothing is left at every size that a fit would start
+    from: "absorbed" where the calibration on the flat sample takes up their effect, "hidden" where the errors of the
+    model for the patterns, or of specimens, days and drift, take up what the calibration leaves.
     """
 
     model: ModelFit
@@ -307,7 +310,7 @@ class StartEffects:
     length: FloatArray
     pull: FloatArray
     size: FloatArray
-    absorbed: frozenset[str]
+    absorbed: Mapping[str, Absorption]
 
 
 def start_effects(f: ModelFit) -> StartEffects:
@@ -323,12 +326,12 @@ def start_effects(f: ModelFit) -> StartEffects:
     return StartEffects(f, acting, every_course, np.sqrt(left), pull, size, _absorbed(f, every_start))
 
 
-def _absorbed(f: ModelFit, every_start: Mapping[str, FloatArray]) -> frozenset[str]:
-    names = [name for name, columns in every_start.items() for _ in range(columns.shape[2])]
-    if not names:
-        return frozenset()
-    columns = np.concatenate(list(every_start.values()), axis=2)
-    kept = np.sum(f.cleared(columns)[0] ** 2, axis=0)
-    whole = np.sum(columns**2, axis=(0, 1)) / np.mean(np.diag(f.noise.repeat))
-    seen = {name for name, k, w in zip(names, kept, whole, strict=True) if k >= SEEN * max(w, 1e-30)}
-    return frozenset(set(names) - seen)
+def _absorbed(f: ModelFit, every_start: Mapping[str, FloatArray]) -> dict[str, Absorption]:
+    found: dict[str, Absorption] = {}
+    for name, columns in every_start.items():
+        whole = np.sum(columns**2, axis=(0, 1))
+        kept = np.sum(f.cleared(columns)[0] ** 2, axis=0) * np.mean(np.diag(f.noise.repeat))
+        if columns.shape[2] and not np.any(kept >= SEEN * np.maximum(whole, 1e-30)):
+            beside_law = np.sum(f.beyond_law(columns) ** 2, axis=(0, 1))
+            found[name] = "hidden" if np.any(beside_law >= SEEN * np.maximum(whole, 1e-30)) else "absorbed"
+    return found

@@ -21,11 +21,12 @@ LayerKind = Literal["pattern_correction", "cause", "law", "remainder", "nuisance
 Nuisance = Literal["days", "drift", "specimen_drift"]
 # why a mechanism is not among the causes
 Why = Literal[
-    "zero subtracted", "absorbed", "not varied", "not certain", "only in traces", "wrong sign", "explains less",
-    "a law explains more", "not printed", "contradicted", "only with the load", "vary together", "recorded in part",
+    "zero subtracted", "absorbed", "hidden", "not varied", "not certain", "only in traces", "wrong sign",
+    "explains less", "a law explains more", "not printed", "contradicted", "only with the load", "vary together",
+    "recorded in part",
 ]  # fmt: skip
 UNTESTED: frozenset[Why] = frozenset(
-    {"absorbed", "not varied", "only in traces", "not printed", "only with the load", "vary together",
+    {"absorbed", "hidden", "not varied", "only in traces", "not printed", "only with the load", "vary together",
      "recorded in part"}
 )
 # what a further test does

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from tribo.figures import style
-from tribo.figures.misfit import mechanism_label
+from tribo.figures.misfit import mechanism_label, pattern_differences
 from tribo.records import FloatArray
 
 if TYPE_CHECKING:
@@ -142,8 +142,9 @@ POWER_FRAME_MM = 26.0
 def power_numbers(d: Diagnosis, level: float = LEVEL) -> pd.DataFrame:
     """Chance: the strongest deviation in each simulated campaign without effect. Observed: the strongest in this one.
 
-    Then one row per mechanism: the effect on T, in percent over the range of the variable, that is detected with 10, 50
-    and 90 % probability. The strength of a deviation is proportional to the effect and has a standard deviation of 1.
+    Means: by how many times its stated error the patterned samples differ from the model, where this is certain. Then
+    one row per mechanism: the effect on T, in percent over the range of the variable, that is detected with 10, 50 and
+    90 % probability. The strength of a deviation is proportional to the effect and has a standard deviation of 1.
     """
     chance = [("chance", "", float(z), *[float("nan")] * 3) for z in d.screened.chance]
     best = int(np.argmax(d.screened.strength))
@@ -152,6 +153,8 @@ def power_numbers(d: Diagnosis, level: float = LEVEL) -> pd.DataFrame:
     seen, nothing = float(d.screened.strength[best]), [float("nan")] * 3
     rows = [*chance, ("need", f"level {level:g}", need, *nothing)]
     rows.append(("observed", f"{contrast.observable}, {contrast.title}", seen, *nothing))
+    if pattern_differences(d):
+        rows.append(("means", "means of the patterned samples", d.verdict.shows.excess[0], *nothing))
     for name, percent in sorted(d.verdict.smallest_effects.items(), key=lambda item: item[1])[:SHOWN]:
         low, high = (percent * (need + s * TENTH) / need for s in (-1, 1))
         rows.append(("mechanism", name, float("nan"), low, percent, high))
@@ -192,7 +195,10 @@ def _chance(ax: Axes, numbers: pd.DataFrame) -> None:
         ax.hist(chance, bins=edges.tolist(), color="0.75")
     ax.axvline(need, color="black", ls="--", lw=0.9)
     ax.axvline(observed, color=style.VERMILLION, lw=1.6)
-    style.panel_title(ax, "Is there a misfit?", "yes" if observed > need else "no")
+    answer = "yes" if observed > need else "no"
+    if (numbers["mark"] == "means").any():
+        answer = f"means: yes, else: {answer}"
+    style.panel_title(ax, "A misfit?", answer)
     ax.set_xlabel("Strongest deviation (standard deviations)")
     ax.set_ylabel("Campaigns")
 
@@ -229,7 +235,8 @@ POWER = style.FigureOf(
     "power",
     "Effects this campaign could have detected",
     "Left: the strongest deviation in this campaign, and in simulated campaigns of the calibrated model "
-    "with the same design and noise. Right: change of T over the whole range of a variable, after the part "
+    "with the same design and noise; means of patterned samples that differ from the model by more than its stated "
+    "error are judged apart. Right: change of T over the whole range of a variable, after the part "
     "that calibration on the flat sample absorbs, that would be detected in 10 %, 50 % and 90 % of such "
     "campaigns (bar: 10 to 90 %, dot: 50 %).",
     power_numbers,

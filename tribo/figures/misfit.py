@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from tribo.diagnostics import Diagnosis
     from tribo.diagnostics.fit import ModelFit
     from tribo.diagnostics.model import Setup
+    from tribo.diagnostics.verdict import Layer
 
 
 BEND = "bend"  # the square of ln N: whether T(N) bends
@@ -133,7 +134,9 @@ def misfit_numbers(d: Diagnosis) -> pd.DataFrame:
     The model is the one calibrated on the flat sample alone. The column "mean" is the mean over a sample of
     100 (measured / model - 1); the flat sample has neither a mean nor a change with load, since the calibration absorbs
     both. ``strength`` is the signed score in standard deviations once the flat law, the model's own error of a sample
-    and the specimens are taken out; ``p_adjusted`` sets it against the strongest contrast of simulated campaigns.
+    and the specimens are taken out; ``p_adjusted`` sets it against the strongest contrast of simulated campaigns. The
+    p of a mean is that of the verdict: where the patterned samples differ from the model by more than its stated error,
+    that of the difference itself; of both regimes together the larger of the two.
     The observable "trace" has the change of the zero (of the median sliding force), of the slope of the rise and of the
     stick-slip amplitude, with the p value of a rank correlation, adjusted for the number of cells.
     """
@@ -162,10 +165,22 @@ def _cells(d: Diagnosis, columns: list[Covariate], observable: str, residual: Fl
             cells.append((row, column, _end_to_end(column, residual[here], here)))
             shapes.append(shape)
     strength = _strengths(f, np.column_stack(shapes), observable)
-    return [
-        _cell(observable, row, column, effect, float(z), d.screened.p_adjusted(abs(float(z))))
-        for (row, column, effect), z in zip(cells, strength, strict=True)
-    ]
+    of_patterns = {(c.name, r): c.p_adjusted for c in pattern_differences(d) for r in c.regimes}
+    found = []
+    for (row, column, effect), z in zip(cells, strength, strict=True):
+        p = d.screened.p_adjusted(abs(float(z)))
+        if column.name == "mean" and observable != "drop":
+            about = [r for r in ("static", "sliding") if observable in (r, "both")]
+            p = max((of_patterns[row, r] for r in about if (row, r) in of_patterns), default=p)
+        found.append(_cell(observable, row, column, effect, float(z), p))
+    return found
+
+
+def pattern_differences(d: Diagnosis) -> list[Layer]:
+    """The mean difference of every patterned sample and regime from the model, where the verdict says that these differ
+    by more than the error that is stated for the model; else none."""
+    excess = getattr(d.verdict.shows, "excess", None)
+    return [c for c in d.verdict.layers if c.kind == "pattern_correction"] if excess is not None else []
 
 
 def _shape(column: Covariate, here: np.ndarray) -> FloatArray:
@@ -244,7 +259,10 @@ def _trace_observables(d: Diagnosis) -> dict[str, FloatArray]:
 def draw_misfit(numbers: pd.DataFrame) -> Figure:
     """One panel an observable, rows the samples, columns the covariates, one colour scale."""
     panels = [(name, part) for name in TITLES if len(part := numbers[numbers["observable"] == name])]
-    labels = numbers.drop_duplicates("covariate").set_index("covariate")["label"]
+    of_most = numbers.groupby(["observable", "row"])["covariate"].transform("size")  # the flat sample has no mean
+    labels = (
+        numbers.iloc[np.argsort(-of_most, kind="stable")].drop_duplicates("covariate").set_index("covariate")["label"]
+    )
     heights = [part["row"].nunique() for _, part in panels]
     # a page that is too narrow for all columns has them in blocks, one below the other
     narrow = style.page_mm() < style.PAGE_MM
@@ -306,7 +324,9 @@ MISFIT = style.FigureOf(
     "/ model − 1). Column “bend with load”: height of the ends of the load range above its middle. Strong "
     "colours and asterisks (** p < 0.01, * p < 0.05) mark statistically significant deviations. The p values "
     "are adjusted for all comparisons: each is compared with the strongest deviation in simulated campaigns "
-    "of the calibrated model. Pale cells are not significant. Last rows: change of the zero of the force (in "
+    "of the calibrated model; where the patterned samples differ from the model by more than its stated error, "
+    "that of a mean is the p value of this difference, and the other columns are judged beside it. Pale cells are "
+    "not significant. Last rows: change of the zero of the force (in "
     "percent of the median sliding force), of the slope of the rise and of the stick-slip amplitude; their p "
     "values are those of rank correlations.",
     misfit_numbers,

@@ -14,7 +14,14 @@ from matplotlib.patches import Patch
 from tribo.diagnostics.effect_sizes import percent
 from tribo.diagnostics.model import PATTERN
 from tribo.figures import style
-from tribo.figures.misfit import LOGARITHMIC, LOGARITHMIC_AXES, REGIMES as WEIGHTS, Covariate, covariate
+from tribo.figures.misfit import (
+    LOGARITHMIC,
+    LOGARITHMIC_AXES,
+    REGIMES as WEIGHTS,
+    Covariate,
+    covariate,
+    pattern_differences,
+)
 from tribo.records import REGIMES, FloatArray
 
 if TYPE_CHECKING:
@@ -50,21 +57,31 @@ def residual_numbers(d: Diagnosis) -> pd.DataFrame:
     return pd.DataFrame([row for rows in frames for row in rows], columns=RESIDUAL_COLUMNS)
 
 
-def _panels(d: Diagnosis) -> list[tuple[Contrast, Covariate, np.ndarray, float]]:
-    """The strongest contrast with each covariate and sample, its covariate, the tests it is about, and its p."""
-    s = d.screened
-    found: dict[tuple[str, str], tuple[Contrast, Covariate, np.ndarray, float]] = {}
+Panel = tuple[str, str, Covariate, np.ndarray, float]  # observable, title, covariate, tests it is about, p
+
+
+def _panels(d: Diagnosis) -> list[Panel]:
+    """The samples, if they differ from the model by more than its stated error; then the strongest contrast with each
+    covariate and sample."""
+    s, conditions = d.screened, d.baseline.setup.observations.conditions
+    found: dict[tuple[str, str], Panel] = {}
     for k in np.argsort(-s.strength):
         contrast = s.contrasts[k]
         about = _tests_and_covariate(d, contrast)
         if about is not None and not contrast.is_taken_up(d.baseline.setup.observations.flat):
             column, here = about
             key = (column.name, contrast.sample if contrast.kind == "sample" else "")
-            found.setdefault(key, (contrast, column, here, s.p_adjusted(float(s.strength[k]))))
+            p = s.p_adjusted(float(s.strength[k]))
+            found.setdefault(key, (_observable(contrast), _title(contrast), column, here, p))
         if len(found) == MOST_PANELS:
             break
-    certain = [panel for panel in found.values() if panel[-1] < 0.05]
-    return certain or list(found.values())[:3]
+    strongest = [panel for panel in found.values() if panel[-1] < 0.05] or list(found.values())[:3]
+    if not pattern_differences(d):
+        return strongest
+    every = np.ones(len(conditions.sample), bool)
+    means: Panel = ("both", "Means", covariate(d.baseline.setup, "sample"), every, d.verdict.shows.excess[1])
+    certain = any(panel[-1] < 0.05 for panel in strongest)
+    return [means, *strongest[: MOST_PANELS - 1 if certain else 2]]
 
 
 def _tests_and_covariate(d: Diagnosis, contrast: Contrast) -> tuple[Covariate, np.ndarray] | None:
@@ -90,19 +107,16 @@ def _tests_and_covariate(d: Diagnosis, contrast: Contrast) -> tuple[Covariate, n
         return None
 
 
-def _rows(
-    d: Diagnosis, k: int, panel: tuple[Contrast, Covariate, np.ndarray, float], residual: FloatArray
-) -> list[dict[str, Any]]:
-    contrast, column, here, p = panel
+def _rows(d: Diagnosis, k: int, panel: Panel, residual: FloatArray) -> list[dict[str, Any]]:
+    observable, title, column, here, p = panel
     o = d.baseline.setup.observations
-    observable = _observable(contrast)
     weight = np.array(WEIGHTS[observable])
     samples = sorted(set(o.conditions.sample.tolist()), key=lambda s: (s != o.flat, s))
     places = {s: i for i, s in enumerate(samples)}
     x, y = column.values, percent(residual @ weight)
     added = added_by_causes(d, residual, weight)
     common = {
-        "panel": k, "title": _title(contrast), "detail": f"p {_p(p)}", "axis": column.axis,
+        "panel": k, "title": title, "detail": f"p {_p(p)}", "axis": _axis_name(column),
         "y_axis": f"{NAMES[observable]}:\nmeasured / model − 1 (%)",
     }  # fmt: skip
     tests = [
@@ -134,7 +148,8 @@ def summaries(
         at = {"x": centre, "x_name": _name(column, centre)}
         error = float(y[rows].std(ddof=1) / np.sqrt(len(rows))) if len(rows) > 1 else float("nan")
         mean = float(y[rows].mean())
-        low, high = percent(np.array([-BAND, BAND]) * np.sqrt(variance_of_mean(d, weight, rows)))
+        variance = variance_of_mean(d, weight, rows, stated=column.name == "sample")
+        low, high = percent(np.array([-BAND, BAND]) * np.sqrt(variance))
         found.append(at | {"mark": "mean", "y": mean, "y_low": mean - BAND * error, "y_high": mean + BAND * error})
         found.append(at | {"mark": "band", "y": 0.0, "y_low": float(low), "y_high": float(high)})
         if added is not None:
@@ -142,18 +157,19 @@ def summaries(
     return found
 
 
-def variance_of_mean(d: Diagnosis, weight: FloatArray, rows: np.ndarray) -> float:
+def variance_of_mean(d: Diagnosis, weight: FloatArray, rows: np.ndarray, *, stated: bool) -> float:
     """Variance of the mean residual of ``rows`` by the fitted noise: repeats, reading, specimens, error of the sample.
 
     The tests of a specimen, or of a sample, share its deviation, so that more of them do not reduce it. The error of
-    the model counts with the size that is stated for it, however far the campaign lies from the model.
+    the model for the patterns counts with the size that is ``stated`` for it, as the means of the samples are judged,
+    or with that which the campaign shows, as all else is.
     """
     f = d.baseline
-    stated = np.where(f.setup.group == PATTERN, max(f.noise.pattern, 1.0), 1.0)
+    over = np.where((f.setup.group == PATTERN) & stated, max(f.noise.pattern, 1.0), 1.0)
     repeats = np.einsum("i,nij,j->n", weight, f.noise.per_test(f.setup)[rows], weight)
     repeats += f.setup.observations.reading[rows] ** 2 @ weight**2
     shared = f.setup.take(rows).summed(weight) / len(rows)
-    return float(repeats.sum() / len(rows) ** 2 + shared**2 @ (1.0 / (stated**2 * f.precision)))
+    return float(repeats.sum() / len(rows) ** 2 + shared**2 @ (1.0 / (over**2 * f.precision)))
 
 
 def _bins(x: FloatArray, here: np.ndarray, column: Covariate) -> list[np.ndarray]:
@@ -215,7 +231,9 @@ def _residual_panel(ax: Axes, part: pd.DataFrame) -> None:
     mean = part[part["mark"] == "mean"]
     bars = np.abs(mean[["y_low", "y_high"]].to_numpy(float) - mean[["y"]].to_numpy(float)).T
     ax.errorbar(mean["x"], mean["y"], bars, fmt="o", ms=3.4, color="black", elinewidth=0.9, zorder=5)
-    if len(band) > 1:
+    if names is not None:
+        ax.bar(band["x"], band["y_high"] - band["y_low"], 0.8, band["y_low"], color="0.75", alpha=0.35, lw=0)
+    elif len(band) > 1:
         ax.fill_between(band["x"].astype(float), band["y_low"], band["y_high"], color="0.75", alpha=0.35, lw=0)
     curve = part[part["mark"] == "curve"].sort_values("x")
     step: dict[str, Any] = {"drawstyle": "steps-mid"} if names is not None else {}
@@ -403,7 +421,8 @@ RESIDUALS = style.FigureOf(
     "100 (measured / model − 1) against the recorded variable with which it varies most strongly; if no "
     "deviation is significant, against the three variables that come closest. Small points: tests; points with "
     "bars: means with twice their standard error. Band: range of 95 % of such means if the model were right, "
-    "given the scatter of repeats and specimens and the error of the model. Thick line: contribution of the "
+    "given the scatter of repeats and specimens and the error of the model: the stated one for the means of the "
+    "samples, else that which the samples of this campaign show. Thick line: contribution of the "
     "identified mechanism.",
     residual_numbers,
     draw_residuals,

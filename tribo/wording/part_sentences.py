@@ -34,6 +34,10 @@ COURSES = {
     "rising": "rising throughout", "falling": "falling throughout", "hump": "highest in the middle",
     "hollow": "lowest in the middle",
 }  # fmt: skip
+TAKEN_UP = {
+    "absorbed": "the calibration on the flat sample absorbs its effect",
+    "hidden": "the error of the model for the patterns, or a difference between specimens or days, could look the same",
+}
 MOST_LISTED, MOST_RECORDS = 6, 8
 ALONE = {
     "normal_load_N": "Pull one specimen at nine loads over the range, first upwards, then downwards",
@@ -306,7 +310,8 @@ def why_not(e: Excluded) -> str:
         most = f"at most {m.amplitude.name} = {e.shows:.2g} {m.amplitude.unit}".rstrip()
         return f"wrong sign: it can change friction in one direction only; {most} (95 %)"
     return {
-        "absorbed": f"the calibration on the flat sample absorbs its effect; to test it, {m.separates}",
+        "absorbed": f"{TAKEN_UP['absorbed']}; to test it, {m.separates}",
+        "hidden": f"{TAKEN_UP['hidden']}; to test it, {m.separates}",
         "not varied": not_varied(m.needs),
         "only in traces": m.untested,
         "not printed": m.in_table.missing,

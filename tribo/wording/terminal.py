@@ -10,7 +10,7 @@ from tribo.records import PA_PER_KPA, REGIMES, LawFit, Regime, Study
 from tribo.wording import study_sentences as study_words
 from tribo.wording.card import Card
 from tribo.wording.numerals import with_uncertainty
-from tribo.wording.part_sentences import name_in_words, not_varied
+from tribo.wording.part_sentences import TAKEN_UP, name_in_words, not_varied
 from tribo.wording.verdict_sentences import verdict_in_words
 
 HEAD = ("sample", "mu", "tau0 (kPa)", "T (N)", "mu", "tau0 (kPa)", "T (N)", "specimens", "tests")
@@ -106,7 +106,7 @@ def verdict_text(v: Verdict) -> str:
 def why_not_found(f: Finding) -> str:
     """Why a planned design cannot show a mechanism; empty where it can."""
     return {
-        "": "", "absorbed": "the calibration on the flat sample absorbs its effect",
+        "": "", **TAKEN_UP,
         "not varied": not_varied(mechanism(f.mechanism).needs),
         "in the trace": "it changes the shape of the trace, not the friction forces",
     }[f.why]  # fmt: skip
