@@ -26,6 +26,12 @@ def test_patterns_six_times_as_far_off_as_stated_are_reported_each_with_its_own_
             own[m.sample, m.observable].effect_percent, own[m.sample, m.observable].p_adjusted
         )  # fmt: skip
     assert "times the error that is stated for it" in worded(verdict).text
+    step = worded(verdict).next_test
+    assert step is not None
+    assert step.design["sample"] == verdict.misfits[0].sample
+    assert set(step.separates) <= {e.mechanism for e in verdict.not_testable}
+    assert {"velocity_dependence", "contact_ageing"} <= set(step.separates)
+    assert step.text.startswith("Vary the pull speed")
 
 
 def test_the_reported_percentages_are_those_by_which_the_patterns_were_moved() -> None:

@@ -276,7 +276,9 @@ def conclude(
         layers=tuple(layers),
         gain=gained,
         set_aside=o.set_aside,
-        next_test=next_test_of(named, outcome, misfits, o.conditions),
+        next_test=next_test_of(
+            named, outcome, misfits, o.conditions, [e.mechanism for e in barred if e.why == "hidden"]
+        ),
         smallest_effects=_smallest_effects(effects, screened.chance, {e.mechanism for e in barred}, level),
         shows=AgainstModel(
             tuple(sorted(set(o.conditions.sample.tolist()))), o.flat, excess, wrong_in_form,

@@ -5,7 +5,7 @@ best distinguishes mechanisms that explain a campaign about equally, per hour at
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -165,10 +165,16 @@ def expected_fit(campaign: Campaign, noise: Noise, law: FloatArray, predictor: P
 
 
 def next_test_of(
-    named: Named | None, outcome: Outcome, misfits: Sequence[Misfit], conditions: Conditions
+    named: Named | None, outcome: Outcome, misfits: Sequence[Misfit], conditions: Conditions, hidden: Collection[str]
 ) -> NextTest | None:
     """A test that distinguishes tied mechanisms, confirms a cause against the next best, or narrows or widens the
-    search."""
+    search; ``hidden`` are the mechanisms that the errors of the model for the patterns hide.
+
+    Samples that differ for no known reason were measured already: what can tell more is what the campaign could not
+    test, on the sample that differs most.
+    """
+    if outcome == "unknown" and misfits and misfits[0].covariate == "sample":
+        return widening_test(conditions, misfits[0].sample, hidden) or first_test_of("sample")
     if outcome == "unknown":
         return first_test_of(misfits[0].covariate) if misfits else None
     if named is None or not named.causes:
@@ -235,15 +241,21 @@ def first_test_of(covariate: str) -> NextTest:
     return NextTest("vary one column", (covariate,), design)
 
 
-def widening_test(conditions: Conditions) -> NextTest | None:
-    """For a campaign without misfit: vary what was held fixed, so that further mechanisms can be tested."""
+def widening_test(conditions: Conditions, sample: str = "", hidden: Collection[str] = ()) -> NextTest | None:
+    """Vary what was held fixed, so that further mechanisms can be tested: on the flat sample, and on ``sample``, which
+    is pulled again without those of the ``hidden`` mechanisms that can be removed."""
     fixed = {
         name: m.variation for name, m in MECHANISMS.items() if m.variation is not None and not m.applies(conditions)
     }
-    if not fixed:
+    removed = [name for name in hidden if sample and MECHANISMS[name].removed_by]
+    if not fixed and not removed:
         return None
     design: dict[str, Any] = {v.column: list(v.values) for v in fixed.values()}
-    return NextTest("vary what was fixed", tuple(fixed), design | {"pulls": PULLS, "hours": 3 * PULLS * HOURS_PER_PULL})
+    pulls = PULLS // 2 * (2 * bool(fixed) + len(removed))
+    if sample:
+        design |= {"sample": sample, "without": removed}
+    design |= {"pulls": pulls, "hours": 3 * pulls * HOURS_PER_PULL}
+    return NextTest("vary what was fixed", (*fixed, *removed), design)
 
 
 def bits(distance2: float) -> float:

@@ -340,7 +340,13 @@ def next_test_sentence(t: NextTest) -> str:
         return f"{ALONE.get(column, alone)}: {pulls} pulls."
     if t.kind == "vary what was fixed":
         varied = [v.text for name in t.separates if (v := mechanism(name).variation) is not None]
-        return f"Vary {' and '.join(varied)} in random order: {pulls} pulls of the flat sample."
+        if "sample" not in design:
+            return f"Vary {' and '.join(varied)} in random order: {pulls} pulls of the flat sample."
+        patterned, removed = design["sample"], [mechanism(name).removed_by for name in design["without"]]
+        each = f"{pulls // (len(removed) + 2 * bool(varied))} pulls of"
+        vary = f"Vary {' and '.join(varied)} in random order: {each} {patterned} and as many of the flat sample."
+        steps = [vary] if varied else []
+        return " ".join([*steps, *(f"{sentence_case(step)}: {each} {patterned}." for step in removed)])
     if t.kind == "measure more":
         counts = [(design["pulls"], "pull"), (design["loads"], "load"), (design["samples"], "sample")]
         return f"Measure at least {joined([counted(n, noun) for n, noun in counts if n > 1])}, in random order."

@@ -433,14 +433,14 @@ def why_next(v: Verdict) -> str:
         return "with fewer, nothing can be told from chance"
     if not separates:
         return "it is the most informative test"
+    if v.next_test is not None and v.next_test.kind == "vary what was fixed":
+        return f"this campaign could not test {joined(list(map(name_in_words, separates)))}"
     if v.verdict == "unknown" and not of_kind(v, "law"):
         return f"to see whether friction follows {joined(list(map(in_words, separates)))} when nothing else changes"
     for law in of_kind(v, "law"):
         if set(separates) <= {law.formula, *law.tied_with}:
             return f"it distinguishes laws of {_columns(law)} that fit equally well"
     first, *others = [in_words(s) if without_model(v) else name_in_words(s) for s in separates]
-    if v.verdict == "no_misfit" and not without_model(v):
-        return f"this campaign could not test {joined([first, *others])}"
     if others:
         tells = "it tells the effect of" if without_model(v) else "it distinguishes"
         return f"{tells} {first} from {'that of ' if without_model(v) else ''}{joined(others)}"
