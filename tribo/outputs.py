@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 FLOAT_FORMAT = "%.8g"
 # How the end of a column name says its unit; the longest ending wins.
 UNIT_ENDINGS = {
-    "_N_per_s": "N/s", "_N_per_m": "N/m", "_m_s": "m/s", "_u_kPa": "kPa", "_kPa": "kPa", "_Pa": "Pa",
+    "_N_per_s": "N/s", "_N_per_m": "N/m", "_m_s": "m/s", "_mm_s": "mm/s", "_u_kPa": "kPa", "_kPa": "kPa", "_Pa": "Pa",
     "_N": "N",
     "_u_N": "N", "_s": "s", "_m": "m", "_kg": "kg", "_deg": "degree", "_C": "degC", "_pct": "percent",
     "_percent": "percent",
@@ -149,6 +149,19 @@ RESTARTS = {
     "static_u_N": "its standard uncertainty",
     "sliding_N": "mean sliding force after it",
     "sliding_u_N": "its standard uncertainty",
+}
+PHASES = {
+    "test_id": "the test",
+    "phase": "what the rig did; see [how a record is read](../concepts/records.md)",
+    "start_s": "start of the phase on the clock of the record",
+    "end_s": "its end, which is the start of the next phase",
+    "speed_mm_s": "speed of the drive in it, as recorded",
+    "normal_load_N": "normal load in it, as recorded",
+    "cycle": "number of the cycle that a stroke belongs to; 0 for everything else",
+    "force_N": "mean force above the zero of the test",
+    "u_N": "its standard uncertainty",
+    "evidence": "what tells of its beginning",
+    "doubt": "what is doubtful about it",
 }
 FITS = {
     "sample": "sample",
@@ -357,6 +370,11 @@ PRODUCTS = (
         RESTARTS, "tribo.report.tables:restarts_table",
     ),
     Product(
+        "phases.csv", "ingest",
+        "one row per phase of a record, in the order of time: rests, rises, slides, strokes, holds and steps.",
+        PHASES, "tribo.report.tables:phases_table", "phases", "phase_row",
+    ),
+    Product(
         "fits.csv", "fit",
         "mu and tau0 of every sample and regime, with covariance and 95 % intervals: `mu_u`, `cov`, `mu_low` and so on "
         "by the combined uncertainty, which is what the report states and `tribo.fit` returns; `mu_type_a_u`, "
@@ -397,9 +415,9 @@ PRODUCTS = (
         "campaign.nc", "ingest",
         "all of the tables above but restarts, laws, dependence and differences, and the traces: HDF5 with units, "
         "readable by h5py and xarray. `xr.open_dataset(\"campaign.nc\")` gives the table of tests; "
-        "`xr.open_datatree(\"campaign.nc\")` also gives the groups `fits`, `comparison`, `simulated`, `budget` and "
-        "`traces`. In `traces`, the samples of all traces follow each other: those of trace k begin at `row_start[k]` "
-        "and are `row_size[k]` in number.",
+        "`xr.open_datatree(\"campaign.nc\")` also gives the groups `phases`, `fits`, `comparison`, `simulated`, "
+        "`budget` and `traces`. In `traces`, the samples of all traces follow each other: those of trace k begin at "
+        "`row_start[k]` and are `row_size[k]` in number.",
         origin_in=(".nc",),
     ),
     Product(

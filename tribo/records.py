@@ -85,14 +85,59 @@ class Trace:
     first_row: int = 1
 
 
+PHASES = {
+    "rest": "the bodies touch, or no load is recorded, and the drive stands still before it first moves",
+    "approach": "before the bodies touch",
+    "loading": "the normal load rises",
+    "rise": "the force climbs from rest to its static peak",
+    "slip": "the force falls from the static peak",
+    "running-in": "the force drifts towards a steady level while the drive moves",
+    "steady sliding": "the drive moves at one speed under one load",
+    "stroke": "one way of a motion to and fro",
+    "reversal": "from one stroke to the next",
+    "hold": "the drive stands still between two motions",
+    "step of speed": "from one speed to the next",
+    "step of load": "from one load to the next",
+    "end of the drive": "the drive has stopped for good, the bodies still touch",
+    "unloading": "the normal load falls",
+    "lift-off": "after the bodies came apart",
+}
+
+
 @displayed(lambda p: f"{p.name}, {p.start_s:.4g} to {p.end_s:.4g} s")
 @dataclass(frozen=True)
 class Phase:
-    """A part of a record by what the rig did, from ``start_s`` to ``end_s`` on the clock of the trace."""
+    """A part of a record by what the rig did, from ``start_s`` to ``end_s`` on the clock of the trace.
+
+    Parameters
+    ----------
+    name : str
+        What the rig did: a name in ``PHASES``.
+    start_s, end_s : float
+        Start and end in s. The phases of a record follow each other without gaps.
+    speed_m_s, normal_load_N : float
+        Mean speed of the drive in m/s (without its sign) and mean normal load in N, as recorded; NaN where they were
+        not recorded.
+    cycle : int
+        Number of the cycle that a stroke belongs to, counted from 1; 0 for everything else.
+    force_N, force_u_N : float
+        Mean force in N and its standard uncertainty: above the zero of the pull, or as recorded where there is none.
+    evidence : str
+        The channel that tells of the beginning of the phase, and how.
+    doubt : str
+        What is doubtful about it.
+    """
 
     name: str
     start_s: float
     end_s: float
+    speed_m_s: float = float("nan")
+    normal_load_N: float = float("nan")
+    cycle: int = 0
+    force_N: float = float("nan")
+    force_u_N: float = float("nan")
+    evidence: str = ""
+    doubt: str = ""
 
 
 @displayed(lambda r: f"hold {r.hold_s:.4g} s, static {r.static_N:.4g} N")
@@ -714,6 +759,7 @@ class Study:
 __all__ = [
     "CLOSED_TRACK_M",
     "PA_PER_KPA",
+    "PHASES",
     "REGIMES",
     "STANDARD_GRAVITY",
     "UNCORRECTED",

@@ -11,8 +11,8 @@ import pytest
 from tribo.errors import TraceError
 from tribo.records import Trace
 from tribo.traces import load_of, pieces_of, read_pulls, split_pulls
+from tribo.traces.cuts import reversals, steps
 from tribo.traces.evaluation import _starts_sliding as starts_sliding
-from tribo.traces.phases import reversals, steps
 
 from .synthetic import Shape
 

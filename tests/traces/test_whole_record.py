@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from tribo import read_pull
 from tribo.errors import Problem, TraceError
-from tribo.records import Pull, Test, Trace
+from tribo.records import PHASES, Pull, Test, Trace
 from tribo.traces.evaluation import drive_of
 from tribo.traces.oscillation import oscillation_of
-from tribo.traces.phases import _drive_stops, _moving
+from tribo.traces.phases import _drive_stops, _moving, phases_of
 from tribo.traces.sliding import transient_end
 from tribo.traces.zero import _level
 from tribo.zeroing import zero_choice
@@ -160,7 +161,7 @@ def test_approach_rest_and_lift_off_are_no_part_of_sliding() -> None:
     assert pull.sliding_N == pytest.approx(1.2, abs=0.02)
     assert pull.recorded_load_N == pytest.approx(5.0, abs=0.02)
     names = [phase.name for phase in pull.phases]
-    assert names == ["approach", "contact", "steady sliding", "rest", "lift-off"]
+    assert names == ["approach", "steady sliding", "end of the drive", "lift-off"]
 
 
 @pytest.mark.parametrize("impulses", [0, 100])
@@ -361,3 +362,23 @@ def test_what_a_zero_drifts_is_in_its_uncertainty_as_a_rectangular_distribution(
     assert drifting.drifts
     assert drifting.force_N == pytest.approx(0.25, abs=1e-3)
     assert drifting.u_N == pytest.approx(0.4 / math.sqrt(12.0), rel=0.01)
+
+
+def seconds_of(trace: Trace) -> list[tuple[str, float, float]]:
+    return [(phase.name, phase.start_s, phase.end_s) for phase in phases_of(trace)]
+
+
+@pytest.mark.parametrize("trace", [rotary(), with_a_stop(), slide_hold_slide((5.0, 20.0), (2.2, 2.35)), sawtooth()])
+def test_phases_follow_each_other_from_the_first_sample_to_the_last(trace: Trace) -> None:
+    found = seconds_of(trace)
+    assert found[0][1] == trace.time_s[0]
+    assert found[-1][2] == trace.time_s[-1]
+    assert all(end == start for (*_, end), (_, start, _) in pairwise(found))
+    assert all(start < end and name in PHASES for name, start, end in found)
+
+
+def test_a_stop_is_a_hold_and_the_climb_after_it_a_rise() -> None:
+    found = seconds_of(slide_hold_slide((20.0,), (2.35,)))
+    slide = ["rise", "slip", "steady sliding"]
+    assert [name for name, *_ in found] == ["rest", *slide, "hold", *slide]
+    assert found[4][1:] == pytest.approx((760 / RATE, 1760 / RATE), abs=0.1)

@@ -52,8 +52,8 @@ def write_tables(
     Returns
     -------
     list of Path
-        tests.csv, and restarts, fits, other_fits, laws, dependence, budget, differences, comparison, diagnosis and
-        layers as far as the study went.
+        tests.csv, and restarts, phases, fits, other_fits, laws, dependence, budget, differences, comparison,
+        diagnosis and layers as far as the study went.
     """
     made = tables_of(study, diagnosis) if tables is None else tables
     return [outputs.write(out, name, table) for name, table in made.items()]
@@ -136,6 +136,21 @@ def restarts_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | N
         for number, restart in enumerate(pulls[test.test_id].restarts, start=1)
     ]
     return pd.DataFrame(rows, columns=names) if rows else None
+
+
+def phases_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
+    """One row per phase of every record that was read; None where forces were evaluated elsewhere alone."""
+    pulls = study.ingested.pulls
+    rows = [
+        (
+            test.test_id, p.name, p.start_s, p.end_s, 1e3 * p.speed_m_s, p.normal_load_N, p.cycle, p.force_N,
+            p.force_u_N, p.evidence, p.doubt,
+        )
+        for test in study.ingested.campaign.tests
+        if test.test_id in pulls
+        for p in pulls[test.test_id].phases
+    ]  # fmt: skip
+    return pd.DataFrame(rows, columns=outputs.product("phases.csv").column_names) if rows else None
 
 
 def fits_of_study(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:

@@ -1,3 +1,4 @@
+from .cuts import split_pulls as split_pulls
 from .evaluation import (
     PullOptions as PullOptions,
     evaluate as evaluate,
@@ -5,6 +6,6 @@ from .evaluation import (
     read_pulls as read_pulls,
 )
 from .oscillation import oscillation_of as oscillation_of
-from .phases import split_pulls as split_pulls
+from .phases import phases_of as phases_of
 from .rules import RULES as RULES, Rule as Rule
 from .zero import load_of as load_of

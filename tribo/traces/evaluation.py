@@ -18,6 +18,7 @@ import numpy as np
 from tribo.display import displayed
 from tribo.errors import Problem, TraceError
 from tribo.records import STANDARD_GRAVITY, FloatArray, Phase, Pull, Restart, Test, Trace
+from tribo.traces.cuts import directions_of, piece_of, split_pulls
 from tribo.traces.loading import Zero, loading_of, starting_level
 from tribo.traces.oscillation import oscillation_of
 from tribo.traces.peak import (
@@ -30,7 +31,7 @@ from tribo.traces.peak import (
     with_peak_near,
     within_samples,
 )
-from tribo.traces.phases import Course, course_of, directions_of, piece_of, split_pulls
+from tribo.traces.phases import Course, course_of, phases_of
 from tribo.traces.rules import DEFAULT_RULE, Rule, named_rule
 from tribo.traces.signal import Signal, line, median_of_three, signal_of, steady
 from tribo.traces.sliding import Sliding, slides_on_closed_track, sliding_over, transient_end, window_between
@@ -160,7 +161,7 @@ def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
     if options.turned or options.begins == "reversal":
         flags.append("backward" if options.turned else "forward")
     pull = replace(
-        pull, test_id=test.test_id, flags=tuple(dict.fromkeys(flags)), phases=_phases(pull, signal, course),
+        pull, test_id=test.test_id, flags=tuple(dict.fromkeys(flags)), phases=_phases(trace, pull, signal, course),
         problems=tuple(p.at(file=trace.file or None, test_id=test.test_id) for p in (*doubts, *pull.problems)),
     )  # fmt: skip
     if "no_time" in trace.flags:  # path stands for time, so nothing can be counted per second
@@ -535,28 +536,10 @@ def _doubts(trace: Trace, pull: Pull, test: Test) -> list[Problem]:
     return found
 
 
-def _phases(pull: Pull, signal: Signal, course: Course) -> tuple[Phase, ...]:
-    """The phases of a record in their order: what was picked, in the terms of the report."""
-    time, last = signal.time_s, signal.time_s.size - 1
-    begin, end = float(time[course.contact[0]]), float(time[min(course.end, last)])
-    stops = [(float(time[a]), float(time[b])) for a, b in course.stops]
-    found = []
-    if course.begins_before_contact:
-        found += [Phase("approach", float(time[0]), begin), Phase("contact", begin, begin)]
-    until = stops[0][0] if stops else end
+def _phases(trace: Trace, pull: Pull, signal: Signal, course: Course) -> tuple[Phase, ...]:
+    """The phases of a record, with the starts that were read from it and forces above its zero."""
+    starts = [(r.stop_s + r.hold_s, r.peak_s) for r in pull.restarts]
     if math.isfinite(pull.peak_s):
-        found += [Phase("rest", begin, pull.onset_s)] if pull.onset_s > begin else []
-        begin = pull.window_s[0] if pull.peak_s < pull.window_s[0] < until else until
-        found += [Phase("rise", pull.onset_s, pull.peak_s), Phase("slip", pull.peak_s, begin)]
-    if begin < until:
-        regime = pull.oscillation.regime if pull.oscillation else "steady"
-        found.append(Phase("steady sliding" if regime == "steady" else f"sliding ({regime})", begin, until))
-    peaks = {restart.stop_s: restart.peak_s for restart in pull.restarts}
-    for (stop, restart), until in zip(stops, [*(stop for stop, _ in stops[1:]), end], strict=False):
-        peak = peaks.get(stop, restart)
-        found += [Phase("hold", stop, restart), Phase("reactivation", restart, peak), Phase("sliding", peak, until)]
-    if course.end <= last:
-        rest = float(time[min(course.contact[1], last)])
-        found += [Phase("rest", end, rest)] if rest > end else []
-        found += [Phase("lift-off", rest, float(time[-1]))] if rest < time[-1] else []
-    return tuple(found)
+        starts.append((pull.onset_s, pull.peak_s))
+    found = phases_of(trace, signal=signal, course=course, starts_s=starts)
+    return tuple(replace(phase, force_N=phase.force_N - pull.zero_N) for phase in found)

@@ -1,20 +1,22 @@
-"""The phases of a record, by its channels and its force, and where a record of several pulls is cut.
+"""The phases of a record, by its channels and its force.
 
-:func:`course_of` tells when the bodies touch, when the drive moves, stops and goes on; :func:`split_pulls` cuts a
-record at reversals of the force and at steps of load or speed.
+:func:`course_of` tells when the bodies touch, when the drive moves, stops and goes on; :func:`phases_of` names every
+part of the record.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.records import FloatArray, Trace
-from tribo.traces.loading import starting_level
+from tribo.errors import TraceError
+from tribo.records import FloatArray, Phase, Trace
+from tribo.traces.cuts import reversals, steps
+from tribo.traces.loading import loading_of, starting_level
 from tribo.traces.signal import (
     MINIMUM_SAMPLES,
     Signal,
@@ -23,9 +25,10 @@ from tribo.traces.signal import (
     noise_of,
     running_mean,
     runs_of,
-    sample_noise,
+    signal_of,
     wander,
 )
+from tribo.traces.sliding import transient_end
 
 Mask = NDArray[np.bool_]
 Range = tuple[int, int]
@@ -49,12 +52,9 @@ _RETURNS = 0.02  # share of the later part of a record that lies below the force
 _UNPULLED = 0.3  # share of the usual force below which a record begins with nothing pulled
 _NEAR = 0.1  # share of its swing below the lowest later force from which on a record begins at rest
 _FELT = 12.0  # a friction force is at least this many times the noise
-_REVERSED = 0.25  # share of its swing by which a force passes the middle before its direction counts as reversed
-_OF_SPAN = 0.2  # a step is at least this share of the span of its channel,
-_OF_LEVEL = 0.05  # this share of its level,
-_OF_NOISE = 6.0  # and this many times the noise of the difference
-_FRAGMENT = 0.2  # share of the median piece below which a piece is what a cut left over
-_MIDDLE = (0.3, 0.7)  # share of a stroke in which its force is taken to tell its direction and zero
+_LEFT = 0.2  # share of the way to the other level from which on a force has left the old one
+_DRIFTS = 0.02  # share of the later force by which the force before it differs at the least where it still runs in,
+_CLEARLY_DRIFTS = 4.0  # and this many times the uncertainty of the difference
 
 
 @dataclass(frozen=True)
@@ -269,137 +269,164 @@ def _returns(signal: Signal, span: Range) -> bool:
     return bool(felt and in_range and start > _UNPULLED * float(np.median(later)))
 
 
-def split_pulls(trace: Trace) -> tuple[Trace, ...]:
-    """Split a record where a new pull begins: at a reversal of the force, a step of the load, a step of the speed.
+def phases_of(
+    trace: Trace,
+    contact: str = "",
+    *,
+    signal: Signal | None = None,
+    course: Course | None = None,
+    starts_s: Sequence[tuple[float, float]] | None = None,
+) -> tuple[Phase, ...]:
+    """Every part of a record by what the rig did, in order of time, without gaps and overlaps.
 
-    Load and speed are taken from ``columns`` ("normal_force_N", "speed_m_s"). The transition from one steady load or
-    speed to the next belongs to no pull. A start from rest is not a step: the data before it give the zero. A record
-    without any of these is returned unchanged. Pieces are named ``name/1``, ``name/2``; those under twenty samples or
-    a fifth of the median are left out.
+    Parameters
+    ----------
+    trace : Trace
+        The record.
+    contact : str
+        As stated in campaign.toml: sled, pin_on_disc, ball_on_disc, ring_shear, reciprocating or rotary.
+    signal, course : optional
+        The same of the record, where they are at hand.
+    starts_s : sequence of (onset, peak), optional
+        Times at which the force begins to rise from rest and at which it has its static peak, for every start that is
+        known; else they are looked for.
+
+    Raises
+    ------
+    TraceError
+        The record holds no signal that can be read.
     """
-    cuts = [(k, k) for k in reversals(trace.force_N)]
-    if (load := trace.columns.get("normal_force_N")) is not None:
-        cuts += steps(load)
-    if (speed := trace.columns.get("speed_m_s")) is not None:
-        moving = np.abs(speed)
-        rest = _AT_REST * float(moving.max())
-        cuts += [(a, b) for a, b in steps(moving) if moving[max(a - 1, 0)] > rest]
-    if not cuts:
-        return (trace,)
-    stretches = [(a, b) for a, b in between(cuts, trace.time_s.size) if b - a >= MINIMUM_SAMPLES]
-    if speed is not None:
-        stretches = [(a, b) for a, b in stretches if (moving[a:b] > rest).any()] or stretches
-    shortest = _FRAGMENT * float(np.median([b - a for a, b in stretches])) if stretches else 0.0
-    kept = [(a, b) for a, b in stretches if b - a >= shortest] or [(0, trace.time_s.size)]
-    return tuple(piece_of(trace, a, b, f"{trace.name}/{k}") for k, (a, b) in enumerate(kept, start=1))
+    signal = signal or signal_of(trace)
+    course = course or course_of(trace, signal)
+    spans: list[_Span] = []
+    samples = signal.time_s.size
+    if course.begins_before_contact:
+        spans.append(_Span("approach", 0, course.contact[0], "the load is level and low"))
+    for k, (first, last) in enumerate(course.pieces):
+        if k:
+            spans.append(_Span("hold", first, course.stops[k - 1][1], "the drive stands still"))
+            first = course.stops[k - 1][1]
+        from_rest = k > 0 or not course.starts_sliding
+        start = _start_from_rest(signal, (first, last), starts_s) if from_rest else None
+        spans += _motion(trace, signal, (first, last), start, k)
+    touching, end = course.contact[1], course.end
+    if end < touching:
+        spans.append(_Span("end of the drive", end, touching, "the drive stands still until the end"))
+    if touching < samples:
+        spans.append(_Span("lift-off", touching, samples, "the load has fallen back"))
+    return tuple(_phase(trace, signal, span) for span in spans if span.last > span.first)
 
 
-def piece_of(trace: Trace, start: int, end: int, name: str) -> Trace:
-    """The samples ``start`` to ``end`` of a trace as a trace of their own."""
-    part = slice(start, end)
-    return replace(
-        trace,
-        name=name,
-        time_s=trace.time_s[part],
-        force_N=trace.force_N[part],
-        displacement_m=None if trace.displacement_m is None else trace.displacement_m[part],
-        columns={quantity: values[part] for quantity, values in trace.columns.items()},
-        first_row=trace.first_row + start,
-    )
+@dataclass(frozen=True)
+class _Span:
+    """A phase as a range of samples."""
+
+    name: str
+    first: int
+    last: int
+    evidence: str = ""
+    doubt: str = ""
+    cycle: int = 0
 
 
-def reversals(force_N: FloatArray) -> list[int]:
-    """Indices at which the pull changes direction: the force passes from one side of its middle to the other.
-
-    The middle lies half-way between the 5th and 95th percentile; it counts as passed once the force is a quarter of
-    their distance beyond it. A force that has only one sign, or hardly leaves zero on the other side, is not reversed.
-    """
-    if -float(force_N.min()) < _REVERSED * float(np.median(force_N)):
-        return []  # as below, without the percentiles, which take longer
-    low, high = np.percentile(force_N, (5.0, 95.0))
-    if min(high, -low) < _REVERSED * max(high, -low):
-        return []
-    middle, swing = (high + low) / 2.0, (high - low) / 2.0
-    calm = median_of_three(force_N)
-    side = np.where(calm > middle + _REVERSED * swing, 1, np.where(calm < middle - _REVERSED * swing, -1, 0))
-    decided = np.flatnonzero(side)
-    changed = np.flatnonzero(np.diff(side[decided]))
-    before, after = decided[changed], decided[changed + 1]
-    return [
-        int(a) + 1 + int(np.argmin(np.abs(force_N[a + 1 : b + 1] - middle))) for a, b in zip(before, after, strict=True)
-    ]
-
-
-def steps(values: FloatArray) -> list[tuple[int, int]]:
-    """(end of the old level, start of the new one) wherever a channel steps or ramps from one level to another.
-
-    The means before and after every sample are compared, over a hundredth of the record (five samples at the least) for
-    sharp steps, then between those over a twenty-fifth for slow ramps. A step is at least 20 % of the channel's span,
-    5 % of its level, and six times the noise of such a difference and what is typical of it.
-    """
-    n = values.size
-    found: list[tuple[int, int]] = []
-    for width, sharp in ((max(5, n // 100), True), (max(5, n // 25), False)):
-        span = float(np.ptp(np.percentile(running_mean(values, width), (1.0, 99.0)))) if n else 0.0
-        least = max(_OF_SPAN * span, _OF_LEVEL * float(np.abs(values).max(initial=0.0)))
-        found += [
-            (start + a, start + b)
-            for start, end in between(found, n)
-            for a, b in _steps_over(values[start:end], width, least, sharp)
-        ]
-    return sorted(found)
+def _start_from_rest(
+    signal: Signal, span: Range, starts_s: Sequence[tuple[float, float]] | None
+) -> tuple[int, int] | None:
+    """Samples of the onset and of the static peak of a motion from rest; None where no rise was seen."""
+    first, last = span
+    time = signal.time_s
+    if starts_s is not None:
+        for onset_s, peak_s in starts_s:
+            if time[first] <= peak_s <= time[last - 1]:
+                return max(int(np.searchsorted(time, onset_s)), first), int(np.searchsorted(time, peak_s))
+        return None
+    part = slice(first, last)
+    try:
+        loading = loading_of(
+            replace(
+                signal, time_s=time[part], force_N=signal.force_N[part], calm_N=signal.calm_N[part],
+                smooth_N=signal.smooth_N[part], recorder_fault=None,
+            )
+        )  # fmt: skip
+    except TraceError:
+        return None
+    return first + int(np.searchsorted(time[part], loading.onset_s)), first + loading.top
 
 
-def between(passages: Sequence[tuple[int, int]], samples: int) -> list[tuple[int, int]]:
-    """What passages leave of a record, as (start, end) of every stretch."""
-    ordered = sorted(passages)
-    return list(zip([0, *(b for _, b in ordered)], [*(a for a, _ in ordered), samples], strict=True))
+def _motion(trace: Trace, signal: Signal, span: Range, start: tuple[int, int] | None, number: int) -> Iterator[_Span]:
+    """The phases of one motion of the drive, from its start to its stop."""
+    first, last = span
+    if start is not None:
+        onset, peak = start
+        if number == 0:
+            yield _Span("rest", first, onset, "the force before the first rise")
+            yield _Span("rise", onset, peak, "the force climbs")
+        else:
+            yield _Span("rise", first, peak, "the force climbs after the stop")
+        first = peak
+    cuts = [(*_reversal(signal, (first, last), first + k), "reversal") for k in reversals(signal.force_N[first:last])]
+    for name, quantity in (("step of load", "normal_force_N"), ("step of speed", "speed_m_s")):
+        if (values := trace.columns.get(quantity)) is not None and not cuts:
+            cuts += [(first + a, first + max(b, a + 1), name) for a, b in steps(np.abs(values[first:last]))]
+    least = max(_FEWEST_AT_REST, (last - first) // 100)
+    cuts = [cut for cut in cuts if cut[0] - first >= least and last - cut[1] >= least]
+    cuts = [cut for k, cut in enumerate(sorted(cuts)) if k == 0 or cut[0] >= sorted(cuts)[k - 1][1]]
+    to_and_fro = any(name == "reversal" for *_, name in cuts)
+    begin, evidence = first, "the force after the peak" if start else "the drive moves"
+    for k, (a, b, name) in enumerate([*cuts, (last, last, "")]):
+        if to_and_fro:
+            yield _Span("stroke", begin, a, evidence, cycle=k // 2 + 1)
+        else:
+            yield from _slide(signal, begin, a, evidence, after_peak=k == 0 and start is not None)
+        told = {"reversal": "the force changes sides", "step of load": "the load", "step of speed": "the speed"}
+        yield _Span(name, a, b, told.get(name, ""))
+        begin, evidence = b, f"after the {name}"
 
 
-def _steps_over(values: FloatArray, width: int, least: float, sharp: bool) -> list[tuple[int, int]]:
-    """Steps of one stretch as means over ``width`` samples show them; a ``sharp`` one is a cut, a ramp is left out.
-
-    The means before and after each sample are compared; at the ends the first and last mean are repeated.
-    """
-    if values.size < 4 * width:
-        return []
-    total = np.concatenate(([0.0], np.cumsum(values)))
-    means = (total[width:] - total[:-width]) / width
-    index = np.arange(values.size)
-    before, after = means[np.clip(index - width, 0, means.size - 1)], means[np.clip(index, 0, means.size - 1)]
-    jump = np.abs(after - before)
-    noise = max(sample_noise(values) * math.sqrt(2.0 / width), float(np.median(jump)))
-    found = []
-    for a, b in (map(int, run) for run in zip(*runs_of(jump > max(least, _OF_NOISE * noise)), strict=True)):
-        steepest = a + int(np.argmax(jump[a:b]))
-        found.append((steepest, steepest) if sharp and b - a <= 2 * width else (a, b))
-    return found
+def _reversal(signal: Signal, span: Range, at: int) -> Range:
+    """The samples in which the force passes from one level to the other around a reversal."""
+    force = signal.calm_N
+    reach = max(MINIMUM_SAMPLES, (span[1] - span[0]) // 100)
+    low, high = max(at - reach, span[0]), min(at + reach, span[1])
+    old, new = float(np.median(force[low:at])), float(np.median(force[at:high]))
+    share = (force[low:high] - old) / (new - old) if new != old else np.zeros(high - low)
+    leaves, arrives = np.flatnonzero(share[: at - low] < _LEFT), np.flatnonzero(share[at - low :] > 1.0 - _LEFT)
+    first = low + int(leaves[-1]) + 1 if leaves.size else low
+    return first, max(at + int(arrives[0]) if arrives.size else high, first + 1)
 
 
-def directions_of(
-    pieces: Sequence[Trace], zeros_N: Sequence[float]
-) -> tuple[tuple[int, ...], tuple[float, float] | None]:
-    """The direction of each piece, 1 or -1, and the zero (N, standard uncertainty) that strokes both ways share.
+def _slide(signal: Signal, first: int, last: int, evidence: str, *, after_peak: bool) -> Iterator[_Span]:
+    """The slip after a peak, the running-in and the steady part of a slide at one speed under one load."""
+    smooth = signal.smooth_N[first:last]
+    if after_peak and smooth.size:
+        fallen = first + int(np.argmax(smooth <= np.median(smooth)))
+        yield _Span("slip", first, fallen, evidence)
+        first, evidence = fallen, "the force has come down to its later level"
+    force = signal.force_N[first:last]
+    if force.size >= 4 * MINIMUM_SAMPLES:
+        settled = transient_end(force)
+        early, late = force[: max(settled, 1)], force[settled:]
+        away = abs(float(early.mean() - late.mean()))
+        u = math.hypot(wander(early, 1.0)[0], wander(late, 1.0)[0]) if settled >= MINIMUM_SAMPLES else math.inf
+        if away > max(_CLEARLY_DRIFTS * u, _DRIFTS * abs(float(late.mean()))):
+            yield _Span("running-in", first, first + settled, evidence)
+            first, evidence = first + settled, "the force has stabilised"
+    yield _Span("steady sliding", first, last, evidence)
 
-    The force of a piece is its mean over the middle (30 to 70 %) above a zero that is known, else above none. Strokes
-    go both ways where these forces have both signs; the direction is then the side of their midpoint. Friction is
-    assumed equal in both directions, so the zero is half the sum of the means of the two; its uncertainty comes from
-    their scatter, or from within strokes. None where all pieces go one way.
-    """
-    middles = []
-    for piece in pieces:
-        start, end = (int(share * piece.force_N.size) for share in _MIDDLE)
-        middles.append(piece.force_N[start : max(end, start + 1)])
-    forces = np.array([float(f.mean()) for f in middles]) - np.array(zeros_N)
-    if not forces.min() < 0 < forces.max():
-        return tuple(-1 if force < 0 else 1 for force in forces), None
-    u = np.array([wander(f, 1.0)[0] for f in middles])
-    side = np.where(forces >= (forces.max() + forces.min()) / 2.0, 1, -1)
-    means, us = [], []
-    for sign in (1, -1):
-        mine = side == sign
-        count = int(mine.sum())
-        means.append(float(forces[mine].mean()))
-        scatter = float(forces[mine].std(ddof=1)) / math.sqrt(count) if count > 1 else 0.0
-        us.append(max(scatter, float(np.sqrt((u[mine] ** 2).sum())) / count))
-    return tuple(int(s) for s in side), (sum(means) / 2.0, math.hypot(*us) / 2.0)
+
+def _phase(trace: Trace, signal: Signal, span: _Span) -> Phase:
+    """A phase with the means of its channels."""
+    part = slice(span.first, span.last)
+    time = signal.time_s
+
+    def mean_of(quantity: str) -> float:
+        values = trace.columns.get(quantity)
+        return math.nan if values is None else abs(float(np.mean(values[part])))
+
+    force = signal.force_N[part]
+    force_u = wander(force, float(time[span.last - 1] - time[span.first]))[0] if force.size > 1 else math.nan
+    end = float(time[min(span.last, time.size - 1)])
+    return Phase(
+        span.name, float(time[span.first]), end, mean_of("speed_m_s"), mean_of("normal_force_N"), span.cycle,
+        float(force.mean()), force_u, span.evidence, span.doubt,
+    )  # fmt: skip
