@@ -25,7 +25,7 @@ def test_patterns_six_times_as_far_off_as_stated_are_reported_each_with_its_own_
         assert (m.effect_percent, m.p_adjusted) == (
             own[m.sample, m.observable].effect_percent, own[m.sample, m.observable].p_adjusted
         )  # fmt: skip
-    assert "times the error that is stated for it" in worded(verdict).text
+    assert "times its stated error for patterns" in worded(verdict).text
     step = worded(verdict).next_test
     assert step is not None
     assert step.design["sample"] == verdict.misfits[0].sample

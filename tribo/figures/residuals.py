@@ -409,7 +409,8 @@ def _finding_legend(numbers: pd.DataFrame) -> list[Any]:
 FINDING = style.FigureOf(
     "finding",
     "What was found",
-    "100 (measured / model − 1) against what it follows, for the model calibrated on the flat sample. Points "
+    "Measured over modelled friction, less one, in percent, against the quantity that it follows. The model is "
+    "calibrated on the flat sample. Points "
     "with bars: means with twice their standard error. Band: range of 95 % of such means if the model were "
     "right. Thick line, if a cause is named: what it adds. Small points, if shown: tests.",
     finding_numbers,

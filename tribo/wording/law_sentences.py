@@ -187,11 +187,11 @@ def across_sentence(found: Sequence[LawsAcross]) -> str:
         )
     best = min(found, key=lambda s: s.best.error)
     return (
-        f"No law across the patterns is beyond chance. The best one, {formula(best.best)}, predicts patterns that it "
-        f"was not fitted to within {_factor(best.best.error)}, where the model alone is wrong by "
-        f"{_factor(without)}; but a search with the deviations assigned to other patterns does as well in "
-        f"{100 * best.p:.0f} % of all assignments, and a law that is also chosen without the pattern it predicts is "
-        f"wrong by {_factor(best.nested)}. {_tried(best)}"
+        f"No law of the geometry predicts these differences beyond chance. The best one, {formula(best.best)}, predicts "
+        f"patterns that it was not fitted to within {_factor(best.best.error)}; the model alone, within "
+        f"{_factor(without)}. Where the differences are exchanged between the patterns at random, the best law is as "
+        f"good in {100 * best.p:.0f} % of the cases. Chosen without the pattern that it predicts, it is wrong by "
+        f"{_factor(best.nested)}. {_tried(best)}"
     )
 
 

@@ -282,8 +282,8 @@ def _evidence(v: Verdict) -> Iterator[str]:
     if shows.excess is not None:
         factor, p = shows.excess
         yield (
-            f"The patterned samples differ from the model by about {factor:.1f} times the error that is "
-            f"stated for it (p {p_text(p)} for a factor of at most {WITHIN:g})."
+            f"The patterned samples differ from the model by about {factor:.2g} times its stated error for patterns; a "
+            f"true factor of {WITHIN:g} or less is excluded with p {p_text(p)}."
         )
     yield from map(in_part_sentence, shows.in_part)
     if shows.known:
