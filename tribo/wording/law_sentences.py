@@ -187,7 +187,7 @@ def across_sentence(found: Sequence[LawsAcross]) -> str:
         )
     best = min(found, key=lambda s: s.best.error)
     return (
-        f"No law of the geometry predicts these differences beyond chance. The best one, {formula(best.best)}, predicts "
+        f"No law across the patterns is beyond chance. The best one, {formula(best.best)}, predicts "
         f"patterns that it was not fitted to within {_factor(best.best.error)}; the model alone, within "
         f"{_factor(without)}. Where the differences are exchanged between the patterns at random, the best law is as "
         f"good in {100 * best.p:.0f} % of the cases. Chosen without the pattern that it predicts, it is wrong by "
