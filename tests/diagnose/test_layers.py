@@ -53,6 +53,22 @@ def test_three_causes_at_once_are_all_named() -> None:
     assert {layer.name for layer in v.layers if layer.kind == "cause"} == {"tilt", "run_in", "temperature"}
 
 
+def test_a_cause_that_follows_a_recorded_column_is_told_from_its_lowest_to_its_highest_recorded_value() -> None:
+    ladder = Design(samples=("F", "A", "B"), masses_g=(12.0, 50.0, 138.5), speeds_mm_s=(0.05, 0.2, 0.8))
+
+    def faster_slides_harder(s: Setup) -> np.ndarray:
+        return 0.08 * np.log(s.observations.conditions.speed_m_s)[:, None] * np.array([0.0, 1.0])
+
+    v = worded(examine(made(faster_slides_harder, seed=3, design=ladder), replicates=FEW).verdict)
+    (layer,) = [layer for layer in v.layers if layer.kind == "cause"]
+    assert layer.over is not None
+    assert layer.over["column"] == "speed_m_s"
+    assert (layer.over["from"], layer.over["to"]) == pytest.approx((5e-5, 8e-4))
+    assert layer.over["low"] < 100 * (16**0.08 - 1) < layer.over["high"]
+    assert "as the pull speed rises from 0.05 to 0.8 mm/s" in v.sentence
+    assert "up to" not in v.sentence
+
+
 def test_a_cause_is_certain_although_something_without_a_law_is_left(beside: Diagnosis) -> None:
     v = beside.verdict
     assert v.verdict == "partly"

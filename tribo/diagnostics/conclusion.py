@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -43,6 +45,8 @@ from tribo.records import REGIMES, FloatArray
 Weighed = tuple[CauseCandidate, float, Mapping[str, Estimate]]  # with its share and its parameters
 SHOWN = 8
 SHARE = 0.1  # of the largest effect, above which a cause is said to act on a sample or in a regime
+RECORDED = ("speed_m_s", "hold_s", "temperature_C", "humidity_pct", "specimen_run", "elapsed_s")
+END = 0.02  # share of the tests that have the lowest or the highest values of a column, at least
 NEEDED = 3.7  # strength that chance reaches in one campaign of a hundred, where none was simulated
 
 
@@ -206,8 +210,36 @@ def cause_layers(
             parameters=parameters, formula=m.formula, tied_with=tuple(c.name for c in tied),
             gain=gain(without, beside.fit, rng), choice=acting.choice, most=(REGIMES[regime], str(sample[test]), load),
         )  # fmt: skip
-        layers.append(layer)
+        layers.append(replace(layer, over=_over_recorded_values(best, parameters[m.amplitude.name], layer)))
     return layers
+
+
+def _over_recorded_values(best: CauseCandidate, amplitude: Estimate, layer: Layer) -> dict[str, Any] | None:
+    """``Layer.over``: the mean over the tests with the highest values of the column, less that over the lowest."""
+    f, acting = best.fit, best.acting
+    c = f.setup.observations.conditions
+    needs = [name for name in acting.mechanism.needs if name in RECORDED]
+    column = needs[0] if needs else acting.choice if acting.mechanism.any_column else ""
+    try:
+        x = c.recorded(column) if column in RECORDED else np.asarray(c.columns[column], float)
+    except (KeyError, ValueError):
+        return None
+    here = np.flatnonzero(np.isin(c.sample, layer.samples) & np.isfinite(x))
+    if not len(here) or np.ptp(x[here]) == 0.0:
+        return None
+    low_end, high_end = np.quantile(x[here], (END, 1.0 - END))
+    first, last = here[x[here] <= low_end], here[x[here] >= high_end]
+    regimes = [REGIMES.index(r) for r in layer.regimes]
+
+    def change(size: float) -> float:
+        effect = effect_of(f.setup, f.law, acting, np.array([size, *best.values[1:]]))[:, regimes]
+        return float(percent(effect[last].mean() - effect[first].mean()))
+
+    low, high = sorted((change(amplitude.low), change(amplitude.high)))
+    return {
+        "column": column, "from": float(x[first].mean()), "to": float(x[last].mean()),
+        "percent": change(amplitude.value), "low": low, "high": high,
+    }  # fmt: skip
 
 
 def remainder_layers(misfits: Sequence[Misfit]) -> list[Layer]:

@@ -123,6 +123,9 @@ class Layer:
     the root mean square over the tests. ``tied_with``
     are mechanisms that the design cannot distinguish from it, ``gain`` what the layer gains on tests left out, ``at``
     the sample, regime and load at which a cause acts most, ``choice`` the specimen, pattern or value it concerns.
+    ``over`` says, of a cause that follows a recorded column, by how much T changes from its lowest to its highest
+    recorded values: the ``column``, the values ``from`` and ``to``, and the change in ``percent`` from ``low`` to
+    ``high``.
     """
 
     kind: LayerKind
@@ -141,6 +144,7 @@ class Layer:
     at: str = ""
     choice: str = ""
     most: tuple[str, str, float] | None = None  # regime, sample and load (N) of ``at``
+    over: Mapping[str, Any] | None = None
     shows: Any = field(default=None, compare=False, repr=False)
 
 
@@ -265,7 +269,7 @@ KEPT = {  # fields of the records in verdict.json, in the order of its schema
     Excluded: ("mechanism", "reason"),
     Layer: (
         "kind", "name", "samples", "regimes", "p_adjusted", "effect_percent", "low", "high", "parameters", "formula",
-        "tied_with", "gain", "text", "at", "choice",
+        "tied_with", "gain", "text", "at", "choice", "over",
     ),
     NextTest: ("text", "separates", "design", "expected_bits"),
 }  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tribo.berardo2019.table_diagnosis import OverLoads
@@ -18,7 +18,7 @@ from tribo.lawsearch.law_file import KnownLaw
 from tribo.lawsearch.model_choice import FoundLaw
 from tribo.mechanisms.record import Mechanism, TraceEvidence
 from tribo.mechanisms.table import MECHANISMS, mechanism
-from tribo.vocabulary import COLUMNS, OBSERVABLES, in_words
+from tribo.vocabulary import COLUMNS, OBSERVABLES, ColumnWords, in_words
 from tribo.wording.law_sentences import law_sentence, law_test, size_sentence, tied_laws
 from tribo.wording.numerals import counted, joined, p_text, sentence_case
 
@@ -187,11 +187,25 @@ def layer_sentence(layer: Layer) -> str:
         return _offset(layer) if layer.name == OFFSET else without_model_sentence(shows)
     if layer.kind != "cause" or layer.most is None:
         return layer.text
+    if layer.over:
+        said = f"{sentence_case(mechanism(layer.name).in_words)} changes T by {change_over_range(layer.over)}."
+        return f"{said} {tied_laws(shows)}" if tied else said
     said = (
         f"{sentence_case(mechanism(layer.name).in_words)} changes T by {value:+.0f} % (90 % interval {low:+.0f} to "
         f"{high:+.0f} %) where it acts most: {place(layer)}."
     )
     return f"{said} {tied_laws(shows)}" if tied else said
+
+
+def change_over_range(over: Mapping[str, Any]) -> str:
+    """ "+25 % (90 % interval +22 to +29 %) as the pull speed rises from 0.05 to 0.8 mm/s"."""
+    words = COLUMNS.get(over["column"], ColumnWords(over["column"]))
+    start, end = (f"{words.factor * over[key]:.3g}" for key in ("from", "to"))
+    sizes = [f"{over[key]:+.0f}".replace("-", "−") for key in ("percent", "low", "high")]
+    return (
+        f"{sizes[0]} % (90 % interval {sizes[1]} to {sizes[2]} %) as {words.words} rises from {start} to "
+        f"{end} {words.unit}".rstrip()
+    )
 
 
 def place(layer: Layer) -> str:
@@ -343,7 +357,7 @@ def next_test_sentence(t: NextTest) -> str:
         if "sample" not in design:
             return f"Vary {' and '.join(varied)} in random order: {pulls} pulls of the flat sample."
         patterned, removed = design["sample"], [mechanism(name).removed_by for name in design["without"]]
-        each = f"{pulls // (len(removed) + 2 * bool(varied))} pulls of"
+        each = f"{design['pulls'] // (len(removed) + 2 * bool(varied))} pulls of"
         vary = f"Vary {' and '.join(varied)} in random order: {each} {patterned} and as many of the flat sample."
         steps = [vary] if varied else []
         return " ".join([*steps, *(f"{sentence_case(step)}: {each} {patterned}." for step in removed)])

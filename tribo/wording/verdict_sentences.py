@@ -33,6 +33,7 @@ from tribo.wording.law_sentences import across_sentence, held_sentence, tied_law
 from tribo.wording.numerals import counted, joined, p_text, sentence_case, significant
 from tribo.wording.part_sentences import (
     cause_sentence,
+    change_over_range,
     layer_sentence,
     meaning_in_words,
     misfit_sentence,
@@ -160,14 +161,14 @@ def _caused(v: Verdict, layers: Sequence[Layer]) -> str:
         subject = f"{sentence_case(meaning_in_words(names[0]))} ({name_in_words(names[0])}{choice}): this changes"
     else:
         subject = f"{sentence_case(_either(names))} (this campaign cannot tell which) changes"
-    most = f", most in {first.at}" if first.at else ""
     also = [f"{_either(_alternatives(v, layer))} ({size_in_words(layer)})" for layer in others]
     also += [f"{name_in_words(c.mechanism)} ({_parameters(c)})" for c in v.causes if isinstance(c.shows, TraceEvidence)]
     also += [f"a change with {_columns(law)} ({size_in_words(law)})" for law in of_kind(v, "law")]
     added = f"; in addition, {joined(also)}" if also else ""
     rest = v.verdict == "partly" and not v.shows.within_chance
     left = "; part of the difference from the model remains unexplained" if rest else ""
-    return f"{subject} {_where(v, first)} by up to {size_in_words(first)}{most}{added}{left}."
+    up_to, most = ("", "") if first.over else ("up to ", f", most in {first.at}" if first.at else "")
+    return f"{subject} {_where(v, first)} by {up_to}{size_in_words(first)}{most}{added}{left}."
 
 
 def _where(v: Verdict, layer: Layer) -> str:
@@ -231,7 +232,11 @@ def _unknown(v: Verdict) -> str:
 
 
 def size_in_words(effect: Layer | Misfit) -> str:
-    """ "−27 % (90 % interval −31 to −23 %)" of a layer or a misfit."""
+    """ "−27 % (90 % interval −31 to −23 %)" of a layer or a misfit; of a cause that follows a recorded column, from its
+    lowest to its highest recorded values: "+25 % (90 % interval +22 to +29 %) as the pull speed rises from 0.05 to 0.8
+    mm/s"."""
+    if isinstance(effect, Layer) and effect.over:
+        return change_over_range(effect.over)
     value, low, high = (_signed(x) for x in (effect.effect_percent, effect.low, effect.high))
     known = math.isfinite(effect.low) and math.isfinite(effect.high)
     return f"{value} %" + (f" (90 % interval {low} to {high} %)" if known else "")
