@@ -65,7 +65,8 @@ class LawFit:
     type_a : ndarray, shape (p, p), optional
         Part of the covariance that is of the mean over specimens, with ``dof`` degrees of freedom.
     largest : mapping of str to (str, float)
-        For each parameter and for T, the component with the largest share of the variance, and that share in percent.
+        For each parameter and for T, the component with the largest share of the variance, and that share in percent;
+        "wire angle, assumed" where the instrument is not stated.
     alone : LawFit, optional
         The fit by the tests of the sample alone (type A). That fit itself has no ``type_a``, ``largest`` and ``alone``.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from tribo.diagnostics import examine
 from tribo.diagnostics.inference import pattern_corrections, pattern_excess
@@ -26,6 +27,8 @@ def test_patterns_six_times_as_far_off_as_stated_are_reported_each_with_its_own_
             own[m.sample, m.observable].effect_percent, own[m.sample, m.observable].p_adjusted
         )  # fmt: skip
     assert "times its stated error for patterns" in worded(verdict).text
+    assert worded(verdict).sentence.endswith("no mechanism that this design can test explains it.")
+    assert "of the library" in worded(replace(verdict, not_testable=())).sentence
     step = worded(verdict).next_test
     assert step is not None
     assert step.design["sample"] == verdict.misfits[0].sample

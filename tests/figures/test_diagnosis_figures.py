@@ -81,6 +81,7 @@ def test_samples_that_differ_come_first_among_the_residuals_and_points_outside_t
         beyond = (means["y"] < bands["y_low"]) | (means["y"] > bands["y_high"])
         outside[part["detail"].iloc[0]] = beyond.mean()
         assert (panel == 0) == (part["axis"].iloc[0] == "Sample")
+    assert rows[rows["x"] == 0.0]["x_name"].iloc[0] == "F"  # the flat sample first
     assert all((share > 0.3) == (detail == "p < 0.001") for detail, share in outside.items()), outside
     assert outside["p < 0.001"] > 0.3
 

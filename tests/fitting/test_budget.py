@@ -91,6 +91,13 @@ def test_the_wire_angle_counts_as_the_slope_of_its_gain(angle: float) -> None:
     assert row["u_T_N"] / found.force_N(PRESSURE_PA * AREA) == pytest.approx(change, rel=1e-4)
 
 
+def test_the_largest_part_says_that_it_was_assumed_unless_the_instrument_is_stated() -> None:
+    (fit,) = fit_samples(quiet := pulls(between=0.001, within=0.001), "static", AREA)
+    assumed = uncertainty_budget(quiet, fit, {}, rise_N_per_s=math.nan, sampling_rate_Hz=math.nan)[0]
+    assert assumed.largest["mu"][0] == "wire angle, assumed"
+    assert budget(quiet, {"wire_angle_u_deg": 0.5})[0].largest["mu"][0] == "wire angle"
+
+
 def test_the_sampling_clip_is_half_a_sample_of_rise_rectangular_and_static_only() -> None:
     _, static = budget(pulls(), rise=6.0, rate=50.0)
     assert static.loc["sampling clip", "u_T_N"] == pytest.approx(6.0 / (2 * 50.0) / np.sqrt(3))

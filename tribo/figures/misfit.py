@@ -103,8 +103,9 @@ def covariate(s: Setup, name: str) -> Covariate:
     try:
         return Covariate(name, np.asarray(column, float))
     except ValueError:
-        names, places = np.unique(column, return_inverse=True)
-        return Covariate(name, places.astype(float), tuple(map(str, names)))
+        names = sorted(set(map(str, column)), key=lambda text: (name == "sample" and text != o.flat, text))
+        places = {text: float(place) for place, text in enumerate(names)}
+        return Covariate(name, np.array([places[str(text)] for text in column]), tuple(names))
 
 
 COLUMNS = ["observable", "row", "covariate", "label", "effect_percent", "strength", "p_adjusted", "mark"]

@@ -173,8 +173,9 @@ def uncertainty_budget(
     table_of_parts.attrs["notes"] = notes
     largest = {}
     for number, parameter in zip(by, (*fit.parameters, "T"), strict=True):
-        name, _, u, _, _ = max(components[:-1], key=lambda component: component[2][number])
-        largest[parameter] = (name, 100 * (u[number] / combined[number]) ** 2)
+        name, _, u, _, origin = max(components[:-1], key=lambda component: component[2][number])
+        assumed = ", assumed" if origin.startswith("default") else ""
+        largest[parameter] = (f"{name}{assumed}", 100 * (u[number] / combined[number]) ** 2)
     whole = replace(fit, covariance=covariance, type_a=fit.covariance, largest=largest, alone=fit.by_itself)
     return whole, table_of_parts
 

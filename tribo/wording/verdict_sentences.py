@@ -135,7 +135,7 @@ def finding(v: Verdict) -> str:
         return _caused(v, layers)
     if laws := of_kind(v, "law"):
         law = laws[0].text.rstrip(".")
-        return f"{law}; no mechanism of the library explains it." if v.verdict == "unknown" else f"{law}."
+        return f"{law}; {_by_no_mechanism(v)}." if v.verdict == "unknown" else f"{law}."
     if v.causes and v.verdict != "unknown":
         return _seen_in_traces(v)
     return _unknown(v)
@@ -222,13 +222,19 @@ def _unknown(v: Verdict) -> str:
         apart = list(dict.fromkeys(m.sample for m in v.misfits if m.covariate == "sample"))
         return (
             f"The model predicts the wrong friction for {joined(apart)}: measured {OBSERVABLES[largest.observable]} of "
-            f"{largest.sample} differs most, by {size_in_words(largest)}; no mechanism of the library explains it."
+            f"{largest.sample} differs most, by {size_in_words(largest)}; {_by_no_mechanism(v)}."
         )
     return (
         f"{sentence_case(OBSERVABLES.get(largest.observable, 'friction'))} of {largest.sample or 'all samples'} "
-        f"changes with {in_words(largest.covariate)} by {size_in_words(largest)} relative to the model, and no "
-        "mechanism of the library explains it."
+        f"changes with {in_words(largest.covariate)} by {size_in_words(largest)} relative to the model, and "
+        f"{_by_no_mechanism(v)}."
     )
+
+
+def _by_no_mechanism(v: Verdict) -> str:
+    """That nothing explains it, and whether the design could test every mechanism."""
+    tested = "that this design can test" if v.not_testable else "of the library"
+    return f"no mechanism {tested} explains it"
 
 
 def size_in_words(effect: Layer | Misfit) -> str:
