@@ -337,7 +337,8 @@ class Correction:
     """What a user states about the numbers of an export; applied once, at the end of reading.
 
     The friction force is multiplied by ``sign`` (1 or -1) and ``gain``; a torque becomes a force over ``lever_arm_m``.
-    ``sampling_rate_Hz`` gives the time where the export has none, else ``speed_m_s`` does for a recorded path.
+    ``sampling_rate_Hz`` gives the time where the export has none, else ``speed_m_s`` does for a recorded path. A
+    friction coefficient without a recorded load is multiplied by ``load_N``, a recorded stress by ``area_m2``.
     """
 
     sign: float = 1.0
@@ -345,6 +346,8 @@ class Correction:
     lever_arm_m: float | None = None
     sampling_rate_Hz: float | None = None
     speed_m_s: float | None = None
+    load_N: float | None = None
+    area_m2: float | None = None
 
 
 UNCORRECTED = Correction()

@@ -40,7 +40,7 @@ QUANTITIES: dict[str, Quantity] = {
             time, test time, step time, elapsed time, timestamp, time stamp, total time, run time, running time, zeit,
             prufzeit, laufzeit, versuchszeit, temps, temps d essai, duree, t, test zeit, temps ecoule, tiempo, tempo,
             tijd, total elapsed time, cycle elapsed time, czas, czas testu, aika, tid, cas, ido, zaman, sure, timp,
-            время, час, χρονος, 时间, 试验时间, 時間, 試験時間, 経過時間, 시간
+            время, час, χρονος, 时间, 试验时间, 時間, 試験時間, 経過時間, 測定時間, テスト時間, 测试时间, 시간
         """),
         _quantity("friction force", "T", "N", "force_N", """
             friction force, friction, tangential force, traction force, frictionforce, lateral force, reibkraft,
@@ -66,7 +66,9 @@ QUANTITIES: dict[str, Quantity] = {
             corsa, percorso, curso, перемещение, путь, ход, 位移, 行程, 変位, ストローク, 移動距離, 변위
         """),
         _quantity("normal force", "N", "N", "normal_force_N", """
-            normal force, normal load, vertical force, normal force fz, ball load, contact force, normalkraft,
+            normal force, normal load, vertical force, normal force fz, ball load, pin load, contact force, normalkraft,
+            normal, contact load, specimen load, applied normal load, applied normal force, vertical load, down force,
+            force normal, load normal, normalbelastung, normallast, anpresskraft, charge normale, effort normal,
             force normale, fz, fn, fz force, daq fz, nominal load, force z, carga normal, forza normale, fuerza normal,
             sila normalna, obciazenie normalne, sila nacisku, normaalivoima, normaalkracht, normalova sila,
             pritlacna sila, normal kuvvet, forta normala, forca normal, нормальная сила, нормальная нагрузка, 法向力,
@@ -95,13 +97,24 @@ QUANTITIES: dict[str, Quantity] = {
         """),
         _quantity("speed", "v", "m/s", "speed_m_s", """
             sliding velocity, sliding speed, speed, velocity, geschwindigkeit, gleitgeschwindigkeit, vitesse,
+            disc speed, disk speed, motor speed, drive speed, tachometer, tacho, linear speed, linear velocity,
             vitesse de glissement, gleitgeschw, predkosc, predkosc poslizgu, velocidad, velocita, velocidade, snelheid,
-            nopeus, hastighet, rychlost, hiz, viteza, скорость, скорость скольжения, 速度, 滑动速度, すべり速度, 속도
+            nopeus, hastighet, rychlost, hiz, viteza, скорость, скорость скольжения, 速度, 滑动速度, すべり速度,
+            摺動速度, 속도
         """),
         _quantity("rotation speed", "n", "revolution/s", "rotation_rev_per_s", """
             rotation speed, rotational speed, rotary speed, spindle speed, rotational velocity, rotation rate,
             revolution speed, rpm, drehzahl, vitesse de rotation, velocidad de giro, velocita di rotazione, toerental,
-            转速, 回転数, 회전수
+            rotary velocity, predkosc obrotowa, obroty, otacky, pyorimisnopeus, varvtal,
+            скорость вращения, 转速, 回転数, 回転速度, 회전수
+        """),
+        _quantity("radius", "r", "m", "radius_m", """
+            radius, track radius, wear track radius, disc track radius, sliding radius, bahnradius, laufradius, rayon,
+            raggio, radio, promien, polomer, радиус, 半径, 반경
+        """),
+        _quantity("normal stress", "sigma", "Pa", "normal_stress_Pa", """
+            normal stress, effective normal stress, normalspannung, contrainte normale, naprezenie normalne, 正应力,
+            法向应力, 垂直応力, 수직응력
         """),
     )
 }  # fmt: skip
@@ -183,6 +196,7 @@ _SPELLINGS = {
     "mn": "millinewton",
     "cn": "centinewton",
     "un": "micronewton",
+    "dan": "decanewton",
     "µn": "micronewton",
     "μn": "micronewton",
     "gf": "gram_force",
@@ -190,6 +204,8 @@ _SPELLINGS = {
     "kp": "kilogram_force",
     "lbf": "pound_force",
     "lb": "pound_force",
+    "lbs": "pound_force",
+    "kips": "kip",
     "µm": "micrometer",
     "μm": "micrometer",
     "um": "micrometer",
@@ -219,9 +235,14 @@ _SPELLINGS = {
     "牛顿": "newton",
     "千牛": "kilonewton",
     "毫牛": "millinewton",
+    "кгс": "kilogram_force",
+    "гс": "gram_force",
+    "公斤": "kilogram_force",
     "мм": "millimeter",
     "мкм": "micrometer",
     "м": "meter",
+    "ミリメートル": "millimeter",
+    "ニュートン": "newton",
     "毫米": "millimeter",
     "微米": "micrometer",
     "米": "meter",
@@ -241,6 +262,9 @@ _TURNS = {
     "rps": "revolution/s", "rev/s": "revolution/s", "r/s": "revolution/s", "1/s": "revolution/s", "hz": "revolution/s",
     "rpm": "revolution/minute", "rev/min": "revolution/minute", "r/min": "revolution/minute",
     "1/min": "revolution/minute", "min-1": "revolution/minute", "u/min": "revolution/minute",
+    "tr/min": "revolution/minute", "obr/min": "revolution/minute", "об/мин": "revolution/minute",
+    "转/分": "revolution/minute", "转/分钟": "revolution/minute", "min^-1": "revolution/minute",
+    "giri/min": "revolution/minute", "ot/min": "revolution/minute",
 }  # fmt: skip
 _MASSES_AS_FORCES = {"g": "gram_force", "kg": "kilogram_force"}
 _NO_UNIT = {"", "-", "1"}
@@ -252,7 +276,7 @@ _NUMBER_BELOW = re.compile(r"/\s*([\d.]+\s*[^\W\d_]+)")
 
 
 _LONGEST_NAME = 80  # characters; longer cells are no column names
-_WIDE = str.maketrans("（）［］【】：／，　", "()[][]:/, ")
+_WIDE = str.maketrans("（）［］【】：／，　･・", "()[][]:/, ··")
 _BARRED = str.maketrans({"ł": "l", "ø": "o", "đ": "d", "ß": "ss", "æ": "ae", "œ": "oe", "ı": "i"})
 _CHANNEL = re.compile(r"^\s*(?:c|ch|channel|kanal)[ _]?\d+[ _]", re.I)
 
@@ -295,7 +319,7 @@ def unit_factor(unit: str, quantity: str) -> tuple[float, float]:
         The unit is unknown, empty, or not a unit of this quantity. Units are never guessed.
     """
     target = QUANTITIES[quantity].si_unit or "dimensionless"
-    text = unit.strip()
+    text = narrow(unit.strip())
     if not text and target != "dimensionless":
         raise ReadError(Problem("missing_unit", f"the {quantity} has no unit", allowed=f"a unit such as {target}"))
     _registry()  # an installation without a working pint is no fault of the unit
@@ -341,6 +365,11 @@ def match_quantity(name: str) -> tuple[str, int] | None:
 
 
 _SHORT_NAMES = {"force": "friction force", "friction": "friction force", "load": "normal force"}
+
+
+def turns_a_time(unit: str) -> bool:
+    """Whether a unit counts turns in a time: rpm, 1/s, obr/min."""
+    return unit.strip().lower() in _TURNS
 
 
 def quantity_named(key: str) -> str | None:

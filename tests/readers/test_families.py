@@ -553,7 +553,7 @@ def test_damage_in_one_of_several_tables_is_named_with_its_row(tmp_path: Path) -
 
 def test_every_family_has_a_sample_here() -> None:
     tested = {family for _, family, _, _ in SAMPLES.values()} | {"trapezium", "te67", "csm", "newport", "matlab"}
-    assert tested | {"tdms"} == set(READERS)
+    assert tested | {"tdms", "json"} == set(READERS)
 
 
 def with_speed(radius_mm: float) -> list[str]:

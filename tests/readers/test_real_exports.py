@@ -17,10 +17,11 @@ from tribo.records import Trace
 
 GRAM_FORCE = 9.80665e-3
 
-# file: family, rows of each trace, (time, force, displacement) columns as the file spells them
+# file: family, rows of each trace, (time, force, displacement) columns as the file spells them; X of the UMT is the
+# radius of the track, 3.94925 mm in every row, and no displacement
 READ = {
-    "fr_cetr_umt2_2N_stroke001.csv": ("umt", (110, 107), "T [sec]", "Fx [g]", "X [mm]"),
-    "fr_cetr_umt2_2N_stroke050.csv": ("umt", (107, 108), "T [sec]", "Fx [g]", "X [mm]"),
+    "fr_cetr_umt2_2N_stroke001.csv": ("umt", (110, 107), "T [sec]", "Fx [g]", None),
+    "fr_cetr_umt2_2N_stroke050.csv": ("umt", (107, 108), "T [sec]", "Fx [g]", None),
     "fr_labview_lvm_demo2.txt": ("labview", (6, 6, 6), "X_Value [s]", "fx [N]", "dx [um]"),
     "fr_pcs_ehd2_demo3.txt": ("pcs", (21, 21), "Step Time [s]", "Traction Force 1 [N]", None),
     "fr_pcs_mtm_output.txt": ("pcs", (300,) * 24, "Step Time [s]", "Traction Force [N]", None),

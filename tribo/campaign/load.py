@@ -199,7 +199,7 @@ def _test(row: TestRow, described: CampaignFile, order: str, area_m2: float | No
         "operator": cells.get("operator", ""),
         "covariates": {name: cell for name, cell in cells.items() if name and name not in KNOWN},
         "row": row.row,
-        "correction": correction_of(numbers, general, speed_m_s),
+        "correction": correction_of(numbers, general, speed_m_s, load),
         "evaluated": evaluated_forces(row, load),
         "zero": zero_choice(cells.get("zero") or general.zero),
         "load_zero": zero_choice(cells.get("load_zero") or general.load_zero),

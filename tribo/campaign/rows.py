@@ -323,7 +323,9 @@ def pattern_of(sample: str, patterns: Mapping[str, Pattern]) -> str:
     return sample[:-1] if sample[-1:] in ("x", "y") and sample[:-1] in patterns else ""
 
 
-def correction_of(numbers: Mapping[str, float | None], general: Any, speed_m_s: float | None) -> Correction:
+def correction_of(
+    numbers: Mapping[str, float | None], general: Any, speed_m_s: float | None, load_N: float
+) -> Correction:
     """The correction of one test: its own cells first, then [campaign] of campaign.toml."""
     given = {key: numbers.get(key) if numbers.get(key) is not None else getattr(general, key) for key in _CORRECTIONS}
     lever = given["lever_arm_mm"]
@@ -333,6 +335,8 @@ def correction_of(numbers: Mapping[str, float | None], general: Any, speed_m_s: 
         lever_arm_m=None if lever is None else lever * _MM,
         sampling_rate_Hz=given["sampling_rate_Hz"],
         speed_m_s=speed_m_s or None,
+        load_N=None if math.isnan(load_N) else load_N,
+        area_m2=None if general.nominal_area_mm2 is None else general.nominal_area_mm2 * _MM**2,
     )
 
 

@@ -23,7 +23,7 @@ COLUMNS = click.option(
     "#3 means the third column, * every further column; none leaves a quantity out.",
 )
 _MM = 1e-3
-_KEYS = ("sign", "gain", "lever_arm_mm", "sampling_rate_Hz", "speed_mm_s")
+_KEYS = ("sign", "gain", "lever_arm_mm", "sampling_rate_Hz", "speed_mm_s", "normal_load_N", "nominal_area_mm2")
 
 
 def _corrections(context: click.Context, parameter: click.Parameter, given: tuple[str, ...]) -> dict[str, float]:
@@ -52,7 +52,8 @@ SET = click.option(
     metavar="KEY=NUMBER",
     callback=_corrections,
     help="Correct what is read: sign=-1, gain, lever_arm_mm (torque to force), sampling_rate_Hz or speed_mm_s (where "
-    "an export has no time). Can be repeated; holds for every test and replaces campaign.toml and tests.csv.",
+    "an export has no time), normal_load_N (of a friction coefficient), nominal_area_mm2 (of a stress). "
+    "Can be repeated; holds for every test and replaces campaign.toml and tests.csv.",
 )
 
 
@@ -63,7 +64,7 @@ def reading_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def corrected(correction: Correction, stated: dict[str, float]) -> Correction:
     """A correction with what the command line states in place of what it says."""
-    lever, speed = stated.get("lever_arm_mm"), stated.get("speed_mm_s")
+    lever, speed, area = (stated.get(key) for key in ("lever_arm_mm", "speed_mm_s", "nominal_area_mm2"))
     return replace(
         correction,
         sign=stated.get("sign", correction.sign),
@@ -71,6 +72,8 @@ def corrected(correction: Correction, stated: dict[str, float]) -> Correction:
         lever_arm_m=correction.lever_arm_m if lever is None else lever * _MM,
         sampling_rate_Hz=stated.get("sampling_rate_Hz", correction.sampling_rate_Hz),
         speed_m_s=correction.speed_m_s if speed is None else speed * _MM,
+        load_N=stated.get("normal_load_N", correction.load_N),
+        area_m2=correction.area_m2 if area is None else area * _MM**2,
     )
 
 
@@ -83,8 +86,12 @@ def with_reading_options(campaign: Campaign, columns: str, stated: dict[str, flo
         by_file = {file: {**its, **asked} for file, its in campaign.columns_by_file.items()}
         campaign = replace(campaign, columns={**campaign.columns, **asked}, columns_by_file=by_file)
     if stated:
+        load = stated.get("normal_load_N")
         tests = tuple(replace(t, correction=corrected(t.correction, stated)) for t in campaign.tests)
-        campaign = replace(campaign, tests=tests)
+        tests = tests if load is None else tuple(replace(t, normal_load_N=load) for t in tests)
+        area = stated.get("nominal_area_mm2")
+        area_m2 = campaign.nominal_area_m2 if area is None else area * _MM**2
+        campaign = replace(campaign, tests=tests, nominal_area_m2=area_m2)
     return campaign
 
 

@@ -51,7 +51,7 @@ _SEPARATOR = re.compile(r"[_ ]+")
 _NOT_LOOKED_AT = (".", "~$", "Thumbs.db")
 _NAMES_OR_UNITS = {
     "missing_column", "missing_unit", "unknown_unit", "ambiguous_unit", "ambiguous_mark", "names_do_not_fit",
-    "time_of_day",
+    "time_of_day", "missing_load", "missing_area",
 }  # fmt: skip
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _CLOCK = r"(?P<clock>\d{1,2}:\d\d(?::\d\d)?)"

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tribo.errors import Problem
+from tribo.errors import Problem, ReadError
 from tribo.input_files import LARGEST_NUMBER, SMALLEST_NUMBER
-from tribo.readers.columns import Column
+from tribo.readers.columns import ASKED, Column, force_follows
 from tribo.records import Correction, FloatArray
 
 NO_TIME = "no_time"
@@ -28,6 +28,7 @@ _MOST_STEPS = 40  # large steps, above which they are what the signal does
 _MOST_TRIED = 10  # large steps that may begin a scaled rest of the record
 _FEWEST_ROWS, _ROWS_BESIDE = 10, 100  # looked at on either side of a jump
 _LEVEL_ROWS = (1, 10, 100)  # rows beside a jump by which the levels are compared; all are tried, as the force may swing
+_SAME_RATIO = 0.02  # share: numbers of two digits are rounded by up to 1 %
 _TIMES_IN_WORDS = {1: "ten", 2: "a hundred", 3: "a thousand"}
 
 Arrays = dict[str, FloatArray]  # by quantity, SI units
@@ -37,19 +38,22 @@ RowOf = Callable[[int], int]  # line of the file of a sample
 def complete(
     arrays: Arrays, columns: Sequence[Column], correction: Correction, file: str
 ) -> tuple[Arrays, tuple[Column, ...], list[Problem]]:
-    """Arrays that hold time and friction force, the columns they came from, and a doubt where time is missing."""
+    """Arrays that hold time and friction force, the columns they came from, and a doubt where time is missing.
+
+    Raises
+    ------
+    ReadError
+        no_radius or load_is_friction.
+    """
     columns, doubts = list(columns), []
+    arrays, columns = _forces(arrays, columns, correction, file)
     lever = correction.lever_arm_m
-    if "friction force" not in arrays:
-        torque = next(c for c in columns if c.quantity == "torque")
-        arrays = {**arrays, "friction force": arrays["torque"] / (lever or 1.0)}
-        reason = f"torque over the lever arm of {(lever or 0.0) * 1e3:g} mm, as given"
-        columns.append(Column("friction force", -1, torque.label, 1.0, 0.0, reason))
-    if "rotation speed" in arrays and "speed" not in arrays and lever is not None:
+    if "rotation speed" in arrays and "speed" not in arrays and (lever is not None or "radius" in arrays):
         turns = next(c for c in columns if c.quantity == "rotation speed")
-        arrays = {**arrays, "speed": 2.0 * np.pi * lever * arrays["rotation speed"]}
-        reason = f"rotation speed times 2 pi times the lever arm of {lever * 1e3:g} mm, as given"
-        columns.append(Column("speed", -1, turns.label, 1.0, 0.0, reason))
+        arm = "the recorded radius" if lever is None else f"the lever arm of {lever * 1e3:g} mm, as given"
+        radius = arrays["radius"] if lever is None else lever
+        arrays = {**arrays, "speed": 2.0 * np.pi * radius * arrays["rotation speed"]}
+        columns.append(Column("speed", -1, turns.label, 1.0, 0.0, f"rotation speed times 2 pi times {arm}"))
     factor = correction.sign * correction.gain
     if factor != 1.0:
         said = [f"gain {correction.gain:g}"] if correction.gain != 1.0 else []
@@ -68,6 +72,64 @@ def complete(
             )
             doubts.append(Problem(NO_TIME, what, file, allowed="speed_mm_s, sampling_rate_Hz, or a column of the time"))
     return arrays, tuple(columns), doubts
+
+
+def _forces(arrays: Arrays, columns: list[Column], stated: Correction, file: str) -> tuple[Arrays, list[Column]]:
+    """Arrays and columns with the friction force, and the normal force where it follows from others.
+
+    Raises
+    ------
+    ReadError
+        load_is_friction: the load follows the friction coefficient, so that it may be the friction force.
+    """
+    label = {c.quantity: c.label for c in columns}
+    arrays = dict(arrays)
+
+    def add(quantity: str, values: FloatArray, of: str, reason: str) -> None:
+        arrays[quantity] = values
+        columns.append(Column(quantity, -1, label[of], 1.0, 0.0, reason))
+
+    if "normal stress" in arrays and "normal force" not in arrays and stated.area_m2 is not None:
+        reason = f"normal stress times the nominal area of {stated.area_m2 * 1e6:g} mm2"
+        add("normal force", arrays["normal stress"] * stated.area_m2, "normal stress", reason)
+    mu, load = arrays.get("friction coefficient"), arrays.get("normal force")
+    if "friction force" in arrays:
+        if mu is not None and load is None and (constant := _constant_ratio(arrays["friction force"], mu)):
+            reason = "friction force over friction coefficient, the same in all rows"
+            add("normal force", np.full(mu.size, constant), "friction coefficient", reason)
+        return arrays, columns
+    how = force_follows(arrays, stated)
+    if how == "torque over lever arm":
+        reason = f"torque over the lever arm of {(stated.lever_arm_m or 0.0) * 1e3:g} mm, as given"
+        add("friction force", arrays["torque"] / (stated.lever_arm_m or 1.0), "torque", reason)
+    elif how == "torque over recorded radius":
+        if not np.all(arrays["radius"] > 0):
+            what, allowed = "a torque needs a radius above zero in every row", "lever_arm_mm = 2.5, or radius = none"
+            raise ReadError(Problem("no_radius", what, file, None, label["radius"], allowed=allowed))
+        add("friction force", arrays["torque"] / arrays["radius"], "torque", "torque over the recorded radius")
+    elif mu is not None and load is not None:
+        if _constant_ratio(load, mu, float(np.ptp(load) / np.abs(load).max()) / 10.0):
+            what = "the load is the friction coefficient times a constant, so it may be the friction force"
+            name = label["normal force"]
+            allowed = f'friction_force = "{name}" in columns; or normal_force = "{name}" if it is the normal load'
+            if not any(c.quantity == "normal force" and c.reason.startswith(ASKED) for c in columns):
+                raise ReadError(Problem("load_is_friction", what, file, None, name, allowed=allowed))
+        reason = f"friction coefficient times {label.get('normal force', label.get('normal stress', ''))}"
+        add("friction force", mu * np.abs(load), "friction coefficient", reason)
+    elif mu is not None:
+        reason = f"friction coefficient times the load of {stated.load_N:g} N, as given"
+        add("friction force", mu * float(stated.load_N or 0.0), "friction coefficient", reason)
+    return arrays, columns
+
+
+def _constant_ratio(over: FloatArray, under: FloatArray, spread: float = _SAME_RATIO) -> float | None:
+    """The ratio of two columns where it is one number in nearly all rows, within a share; None where it varies."""
+    large = np.abs(under) > 0.3 * np.abs(under).max()
+    if large.sum() < _FEWEST_ROWS or not np.ptp(under):
+        return None
+    ratio = np.abs(over[large] / under[large])
+    low, middle, high = np.quantile(ratio, (0.05, 0.5, 0.95))
+    return float(middle) if high - low < min(spread, _SAME_RATIO) * middle else None
 
 
 def _time(arrays: Arrays, correction: Correction) -> tuple[FloatArray, str, str]:

@@ -7,22 +7,24 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from tribo.errors import Problem, ReadError
 from tribo.records import UNCORRECTED, Correction
-from tribo.units import QUANTITIES, match_quantity, narrow, quantity_named, unit_factor
+from tribo.units import QUANTITIES, match_quantity, narrow, plain_name, quantity_named, turns_a_time, unit_factor
 from tribo.user_text import did_you_mean
 
 ASKED = "asked for"
 NONE, IGNORE, DECIMAL = "none", "ignore", "decimal"
 NEEDED = ("time", "friction force")
 _SIMILAR = 0.7  # difflib ratio from which a name that was asked for is taken for a misspelt one of the file
-_MEANS_NORMAL_BESIDE_FRICTION = {
-    "load", "last", "applied load", "charge", "carga", "obciążenie", "нагрузка", "载荷", "负荷", "荷重", "하중",
+_MEANS_NORMAL_BESIDE_FRICTION = {  # beside a friction force, a friction coefficient or a torque
+    "load", "last", "applied load", "charge", "carga", "obciążenie", "obciazenie", "нагрузка", "载荷", "负荷", "荷重",
+    "하중",
 }  # fmt: skip
+_A_RATIO_BESIDE_STRESS = {"friction", "friktion", "frottement", "tarcie", "reibung"}  # without a unit
 _ACCELERATION = re.compile(r"m\s*/\s*s(?:ec)?\s*(?:\^?2|²)|m/s/s|m·?s(?:\^?-2|⁻²)")
 _BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^\[\]()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
 _AFTER_MARK = re.compile(r"^(.*\S)\s*(?:\s?/|\sin\s|,\s|_)\s*((?:[^\W\d_]|[°%])[\w/°%^·²-]*)$")
@@ -51,7 +53,7 @@ def split_unit(name: str) -> tuple[str, str | None]:
         return name[: found.start()].strip(), found.group(1).strip()
     found = _AFTER_MARK.match(name)
     hit = match_quantity(found.group(1)) if found and match_quantity(name) is None else None
-    if found and hit and is_unit(found.group(2), hit[0]):
+    if found and hit and (is_unit(found.group(2), hit[0]) or (hit[0] == "speed" and turns_a_time(found.group(2)))):
         return found.group(1).strip(), found.group(2)
     return name, None
 
@@ -196,17 +198,20 @@ def assign(
     filled = tuple(there and not given.ignores(k, names[k]) for k, there in enumerate(filled))
     chosen, absent, problems = _asked_for(given.hints, names)
     taken = {index for index, _, _ in chosen.values()}
-    for quantity, index, reason in _matches(names, filled, taken):
+    for quantity, index, reason in _matches(names, units, filled, taken, set(chosen)):
         if quantity not in given.without:
             chosen.setdefault(quantity, (index, None, reason))
     columns, doubts, faults = _columns(chosen, names, units, given.correction)
     unreadable = {problem.column for problem in faults}
     there = {c.quantity for c in columns} | {q for q, (k, *_) in chosen.items() if _called(names, k) in unreadable}
-    follows = {  # time from rate or path, friction force from a torque
+    follows = {  # time from rate or path
         "time": given.correction.sampling_rate_Hz is not None or "displacement" in there,
-        "friction force": "torque" in there and given.correction.lever_arm_m is not None,
+        "friction force": force_follows(there, given.correction),
     }
     missing = [q for q in NEEDED if q not in there and not follows[q]]
+    if "friction force" in missing and force_follows({*there, *chosen}, given.correction):  # but for a missing unit
+        faults, doubts = [*faults, *doubts], []
+        missing.remove("friction force")
     refused = {h.quantity for h in given.hints} - set(chosen)
     if absent and (missing or faults or problems):
         problems += absent
@@ -217,6 +222,20 @@ def assign(
     if problems or faults:
         raise ReadError([*problems, *faults])
     return tuple(columns), tuple(doubts)
+
+
+def force_follows(there: Collection[str], stated: Correction) -> str:
+    """How the friction force follows from the quantities of a table and what was stated; "" where it does not."""
+    if "torque" in there and stated.lever_arm_m is not None:
+        return "torque over lever arm"
+    if "friction coefficient" in there:
+        if "normal force" in there:
+            return "coefficient times recorded load"
+        if "normal stress" in there and stated.area_m2 is not None:
+            return "coefficient times recorded stress"
+        if stated.load_N is not None:
+            return "coefficient times stated load"
+    return "torque over recorded radius" if {"torque", "radius"} <= set(there) else ""
 
 
 def _asked_for(hints: Sequence[Hint], names: Sequence[str]) -> tuple[Chosen, list[Problem], list[Problem]]:
@@ -265,24 +284,50 @@ def _called(names: Sequence[str], index: int) -> str:
     return names[index] or f"#{index + 1}"
 
 
-def _matches(names: Sequence[str], filled: Sequence[bool], taken: set[int]) -> list[tuple[str, int, str]]:
+def _matches(
+    names: Sequence[str], units: Sequence[str], filled: Sequence[bool], taken: set[int], asked: set[str]
+) -> list[tuple[str, int, str]]:
     """(quantity, index, reason) of the best-named column of each quantity; the first of equal ones."""
-    best: dict[str, tuple[int, int]] = {}
     hits = {
-        index: hit
+        index: _by_its_unit(names, units, index, hit)
         for index, name in enumerate(names)
         if name and index not in taken and filled[index] and (hit := match_column(name))
     }
+    there = asked | {quantity for quantity, _ in hits.values()}
+    loads = [index for index in hits if split_unit(names[index])[0].strip().lower() in _MEANS_NORMAL_BESIDE_FRICTION]
+    friction = [(rank, index) for index, (quantity, rank) in hits.items() if quantity == "friction force"]
+    of_another = "friction force" in asked or bool(friction and min(friction)[1] not in loads)
+    if not of_another and not there & {"friction coefficient", "torque"}:
+        loads = [index for _, index in sorted(friction)[1:] if index in loads]
+    for index in loads:  # a load beside what friction is read from is the normal one; it comes after those named so
+        if hits[index][0] == "friction force":
+            hits[index] = ("normal force", len(QUANTITIES["normal force"].aliases))
+    best: dict[str, tuple[int, int]] = {}
     for index, (quantity, rank) in hits.items():
         if quantity not in best or rank < best[quantity][0]:
             best[quantity] = (rank, index)
-    friction = best.get("friction force")
-    for index, (quantity, _) in hits.items():
-        plain = split_unit(names[index])[0].strip().lower()
-        beside = quantity == "friction force" and friction and index != friction[1]
-        if beside and plain in _MEANS_NORMAL_BESIDE_FRICTION and "normal force" not in best:
-            best["normal force"] = (0, index)
     return [(q, index, f'named "{names[index]}"') for q, (_, index) in best.items()]
+
+
+def _by_its_unit(
+    names: Sequence[str], units: Sequence[str], index: int, hit: tuple[str, int]
+) -> tuple[str, int]:
+    """What a column is where its unit, or the lack of one, tells more than its name."""
+    unit = _unit_of(names, units, index)
+    if hit[0] == "speed" and turns_a_time(unit):
+        return "rotation speed", hit[1]
+    if hit[0] == "rotation speed" and unit and not turns_a_time(unit) and is_unit(unit, "speed"):
+        return "speed", hit[1]
+    is_ratio = hit[0] == "friction force" and not unit and plain_name(names[index]) in _A_RATIO_BESIDE_STRESS
+    if is_ratio and any((other := match_column(name)) and other[0] == "normal stress" for name in names):
+        return "friction coefficient", hit[1]
+    return hit
+
+
+def _unit_of(names: Sequence[str], units: Sequence[str], index: int) -> str:
+    """The unit of a column as the file has it; a name such as "rpm" is its own."""
+    own = split_unit(names[index])[0]
+    return bare_unit(units[index]) or split_unit(names[index])[1] or (own if turns_a_time(own) else "")
 
 
 def _wanted_column(hint: Hint, names: Sequence[str]) -> tuple[int, str | None, str]:
@@ -305,7 +350,7 @@ def _column(
 ) -> Column:
     names, units = header
     if unit is None:
-        unit = bare_unit(units[index]) or split_unit(names[index])[1] or ""
+        unit = _unit_of(names, units, index)
         if unit == "g" and "force" in quantity and any(map(_ACCELERATION.search, (*names, *units))):
             what = "the unit g may be gram-force or acceleration of gravity, as another column is in m/s2"
             raise ReadError(Problem("ambiguous_unit", what, found=unit))
@@ -325,8 +370,13 @@ def _missing(quantity: str, names: Sequence[str], there: set[str]) -> Problem:
     elif "torque" in there:
         what = "the friction is recorded as a torque, without a friction force"
         ways = ["lever_arm_mm = 2.5, the distance of the contact from the axis"]
+    elif {"friction coefficient", "normal stress"} <= there:
+        what = "a friction coefficient and a stress are recorded; the forces need the nominal area"
+        return Problem("missing_area", what, allowed="nominal_area_mm2 = 100, in campaign.toml or with --set")
     elif "friction coefficient" in there:
-        ways += ['for friction over load, the load is the unit, friction_force = "NAME [3 N]"']
+        what = "a friction coefficient is recorded, without a friction force or a load"
+        ways = ["normal_load_N in tests.csv or with --set", 'or the load as the unit, friction_force = "NAME [3 N]"']
+        return Problem("missing_load", what, allowed="; ".join([*ways, here]))
     return Problem("missing_column", what, allowed="; ".join([*ways, here]))
 
 

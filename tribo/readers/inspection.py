@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ _MARKS = {"\t": "tab", " ": "blanks", "": "nothing", ",": "comma", ";": "semicol
 
 @dataclass(frozen=True)
 class ColumnSeen:
-    """A column as the file has it, and the quantity it was taken for ("" if none) and why."""
+    """A column as the file has it, and the quantity it was taken for ("" if none) and why, or why not."""
 
     position: int
     name: str
@@ -101,7 +102,8 @@ class Inspection:
             lines.append(f"  format    {self.family_text} ({self.family})")
             lines.append(f"  encoding  {self.encoding}, {marks}, {self.header_rows} header rows")
         for c in self.columns:
-            unit, why = f" [{c.unit}]" if c.unit else "", f" -> {c.quantity} ({c.reason})" if c.quantity else ""
+            unit, why = f" [{c.unit}]" if c.unit else "", f" (not used: {c.reason})" if c.reason else ""
+            why = f" -> {c.quantity} ({c.reason})" if c.quantity else why
             lines.append(f'  column    {c.position} "{c.name}"{unit}{why}')
         lines += [f"  table     {_table_in_words(t)}" for t in self.tables[:12]]
         if len(self.tables) > 12:
@@ -213,7 +215,7 @@ def _read(file: str, readings: list[Reading], others: list[str], footer: list[st
         delimiter=layout.delimiter,
         decimal=layout.decimal,
         header_rows=layout.header_rows,
-        columns=_columns(layout, first.columns),
+        columns=_columns(layout, first.columns, first.passed_over),
         tables=tuple(_table(part) for part in parts),
         other_tables=tuple(others),
         metadata=layout.metadata,
@@ -224,13 +226,15 @@ def _read(file: str, readings: list[Reading], others: list[str], footer: list[st
     )
 
 
-def _columns(layout: Layout, columns: tuple[Column, ...]) -> tuple[ColumnSeen, ...]:
+def _columns(
+    layout: Layout, columns: tuple[Column, ...], passed_over: Mapping[int, str] = MappingProxyType({})
+) -> tuple[ColumnSeen, ...]:
     taken = {c.index: c for c in columns}
     seen = []
     for k in range(layout.n_cells):
         column = taken.get(k)
         if column is None:
-            seen.append(ColumnSeen(k + 1, layout.names[k], layout.units[k]))
+            seen.append(ColumnSeen(k + 1, layout.names[k], layout.units[k], reason=passed_over.get(k, "")))
         else:
             unit = column.label.rpartition("[")[2].rstrip("]") if "[" in column.label else ""
             seen.append(ColumnSeen(k + 1, layout.names[k], unit, column.quantity, column.reason))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -14,13 +14,13 @@ from tribo.errors import Problem, ReadError
 from tribo.input_files import OLD_EXCEL, ZIP, sheets_as_text
 from tribo.readers.binary_machines import BINARY_MACHINES
 from tribo.readers.checks import NO_TIME, Arrays, beyond_measurement, check_scale, check_time, complete
-from tribo.readers.columns import Column, Columns, Given, assign, parse_columns
+from tribo.readers.columns import Column, Columns, Given, assign, match_column, parse_columns
 from tribo.readers.layout import Layout, cut, first_table, tables_one_below_the_other
 from tribo.readers.parsing import parse_block, refuse_ambiguous_marks
 from tribo.readers.source import HEAD_BYTES, Source, export_bytes, is_workbook_archive, open_text
 from tribo.readers.text_machines import TEXT_MACHINES, Machine
 from tribo.readers.wide_tables import looks_wide, records_side_by_side
-from tribo.records import Correction, ExportFormat, Trace
+from tribo.records import Correction, ExportFormat, FloatArray, Trace
 from tribo.units import QUANTITIES
 
 READERS: dict[str, Machine] = {machine.name: machine for machine in (*BINARY_MACHINES, *TEXT_MACHINES)}
@@ -31,6 +31,7 @@ _WIDE = 'for several records side by side: friction_force = "* [N]", or "F* [N]"
 _INSTEAD_OF_A_CLOCK = (
     'a column in seconds, or a row counter with the sampling interval as its unit: time = "NAME [0.01 s]" in columns'
 )
+_FEWEST_ALIKE = 50  # rows with one value, from which a column is said to be constant
 _CLOCK = re.compile(r"(?<!\d)\d{1,2}:\d\d:\d\d(?!\d)")
 
 
@@ -45,6 +46,7 @@ class Reading:
     arrays: Arrays
     findings: tuple[Problem, ...]
     skipped: int = 0  # rows of the table that belong to a trace before this one
+    passed_over: Mapping[int, str] = field(default_factory=dict)  # columns by position, and why they are not used
 
     def row_of(self, sample: int) -> int:
         """Line of the file, from 1, of a sample, from 0."""
@@ -273,20 +275,28 @@ def machine_of(source: Source) -> Machine:
 
 
 def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -> Reading | ReadError:
-    """A table as a trace would hold it, or what keeps it from being one."""
-    try:
-        columns, doubts = assign(
-            layout.names, layout.units, layout.filled, given.with_hints(machine.hints(source, layout))
-        )
-    except ReadError as why:
-        return ReadError(_explained(why, machine, source, layout))
-    used = [c.index for c in columns]
-    try:
-        if not given.decimal:
-            refuse_ambiguous_marks(source, layout, used)
-        written, end = parse_block(source, layout, used)
-    except ReadError as why:
-        return why
+    """A table as a trace would hold it, or what keeps it from being one.
+
+    A column that was not asked for is passed over where it cannot be what its name says: one without a number, one of
+    zeros beside another of the same quantity, a coordinate that never changes.
+    """
+    given = given.with_hints(machine.hints(source, layout))
+    passed_over: dict[int, str] = {}
+    while True:
+        ignored = (*given.ignored, *(f"#{index + 1}" for index in passed_over))
+        read = _read_columns(machine, source, layout, replace(given, ignored=ignored))
+        if isinstance(read, ReadError):
+            unwanted = _without_numbers(read, source, layout, given)
+        else:
+            columns, written, _, _ = read
+            unwanted = _says_nothing(columns, written, layout, set(passed_over))
+        unwanted = {index: why for index, why in unwanted.items() if index not in passed_over}
+        if not unwanted:
+            break
+        passed_over |= unwanted
+    if isinstance(read, ReadError):
+        return read
+    columns, written, doubts, end = read
     if not written.size:
         problem = Problem("header_only", "a header without data rows", source.file, layout.header_rows)
         return ReadError(problem)
@@ -295,9 +305,15 @@ def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -
         if (c.factor, c.offset) != (1.0, 0.0):  # in their own memory: a long record is not held twice
             arrays[c.quantity] *= c.factor
             arrays[c.quantity] += c.offset
-    arrays, columns, completed = complete(arrays, columns, given.correction, source.file)
     labels, row_of = {c.quantity: c.label for c in columns}, partial(_row_of, source, layout)
-    impossible = beyond_measurement(arrays, source.file, labels, row_of)
+    try:
+        impossible = beyond_measurement(arrays, source.file, labels, row_of)
+        if not impossible:
+            arrays, columns, completed = complete(arrays, columns, given.correction, source.file)
+            labels = {c.quantity: c.label for c in columns}
+            impossible = beyond_measurement(arrays, source.file, labels, row_of)
+    except ReadError as why:
+        return why
     if impossible:
         return ReadError(impossible)
     findings = check_time(arrays["time"], source.file, labels["time"], row_of)
@@ -309,7 +325,59 @@ def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -
     row = layout.units_row or layout.names_row
     findings += [replace(doubt, file=source.file, row=row) for doubt in doubts]
     findings += [*completed, *([end] if end else [])]
-    return Reading(source, machine, layout, columns, arrays, tuple(findings))
+    return Reading(source, machine, layout, columns, arrays, tuple(findings), passed_over=passed_over)
+
+
+Written = tuple[tuple[Column, ...], FloatArray, tuple[Problem, ...], Problem | None]
+
+
+def _read_columns(machine: Machine, source: Source, layout: Layout, given: Given) -> Written | ReadError:
+    """The columns of a table, their numbers as written, doubts about the columns and one about the end."""
+    try:
+        columns, doubts = assign(layout.names, layout.units, layout.filled, given)
+    except ReadError as why:
+        return ReadError(_explained(why, machine, source, layout))
+    used = [c.index for c in columns]
+    try:
+        if not given.decimal:
+            refuse_ambiguous_marks(source, layout, used)
+        written, end = parse_block(source, layout, used)
+    except ReadError as why:
+        return why
+    return columns, written, doubts, end
+
+
+def _says_nothing(
+    columns: Sequence[Column], written: FloatArray, layout: Layout, passed_over: set[int]
+) -> dict[int, str]:
+    """Columns taken by their names that cannot be what they say, and why, by their position."""
+    meant = {k: hit[0] for k, name in enumerate(layout.names) if name and (hit := match_column(name))}
+    taken = {c.index for c in columns}
+    found = {}
+    for column, numbers in zip(columns, written, strict=True):
+        if not column.reason.startswith("named") or numbers.size < _FEWEST_ALIKE or np.any(numbers != numbers[0]):
+            continue
+        others = {k for k, q in meant.items() if q == column.quantity and layout.filled[k]} - taken - passed_over
+        if column.quantity == "displacement" and any(c.quantity == "time" for c in columns):
+            found[column.index] = "it never changes, so it is no displacement"
+        elif column.quantity != "displacement" and not numbers[0] and others:
+            found[column.index] = f"it is zero in every row, unlike {layout.name(min(others))}"
+    return found
+
+
+def _without_numbers(why: ReadError, source: Source, layout: Layout, given: Given) -> dict[int, str]:
+    """Columns that are refused for having no number in any row that was looked at, by their position."""
+    if source.arrays or any(p.kind != "nan_gap" for p in why.problems):
+        return {}
+    first, _ = source.lines(layout.start, HEAD_BYTES)
+    last, _ = source.lines(max(layout.start, layout.end - HEAD_BYTES), HEAD_BYTES)
+    rows = [cut(line, layout.delimiter) for line in (*first[:-1], *last[1:]) if line.strip()]
+    found = {}
+    for index in {layout.names.index(p.column) for p in why.problems if p.column in layout.names}:
+        cells = [row[index] for row in rows if index < len(row)]
+        if not given.names(layout.names[index]) and not any(map(str.isdigit, "".join(cells))):
+            found[index] = "it holds no number"
+    return found
 
 
 def _explained(why: ReadError, machine: Machine, source: Source, layout: Layout) -> list[Problem]:

@@ -48,6 +48,7 @@ _MULTIBYTE = ("gb18030", "cp932", "cp949", "big5")
 _ASCII = bytes(range(128))
 # Letters and signs that western machines write; anything else makes cp1252 an unlikely reading.
 _PLAUSIBLE = frozenset("äöüÄÖÜßéèêëàâçîïôùûÉÈÀÇñÑåÅøØæÆáíóúìòãõµ°²³±·×«»‘’“”–—…€ \xa0")
+_JAPANESE_WORD = re.compile(r"[\u3041-\u30ff\u4e00-\u9fff]{2,}")
 _CHUNK = 1 << 20
 _MOST_LISTED = 12
 _GZIP, _ZIP = b"\x1f\x8b", b"PK\x03\x04"
@@ -296,6 +297,21 @@ def _too_large(size: int, limit: int, file: str) -> ReadError:
     return ReadError(Problem("too_large", "the file is too large", file=file, found=found, allowed=allowed))
 
 
+def _is_shift_jis(head: bytes) -> bool:
+    """Whether most of what is beyond ASCII are words of two Japanese letters or more, in Shift-JIS.
+
+    An accented letter of a western word takes the letter behind it along, so that its "word" is one letter long;
+    Chinese and Korean bytes are katakana of half width.
+    """
+    try:
+        text = head[: head.rfind(b"\n") + 1 or None].decode("cp932")
+    except UnicodeDecodeError:
+        return False
+    beyond = sum(not c.isascii() for c in text)
+    in_words = sum(map(len, _JAPANESE_WORD.findall(text)))
+    return in_words >= 4 and 2 * in_words > beyond
+
+
 def _narrow_encoding(raw: bytes | mmap.mmap) -> str:
     looked_at = raw if isinstance(raw, bytes) else raw[:CHUNK_BYTES]
     if looked_at.isascii():
@@ -312,6 +328,8 @@ def _narrow_encoding(raw: bytes | mmap.mmap) -> str:
         return sum(match_quantity(cell.strip()) is not None for cell in cells if not cell.isascii())
 
     by_names = max(("cp1252", *_BY_NAMES), key=names_in)  # the first of equal ones
+    if by_names not in _MULTIBYTE and _is_shift_jis(looked_at[:HEAD_BYTES]):
+        return "cp932"
     if by_names != "cp1252":
         return by_names
     strange = looked_at.translate(None, delete=_ASCII)

@@ -8,10 +8,12 @@ rows are not those of a table.
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -215,6 +217,59 @@ def _te67_hints(source: Source, layout: Layout) -> tuple[Hint, ...]:
     return tuple(found)
 
 
+# JSON of programs that evaluate: rows under "data" with their names under "columns", rows that name their cells, or
+# lists by name. The data sets of a banded rotary damper (ARTS-Laboratory) have rows without names; the keys with their
+# units say which rig it is, and the authors state the order.
+_DAMPER_COLUMNS = (
+    "time", "displacement", "friction force", "velocity", "actuator force 1", "actuator force 2",
+)  # fmt: skip
+
+
+def _json_as_table(source: Source) -> Source:
+    """The columns of numbers as named arrays; the text as it is where it holds none."""
+    try:
+        stored = json.loads(source.text(bytes(source.data)))
+    except (ValueError, RecursionError):
+        return source
+    columns = _json_columns(stored)
+    arrays = {}
+    for name, values in columns.items():
+        with suppress(TypeError, ValueError):
+            arrays[name] = np.array([np.nan if v is None else v for v in values], dtype=float)
+    sizes = [a.size for a in arrays.values() if a.ndim == 1 and a.size > 1]
+    most = max(set(sizes), key=sizes.count, default=0)
+    kept = {name: a for name, a in arrays.items() if a.ndim == 1 and a.size == most}
+    if len(kept) < 2:
+        return source
+    return replace(source, data=b"", names=tuple(kept), arrays=tuple(kept.values()), machine="json")
+
+
+def _json_columns(stored: Any) -> dict[str, Sequence[Any]]:
+    """The columns of a JSON value by name, "#1" and so on where they have none."""
+    above = stored if isinstance(stored, dict) else {}
+    rows = above.get("data", above.get("rows", above.get("records"))) if above else stored
+    if isinstance(rows, list) and rows and all(isinstance(row, dict) for row in rows):
+        return {str(name): [row.get(name) for row in rows] for name in rows[0]}
+    if isinstance(rows, list) and rows and all(isinstance(row, list) for row in rows):
+        width = len(rows[0])
+        if any(len(row) != width for row in rows):
+            return {}
+        named = next((above[key] for key in ("columns", "names", "header", "headers", "fields") if key in above), None)
+        names = [str(name) for name in named] if isinstance(named, list) and len(named) == width else []
+        if not names and "friction force units" in above and width == len(_DAMPER_COLUMNS):
+            names = [f"{name} [{_damper_unit(name, above)}]" for name in _DAMPER_COLUMNS]
+        names = names or [f"#{k + 1}" for k in range(width)]
+        return {name: [row[k] for row in rows] for k, name in enumerate(names)}
+    columns = rows if isinstance(rows, dict) else above
+    return {str(name): values for name, values in columns.items() if isinstance(values, list)}
+
+
+def _damper_unit(name: str, above: Mapping[str, Any]) -> str:
+    if name == "velocity":
+        return f"{above.get('displacement units', '')}/{above.get('time units', '')}"
+    return str(above.get(f"{name.rstrip(' 12')} units", ""))
+
+
 # Tried in this order; the last one accepts everything the others do not recognise.
 TEXT_MACHINES = (
     Machine(
@@ -275,6 +330,12 @@ TEXT_MACHINES = (
         _newport_hints,
         advice="column 4 is the friction torque; give the lever arm: lever_arm_mm = 2.5 in campaign.toml, "
         'or friction_force = "#4 [N m / 2.5 mm]" in columns',
+    ),
+    Machine(
+        "json",
+        "JSON with columns or rows of numbers",
+        lambda source: source.machine == "json" or source.head_text.lstrip()[:1] in ("{", "["),
+        as_table=_json_as_table,
     ),
     Machine("rtec", "Rtec and similar, one table per step, columns in any order", _is_rtec, _rtec_hints),
     Machine("delimited", "plain delimited table with column names and units", lambda source: True),
