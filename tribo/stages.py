@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from tribo.cache.kept_results import kept_or_made
 from tribo.campaign.load import required_flat_sample, with_flat_sample, with_zeros
 from tribo.display import displayed
-from tribo.errors import FitError, Problem
+from tribo.errors import FitError
 from tribo.records import (
     Campaign,
     Fits,
@@ -351,18 +351,6 @@ def naming_set_aside(ingested: Ingested) -> Iterator[None]:
     except FitError as why:
         problems = [p.at(test_id=s.test_id) for s in ingested.set_aside for p in s.problems]
         raise FitError((*why.problems, *problems)) from why
-
-
-def too_few_to_diagnose(ingested: Ingested) -> tuple[Problem, ...]:
-    """That the usable tests are too few for a diagnosis, and why tests were set aside; empty where they are enough."""
-    from tribo.diagnostics.observations import enough, observe
-
-    try:
-        with naming_set_aside(ingested):
-            enough(observe(ingested))
-    except FitError as why:
-        return why.problems
-    return ()
 
 
 def with_doubts(study: Study) -> Study:

@@ -294,9 +294,12 @@ def test_where_too_few_tests_are_left_it_is_said_which_were_set_aside_and_why(
     table = spoiled / "tests.csv"
     table.write_text("".join(table.read_text(encoding="utf-8").splitlines(keepends=True)[:9]), encoding="utf-8")
     result = run(command, spoiled, "-o", tmp_path / "out", "-q")
-    assert result.exit_code == 1
-    assert "too few usable tests" in result.stderr
     if command == "diagnose":
+        assert result.exit_code == 3  # done, with tests set aside
         assert json.loads((tmp_path / "out" / "verdict.json").read_text(encoding="utf-8"))["verdict"] == "cannot_tell"
+        assert "too little was measured (6 usable tests, at least 12 are needed)" in result.stdout
+    else:
+        assert result.exit_code == 1
+        assert "too few usable tests" in result.stderr
     assert "T003: raw/T003.csv: the file is empty" in result.stderr
     assert "T005: tests.csv, row 6, column sample" in result.stderr

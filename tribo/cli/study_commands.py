@@ -194,9 +194,6 @@ def diagnose(
         write_until(study, out, "ingest", drawing, provenance_of_run(study, campaign, chosen), found, card)
     console.result(verdict.as_dict() | {"card": card.as_dict()}, f"{card_text(card)}\n\n{verdict_text(verdict)}")
     console.list_doubts(study.doubts)
-    if until == "ingest" and verdict.verdict == "cannot_tell":
-        console.list_problems(stages.too_few_to_diagnose(study.ingested))
-        return UNUSABLE
     return console.status_after(study.ingested.set_aside)
 
 
