@@ -13,6 +13,7 @@ from tribo.campaign import load_campaign
 from tribo.display import exact_text
 from tribo.ingestion import exports
 from tribo.records import SetAside
+from tribo.traces import PullOptions
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "data" / "example"
 
@@ -53,7 +54,7 @@ def test_a_displacement_that_does_not_run_at_the_speed_of_the_test_is_doubted() 
     assert test.speed_m_s is not None
     for factor, doubted in ((1.0, False), (1.1, False), (2.0, True), (0.1, True)):
         told = replace(test, speed_m_s=factor * test.speed_m_s)
-        ((_, outcome),), _ = exports.read_row(campaign.root, lambda file: campaign.columns, "first_peak", told)
+        ((_, outcome),), _ = exports.read_row(campaign.root, lambda file: campaign.columns, PullOptions(), told)
         assert not isinstance(outcome, SetAside)
         trace, pull = outcome
         assert trace is not None

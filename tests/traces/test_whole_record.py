@@ -12,9 +12,10 @@ import pytest
 from tribo import read_pull
 from tribo.errors import Problem, TraceError
 from tribo.records import PHASES, Pull, Test, Trace
-from tribo.traces.evaluation import drive_of
+from tribo.traces.drive import drive_of, drive_stops
+from tribo.traces.evaluation import spring_of
 from tribo.traces.oscillation import oscillation_of
-from tribo.traces.phases import _drive_stops, _moving, phases_of
+from tribo.traces.phases import phases_of
 from tribo.traces.sliding import transient_end
 from tribo.traces.zero import _level
 from tribo.zeroing import zero_choice
@@ -258,10 +259,10 @@ def test_sliding_before_a_stop_counts_where_it_is_settled_however_even_the_slidi
 
 def test_the_free_period_is_that_of_the_loaded_mass_on_its_spring() -> None:
     """A load of two kilograms on 80 N/m swings in 2 pi sqrt(2/80) s; at 2 mm/s the spring is loaded by 0.16 N/s."""
-    with_spring = drive_of(a_test(speed_m_s=2e-3, stiffness_N_per_m=80.0), 2 * 9.80665)
+    with_spring = spring_of(a_test(speed_m_s=2e-3, stiffness_N_per_m=80.0), 2 * 9.80665)
     assert with_spring["free_period_s"] == pytest.approx(2 * math.pi * math.sqrt(2 / 80))
     assert with_spring["drive_N_per_s"] == pytest.approx(0.16)
-    assert all(math.isnan(v) for v in drive_of(a_test(speed_m_s=2e-3), 20.0).values())
+    assert all(math.isnan(v) for v in spring_of(a_test(speed_m_s=2e-3), 20.0).values())
 
 
 @pytest.mark.parametrize("peaks", [2, 3, 4])
@@ -322,34 +323,40 @@ def ranges_of(*parts: tuple[bool, int]) -> np.ndarray:
 
 def test_a_drive_stands_still_from_five_samples_on() -> None:
     moving = ranges_of((False, 5), (True, 20), (False, 4), (True, 20), (False, 5), (True, 20), (False, 5))
-    stops, end, rests = _drive_stops(moving, (0, moving.size))
+    stops, end, rests = drive_stops(moving, (0, moving.size))
     assert stops == [(49, 54)]
     assert end == 74  # behind it the drive does not move again
     assert rests == [(0, 5), (49, 54), (74, 79)]
-    stops, end, rests = _drive_stops(moving[:-1], (0, 78))
+    stops, end, rests = drive_stops(moving[:-1], (0, 78))
     assert (end, rests) == (78, [(0, 5), (49, 54)])  # four samples are no end
 
 
 def test_a_stop_of_the_drive_counts_where_the_bodies_touch_before_and_after_it() -> None:
     moving = ranges_of((True, 20), (False, 10), (True, 20), (False, 10), (True, 20))
-    assert _drive_stops(moving, (0, 80))[0] == [(20, 30), (50, 60)]
-    assert _drive_stops(moving, (20, 80))[0] == [(50, 60)]
-    assert _drive_stops(moving, (19, 80))[0] == [(20, 30), (50, 60)]
-    assert _drive_stops(moving, (0, 60))[0] == [(20, 30)]
-    assert _drive_stops(moving, (0, 61))[0] == [(20, 30), (50, 60)]
-    assert _drive_stops(np.zeros(9, bool), (2, 7)) == ([], 7, [])
+    assert drive_stops(moving, (0, 80))[0] == [(20, 30), (50, 60)]
+    assert drive_stops(moving, (20, 80))[0] == [(50, 60)]
+    assert drive_stops(moving, (19, 80))[0] == [(20, 30), (50, 60)]
+    assert drive_stops(moving, (0, 60))[0] == [(20, 30)]
+    assert drive_stops(moving, (0, 61))[0] == [(20, 30), (50, 60)]
+    assert drive_stops(np.zeros(9, bool), (2, 7)) == ([], 7, [])
 
 
 def test_a_displacement_that_goes_one_way_tells_where_the_drive_stands_still() -> None:
     travel = np.concatenate([np.arange(1000), np.full(1000, 999), np.arange(1000) + 999]) * 1e-6
     record = Trace("x", np.arange(3000) / 100, np.ones(3000), displacement_m=travel)
-    moving = _moving(record)
-    assert moving is not None
+    moving = drive_of(record).moving  # type: ignore[union-attr]
     assert moving[:990].all()
     assert not moving[1010:1990].any()
     assert moving[2010:].all()
-    assert _moving(replace(record, displacement_m=1e-4 * np.sin(np.arange(3000) / 100))) is None  # to and fro
-    assert _moving(replace(record, displacement_m=np.zeros(3000))) is None
+    assert drive_of(replace(record, displacement_m=np.zeros(3000))) is None
+    assert drive_of(replace(record, displacement_m=noise(3000, sd=1e-6))) is None
+
+
+def test_a_position_that_goes_to_and_fro_tells_where_the_drive_turns() -> None:
+    record = Trace("x", np.arange(3000) / 100, np.ones(3000), displacement_m=1e-4 * np.sin(np.arange(3000) / 100))
+    drive = drive_of(record)
+    assert drive is not None
+    assert drive.turns == pytest.approx([math.pi / 2 * 100 * k for k in range(1, 19, 2)], abs=3)
 
 
 def test_what_a_zero_drifts_is_in_its_uncertainty_as_a_rectangular_distribution() -> None:

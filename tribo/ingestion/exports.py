@@ -54,7 +54,7 @@ def ingest_campaign(campaign: Campaign, rule: str, jobs: int, progress: Progress
     set_aside = list(campaign.set_aside)
     tests: list[Test] = []
     inputs = dict(campaign.inputs)
-    read = partial(read_row, campaign.root, stated_columns(campaign), rule)
+    read = partial(read_row, campaign.root, stated_columns(campaign), options_of(campaign, rule))
     rows: Iterator[tuple[Outcomes, dict[str, str]]] = map(read, campaign.tests)
     if jobs > 1 and len(campaign.tests) >= FEWEST_FOR_PROCESSES and may_fork():
         read(campaign.tests[0])  # what it imports is then in every process
@@ -87,8 +87,15 @@ def stated_columns(campaign: Campaign) -> ColumnsFor:
     return partial(columns_of, general=campaign.columns, by_file=campaign.columns_by_file)
 
 
+def options_of(campaign: Campaign, rule: str) -> PullOptions:
+    """How every trace of a campaign is read."""
+    from tribo.traces import PullOptions
+
+    return PullOptions(rule, contact=campaign.contact)
+
+
 def read_row(
-    root: Path, columns: ColumnsFor, rule: str, test: Test, by_hand: Override | None = None
+    root: Path, columns: ColumnsFor, options: PullOptions, test: Test, by_hand: Override | None = None
 ) -> tuple[Outcomes, dict[str, str]]:
     """The tests of a row of tests.csv with their outcomes, and the SHA-256 of every file read for them, by its path.
 
@@ -97,9 +104,9 @@ def read_row(
     becomes a separate test called ``ID#2/3``. A row without a load uses the normal force recorded in the export. A test
     that cannot be read is set aside with its problems.
     """
-    from tribo.traces import PullOptions, evaluate
+    from tribo.traces import evaluate
 
-    options = PullOptions(rule, test=test)
+    options = replace(options, test=test)
     if by_hand is not None:
         options = replace(options, peak_s=by_hand.peak_s, window_s=by_hand.window_s)
     outcomes: list[tuple[Test, Outcome]] = []

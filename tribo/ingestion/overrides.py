@@ -13,7 +13,7 @@ import numpy as np
 from tribo.campaign.table import TestRow, read_table
 from tribo.errors import CampaignError, Problem, system_problem
 from tribo.files import LEADS_OUT, leads_out
-from tribo.ingestion.exports import read_row, stated_columns
+from tribo.ingestion.exports import options_of, read_row, stated_columns
 from tribo.input_files import hashes_of_reads
 from tribo.records import Ingested, Override, SetAside, Trace
 from tribo.user_text import did_you_mean
@@ -45,12 +45,12 @@ def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
     if not pulls:
         raise CampaignError(Problem("no_usable_test", "all tests are excluded", file=path.name))
     tests = {t.test_id: t for t in ingested.campaign.tests}
-    columns = stated_columns(ingested.campaign)
+    columns, options = stated_columns(ingested.campaign), options_of(ingested.campaign, rule)
     problems: list[Problem] = []
     for o in overrides:
         if o.action == "exclude":
             continue
-        ((_, outcome),), _ = read_row(ingested.campaign.root, columns, rule, tests[o.test_id], o)
+        ((_, outcome),), _ = read_row(ingested.campaign.root, columns, options, tests[o.test_id], o)
         if isinstance(outcome, SetAside):
             problems += outcome.problems
         else:

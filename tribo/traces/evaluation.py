@@ -19,6 +19,7 @@ from tribo.display import displayed
 from tribo.errors import Problem, TraceError
 from tribo.records import STANDARD_GRAVITY, FloatArray, Phase, Pull, Restart, Test, Trace
 from tribo.traces.cuts import directions_of, piece_of, split_pulls
+from tribo.traces.drive import speed_level_m_s
 from tribo.traces.loading import Zero, loading_of, starting_level
 from tribo.traces.oscillation import oscillation_of
 from tribo.traces.peak import (
@@ -31,7 +32,7 @@ from tribo.traces.peak import (
     with_peak_near,
     within_samples,
 )
-from tribo.traces.phases import Course, course_of, phases_of
+from tribo.traces.phases import Course, course_of, course_of_piece, phases_of
 from tribo.traces.rules import DEFAULT_RULE, Rule, named_rule
 from tribo.traces.signal import Signal, line, median_of_three, signal_of, steady
 from tribo.traces.sliding import Sliding, slides_on_closed_track, sliding_over, transient_end, window_between
@@ -45,6 +46,7 @@ _WITH_LOAD = 0.6  # correlation of force and load from which on the force follow
 _SETTLED = 0.05  # share of its mean by which a force may change while it slides and still count as settled
 _LEAD_IN = 0.75  # share of a stop after which the piece that holds its restart begins
 _GAP = 3.0
+_STRETCH_M = 5e-3  # a sled, a pin or its spring gives way by less before it slides; a disc goes further in a second
 _NO_PEAK = {"stopped_before_peak", "sign_flipped", "spike"}  # problems of a piece that only slides
 _CLIMB_OVER_SWING = 5.0
 _OFF_LOAD = 0.02  # share by which the recorded load may differ from that of the test
@@ -70,6 +72,8 @@ class PullOptions:
     begins : {"", "step", "reversal"}
         How a piece begins that was cut from a record: at a step of load or speed, or where the pull changes direction.
         Empty for a whole record, whose channels and force tell.
+    contact : str
+        The contact that campaign.toml states.
     turned : bool
         Whether the sign of the force was changed, so that friction is positive.
     peak_s, window_s : float and (float, float), optional
@@ -82,6 +86,7 @@ class PullOptions:
     zero: Zero | None = None
     load_zero: Zero | None = None
     begins: Literal["", "step", "reversal"] = ""
+    contact: str = ""
     turned: bool = False
     peak_s: float | None = None
     window_s: tuple[float, float] | None = None
@@ -124,15 +129,17 @@ def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
         without = () if "static_N" in forces else ("no_static",)
         return Pull(options.test.test_id, GIVEN, flags=("evaluated_elsewhere", *without), **forces)
     test = options.test or Test(trace.name, trace.file, "", math.nan, "")
+    if test.speed_m_s is None and math.isfinite(speed := speed_level_m_s(trace)):
+        test = replace(test, speed_m_s=speed)
     options = replace(options, rule=rule.name, test=test)
     zero, load_zero, load = options.zero, options.load_zero, trace.columns.get("normal_force_N")
     try:
         signal = signal_of(trace)
         if options.begins:
-            whole = (0, signal.time_s.size)
-            course = Course(whole, whole[1], (), (), options.begins == "step" and _starts_sliding(trace.force_N))
+            at_once = options.begins == "step" and _starts_sliding(trace.force_N)
+            course = course_of_piece(trace, signal, starts_sliding=at_once)
         else:
-            course = course_of(trace, signal)
+            course = course_of(trace, signal, options.contact)
             zero = zero or chosen_zero(test.zero, signal.time_s, signal.force_N, course, trace.file)
             if zero is None and test.zero.kind == "before contact":  # as stated, whatever the force looks like
                 course = replace(course, starts_sliding=False)
@@ -284,11 +291,34 @@ def _first_motion(
     if window_s is not None and not piece.time_s[0] <= window_s[0] < window_s[1] <= piece.time_s[-1]:
         window_s = None
     try:
-        return _from_rest(piece, zero, rule, options.test, options.peak_s, window_s)
+        pull = _from_rest(piece, zero, rule, options.test, options.peak_s, window_s)
+        return _without_static(pull) if _slid_unseen(trace, pull, options.test) else pull
     except TraceError as fault:
         if not options.begins or not {p.kind for p in fault.problems} <= _NO_PEAK:
             raise
-    return _sliding(signal, (0, samples), zero, options)
+    return _sliding(signal, (start, end), zero, options)
+
+
+def _slid_unseen(trace: Trace, pull: Pull, test: Test | None) -> bool:
+    """Whether the drive went so far between two samples of a rise that no sample shows the bodies at rest."""
+    if "peak_between_samples" not in pull.flags:
+        return False
+    at, speed = int(np.searchsorted(trace.time_s, pull.peak_s)), trace.columns.get("speed_m_s")
+    before, after = max(at - 1, 0), min(at + 1, trace.time_s.size - 1)
+    step_s = float(trace.time_s[after] - trace.time_s[before]) / max(after - before, 1)
+    if speed is not None:
+        return bool(np.abs(speed[before : after + 1]).max() * step_s > _STRETCH_M)
+    return bool(test and test.speed_m_s and test.speed_m_s * step_s > _STRETCH_M)
+
+
+def _without_static(pull: Pull) -> Pull:
+    """A pull whose first maximum is none of a start from rest."""
+    flags = [flag for flag in pull.flags if not flag.startswith("peak_") and flag not in ("rounded_peak", "no_drop")]
+    unknown = (
+        "static_N", "static_u_N", "onset_s", "peak_s", "rise_N_per_s", "rise_stiffness_N_per_m", "first_maximum_N",
+        "highest_N", "first_drop_N",
+    )  # fmt: skip
+    return replace(pull, **dict.fromkeys(unknown, math.nan), flags=("no_static", *flags))  # type: ignore[arg-type]
 
 
 def _from_rest(
@@ -485,7 +515,7 @@ def _with_doubt_of_zero(pull: Pull, signal: Signal, course: Course) -> Pull:
     )  # fmt: skip
 
 
-def drive_of(test: Test, load_N: float) -> dict[str, float]:
+def spring_of(test: Test, load_N: float) -> dict[str, float]:
     """k v in N/s and the free period of the slider on its spring in s; NaN where not known."""
     load = test.normal_load_N if math.isfinite(test.normal_load_N) else load_N
     mass, k, v = load / STANDARD_GRAVITY, test.stiffness_N_per_m or math.nan, test.speed_m_s or math.nan
@@ -498,7 +528,7 @@ def _with_oscillation(pull: Pull, trace: Trace, signal: Signal, test: Test) -> P
     if last - first < _FEWEST:
         return pull
     time, force = signal.time_s[first : last + 1], signal.force_N[first : last + 1] - pull.zero_N
-    found = oscillation_of(time, force, **drive_of(test, pull.recorded_load_N))
+    found = oscillation_of(time, force, **spring_of(test, pull.recorded_load_N))
     load = trace.columns.get("normal_force_N")
     if load is not None and found.cycles:
         load = load[first : last + 1]
@@ -538,8 +568,8 @@ def _doubts(trace: Trace, pull: Pull, test: Test) -> list[Problem]:
 
 def _phases(trace: Trace, pull: Pull, signal: Signal, course: Course) -> tuple[Phase, ...]:
     """The phases of a record, with the starts that were read from it and forces above its zero."""
-    starts = [(r.stop_s + r.hold_s, r.peak_s) for r in pull.restarts]
-    if math.isfinite(pull.peak_s):
-        starts.append((pull.onset_s, pull.peak_s))
+    starts = None
+    if math.isfinite(pull.peak_s) or course.starts_sliding:
+        starts = [(pull.onset_s, pull.peak_s), *((r.stop_s + r.hold_s, r.peak_s) for r in pull.restarts)]
     found = phases_of(trace, signal=signal, course=course, starts_s=starts)
     return tuple(replace(phase, force_N=phase.force_N - pull.zero_N) for phase in found)

@@ -8,8 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from tribo.records import FloatArray, Oscillation
-from tribo.traces.phases import turning_points
-from tribo.traces.signal import condense, line, noise_of, sample_noise
+from tribo.traces.signal import condense, line, noise_of, sample_noise, turning_points
 
 SMALLEST_DROP = 0.1  # share of the range of the force over ten cycles from which on a fall counts as a slip
 _FIRST_LOOK = 0.05  # share of the range of the whole record, for a first count of the cycles

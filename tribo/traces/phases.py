@@ -9,13 +9,24 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tribo.errors import TraceError
 from tribo.records import FloatArray, Phase, Trace
-from tribo.traces.cuts import reversals, steps
+from tribo.traces.cuts import reversals
+from tribo.traces.drive import (
+    FEWEST_AT_REST,
+    Drive,
+    Range,
+    drive_of,
+    drive_stops,
+    level_cuts,
+    level_of,
+    levels_of,
+    quiet_end,
+)
 from tribo.traces.loading import loading_of, starting_level
 from tribo.traces.signal import (
     MINIMUM_SAMPLES,
@@ -26,19 +37,15 @@ from tribo.traces.signal import (
     running_mean,
     runs_of,
     signal_of,
+    turning_points,
     wander,
 )
 from tribo.traces.sliding import transient_end
 
-Mask = NDArray[np.bool_]
-Range = tuple[int, int]
-
 _FLAT_START = 0.02  # share of a record that shows the load before contact, if there is such a part
 _LEVEL = 0.1  # share of the swing of a load within which it counts as level, and above which the bodies touch
 _UNLOADED = 0.2  # an unloaded level lies below this share of the load later on
-_AT_REST = 0.05  # share of the usual speed below which the drive stands still
-_ONE_WAY = 0.5  # net over total displacement from which on a displacement channel shows the travel
-_FEWEST_AT_REST = 5
+TURNING = ("pin_on_disc", "ball_on_disc", "rotary")  # contacts that slide on and on, whose records seldom begin at rest
 _FALLEN = 0.5  # share of the sliding force below which a force has fallen, where nothing but the force tells of a stop
 _AT_BOTTOM = 0.35  # share of the depth of a fall near its lowest force, in which a stop spends most of its time
 _SHORTEST_STOP = 0.005  # share of a record that a stop lasts at least, where nothing but the force tells of it
@@ -50,8 +57,13 @@ _DWELLS = 0.05  # share of the samples of a fall that lie at a level at which th
 _RESTART = 0.05  # share of the force by which it rises at a restart
 _RETURNS = 0.02  # share of the later part of a record that lies below the force it begins with if it began in motion
 _UNPULLED = 0.3  # share of the usual force below which a record begins with nothing pulled
+_PULLED = 0.5  # the same where nothing tells of the drive
+_QUARTER, _THREE_QUARTERS = 0.25, 0.75  # share of its climb
+_CLIMBS = 4.0  # times its noise by which a force climbs that begins at rest
 _NEAR = 0.1  # share of its swing below the lowest later force from which on a record begins at rest
 _FELT = 12.0  # a friction force is at least this many times the noise
+_LOADED = 0.95  # share of its first level that a load has reached
+_WAITS = 0.1  # share of a stroke for which a drive stands still at its end that does more than turn
 _LEFT = 0.2  # share of the way to the other level from which on a force has left the old one
 _DRIFTS = 0.02  # share of the later force by which the force before it differs at the least where it still runs in,
 _CLEARLY_DRIFTS = 4.0  # and this many times the uncertainty of the difference
@@ -85,29 +97,54 @@ class Course:
         return tuple(zip(starts, ends, strict=True))
 
 
-def course_of(trace: Trace, signal: Signal) -> Course:
-    """The course of a record by its load, its speed or displacement, and its force."""
+def course_of(trace: Trace, signal: Signal, contact_kind: str = "") -> Course:
+    """The course of a record by its load, its speed or displacement, and its force.
+
+    ``contact_kind`` is the contact that campaign.toml states. A disc or ring that turns slides from its first sample,
+    unless the drive or the force shows that it began at rest.
+    """
     samples = signal.time_s.size
     contact = _contact(trace.columns.get("normal_force_N"), samples)
-    moving = _moving(trace)
-    begins_at_rest = moving is None or not moving[: _FEWEST_AT_REST * 2].all()
+    drive = drive_of(trace)
+    moving = drive.moving if drive is not None and not drive.turns else None
+    begins_at_rest = moving is None or not moving[: FEWEST_AT_REST * 2].all()
     rests: list[Range] = []
-    if moving is None:
-        stops, end = force_stops(signal, contact, in_motion=_returns(signal, contact)), contact[1]
+    stops: list[Range] = []
+    end = contact[1]
+    if moving is not None:
+        stops, end, rests = drive_stops(moving, contact)
+    touching = contact[0], stops[0][0] if stops else end
+    if contact[0] > 0 and moving is not None:
+        at_once = bool(moving[max(contact[0] - 2, 0) : contact[0] + 2].all())
+    elif moving is None or not begins_at_rest:
+        turns = contact_kind in TURNING or (drive is not None and drive.channel in ("speed", "rotation speed"))
+        at_once = _returns(signal, touching)
+        at_once = at_once or _begins_high(signal, touching, turns=turns, told=turns and moving is not None)
     else:
-        stops, end, rests = _drive_stops(moving, contact)
-    rests += [(a, b) for a, b in ((0, contact[0]), (contact[1], samples)) if b - a >= _FEWEST_AT_REST]
-    first_end = stops[0][0] if stops else end
-    in_motion = contact[0] > 0 and moving is not None and bool(moving[max(contact[0] - 2, 0) : contact[0] + 2].all())
-    at_once = in_motion or (not begins_at_rest and contact[0] == 0 and _returns(signal, (contact[0], first_end)))
-    at_once = at_once or (moving is None and _returns(signal, (contact[0], first_end)))
+        at_once = False
+    if moving is None:
+        stops, end = force_stops(signal, contact, in_motion=at_once), contact[1]
+        end = min(end, int(np.flatnonzero(drive.moving)[-1]) + 1 if drive else quiet_end(signal.force_N))
+        end = max(end, stops[-1][1] + 1) if stops else end
+    rests += [(a, b) for a, b in ((0, contact[0]), (contact[1], samples)) if b - a >= FEWEST_AT_REST]
     return Course(contact, end, tuple(stops), tuple(sorted(rests)), at_once)
+
+
+def course_of_piece(trace: Trace, signal: Signal, *, starts_sliding: bool) -> Course:
+    """The course of a piece that was cut from a record: it ends where its drive stops."""
+    whole, drive = (0, signal.time_s.size), drive_of(trace)
+    if drive is not None and drive.moving.any():
+        end = int(np.flatnonzero(drive.moving)[-1]) + 1
+        end = end if whole[1] - end >= FEWEST_AT_REST else whole[1]
+    else:
+        end = quiet_end(signal.force_N)
+    return Course(whole, end, (), (), starts_sliding)
 
 
 def _contact(load: FloatArray | None, samples: int) -> Range:
     """Range in which the bodies touch, by a load that is level and low before it; else the whole record."""
     whole = (0, samples)
-    first = max(int(samples * _FLAT_START), _FEWEST_AT_REST)
+    first = max(int(samples * _FLAT_START), FEWEST_AT_REST)
     if load is None or first * 4 > samples or not np.isfinite(load).all():
         return whole
     low, high = np.percentile(load, (5.0, 95.0))
@@ -116,42 +153,11 @@ def _contact(load: FloatArray | None, samples: int) -> Range:
     swing = high - before
     if before > _UNLOADED * high or float(np.ptp(np.percentile(load[:first], (5.0, 95.0)))) > _LEVEL * swing:
         return whole
-    touching = np.flatnonzero(running_mean(load, _FEWEST_AT_REST) > before + _LEVEL * swing)
+    touching = np.flatnonzero(running_mean(load, FEWEST_AT_REST) > before + _LEVEL * swing)
     if touching.size == 0:
         return whole
     end = int(touching[-1]) + 1
-    return int(touching[0]), end if samples - end >= _FEWEST_AT_REST else samples
-
-
-def _moving(trace: Trace) -> Mask | None:
-    """Where the drive moves, by a recorded speed or rotation, else by a displacement that goes one way; else None."""
-    speed = trace.columns.get("speed_m_s", trace.columns.get("rotation_rev_per_s"))
-    if speed is not None and np.isfinite(speed).all() and np.any(speed):
-        pace = np.abs(median_of_three(speed))
-        return pace > _AT_REST * float(np.percentile(pace, 95))
-    x = trace.displacement_m
-    if x is None or not np.isfinite(x).all() or x.size < 4 * _FEWEST_AT_REST:
-        return None
-    width = max(_FEWEST_AT_REST, x.size // 500)
-    smooth = running_mean(x, width)
-    path = float(np.abs(np.diff(smooth[::width])).sum())
-    if path <= 0 or abs(float(smooth[-1] - smooth[0])) < _ONE_WAY * path:
-        return None
-    ahead, behind = np.minimum(np.arange(x.size) + width, x.size - 1), np.maximum(np.arange(x.size) - width, 0)
-    spent = np.maximum(trace.time_s[ahead] - trace.time_s[behind], 1e-300)
-    pace = np.abs(smooth[ahead] - smooth[behind]) / spent
-    return np.asarray(pace > _AT_REST * float(np.percentile(pace, 75)))
-
-
-def _drive_stops(moving: Mask, contact: Range) -> tuple[list[Range], int, list[Range]]:
-    """Stops of the drive while the bodies touch, where motion ends for good, and all ranges at rest."""
-    rests = [(int(a), int(b)) for a, b in zip(*runs_of(~moving), strict=True) if b - a >= _FEWEST_AT_REST]
-    if not moving.any():
-        return [], contact[1], []
-    first, last = int(np.argmax(moving)), int(np.flatnonzero(moving)[-1])
-    stops = [(a, b) for a, b in rests if max(first, contact[0]) < a and b < min(last, contact[1])]
-    after = moving.size - last - 1
-    return stops, min(contact[1], last + 1) if after >= _FEWEST_AT_REST else contact[1], rests
+    return int(touching[0]), end if samples - end >= FEWEST_AT_REST else samples
 
 
 def force_stops(signal: Signal, contact: Range, *, in_motion: bool) -> list[Range]:
@@ -163,7 +169,7 @@ def force_stops(signal: Signal, contact: Range, *, in_motion: bool) -> list[Rang
     first, last = contact
     force = signal.smooth_N[first:last]
     height = force if in_motion else force - starting_level(force)
-    if height.size < 20 * _FEWEST_AT_REST or float(height.max()) < _FELT * signal.noise_N:
+    if height.size < 20 * FEWEST_AT_REST or float(height.max()) < _FELT * signal.noise_N:
         return []
     top = float(np.percentile(height, 90))
     dips = [
@@ -180,7 +186,7 @@ def _stop_in(height: FloatArray, dip: Range) -> Range | None:
     inside = height[dip[0] : dip[1]]
     edge, bottom = float(max(inside[0], inside[-1])), float(np.percentile(inside, 5))
     near = np.flatnonzero(inside <= bottom + _AT_BOTTOM * (edge - bottom))
-    if inside.size < max(2 * _FEWEST_AT_REST, _SHORTEST_STOP * height.size) or near.size <= inside.size / 2:
+    if inside.size < max(2 * FEWEST_AT_REST, _SHORTEST_STOP * height.size) or near.size <= inside.size / 2:
         return None
     low = np.flatnonzero(inside <= bottom + _AT_BOTTOM / 2 * (edge - bottom))
     return dip[0], dip[0] + int(low[-1]) + 1
@@ -216,7 +222,7 @@ def _pace(time_s: FloatArray, height: FloatArray, start: int, end: int) -> tuple
 
 def _relaxes_from(height: FloatArray, peak: int, trough: int, noise: float) -> int:
     """Index at which the slide after a peak ends and the force relaxes: the last at the highest level it dwells at."""
-    fall = running_mean(height[peak:trough], _FEWEST_AT_REST)
+    fall = running_mean(height[peak:trough], FEWEST_AT_REST)
     width = max(3.0 * noise, 0.005 * float(np.ptp(fall)), 1e-300)
     bins = np.floor((fall - fall.min()) / width).astype(int)
     share = np.bincount(bins) / bins.size
@@ -227,46 +233,46 @@ def _relaxes_from(height: FloatArray, peak: int, trough: int, noise: float) -> i
     return peak + int(np.flatnonzero(fall >= level - width)[-1]) + 1
 
 
-def turning_points(force: FloatArray, least: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Indices of the maxima and minima between which a force goes back and forth by at least ``least``.
-
-    The first turning point is a maximum; equal heights count once, unlike prominences of ties.
-    """
-    peaks: list[int] = []
-    troughs: list[int] = []
-    extreme, at, rising = -np.inf, 0, True
-    values = force.tolist()
-    for k, value in enumerate(values):
-        if rising:
-            if value > extreme:
-                extreme, at = value, k
-            elif extreme - value >= least:
-                peaks.append(at)
-                extreme, at, rising = value, k, False
-        elif value < extreme:
-            extreme, at = value, k
-        elif value - extreme >= least:
-            troughs.append(at)
-            extreme, at, rising = value, k, True
-    return np.array(peaks, int), np.array(troughs, int)
-
-
-def _returns(signal: Signal, span: Range) -> bool:
-    """Whether a record begins at a force that it comes back to, or falls from: it then slides from its first sample."""
+def _first_and_later(signal: Signal, span: Range) -> tuple[float, FloatArray]:
+    """The force that a range begins with, and the later three quarters of it, a last fall left out; both positive."""
     force = signal.smooth_N[span[0] : span[1]]
-    if force.size < 4 * _FEWEST_AT_REST:
-        return False
-    begin = signal.force_N[span[0] : span[0] + _FEWEST_AT_REST]
+    begin = signal.force_N[span[0] : span[0] + FEWEST_AT_REST]
     start = min(float(np.median(begin)), float(np.median(begin[:3])), key=abs)
     later = force[force.size // 4 :]
     if np.median(later) < 0:
         later, start = -later, -start
     high = np.flatnonzero(later > _FALLEN * float(np.median(later)))
-    later = later[: int(high[-1]) + 1] if high.size else later  # without a tail in which the force has fallen for good
+    return start, later[: int(high[-1]) + 1] if high.size else later
+
+
+def _returns(signal: Signal, span: Range) -> bool:
+    """Whether a record begins at a force that it comes back to, or falls from: it then slides from its first sample."""
+    if span[1] - span[0] < 4 * FEWEST_AT_REST:
+        return False
+    start, later = _first_and_later(signal, span)
     felt = float(np.median(later)) > _FELT * max(signal.noise_N, noise_of(later))
     low, high = np.quantile(later, (_RETURNS, 1.0 - _RETURNS))
     in_range = start >= low - _NEAR * (high - low) - 2.0 * signal.noise_N
     return bool(felt and in_range and start > _UNPULLED * float(np.median(later)))
+
+
+def _begins_high(signal: Signal, span: Range, *, turns: bool, told: bool) -> bool:
+    """Whether a record begins with a large part of its later force, so that its bodies slide, and the force drifts up.
+
+    Where a channel ``told`` that the drive moves, this is enough. Else a force that keeps level before it climbs began
+    at rest, above a large zero. ``turns`` is a disc, a ring or a spindle.
+    """
+    if span[1] - span[0] < 4 * FEWEST_AT_REST:
+        return False
+    start, later = _first_and_later(signal, span)
+    level = float(np.median(later))
+    if level <= _FELT * signal.noise_N or start <= (_UNPULLED if turns else _PULLED) * level:
+        return False
+    if told or level - start < _CLIMBS * max(signal.noise_N, noise_of(later)):
+        return True
+    height = (np.abs(signal.smooth_N[span[0] : span[1]]) - start) / (level - start)
+    quarter, most = int(np.argmax(height > _QUARTER)), int(np.argmax(height > _THREE_QUARTERS))
+    return quarter - (most - quarter) / 2.0 < FEWEST_AT_REST
 
 
 def phases_of(
@@ -297,24 +303,50 @@ def phases_of(
         The record holds no signal that can be read.
     """
     signal = signal or signal_of(trace)
-    course = course or course_of(trace, signal)
+    course = course or course_of(trace, signal, contact)
+    drive, samples = drive_of(trace), signal.time_s.size
     spans: list[_Span] = []
-    samples = signal.time_s.size
     if course.begins_before_contact:
         spans.append(_Span("approach", 0, course.contact[0], "the load is level and low"))
-    for k, (first, last) in enumerate(course.pieces):
-        if k:
-            spans.append(_Span("hold", first, course.stops[k - 1][1], "the drive stands still"))
-            first = course.stops[k - 1][1]
-        from_rest = k > 0 or not course.starts_sliding
-        start = _start_from_rest(signal, (first, last), starts_s) if from_rest else None
-        spans += _motion(trace, signal, (first, last), start, k)
-    touching, end = course.contact[1], course.end
+    begin, end = _under_load(trace, course)
+    if begin > course.contact[0]:
+        spans.append(_Span("loading", course.contact[0], begin, "the load rises"))
+    strokes = _strokes(signal, drive, (begin, end))
+    if strokes:
+        spans += strokes
+    else:
+        for k, (first, last) in enumerate(course.pieces):
+            if k:
+                spans.append(_Span("hold", first, course.stops[k - 1][1], "the drive stands still"))
+                first = course.stops[k - 1][1]
+            first, last = max(first, begin), min(last, end)
+            from_rest = k > 0 or not course.starts_sliding
+            start = _start_from_rest(signal, (first, last), starts_s) if from_rest and last > first else None
+            spans += _motion(trace, signal, drive, (first, last), start, k)
+    touching = course.contact[1]
     if end < touching:
-        spans.append(_Span("end of the drive", end, touching, "the drive stands still until the end"))
+        falls = end < course.end
+        name, evidence = ("unloading", "the load falls") if falls else ("end of the drive", "the drive stands still")
+        spans.append(_Span(name, end, touching, evidence))
     if touching < samples:
         spans.append(_Span("lift-off", touching, samples, "the load has fallen back"))
     return tuple(_phase(trace, signal, span) for span in spans if span.last > span.first)
+
+
+def _under_load(trace: Trace, course: Course) -> Range:
+    """The samples from which on the load has reached its first level, and up to which it keeps its last."""
+    first, last = course.contact[0], course.end
+    load = trace.columns.get("normal_force_N")
+    if load is None or not np.isfinite(load).all():
+        return first, last
+    load = median_of_three(np.abs(load[first : course.contact[1]]))
+    levels = levels_of(load)
+    if not levels or not course.begins_before_contact:
+        return first, last
+    low = np.flatnonzero(load[: levels[0][0]] < _LOADED * levels[0][2])
+    begin, end = first + int(low[-1]) + 1 if low.size else first, first + levels[-1][1]
+    begin = begin if first + FEWEST_AT_REST < begin < last else first
+    return begin, (end if begin < end < last - FEWEST_AT_REST else last)
 
 
 @dataclass(frozen=True)
@@ -353,7 +385,47 @@ def _start_from_rest(
     return first + int(np.searchsorted(time[part], loading.onset_s)), first + loading.top
 
 
-def _motion(trace: Trace, signal: Signal, span: Range, start: tuple[int, int] | None, number: int) -> Iterator[_Span]:
+def _strokes(signal: Signal, drive: Drive | None, span: Range) -> list[_Span]:
+    """The strokes of a motion to and fro, by the turns of the drive, else by the reversals of the force."""
+    begin, end = span
+    told = drive is not None and bool(drive.turns)
+    turns = [turn for turn in drive.turns if begin < turn < end] if drive and told else []
+    if not told:
+        turns = [begin + k for k in reversals(signal.force_N[begin:end])]
+    found: list[_Span] = []
+    cycle = 1
+    for k, (a, b) in enumerate(pairwise([begin, *turns, end] if turns else [])):
+        first, last = a, b
+        if drive is not None and told:
+            moving = np.flatnonzero(drive.moving[a:b])
+            first, last = (a + int(moving[0]), a + int(moving[-1]) + 1) if moving.size else (a, b)
+            found += _between_strokes(found, first, last - first, "the drive")
+        else:
+            first = _reversal(signal, (begin, end), a)[1] if k else a
+            last = a + quiet_end(signal.force_N[a:b])
+            last = min(last, _reversal(signal, (begin, end), b)[0]) if b < end else last
+            found += _between_strokes(found, first, last - first, "the force")
+        found.append(_Span("stroke", first, last, "the drive moves" if told else "the force", cycle=cycle))
+        cycle += k % 2
+    if found and found[-1].last < end:
+        found.append(_Span("end of the drive", found[-1].last, end, "the drive stands still"))
+    if found and found[0].first > begin:
+        found.insert(0, _Span("rest", begin, found[0].first, "the drive stands still"))
+    return found
+
+
+def _between_strokes(found: Sequence[_Span], first: int, stroke: int, teller: str) -> Iterator[_Span]:
+    """The reversal from the last stroke to the next; a hold where the drive stands still for some time."""
+    if not found or found[-1].last >= first:
+        return
+    waits = first - found[-1].last >= max(FEWEST_AT_REST, _WAITS * stroke) and teller == "the drive"
+    evidence = f"{teller} stands still" if waits else f"{teller} turns"
+    yield _Span("hold" if waits else "reversal", found[-1].last, first, evidence)
+
+
+def _motion(
+    trace: Trace, signal: Signal, drive: Drive | None, span: Range, start: tuple[int, int] | None, number: int
+) -> Iterator[_Span]:
     """The phases of one motion of the drive, from its start to its stop."""
     first, last = span
     if start is not None:
@@ -364,22 +436,17 @@ def _motion(trace: Trace, signal: Signal, span: Range, start: tuple[int, int] | 
         else:
             yield _Span("rise", first, peak, "the force climbs after the stop")
         first = peak
-    cuts = [(*_reversal(signal, (first, last), first + k), "reversal") for k in reversals(signal.force_N[first:last])]
-    for name, quantity in (("step of load", "normal_force_N"), ("step of speed", "speed_m_s")):
-        if (values := trace.columns.get(quantity)) is not None and not cuts:
-            cuts += [(first + a, first + max(b, a + 1), name) for a, b in steps(np.abs(values[first:last]))]
-    least = max(_FEWEST_AT_REST, (last - first) // 100)
-    cuts = [cut for cut in cuts if cut[0] - first >= least and last - cut[1] >= least]
-    cuts = [cut for k, cut in enumerate(sorted(cuts)) if k == 0 or cut[0] >= sorted(cuts)[k - 1][1]]
-    to_and_fro = any(name == "reversal" for *_, name in cuts)
+    cuts = []
+    channels = {"step of load": trace.columns.get("normal_force_N"), "step of speed": drive.pace if drive else None}
+    for name, values in channels.items():
+        if values is not None and np.isfinite(values[first:last]).all():
+            cuts += [(first + a, first + b, name) for a, b in level_cuts(np.abs(values[first:last]))]
+    cuts.sort()
+    cuts = [cut for k, cut in enumerate(cuts) if k == 0 or cut[0] >= cuts[k - 1][1]]
     begin, evidence = first, "the force after the peak" if start else "the drive moves"
     for k, (a, b, name) in enumerate([*cuts, (last, last, "")]):
-        if to_and_fro:
-            yield _Span("stroke", begin, a, evidence, cycle=k // 2 + 1)
-        else:
-            yield from _slide(signal, begin, a, evidence, after_peak=k == 0 and start is not None)
-        told = {"reversal": "the force changes sides", "step of load": "the load", "step of speed": "the speed"}
-        yield _Span(name, a, b, told.get(name, ""))
+        yield from _slide(signal, begin, a, evidence, after_peak=k == 0 and start is not None)
+        yield _Span(name, a, b, "the load" if name == "step of load" else "the speed")
         begin, evidence = b, f"after the {name}"
 
 
@@ -421,7 +488,7 @@ def _phase(trace: Trace, signal: Signal, span: _Span) -> Phase:
 
     def mean_of(quantity: str) -> float:
         values = trace.columns.get(quantity)
-        return math.nan if values is None else abs(float(np.mean(values[part])))
+        return math.nan if values is None else abs(level_of(values[part]))
 
     force = signal.force_N[part]
     force_u = wander(force, float(time[span.last - 1] - time[span.first]))[0] if force.size > 1 else math.nan

@@ -96,6 +96,30 @@ def running_mean(values: FloatArray, width: int) -> FloatArray:
     return np.asarray((total[high] - total[low]) / (high - low))
 
 
+def turning_points(force: FloatArray, least: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Indices of the maxima and minima between which a force goes back and forth by at least ``least``.
+
+    The first turning point is a maximum; equal heights count once, unlike prominences of ties.
+    """
+    peaks: list[int] = []
+    troughs: list[int] = []
+    extreme, at, rising = -np.inf, 0, True
+    values = force.tolist()
+    for k, value in enumerate(values):
+        if rising:
+            if value > extreme:
+                extreme, at = value, k
+            elif extreme - value >= least:
+                peaks.append(at)
+                extreme, at, rising = value, k, False
+        elif value < extreme:
+            extreme, at = value, k
+        elif value - extreme >= least:
+            troughs.append(at)
+            extreme, at, rising = value, k, True
+    return np.array(peaks, int), np.array(troughs, int)
+
+
 def wander(values: FloatArray, duration_s: float) -> tuple[float, float, float]:
     """Split the departures of ``values`` (spread evenly over ``duration_s``) into stationary noise and a slow walk.
 

@@ -1,0 +1,180 @@
+"""Records of programmes: which part is a rest, a slide, a stroke, a step, and what may be read from it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tribo import read_pull
+from tribo.readers import read_blocks
+from tribo.records import Pull, Test, Trace
+from tribo.traces import PullOptions, evaluate, phases_of, pieces_of
+from tribo.traces.drive import level_cuts, quiet_end, speed_level_m_s
+
+REAL = Path(__file__).resolve().parents[3] / "shared" / "real"
+at_hand = pytest.mark.skipif(not REAL.is_dir(), reason="the real campaigns are not at hand")
+TEST = Test("T1", "raw/T1.csv", "S", math.nan, "S1")
+
+
+def noise(size: int, seed: int = 0, sd: float = 0.01) -> np.ndarray:
+    return sd * np.random.default_rng(seed).standard_normal(size)
+
+
+def continuous(seed: int = 0, *, rpm: bool = True) -> Trace:
+    """Three minutes on a turning disc: 0.14 N more from the first sample to the last, 0.5 N to begin with."""
+    time = np.arange(1800) / 10
+    force = 0.5 + 0.14 * (1 - np.exp(-time / 40)) + noise(1800, seed)
+    columns = {"rotation_rev_per_s": 7.9 + noise(1800, seed + 1, 0.02)} if rpm else {}
+    return Trace("disc", time, force, columns=columns)
+
+
+def of_phase(trace: Trace, name: str) -> list[tuple[float, float]]:
+    return [(p.start_s, p.end_s) for p in phases_of(trace) if p.name == name]
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("rpm", "contact"), [(True, ""), (True, "sled"), (False, "ball_on_disc"), (False, "rotary")])
+def test_a_disc_that_turns_from_the_first_row_has_no_static_force_and_no_zero(
+    seed: int, rpm: bool, contact: str
+) -> None:
+    trace = continuous(seed, rpm=rpm)
+    pull = evaluate(trace, PullOptions(test=TEST, contact=contact))
+    assert math.isnan(pull.static_N)
+    assert pull.zero_N == 0.0
+    assert not pull.problems
+    assert pull.sliding_N == pytest.approx(trace.force_N[600:].mean(), rel=0.02)
+    assert {p.name for p in pull.phases} <= {"running-in", "steady sliding"}
+
+
+def test_a_pull_from_rest_over_a_large_zero_keeps_its_static_force_on_a_rotary_rig() -> None:
+    time = np.arange(3000) / 50
+    climb = np.clip((time - 4) / 2, 0, 1) * np.where(time > 6, 1 + 0.2 * np.exp(-np.maximum(time - 6, 0) / 0.5), 1.2)
+    pull = evaluate(Trace("ring", time, 1.0 + climb + noise(3000)), PullOptions(test=TEST, contact="rotary"))
+    assert pull.static_N == pytest.approx(1.2, abs=0.05)
+    assert pull.zero_N == pytest.approx(1.0, abs=0.02)
+
+
+def stroke_with_a_rest(channel: str, seed: int = 0) -> Trace:
+    """A stroke of 2 N whose drive stops at two thirds of the record; the force relaxes to 1.6 N and is quiet."""
+    n = 300
+    time, moving = np.arange(n) / 50, np.arange(n) < 200
+    slide = 2.0 + noise(n, seed, 0.03)
+    force = np.where(moving, slide, 1.6 + 0.4 * np.exp(-np.maximum(time - 4, 0) / 0.05) + noise(n, seed, 1e-4))
+    force[:10] = np.linspace(-1.6, 2.0, 10)
+    speed = np.where(moving, 5e-3, 0.0)
+    trace = Trace("stroke", time, force)
+    if channel == "speed":
+        return replace(trace, columns={"speed_m_s": speed})
+    return replace(trace, displacement_m=np.cumsum(speed) / 50) if channel == "displacement" else trace
+
+
+@pytest.mark.parametrize("begins", ["", "reversal"])
+@pytest.mark.parametrize("channel", ["speed", "displacement", "force alone"])
+def test_the_sliding_window_ends_where_the_drive_of_a_stroke_stops(channel: str, begins: str) -> None:
+    options = PullOptions(test=TEST, begins=begins)  # type: ignore[arg-type]
+    pull = evaluate(stroke_with_a_rest(channel), options)
+    assert pull.window_s[1] <= 4.04
+    assert pull.sliding_N + pull.zero_N == pytest.approx(2.0, abs=0.02)
+    last = pull.phases[-1]
+    assert (last.name, last.start_s) == ("end of the drive", pytest.approx(4.0, abs=0.06))
+
+
+@pytest.mark.parametrize("noisy", [0.0, 0.1, 0.3])
+def test_the_speed_of_a_noisy_tachometer_is_its_level(noisy: float) -> None:
+    true = 1.68e-3
+    moving = (np.arange(4000) > 500) & (np.arange(4000) < 3500)
+    speed = np.where(moving, true, 0.0) + noise(4000, 3, noisy * true)
+    trace = Trace(
+        "tacho", np.arange(4000) / 100, np.where(moving, 1.0, 0.0) + noise(4000), columns={"speed_m_s": speed}
+    )
+    assert speed_level_m_s(trace) == pytest.approx(true, rel=0.01)
+    ((start, end),) = of_phase(trace, "steady sliding")[-1:]
+    assert end == pytest.approx(35.0, abs=0.4)
+    assert start < 6.0
+
+
+def test_a_first_plateau_at_one_sample_a_second_is_no_static_friction() -> None:
+    """The disc goes 15 cm between two samples: its start from rest is seen by none."""
+    time = np.arange(1800.0)
+    force = np.where(time < 3, 0.0, 7.0 + 2.5 * np.exp(-(time - 3) / 20)) + noise(1800, 0, 0.05)
+    speed = np.where(time < 3, 0.0, 0.15)
+    pull = read_pull(Trace("pin", time, force, columns={"speed_m_s": speed}), test=TEST)
+    assert math.isnan(pull.static_N)
+    assert "no_static" in pull.flags
+    assert pull.sliding_N == pytest.approx(7.0, abs=0.02)
+
+
+def ladder(levels: tuple[float, ...], seed: int = 0, ramp: int = 0) -> np.ndarray:
+    """A channel of 500 samples a level, with or without ramps of so many samples between the levels."""
+    parts = [np.full(500, levels[0])]
+    for one, other in pairwise(levels):
+        parts += [np.linspace(one, other, ramp + 2)[1:-1], np.full(500, other)]
+    values = np.concatenate(parts)
+    return values * (1 + noise(values.size, seed, 0.005))
+
+
+@pytest.mark.parametrize("ramp", [0, 20, 60])
+@pytest.mark.parametrize("levels", [(1.0, 3.0, 10.0, 30.0, 100.0, 300.0), (5.0, 6.0, 7.0, 8.0, 9.0), (4.0, 2.0)])
+def test_every_level_of_a_ladder_is_told_from_the_next(levels: tuple[float, ...], ramp: int) -> None:
+    found = level_cuts(ladder(levels, ramp=ramp))
+    begins = [500 + k * (500 + ramp) for k in range(len(levels) - 1)]
+    assert [a for a, _ in found] == pytest.approx(begins, abs=5)
+    assert [b for _, b in found] == pytest.approx([a + ramp for a in begins], abs=5)
+
+
+def test_a_ladder_of_speeds_slides_on_at_its_slowest_level() -> None:
+    speed = 1e-3 * ladder((300.0, 30.0, 3.0, 1.0))
+    trace = Trace("ladder", np.arange(speed.size) / 10, 1.0 + noise(speed.size), columns={"speed_m_s": speed})
+    steady = [p for p in phases_of(trace) if p.name == "steady sliding"]
+    assert [p.speed_m_s for p in steady] == pytest.approx([0.3, 0.03, 3e-3, 1e-3], rel=0.01)
+
+
+def test_a_step_of_speed_is_seen_in_the_displacement_alone() -> None:
+    time = np.arange(4000) / 10
+    x = np.where(time < 200, 1e-6 * time, 2e-4 + 3e-6 * (time - 200)) + noise(4000, 0, 1e-7)
+    force = np.where(time < 200, 10.0, 10.5 + 0.5 * np.exp(-(time - 200) / 10))
+    names = [p.name for p in phases_of(Trace("gouge", time, force + noise(4000), displacement_m=x))]
+    assert names == ["steady sliding", "step of speed", "steady sliding"]
+
+
+def test_a_rough_force_has_no_quiet_end_and_a_force_that_stops_being_rough_has_one() -> None:
+    rough = 2.0 + noise(500, 1, 0.02)
+    assert quiet_end(rough) == 500
+    assert quiet_end(np.concatenate([rough, np.full(100, 1.7)])) == pytest.approx(500, abs=2)
+
+
+def real(folder: str, name: str, **columns: str) -> list[Trace]:
+    (file,) = sorted((REAL / folder).glob(name))
+    return read_blocks(file, columns=columns or None)
+
+
+@at_hand
+@pytest.mark.parametrize("name", ["014*", "018*"])
+def test_no_step_of_the_rotary_rig_that_never_rests_has_a_static_force_or_a_zero(name: str) -> None:
+    pulls: list[Pull] = [read_pull(trace, test=TEST) for trace in real("rotary-plastics-down", name)]
+    assert len(pulls) == 4
+    assert all(math.isnan(p.static_N) and p.zero_N == 0.0 for p in pulls)
+
+
+@at_hand
+@pytest.mark.parametrize("name", ["*_001.csv", "*_050.csv", "*_100.csv"])
+def test_the_window_over_an_alloy_stroke_ends_before_its_force_relaxes(name: str) -> None:
+    """By the columns: the force of every stroke leaves its level at 1.4 to 1.55 s and is constant from 1.7 s on."""
+    for piece, options in pieces_of(real("alloy-reciprocating", name)).values():
+        assert evaluate(piece, replace(options, test=TEST)).window_s[1] < 1.6
+
+
+@at_hand
+def test_the_velocity_step_in_gouge_is_where_the_displacement_bends() -> None:
+    stated = {
+        "time": "Time(s)", "force": "Friction [N]", "displacement": "Displ(microns) [um]",
+        "normal_force": "Effective_Normal_stress(MPa) [N]",
+    }  # fmt: skip
+    (trace,) = real("velocity-step-gouge", "*.txt", **stated)
+    ((start, end),) = of_phase(trace, "step of speed")
+    assert 21300 < start < end < 21330

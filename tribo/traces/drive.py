@@ -1,0 +1,275 @@
+"""How the drive of a rig moves, by the channel that tells it, and the levels at which speed and load stand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tribo.records import FloatArray, Trace
+from tribo.traces.signal import (
+    MINIMUM_SAMPLES,
+    line,
+    median_of_three,
+    running_mean,
+    runs_of,
+    sample_noise,
+    turning_points,
+)
+
+Mask = NDArray[np.bool_]
+Range = tuple[int, int]
+
+FEWEST_AT_REST = 5
+_AT_REST = 0.05  # share of the lowest level of the speed below which the drive stands still
+_BINS = 10  # of the speed in a decade, where its levels are looked for
+_OCCUPIED = 0.01  # share of the samples in one bin from which on a speed is a level and not passed through
+_CALM = 0.02  # share of the usual speed up to which its noise is left as it is
+_ABOVE_NOISE = 3.0  # a speed of this many times its noise at rest is motion
+_ONE_WAY = 0.5  # net over total displacement from which on a displacement channel shows the travel
+_MOVES = 20.0  # a displacement that moves spans this many times its noise
+_OF_STROKE = 0.3  # share of its span by which a position goes back where the drive turns round
+_WINDOWS = (400, 100, 25)  # samples over those of the windows in which steps are looked for
+_TAIL = 0.05  # share of the values at either end that a level draws in
+_QUIET = 0.25  # share of its usual range over five samples within which a force stands still
+_PULLED = 0.9  # share of the fall to a quiet end above which the drive still pulls
+_QUIET_SHARE = 0.03  # share of a record that a quiet end lasts at the least
+_STEP = 0.08  # share of the lower level by which two levels of speed or load differ
+_OF_NOISE = 6.0  # and this many times the noise of the difference
+_QUARTER = 0.25  # share of the way between two levels at which a passage is placed
+_SHORTEST = 0.02  # share of a motion that a level lasts at the least
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The motion of the drive: ``pace`` (n,) in the unit of its ``channel`` per second, signed where that tells.
+
+    ``moving`` (n,) says where it moves; ``turns`` are the samples at which it changes its direction.
+    """
+
+    pace: FloatArray
+    moving: Mask
+    channel: str
+    turns: tuple[int, ...] = ()
+
+
+def drive_of(trace: Trace) -> Drive | None:
+    """The motion of the drive by a recorded speed or rotation, else by a displacement that moves; None without one."""
+    for quantity, channel in (("speed_m_s", "speed"), ("rotation_rev_per_s", "rotation speed")):
+        speed = trace.columns.get(quantity)
+        if speed is not None and np.isfinite(speed).all() and np.any(speed):
+            return _by_speed(np.asarray(speed, float), channel)
+    x = trace.displacement_m
+    if x is None or not np.isfinite(x).all() or x.size < 4 * FEWEST_AT_REST:
+        return None
+    return _one_way(trace.time_s, x) or _to_and_fro(trace.time_s, x)
+
+
+def _by_speed(speed: FloatArray, channel: str) -> Drive:
+    calm = median_of_three(speed)
+    top = float(np.percentile(np.abs(calm), 95)) or float(np.abs(speed).max())
+    blocks = np.array_split(speed, min(20, max(speed.size // MINIMUM_SAMPLES, 1)))
+    noise = min(sample_noise(block) for block in blocks) if speed.size >= 3 * len(blocks) else 0.0
+    usual = sample_noise(speed)
+    width = 1
+    if usual > _CALM * top:  # a noisy tachometer: the mean over so many samples is as calm as that
+        width = int(min((usual / (_CALM * top)) ** 2, max(speed.size // 50, 1))) | 1
+    pace = running_mean(calm, width)
+    least = _slowest(np.abs(pace), top)
+    least = max(least, min(_ABOVE_NOISE * noise, 0.5 * top)) if width > 1 else least
+    moving = np.abs(pace) > least
+    if width > 1:
+        moving = _narrowed(moving, int(width // 2 * (1.0 - 2.0 * min(least / top, 0.5))))
+    side = np.sign(pace) * moving
+    decided = np.flatnonzero(side)
+    turned = np.flatnonzero(np.diff(side[decided]))
+    return Drive(pace, moving, channel, tuple(int(decided[k + 1]) for k in turned))
+
+
+def _slowest(pace: FloatArray, top: float) -> float:
+    """Speed below which the drive stands still: a small share of the lowest level at which it runs for some time.
+
+    Levels of a ladder may lie far apart; each is less than twenty times the next lower one.
+    """
+    least = _AT_REST * top
+    bins = np.floor(_BINS * np.log10(np.maximum(pace, 1e-9 * top) / top)).astype(int)
+    while True:
+        levels = np.bincount(bins[pace > least] + 9 * _BINS + 1)
+        occupied = np.flatnonzero(levels >= max(_OCCUPIED * pace.size, 2 * FEWEST_AT_REST))
+        lower = _AT_REST * top * 10.0 ** ((int(occupied[0]) - 9 * _BINS - 1) / _BINS) if occupied.size else least
+        if lower >= least * 0.9:
+            return least
+        least = lower
+
+
+def _narrowed(mask: Mask, by: int) -> Mask:
+    """A mask whose runs are shorter by so many samples at either end, but not at the ends of the record."""
+    found = np.zeros(mask.size, bool)
+    for a, b in zip(*runs_of(mask), strict=True):
+        less = min(by, int(b - a - 1) // 2)
+        found[a + (less if a else 0) : b - (less if b < mask.size else 0)] = True
+    return found
+
+
+def _one_way(time_s: FloatArray, x: FloatArray) -> Drive | None:
+    """The drive by a displacement that goes one way."""
+    width = max(FEWEST_AT_REST, x.size // 500)
+    smooth = running_mean(x, width)
+    path = float(np.abs(np.diff(smooth[::width])).sum())
+    if path <= 0 or abs(float(smooth[-1] - smooth[0])) < _ONE_WAY * path:
+        return None
+    pace = _pace(time_s, smooth, width)
+    moving = np.abs(pace) > _AT_REST * float(np.percentile(np.abs(pace), 75))
+    return Drive(pace, _narrowed(moving, width - 1), "displacement")  # motion is felt so many samples around it
+
+
+def _pace(time_s: FloatArray, x: FloatArray, width: int) -> FloatArray:
+    """Slope of a displacement over ``width`` samples to either side."""
+    ahead, behind = np.minimum(np.arange(x.size) + width, x.size - 1), np.maximum(np.arange(x.size) - width, 0)
+    return np.asarray((x[ahead] - x[behind]) / np.maximum(time_s[ahead] - time_s[behind], 1e-300))
+
+
+def _to_and_fro(time_s: FloatArray, x: FloatArray) -> Drive | None:
+    """The drive by a displacement that goes to and fro, with its turns."""
+    noise, span = sample_noise(x), float(np.ptp(x))
+    if span <= _MOVES * noise or span <= 0:
+        return None
+    peaks, troughs = turning_points(x, _OF_STROKE * span)
+    ends = np.sort(np.concatenate((peaks, troughs)))
+    if ends.size == 0:
+        return None
+    path = float(np.abs(np.diff(x[ends])).sum()) if ends.size > 1 else span
+    between = max(int(ends[-1] - ends[0]), 1) if ends.size > 1 else x.size
+    width = int(np.clip(math.ceil(_MOVES * noise / (path / between)), 1, max(between // max(ends.size, 1) // 10, 1)))
+    pace = _pace(time_s, running_mean(x, 2 * width + 1) if width > 1 else x, width)
+    size = np.abs(pace)
+    moving = size > _AT_REST * float(np.percentile(size, 75))
+    side = np.sign(pace) * moving
+    turns = []
+    for end in ends:  # the drive turns half-way through its dwell at the end of a stroke
+        before, after = np.flatnonzero(moving[:end]), np.flatnonzero(moving[end:])
+        if before.size and after.size:
+            turns.append((int(before[-1]) + 1 + end + int(after[0])) // 2)
+    return Drive(pace, side != 0, "position", tuple(turns))
+
+
+def speed_level_m_s(trace: Trace) -> float:
+    """The level of the recorded speed while the drive moves, without its sign; NaN where none was recorded.
+
+    Neither noise nor a few ticks of a coarse tachometer move it.
+    """
+    speed, drive = trace.columns.get("speed_m_s"), drive_of(trace)
+    if speed is None or drive is None or drive.channel != "speed" or not drive.moving.any():
+        return math.nan
+    return level_of(np.sign(drive.pace[drive.moving]) * speed[drive.moving])
+
+
+def level_of(values: FloatArray) -> float:
+    """Mean of some values, the outermost twentieths drawn in to the next ones; NaN where a value is."""
+    if not np.isfinite(values).all():
+        return math.nan
+    low, high = np.quantile(values, (_TAIL, 1.0 - _TAIL))
+    return float(np.clip(values, low, high).mean())
+
+
+def drive_stops(moving: Mask, contact: Range) -> tuple[list[Range], int, list[Range]]:
+    """Stops of the drive while the bodies touch, where motion ends for good, and all ranges at rest."""
+    rests = [(int(a), int(b)) for a, b in zip(*runs_of(~moving), strict=True) if b - a >= FEWEST_AT_REST]
+    if not moving.any():
+        return [], contact[1], []
+    first, last = int(np.argmax(moving)), int(np.flatnonzero(moving)[-1])
+    stops = [(a, b) for a, b in rests if max(first, contact[0]) < a and b < min(last, contact[1])]
+    after = moving.size - last - 1
+    return stops, min(contact[1], last + 1) if after >= FEWEST_AT_REST else contact[1], rests
+
+
+def quiet_end(force_N: FloatArray) -> int:
+    """Index from which a force stands still until the record ends, as after a stop of the drive; the size without one.
+
+    Sliding makes a force rough. Where its range over five samples falls below a quarter of what it is while sliding,
+    and stays there, nothing slides.
+    """
+    n = force_N.size
+    if n < 4 * MINIMUM_SAMPLES:
+        return n
+    windows = np.lib.stride_tricks.sliding_window_view(force_N, FEWEST_AT_REST)
+    rough = windows.max(axis=1) - windows.min(axis=1)
+    usual = float(np.median(rough[: n // 2]))
+    loud = np.flatnonzero(rough > _QUIET * usual)
+    end = int(loud[-1]) + FEWEST_AT_REST if loud.size else n
+    if usual <= 0 or n - end < max(2 * FEWEST_AT_REST, _QUIET_SHARE * n):
+        return n
+    rests, slides = float(np.median(force_N[end:])), float(np.median(force_N[n // 4 : end - (end - n // 4) // 4]))
+    if abs(slides - rests) <= usual:
+        return end
+    pulled = np.flatnonzero((force_N[:end] - rests) / (slides - rests) > _PULLED)  # before the force relaxes
+    return int(pulled[-1]) + 1 if pulled.size else end
+
+
+def levels_of(values: FloatArray) -> list[tuple[int, int, float]]:
+    """(start, end, median) of every steady level of a channel, in order; none where it has not even one.
+
+    Means before and after every sample are compared over windows from a four-hundredth to a twenty-fifth of the
+    samples. Levels differ by 8 % of the lower one and by six times the noise of such a difference; each lasts at least
+    2 % of the samples and drifts by less than two levels differ.
+    """
+    n = values.size
+    shortest = max(MINIMUM_SAMPLES, int(_SHORTEST * n))
+    if n < shortest:
+        return []
+    changing = np.zeros(n, bool)
+    total = np.concatenate(([0.0], np.cumsum(values)))
+    single = sample_noise(values)
+    for width in sorted({max(FEWEST_AT_REST, n // share) for share in _WINDOWS}):
+        if 2 * width >= n:
+            continue
+        means = (total[width:] - total[:-width]) / width
+        before, after = means[: n - 2 * width + 1], means[width:]
+        jump = np.abs(after - before)
+        noise = max(single * math.sqrt(2.0 / width), float(np.median(jump)))
+        least = np.maximum(_STEP * np.minimum(np.abs(before), np.abs(after)), _OF_NOISE * noise)
+        for a, b in zip(*runs_of(jump > least), strict=True):
+            first, last = int(a) + width, int(b) + width  # the middles of the windows
+            if changing[max(first - width, 0) : last + width].any():
+                continue  # a narrower window has placed it
+            if last - first <= 2 * width:  # sharp for this window
+                first = last = first + int(np.argmax(jump[a:b]))
+            changing[first : last + 1] = True
+    stretches = [(int(a), int(b)) for a, b in zip(*runs_of(~changing), strict=True) if b - a >= shortest]
+    levels: list[tuple[int, int, float]] = []
+    for a, b in stretches:
+        part = values[a:b]
+        mean, edge = float(np.median(part)), max((b - a) // 5, 1)
+        drift = abs(float(np.median(part[-edge:]) - np.median(part[:edge])))
+        if drift > max(_STEP * abs(mean), _OF_NOISE * single / math.sqrt(edge)):
+            continue
+        if levels and abs(mean - levels[-1][2]) <= _STEP * min(abs(mean), abs(levels[-1][2])):
+            levels[-1] = (levels[-1][0], b, float(np.median(values[levels[-1][0] : b])))
+        else:
+            levels.append((a, b, mean))
+    return levels
+
+
+def level_cuts(values: FloatArray) -> list[Range]:
+    """(end of a level, start of the next) wherever a channel goes from one steady level to another."""
+    calm = median_of_three(values)
+    return [_passage(calm, one, other) for one, other in pairwise(levels_of(values))]
+
+
+def _passage(values: FloatArray, one: tuple[int, int, float], other: tuple[int, int, float]) -> Range:
+    """The samples between two levels (start, end, median), by a line through the middle half of the way."""
+    first = max(one[1] - (one[1] - one[0]) // 4, one[0])
+    last = min(other[0] + (other[1] - other[0]) // 4, other[1])
+    share = (values[first:last] - one[2]) / (other[2] - one[2])
+    middle = int(np.argmax(share > 0.5))
+    leaves, arrives = np.flatnonzero(share[:middle] < _QUARTER), np.flatnonzero(share[middle:] > 1.0 - _QUARTER)
+    left = int(leaves[-1]) + 1 if leaves.size else 0
+    there = middle + int(arrives[0]) if arrives.size else last - first
+    if there - left < FEWEST_AT_REST:
+        return first + left, first + max(there, left + 1)
+    slope, at, height = line(np.arange(left, there, dtype=float), share[left:there])  # a ramp is a straight line
+    start, end = (at - height / slope, at + (1.0 - height) / slope) if slope > 0 else (left, there)
+    return first + max(round(start), 0), min(first + max(round(end), round(start) + 1), other[1])
