@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tribo.diagnostics.fit import ModelFit
-from tribo.diagnostics.model import PATTERN, Setup
+from tribo.diagnostics.model import GAIN, PATTERN, Setup
 from tribo.diagnostics.normal_equations import Inverse, ModelColumns, Normal, Sides, Weighted
 from tribo.diagnostics.scatter import (
     SIZE_PRIORS,
@@ -34,11 +34,12 @@ ITERATIONS = 4
 RandomSizes = tuple[FloatArray, FloatArray, FloatArray]
 # Of the logarithms of the sizes of all groups: what a contrast explains of the patterns makes their error smaller, and
 # what it explains of a specimen, or of the course of the series, makes the spread of these smaller.
-SIZE_STEPS = np.zeros((5, len(SIZE_PRIORS)))
+SIZE_STEPS = np.zeros((6, len(SIZE_PRIORS)))
 SIZE_STEPS[1, PATTERN] = -0.7
 SIZE_STEPS[2, :PATTERN] = -0.7
-SIZE_STEPS[3, PATTERN + 1 :] = -0.7
-SIZE_STEPS[4, PATTERN + 1 :] = -2.0
+SIZE_STEPS[3, GAIN] = -1.0
+SIZE_STEPS[4, PATTERN + 1 :] = -0.7
+SIZE_STEPS[5, PATTERN + 1 :] = -2.0
 
 
 def fitted_noise(s: Setup, noise: Noise, replicates: int) -> RandomSizes:
