@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,18 @@ from tribo.zeroing import DEFAULT, ZeroChoice, zero_choice
 _NOT_WORTH_A_NOTE = (".", "~$", "Thumbs.db")
 _TABLES_OF_EXPORTS = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".xls", ".ods", ".tra", ".mat", ".tdms")
 _MM2, _GRAM, _MM = 1e-6, 1e-3, 1e-3
+# beginning of the name of a covariate that ends in a unit, and the number of a test that is the same quantity
+_SAME_QUANTITY = {
+    "speed": "speed_m_s", "velocity": "speed_m_s", "rotation": "speed_m_s", "normal_load": "normal_load_N",
+    "load": "normal_load_N", "mass": "normal_load_N", "hold": "hold_s", "temperature": "temperature_C",
+    "humidity": "humidity_pct",
+}  # fmt: skip
+_OF_A_QUANTITY = re.compile(
+    rf"(?:nominal_|set_)?({'|'.join(_SAME_QUANTITY)})"
+    r"_(?:rpm|rps|Hz|[muc]?m_s|mm_min|[mk]?N|k?gf|[mk]?g|s|min|h|C|pct)"
+)
+_IN_TABLE = {"speed_m_s": "speed_mm_s", "normal_load_N": "the load"}
+_SAME_RATIO = 0.02  # largest over smallest ratio of a column to another, beyond 1, of which both have three digits
 _LOADS_AGREE = 0.05  # share by which normal_load_N may differ from the weight put on
 _NUMBER_ROW = re.compile(rb'^\s*"?[-+]?[.,]?\d+[.,\d]*"?\s*[,;\t|]', re.M)
 _FIELDS = {f.name for f in fields(Test)}
@@ -109,6 +122,7 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     problems += [note for row in usable if (note := _loads_disagree(row, described))]
     problems += words_for_numbers(usable)
     tests = tuple(_test(row, described, order, area_m2) for row in usable)
+    tests = _each_quantity_once(tests, problems, rows[0].file)
     names = sorted({t.sample for t in tests}, key=lambda n: (list(patterns).index(pattern_of(n, patterns)), n))
     by_file = {key: value for key, value in described.columns.items() if isinstance(value, dict)}
     return Campaign(
@@ -208,6 +222,50 @@ def _test(row: TestRow, described: CampaignFile, order: str, area_m2: float | No
         "mass_kg": None if mass is None else mass * _GRAM,
     }
     return Test(**{column: value for column, value in numbers.items() if column in _FIELDS} | stated)
+
+
+def _each_quantity_once(tests: tuple[Test, ...], problems: list[Problem], file: str) -> tuple[Test, ...]:
+    """The tests without columns that say what another one says, in other words or units, with a note on each.
+
+    A nominal value beside the recorded one, a speed in turns that goes with the speed, a repeat that counts the tests
+    in their order: none of them is a second variable.
+    """
+    same: dict[str, str] = {}
+    for name in dict.fromkeys(name for test in tests for name in test.covariates):
+        named = _OF_A_QUANTITY.fullmatch(name)
+        if named is None or len(tests) < 2:
+            continue
+        column = _SAME_QUANTITY[named[1]]
+        pairs = [(test.covariates.get(name, ""), getattr(test, column)) for test in tests]
+        if (name == "nominal_load_N" and any(math.isnan(load) for _, load in pairs)) or _are_proportional(pairs):
+            same[name] = column
+    places = [(test.run_order, test.repeat) for test in tests if test.repeat is not None and test.run_order is not None]
+    if len(places) == len(tests) > 2:
+        repeats = [repeat for _, repeat in sorted(places)]
+        if all(a < b for a, b in pairwise(repeats)):
+            same["repeat"] = "run_order"
+    for name, column in same.items():
+        what = f"this column says what {_IN_TABLE.get(column, column)} says, and is not treated as a second variable"
+        problems.append(Problem("same_quantity", what, file, None, name))
+    if not same:
+        return tests
+    return tuple(
+        replace(
+            test, covariates={name: cell for name, cell in test.covariates.items() if name not in same},
+            repeat=None if "repeat" in same else test.repeat,
+        )
+        for test in tests
+    )  # fmt: skip
+
+
+def _are_proportional(pairs: Sequence[tuple[str, float | None]]) -> bool:
+    """Whether a column of text is one factor times a number in all tests, within the rounding of three digits."""
+    try:
+        ratios = [float(text) / float(value) for text, value in pairs if value is not None]
+    except (ValueError, ZeroDivisionError):
+        return False
+    known = len(ratios) == len(pairs) and all(map(math.isfinite, ratios))
+    return known and min(ratios) > 0 and max(ratios) < (1.0 + _SAME_RATIO) * min(ratios)
 
 
 def _loads_disagree(row: TestRow, described: CampaignFile) -> Problem | None:

@@ -71,20 +71,26 @@ def init(console: Console, folder: Path, raw: Path | None, dry_run: bool, **opti
     from tribo.records import UNCORRECTED
 
     columns = columns_from_text(options["columns"]) if options["columns"] else {}
-    correction = corrected(UNCORRECTED, options["stated"])
+    stated = options["stated"]
+    area_mm2 = options["area_mm2"] or stated.get("nominal_area_mm2")
+    correction = corrected(UNCORRECTED, stated | ({"nominal_area_mm2": area_mm2} if area_mm2 else {}))
+    filled = columns_from_text(options["fill"]) if options["fill"] else {}
+    if "normal_load_N" in stated:
+        filled.setdefault("normal_load_N", f"{stated['normal_load_N']:g}")
     if options["table"]:
         draft = draft_from_table(raw, columns_from_text(options["table"]))
     else:
         draft = _from_exports(
             raw, patterns=tuple(options["names"]), records=options["records"], columns=columns, correction=correction,
-            filled=columns_from_text(options["fill"]) if options["fill"] else {},
+            filled=filled,
         )  # fmt: skip
-    contents = texts(folder, draft, columns, correction, options["area_mm2"])
+    contents = texts(folder, draft, columns, correction, area_mm2)
     if not dry_run:
         write_draft(folder, contents, raw if draft.of_exports else None)
     record = {
         "folder": str(folder), "rows": draft.rows, "found": draft.found, "missing": draft.missing,
-        "not_read": draft.not_read, "files": {path.name: text for path, text in contents.items()},
+        "not_read": draft.not_read, "not_used": draft.not_used,
+        "files": {path.name: text for path, text in contents.items()},
     }  # fmt: skip
     shown = "\n".join(f"--- {path}\n{text}" for path, text in contents.items()) if dry_run else ""
     console.result(record, shown + _words(draft, folder, dry_run))
@@ -124,6 +130,7 @@ def _words(draft: Draft, folder: Path, dry_run: bool) -> str:
     lines = [f"{verb}: {len(draft.rows)} rows for {len(files)} exports, samples {', '.join(draft.samples)}"]
     lines += [f"found: {text}" for text in draft.found]
     lines += [f"to fill in: {text}" for text in draft.missing]
+    lines += [f"names not used: {text}" for text in draft.not_used]
     lines += [f"not listed in tests.csv: {text}" for text in draft.not_read]
     lines.append(f"then: tribo ingest {folder} -o out")
     return "\n".join(lines)

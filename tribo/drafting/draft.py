@@ -1,7 +1,4 @@
-"""A campaign drafted from the exports at hand: what their names, headers and columns say, and what they do not.
-
-Names of files are read by a pattern such as "{sample}_{normal_load_N}N", given or proposed.
-"""
+"""A campaign drafted from the exports at hand: what their names, headers and columns say, and what they do not."""
 
 from __future__ import annotations
 
@@ -9,49 +6,33 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from tribo.campaign.rows import Columns
 from tribo.campaign.table import LOADS
+from tribo.drafting.file_names import (
+    columns_in_name,
+    listed,
+    name_expression,
+    not_used,
+    parts_in_words,
+    proposed_patterns,
+    question,
+    where_it_stops,
+)
 from tribo.errors import CampaignError, Problem, ReadError, TriboError
 from tribo.files import found_below
-from tribo.records import UNCORRECTED, Correction, Test, Trace
+from tribo.records import UNCORRECTED, Correction, FloatArray, Test, Trace
 from tribo.units import unit_factor
 
-_FIELD = re.compile(r"\{(\w+)\}|\[([^\[\]{}]*)\]")
-_NUMBER = r"[-+]?\d+(?:[.,p-]\d+)?"
-_TEXTS = {"sample", "specimen", "direction", "operator", "test_id", "started_at"}
-# column of tests.csv, factor: what a field with another unit is written as
-_CONVERTED = {
-    "load_N": ("normal_load_N", 1.0), "load_mN": ("normal_load_N", 1e-3), "load_kN": ("normal_load_N", 1e3),
-    "normal_load_mN": ("normal_load_N", 1e-3), "normal_load_kN": ("normal_load_N", 1e3),
-    "normal_load_gf": ("normal_load_N", 9.80665e-3), "normal_load_kgf": ("normal_load_N", 9.80665),
-    "mass_kg": ("mass_g", 1e3), "mass_mg": ("mass_g", 1e-3),
-    "normal_stress_kPa": ("normal_stress_Pa", 1e3), "normal_stress_MPa": ("normal_stress_Pa", 1e6),
-    "speed_um_s": ("speed_mm_s", 1e-3), "speed_m_s": ("speed_mm_s", 1e3), "speed_mm_min": ("speed_mm_s", 1 / 60),
-    "speed_cm_s": ("speed_mm_s", 10.0), "hold_min": ("hold_s", 60.0), "hold_h": ("hold_s", 3600.0),
-}  # fmt: skip
-# text behind a number in a file name: the field it is proposed as
-_UNITS = {
-    "N": "normal_load_N", "mN": "normal_load_mN", "kN": "normal_load_kN", "gf": "normal_load_gf", "g": "mass_g",
-    "kg": "mass_kg", "Pa": "normal_stress_Pa", "kPa": "normal_stress_kPa", "MPa": "normal_stress_MPa",
-    "rpm": "speed_rpm", "rps": "speed_rps", "Hz": "frequency_Hz", "hz": "frequency_Hz", "min": "duration_min",
-    "mins": "duration_min", "C": "temperature_C", "degC": "temperature_C", "mms": "speed_mm_s", "ums": "speed_um_s",
-    "pct": "humidity_pct", "RH": "humidity_pct", "wt": "content_wt",
-}  # fmt: skip
-_NUMBERS_IN_PART = re.compile(r"([A-Za-z]*?)(\d+(?:[.,-]\d+)?)([A-Za-z]*)")
-_NUMBERS = re.compile(r"[A-Za-z]{0,4}(?:\d+(?:[.,-]\d+)?[A-Za-z]{0,4})+")
-_FEWEST_FITTING = 2
-_REPEATS = {"", "r", "rep", "run", "test", "t", "no", "stroke"}
-_SEPARATOR = re.compile(r"[_ ]+")
 _NOT_LOOKED_AT = (".", "~$", "Thumbs.db")
 _NAMES_OR_UNITS = {
     "missing_column", "missing_unit", "unknown_unit", "ambiguous_unit", "ambiguous_mark", "names_do_not_fit",
-    "time_of_day", "missing_load", "missing_area",
+    "time_of_day", "missing_load", "missing_area", "missing_lever",
 }  # fmt: skip
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _CLOCK = r"(?P<clock>\d{1,2}:\d\d(?::\d\d)?)"
@@ -71,6 +52,13 @@ _HEADERS = (  # words of a header, quantity, column of tests.csv, its unit in SI
      re.I), "speed", "speed_mm_s", 1e3),
 )  # fmt: skip
 _FEWEST_ROWS = 8
+_SIZES = {  # fault of exports that say no size: key of campaign.toml, and what stands in for it
+    "missing_load": ("", ""),
+    "missing_area": ("nominal_area_mm2", "a coefficient and a stress are recorded; forces are those on 1 mm2"),
+    "missing_lever": ("lever_arm_mm", "a torque is recorded; friction forces are those on an arm of 1 mm"),
+}
+_BLOCKS = 200  # of a record, whose median speeds are those of the drive without the noise of its tachometer
+_FEWEST_REVERSALS = 3
 _BOTH_SIGNS = 0.2  # share of the larger side from which a force takes both signs, above noise and a small offset
 
 
@@ -82,8 +70,10 @@ class Draft:
     found: list[str] = field(default_factory=list)
     missing: list[str] = field(default_factory=list)
     not_read: list[str] = field(default_factory=list)
+    not_used: list[str] = field(default_factory=list)  # texts of the names of files that differ and that no column has
     negative: bool = False  # the friction force is negative in every record
     zero: str = ""  # of the force, where the exports show which is meant
+    stands_in: dict[str, float] = field(default_factory=dict)  # for what the exports do not say, by key
     of_exports: bool = True  # not of a table of evaluated forces
 
     @property
@@ -137,9 +127,18 @@ def draft_campaign(
         name_expression(pattern)
     readable: dict[str, tuple[Trace, ...]] = {}
     refused: dict[str, tuple[Problem, ...]] = {}
+    stands_in: set[str] = set()
     for name, path in exports_in(raw).items():
         try:
-            blocks = read_blocks(path, columns=columns, correction=correction, name=name, file=name)
+            try:
+                blocks = read_blocks(path, columns=columns, correction=correction, name=name, file=name)
+            except ReadError as why:
+                if {p.kind for p in why.problems} - set(_SIZES):
+                    raise
+                # what friction is does not depend on the load, area or lever arm; one that stands for it is filled in
+                stands_in |= {p.kind for p in why.problems} & {"missing_area", "missing_lever"}
+                blocks = read_blocks(path, columns=columns, correction=_with_sizes(correction), name=name, file=name)
+                blocks = tuple(replace(r, columns=_without_speed_of_turns(r)) for r in blocks)
         except TriboError as why:
             refused[name] = why.problems
             continue
@@ -153,18 +152,26 @@ def draft_campaign(
     if not used:
         raise CampaignError([problems[0] for problems in refused.values() if problems[0].kind != "short"])
     draft = Draft(not_read=[f"{name}: {problems[0].what}" for name, problems in refused.items() if name not in used])
+    for kind in sorted(stands_in):
+        key, what = _SIZES[kind]
+        draft.stands_in[key] = 1.0
+        draft.missing.append(f"{key} in campaign.toml, for which 1 was written: {what}")
     named = _named(used, patterns, draft)
     for name, found in used.items():
         for row in _rows_of(name, found, named.get(name, {}), records):
             draft.rows.append(row | {c: value for c, value in (filled or {}).items() if not row.get(c)})
-    loaded = [any(row.get(key) for key in LOADS) for row in draft.rows]
-    for row, there in zip(draft.rows, loaded, strict=True):
-        # beside rows with a load, a row that leaves it to its export names the record: raw/a.csv#1
-        if any(loaded) and not there and "#" not in row["file"] and "nominal_load_N" in row:
-            row["file"] += "#1"
+    recorded = {f"raw/{name}" for name, found in used.items() if any(map(has_load, found))}
+    in_export = [row["file"].partition("#")[0] in recorded for row in draft.rows]
+    if not all(in_export):
+        for row, there in zip(draft.rows, in_export, strict=True):
+            # beside rows with a load, a row that leaves it to its export names the record: raw/a.csv#1
+            if there and "#" not in row["file"]:
+                row["file"] += "#1"
     width = len(str(len(draft.rows)))
+    named_so = Counter(row.get("test_id") for row in draft.rows)
     for k, row in enumerate(draft.rows, start=1):
-        row.setdefault("test_id", f"T{k:0{width}d}")
+        if row.setdefault("test_id", f"T{k:0{width}d}") and named_so[row["test_id"]] > 1:
+            row["test_id"] += "-" + row["file"].rpartition("#")[2] if "#" in row["file"] else f"-{k}"
         row.setdefault("sample", raw.stem)
     if all(len(row.get("started_at", "")) > len("2026-01-01") for row in draft.rows):  # a date with a time
         for k, row in enumerate(sorted(draft.rows, key=lambda r: r["started_at"]), start=1):
@@ -172,24 +179,58 @@ def draft_campaign(
     for what in dict.fromkeys(f"{p.what}; give: {p.allowed}" for name in used for p in refused.get(name, ())):
         draft.missing.append(what)
     _say_what_is_missing(draft, used, speed_given=correction.speed_m_s is not None)
-    _signs(draft, readable)
+    in_strokes = {row["file"][len("raw/") : -len("#*")] for row in draft.rows if row["file"].endswith("#*")}
+    _signs(draft, {name: found for name, found in readable.items() if name not in in_strokes})
     return draft
 
 
+def _with_sizes(correction: Correction) -> Correction:
+    """The correction with a load of 1 N, an area of 1 mm2 and a lever arm of 1 mm where none is stated."""
+    return replace(
+        correction, load_N=correction.load_N or 1.0, area_m2=correction.area_m2 or 1e-6,
+        lever_arm_m=correction.lever_arm_m or 1e-3,
+    )  # fmt: skip
+
+
+def _without_speed_of_turns(record: Trace) -> dict[str, FloatArray]:
+    """The columns of a record but for a speed that was computed from turns and a lever arm that nobody stated."""
+    from_turns = record.source is not None and "lever arm" in record.source.reasons.get("speed", "")
+    return {name: values for name, values in record.columns.items() if not (from_turns and name == "speed_m_s")}
+
+
 def _named(used: Iterable[str], patterns: Sequence[str], draft: Draft) -> dict[str, dict[str, str]]:
-    """What the names of files say, and a note on the patterns used and on names that none fits."""
+    """What the names of files say, and notes on the patterns used and on what of the names is not.
+
+    Raises
+    ------
+    CampaignError
+        bad_names: a given pattern fits no file; names_not_used: names differ in what no proposed pattern reads.
+    """
     # the name without folder and suffixes; a point between digits is no suffix
     stems = {file: re.sub(r"(?:\.[A-Za-z]\w{0,5})+$", "", file.rpartition("/")[2]) for file in used}
-    chosen = patterns or proposed_patterns(list(stems.values()))
-    read = {file: columns_in_name(stem, chosen) for file, stem in stems.items()}
+    names = list(dict.fromkeys(stems.values()))
+    chosen = patterns or proposed_patterns(names)
+    fits = {stem: found for stem in names if (found := columns_in_name(stem, chosen)) is not None}
+    if not patterns and (asked := question(names, chosen, fits)):
+        raise CampaignError(asked)
+    problems = []
     for pattern in chosen:
         n = sum(columns_in_name(stem, [pattern]) is not None for stem in stems.values())
         how = "as given" if patterns else "proposed; give --names to read them otherwise"
         draft.found.append(f'names "{pattern}" ({how}): fits {n} of {len(stems)} files')
-    unfit = [file for file, columns in read.items() if columns is None]
-    if unfit and chosen:
-        draft.missing.append(f"names that no pattern fits: {_listed(unfit)}")
-    return {file: columns for file, columns in read.items() if columns is not None}
+        if not n:
+            what, where = f'the pattern "{pattern}" fits no file', where_it_stops(names[0], pattern)
+            allowed = "{column} where a value is read, [text] for what may be missing, * for what is not used"
+            problems.append(Problem("bad_names", what, found=where, allowed=allowed))
+    if problems:
+        raise CampaignError(problems)
+    if not patterns and len(names) > 1:
+        draft.found += parts_in_words(names, chosen)
+    unfit = [stem for stem in names if stem not in fits]
+    for stem in unfit if chosen else ():
+        draft.missing.append(f"a name that no pattern fits: {where_it_stops(stem, chosen[0])}")
+    draft.not_used = [*not_used(names, chosen), *([listed(unfit)] if chosen and unfit else [])]
+    return {file: fits[stem] for file, stem in stems.items() if stem in fits}
 
 
 def _rows_of(name: str, records: Sequence[Trace], named: Mapping[str, str], pattern: str) -> Iterator[dict[str, str]]:
@@ -201,12 +242,24 @@ def _rows_of(name: str, records: Sequence[Trace], named: Mapping[str, str], patt
     # mean force of the second half
     signs = {math.copysign(1.0, float(np.mean(r.force_N[r.force_N.size // 2 :]))) for r in records}
     if len(records) < 2:
-        yield _row(file, named, records[0], pattern) if records else {"file": file, **named}
+        strokes = "#*" if records and _is_strokes(records[0]) else ""
+        yield _row(file + strokes, named, records[0], pattern) if records else {"file": file, **named}
     elif len(signs) == 2 and not pattern:
         yield _row(f"{file}#*", named, records[0], pattern)
     else:
         for k, record in enumerate(records, start=1):
             yield _row(f"{file}#{k}", named, record, pattern)
+
+
+def _is_strokes(record: Trace) -> bool:
+    """Whether the force of one record reverses several times, each time for a stroke."""
+    from tribo.traces import split_pulls
+
+    pieces = split_pulls(record)
+    means = [float(np.mean(piece.force_N)) for piece in pieces]
+    largest = max(map(abs, means))
+    signs = [mean > 0 for mean in means if abs(mean) > _BOTH_SIGNS * largest]
+    return sum(a != b for a, b in pairwise(signs)) >= _FEWEST_REVERSALS
 
 
 def _row(file: str, named: Mapping[str, str], record: Trace, pattern: str) -> dict[str, str]:
@@ -222,8 +275,11 @@ def _row(file: str, named: Mapping[str, str], record: Trace, pattern: str) -> di
     stated_in_header = _in_header(record.metadata)
     if "normal_load_N" in stated_in_header and not has_load(record) and not any(row.get(key) for key in LOADS):
         row["normal_load_N"] = stated_in_header["normal_load_N"]
-    if speed := _recorded_speed_mm_s(record) or stated_in_header.get("speed_mm_s", ""):
+    recorded = _recorded_speed(record.columns.get("speed_m_s"))
+    if speed := f"{recorded * 1e3:.3g}" if recorded else stated_in_header.get("speed_mm_s", ""):
         row.setdefault("speed_mm_s", speed)
+    elif "speed_rps" not in row and (turns := _recorded_speed(record.columns.get("rotation_rev_per_s"))):
+        row.setdefault("speed_rpm", f"{turns * 60.0:.4g}")
     if started := started_at(record.metadata):
         row.setdefault("started_at", started)
     return row
@@ -235,14 +291,21 @@ def has_load(record: Trace) -> bool:
     return load is not None and bool(np.any(load != 0))
 
 
-def _recorded_speed_mm_s(record: Trace) -> str:
-    """The median of a recorded speed while there is any; "" without one."""
-    speed = record.columns.get("speed_m_s")
-    if speed is None or not np.abs(speed).max() > 0:
-        return ""
-    size = np.abs(speed)
-    text = f"{np.median(size[size >= 0.5 * size.max()]) * 1e3:.3g}"
-    return text if float(text) > 0 else ""
+def _recorded_speed(values: FloatArray | None) -> float:
+    """The median of a recorded speed while there is any, 0.0 without one.
+
+    Medians of short blocks are compared with half of the speed found so far; in single rows the noise of a tachometer
+    may be larger than that.
+    """
+    if values is None or not np.abs(values).max() > 0:
+        return 0.0
+    size = max(1, values.size // _BLOCKS)
+    whole = values[: values.size // size * size].reshape(-1, size)
+    speed = np.abs(np.median(whole, axis=1))
+    found = float(np.quantile(speed, 0.9)) or float(speed.max())
+    for _ in range(3):
+        found = float(np.median(speed[speed >= 0.5 * found]))
+    return found
 
 
 def _in_header(metadata: Mapping[str, str]) -> dict[str, str]:
@@ -286,10 +349,13 @@ def _say_what_is_missing(draft: Draft, used: Mapping[str, Sequence[Trace]], spee
     without = [r["file"] for r in draft.rows if r not in with_load and not any(r.get(c) for c in LOADS)]
     if without:
         draft.missing.append(
-            f"the load of {len(without)} rows: normal_load_N or mass_g in tests.csv ({_listed(without)})"
+            f"the load of {len(without)} rows: normal_load_N or mass_g in tests.csv ({listed(without)})"
         )
     if not speed_given and not any(r.get("speed_mm_s") for r in draft.rows):
-        draft.missing.append("the speed: pull_speed_mm_s in campaign.toml, or a column speed_mm_s in tests.csv")
+        turns = any("speed_rpm" in r or "speed_rps" in r for r in draft.rows)
+        arm = "; or lever_arm_mm, the radius at which it slides, as turns are recorded" if turns else ""
+        what = f"the speed: pull_speed_mm_s in campaign.toml, or a column speed_mm_s in tests.csv{arm}"
+        draft.missing.append(what)
     for column, what in (("normal_load_N", "loads"), ("speed_mm_s", "speeds"), ("started_at", "starts")):
         n = sum(bool(r.get(column)) for r in draft.rows)
         if n:
@@ -319,7 +385,7 @@ def _signs(draft: Draft, readable: Mapping[str, Sequence[Trace]]) -> None:
     elif mixed:
         draft.missing.append(
             f"the force takes both signs within {len(mixed)} records: state its zero in campaign.toml, and "
-            f"sign = -1 if friction is negative ({_listed(mixed)})"
+            f"sign = -1 if friction is negative ({listed(mixed)})"
         )
 
 
@@ -333,101 +399,3 @@ def _positive_over_rest(record: Trace) -> bool:
         return evaluate(record, PullOptions(test=test)).sliding_N > 0
     except TriboError:
         return False
-
-
-def _listed(names: Iterable[str]) -> str:
-    names = list(names)
-    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
-
-
-@lru_cache
-def name_expression(pattern: str) -> re.Pattern[str]:
-    """The expression of a pattern: ``{column}`` for what is read, ``[text]`` for text that may be missing.
-
-    Raises
-    ------
-    CampaignError
-        bad_names: it has no field, or one field twice.
-    """
-    names = [name for name, _ in _FIELD.findall(pattern) if name]
-    if not names or len(set(names)) < len(names):
-        what = "a pattern of names needs at least one field, each once"
-        allowed = '{column} where a value is read, [text] for what may be missing: "{sample}_{normal_load_N}N_{repeat}"'
-        raise CampaignError(Problem("bad_names", what, found=pattern, allowed=allowed))
-    parts, at = [], 0
-    for mark in _FIELD.finditer(pattern):
-        name, optional = mark.groups()
-        parts.append(re.escape(pattern[at : mark.start()]))
-        parts.append(f"(?P<{name}>{_kind(name)})" if name else f"(?:{re.escape(optional)})?")
-        at = mark.end()
-    return re.compile("".join(parts) + re.escape(pattern[at:]))
-
-
-def columns_in_name(name: str, patterns: Sequence[str]) -> dict[str, str] | None:
-    """Columns of tests.csv by what a name says, by the first pattern that fits it; None where none does."""
-    found = next(filter(None, (name_expression(pattern).fullmatch(name) for pattern in patterns)), None)
-    return None if found is None else dict(as_column(*one) for one in found.groupdict().items())
-
-
-def _kind(field: str) -> str:
-    """A number where the field ends in a unit or counts, else text up to the next literal."""
-    if field in ("repeat", "run_order", "specimen_run", "cycle"):
-        return r"\d+"
-    return _NUMBER if "_" in field and field not in _TEXTS else ".+?"
-
-
-def as_column(name: str, text: str) -> tuple[str, str]:
-    """(column of tests.csv, text) of a field and its text: numbers with a point, in the unit of the column."""
-    if _kind(name) != _NUMBER:
-        return name, text
-    sign, digits = ("-", text[1:]) if text.startswith("-") else ("", text.lstrip("+"))
-    number = sign + re.sub(r"[,p-]", ".", digits)  # 0-3 and 0p3 are 0.3 in names that may hold no point
-    column, factor = _CONVERTED.get(name, (name, None))
-    return column, number if factor is None else f"{float(number) * factor:.10g}"
-
-
-def proposed_patterns(names: Sequence[str]) -> tuple[str, ...]:
-    """Patterns that together fit the names, the most frequent first; nothing where names say nothing.
-
-    Parts between ``_`` or blanks: a number with a unit is its quantity, a number at the end the repeat, the first other
-    part that is no number the sample; everything else stays as it is.
-    """
-    shapes = Counter(map(_shape, names))
-    ordered = sorted(shapes, key=lambda shape: -shapes[shape])
-    fewest = min(_FEWEST_FITTING, len(names))  # a pattern that only one of many names fits says nothing
-    return tuple(shape for shape in ordered if "{" in shape and shape != "{sample}" and shapes[shape] >= fewest)
-
-
-def _shape(name: str) -> str:
-    parts = _SEPARATOR.split(name)
-    between = [*_SEPARATOR.findall(name), ""]
-    taken: set[str] = set()
-    last = len(parts) - 1
-    return "".join(_shape_of_part(part, 0 < k == last, taken) + between[k] for k, part in enumerate(parts))
-
-
-def _shape_of_part(part: str, is_last: bool, taken: set[str]) -> str:
-    part = re.sub(r"[{}\[\]]", "", part)
-    if part.isdigit():
-        return _field("repeat", part, taken) if is_last else part
-    if _NUMBERS.fullmatch(part):
-        return _NUMBERS_IN_PART.sub(lambda found: _shape_of_number(found, is_last, taken), part)
-    return _field("sample", part, taken) if part else ""
-
-
-def _shape_of_number(found: re.Match[str], is_last: bool, taken: set[str]) -> str:
-    """A number with what stands before and behind it: 60N, 200RPM, k168, v42."""
-    prefix, number, unit = found.groups()
-    field = _UNITS.get(unit) or _UNITS.get(unit.lower(), "") if unit else ""
-    if not field and is_last and not unit and prefix.lower() in _REPEATS:
-        field = "repeat"
-    field = field or (f"{prefix.lower()}_number" if prefix else "")
-    return f"{prefix}{_field(field, number, taken) if field else number}{unit}"
-
-
-def _field(name: str, text: str, taken: set[str]) -> str:
-    """The field, or the text itself where the field is already in the pattern."""
-    if name in taken:
-        return text
-    taken.add(name)
-    return f"{{{name}}}"

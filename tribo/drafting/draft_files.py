@@ -24,10 +24,11 @@ title = {title}
 # FILL IN material = ""
 # FILL IN counterface = ""
 {area}
-{stated}
+{not_used}{stated}
 {columns}
 # One table for each sample. cavity = "none" is a surface without a pattern of cavities.
 {patterns}"""
+_AREA = "nominal_area_mm2 = {:g}"
 _NO_AREA = "# FILL IN nominal_area_mm2 =   # area of the sample face"
 
 
@@ -48,11 +49,15 @@ def texts(
         keys["pull_speed_mm_s"] = f"{given.speed_m_s * 1e3:g}"
     if draft.zero:
         keys["zero"] = json.dumps(draft.zero)
+    keys |= {key: f"{value:g}   # FILL IN; 1 stands in for it" for key, value in draft.stands_in.items()}
     columns = [f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in stated_columns.items()]
     samples = [json.dumps(sample, ensure_ascii=False) for sample in draft.samples]
     toml = _TOML.format(
         title=json.dumps(folder.resolve().name, ensure_ascii=False),
-        area=_NO_AREA if area_mm2 is None else f"nominal_area_mm2 = {area_mm2:g}",
+        area="" if "nominal_area_mm2" in draft.stands_in else _NO_AREA if area_mm2 is None else _AREA.format(area_mm2),
+        not_used="".join(
+            f"# names of files not used: {json.dumps(text, ensure_ascii=False)}\n" for text in draft.not_used
+        ),
         stated="".join(f"{key} = {text}\n" for key, text in keys.items()),
         columns="".join(["[columns]\n", *columns]) if columns else "",
         patterns="\n".join(f'[patterns.{sample}]\ncavity = "none"\n' for sample in samples),

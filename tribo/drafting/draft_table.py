@@ -10,7 +10,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from tribo.campaign.table import EVALUATED, KNOWN, read_table
-from tribo.drafting.draft import Draft, as_column
+from tribo.drafting.draft import Draft
+from tribo.drafting.file_names import as_column
 from tribo.errors import CampaignError, Problem
 from tribo.units import match_quantity
 

@@ -25,6 +25,7 @@ _MEANS_NORMAL_BESIDE_FRICTION = {  # beside a friction force, a friction coeffic
     "하중",
 }  # fmt: skip
 _A_RATIO_BESIDE_STRESS = {"friction", "friktion", "frottement", "tarcie", "reibung"}  # without a unit
+_ONLY_WITH_UNIT = ("radius", "normal stress")  # of no use without one, and missed by nobody
 _ACCELERATION = re.compile(r"m\s*/\s*s(?:ec)?\s*(?:\^?2|²)|m/s/s|m·?s(?:\^?-2|⁻²)")
 _BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^\[\]()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
 _AFTER_MARK = re.compile(r"^(.*\S)\s*(?:\s?/|\sin\s|,\s|_)\s*((?:[^\W\d_]|[°%])[\w/°%^·²-]*)$")
@@ -266,6 +267,8 @@ def _columns(
         try:
             columns.append(_column(quantity, index, unit, reason, (names, units)))
         except ReadError as why:
+            if quantity in _ONLY_WITH_UNIT and reason.startswith("named"):
+                continue
             called = _called(names, index)
             way = f'{quantity.replace(" ", "_")} = "{split_unit(called)[0]} [unit]" in columns, the unit such as '
             units_of = {"ambiguous_unit": "gf or N"}
@@ -370,6 +373,7 @@ def _missing(quantity: str, names: Sequence[str], there: set[str]) -> Problem:
     elif "torque" in there:
         what = "the friction is recorded as a torque, without a friction force"
         ways = ["lever_arm_mm = 2.5, the distance of the contact from the axis"]
+        return Problem("missing_lever", what, allowed="; ".join([*ways, here]))
     elif {"friction coefficient", "normal stress"} <= there:
         what = "a friction coefficient and a stress are recorded; the forces need the nominal area"
         return Problem("missing_area", what, allowed="nominal_area_mm2 = 100, in campaign.toml or with --set")
