@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -109,13 +110,41 @@ def test_one_pull_of_a_log_is_the_same_named_alone(ingested: Ingested, tmp_path:
 
 def test_a_log_read_as_one_pull_is_doubted_with_what_to_write(tmp_path: Path) -> None:
     campaign = write_campaign(tmp_path, ["R1,raw/F1.csv,F,F1,1"])
-    time = np.arange(6000) / RATE_HZ
-    table = np.column_stack([time, np.where(time < 2, 0, np.where(time < 30, 1.0, 2.0)), np.where(time < 30, -2.0, -4)])
-    (tmp_path / "raw" / "F1.csv").write_text(umt_text(table + 0.003 * np.sin(40 * time)[:, None] * [0, 1, 1]))
     (doubt,) = stages.ingest(campaign).doubts()
     (problem,) = (p for p in doubt.problems if p.kind == "several_pulls")
-    assert problem.what.startswith("this trace contains 2 pulls")
+    assert problem.what.startswith("this trace contains 12 pulls")
     assert "raw/F1.csv#1/* for all" in (problem.allowed or "")
+
+
+def ladder_log(loads_N: tuple[float, ...], offset_N: float, rest_s: float = 4.0, level_s: float = 20.0) -> str:
+    """A log that begins at rest and slides on under one load after another, 0.6 of the load."""
+    time = np.arange(0, rest_s + level_s * len(loads_N), 0.02)
+    level = np.clip(((time - rest_s) // level_s).astype(int), 0, len(loads_N) - 1)
+    load = np.array(loads_N)[level]
+    force = offset_N + MU * load * np.clip((time - rest_s) / 1.5, 0, 1)
+    scatter = 0.004 * np.random.default_rng(5).standard_normal((time.size, 2))
+    return umt_text(np.column_stack([time, force + scatter[:, 0], -load + scatter[:, 1]]))
+
+
+def test_a_ladder_of_loads_is_one_test_a_level_and_says_which_way_each_was_reached(tmp_path: Path) -> None:
+    campaign = write_campaign(tmp_path, ["R1,raw/F1.csv,F,F1,1", "R2,raw/F2.csv#whole,F,F2,2"])
+    loads = (1.0, 1.3, 1.6, 2.0, 1.6, 1.3)
+    for k in (1, 2):
+        (tmp_path / "raw" / f"F{k}.csv").write_text(ladder_log(loads, 0.2))
+    found = stages.ingest(campaign)
+    assert not found.set_aside
+    assert list(found.pulls) == [*(f"R1#1/{k}" for k in range(1, 7)), "R2"]
+    tests, pulls = found.campaign.tests[:6], list(found.pulls.values())[:6]
+    assert [t.normal_load_N for t in tests] == pytest.approx(loads, rel=5e-3)
+    assert [p.sliding_N for p in pulls] == pytest.approx([MU * load for load in loads], abs=0.01)
+    assert [p.zero_N for p in pulls] == pytest.approx([0.2] * 6, abs=0.01)
+    assert [t.covariates["ladder"] for t in tests] == ["up", "up", "up", "up", "down", "down"]
+    assert [float(t.covariates["duration_s"]) for t in tests] == pytest.approx([24.0, *[20.0] * 5], abs=0.5)
+    assert [math.isnan(p.static_N) for p in pulls] == [False, True, True, True, True, True]
+    assert "several_pulls" not in {p.kind for d in found.doubts() for p in d.problems}
+    alone = write_campaign(tmp_path, ["one,raw/F1.csv#1/3,F,F1,"])
+    (tmp_path / "raw" / "F1.csv").write_text(ladder_log(loads, 0.2))
+    assert stages.ingest(alone).pulls["one"].sliding_N == found.pulls["R1#1/3"].sliding_N
 
 
 def test_a_pull_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) -> None:

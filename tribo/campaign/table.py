@@ -50,7 +50,8 @@ COUNTS = of_kind("count")
 EVALUATED = of_kind("force")
 _NAMES = of_kind("name")  # on one line, without control characters
 
-_CHOICE = re.compile(r"#(\*|\d+(?:/(?:\d+|\*))?)$")
+WHOLE = "whole"  # a record that is read as one, whatever it holds
+_CHOICE = re.compile(rf"#(\*|{WHOLE}|\d+(?:/(?:\d+|\*|{WHOLE}))?)$")
 ALLOWED_DATES = (
     "YYYY-MM-DD or YYYY-MM-DDTHH:MM:SS; DD/MM/YYYY or MM/DD/YYYY where a day after the 12th settles the order"
 )
@@ -251,7 +252,8 @@ def _missing(name: str, unknown: list[str], names: list[str], file: str, row: in
 def split_choice(file: str) -> tuple[str, str]:
     """("raw/a.csv", "2/3") of "raw/a.csv#2/3", the third pull of the second table; "" where nothing is chosen.
 
-    "2" is the second table as a whole, "2/*" every pull of it, "*" every pull of every table.
+    "2" is the second table, "2/*" every pull of it, "*" every pull of every table. "whole" and "2/whole" read a record
+    of several levels of speed or load as one.
     """
     found = _CHOICE.search(file)
     return (file, "") if found is None else (file[: found.start()], found[1])
@@ -259,7 +261,7 @@ def split_choice(file: str) -> tuple[str, str]:
 
 def names_pulls(choice: str) -> bool:
     """Whether a choice cuts tables into pulls, and does not take one as it stands."""
-    return choice.endswith("*") or "/" in choice
+    return not choice.endswith(WHOLE) and (choice.endswith("*") or "/" in choice)
 
 
 def is_chosen(address: str, choice: str) -> bool:
@@ -269,12 +271,12 @@ def is_chosen(address: str, choice: str) -> bool:
 
 def overlap(one: str, other: str) -> bool:
     """Whether two choices within one export may mean the same samples."""
-    if "" in (one, other) or "*" in (one, other):
+    if {one, other} & {"", "*", WHOLE}:
         return True
     tables = one.partition("/"), other.partition("/")
     if tables[0][0] != tables[1][0]:
         return False
-    return any(pull in ("", "*") for _, _, pull in tables) or one == other
+    return any(pull in ("", "*", WHOLE) for _, _, pull in tables) or one == other
 
 
 def order_of(cells: Iterable[str]) -> str:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tribo.campaign.rows import Columns, columns_of
-from tribo.campaign.table import is_chosen, names_pulls, split_choice
+from tribo.campaign.table import WHOLE, is_chosen, names_pulls, split_choice
 from tribo.errors import CampaignError, Problem, TraceError, TriboError, unexpected
 from tribo.forked import each, may_fork
 from tribo.input_files import LARGEST_LOAD_N, SMALLEST_LOAD_N, hashes_of_reads
@@ -33,6 +33,7 @@ CHUNK = 16
 _UNLOADED = 0.05  # share of the largest load of an export below which a piece of it carries none
 _LABELLED = 0.9  # share of exports that name their own test from which on a header that names another one counts
 _FEWEST = 5
+_LEVELS_DIFFER = 0.08  # share by which the highest level of a speed or load exceeds the lowest where they make a ladder
 _WORD = re.compile(r"[\w.+-]+")
 
 Progress = Callable[[str, int, int], None]
@@ -118,7 +119,7 @@ def read_row(
                 measured = [*_chosen(root / export, choice, columns(test.file), test, options).values()]
             elif test.evaluated is None:
                 trace = _whole(root / test.file, columns(test.file), test.correction, test.test_id, test.file)
-                measured = [(trace, options)]
+                measured = _levels(trace, options) or [(trace, options)]
             for one, own in measured:
                 this = own.test or test
                 try:
@@ -218,7 +219,12 @@ def _whole(
     from tribo.readers import read_export
     from tribo.traces import split_pulls
 
-    trace = read_export(path, columns=columns, correction=correction, name=name, file=file)
+    named, choice = split_choice(str(path))
+    table = choice.removesuffix(WHOLE).removesuffix("/")
+    whole = Path(f"{named}#{table}" if table else named)
+    trace = read_export(whole, columns=columns, correction=correction, name=name, file=file)
+    if choice.endswith(WHOLE):
+        return trace
     pieces = split_pulls(trace)
     loaded = [] if len(pieces) == 1 else [k for k, there in enumerate(_carry_load(pieces)) if there]
     if len(loaded) < 2:
@@ -229,6 +235,47 @@ def _whole(
     allowed = f"{export}#{table}/{loaded[0] + 1} (and so on) for a single pull, {export}#{table}/* for all"
     doubt = Problem("several_pulls", what, trace.file, allowed=allowed)
     return replace(trace, flags=(*trace.flags, doubt.kind), problems=(*trace.problems, doubt))
+
+
+def _levels(trace: Trace, options: PullOptions) -> list[tuple[Trace | None, PullOptions]]:
+    """The tests of a record that slides at several levels of speed or load, one a level; none of any other record.
+
+    Each has the speed and load of its level, how long it lasts, and whether it was reached on the way ``up`` or
+    ``down``.
+    """
+    from tribo.traces import load_of, pieces_of
+    from tribo.traces.drive import speed_level_m_s
+
+    test = options.test
+    if "several_pulls" not in trace.flags or test is None:
+        return []
+    plain = replace(trace, flags=tuple(flag for flag in trace.flags if flag != "several_pulls"))
+    plain = replace(plain, problems=tuple(p for p in trace.problems if p.kind != "several_pulls"))
+    pieces = pieces_of(plain, options)
+    if any(own.begins == "reversal" for _, own in pieces.values()):
+        return []  # strokes
+    loaded = dict(zip(pieces, _carry_load([piece for piece, _ in pieces.values()]), strict=True))
+    pieces = {address: found for address, found in pieces.items() if loaded[address]}
+    speeds, loads = (
+        [of(piece) for piece, _ in pieces.values()] for of in (speed_level_m_s, lambda piece: load_of(piece)[0])
+    )
+    varies = next((values for values in (speeds, loads) if max(values) > (1.0 + _LEVELS_DIFFER) * min(values)), None)
+    if varies is None:
+        return []
+    export, table = split_choice(trace.file)
+    found: list[tuple[Trace | None, PullOptions]] = []
+    for k, (address, (piece, own)) in enumerate(pieces.items()):
+        name = f"{test.test_id}#{table or 1}/{address.partition('/')[2]}"
+        file = f"{export}#{table or 1}/{address.partition('/')[2]}"
+        up = varies[max(k, 1)] > varies[max(k, 1) - 1]
+        about = {"ladder": "up" if up else "down", "duration_s": f"{piece.time_s[-1] - piece.time_s[0]:.4g}"}
+        level = replace(test, test_id=name, file=file, covariates={**test.covariates, **about})
+        if math.isfinite(speeds[k]):
+            level = replace(level, speed_m_s=speeds[k])
+        if varies is loads:
+            level = replace(level, normal_load_N=math.nan)
+        found.append((replace(piece, name=name, file=file), replace(own, test=level)))
+    return found
 
 
 def _chosen(

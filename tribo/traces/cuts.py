@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from tribo.records import FloatArray, Trace
+from tribo.traces.drive import at_rest_below, level_cuts
 from tribo.traces.signal import MINIMUM_SAMPLES, median_of_three, running_mean, runs_of, sample_noise, wander
 
 _AT_REST = 0.05  # share of the usual speed below which the drive stands still
@@ -29,12 +30,15 @@ def split_pulls(trace: Trace) -> tuple[Trace, ...]:
     a fifth of the median are left out.
     """
     cuts = [(k, k) for k in reversals(trace.force_N)]
-    if (load := trace.columns.get("normal_force_N")) is not None:
-        cuts += steps(load)
-    if (speed := trace.columns.get("speed_m_s")) is not None:
+    load = trace.columns.get("normal_force_N")
+    speed = trace.columns.get("speed_m_s", trace.columns.get("rotation_rev_per_s"))
+    find = steps if cuts else _steps_or_levels
+    if load is not None:
+        cuts += find(load)
+    if speed is not None:
         moving = np.abs(speed)
-        rest = _AT_REST * float(moving.max())
-        cuts += [(a, b) for a, b in steps(moving) if moving[max(a - 1, 0)] > rest]
+        rest = min(_AT_REST * float(moving.max()), at_rest_below(moving))
+        cuts += [(a, b) for a, b in find(moving) if moving[max(a - 1, 0)] > rest]
     if not cuts:
         return (trace,)
     stretches = [(a, b) for a, b in between(cuts, trace.time_s.size) if b - a >= MINIMUM_SAMPLES]
@@ -43,6 +47,12 @@ def split_pulls(trace: Trace) -> tuple[Trace, ...]:
     shortest = _FRAGMENT * float(np.median([b - a for a, b in stretches])) if stretches else 0.0
     kept = [(a, b) for a, b in stretches if b - a >= shortest] or [(0, trace.time_s.size)]
     return tuple(piece_of(trace, a, b, f"{trace.name}/{k}") for k, (a, b) in enumerate(kept, start=1))
+
+
+def _steps_or_levels(values: FloatArray) -> list[tuple[int, int]]:
+    """The steps of a channel; those between its levels where it has more levels than large steps, as in a ladder."""
+    large, every = steps(values), level_cuts(np.abs(values))
+    return every if len(every) > len(large) else large
 
 
 def piece_of(trace: Trace, start: int, end: int, name: str) -> Trace:

@@ -89,6 +89,12 @@ def _by_speed(speed: FloatArray, channel: str) -> Drive:
     return Drive(pace, moving, channel, tuple(int(decided[k + 1]) for k in turned))
 
 
+def at_rest_below(speed: FloatArray) -> float:
+    """Speed below which the drive stands still, by a recorded speed without its sign (see :func:`drive_of`)."""
+    calm = median_of_three(speed)
+    return _slowest(calm, float(np.percentile(calm, 95)) or float(calm.max()))
+
+
 def _slowest(pace: FloatArray, top: float) -> float:
     """Speed below which the drive stands still: a small share of the lowest level at which it runs for some time.
 

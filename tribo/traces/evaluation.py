@@ -19,7 +19,7 @@ from tribo.display import displayed
 from tribo.errors import Problem, TraceError
 from tribo.records import STANDARD_GRAVITY, FloatArray, Phase, Pull, Restart, Test, Trace
 from tribo.traces.cuts import directions_of, piece_of, split_pulls
-from tribo.traces.drive import speed_level_m_s
+from tribo.traces.drive import FEWEST_AT_REST, drive_of, speed_level_m_s
 from tribo.traces.loading import Zero, loading_of, starting_level
 from tribo.traces.oscillation import oscillation_of
 from tribo.traces.peak import (
@@ -36,7 +36,7 @@ from tribo.traces.phases import Course, course_of, course_of_piece, phases_of
 from tribo.traces.rules import DEFAULT_RULE, Rule, named_rule
 from tribo.traces.signal import Signal, line, median_of_three, signal_of, steady
 from tribo.traces.sliding import Sliding, slides_on_closed_track, sliding_over, transient_end, window_between
-from tribo.traces.zero import BEFORE_CONTACT, chosen_zero, disagreement_N, load_level, stated_zeros
+from tribo.traces.zero import BEFORE_CONTACT, chosen_zero, disagreement_N, load_level, stated_zeros, zero_at_first
 
 GIVEN = "given"  # the rule of forces that were evaluated elsewhere
 _LEFT_OUT = 0.1  # share at the start of a record that slides from its first sample, left out as not yet settled
@@ -48,7 +48,7 @@ _LEAD_IN = 0.75  # share of a stop after which the piece that holds its restart 
 _GAP = 3.0
 _STRETCH_M = 5e-3  # a sled, a pin or its spring gives way by less before it slides; a disc goes further in a second
 _NO_PEAK = {"stopped_before_peak", "sign_flipped", "spike"}  # problems of a piece that only slides
-_CLIMB_OVER_SWING = 5.0
+_UNPULLED = 0.3  # share of its later force below which a piece begins with nothing pulled
 _OFF_LOAD = 0.02  # share by which the recorded load may differ from that of the test
 _OFF_SPEED = 0.2  # share by which the travel while sliding may differ from the speed of the test times the time
 
@@ -136,8 +136,7 @@ def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
     try:
         signal = signal_of(trace)
         if options.begins:
-            at_once = options.begins == "step" and _starts_sliding(trace.force_N)
-            course = course_of_piece(trace, signal, starts_sliding=at_once)
+            course = course_of_piece(trace, signal, starts_sliding=options.begins == "step" and _slides_on(trace))
         else:
             course = course_of(trace, signal, options.contact)
             zero = zero or chosen_zero(test.zero, signal.time_s, signal.force_N, course, trace.file)
@@ -180,8 +179,9 @@ def pieces_of(tables: Trace | Sequence[Trace], options: PullOptions = WHOLE) -> 
     """The pulls of a record, or of several tables of one, by address: "2/3" is the third pull of the second table.
 
     Each is turned so that friction is positive, and comes with the options for :func:`evaluate`. Strokes in both
-    directions share a zero, determined from their asymmetry where ``options.test`` states none. A zero that is stated
-    is read on the clock of the table. A record of one pull is read as a whole.
+    directions share a zero, determined from their asymmetry where ``options.test`` states none. A piece that slides on
+    after a step of load or speed counts from the zero that its record begins with. A zero that is stated is read on the
+    clock of the table. A record of one pull is read as a whole.
 
     Parameters
     ----------
@@ -198,10 +198,14 @@ def pieces_of(tables: Trace | Sequence[Trace], options: PullOptions = WHOLE) -> 
     tables = [tables] if isinstance(tables, Trace) else list(tables)
     test = options.test or Test("", "", "", math.nan, "")
     cut: dict[str, tuple[Trace, Zero | None, Zero | None]] = {}
+    before: dict[str, Zero | None] = {}  # the zero that a record begins with, for what slides on later
     for t, table in enumerate(tables, 1):
         zero, load_zero = stated_zeros(table, test.zero, test.load_zero)
         zero, load_zero = options.zero or zero, options.load_zero or load_zero
-        cut |= {f"{t}/{k}": (piece, zero, load_zero) for k, piece in enumerate(split_pulls(table), 1)}
+        pieces = {f"{t}/{k}": piece for k, piece in enumerate(split_pulls(table), 1)}
+        cut |= {address: (piece, zero, load_zero) for address, piece in pieces.items()}
+        if zero is None and len(pieces) > 1:
+            before |= dict.fromkeys(list(pieces)[1:], zero_at_first(pieces[f"{t}/1"], options.contact))
     if not cut:
         raise TraceError(Problem("no_strokes", "no strokes are given"))
     offsets = [zero.force_N if zero else 0.0 for _, zero, _ in cut.values()]
@@ -213,12 +217,14 @@ def pieces_of(tables: Trace | Sequence[Trace], options: PullOptions = WHOLE) -> 
             zero = None  # it is read from the whole record as from any other
         elif zero is None and shared is not None:
             zero = Zero(*shared, "strokes in both directions")
+        elif zero is None and shared is None and address in before and _slides_on(piece):
+            zero = before[address]
         found[address] = (
             piece if sign > 0 else replace(piece, force_N=-piece.force_N),
             replace(
                 options, zero=zero and replace(zero, force_N=sign * zero.force_N),
                 load_zero=options.load_zero if whole else load_zero, turned=sign < 0,
-                begins="" if whole else "step" if shared is None else "reversal",
+                begins="reversal" if shared else "" if whole or address.endswith("/1") else "step",
             ),
         )  # fmt: skip
     return found
@@ -267,11 +273,13 @@ def read_pulls(
     return tuple(pulls)
 
 
-def _starts_sliding(force_N: FloatArray) -> bool:
-    """Whether a piece begins near the force it keeps: above half its maximum, and climbing little for its swing."""
-    force = median_of_three(force_N)
-    start, top = starting_level(force), float(force.max())
-    return start > 0.5 * top and top - start < _CLIMB_OVER_SWING * float(force[force.size // 2 :].std())
+def _slides_on(piece: Trace) -> bool:
+    """Whether a piece that begins at a step goes on sliding: its drive moves and its force has not fallen."""
+    drive = drive_of(piece)
+    if drive is not None and not drive.turns and not drive.moving[: 2 * FEWEST_AT_REST].any():
+        return False
+    force = median_of_three(piece.force_N)
+    return starting_level(force) > _UNPULLED * float(np.median(force[force.size // 4 :]))
 
 
 def _first_motion(

@@ -78,6 +78,17 @@ def stated_zeros(table: Trace, force: ZeroChoice, load: ZeroChoice) -> tuple[Zer
     return zero, load_zero
 
 
+def zero_at_first(piece: Trace, contact: str) -> Zero | None:
+    """The zero that a record begins with, at rest before the rise of its first piece; None where that slides."""
+    try:
+        course = course_of(piece, signal_of(piece), contact)
+        if course.starts_sliding:
+            return None
+        return stated_zeros(piece, ZeroChoice("before contact"), ZeroChoice())[0]
+    except TraceError:
+        return None
+
+
 def _none_there(what: str, file: str, allowed: str = "") -> Problem:
     said = f"the zero cannot be read: the record has no {what} of {_FEWEST} data points or more"
     return Problem("no_zero_there", said, file or None, column="zero", allowed=allowed or None)
