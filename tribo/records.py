@@ -547,19 +547,21 @@ class Campaign:
 @displayed(lambda o: f"{o.test_id}: {o.action}")
 @dataclass(frozen=True)
 class Override:
-    """A decision made by hand about one test: exclude it, or move its static peak or sliding window.
+    """A decision made by hand about one test: exclude it, move its static peak or sliding window, or state phases.
 
     Times as recorded in the trace; None where the automatic value is kept. ``automatic`` is the result without the
-    decision; ``trace`` is None where the forces were evaluated elsewhere.
+    decision, without any number where the test had been set aside; ``trace`` is None where the forces were evaluated
+    elsewhere.
     """
 
     test_id: str
-    action: Literal["exclude", "move"]
+    action: Literal["exclude", "move", "phase"]
     automatic: Pull
     trace: Trace | None = None
     reason: str = ""
     window_s: tuple[float, float] | None = None
     peak_s: float | None = None
+    phases: tuple[Phase, ...] = ()
 
 
 @displayed(lambda i: f"{i.campaign.title}, {len(i.pulls)} pulls, {len(i.set_aside)} tests set aside")

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import support.campaigns
 
 from tribo.campaign import load_campaign
 from tribo.errors import CampaignError, Problem
 from tribo.ingestion.overrides import apply_overrides
 from tribo.records import Ingested
 from tribo.stages import ingest
+from tribo.wording.study_sentences import by_hand_sentence
 
 HEADER = "test_id,action,reason,window_start_s,window_end_s,peak_s"
 
@@ -157,3 +159,76 @@ def test_fit_leaves_out_what_overrides_exclude(small_campaign: Path, tmp_path: P
     assert np.isnan(table.loc["T003", "static_N"])
     assert "window_by_hand" in table.loc["T005", "flags"]
     assert table.loc["T005", "window_start_s"] == pytest.approx(10, abs=0.1)
+
+
+PHASES = "test_id,action,reason,phase,start_s,end_s"
+TOML = """\
+[campaign]
+title = "Pulls and a slide"
+nominal_area_mm2 = 55.0
+
+[patterns.F]
+cavity = "none"
+"""
+
+
+def export(force: np.ndarray) -> str:
+    scatter = 0.003 * np.random.default_rng(1).standard_normal(force.size)
+    lines = [f"{k / 50:.2f},{f:.5f}" for k, f in enumerate(force + scatter)]
+    return "\n".join(["Time (s),Friction force (N)", *lines, ""])
+
+
+@pytest.fixture(scope="module")
+def with_a_slide(tmp_path_factory: pytest.TempPathFactory) -> Ingested:
+    """A pull, and a slide whose force climbs threefold from the first row on, which is set aside."""
+    time = np.arange(1000) / 50
+    pulled = np.interp(time, [0, 2, 4, 4.2, 20], [0, 0, 2.0, 1.5, 1.5])
+    slides = 0.5 + time / 20
+    root = tmp_path_factory.mktemp("slide")
+    rows = ["test_id,file,sample,specimen,normal_load_N", "P,raw/P.csv,F,F1,2", "S,raw/S.csv,F,F2,2"]
+    exports = {"P.csv": export(pulled), "S.csv": export(slides)}
+    found = ingest(load_campaign(support.campaigns.written(root, TOML, rows, exports)))
+    assert {s.test_id for s in found.set_aside} == {"S"}
+    return found
+
+
+def test_a_phase_stated_by_hand_brings_back_a_test_that_was_set_aside(with_a_slide: Ingested, tmp_path: Path) -> None:
+    rows = ("S,phase,turns from the start,running-in,0,10", "S,phase,,steady sliding,10,20")
+    decided = apply_overrides(with_a_slide, written(tmp_path, *rows, header=PHASES), "first_peak")
+    assert not decided.set_aside
+    pull = decided.pulls["S"]
+    assert np.isnan(pull.static_N)
+    assert pull.sliding_N == pytest.approx(1.25, abs=0.01)
+    assert [(p.name, p.evidence) for p in pull.phases] == [
+        ("running-in", "stated by hand"), ("steady sliding", "stated by hand"),
+    ]  # fmt: skip
+    assert "phases_by_hand" in pull.flags
+    said = by_hand_sentence(decided.by_hand["S"], pull)
+    assert "turns from the start" in said
+    assert "steady sliding from 10.0 to 20.0 s" in said
+    assert "automatic value none" in said
+    assert "nan" not in said
+
+
+def test_a_window_moved_by_hand_brings_back_a_test_that_was_set_aside(with_a_slide: Ingested, tmp_path: Path) -> None:
+    decided = apply_overrides(with_a_slide, written(tmp_path, "S,move,slides,10,20,"), "first_peak")
+    assert decided.pulls["S"].sliding_N == pytest.approx(1.25, abs=0.01)
+
+
+def test_a_rest_and_a_rise_stated_by_hand_give_the_zero_and_the_peak(with_a_slide: Ingested, tmp_path: Path) -> None:
+    rows = ("P,phase,by eye,rest,0,1", "P,phase,by eye,rise,2,4", "P,phase,by eye,end of the drive,12,19")
+    pull = apply_overrides(with_a_slide, written(tmp_path, *rows, header=PHASES), "first_peak").pulls["P"]
+    assert pull.zero_rule == "mean from 0 to 1 s"
+    assert pull.peak_s == pytest.approx(4.0, abs=0.05)
+    assert pull.window_s[1] <= 12.0
+    assert ("end of the drive", 12.0, 19.0) in [(p.name, p.start_s, p.end_s) for p in pull.phases]
+
+
+def test_every_fault_of_a_stated_phase_is_named(with_a_slide: Ingested, tmp_path: Path) -> None:
+    rows = (
+        "P,phase,x,sliding,1,2", "P,phase,x,rise,2,1", "P,phase,x,rise,2,", "P,phase,x,rise,2,99", "P,exclude,x,,,",
+    )  # fmt: skip
+    found = {(p.row, p.kind) for p in faults(with_a_slide, written(tmp_path, *rows, header=PHASES))}
+    assert found == {
+        (2, "unknown_phase"), (3, "window_reversed"), (4, "half_a_window"), (5, "outside_trace"), (6, "duplicate_row"),
+    }  # fmt: skip

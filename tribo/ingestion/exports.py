@@ -109,7 +109,7 @@ def read_row(
 
     options = replace(options, test=test)
     if by_hand is not None:
-        options = replace(options, peak_s=by_hand.peak_s, window_s=by_hand.window_s)
+        options = replace(options, peak_s=by_hand.peak_s, window_s=by_hand.window_s, phases=by_hand.phases)
     outcomes: list[tuple[Test, Outcome]] = []
     measured: list[tuple[Trace | None, PullOptions]] = [(None, options)]
     with hashes_of_reads() as read:

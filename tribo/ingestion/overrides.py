@@ -15,12 +15,14 @@ from tribo.errors import CampaignError, Problem, system_problem
 from tribo.files import LEADS_OUT, leads_out
 from tribo.ingestion.exports import options_of, read_row, stated_columns
 from tribo.input_files import hashes_of_reads
-from tribo.records import Ingested, Override, SetAside, Trace
+from tribo.records import PHASES, Ingested, Override, Phase, Pull, SetAside, Trace
 from tribo.user_text import did_you_mean
 
 TIMES = ("window_start_s", "window_end_s", "peak_s")
-COLUMNS = ("test_id", "action", "reason", *TIMES)
-ACTIONS = ("exclude", "move")
+OF_PHASE = ("start_s", "end_s")
+COLUMNS = ("test_id", "action", "reason", *TIMES, "phase", *OF_PHASE)
+ACTIONS = ("exclude", "move", "phase")
+LEFT_ASIDE = {"same_numbers", "other_test"}  # an export that belongs to another test; no decision changes that
 FEWEST_IN_WINDOW = 10
 OVERRIDES = "--overrides"  # among the inputs of a campaign; no file of a campaign has this name
 
@@ -28,9 +30,10 @@ OVERRIDES = "--overrides"  # among the inputs of a campaign; no file of a campai
 def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
     """The campaign with overrides.csv applied: pulls excluded, static peaks and windows moved.
 
-    Columns: test_id, action (``exclude`` or ``move``), reason, window_start_s, window_end_s, peak_s; times on the
-    clock of the trace. A pull excluded is set aside with its reason; a moved one is read again from its export by the
-    same rule, with the given peak or window. The automatic results of both are kept in ``by_hand``.
+    Columns: test_id, action (``exclude``, ``move`` or ``phase``), reason, window_start_s, window_end_s, peak_s, and for
+    a phase its name, start_s and end_s; times on the clock of the trace. A pull excluded is set aside with its reason;
+    a moved one, or one with phases stated, is read again from its export by the same rule, also where it had been set
+    aside. The automatic results are kept in ``by_hand``.
 
     Raises
     ------
@@ -47,22 +50,28 @@ def apply_overrides(ingested: Ingested, path: Path, rule: str) -> Ingested:
     tests = {t.test_id: t for t in ingested.campaign.tests}
     columns, options = stated_columns(ingested.campaign), options_of(ingested.campaign, rule)
     problems: list[Problem] = []
+    traces = {i: t for i, t in ingested.traces.items() if i not in excluded}
+    read: dict[str, Override] = {}
     for o in overrides:
         if o.action == "exclude":
             continue
-        ((_, outcome),), _ = read_row(ingested.campaign.root, columns, options, tests[o.test_id], o)
-        if isinstance(outcome, SetAside):
-            problems += outcome.problems
-        else:
-            pulls[o.test_id] = outcome[1]
+        outcomes, _ = read_row(ingested.campaign.root, columns, options, tests[o.test_id], o)
+        for test, outcome in outcomes:
+            if isinstance(outcome, SetAside):
+                problems += outcome.problems
+                continue
+            trace, pulls[test.test_id] = outcome
+            if trace is not None:
+                traces[test.test_id] = trace
+            read[o.test_id] = replace(o, trace=trace)
     if problems:
         raise CampaignError(problems)
-    traces = {i: t for i, t in ingested.traces.items() if i not in excluded}
-    by_hand = {o.test_id: o for o in overrides if o.trace is not None}
+    by_hand = {o.test_id: o for o in (read.get(o.test_id, o) for o in overrides) if o.trace is not None}
+    aside = tuple(s for s in ingested.set_aside if s.test_id not in pulls)
     inputs = {**ingested.campaign.inputs, **dict.fromkeys([OVERRIDES], *hashes.values())}
     return replace(
         ingested, campaign=replace(ingested.campaign, inputs=inputs), traces=traces, pulls=pulls,
-        set_aside=(*ingested.set_aside, *left_out), by_hand=by_hand,
+        set_aside=(*aside, *left_out), by_hand=by_hand,
     )  # fmt: skip
 
 
@@ -102,33 +111,48 @@ def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
         raise CampaignError(problems)
     traces: dict[str, Trace | None] = dict.fromkeys([s.test_id for s in ingested.set_aside])
     traces |= {t.test_id: ingested.traces.get(t.test_id) for t in ingested.campaign.tests}
-    first: dict[str, int] = {}
-    overrides = []
+    read_again = {s.test_id for s in ingested.set_aside if not {p.kind for p in s.problems} & LEFT_ASIDE and s.problems}
+    read_again &= {t.test_id for t in ingested.campaign.tests}
+    first: dict[str, TestRow] = {}
+    found: dict[str, Override] = {}
     for row in rows:
-        if row.test_id in first:
-            what = f"this test already occurs in row {first[row.test_id]}"
-            problems.append(Problem("duplicate_row", what, file, row.row, "test_id", row.test_id, "one row per test"))
-        first.setdefault(row.test_id, row.row)
+        test_id, action = row.test_id, row.cells.get("action", "")
+        again = test_id in first and {action, first[test_id].cells.get("action", "")} != {"phase"}
+        if again:
+            what = f"this test already occurs in row {first[test_id].row}"
+            allowed = "one row per test, or one per phase"
+            problems.append(Problem("duplicate_row", what, file, row.row, "test_id", test_id, allowed))
+        first.setdefault(test_id, row)
         times, faults = _times(row)
         faults += _row_faults(row, traces, ingested, None if faults else times)
         faults = [row.fault] if row.fault else faults
         problems += faults
-        if not faults and row.test_id in ingested.pulls:
+        if faults or again or not (test_id in ingested.pulls or (test_id in read_again and action != "exclude")):
+            continue
+        reason = row.cells.get("reason", "")
+        made = found.get(test_id)
+        if made is None:
+            automatic = ingested.pulls.get(test_id, Pull(test_id, ""))
             window = (times["window_start_s"], times["window_end_s"]) if "window_start_s" in times else None
-            action: Literal["exclude", "move"] = "exclude" if row.cells["action"] == "exclude" else "move"
-            automatic, reason = ingested.pulls[row.test_id], row.cells.get("reason", "")
-            overrides.append(
-                Override(row.test_id, action, automatic, traces[row.test_id], reason, window, times.get("peak_s"))
+            kind: Literal["exclude", "move", "phase"] = (
+                "exclude" if action == "exclude" else "phase" if action == "phase" else "move"
             )
+            made = Override(test_id, kind, automatic, traces[test_id], reason, window, times.get("peak_s"))
+        elif reason not in made.reason:
+            made = replace(made, reason=f"{made.reason}; {reason}".removeprefix("; "))
+        if action == "phase":
+            phase = Phase(row.cells["phase"], times["start_s"], times["end_s"])
+            made = replace(made, phases=(*made.phases, phase))
+        found[test_id] = made
     if problems:
         raise CampaignError(problems)
-    return tuple(overrides)
+    return tuple(found.values())
 
 
 def _times(row: TestRow) -> tuple[dict[str, float], list[Problem]]:
     """The times given, in seconds, and the cells that hold none."""
     found, problems = {}, []
-    for column in TIMES:
+    for column in (*TIMES, *OF_PHASE):
         cell = row.cells.get(column, "")
         try:
             value = float(cell.replace(",", ".") if row.decimal_comma else cell) if cell else math.nan
@@ -161,11 +185,27 @@ def _row_faults(
             if cell := row.cells.get(column):
                 what = "an excluded test cannot have a peak or window"
                 yield Problem("unused_cell", what, *place, column, cell, "an empty cell")
-    elif action == "move" and test_id in ingested.pulls and test_id not in ingested.traces:
+    elif action in ("move", "phase") and test_id in ingested.pulls and test_id not in ingested.traces:
         what = "the forces of this test were evaluated elsewhere, so it has no peak and no window to move"
         yield Problem("no_trace", what, *place, "action", action, "exclude")
     elif action == "move" and times is not None:
         yield from _move_faults(row, times, traces.get(test_id))
+    elif action == "phase" and times is not None:
+        yield from _phase_faults(row, times, traces.get(test_id))
+
+
+def _phase_faults(row: TestRow, times: Mapping[str, float], trace: Trace | None) -> Iterator[Problem]:
+    place, name = (row.file, row.row), row.cells.get("phase", "")
+    if name not in PHASES:
+        hint = did_you_mean(name, PHASES) or ", ".join(PHASES)
+        yield Problem("unknown_phase", "no such phase", *place, "phase", name, hint)
+    if missing := [column for column in OF_PHASE if column not in times]:
+        yield Problem("half_a_window", "a phase needs start and end", *place, missing[0], "", "seconds")
+        return
+    if not times["start_s"] < times["end_s"]:
+        found, allowed = row.cells["end_s"], f"more than {times['start_s']:g}"
+        yield Problem("window_reversed", "the phase must end after its start", *place, "end_s", found, allowed)
+    yield from _outside(row, {column: times[column] for column in OF_PHASE}, trace)
 
 
 def _move_faults(row: TestRow, times: Mapping[str, float], trace: Trace | None) -> Iterator[Problem]:
@@ -181,15 +221,21 @@ def _move_faults(row: TestRow, times: Mapping[str, float], trace: Trace | None) 
         found, allowed = row.cells["window_end_s"], f"more than {start:g}"
         yield Problem("window_reversed", "the window must end after its start", *place, "window_end_s", found, allowed)
         return
+    yield from _outside(row, {column: times[column] for column in TIMES if column in times}, trace)
+    if trace is not None and start is not None and end is not None:
+        inside = np.count_nonzero((trace.time_s >= start) & (trace.time_s <= end))
+        if inside < FEWEST_IN_WINDOW:
+            found, allowed = f"{inside} data points", f"at least {FEWEST_IN_WINDOW}"
+            yield Problem("window_short", "too few data points in this window", *place, "window_end_s", found, allowed)
+
+
+def _outside(row: TestRow, times: Mapping[str, float], trace: Trace | None) -> Iterator[Problem]:
+    """Times that lie outside of a trace; none where it could not be read so far."""
     if trace is None:
         return
     first, last = float(trace.time_s[0]), float(trace.time_s[-1])
     for column, value in times.items():
         if not first <= value <= last:
             what = "this time is outside the recorded trace"
-            yield Problem("outside_trace", what, *place, column, row.cells[column], f"{first:g} to {last:g}")
-    if start is not None and end is not None:
-        inside = np.count_nonzero((trace.time_s >= start) & (trace.time_s <= end))
-        if inside < FEWEST_IN_WINDOW:
-            found, allowed = f"{inside} data points", f"at least {FEWEST_IN_WINDOW}"
-            yield Problem("window_short", "too few data points in this window", *place, "window_end_s", found, allowed)
+            allowed = f"{first:g} to {last:g}"
+            yield Problem("outside_trace", what, row.file, row.row, column, row.cells[column], allowed)

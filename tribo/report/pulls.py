@@ -22,7 +22,7 @@ from tribo.wording.study_sentences import by_hand_sentence, flags_in_words, odd_
 WIDTH, HEIGHT = 180, 56
 PICTURE_BYTES = 1_200_000  # all pictures together, so that the page stays easy to send
 PULLS_A_PAGE = 2000  # more of them on one page are slow to open
-BY_HAND = ("peak_by_hand", "window_by_hand")
+BY_HAND = ("peak_by_hand", "phases_by_hand", "window_by_hand")
 
 
 def pull_cards(study: Study) -> list[dict[str, Any]]:

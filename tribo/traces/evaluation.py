@@ -32,11 +32,12 @@ from tribo.traces.peak import (
     with_peak_near,
     within_samples,
 )
-from tribo.traces.phases import Course, course_of, course_of_piece, phases_of
+from tribo.traces.phases import Course, as_stated, course_of, course_of_piece, phases_of
 from tribo.traces.rules import DEFAULT_RULE, Rule, named_rule
 from tribo.traces.signal import Signal, line, median_of_three, signal_of, steady
 from tribo.traces.sliding import Sliding, slides_on_closed_track, sliding_over, transient_end, window_between
 from tribo.traces.zero import BEFORE_CONTACT, chosen_zero, disagreement_N, load_level, stated_zeros, zero_at_first
+from tribo.zeroing import ZeroChoice
 
 GIVEN = "given"  # the rule of forces that were evaluated elsewhere
 _LEFT_OUT = 0.1  # share at the start of a record that slides from its first sample, left out as not yet settled
@@ -78,6 +79,9 @@ class PullOptions:
         Whether the sign of the force was changed, so that friction is positive.
     peak_s, window_s : float and (float, float), optional
         A static peak and a sliding window chosen by hand, on the clock of the trace.
+    phases : tuple of Phase
+        Phases stated by hand: the end of a rise is a static peak, steady sliding the window of the sliding force, a
+        rest the zero. A record for which sliding from its beginning is stated, and no rise, has no static force.
     """
 
     rule: str = DEFAULT_RULE
@@ -90,6 +94,7 @@ class PullOptions:
     turned: bool = False
     peak_s: float | None = None
     window_s: tuple[float, float] | None = None
+    phases: tuple[Phase, ...] = ()
 
 
 WHOLE = PullOptions()
@@ -131,7 +136,8 @@ def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
     test = options.test or Test(trace.name, trace.file, "", math.nan, "")
     if test.speed_m_s is None and math.isfinite(speed := speed_level_m_s(trace)):
         test = replace(test, speed_m_s=speed)
-    options = replace(options, rule=rule.name, test=test)
+    options = _with_phases(replace(options, rule=rule.name, test=test))
+    test = options.test or test
     zero, load_zero, load = options.zero, options.load_zero, trace.columns.get("normal_force_N")
     try:
         signal = signal_of(trace)
@@ -142,6 +148,7 @@ def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
             zero = zero or chosen_zero(test.zero, signal.time_s, signal.force_N, course, trace.file)
             if zero is None and test.zero.kind == "before contact":  # as stated, whatever the force looks like
                 course = replace(course, starts_sliding=False)
+        course = as_stated(course, signal, options.phases)
         pull = _first_motion(trace, signal, course, zero, options, rule)
         if zero and zero.drifts:
             pull = replace(pull, flags=(*pull.flags, "zero_uncertain"))
@@ -164,15 +171,30 @@ def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
     doubts = _doubts(trace, pull, test)
     flags = [*trace.flags, *(doubt.kind for doubt in doubts), *pull.flags]
     flags += ["impulsive"] if signal.impulsive else []
+    flags += ["phases_by_hand"] if options.phases else []
     if options.turned or options.begins == "reversal":
         flags.append("backward" if options.turned else "forward")
     pull = replace(
-        pull, test_id=test.test_id, flags=tuple(dict.fromkeys(flags)), phases=_phases(trace, pull, signal, course),
+        pull, test_id=test.test_id, flags=tuple(dict.fromkeys(flags)),
+        phases=_phases(trace, pull, signal, course, options),
         problems=tuple(p.at(file=trace.file or None, test_id=test.test_id) for p in (*doubts, *pull.problems)),
     )  # fmt: skip
     if "no_time" in trace.flags:  # path stands for time, so nothing can be counted per second
         pull = replace(pull, rise_N_per_s=math.nan, stick_slip_period_s=math.nan, drift_N_per_s=math.nan)
     return pull
+
+
+def _with_phases(options: PullOptions) -> PullOptions:
+    """Options whose peak, window and zero are those of the phases stated by hand, unless they are given otherwise."""
+    for phase in options.phases:
+        if phase.name == "rise" and options.peak_s is None:
+            options = replace(options, peak_s=phase.end_s)
+        elif phase.name == "steady sliding" and options.window_s is None:
+            options = replace(options, window_s=(phase.start_s, phase.end_s))
+        elif phase.name == "rest" and options.test is not None and options.zero is None:
+            rest = ZeroChoice("interval", interval_s=(phase.start_s, phase.end_s))
+            options = replace(options, test=replace(options.test, zero=rest))
+    return options
 
 
 def pieces_of(tables: Trace | Sequence[Trace], options: PullOptions = WHOLE) -> dict[str, tuple[Trace, PullOptions]]:
@@ -302,7 +324,8 @@ def _first_motion(
         pull = _from_rest(piece, zero, rule, options.test, options.peak_s, window_s)
         return _without_static(pull) if _slid_unseen(trace, pull, options.test) else pull
     except TraceError as fault:
-        if not options.begins or not {p.kind for p in fault.problems} <= _NO_PEAK:
+        kinds = {p.kind for p in fault.problems}
+        if not (options.begins or (options.window_s and options.peak_s is None)) or not kinds <= _NO_PEAK:
             raise
     return _sliding(signal, (start, end), zero, options)
 
@@ -574,10 +597,10 @@ def _doubts(trace: Trace, pull: Pull, test: Test) -> list[Problem]:
     return found
 
 
-def _phases(trace: Trace, pull: Pull, signal: Signal, course: Course) -> tuple[Phase, ...]:
+def _phases(trace: Trace, pull: Pull, signal: Signal, course: Course, options: PullOptions) -> tuple[Phase, ...]:
     """The phases of a record, with the starts that were read from it and forces above its zero."""
     starts = None
     if math.isfinite(pull.peak_s) or course.starts_sliding:
         starts = [(pull.onset_s, pull.peak_s), *((r.stop_s + r.hold_s, r.peak_s) for r in pull.restarts)]
-    found = phases_of(trace, signal=signal, course=course, starts_s=starts)
+    found = phases_of(trace, signal=signal, course=course, starts_s=starts, stated=options.phases)
     return tuple(replace(phase, force_N=phase.force_N - pull.zero_N) for phase in found)

@@ -63,6 +63,7 @@ _CLIMBS = 4.0  # times its noise by which a force climbs that begins at rest
 _NEAR = 0.1  # share of its swing below the lowest later force from which on a record begins at rest
 _FELT = 12.0  # a friction force is at least this many times the noise
 _LOADED = 0.95  # share of its first level that a load has reached
+_AT_BEGINNING = 0.1  # share of a record up to which sliding that is stated begins with the record
 _WAITS = 0.1  # share of a stroke for which a drive stands still at its end that does more than turn
 _LEFT = 0.2  # share of the way to the other level from which on a force has left the old one
 _DRIFTS = 0.02  # share of the later force by which the force before it differs at the least where it still runs in,
@@ -139,6 +140,23 @@ def course_of_piece(trace: Trace, signal: Signal, *, starts_sliding: bool) -> Co
     else:
         end = quiet_end(signal.force_N)
     return Course(whole, end, (), (), starts_sliding)
+
+
+def as_stated(course: Course, signal: Signal, phases: Sequence[Phase]) -> Course:
+    """A course with what a person stated of its phases: where sliding begins and ends, and whether from rest."""
+    if not phases:
+        return course
+    time = signal.time_s
+    slides = [p for p in phases if p.name in ("running-in", "steady sliding")]
+    ends = [p.start_s for p in phases if p.name in ("end of the drive", "unloading", "lift-off")]
+    from_rest = any(p.name in ("rest", "rise") for p in phases)
+    end = int(np.searchsorted(time, min(ends))) if ends else course.end
+    first = min((p.start_s for p in slides), default=math.inf)
+    begin = float(time[course.contact[0]])
+    if slides and not from_rest and first <= begin + _AT_BEGINNING * (float(time[-1]) - begin):
+        return Course((int(np.searchsorted(time, first)), course.contact[1]), end, (), course.rests, True)
+    stops = tuple(stop for stop in course.stops if stop[1] < end)
+    return replace(course, end=end, stops=stops, starts_sliding=course.starts_sliding and not from_rest)
 
 
 def _contact(load: FloatArray | None, samples: int) -> Range:
@@ -282,6 +300,7 @@ def phases_of(
     signal: Signal | None = None,
     course: Course | None = None,
     starts_s: Sequence[tuple[float, float]] | None = None,
+    stated: Sequence[Phase] = (),
 ) -> tuple[Phase, ...]:
     """Every part of a record by what the rig did, in order of time, without gaps and overlaps.
 
@@ -296,6 +315,8 @@ def phases_of(
     starts_s : sequence of (onset, peak), optional
         Times at which the force begins to rise from rest and at which it has its static peak, for every start that is
         known; else they are looked for.
+    stated : sequence of Phase
+        What a person stated: it stands in place of what was found there.
 
     Raises
     ------
@@ -330,7 +351,18 @@ def phases_of(
         spans.append(_Span(name, end, touching, evidence))
     if touching < samples:
         spans.append(_Span("lift-off", touching, samples, "the load has fallen back"))
+    for phase in stated:
+        first, last = (int(k) for k in np.searchsorted(signal.time_s, (phase.start_s, phase.end_s)))
+        spans = [*_without(spans, first, last), _Span(phase.name, first, last, "stated by hand")]
+    spans.sort(key=lambda span: span.first)
     return tuple(_phase(trace, signal, span) for span in spans if span.last > span.first)
+
+
+def _without(spans: Sequence[_Span], first: int, last: int) -> Iterator[_Span]:
+    """Spans, or what is left of them, outside of a range."""
+    for span in spans:
+        yield replace(span, last=min(span.last, first))
+        yield replace(span, first=max(span.first, last))
 
 
 def _under_load(trace: Trace, course: Course) -> Range:

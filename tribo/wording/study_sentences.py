@@ -23,6 +23,7 @@ FLAGS = {
     "impulsive": "impulsive noise", "no_drop": "no drop after the peak", "no_sliding": "no sliding phase",
     "no_static": "no static peak", "no_zero_phase": "no zero phase", "peak_ambiguous": "readings of the peak differ",
     "peak_between_samples": "peak between samples", "peak_by_hand": "peak moved by hand", "restarts": "restarts",
+    "phases_by_hand": "phases stated by hand",
     "stick_slip": "stick-slip", "window_by_hand": "window moved by hand", "window_short": "window too short",
     "zero_uncertain": "zero uncertain",
 }  # fmt: skip
@@ -263,13 +264,19 @@ def by_hand_sentence(decided: Override, pull: Pull | None) -> str:
     if decided.window_s is not None:
         before, after = (" to ".join(map(significant, p.window_s)) for p in (automatic, pull))
         moved.append(f"sliding window from {before} s to {after} s")
+    for phase in decided.phases:
+        moved.append(f"{phase.name} from {significant(phase.start_s)} to {significant(phase.end_s)} s")
+    done = "Stated" if decided.phases else "Moved"
     return (
-        f"Moved by hand{reason}: {joined(moved)}. Static force {_changed(automatic.static_N, pull.static_N)}, "
+        f"{done} by hand{reason}: {joined(moved)}. Static force {_changed(automatic.static_N, pull.static_N)}, "
         f"sliding force {_changed(automatic.sliding_N, pull.sliding_N)}."
     )
 
 
 def _changed(before: float, after: float) -> str:
+    if not (math.isfinite(before) and math.isfinite(after)):
+        now, then = (f"{significant(v)} N" if math.isfinite(v) else "none" for v in (after, before))
+        return f"{now}, automatic value {then}"
     change = percent(after / before - 1) if before else "–"
     return f"{significant(after)} N, automatic value {significant(before)} N ({change})"
 
