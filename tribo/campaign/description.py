@@ -197,16 +197,16 @@ Stated = dict[str, str | list[str] | dict[str, str | list[str]]]
 
 
 def _only_quantities(columns: Stated) -> Stated:
-    """[columns] holds quantities, "ignore" and "decimal", and tables of the same for a file or a glob of files."""
-    names = [*(name.replace(" ", "_") for name in QUANTITIES), "ignore", "decimal"]
+    """[columns] holds quantities, "ignore", "decimal" and "accept", and tables of the same for a file or a glob."""
+    names = [*(name.replace(" ", "_") for name in QUANTITIES), "ignore", "decimal", "accept"]
     for key, value in columns.items():
         if isinstance(value, dict):
             _only_quantities(dict(value))
-        elif key not in ("ignore", "decimal") and quantity_named(key) is None:
+        elif key not in ("ignore", "decimal", "accept") and quantity_named(key) is None:
             hint = did_you_mean(key, names) or f"known quantities: {', '.join(names)}"
             raise ValueError(f"{key} is not a known quantity; {hint}")
-        elif key != "ignore" and not isinstance(value, str):
-            raise ValueError(f"{key} must be one column, not a list; only ignore takes a list")
+        elif key not in ("ignore", "accept") and not isinstance(value, str):
+            raise ValueError(f"{key} must be one column, not a list; only ignore and accept take a list")
         elif key == "decimal" and value not in (".", ","):
             raise ValueError("decimal must be a point or a comma")
     return columns

@@ -9,7 +9,7 @@ import click
 
 from tribo import __version__
 from tribo.cli.build_commands import build, schedule
-from tribo.cli.console import Console, GivenPath, command_options
+from tribo.cli.console import Console, ExportPath, GivenPath, command_options
 from tribo.cli.setup_commands import init
 from tribo.cli.simulate_command import simulate
 from tribo.cli.study_commands import compare, compare_reports, demo, diagnose, discover, fit, ingest, predict, report
@@ -134,7 +134,7 @@ def plan(console: Console, campaign: Path, law_file: Path | None, **_: Any) -> N
 
 
 @main.command()
-@click.argument("files", nargs=-1, required=True, type=GivenPath(dir_okay=False))
+@click.argument("files", nargs=-1, required=True, type=ExportPath(dir_okay=False))
 @reading_options
 @command_options
 def inspect(console: Console, files: tuple[Path, ...], columns: str, stated: dict[str, float], **_: Any) -> int:

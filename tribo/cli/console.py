@@ -62,6 +62,15 @@ class GivenPath(click.Path):
         return super().convert(value, param, ctx)
 
 
+class ExportPath(GivenPath):
+    """A path that exists; or one that goes on into a file, as ``all.zip/a.csv``, or chooses from it, as ``a.csv#2``."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        path = Path(value)
+        within = Path(str(value).rpartition("#")[0]).is_file() or any(p.is_file() for p in path.parents)
+        return path if within and not path.exists() else super().convert(value, param, ctx)
+
+
 def _beside(path: Path) -> Path | None:
     """The file or folder beside ``path`` whose name is nearest to its name."""
     try:

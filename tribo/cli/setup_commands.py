@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tribo.cli.console import Console, command_options
+from tribo.cli.console import Console, ExportPath, command_options
 from tribo.cli.study_options import corrected, reading_options
 from tribo.errors import Problem
 
@@ -24,13 +24,10 @@ if TYPE_CHECKING:
     from tribo.springblock.engine_speed import Timing
 
 
-_TABLE = "--table sample=COLUMN,normal_load_N=COLUMN,coefficient=COLUMN"
-
-
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option(
-    "--from", "raw", type=click.Path(exists=True, path_type=Path),
+    "--from", "raw", type=ExportPath(),
     help="Folder (or one file, or a .zip) of exports: campaign.toml and tests.csv are written from them.",
 )  # fmt: skip
 @click.option(
@@ -111,6 +108,7 @@ def _from_exports(raw: Path, **stated: Any) -> Draft:
     from tribo.drafting.draft import draft_campaign, exports_in
     from tribo.drafting.draft_table import draft_from_table, is_table_of_forces
     from tribo.errors import CampaignError
+    from tribo.readers.columns import TABLE_OPTION
 
     (file, *more) = exports_in(raw).values()
     if not more and is_table_of_forces(file):
@@ -119,7 +117,7 @@ def _from_exports(raw: Path, **stated: Any) -> Draft:
         return draft_campaign(raw, **stated)
     except CampaignError as why:
         what = "a table of forces that were evaluated elsewhere is read with --table"
-        hints = [] if more else [Problem("no_export", what, allowed=_TABLE)]
+        hints = [] if more else [Problem("no_export", what, allowed=TABLE_OPTION)]
         raise CampaignError([*why.problems, *hints]) from None
 
 

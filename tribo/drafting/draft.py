@@ -84,8 +84,10 @@ class Draft:
 
 def exports_in(raw: Path) -> dict[str, Path]:
     """Exports below a folder (or the one file) by the name they get in raw/: entries of a .zip as ZIP/ENTRY."""
-    from tribo.readers.source import entries_of
+    from tribo.readers.source import archive_of, entries_of
 
+    if (archive := archive_of(raw)) is not None:
+        return {f"{archive.name}/{raw.relative_to(archive).as_posix()}": raw}
     base = raw if raw.is_dir() else raw.parent
     files = [p for p in found_below(raw) if p.is_file()] if raw.is_dir() else [raw]
     found = {}

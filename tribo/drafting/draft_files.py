@@ -86,8 +86,11 @@ def write_draft(folder: Path, contents: Mapping[Path, str], raw: Path | None) ->
     CampaignError
         A file of the campaign, or one in raw/ of the same name as an export, already exists. Nothing is written.
     """
+    from tribo.readers.source import archive_of
+
     copies: dict[Path, Path] = {}  # where each export goes, unless they are in raw/ already
     if raw is not None:
+        raw = archive_of(raw) or raw
         base, target = raw if raw.is_dir() else raw.parent, folder / RAW
         files = [p for p in found_below(raw) if p.is_file()] if raw.is_dir() else [raw]
         if target.resolve() not in (base.resolve(), *base.resolve().parents):

@@ -228,7 +228,7 @@ def _pattern_of(names: Sequence[str]) -> str:
     differing = [k for k in texts if len(set(parts[k])) > 1]
     sample = differing[0] if differing else (0 if 0 in texts and len(parts) > 1 else -1)
     taken: set[str] = set()
-    found = []
+    found: list[str] = []
     for k, values in enumerate(parts):
         if k in texts:
             name = "sample" if k == sample else f"part{k + 1}"
@@ -257,7 +257,7 @@ def _numbers(values: Sequence[str]) -> list[list[tuple[str, str, str]]]:
 
 
 def _pattern_of_numbers(values: Sequence[str], is_last: bool, is_first: bool, n: int, taken: set[str]) -> str:
-    found = []
+    found: list[str] = []
     for pieces in zip(*_numbers(values), strict=True):
         prefix, number, _ = pieces[0]
         units = [unit for _, _, unit in pieces]

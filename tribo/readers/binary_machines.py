@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +23,7 @@ from tribo.records import FloatArray
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _TDMS_UNITS = ("unit_string", "NI_UnitDescription", "Unit", "unit", "Units", "units")
 _NO_UNITS = {"", "none", "no unit"}
+_MOST_COLUMNS = 64  # of a matrix that is a table
 
 
 def _most_frequent_length(arrays: Mapping[str, Any]) -> int:
@@ -32,7 +33,7 @@ def _most_frequent_length(arrays: Mapping[str, Any]) -> int:
 
 
 def _open_matlab(source: Source) -> tuple[Source, ...]:
-    """All vectors of the most frequent length, as named columns.
+    """All vectors of the most frequent length, as named columns; those of matrices and structs among them.
 
     Raises
     ------
@@ -52,17 +53,32 @@ def _open_matlab(source: Source) -> tuple[Source, ...]:
             found = {name: value for name, value in loadmat(stream).items() if not name.startswith("__")}
     except Exception as why:  # scipy and h5py raise many kinds on damaged files
         raise ReadError(Problem("bad_mat", f"not a readable .mat file ({why})", file=source.file)) from why
-    vectors = {
-        name: np.ascontiguousarray(np.ravel(value), dtype=float)
-        for name, value in found.items()
-        if isinstance(value, np.ndarray) and value.dtype.kind in "fiu" and value.size == max(value.shape, default=0)
-    }
+    vectors = dict(_vectors(found))
     size = _most_frequent_length(vectors)
     if not size:
-        names = ", ".join(vectors) or None
-        raise ReadError(Problem("not_an_export", "no vectors in it", file=source.file, found=names))
+        held = ", ".join(f"{name} ({_held(value)})" for name, value in found.items()) or None
+        what, allowed = "no vectors in it", "vectors of one length, or a matrix with a column for each quantity"
+        raise ReadError(Problem("not_an_export", what, file=source.file, found=held, allowed=allowed))
     kept = {name: v for name, v in vectors.items() if v.size == size}
     return (replace(source, data=b"", names=tuple(kept), arrays=tuple(kept.values())),)
+
+
+def _vectors(found: Mapping[str, Any]) -> Iterator[tuple[str, FloatArray]]:
+    """The vectors of a .mat file by name; a matrix is its columns, "data(1)" and so on, a struct its fields."""
+    for name, value in found.items():
+        if isinstance(value, np.ndarray) and value.dtype.names and value.size == 1:
+            yield from _vectors({field: value[field].item() for field in value.dtype.names})
+        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiu":
+            if value.size == max(value.shape, default=0):
+                yield name, np.ascontiguousarray(np.ravel(value), dtype=float)
+            elif value.ndim == 2 and min(value.shape) <= _MOST_COLUMNS:
+                rows = value if value.shape[0] > value.shape[1] else value.T
+                for k, column in enumerate(rows.T, start=1):
+                    yield f"{name}({k})", np.ascontiguousarray(column, dtype=float)
+
+
+def _held(value: Any) -> str:
+    return " x ".join(map(str, value.shape)) if isinstance(value, np.ndarray) else type(value).__name__
 
 
 def _open_tdms(source: Source) -> tuple[Source, ...]:
@@ -146,8 +162,9 @@ BINARY_MACHINES = (
         "matlab",
         "MATLAB .mat, named variables",
         lambda source: source.data[:16].startswith((b"MATLAB 5.0", b"MATLAB 7.3", _HDF5)),
-        advice="the variables have no units; give them in columns "
-        '(for a force divided by a weight, give that weight as the unit: friction_force = "Fnorm [30.7 gf]")',
+        advice='the variables have no units; give them in columns: time = "NAME [s]", friction_force = "NAME [N]" '
+        '(or "#2 [N]", the second one; for a force divided by a weight, give that weight as the unit: '
+        'friction_force = "Fnorm [30.7 gf]")',
         opens=_open_matlab,
     ),
 )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tribo.errors import Problem, ReadError
 from tribo.input_files import LARGEST_NUMBER, SMALLEST_NUMBER
-from tribo.readers.columns import ASKED, Column, force_follows
+from tribo.readers.columns import Column, force_follows
 from tribo.records import Correction, FloatArray
 
 NO_TIME = "no_time"
@@ -108,12 +108,12 @@ def _forces(arrays: Arrays, columns: list[Column], stated: Correction, file: str
             raise ReadError(Problem("no_radius", what, file, None, label["radius"], allowed=allowed))
         add("friction force", arrays["torque"] / arrays["radius"], "torque", "torque over the recorded radius")
     elif mu is not None and load is not None:
-        if _constant_ratio(load, mu, float(np.ptp(load) / np.abs(load).max()) / 10.0):
+        by_name = any(c.quantity == "normal force" and c.reason.startswith("named") for c in columns)
+        if by_name and _constant_ratio(load, mu, float(np.ptp(load) / np.abs(load).max()) / 10.0):
             what = "the load is the friction coefficient times a constant, so it may be the friction force"
             name = label["normal force"]
             allowed = f'friction_force = "{name}" in columns; or normal_force = "{name}" if it is the normal load'
-            if not any(c.quantity == "normal force" and c.reason.startswith(ASKED) for c in columns):
-                raise ReadError(Problem("load_is_friction", what, file, None, name, allowed=allowed))
+            raise ReadError(Problem("load_is_friction", what, file, None, name, allowed=allowed))
         reason = f"friction coefficient times {label.get('normal force', label.get('normal stress', ''))}"
         add("friction force", mu * np.abs(load), "friction coefficient", reason)
     elif mu is not None:

@@ -17,7 +17,10 @@ from tribo.units import QUANTITIES, match_quantity, narrow, plain_name, quantity
 from tribo.user_text import did_you_mean
 
 ASKED = "asked for"
-NONE, IGNORE, DECIMAL = "none", "ignore", "decimal"
+NONE, IGNORE, DECIMAL, ACCEPT = "none", "ignore", "decimal", "accept"
+# damage that a user may accept: rows that are then left out, and one that is then taken as it stands
+ROWS_LEFT_OUT = ("text_in_numbers", "two_decimal_marks", "nan_gap", "wrong_number_of_cells", "truncated_mid_row")
+ACCEPTABLE = ("scale_jump", *ROWS_LEFT_OUT)
 NEEDED = ("time", "friction force")
 _SIMILAR = 0.7  # difflib ratio from which a name that was asked for is taken for a misspelt one of the file
 _MEANS_NORMAL_BESIDE_FRICTION = {  # beside a friction force, a friction coefficient or a torque
@@ -29,6 +32,8 @@ _ONLY_WITH_UNIT = ("radius", "normal stress")  # of no use without one, and miss
 _ACCELERATION = re.compile(r"m\s*/\s*s(?:ec)?\s*(?:\^?2|²)|m/s/s|m·?s(?:\^?-2|⁻²)")
 _BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^\[\]()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
 _AFTER_MARK = re.compile(r"^(.*\S)\s*(?:\s?/|\sin\s|,\s|_)\s*((?:[^\W\d_]|[°%])[\w/°%^·²-]*)$")
+
+TABLE_OPTION = "--table sample=COLUMN,normal_load_N=COLUMN,coefficient=COLUMN"
 
 Columns = Mapping[str, str | Sequence[str]]  # the column of each quantity, as a user states it
 Chosen = dict[str, tuple[int, str | None, str]]  # position, unit if given, and reason of the column of each quantity
@@ -90,13 +95,15 @@ class Given:
     """Everything stated for one export.
 
     ``without`` are quantities that are not read although a column has their name, ``ignored`` columns that are not
-    looked at, by name or position; ``decimal`` is the decimal mark, "" where the file settles it.
+    looked at, by name or position; ``decimal`` is the decimal mark, "" where the file settles it; ``accepted`` are
+    kinds of damage.
     """
 
     hints: tuple[Hint, ...] = ()
     without: frozenset[str] = frozenset()
     ignored: tuple[str, ...] = ()
     decimal: str = ""
+    accepted: frozenset[str] = frozenset()
     correction: Correction = UNCORRECTED
 
     def names(self, name: str) -> bool:
@@ -113,14 +120,15 @@ class Given:
 
 
 def parse_columns(columns: Columns | None, correction: Correction | None = None, *, strict: bool = True) -> Given:
-    """``{quantity: "name [unit]"}`` as hints; "none" for a quantity to leave out; ``ignore`` and ``decimal``.
+    """``{quantity: "name [unit]"}`` as hints; "none" for a quantity to leave out; ``ignore``, ``decimal``, ``accept``.
 
     Without ``strict``, entries that cannot be used are left out.
 
     Raises
     ------
     ReadError
-        unknown_quantity for every key that names none, unknown_decimal for a mark that is no decimal mark.
+        unknown_quantity for every key that names none, unknown_decimal for a mark that is no decimal mark,
+        not_acceptable for damage that cannot be accepted.
     """
     stated: dict[str, str | Sequence[str]] = {}
     problems = []
@@ -130,23 +138,33 @@ def parse_columns(columns: Columns | None, correction: Correction | None = None,
         elif key == DECIMAL:
             what, allowed = "not a decimal mark", '"." or ","'
             problems.append(Problem("unknown_decimal", what, found=str(value), allowed=allowed))
+        elif key == ACCEPT:
+            stated[key] = value
+            if wrong := set(_listed_in(value)) - set(ACCEPTABLE):
+                what = "not a damage that can be accepted"
+                found, allowed = ", ".join(sorted(wrong)), ", ".join(ACCEPTABLE)
+                problems.append(Problem("not_acceptable", what, found=found, allowed=allowed))
         else:
             names = [name.replace(" ", "_") for name in QUANTITIES]
-            meant = did_you_mean(key, [*names, IGNORE, DECIMAL])
-            allowed = f"{', '.join(names)}; {IGNORE}, {DECIMAL}{f' ({meant})' if meant else ''}"
+            meant = did_you_mean(key, [*names, IGNORE, DECIMAL, ACCEPT])
+            allowed = f"{', '.join(names)}; {IGNORE}, {DECIMAL}, {ACCEPT}{f' ({meant})' if meant else ''}"
             problems.append(Problem("unknown_quantity", "not a known quantity", found=key, allowed=allowed))
     if strict and problems:
         raise ReadError(problems)
     wanted = [(quantity, str(value).strip()) for key, value in stated.items() if (quantity := quantity_named(key))]
-    ignored = stated.get(IGNORE, ())
-    listed = re.split(r"\s*;\s*", ignored) if isinstance(ignored, str) else ignored
     return Given(
         tuple(Hint(quantity, name) for quantity, name in wanted if name.lower() != NONE),
         frozenset(quantity for quantity, name in wanted if name.lower() == NONE),
-        tuple(name.strip() for name in listed if name.strip()),
+        _listed_in(stated.get(IGNORE, ())),
         str(stated.get(DECIMAL, "")),
+        frozenset(_listed_in(stated.get(ACCEPT, ()))),
         correction or UNCORRECTED,
     )
+
+
+def _listed_in(value: str | Sequence[str]) -> tuple[str, ...]:
+    listed = re.split(r"\s*;\s*", value) if isinstance(value, str) else value
+    return tuple(text.strip() for text in listed if text.strip())
 
 
 def columns_from_text(text: str) -> dict[str, str]:
@@ -370,6 +388,7 @@ def _missing(quantity: str, names: Sequence[str], there: set[str]) -> Problem:
     ways = [f"{quantity.replace(' ', '_')} = {example} in columns"]
     if quantity == "time":
         ways += ["a counter takes the sampling interval as its unit, [0.01 s]", "or sampling_rate_Hz = 100"]
+        ways += [f"of forces evaluated elsewhere, one row a test: tribo init NEW --from FILE {TABLE_OPTION}"]
     elif "torque" in there:
         what = "the friction is recorded as a torque, without a friction force"
         ways = ["lever_arm_mm = 2.5, the distance of the contact from the axis"]

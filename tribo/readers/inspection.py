@@ -15,7 +15,16 @@ from tribo.errors import Problem, ReadError
 from tribo.input_files import MAPPED_BYTES
 from tribo.readers.columns import NEEDED, Column, Columns, Given, assign, match_column, parse_columns
 from tribo.readers.layout import Layout, first_table
-from tribo.readers.reading import FATAL, Reading, machine_of, open_sources, read_tables, split_at_restarts
+from tribo.readers.reading import (
+    FATAL,
+    Reading,
+    machine_of,
+    one_of,
+    open_sources,
+    read_tables,
+    split_at_restarts,
+    split_choice,
+)
 from tribo.readers.source import HEAD_BYTES
 from tribo.records import Correction
 
@@ -132,7 +141,7 @@ def inspect_export(
     Parameters
     ----------
     path : Path
-        The export, or ``PATH.zip/ENTRY``.
+        The export, or ``PATH.zip/ENTRY``; ``PATH#2`` is its second table.
     columns, correction : optional
         As in :func:`tribo.readers.read_export`.
 
@@ -147,13 +156,16 @@ def inspect_export(
     >>> seen.family, seen.tables[0].rows, [column.quantity for column in seen.columns]
     ('bluehill', 400, ['time', 'displacement', 'friction force'])
     """
-    path = Path(path)
+    path, chosen = split_choice(Path(path))
     file = str(path)
     try:
         readings, others, footer = read_tables(path, parse_columns(columns, correction), file, beginning_only=True)
+        parts = [part for reading in readings for part in split_at_restarts(reading)]
+        if chosen is not None:
+            parts = [one_of(parts, chosen, file)]
     except ReadError as why:
         return _refused(path, file, why.problems, parse_columns(columns, correction, strict=False))
-    seen = _read(file, readings, others, footer)
+    seen = _read(file, parts, others, footer)
     is_mapped = path.is_file() and path.stat().st_size > MAPPED_BYTES  # PATH.zip/ENTRY is no file, and never mapped
     source = open_sources(path, file)[0] if is_mapped else None
     if source is None or not source.is_large:
@@ -195,9 +207,8 @@ def _refused(path: Path, file: str, problems: tuple[Problem, ...], given: Given)
     )
 
 
-def _read(file: str, readings: list[Reading], others: list[str], footer: list[str]) -> Inspection:
-    first, layout = readings[0], readings[0].layout
-    parts = [part for reading in readings for part in split_at_restarts(reading)]
+def _read(file: str, parts: list[Reading], others: list[str], footer: list[str]) -> Inspection:
+    first, layout = parts[0], parts[0].layout
     findings = [problem for part in parts for problem in part.findings]
     doubts = [problem for problem in findings if problem.kind not in FATAL]
     doubts += [doubt for part in parts[:1] for doubt in _doubts(part, file)]

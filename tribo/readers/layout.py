@@ -22,6 +22,7 @@ _COMMA_NUMBER = re.compile(r"[-+]?(?:\d+,\d*|,\d+)(?:[eE][-+]?\d+)?")
 _DOT_NUMBER = re.compile(r"[-+]?(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(?:(?P<mark>[.,'’\s])\d{3})+(?!(?P=mark))(?P<decimal>[.,])\d*")
 _ROWS_LOOKED_AT = 5
+_ROWS_SEARCHED = 100  # for the first number of a column
 _HEADER_LINES_LOOKED_AT = 200
 _MEASURED = ("time", "friction force", "displacement", "temperature", "speed", "torque")
 _COMMENTS = {"comment", "comments", "kommentar", "commentaire"}
@@ -123,10 +124,21 @@ def tables_one_below_the_other(
         if following.names != first.names and not any(_known(name, given) for name in following.names):
             searched = max(following.start, found.end())
             continue
-        tables.append(replace(current, end=start))
+        tables.append(replace(current, end=_without_a_number_alone(source, current, start)))
         current, searched = following, following.start
     tables.append(current)
     return tuple(replace(t, label=_label(t) or f"table {k}") for k, t in enumerate(tables, start=1)), tuple(footer)
+
+
+def _without_a_number_alone(source: Source, table: Layout, end: int) -> int:
+    """Where the rows of a table end: a line with one cell above the next header is the number of its specimen."""
+    start = max(table.start, end - HEAD_BYTES)
+    for line in reversed(bytes(source.data[start:end]).split(b"\n")[:-1]):
+        text = source.text(line)
+        if text.strip(BLANK) and not (table.n_cells > 1 == sum(map(bool, cut(text, table.delimiter)))):
+            break
+        end -= len(line) + 1
+    return max(end, table.start)
 
 
 def _label(table: Layout) -> str:
@@ -169,11 +181,21 @@ def _table_below(source: Source, given: Given, start: int, rows_above: int = 0) 
     layout = _with_header(lines, layout, given)
     return replace(
         layout,
+        filled=_filled_later(lines[first + len(rows) :], layout, given),
         header_rows=first + rows_above,
         names_row=None if layout.names_row is None else layout.names_row + rows_above,
         units_row=None if layout.units_row is None else layout.units_row + rows_above,
         start=source.offset(start, first),
         end=len(source.data),
+    )
+
+
+def _filled_later(lines: Sequence[str], layout: Layout, given: Given) -> tuple[bool, ...]:
+    """``filled`` with the columns of known names that are empty in the first rows, and hold numbers in later ones."""
+    rows = [cut(line, layout.delimiter) for line in lines[:_ROWS_SEARCHED]]
+    return tuple(
+        there or (_known(name, given) and any(k < len(row) and _NUMBER_START.match(row[k]) for row in rows))
+        for k, (there, name) in enumerate(zip(layout.filled, layout.names, strict=True))
     )
 
 
@@ -232,7 +254,8 @@ def _delimiter(rows: Sequence[str], file: str) -> str:
     if len(words) > 1:
         return " "
     what = "only one column was found; a trace needs time and force"
-    raise ReadError(Problem("one_column", what, file=file, found=row[:60]))
+    allowed = "an export with the time, or the displacement, in a column beside the force"
+    raise ReadError(Problem("one_column", what, file=file, found=row[:60], allowed=allowed))
 
 
 def _decimal(rows: Sequence[Sequence[str]]) -> str:
@@ -320,7 +343,8 @@ def _refuse_decimal_comma_as_delimiter(lines: Sequence[str], layout: Layout, fil
     if 1 < given < layout.n_cells - 1:
         what = "the comma is both delimiter and decimal mark, so the columns cannot be separated"
         place = (file, rows_above + layout.header_rows + 1)
-        raise ReadError(Problem("decimal_is_delimiter", what, *place, found=row[:60]))
+        allowed = "an export with semicolons or tabs between the cells, or with decimal points"
+        raise ReadError(Problem("decimal_is_delimiter", what, *place, found=row[:60], allowed=allowed))
 
 
 def _metadata(lines: Sequence[str], rows: Iterable[int], delimiter: str) -> dict[str, str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -35,8 +35,12 @@ _MARKS_AND_DIGITS = re.compile(r"[-+\d.,'’\s]+")
 _NOTHING = frozenset({"", "nan", "n/a", "na", "#n/a", "--", "---", "-", "null", "none", "inf", "infinity"})
 
 
-def parse_block(source: Source, table: Layout, used: Sequence[int]) -> tuple[FloatArray, Problem | None]:
-    """Columns ``used`` of a table, shape (len(used), rows), as written (no unit applied), and a doubt about its end.
+def parse_block(
+    source: Source, table: Layout, used: Sequence[int], accepted: Collection[str] = ()
+) -> tuple[FloatArray, list[Problem]]:
+    """Columns ``used`` of a table, shape (len(used), rows), as written (no unit applied), and doubts about its rows.
+
+    Rows with damage that is ``accepted`` are left out.
 
     Raises
     ------
@@ -50,7 +54,7 @@ def parse_block(source: Source, table: Layout, used: Sequence[int]) -> tuple[Flo
         finite = np.isfinite(columns).all(axis=0)
         last = int(np.flatnonzero(finite)[-1]) + 1 if finite.any() else 0
         padded = finite.size - last
-        return columns[:, :last], _empty_end(padded, source.file, last + 1) if padded else None
+        return columns[:, :last], [_empty_end(padded, source.file, last + 1)] if padded else []
     rows = sum(chunk.count(b"\n") for chunk in source.chunks(table.start, table.end)) + 1
     if rows > LARGEST_TABLE_ROWS:
         allowed = f"at most {LARGEST_TABLE_ROWS} rows: split the export, or record at a lower rate"
@@ -59,7 +63,7 @@ def parse_block(source: Source, table: Layout, used: Sequence[int]) -> tuple[Flo
     numbers = np.empty((len(used), rows))  # room for all rows, so that no number is held twice
     filled = 0
     problems: list[Problem] = []
-    doubt: Problem | None = None
+    doubts: list[Problem] = []
     row, start = table.header_rows + 1, table.start
     for chunk in source.chunks(table.start, table.end):
         start += len(chunk)
@@ -70,11 +74,17 @@ def parse_block(source: Source, table: Layout, used: Sequence[int]) -> tuple[Flo
             text = source.text(chunk).replace("\r\n", "\n")
             if start >= table.end and not breaks_off:
                 text, doubt = _without_empty_end(text, table, used, source.file, row)
+                doubts += [doubt] if doubt else []
             found = _damage(text, table, used, source.file, row, ends_file, breaks_off)
             values = None if found else _parse_slowly(text, table, used)
             if found and all(p.kind in ("two_decimal_marks", "more") for p in found):
                 values = _parse_grouped(text, table, used)
                 found = found if values is None else []
+            if found and all(p.kind in (*accepted, "more") for p in found):
+                values, left_out = _whole_rows(text, table, used)
+                what = f"{left_out} damaged rows are left out, as accepted; this is the first"
+                doubts.append(replace(found[0], kind="accepted", what=f"{what}: {found[0].what}", allowed=None))
+                found = []
             if values is None and not found:
                 found = [Problem("unreadable", "the table does not consist of numbers", source.file, row)]
             problems += found
@@ -86,7 +96,7 @@ def parse_block(source: Source, table: Layout, used: Sequence[int]) -> tuple[Flo
             filled += len(values)
     if problems:
         raise ReadError(problems)
-    return numbers[:, :filled], doubt
+    return numbers[:, :filled], doubts
 
 
 def parse_rows(rows: bytes, table: Layout, used: Sequence[int]) -> FloatArray | None:
@@ -145,6 +155,18 @@ def _same_cells_in_all_rows(rows: bytes, delimiter: str, n_cells: int) -> bool:
         ends = np.append(ends, codes.size)
     cuts = np.searchsorted(np.flatnonzero(codes == ord(delimiter)), ends)
     return bool(np.all(np.diff(cuts, prepend=0) == n_cells - 1))
+
+
+def _whole_rows(text: str, table: Layout, used: Sequence[int]) -> tuple[FloatArray, int]:
+    """The rows that have all their cells and a number in each used one, and how many have not."""
+    rows = [cut(line, table.delimiter) for line in text.split("\n") if line.strip(BLANK)]
+    whole = [
+        row
+        for row in rows
+        if len(row) == table.n_cells and not any(_not_a_number(row[k], table.decimal) for k in used)
+    ]
+    numbers = [[float(row[k].replace(table.decimal, ".")) for k in used] for row in whole]
+    return np.array(numbers).reshape(len(whole), len(used)), len(rows) - len(whole)
 
 
 def _parse_slowly(text: str, table: Layout, used: Sequence[int]) -> FloatArray | None:

@@ -14,7 +14,16 @@ from tribo.errors import Problem, ReadError
 from tribo.input_files import OLD_EXCEL, ZIP, sheets_as_text
 from tribo.readers.binary_machines import BINARY_MACHINES
 from tribo.readers.checks import NO_TIME, Arrays, beyond_measurement, check_scale, check_time, complete
-from tribo.readers.columns import Column, Columns, Given, assign, match_column, parse_columns
+from tribo.readers.columns import (
+    ACCEPTABLE,
+    ROWS_LEFT_OUT,
+    Column,
+    Columns,
+    Given,
+    assign,
+    match_column,
+    parse_columns,
+)
 from tribo.readers.layout import Layout, cut, first_table, tables_one_below_the_other
 from tribo.readers.parsing import parse_block, refuse_ambiguous_marks
 from tribo.readers.source import HEAD_BYTES, Source, export_bytes, is_workbook_archive, open_text
@@ -98,18 +107,36 @@ def read_export(
     >>> trace.name, trace.source.family, trace.force_N.size, trace.source.columns["friction force"]
     ('T001', 'bluehill', 400, 'Load [N]')
     """
-    path = Path(path)
-    chosen = None if path.exists() else _CHOICE.fullmatch(path.name)
-    path = path if chosen is None else path.with_name(chosen[1])
+    path, chosen = split_choice(Path(path))
     file = str(path) if file is None else file
+    name = path.stem if name is None else name
     readings, _, _ = read_tables(path, parse_columns(columns, correction), file)
-    traces = _traces(readings, path.stem if name is None else name, file, split=chosen is not None)
-    number = 1 if chosen is None else int(chosen[2])
-    if number in range(1, len(traces) + 1) and (chosen is not None or len(traces) == 1):
-        return traces[number - 1]
-    shown = path.name
-    what = f"this export contains {len(traces)} traces"
-    allowed = f"one of {shown}#1 to {shown}#{len(traces)}; in a campaign also {shown}#* for all pulls"
+    if chosen is not None:
+        readings = [part for reading in readings for part in split_at_restarts(reading)]
+        name = f"{name}#{chosen}" if len(readings) > 1 else name
+    (trace,) = _traces([one_of(readings, chosen, file)], name, file, split=False)
+    return trace
+
+
+def split_choice(path: Path) -> tuple[Path, int | None]:
+    """(a.csv, 2) of a.csv#2 where no file is called so."""
+    chosen = None if path.exists() else _CHOICE.fullmatch(path.name)
+    return (path, None) if chosen is None else (path.with_name(chosen[1]), int(chosen[2]))
+
+
+def one_of(readings: Sequence[Reading], chosen: int | None, file: str) -> Reading:
+    """The reading of a number, or the only one.
+
+    Raises
+    ------
+    ReadError
+        several_tables.
+    """
+    number, file = chosen or 1, file.partition("#")[0]
+    if number in range(1, len(readings) + 1) and (chosen is not None or len(readings) == 1):
+        return readings[number - 1]
+    what = f"this export contains {len(readings)} traces"
+    allowed = f"one of {file}#1 to {file}#{len(readings)}; in a campaign also {file}#* for all pulls"
     raise ReadError(Problem("several_tables", what, file=file, allowed=allowed))
 
 
@@ -137,6 +164,10 @@ def _traces(readings: Sequence[Reading], name: str, file: str, *, split: bool) -
     if split:
         readings = [part for reading in readings for part in split_at_restarts(reading)]
     fatal = [problem for reading in readings for problem in reading.findings if problem.kind in FATAL]
+    if fatal and not split and (n := len(list(split_at_restarts(readings[0])))) > 1:
+        export = file.partition("#")[0]
+        choice = f"; it starts again: one of {export}#1 to {export}#{n}"
+        fatal = [replace(p, allowed=f"{p.allowed}{choice}") if p.kind == "time_goes_back" else p for p in fatal]
     if fatal:
         raise ReadError(fatal)
     names = [name] if len(readings) == 1 else [f"{name}#{k + 1}" for k in range(len(readings))]
@@ -282,11 +313,18 @@ def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -
     """
     given = given.with_hints(machine.hints(source, layout))
     passed_over: dict[int, str] = {}
+    empty_start: list[Problem] = []
     while True:
         ignored = (*given.ignored, *(f"#{index + 1}" for index in passed_over))
         read = _read_columns(machine, source, layout, replace(given, ignored=ignored))
         if isinstance(read, ReadError):
             unwanted = _without_numbers(read, source, layout, given)
+            if not unwanted and not empty_start and (later := _first_whole_row(read, source, layout)):
+                first, n = layout.header_rows + 1, later.header_rows - layout.header_rows
+                layout = later
+                what = f"{n} rows at the start lack a value and are left out; this is the first"
+                empty_start = [Problem("empty_start", what, source.file, first)]
+                continue
         else:
             columns, written, _, _ = read
             unwanted = _says_nothing(columns, written, layout, set(passed_over))
@@ -296,7 +334,7 @@ def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -
         passed_over |= unwanted
     if isinstance(read, ReadError):
         return read
-    columns, written, doubts, end = read
+    columns, written, doubts, left_out = read
     if not written.size:
         problem = Problem("header_only", "a header without data rows", source.file, layout.header_rows)
         return ReadError(problem)
@@ -321,18 +359,19 @@ def read_table(machine: Machine, source: Source, layout: Layout, given: Given) -
     load_varies = load is not None and bool(np.ptp(load) > 0.5 * np.abs(load).max())
     for quantity in ("displacement",) if load_varies else ("friction force", "displacement"):
         if quantity in arrays:  # but for a force under a load that varies: tenfold load gives tenfold friction
-            findings += check_scale(arrays[quantity], source.file, labels[quantity], row_of)
+            jumps = check_scale(arrays[quantity], source.file, labels[quantity], row_of)
+            findings += [replace(p, kind="accepted") if p.kind in given.accepted else _acceptable(p) for p in jumps]
     row = layout.units_row or layout.names_row
     findings += [replace(doubt, file=source.file, row=row) for doubt in doubts]
-    findings += [*completed, *([end] if end else [])]
+    findings += [*completed, *empty_start, *left_out]
     return Reading(source, machine, layout, columns, arrays, tuple(findings), passed_over=passed_over)
 
 
-Written = tuple[tuple[Column, ...], FloatArray, tuple[Problem, ...], Problem | None]
+Written = tuple[tuple[Column, ...], FloatArray, tuple[Problem, ...], list[Problem]]
 
 
 def _read_columns(machine: Machine, source: Source, layout: Layout, given: Given) -> Written | ReadError:
-    """The columns of a table, their numbers as written, doubts about the columns and one about the end."""
+    """The columns of a table, their numbers as written, doubts about the columns and about rows left out."""
     try:
         columns, doubts = assign(layout.names, layout.units, layout.filled, given)
     except ReadError as why:
@@ -341,10 +380,19 @@ def _read_columns(machine: Machine, source: Source, layout: Layout, given: Given
     try:
         if not given.decimal:
             refuse_ambiguous_marks(source, layout, used)
-        written, end = parse_block(source, layout, used)
+        written, left_out = parse_block(source, layout, used, given.accepted)
     except ReadError as why:
-        return why
-    return columns, written, doubts, end
+        return ReadError(map(_acceptable, why.problems))
+    return columns, written, doubts, left_out
+
+
+def _acceptable(problem: Problem) -> Problem:
+    """The damage of a table with the way to accept it, where there is one."""
+    if problem.kind not in ACCEPTABLE:
+        return problem
+    how = "leaves out rows without numbers" if problem.kind in ROWS_LEFT_OUT else "takes them as they are"
+    accept = f'accept = "{problem.kind}" in columns {how}'
+    return replace(problem, allowed=f"{problem.allowed}; {accept}" if problem.allowed else accept)
 
 
 def _says_nothing(
@@ -380,12 +428,27 @@ def _without_numbers(why: ReadError, source: Source, layout: Layout, given: Give
     return found
 
 
+def _first_whole_row(why: ReadError, source: Source, layout: Layout) -> Layout | None:
+    """The table from its first row on that has a number in every column used, where earlier ones lack one."""
+    if source.arrays or any(p.kind != "nan_gap" for p in why.problems):
+        return None
+    used = [layout.names.index(p.column) for p in why.problems if p.column in layout.names]
+    lines, _ = source.lines(layout.start, HEAD_BYTES)
+    for k, line in enumerate(lines):
+        cells = cut(line, layout.delimiter)
+        if used and all(index < len(cells) and any(map(str.isdigit, cells[index])) for index in used):
+            start = source.offset(layout.start, k)
+            return replace(layout, start=start, header_rows=layout.header_rows + k) if k else None
+    return None
+
+
 def _explained(why: ReadError, machine: Machine, source: Source, layout: Layout) -> list[Problem]:
     """The faults of the columns of a table with their place, and what to state in this case."""
     row = layout.units_row or layout.names_row
     problems = [replace(p, file=source.file, row=row) for p in why.problems]
     if layout.misfit:
-        problems.insert(0, Problem("names_do_not_fit", layout.misfit, source.file, layout.names_row))
+        allowed = 'columns by their position: time = "#1 [s]", friction_force = "#2 [N]" in columns'
+        problems.insert(0, Problem("names_do_not_fit", layout.misfit, source.file, layout.names_row, allowed=allowed))
     cells = [] if source.arrays else cut(source.lines(layout.start, HEAD_BYTES)[0][0], layout.delimiter)
     for k, problem in enumerate(problems):
         at = layout.names.index(problem.column) if problem.column in layout.names else len(cells)

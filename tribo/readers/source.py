@@ -153,7 +153,7 @@ def export_bytes(path: Path, file: str) -> bytes | mmap.mmap:
     ReadError
         missing, unreadable, not_a_file, too_large, bad_archive, encrypted, several_entries or unknown_entry.
     """
-    archive = None if path.exists() else next((p for p in path.parents if p.is_file()), None)
+    archive = archive_of(path)
     entry = "" if archive is None else path.relative_to(archive).as_posix()
     path = archive or path
     try:
@@ -173,6 +173,11 @@ def export_bytes(path: Path, file: str) -> bytes | mmap.mmap:
     if raw[:2] == _GZIP:
         raw = _unpacked("gz", partial(gzip.GzipFile, fileobj=_stream(raw)), file)
     return raw
+
+
+def archive_of(path: Path) -> Path | None:
+    """The file that a path goes on into, as in ``a.zip/b.csv``; None where the path is one of its own."""
+    return None if path.exists() else next((p for p in path.parents if p.is_file()), None)
 
 
 def entries_of(path: Path) -> tuple[str, ...]:
@@ -246,7 +251,7 @@ def _from_zip(raw: bytes | mmap.mmap, wanted: str, file: str) -> IO[bytes]:
     if wanted:
         raise ReadError(Problem("unknown_entry", "this .zip has no such entry", file=file, allowed=f"one of {listed}"))
     what = f"this .zip contains {len(names)} files"
-    allowed = f"one of them, given after the name of the .zip: {Path(file).name}/{names[0]}; here: {listed}"
+    allowed = f"one of them, given after the name of the .zip: {file}/{names[0]}; here: {listed}"
     raise ReadError(Problem("several_entries", what, file=file, allowed=allowed))
 
 

@@ -11,6 +11,7 @@ from tribo.errors import Problem, ReadError
 from tribo.readers.columns import Given, Hint, bare_unit, is_unit, match_column, split_unit
 from tribo.readers.layout import Layout, cut
 from tribo.readers.source import Source
+from tribo.units import QUANTITIES
 
 _NUMBER_BEHIND = re.compile(r"(?<=\w)[ ._#-]*\(?\d+\)?$")
 _NUMBER_BEFORE = re.compile(r"^(?:specimen|sample|probe|test|run|pull|s|p|n)?[ _#]*\d+[ _:.-]+(?=\w)", re.I)
@@ -147,7 +148,12 @@ def _by_patterns(layout: Layout, given: Given) -> list[Record]:
     fitting = {h: _fitting(h, layout, given) for h in given.hints if h.is_pattern}
     listed = ", ".join(name or f"#{k + 1}" for k, name in enumerate(layout.names))
     problems = [
-        Problem("missing_column", f"no column has a name that fits the pattern for the {h.quantity}", found=h.wanted)
+        Problem(
+            "missing_column",
+            f"no column has a name that fits the pattern for the {h.quantity}; every further column is "
+            f'{h.quantity.replace(" ", "_")} = "* [{QUANTITIES[h.quantity].si_unit}]"',
+            found=h.wanted,
+        )
         for h, columns in fitting.items()
         if not columns
     ]
@@ -157,7 +163,8 @@ def _by_patterns(layout: Layout, given: Given) -> list[Record]:
     if len(sizes) > 1:
         found = ", ".join(f"{h.quantity}: {len(columns)}" for h, columns in fitting.items())
         what = "the patterns in columns fit different numbers of columns"
-        raise ReadError(Problem("uneven_patterns", what, found=found, allowed="as many columns for each"))
+        allowed = "as many columns for each, or none for one of them"
+        raise ReadError(Problem("uneven_patterns", what, found=found, allowed=allowed))
     taken = {k for columns in fitting.values() for k in columns}
     shared = tuple(k for k in range(layout.n_cells) if k not in taken)
     records = []
