@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from tribo.errors import Problem
-from tribo.records import Study
+from tribo.figures.one_pull import pull_numbers
+from tribo.records import Phase, Study
 from tribo.report.pulls import trace_data, trace_picture
 from tribo.report.shell import script_json
+from tribo.report.tables import phases_table
 
 
 def unpacked(record: dict[str, object]) -> np.ndarray:
@@ -64,3 +66,18 @@ def test_no_name_can_end_the_script_element() -> None:
     text = script_json({"fig": [series]})
     assert "<" not in text
     assert json.loads(text)["fig"][0]["name"] == series["name"]
+
+
+def test_the_phases_of_a_pull_are_in_its_picture_its_figure_and_their_table(study: Study) -> None:
+    phases = (Phase("rest", 0.0, 1.0), Phase("steady sliding", 1.0, 9.0, 2e-3, 5.0, 0, 1.5, 0.01, "the drive moves"))
+    pulls = {**study.ingested.pulls, "T0001": replace(study.ingested.pulls["T0001"], phases=phases)}
+    changed = replace(study, ingested=replace(study.ingested, pulls=pulls))
+    record = json.loads(trace_data(changed, ["T0001"]))["T0001"]
+    assert record["phases"] == [["rest", 0.0, 1.0], ["steady sliding", 1.0, 9.0]]
+    marks = pull_numbers(study.ingested.traces["T0001"], pulls["T0001"])
+    assert marks[marks["mark"] == "phase: steady sliding"]["time_s"].tolist() == [1.0, 9.0]
+    table = phases_table(changed)
+    assert table is not None
+    row = table[(table["test_id"] == "T0001") & (table["phase"] == "steady sliding")].iloc[0]
+    assert (row["speed_mm_s"], row["normal_load_N"], row["force_N"], row["u_N"]) == (2.0, 5.0, 1.5, 0.01)
+    assert row["evidence"] == "the drive moves"

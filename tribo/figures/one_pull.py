@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -12,6 +13,8 @@ from tribo.comparison import study_lookup
 from tribo.figures import style
 from tribo.records import FloatArray, Pull, Study, Test, Trace
 
+_STRIP = 0.06  # share of the height of a panel that names the phases
+_LETTER = 0.012  # share of the width of a panel that a small letter takes
 PAGE_POINTS = 1200  # a page is 190 mm wide: more points along a line cannot be seen
 
 
@@ -115,14 +118,28 @@ def pull_numbers(trace: Trace, pull: Pull) -> pd.DataFrame:
     marks = [("trace", t, f) for t, f in zip(time, force, strict=True)]
     marks.append(("peak", pull.peak_s, pull.static_N))
     marks += [("window", t, pull.sliding_N) for t in pull.window_s]
+    marks += [(f"phase: {phase.name}", t, np.nan) for phase in pull.phases for t in (phase.start_s, phase.end_s)]
     frame = pd.DataFrame(marks, columns=["mark", "time_s", "force_N"])
     frame.insert(0, "test_id", pull.test_id)
     return frame
 
 
+def _draw_phases(ax: Axes, phases: pd.DataFrame) -> None:
+    """A strip along the foot of a panel: one field a phase, with its name where there is room for it."""
+    low, high = ax.get_xlim()
+    times = phases["time_s"].to_numpy().reshape(-1, 2)
+    for k, (name, (start, end)) in enumerate(zip(phases["mark"][::2], times, strict=True)):
+        shade = style.BLACK if k % 2 else style.BLUE
+        ax.axvspan(start, end, ymin=0.0, ymax=_STRIP, color=shade, alpha=0.2, lw=0)
+        text = name.removeprefix("phase: ")
+        if (end - start) / (high - low) > _LETTER * len(text):
+            ax.text(start + (end - start) / 2.0, _STRIP / 2.0, text, transform=ax.get_xaxis_transform(), ha="center",
+                    va="center", fontsize="xx-small")  # fmt: skip
+
+
 @style.in_house_style
 def draw_pull(numbers: pd.DataFrame) -> Figure:
-    """The trace with its readings."""
+    """The trace with its readings, and under it the phases of the record."""
     figure, (ax,) = style.panel_grid(1, 75)
     trace, peak, window = (numbers[numbers["mark"] == m] for m in ("trace", "peak", "window"))
     ax.plot(trace["time_s"], trace["force_N"], color=style.BLUE, lw=0.8, label="friction force, zero subtracted")
@@ -130,6 +147,7 @@ def draw_pull(numbers: pd.DataFrame) -> Figure:
     ax.plot(window["time_s"], window["force_N"], color=style.GREEN, lw=1.6, label="sliding window and mean")
     ax.plot(peak["time_s"], peak["force_N"], "v", color=style.VERMILLION, ms=6, label="static peak", clip_on=False)
     style.panel_title(ax, str(numbers["test_id"].iloc[0]))
+    _draw_phases(ax, numbers[numbers["mark"].str.startswith("phase: ")])
     ax.set_xlabel("Time (s)")
     ax.set_ylabel("Friction force T (N)")
     style.legend_below(figure, ax.get_legend_handles_labels()[0])

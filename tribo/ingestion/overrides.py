@@ -15,7 +15,8 @@ from tribo.errors import CampaignError, Problem, system_problem
 from tribo.files import LEADS_OUT, leads_out
 from tribo.ingestion.exports import options_of, read_row, stated_columns
 from tribo.input_files import hashes_of_reads
-from tribo.records import PHASES, Ingested, Override, Phase, Pull, SetAside, Trace
+from tribo.records import PHASES, Ingested, Override, Phase, SetAside, Trace
+from tribo.traces.evaluation import unread
 from tribo.user_text import did_you_mean
 
 TIMES = ("window_start_s", "window_end_s", "peak_s")
@@ -132,7 +133,7 @@ def read_overrides(path: Path, ingested: Ingested) -> tuple[Override, ...]:
         reason = row.cells.get("reason", "")
         made = found.get(test_id)
         if made is None:
-            automatic = ingested.pulls.get(test_id, Pull(test_id, ""))
+            automatic = ingested.pulls.get(test_id) or unread(test_id)
             window = (times["window_start_s"], times["window_end_s"]) if "window_start_s" in times else None
             kind: Literal["exclude", "move", "phase"] = (
                 "exclude" if action == "exclude" else "phase" if action == "phase" else "move"

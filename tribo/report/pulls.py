@@ -139,6 +139,7 @@ def trace_picture(trace: Trace, pull: Pull, points: int = 120) -> Markup:
 
 TRACE_BYTES = 2_000_000  # all traces together
 FULL_SCALE = 65535
+MOST_PHASES = 200  # drawn of one pull; all stand in phases.csv
 
 
 def trace_data(study: Study, test_ids: Iterable[str]) -> Markup:
@@ -151,6 +152,7 @@ def trace_data(study: Study, test_ids: Iterable[str]) -> Markup:
 def _pull_record(study: Study, test_id: str, points: int) -> dict[str, Any]:
     pull, trace, decided = reading(study, test_id)
     record = _trace_record(trace, pull, points) | _marks(pull)
+    record["phases"] = [[p.name, _short(p.start_s), _short(p.end_s)] for p in pull.phases[:MOST_PHASES]]
     doubts = doubted_s(trace, pull)
     if doubts:
         record["doubts"] = [[_short(time), "; ".join(what)] for time, what in doubts.items()]

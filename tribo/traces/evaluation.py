@@ -184,6 +184,11 @@ def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
     return pull
 
 
+def unread(test_id: str) -> Pull:
+    """The pull of a test from which no force could be read."""
+    return Pull(test_id, "")
+
+
 def _with_phases(options: PullOptions) -> PullOptions:
     """Options whose peak, window and zero are those of the phases stated by hand, unless they are given otherwise."""
     for phase in options.phases:

@@ -315,6 +315,14 @@
       const px = s.x(time);
       svg.append(make("path", { class: "doubt", d: `M${px - 5} ${s.top}h10l-5 9z` }, make("title", {}, `${number(time)} s: ${what}`)));
     }
+    for (const [k, [name, start, end]] of (current.record.phases || []).entries()) {
+      if (end <= view[0] || start >= view[1]) continue;
+      const left = inView(start), width = Math.max(inView(end) - left, 1);
+      const strip = make("rect", { class: `phase ${k % 2 ? "odd" : "even"}`, x: left, width, y: s.bottom - 9, height: 9 });
+      strip.append(make("title", {}, `${name}, ${number(start)} to ${number(end)} s`));
+      svg.append(strip);
+      if (width > 5.5 * name.length) svg.append(make("text", { class: "phase-name", x: left + 3, y: s.bottom - 2 }, name));
+    }
     const cross = make("line", { class: "cross", y1: s.top, y2: s.bottom, visibility: "hidden" });
     svg.append(cross);
     handle(svg, s, "start", "Start of the sliding window", now.start);
