@@ -57,3 +57,30 @@ def test_impulses_of_a_sample_are_no_sticks() -> None:
 def test_a_trace_without_cycles_has_none() -> None:
     time = np.arange(0.0, 20.0, 0.01)
     assert oscillation_of(time, 0.1 * time).cycles == 0
+
+
+def bursts(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """A steady force of 0.09 N at 2 kHz with bursts of five samples and 0.01 N, four hundred in twenty seconds."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(40000) / 2000
+    force = 0.09 + 2e-4 * rng.standard_normal(time.size)
+    for at in rng.integers(10, time.size - 10, 400):
+        force[at : at + 5] += 0.01 * rng.choice([-1.0, 1.0])
+    return time, force
+
+
+def test_a_force_that_returns_faster_than_the_spring_can_pull_is_no_slip() -> None:
+    """2254 N/m at 42 um/s give 0.095 N/s: a burst regains 0.01 N within 2.5 ms, forty times as fast."""
+    time, force = bursts(1)
+    assert oscillation_of(time, force).cycles > 100
+    found = oscillation_of(time, force, drive_N_per_s=2254 * 42e-6)
+    assert found.regime == "steady"
+    assert found.cycles <= 3  # where bursts happen to lie far apart
+
+
+def test_slips_of_a_spring_are_counted_beside_faster_noise() -> None:
+    time, force = bursts(2)
+    saw = 0.04 * ((time / 0.5) % 1.0)  # 0.08 N/s
+    found = oscillation_of(time, force + saw, drive_N_per_s=0.08)
+    assert found.cycles == pytest.approx(40, rel=0.1)
+    assert found.drop_N == pytest.approx(0.04, rel=0.15)

@@ -22,6 +22,9 @@ _STICKS = 0.66  # share of a cycle in which the force rises, from which on the s
 _FELT = 0.03  # share of the mean force below which a swing leaves the sliding steady
 _IRREGULAR = 1.2  # spread of the cycle times over their mean above which they are irregular
 _OF_LOADING = 0.5  # share of the loading slope above which the slider counts as stuck
+_MOST_REGAINED = 2.0  # times k v by which a force rises at the most: a slider swings back no faster than it is pulled
+_POSSIBLE = 0.9  # share of the cycles that the drive must be able to supply
+_MOST_TRIES, _NEXT_TRY = 12, 1.5  # falls that count are made larger by this factor until it can
 _MEDIAN_U = 1.2533  # standard uncertainty of a median over that of a mean, normal distribution
 _MAD = 1.4826
 _REPEATS = 0.4  # largest spread of the cycle times over their mean of an oscillation that repeats
@@ -50,21 +53,25 @@ def oscillation_of(
     # impulses of one or two samples are taken out by a median, which leaves slips as they are
     calm = np.asarray(median_filter(force_N, _MEDIAN_SAMPLES, mode="nearest"), float)
     least = _smallest_drop(calm) if smallest_drop_N is None else smallest_drop_N
-    time, force = time_s, calm
-    peaks, troughs = turning_points(force, least)
-    if peaks.size > _FEWEST:
-        factor = int(np.median(np.diff(peaks))) // _PER_CYCLE
-        if factor > 1:
-            time, force = condense(time, factor), condense(force, factor)
-            peaks, troughs = turning_points(force, least)
+    time, force, peaks = _cycles(time_s, calm, least)
+    noise = sample_noise(calm)
+    for _ in range(_MOST_TRIES):
+        supplied = _supplied(time, force, peaks, drive_N_per_s, noise)
+        if supplied.size == 0 or supplied.mean() >= _POSSIBLE:
+            break
+        least *= _NEXT_TRY  # noise was counted
+        time, force, peaks = _cycles(time_s, calm, least)
+    supplied = _supplied(time, force, peaks, drive_N_per_s, noise)
     if peaks.size <= _FEWEST:
         spread = _MAD * float(np.median(np.abs(force_N - np.median(force_N))))
         keeps_level = spread < max(5.0 * sample_noise(force_N), 0.1 * abs(float(np.median(force_N))))
-        return Oscillation("steady" if keeps_level else "irregular", int(max(peaks.size - 1, 0)))
-    troughs = np.array([a + int(np.argmin(force[a:b])) for a, b in pairwise(peaks)])
+        return Oscillation("steady" if keeps_level else "irregular", int(supplied.sum()))
+    troughs = _troughs(force, peaks)
     periods, spent = np.diff(time[peaks]), time[peaks[1:]] - time[troughs]
     loading, loading_u = _loading(time, force, troughs, peaks[1:], spent)
-    peak, trough, drop = (_median(v) for v in (force[peaks], force[troughs], force[peaks[:-1]] - force[troughs]))
+    peak, trough, drop = (
+        _median(v) for v in (force[peaks], force[troughs], (force[peaks[:-1]] - force[troughs])[supplied])
+    )
     fine = np.searchsorted(time_s, time[peaks])
     pace = uniform_filter1d(np.gradient(calm, time_s), max(3, int(np.median(np.diff(fine))) // _PER_CYCLE))
     stuck = np.array([(pace[a:b] > _OF_LOADING * loading).mean() for a, b in pairwise(fine)])
@@ -77,9 +84,35 @@ def oscillation_of(
         wave = regime == "inertial oscillation" and scatter > _REPEATS
         regime = "irregular" if wave or (regime == "stick-slip" and float(stuck.mean()) < _OF_TIME) else regime
     return Oscillation(
-        regime, int(periods.size), *peak, *trough, *drop, *period, loading, loading_u,
+        regime, int(supplied.sum()), *peak, *trough, *drop, *period, loading, loading_u,
         float(stuck.mean()), float(stuck.std(ddof=1) / stuck.size**0.5),
     )  # fmt: skip
+
+
+def _cycles(time_s: FloatArray, calm: FloatArray, least: float) -> tuple[FloatArray, FloatArray, np.ndarray]:
+    """Time and force, averaged to as many samples as a cycle needs, and the indices of the peaks in them."""
+    peaks, _ = turning_points(calm, least)
+    factor = int(np.median(np.diff(peaks))) // _PER_CYCLE if peaks.size > _FEWEST else 1
+    if factor <= 1:
+        return time_s, calm, peaks
+    time, force = condense(time_s, factor), condense(calm, factor)
+    return time, force, turning_points(force, least)[0]
+
+
+def _troughs(force: FloatArray, peaks: np.ndarray) -> np.ndarray:
+    return np.array([a + int(np.argmin(force[a:b])) for a, b in pairwise(peaks)], int)
+
+
+def _supplied(time: FloatArray, force: FloatArray, peaks: np.ndarray, drive_N_per_s: float, noise: float) -> np.ndarray:
+    """Which cycles regain no more force than the spring of the drive can give back; all where k v is not known.
+
+    The spring is stretched by the drive at k v, and by a slider that swings back about as fast again.
+    """
+    if peaks.size < 2 or not drive_N_per_s > 0:
+        return np.ones(max(peaks.size - 1, 0), bool)
+    troughs = _troughs(force, peaks)
+    regained, spent = force[peaks[1:]] - force[troughs], time[peaks[1:]] - time[troughs]
+    return np.asarray(regained < _MOST_REGAINED * drive_N_per_s * spent + 3.0 * noise)
 
 
 def _smallest_drop(force: FloatArray) -> float:
