@@ -47,6 +47,7 @@ QUANTITIES: dict[str, Quantity] = {
             reibungskraft, force de frottement, load, force, standard force, standardkraft, prufkraft, kraft,
             force standard, fx, ff, ft, f, load cell, axial force, traction force 1, effort, last, tangential load,
             tangentialkraft, force tangentielle, horizontal force, pull force, pulling force, tensile force,
+            frictional force, friction load, frictional load, fr, f r, f t, f x,
             sled force, fuerza de friccion, forza di attrito, fuerza, forza, forca, kracht, carga, force x, fx force,
             daq fx, tensile load, zugkraft, charge, sila tarcia, sila, sila styczna, kitkavoima, voima, friktionskraft,
             friktion, wrijvingskracht, treci sila, sila treni, surtunme kuvveti, kuvvet, forta de frecare, forta,
@@ -67,7 +68,8 @@ QUANTITIES: dict[str, Quantity] = {
         """),
         _quantity("normal force", "N", "N", "normal_force_N", """
             normal force, normal load, vertical force, normal force fz, ball load, pin load, contact force, normalkraft,
-            normal, contact load, specimen load, applied normal load, applied normal force, vertical load, down force,
+            f n, f z, normal, contact load, specimen load, applied normal load, applied normal force,
+            vertical load, down force,
             force normal, load normal, normalbelastung, normallast, anpresskraft, charge normale, effort normal,
             force normale, fz, fn, fz force, daq fz, nominal load, force z, carga normal, forza normale, fuerza normal,
             sila normalna, obciazenie normalne, sila nacisku, normaalivoima, normaalkracht, normalova sila,
@@ -75,7 +77,10 @@ QUANTITIES: dict[str, Quantity] = {
             正压力, 法向载荷, 垂直力, 垂直荷重, 法線力, 押付力, 수직하중, 수직력
         """),
         _quantity("friction coefficient", "mu", "", "friction_coefficient", """
-            cof, friction coefficient, coefficient of friction, traction coeff, daq cof, mu, reibwert,
+            cof, friction coefficient, coefficient of friction, friction coeff, coeff of friction, coef of friction,
+            friction coef, frictional coefficient, friction factor, coefficient friction, cof mean, mean cof, avg cof,
+            average cof, cof avg, cof average, dynamic cof, kinetic cof, mean friction coefficient,
+            traction coeff, daq cof, mu, reibwert,
             coefficient de frottement, reibungskoeffizient, reibzahl, reibungszahl, coefficiente di attrito,
             coeficiente de friccion, cof mu, wspolczynnik tarcia, kitkakerroin, friktionskoefficient,
             wrijvingscoefficient, koeficient treni, surtunme katsayisi, coeficient de frecare, coeficiente de atrito,
@@ -98,9 +103,10 @@ QUANTITIES: dict[str, Quantity] = {
         _quantity("speed", "v", "m/s", "speed_m_s", """
             sliding velocity, sliding speed, speed, velocity, geschwindigkeit, gleitgeschwindigkeit, vitesse,
             disc speed, disk speed, motor speed, drive speed, tachometer, tacho, linear speed, linear velocity,
-            vitesse de glissement, gleitgeschw, predkosc, predkosc poslizgu, velocidad, velocita, velocidade, snelheid,
+            vitesse de glissement, gleitgeschw, predkosc, predkosc poslizgu, predkosc liniowa, velocidad,
+            velocita, velocidade, snelheid,
             nopeus, hastighet, rychlost, hiz, viteza, скорость, скорость скольжения, 速度, 滑动速度, すべり速度,
-            摺動速度, 속도
+            摺動速度, 线速度, 속도
         """),
         _quantity("rotation speed", "n", "revolution/s", "rotation_rev_per_s", """
             rotation speed, rotational speed, rotary speed, spindle speed, rotational velocity, rotation rate,
@@ -278,6 +284,7 @@ _NUMBER_BELOW = re.compile(r"/\s*([\d.]+\s*[^\W\d_]+)")
 _LONGEST_NAME = 80  # characters; longer cells are no column names
 _WIDE = str.maketrans("（）［］【】：／，　･・", "()[][]:/, ··")
 _BARRED = str.maketrans({"ł": "l", "ø": "o", "đ": "d", "ß": "ss", "æ": "ae", "œ": "oe", "ı": "i"})
+_CAMEL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _CHANNEL = re.compile(r"^\s*(?:c|ch|channel|kanal)[ _]?\d+[ _]", re.I)
 
 
@@ -339,6 +346,8 @@ def _in_unit(value: float, text: str, quantity: str, target: str) -> float:
     if quantity == "rotation speed":
         text = _TURNS.get(text.lower(), text)
     ureg = _registry()
+    if quantity == "torque":
+        text = re.sub(r"(?<=[^\W\d_])[-.](?=[^\W\d_])", " ", text)  # N-m, in.lb
     name = _spelled_out(text, quantity)
     if re.fullmatch(r"\w+", name):
         return float(ureg.Quantity(value, name).to(target).magnitude)
@@ -351,7 +360,7 @@ def _in_unit(value: float, text: str, quantity: str, target: str) -> float:
 
 def _spelled_out(word: str, quantity: str) -> str:
     """A unit in pint's spelling; g and kg are forces where a force is meant."""
-    if "force" in quantity and word.lower() in _MASSES_AS_FORCES:
+    if ("force" in quantity or quantity == "torque") and word.lower() in _MASSES_AS_FORCES:
         return _MASSES_AS_FORCES[word.lower()]
     return _CASE_MATTERS.get(word) or _SPELLINGS.get(word.lower()) or word
 
@@ -361,7 +370,7 @@ def match_quantity(name: str) -> tuple[str, int] | None:
     """(quantity, rank of the alias) for a column name, or None where nothing fits."""
     if len(name) > _LONGEST_NAME:
         return None
-    return _RANKS.get(plain_name(name))
+    return _RANKS.get(plain_name(name)) or _RANKS.get(plain_name(_CAMEL.sub(" ", name)))
 
 
 _SHORT_NAMES = {"force": "friction force", "friction": "friction force", "load": "normal force"}

@@ -96,6 +96,44 @@ def test_the_normal_load_has_many_names_and_units(tmp_path: Path, name: str, new
     np.testing.assert_allclose(load_of(trace), newton * LOAD, rtol=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("header", "taken"),
+    [
+        ("Time (s);Friction coeff;Load (g)", {"friction coefficient": "Friction coeff", "normal force": "Load [g]"}),
+        ("Time [s];Mean COF;Peak COF;Load [N]", {"friction coefficient": "Mean COF", "normal force": "Load [N]"}),
+        ("Time (s);Frictional Force (N);COF;Load (N)", {"friction force": "Frictional Force [N]"}),
+        ("Time (s);Load (lbs);COF;Torque (in-lb)", {"torque": "Torque [in-lb]", "normal force": "Load [lbs]"}),
+        ("t (s);FR (N);FN (N);n (1/min)", {"friction force": "FR [N]", "rotation speed": "n [1/min]"}),
+        ("Time [s];LateralForce_mN;NormalForce_mN", {"friction force": "LateralForce [mN]"}),
+        ("Time(sec);Friction(kgf);Load(kgf);Revolution(rpm)", {"rotation speed": "Revolution [rpm]"}),
+        ("时间/s;摩擦系数;载荷/N;转速/(r/min)", {"rotation speed": "转速 [r/min]", "normal force": "载荷 [N]"}),
+    ],
+)
+def test_the_columns_of_other_rigs_are_known_by_their_names_and_units(
+    tmp_path: Path, header: str, taken: dict[str, str]
+) -> None:
+    columns = [MU * (1 + 0.1 * np.sin(k * TIME)) for k in range(header.count(";"))]
+    trace = read_export(saved(tmp_path, header, *columns, delimiter="\t"))
+    assert trace.source is not None
+    assert trace.source.columns.items() >= taken.items()
+
+
+def test_a_load_is_not_the_friction_force_beside_a_coefficient_of_an_unknown_name(tmp_path: Path) -> None:
+    with pytest.raises(ReadError, match="no column was recognised as the friction force"):
+        read_export(saved(tmp_path, "Time [s];COF of the left pin;Load [N]", MU, LOAD))
+
+
+def test_a_temperature_in_an_unknown_unit_costs_the_temperature_only(tmp_path: Path) -> None:
+    trace = read_export(saved(tmp_path, "Time [s];Friction [N];Temp (mV)", MU, LOAD))
+    assert trace.flags == ("unknown_unit",)
+    assert "temperature_C" not in trace.columns
+
+
+def test_a_torque_in_newton_minus_metre_is_one(tmp_path: Path) -> None:
+    path = saved(tmp_path, "Time [s];Friction Torque (N-m);Track Radius (mm)", MU, np.full(N, 20.0))
+    np.testing.assert_allclose(read_export(path).force_N, MU / 0.02, rtol=1e-4)
+
+
 @pytest.mark.parametrize("empty", ["", "NaN", "0"])
 def test_an_empty_load_column_is_passed_over_for_the_filled_one(tmp_path: Path, empty: str) -> None:
     path = saved(tmp_path, "Time [s];Ball Load (N);Pin Load (N);Friction [N]", np.full(N, np.nan), LOAD, MU)

@@ -28,7 +28,10 @@ _MEANS_NORMAL_BESIDE_FRICTION = {  # beside a friction force, a friction coeffic
     "하중",
 }  # fmt: skip
 _A_RATIO_BESIDE_STRESS = {"friction", "friktion", "frottement", "tarcie", "reibung"}  # without a unit
+_LOAD_AND_PATH = ("normal force", "displacement")  # what a test is about: an unknown unit of theirs is a fault
 _ONLY_WITH_UNIT = ("radius", "normal stress")  # of no use without one, and missed by nobody
+_A_RATIO = re.compile(r"\b(?:cof|coeff?|coefficient|koeffizient|coefficiente?)\b|friction factor|reibwert|reibzahl")
+_RPM = ("rpm", "RPM", "rev/min", "r/min", "1/min", "U/min", "tr/min", "obr/min", "об/мин", "转/分")
 _ACCELERATION = re.compile(r"m\s*/\s*s(?:ec)?\s*(?:\^?2|²)|m/s/s|m·?s(?:\^?-2|⁻²)")
 _BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*(?:\([^\[\]()]*\)[^\[\]()]*)?)\s*[\])]\s*$")
 _AFTER_MARK = re.compile(r"^(.*\S)\s*(?:\s?/|\sin\s|,\s|_)\s*((?:[^\W\d_]|[°%])[\w/°%^·²-]*)$")
@@ -56,7 +59,7 @@ def split_unit(name: str) -> tuple[str, str | None]:
     name = narrow(name)
     found = _BRACKETS.search(name)
     if found:
-        return name[: found.start()].strip(), found.group(1).strip()
+        return name[: found.start()].strip().removesuffix("/").strip(), found.group(1).strip()
     found = _AFTER_MARK.match(name)
     hit = match_quantity(found.group(1)) if found and match_quantity(name) is None else None
     if found and hit and (is_unit(found.group(2), hit[0]) or (hit[0] == "speed" and turns_a_time(found.group(2)))):
@@ -228,9 +231,10 @@ def assign(
         "friction force": force_follows(there, given.correction),
     }
     missing = [q for q in NEEDED if q not in there and not follows[q]]
-    if "friction force" in missing and force_follows({*there, *chosen}, given.correction):  # but for a missing unit
+    if "friction force" in missing and doubts:  # it may follow from a column whose unit is missing or unknown
         faults, doubts = [*faults, *doubts], []
-        missing.remove("friction force")
+        if force_follows({*there, *chosen}, given.correction):
+            missing.remove("friction force")
     refused = {h.quantity for h in given.hints} - set(chosen)
     if absent and (missing or faults or problems):
         problems += absent
@@ -296,7 +300,9 @@ def _columns(
             ]
             replaced = quantity == "time" and correction.sampling_rate_Hz is not None
             optional = quantity not in NEEDED or replaced
-            left_out = optional and all(p.kind in ("missing_unit", "ambiguous_unit") for p in found)
+            may_be_wrong = quantity not in _LOAD_AND_PATH and reason.startswith("named")
+            doubtful = ("missing_unit", "ambiguous_unit", *(("unknown_unit",) if may_be_wrong else ()))
+            left_out = optional and all(p.kind in doubtful for p in found)
             (doubts if left_out else faults).extend(found)
     return columns, doubts, faults
 
@@ -315,10 +321,14 @@ def _matches(
         if name and index not in taken and filled[index] and (hit := match_column(name))
     }
     there = asked | {quantity for quantity, _ in hits.values()}
+    for index in {*range(len(names))} - taken - set(hits):
+        if filled[index] and names[index] and _unit_of(names, units, index) in _RPM:
+            hits[index] = ("rotation speed", len(QUANTITIES["rotation speed"].aliases))
     loads = [index for index in hits if split_unit(names[index])[0].strip().lower() in _MEANS_NORMAL_BESIDE_FRICTION]
     friction = [(rank, index) for index, (quantity, rank) in hits.items() if quantity == "friction force"]
     of_another = "friction force" in asked or bool(friction and min(friction)[1] not in loads)
-    if not of_another and not there & {"friction coefficient", "torque"}:
+    ratio = there & {"friction coefficient", "torque"} or any(map(_A_RATIO.search, map(plain_name, names)))
+    if not of_another and not ratio:
         loads = [index for _, index in sorted(friction)[1:] if index in loads]
     for index in loads:  # a load beside what friction is read from is the normal one; it comes after those named so
         if hits[index][0] == "friction force":
@@ -347,7 +357,7 @@ def _by_its_unit(
 
 def _unit_of(names: Sequence[str], units: Sequence[str], index: int) -> str:
     """The unit of a column as the file has it; a name such as "rpm" is its own."""
-    own = split_unit(names[index])[0]
+    own = split_unit(names[index])[0].strip()
     return bare_unit(units[index]) or split_unit(names[index])[1] or (own if turns_a_time(own) else "")
 
 
@@ -383,7 +393,7 @@ def _column(
 
 def _missing(quantity: str, names: Sequence[str], there: set[str]) -> Problem:
     here = f"columns here: {_listed(names)}" if any(names) else f"{len(names)} columns without names"
-    example = '"NAME [unit]"' if any(names) else '"#2 [unit]"'
+    example = '"NAME [unit]"' if any(names) else f'"#{1 if quantity == "time" else 2} [unit]"'
     what = f"no column was recognised as the {quantity}"
     ways = [f"{quantity.replace(' ', '_')} = {example} in columns"]
     if quantity == "time":

@@ -142,7 +142,9 @@ def _without_a_number_alone(source: Source, table: Layout, end: int) -> int:
 
 
 def _label(table: Layout) -> str:
-    for key, value in reversed(table.metadata.items()):
+    lines = list(table.metadata.items())[::-1]
+    lines.sort(key=lambda item: not _LABEL.match(item[0]))  # those that begin with the word come first
+    for key, value in lines:
         if _LABEL.search(key) and not key.lower().startswith(("step type", "number of")):
             return f"{key} {value}".strip()
     return ""
