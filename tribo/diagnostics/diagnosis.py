@@ -50,7 +50,8 @@ class Diagnosis:
     """A verdict with what it rests on, for figures and tables.
 
     ``simulated`` is the extended model run in the simulator itself, where that was asked for and possible; ``laws`` is
-    the search for the laws of what the causes leave, where something was left.
+    the search for the laws of what the causes leave, where something was left. ``level`` is the chance of a misfit
+    where nothing is hidden at which the verdict was made.
     """
 
     verdict: Verdict
@@ -59,6 +60,7 @@ class Diagnosis:
     named: Named | None
     simulated: SimulatedExtension | None = None
     laws: Discovery | None = None
+    level: float = 0.01
 
     def without_columns(self) -> Diagnosis:
         """The same without the columns of the contrasts, which nothing needs once the verdict stands."""
@@ -116,8 +118,10 @@ def examine(
         return effects, screened, exclusions(observations.conditions, evidence, effects.absorbed)
 
     effects, screened, barred = screened_at(s)
+    still, offset = held_still(s, s.group > PATTERN)
+    if effects.model.score - (fit(still).score + offset) > FOR_A_CAUSE:
+        level *= BESIDE_DRIFT
     if screened.p.min() >= level:
-        still, offset = held_still(s, s.group > PATTERN)
         without = screened_at(still)
         if without[1].p.min() < level and _a_cause_instead(effects.model, without, offset, level):
             effects, screened, barred = without
@@ -129,9 +133,12 @@ def examine(
 
         named = name_causes(effects, screened, [e.mechanism for e in barred], level, screen_of)
     verdict = conclude(effects, screened, certain_evidence(evidence), barred, named, level, rng)
-    return Diagnosis(verdict, effects.model, screened, named)
+    return Diagnosis(verdict, effects.model, screened, named, level=level)
 
 
+# Share of the level of a misfit that remains where days and drift are certain: their shapes are those of the model in
+# part only, and what they leave looks like a cause.
+BESIDE_DRIFT = 0.1
 # Log likelihood, odds of 100 to 1, by which a mechanism alone has to explain a campaign better than days and drift do,
 # where either would do.
 FOR_A_CAUSE = 4.6

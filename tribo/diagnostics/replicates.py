@@ -33,11 +33,13 @@ ITERATIONS = 4
 # The noise of every replicate: of the repeats (r, 2, 2), what they depend on, (r, k), and of the random effects (r, 11)
 RandomSizes = tuple[FloatArray, FloatArray, FloatArray]
 # Of the logarithms of the sizes of all groups: what a contrast explains of the patterns makes their error smaller, and
-# what it explains of a specimen, or of the course of the series, makes the spread of these smaller.
+# what it explains of a specimen, or of the course of the series, makes the spread of these smaller. The step OF_SEVERAL
+# is for what several specimens share, such as a lot: one specimen that differs belongs to their spread.
+OF_SEVERAL = 3
 SIZE_STEPS = np.zeros((6, len(SIZE_PRIORS)))
 SIZE_STEPS[1, PATTERN] = -0.7
 SIZE_STEPS[2, :PATTERN] = -0.7
-SIZE_STEPS[3, GAIN] = -1.0
+SIZE_STEPS[OF_SEVERAL, GAIN] = -1.0
 SIZE_STEPS[4, PATTERN + 1 :] = -0.7
 SIZE_STEPS[5, PATTERN + 1 :] = -2.0
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tribo.diagnostics.fit import ModelFit
 from tribo.diagnostics.model import EVERY, MOST_PAIRS, Acting, EffectCourse, added, start_changes
 from tribo.diagnostics.normal_equations import ROUNDING, BlockCholesky, Sides, block_cholesky
-from tribo.diagnostics.replicates import SIZE_STEPS, Replicates, as_measured
+from tribo.diagnostics.replicates import OF_SEVERAL, SIZE_STEPS, Replicates, as_measured
 from tribo.display import displayed
 from tribo.records import FloatArray
 
@@ -190,6 +190,8 @@ def scores(fitted: Replicates, terms: Terms, steps: int = len(SIZE_STEPS)) -> tu
         chi2, coefficients = _scores_at(terms, products, roots)
         evidence.append(likelihood)
         chi2 = chi2 + 2.0 * likelihood[:, None]
+        if k == OF_SEVERAL:
+            chi2[:, np.setdiff1d(np.arange(chi2.shape[1]), terms.shared_at)] = -np.inf
         best, first = (chi2, coefficients) if k == 0 else (np.maximum(best, chi2), first)
     return np.maximum(best - 2.0 * np.max(evidence, axis=0)[:, None], 0.0), first
 
