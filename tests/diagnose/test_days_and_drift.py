@@ -59,6 +59,11 @@ def test_what_moves_is_told_with_its_size_and_is_no_cause(name: str, course: Cou
     assert all(layer.effect_percent == pytest.approx(100 * SIZE, rel=0.4) for layer in layers)
 
 
+def test_the_level_is_a_tenth_only_beside_certain_days_and_drift() -> None:
+    assert diagnosed(3, drift).share_of_level == 0.1
+    assert diagnosed(3, None).share_of_level == 1.0
+
+
 def test_the_finding_tells_the_drift() -> None:
     assert "The series drifts by 6 % (root mean square; " in worded(diagnosed(3, drift).verdict).sentence
 

@@ -260,11 +260,12 @@ def conclude(
     certain: Mapping[str, tuple[Evidence, float]],
     barred: Sequence[Excluded],
     named: Named | None,
-    level: float,
+    levels: tuple[float, float],
     rng: np.random.Generator,
 ) -> Verdict:
-    """The verdict at a ``level``; ``certain`` is the evidence of the traces with its p values, ``barred`` what was not
-    weighed, and ``rng`` draws the resamples behind the error of the gain."""
+    """The verdict at the ``levels`` of a misfit and of days and drift; ``certain`` is the evidence of the traces with
+    its p values, ``barred`` what was not weighed, and ``rng`` draws the resamples behind the error of the gain."""
+    level, of_nuisance = levels
     baseline = effects.model
     o = baseline.setup.observations
     model = named.model if named is not None else baseline
@@ -293,7 +294,7 @@ def conclude(
         left = remain + misfits_of(named.left, level, model.residual, o.conditions, o.flat)
         misfits = [*left, *misfits] if named.causes and not patterns_apart(misfits) else [*misfits, *left]
         layers = [*patterns, *cause_layers(named, shown, screened, baseline, rng), *remainder_layers(remain)]
-    layers = [*layers, *nuisance_layers(model, level)]
+    layers = [*layers, *nuisance_layers(model, of_nuisance)]
     if excess is not None:
         misfits = [*misfits_of_patterns(patterns, level), *misfits]
     excluded = exclusions_beside(causes, barred, named.weighed if named is not None else ())

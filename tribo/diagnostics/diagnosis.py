@@ -5,6 +5,7 @@ A :class:`Diagnosis` holds the verdict with everything that it rests on, for fig
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -50,8 +51,8 @@ class Diagnosis:
     """A verdict with what it rests on, for figures and tables.
 
     ``simulated`` is the extended model run in the simulator itself, where that was asked for and possible; ``laws`` is
-    the search for the laws of what the causes leave, where something was left. ``level`` is the chance of a misfit
-    where nothing is hidden at which the verdict was made.
+    the search for the laws of what the causes leave, where something was left. ``share_of_level`` is
+    that of the level of a misfit at which the verdict was made: less than one where days and drift are certain.
     """
 
     verdict: Verdict
@@ -60,7 +61,7 @@ class Diagnosis:
     named: Named | None
     simulated: SimulatedExtension | None = None
     laws: Discovery | None = None
-    level: float = 0.01
+    share_of_level: float = 1.0
 
     def without_columns(self) -> Diagnosis:
         """The same without the columns of the contrasts, which nothing needs once the verdict stands."""
@@ -119,8 +120,8 @@ def examine(
 
     effects, screened, barred = screened_at(s)
     still, offset = held_still(s, s.group > PATTERN)
-    if effects.model.score - (fit(still).score + offset) > FOR_A_CAUSE:
-        level *= BESIDE_DRIFT
+    share = BESIDE_DRIFT if effects.model.score - (fit(still).score + offset) > FOR_A_CAUSE else 1.0
+    level, of_nuisance = share * level, level
     if screened.p.min() >= level:
         without = screened_at(still)
         if without[1].p.min() < level and _a_cause_instead(effects.model, without, offset, level):
@@ -132,8 +133,8 @@ def examine(
             return screen_left(model, replicates=replicates[1], rng=rng, progress=progress)
 
         named = name_causes(effects, screened, [e.mechanism for e in barred], level, screen_of)
-    verdict = conclude(effects, screened, certain_evidence(evidence), barred, named, level, rng)
-    return Diagnosis(verdict, effects.model, screened, named, level=level)
+    verdict = conclude(effects, screened, certain_evidence(evidence), barred, named, (level, of_nuisance), rng)
+    return Diagnosis(verdict, effects.model, screened, named, share_of_level=share)
 
 
 # Share of the level of a misfit that remains where days and drift are certain: their shapes are those of the model in
@@ -157,7 +158,7 @@ def _a_cause_instead(
     if best is None:
         return False
     by_drift = moving.score - (effects.model.score + offset)
-    if best.gain - by_drift <= min(FOR_A_CAUSE, max(by_drift, 0.0)):
+    if best.gain - by_drift <= min(-math.log(level), max(by_drift, 0.0)):
         return False
     session = session_of(moving.setup.observations.conditions)
     change = effect_of(best.fit.setup, best.fit.law, best.acting, best.values)

@@ -53,7 +53,7 @@ def with_laws(
     if answers:
         d = replace(d, verdict=replace(d.verdict, shows=replace(d.verdict.shows, known=answers)))
     settled = {name for law, told in answers if told.answer == "held" for name in law.law.columns}
-    level = min(level, d.level)
+    level, of_nuisance = d.share_of_level * level, level
     found = discover_laws(with_known, level=LEVEL_OF_LAWS * level, rng=rng, progress=progress, without=settled)
     found = replace(found, of_causes=forms)
     if not found.laws and not held:
@@ -71,7 +71,7 @@ def with_laws(
     layers = (
         *pattern_corrections(model), *(x for x in verdict.layers if x.kind == "cause"), *held, *law_layers(found),
         *(x for x in verdict.layers if x.kind == "remainder" and x.name in open_columns),
-        *nuisance_layers(model, level),
+        *nuisance_layers(model, of_nuisance),
     )  # fmt: skip
     next_test = verdict.next_test
     ties = [(law.law, law.ties[0]) for law in found.laws if law.ties]
@@ -95,7 +95,7 @@ def searched_laws(d: Diagnosis, *, seed: int = 0, level: float = 0.01, progress:
     ``level`` is that of a misfit; a law has to be beyond chance at LEVEL_OF_LAWS times it.
     """
     model, _, forms = without_refuted_causes(explained(d))
-    strict = LEVEL_OF_LAWS * min(level, d.level)
+    strict = LEVEL_OF_LAWS * d.share_of_level * level
     found = discover_laws(model, level=strict, rng=np.random.default_rng(seed), progress=progress)
     return replace(found, of_causes=forms)
 
