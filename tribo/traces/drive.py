@@ -27,8 +27,10 @@ FEWEST_AT_REST = 5
 _AT_REST = 0.05  # share of the lowest level of the speed below which the drive stands still
 _BINS = 10  # of the speed in a decade, where its levels are looked for
 _OCCUPIED = 0.01  # share of the samples in one bin from which on a speed is a level and not passed through
-_CALM = 0.02  # share of the usual speed up to which its noise is left as it is
-_ABOVE_NOISE = 3.0  # a speed of this many times its noise at rest is motion
+_CALM = 0.01  # share of the usual speed up to which its noise is left as it is
+_MOST_CALMED = 9  # samples over which a channel with little noise is averaged at the most
+_TURNED = 0.1  # share of the usual speed from which on a speed of the other sign is motion the other way
+_ABOVE_NOISE = 4.0  # a speed of this many times its noise at rest is motion
 _ONE_WAY = 0.5  # net over total displacement from which on a displacement channel shows the travel
 _MOVES = 20.0  # a displacement that moves spans this many times its noise
 _OF_STROKE = 0.3  # share of its span by which a position goes back where the drive turns round
@@ -47,13 +49,15 @@ _SHORTEST = 0.02  # share of a motion that a level lasts at the least
 class Drive:
     """The motion of the drive: ``pace`` (n,) in the unit of its ``channel`` per second, signed where that tells.
 
-    ``moving`` (n,) says where it moves; ``turns`` are the samples at which it changes its direction.
+    ``moving`` (n,) says where it moves; ``turns`` are the samples at which it changes its direction. The pace is a mean
+    over ``width`` samples.
     """
 
     pace: FloatArray
     moving: Mask
     channel: str
     turns: tuple[int, ...] = ()
+    width: int = 1
 
 
 def drive_of(trace: Trace) -> Drive | None:
@@ -75,18 +79,26 @@ def _by_speed(speed: FloatArray, channel: str) -> Drive:
     noise = min(sample_noise(block) for block in blocks) if speed.size >= 3 * len(blocks) else 0.0
     usual = sample_noise(speed)
     width = 1
-    if usual > _CALM * top:  # a noisy tachometer: the mean over so many samples is as calm as that
-        width = int(min((usual / (_CALM * top)) ** 2, max(speed.size // 50, 1))) | 1
+    if usual > 0:  # a noisy tachometer: the mean over so many samples is calm
+        calms = (usual / (_CALM * top)) ** 2
+        width = int(min(max(calms, min(speed.size // 400, _MOST_CALMED)), max(speed.size // 50, 1))) | 1
     pace = running_mean(calm, width)
     least = _slowest(np.abs(pace), top)
-    least = max(least, min(_ABOVE_NOISE * noise, 0.5 * top)) if width > 1 else least
+    least = max(least, min(_ABOVE_NOISE * noise / math.sqrt(width), 0.5 * top))
     moving = np.abs(pace) > least
+    for a, b in zip(*runs_of(moving), strict=True):  # what noise lifts above the least speed for a moment
+        if b - a < FEWEST_AT_REST and np.abs(pace[a:b]).max() < _ABOVE_NOISE * least:
+            moving[a:b] = False
+    for a, b in zip(*runs_of(~moving), strict=True):  # the mean passes zero where the drive turns round
+        if 0 < a < b < moving.size and b - a <= max(width // 4, 1) < width:
+            moving[a:b] = True
     if width > 1:
         moving = _narrowed(moving, int(width // 2 * (1.0 - 2.0 * min(least / top, 0.5))))
-    side = np.sign(pace) * moving
+    side = np.sign(pace) * (np.abs(pace) > max(least, _TURNED * top))
     decided = np.flatnonzero(side)
     turned = np.flatnonzero(np.diff(side[decided]))
-    return Drive(pace, moving, channel, tuple(int(decided[k + 1]) for k in turned))
+    turns = tuple(int(decided[k] + decided[k + 1] + 1) // 2 for k in turned)
+    return Drive(pace, moving, channel, turns, width)
 
 
 def at_rest_below(speed: FloatArray) -> float:
@@ -129,7 +141,9 @@ def _one_way(time_s: FloatArray, x: FloatArray) -> Drive | None:
         return None
     pace = _pace(time_s, smooth, width)
     moving = np.abs(pace) > _AT_REST * float(np.percentile(np.abs(pace), 75))
-    return Drive(pace, _narrowed(moving, width - 1), "displacement")  # motion is felt so many samples around it
+    return Drive(
+        pace, _narrowed(moving, width - 1), "displacement", (), 2 * width
+    )  # motion is felt so many samples around it
 
 
 def _pace(time_s: FloatArray, x: FloatArray, width: int) -> FloatArray:
@@ -159,7 +173,7 @@ def _to_and_fro(time_s: FloatArray, x: FloatArray) -> Drive | None:
         before, after = np.flatnonzero(moving[:end]), np.flatnonzero(moving[end:])
         if before.size and after.size:
             turns.append((int(before[-1]) + 1 + end + int(after[0])) // 2)
-    return Drive(pace, side != 0, "position", tuple(turns))
+    return Drive(pace, side != 0, "position", tuple(turns), 2 * width)
 
 
 def speed_level_m_s(trace: Trace) -> float:

@@ -36,6 +36,7 @@ from tribo.traces.signal import (
     noise_of,
     running_mean,
     runs_of,
+    sample_noise,
     signal_of,
     turning_points,
     wander,
@@ -62,7 +63,8 @@ _QUARTER, _THREE_QUARTERS = 0.25, 0.75  # share of its climb
 _CLIMBS = 4.0  # times its noise by which a force climbs that begins at rest
 _NEAR = 0.1  # share of its swing below the lowest later force from which on a record begins at rest
 _FELT = 12.0  # a friction force is at least this many times the noise
-_LOADED = 0.95  # share of its first level that a load has reached
+_NONE = 0.01  # share of the swing of a load up to which there is none
+_LOADED = 0.99  # share of its level that a load has reached, or less by its noise
 _AT_BEGINNING = 0.1  # share of a record up to which sliding that is stated begins with the record
 _WAITS = 0.1  # share of a stroke for which a drive stands still at its end that does more than turn
 _LEFT = 0.2  # share of the way to the other level from which on a force has left the old one
@@ -169,13 +171,22 @@ def _contact(load: FloatArray | None, samples: int) -> Range:
     load = median_of_three(load if abs(high) >= abs(low) else -load)
     before, high = float(np.median(load[:first])), float(np.percentile(load, 95))
     swing = high - before
-    if before > _UNLOADED * high or float(np.ptp(np.percentile(load[:first], (5.0, 95.0)))) > _LEVEL * swing:
+    if (
+        swing <= 0
+        or before > _UNLOADED * high
+        or float(np.ptp(np.percentile(load[:first], (5.0, 95.0)))) > _LEVEL * swing
+    ):
         return whole
-    touching = np.flatnonzero(running_mean(load, FEWEST_AT_REST) > before + _LEVEL * swing)
+    height = (running_mean(load, FEWEST_AT_REST) - before) / swing
+    touching = np.flatnonzero(height > _LEVEL)
     if touching.size == 0:
         return whole
-    end = int(touching[-1]) + 1
-    return int(touching[0]), end if samples - end >= FEWEST_AT_REST else samples
+    none = max(3.0 * sample_noise(load) / swing, _NONE)
+    free = np.flatnonzero(height[: touching[0]] <= none)
+    begin, end = int(free[-1]) + FEWEST_AT_REST // 2 if free.size else int(touching[0]), int(touching[-1]) + 1
+    free = np.flatnonzero(height[end:] <= none)
+    end += int(free[0]) - FEWEST_AT_REST // 2 + 1 if free.size else 0
+    return min(begin, int(touching[0]) + FEWEST_AT_REST // 2), end if samples - end >= FEWEST_AT_REST else samples
 
 
 def force_stops(signal: Signal, contact: Range, *, in_motion: bool) -> list[Range]:
@@ -341,14 +352,14 @@ def phases_of(
                 spans.append(_Span("hold", first, course.stops[k - 1][1], "the drive stands still"))
                 first = course.stops[k - 1][1]
             first, last = max(first, begin), min(last, end)
-            from_rest = k > 0 or not course.starts_sliding
-            start = _start_from_rest(signal, (first, last), starts_s) if from_rest and last > first else None
-            spans += _motion(trace, signal, drive, (first, last), start, k)
+            if last > first:
+                from_rest = k > 0 or not course.starts_sliding
+                spans += _motion(trace, signal, drive, (first, last), k, from_rest, starts_s)
     touching = course.contact[1]
-    if end < touching:
-        falls = end < course.end
-        name, evidence = ("unloading", "the load falls") if falls else ("end of the drive", "the drive stands still")
-        spans.append(_Span(name, end, touching, evidence))
+    falls = _falls_from(trace, course, max(end, begin))
+    if end < falls:
+        spans.append(_Span("end of the drive", end, falls, "the drive stands still"))
+    spans.append(_Span("unloading", falls, touching, "the load falls"))
     if touching < samples:
         spans.append(_Span("lift-off", touching, samples, "the load has fallen back"))
     for phase in stated:
@@ -366,19 +377,35 @@ def _without(spans: Sequence[_Span], first: int, last: int) -> Iterator[_Span]:
 
 
 def _under_load(trace: Trace, course: Course) -> Range:
-    """The samples from which on the load has reached its first level, and up to which it keeps its last."""
+    """The samples from which on the load has reached its first level, and at which motion or the last level ends."""
     first, last = course.contact[0], course.end
     load = trace.columns.get("normal_force_N")
-    if load is None or not np.isfinite(load).all():
+    if load is None or not course.begins_before_contact or not np.isfinite(load).all():
         return first, last
     load = median_of_three(np.abs(load[first : course.contact[1]]))
     levels = levels_of(load)
-    if not levels or not course.begins_before_contact:
+    if not levels:
         return first, last
-    low = np.flatnonzero(load[: levels[0][0]] < _LOADED * levels[0][2])
-    begin, end = first + int(low[-1]) + 1 if low.size else first, first + levels[-1][1]
-    begin = begin if first + FEWEST_AT_REST < begin < last else first
-    return begin, (end if begin < end < last - FEWEST_AT_REST else last)
+    begin = first + int(np.argmax(load >= _reached(load, levels[0][2])))
+    begin = begin if first + FEWEST_AT_REST // 2 < begin < last else first
+    return begin, min(last, _falls_from(trace, course, begin))
+
+
+def _reached(load: FloatArray, level: float) -> float:
+    """The load from which on a level counts as reached."""
+    return min(_LOADED * level, level - 2.0 * sample_noise(load))
+
+
+def _falls_from(trace: Trace, course: Course, start: int) -> int:
+    """The sample after ``start`` from which the load falls to nothing; the end of contact where it does not fall."""
+    touching, load = course.contact[1], trace.columns.get("normal_force_N")
+    if load is None or touching == load.size or touching - start < 2 * FEWEST_AT_REST:
+        return touching
+    load = median_of_three(np.abs(load[start:touching]))
+    level = float(np.median(load[load.size // 2 :]))
+    kept = np.flatnonzero(load >= _reached(load, level))
+    falls = start + int(kept[-1]) + 1 if kept.size else touching
+    return falls if touching - falls > FEWEST_AT_REST // 2 else touching
 
 
 @dataclass(frozen=True)
@@ -403,7 +430,8 @@ def _start_from_rest(
         for onset_s, peak_s in starts_s:
             if time[first] <= peak_s <= time[last - 1]:
                 return max(int(np.searchsorted(time, onset_s)), first), int(np.searchsorted(time, peak_s))
-        return None
+        if not any(peak_s > time[last - 1] for _, peak_s in starts_s):
+            return None
     part = slice(first, last)
     try:
         loading = loading_of(
@@ -456,10 +484,27 @@ def _between_strokes(found: Sequence[_Span], first: int, stroke: int, teller: st
 
 
 def _motion(
-    trace: Trace, signal: Signal, drive: Drive | None, span: Range, start: tuple[int, int] | None, number: int
+    trace: Trace,
+    signal: Signal,
+    drive: Drive | None,
+    span: Range,
+    number: int,
+    from_rest: bool,
+    starts_s: Sequence[tuple[float, float]] | None,
 ) -> Iterator[_Span]:
     """The phases of one motion of the drive, from its start to its stop."""
     first, last = span
+    cuts = []
+    channels = {"step of load": trace.columns.get("normal_force_N"), "step of speed": drive.pace if drive else None}
+    moving = first + int(np.argmax(drive.moving[first:last])) if drive is not None and last > first else first
+    for name, values in channels.items():
+        if values is not None and np.isfinite(values[moving:last]).all():
+            cuts += [(moving + a, moving + b, name) for a, b in level_cuts(np.abs(values[moving:last]))]
+            if name == "step of speed" and drive is not None:  # which its smoothing has drawn out
+                cuts[:] = [_drawn_in(cut, drive.width) if cut[2] == name else cut for cut in cuts]
+    cuts.sort()
+    cuts = [cut for k, cut in enumerate(cuts) if k == 0 or cut[0] >= cuts[k - 1][1]]
+    start = _start_from_rest(signal, (first, cuts[0][0] if cuts else last), starts_s) if from_rest else None
     if start is not None:
         onset, peak = start
         if number == 0:
@@ -468,18 +513,20 @@ def _motion(
         else:
             yield _Span("rise", first, peak, "the force climbs after the stop")
         first = peak
-    cuts = []
-    channels = {"step of load": trace.columns.get("normal_force_N"), "step of speed": drive.pace if drive else None}
-    for name, values in channels.items():
-        if values is not None and np.isfinite(values[first:last]).all():
-            cuts += [(first + a, first + b, name) for a, b in level_cuts(np.abs(values[first:last]))]
-    cuts.sort()
-    cuts = [cut for k, cut in enumerate(cuts) if k == 0 or cut[0] >= cuts[k - 1][1]]
     begin, evidence = first, "the force after the peak" if start else "the drive moves"
     for k, (a, b, name) in enumerate([*cuts, (last, last, "")]):
         yield from _slide(signal, begin, a, evidence, after_peak=k == 0 and start is not None)
         yield _Span(name, a, b, "the load" if name == "step of load" else "the speed")
         begin, evidence = b, f"after the {name}"
+
+
+def _drawn_in(cut: tuple[int, int, str], width: int) -> tuple[int, int, str]:
+    """A passage from one level to the next without what a mean over so many samples adds to it."""
+    first, last, name = cut
+    if last - first > 1.5 * width:
+        return cut  # the mean of a ramp is a ramp
+    middle = (first + last) // 2
+    return middle, middle + 1, name
 
 
 def _reversal(signal: Signal, span: Range, at: int) -> Range:
