@@ -13,7 +13,7 @@ import pytest
 from tribo import read_pull
 from tribo.readers import read_blocks
 from tribo.records import Pull, Test, Trace
-from tribo.traces import PullOptions, evaluate, phases_of, pieces_of
+from tribo.traces import PullOptions, evaluate, phases_of, pieces_of, split_pulls
 from tribo.traces.drive import level_cuts, quiet_end, speed_level_m_s
 
 REAL = Path(__file__).resolve().parents[3] / "shared" / "real"
@@ -178,3 +178,43 @@ def test_the_velocity_step_in_gouge_is_where_the_displacement_bends() -> None:
     (trace,) = real("velocity-step-gouge", "*.txt", **stated)
     ((start, end),) = of_phase(trace, "step of speed")
     assert 21300 < start < end < 21330
+
+
+def test_a_force_that_climbs_over_metres_of_sliding_has_no_static_peak() -> None:
+    """Running-in from 10 to 27 N within 200 s at 0.15 m/s: thirty metres before the first maximum."""
+    time = np.arange(0, 1800, 0.5)
+    force = np.where(time < 10, 0.0, 27.0 - 17.0 * np.exp(-(time - 10) / 60)) * np.minimum(np.maximum(time - 10, 0), 1)
+    speed = np.where(time < 10, 0.0, 0.15)
+    pull = read_pull(Trace("pin", time, force + noise(time.size, 0, 0.1), columns={"speed_m_s": speed}), test=TEST)
+    assert math.isnan(pull.static_N)
+    assert pull.sliding_N == pytest.approx(27.0, abs=0.1)
+
+
+def test_two_speeds_of_one_displacement_are_two_pieces_and_a_little_faster_is_one() -> None:
+    time = np.arange(4000) / 10
+    for ratio, pieces in ((3.0, 2), (1.2, 1)):
+        x = np.where(time < 200, 1e-6 * time, 2e-4 + ratio * 1e-6 * (time - 200)) + noise(4000, 0, 1e-7)
+        assert len(split_pulls(Trace("gouge", time, 10.0 + noise(4000), displacement_m=x))) == pieces
+
+
+def test_noise_of_a_tachometer_at_rest_is_no_stroke() -> None:
+    moving = (np.arange(3600) > 150) & (np.arange(3600) < 3170)
+    speed = np.where(moving, 3e-4, 0.0) + noise(3600, 6, 7e-6)
+    trace = Trace("tacho", np.arange(3600) / 50, np.where(moving, 0.6, 0.0) + noise(3600), columns={"speed_m_s": speed})
+    names = [p.name for p in phases_of(trace)]
+    assert "stroke" not in names
+    assert names[-1] == "end of the drive"
+
+
+def test_load_and_lift_off_are_placed_where_the_load_begins_to_rise_and_has_fallen() -> None:
+    time = np.arange(3000) / 50
+    load = np.interp(time, [0, 10, 13, 40, 42, 60], [0, 0, 5, 5, 0, 0]) + noise(3000, 0, 0.02)
+    speed = np.where(time < 38, 0.02, 0.0)
+    force = np.where(time < 38, 0.3 * load, 0.1 * load) + noise(3000, 1, 0.01)
+    trace = Trace("rig", time, force, columns={"normal_force_N": load, "speed_m_s": speed})
+    found = {p.name: (p.start_s, p.end_s) for p in phases_of(trace)}
+    assert found["approach"] == pytest.approx((0, 10), abs=0.15)
+    assert found["loading"] == pytest.approx((10, 13), abs=0.15)
+    assert found["end of the drive"] == pytest.approx((38, 40), abs=0.1)
+    assert found["unloading"] == pytest.approx((40, 42), abs=0.15)
+    assert found["lift-off"] == pytest.approx((42, 59.98), abs=0.15)

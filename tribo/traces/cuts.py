@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from tribo.records import FloatArray, Trace
-from tribo.traces.drive import at_rest_below, level_cuts
+from tribo.traces.drive import Mask, at_rest_below, drive_of, level_cuts
 from tribo.traces.signal import MINIMUM_SAMPLES, median_of_three, running_mean, runs_of, sample_noise, wander
 
 _AT_REST = 0.05  # share of the usual speed below which the drive stands still
@@ -18,6 +19,7 @@ _OF_SPAN = 0.2  # a step is at least this share of the span of its channel,
 _OF_LEVEL = 0.05  # this share of its level,
 _OF_NOISE = 6.0  # and this many times the noise of the difference
 _FRAGMENT = 0.2  # share of the median piece below which a piece is what a cut left over
+_CLEARLY_APART = 1.5  # ratio of two speeds that the slope of a displacement tells apart
 _MIDDLE = (0.3, 0.7)  # share of a stroke in which its force is taken to tell its direction and zero
 
 
@@ -39,6 +41,9 @@ def split_pulls(trace: Trace) -> tuple[Trace, ...]:
         moving = np.abs(speed)
         rest = min(_AT_REST * float(moving.max()), at_rest_below(moving))
         cuts += [(a, b) for a, b in find(moving) if moving[max(a - 1, 0)] > rest]
+    drive = drive_of(trace) if speed is None and not cuts else None
+    if drive is not None and drive.channel == "displacement":
+        cuts += _speeds_by_displacement(np.abs(drive.pace), drive.moving)
     if not cuts:
         return (trace,)
     stretches = [(a, b) for a, b in between(cuts, trace.time_s.size) if b - a >= MINIMUM_SAMPLES]
@@ -53,6 +58,15 @@ def _steps_or_levels(values: FloatArray) -> list[tuple[int, int]]:
     """The steps of a channel; those between its levels where it has more levels than large steps, as in a ladder."""
     large, every = steps(values), level_cuts(np.abs(values))
     return every if len(every) > len(large) else large
+
+
+def _speeds_by_displacement(pace: FloatArray, moving: Mask) -> list[tuple[int, int]]:
+    """The steps between two speeds that differ clearly, as the slope of a displacement is rough."""
+    cuts = [(a, b) for a, b in level_cuts(pace) if moving[max(a - 1, 0)] and moving[min(b, moving.size - 1)]]
+    ends = [0, *(k for cut in cuts for k in cut), pace.size]
+    levels = [float(np.median(pace[a:b])) for a, b in zip(ends[::2], ends[1::2], strict=True)]
+    apart = [max(one, other) > _CLEARLY_APART * min(one, other) for one, other in pairwise(levels)]
+    return [cut for cut, clear in zip(cuts, apart, strict=True) if clear]
 
 
 def piece_of(trace: Trace, start: int, end: int, name: str) -> Trace:

@@ -177,12 +177,16 @@ def _to_and_fro(time_s: FloatArray, x: FloatArray) -> Drive | None:
 
 
 def speed_level_m_s(trace: Trace) -> float:
-    """The level of the recorded speed while the drive moves, without its sign; NaN where none was recorded.
+    """The level of the recorded speed while the drive moves, without its sign, else that of a displacement one way.
 
-    Neither noise nor a few ticks of a coarse tachometer move it.
+    NaN where neither was recorded. Neither noise nor a few ticks of a coarse tachometer move it.
     """
     speed, drive = trace.columns.get("speed_m_s"), drive_of(trace)
-    if speed is None or drive is None or drive.channel != "speed" or not drive.moving.any():
+    if drive is None or not drive.moving.any():
+        return math.nan
+    if drive.channel == "displacement":
+        return abs(level_of(drive.pace[drive.moving]))
+    if speed is None or drive.channel != "speed":
         return math.nan
     return level_of(np.sign(drive.pace[drive.moving]) * speed[drive.moving])
 

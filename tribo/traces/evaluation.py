@@ -47,6 +47,7 @@ _WITH_LOAD = 0.6  # correlation of force and load from which on the force follow
 _SETTLED = 0.05  # share of its mean by which a force may change while it slides and still count as settled
 _LEAD_IN = 0.75  # share of a stop after which the piece that holds its restart begins
 _GAP = 3.0
+_LONGEST_STRETCH_M = 0.5  # the softest springs of sleds stretch by a tenth of a metre before the peak
 _STRETCH_M = 5e-3  # a sled, a pin or its spring gives way by less before it slides; a disc goes further in a second
 _NO_PEAK = {"stopped_before_peak", "sign_flipped", "spike"}  # problems of a piece that only slides
 _UNPULLED = 0.3  # share of its later force below which a piece begins with nothing pulled
@@ -134,8 +135,9 @@ def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
         without = () if "static_N" in forces else ("no_static",)
         return Pull(options.test.test_id, GIVEN, flags=("evaluated_elsewhere", *without), **forces)
     test = options.test or Test(trace.name, trace.file, "", math.nan, "")
-    if test.speed_m_s is None and math.isfinite(speed := speed_level_m_s(trace)):
-        test = replace(test, speed_m_s=speed)
+    if test.speed_m_s is None and "speed_m_s" in trace.columns:
+        speed = speed_level_m_s(trace)
+        test = replace(test, speed_m_s=speed if speed > 0 else None)
     options = _with_phases(replace(options, rule=rule.name, test=test))
     test = options.test or test
     zero, load_zero, load = options.zero, options.load_zero, trace.columns.get("normal_force_N")
@@ -336,15 +338,30 @@ def _first_motion(
 
 
 def _slid_unseen(trace: Trace, pull: Pull, test: Test | None) -> bool:
-    """Whether the drive went so far between two samples of a rise that no sample shows the bodies at rest."""
-    if "peak_between_samples" not in pull.flags:
-        return False
-    at, speed = int(np.searchsorted(trace.time_s, pull.peak_s)), trace.columns.get("speed_m_s")
-    before, after = max(at - 1, 0), min(at + 1, trace.time_s.size - 1)
-    step_s = float(trace.time_s[after] - trace.time_s[before]) / max(after - before, 1)
+    """Whether the bodies slid before the first maximum: no rig and no spring gives way by as much as the drive went.
+
+    Where fewer than four samples resolve the rise, the way from one of them to the next counts.
+    """
+    time, speed = trace.time_s, trace.columns.get("speed_m_s")
+    first, at = (int(k) for k in np.searchsorted(time, (pull.onset_s, pull.peak_s)))
+    between_samples = "peak_between_samples" in pull.flags
+    if between_samples:
+        first = at - 1
+    first, last = max(first, 0), min(at + int(between_samples), time.size - 1)
     if speed is not None:
-        return bool(np.abs(speed[before : after + 1]).max() * step_s > _STRETCH_M)
-    return bool(test and test.speed_m_s and test.speed_m_s * step_s > _STRETCH_M)
+        way = np.abs(speed[first : last + 1])
+        travel = float(
+            way.max() * (time[at] - time[max(at - 1, 0)])
+            if between_samples
+            else way[:-1] @ np.diff(time[first : last + 1])
+        )
+    elif test is not None and test.speed_m_s:
+        travel = test.speed_m_s * float(
+            time[at] - time[max(at - 1, 0)] if between_samples else time[last] - time[first]
+        )
+    else:
+        return False
+    return travel > (_STRETCH_M if between_samples else _LONGEST_STRETCH_M)
 
 
 def _without_static(pull: Pull) -> Pull:

@@ -401,8 +401,10 @@ def _falls_from(trace: Trace, course: Course, start: int) -> int:
     touching, load = course.contact[1], trace.columns.get("normal_force_N")
     if load is None or touching == load.size or touching - start < 2 * FEWEST_AT_REST:
         return touching
-    load = median_of_three(np.abs(load[start:touching]))
-    level = float(np.median(load[load.size // 2 :]))
+    levels = levels_of(median_of_three(np.abs(load[course.contact[0] : touching])))
+    if not levels:
+        return touching
+    load, level = median_of_three(np.abs(load[start:touching])), levels[-1][2]
     kept = np.flatnonzero(load >= _reached(load, level))
     falls = start + int(kept[-1]) + 1 if kept.size else touching
     return falls if touching - falls > FEWEST_AT_REST // 2 else touching
