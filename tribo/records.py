@@ -116,8 +116,8 @@ class Phase:
     start_s, end_s : float
         Start and end in s. The phases of a record follow each other without gaps.
     speed_m_s, normal_load_N : float
-        Mean speed of the drive in m/s (without its sign) and mean normal load in N, as recorded; NaN where they were
-        not recorded.
+        Speed of the drive in m/s (without its sign; from the displacement where no speed was recorded) and normal load
+        in N; NaN where they were not recorded.
     cycle : int
         Number of the cycle that a stroke belongs to, counted from 1; 0 for everything else.
     force_N, force_u_N : float

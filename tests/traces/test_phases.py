@@ -218,3 +218,23 @@ def test_load_and_lift_off_are_placed_where_the_load_begins_to_rise_and_has_fall
     assert found["end of the drive"] == pytest.approx((38, 40), abs=0.1)
     assert found["unloading"] == pytest.approx((40, 42), abs=0.15)
     assert found["lift-off"] == pytest.approx((42, 59.98), abs=0.15)
+
+
+def test_a_phase_says_what_is_doubtful_about_it() -> None:
+    """Rows from 30 to 34 s are lost; the end of the drive is told by the force alone, or by the speed."""
+    force = np.concatenate([2.0 + noise(3000, 1, 0.02), np.full(500, 1.7)])
+    time = np.arange(3500) / 50
+    kept = (time < 30) | (time > 34)
+    alone = Trace("slide", time[kept], force[kept])
+    told = replace(alone, columns={"speed_m_s": np.where(time[kept] < 60, 1e-3, 0.0)})
+    sliding, end = phases_of(alone)
+    assert sliding.doubt == "rows are missing in it, for up to 4.04 s"
+    assert end.doubt == "only the force tells of it"
+    assert phases_of(told)[-1].doubt == ""
+
+
+def test_the_speed_of_a_phase_comes_from_the_displacement_where_no_speed_was_recorded() -> None:
+    time = np.arange(4000) / 10
+    x = np.where(time < 200, 1e-6 * time, 2e-4 + 3e-6 * (time - 200))
+    found = phases_of(Trace("gouge", time, 10.0 + noise(4000), displacement_m=x))
+    assert [p.speed_m_s for p in (found[0], found[-1])] == pytest.approx([1e-6, 3e-6], rel=1e-3)

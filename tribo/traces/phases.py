@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tribo.errors import TraceError
 from tribo.records import FloatArray, Phase, Trace
@@ -66,6 +67,9 @@ _FELT = 12.0  # a friction force is at least this many times the noise
 _NONE = 0.01  # share of the swing of a load up to which there is none
 _LOADED = 0.99  # share of its level that a load has reached, or less by its noise
 _AT_BEGINNING = 0.1  # share of a record up to which sliding that is stated begins with the record
+BY_HAND = "stated by hand"
+_OF_DRIVE = ("hold", "end of the drive", "stroke", "reversal")  # phases that a channel of the drive tells of
+_GAP = 10.0  # usual steps of the time between two samples from which on rows are missing
 _WAITS = 0.1  # share of a stroke for which a drive stands still at its end that does more than turn
 _LEFT = 0.2  # share of the way to the other level from which on a force has left the old one
 _DRIFTS = 0.02  # share of the later force by which the force before it differs at the least where it still runs in,
@@ -349,7 +353,8 @@ def phases_of(
     else:
         for k, (first, last) in enumerate(course.pieces):
             if k:
-                spans.append(_Span("hold", first, course.stops[k - 1][1], "the drive stands still"))
+                told = "the drive stands still" if drive else "the force falls and stays low, or relaxes"
+                spans.append(_Span("hold", first, course.stops[k - 1][1], told))
                 first = course.stops[k - 1][1]
             first, last = max(first, begin), min(last, end)
             if last > first:
@@ -358,15 +363,17 @@ def phases_of(
     touching = course.contact[1]
     falls = _falls_from(trace, course, max(end, begin))
     if end < falls:
-        spans.append(_Span("end of the drive", end, falls, "the drive stands still"))
+        told = "the drive stands still" if drive else "the force relaxes and is no longer rough"
+        spans.append(_Span("end of the drive", end, falls, told))
     spans.append(_Span("unloading", falls, touching, "the load falls"))
     if touching < samples:
         spans.append(_Span("lift-off", touching, samples, "the load has fallen back"))
     for phase in stated:
         first, last = (int(k) for k in np.searchsorted(signal.time_s, (phase.start_s, phase.end_s)))
-        spans = [*_without(spans, first, last), _Span(phase.name, first, last, "stated by hand")]
+        spans = [*_without(spans, first, last), _Span(phase.name, first, last, BY_HAND)]
     spans.sort(key=lambda span: span.first)
-    return tuple(_phase(trace, signal, span) for span in spans if span.last > span.first)
+    gaps = _gaps(signal.time_s)
+    return tuple(_phase(trace, signal, drive, gaps, span) for span in spans if span.last > span.first)
 
 
 def _without(spans: Sequence[_Span], first: int, last: int) -> Iterator[_Span]:
@@ -562,19 +569,30 @@ def _slide(signal: Signal, first: int, last: int, evidence: str, *, after_peak: 
     yield _Span("steady sliding", first, last, evidence)
 
 
-def _phase(trace: Trace, signal: Signal, span: _Span) -> Phase:
-    """A phase with the means of its channels."""
+def _gaps(time_s: FloatArray) -> NDArray[np.int64]:
+    """The samples before which rows are missing: the time to the one before is many times the usual step."""
+    step_s = np.diff(time_s)
+    return np.flatnonzero(step_s > _GAP * float(np.median(step_s))) + 1
+
+
+def _phase(trace: Trace, signal: Signal, drive: Drive | None, gaps: NDArray[np.int64], span: _Span) -> Phase:
+    """A phase with the means of its channels and what is doubtful about it."""
     part = slice(span.first, span.last)
-    time = signal.time_s
-
-    def mean_of(quantity: str) -> float:
-        values = trace.columns.get(quantity)
-        return math.nan if values is None else abs(level_of(values[part]))
-
-    force = signal.force_N[part]
+    time, force = signal.time_s, signal.force_N[part]
+    speed, load = trace.columns.get("speed_m_s"), trace.columns.get("normal_force_N")
+    if speed is None and drive is not None and drive.channel in ("displacement", "position"):
+        speed = drive.pace
     force_u = wander(force, float(time[span.last - 1] - time[span.first]))[0] if force.size > 1 else math.nan
     end = float(time[min(span.last, time.size - 1)])
+    doubts = [span.doubt] if span.doubt else []
+    if drive is None and span.name in _OF_DRIVE and span.evidence != BY_HAND:
+        doubts.append("only the force tells of it")
+    if (missing := gaps[(gaps > span.first) & (gaps < span.last)]).size:
+        longest = float((time[missing] - time[missing - 1]).max())
+        doubts.append(f"rows are missing in it, for up to {longest:.4g} s")
     return Phase(
-        span.name, float(time[span.first]), end, mean_of("speed_m_s"), mean_of("normal_force_N"), span.cycle,
-        float(force.mean()), force_u, span.evidence, span.doubt,
+        span.name, float(time[span.first]), end,
+        math.nan if speed is None else abs(level_of(speed[part])),
+        math.nan if load is None else abs(level_of(load[part])),
+        span.cycle, float(force.mean()), force_u, span.evidence, "; ".join(doubts),
     )  # fmt: skip
