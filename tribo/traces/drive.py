@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from tribo.records import FloatArray, Trace
 from tribo.traces.signal import (
     MINIMUM_SAMPLES,
-    line,
     median_of_three,
     running_mean,
     runs_of,
@@ -35,6 +34,7 @@ _ONE_WAY = 0.5  # net over total displacement from which on a displacement chann
 _MOVES = 20.0  # a displacement that moves spans this many times its noise
 _OF_STROKE = 0.3  # share of its span by which a position goes back where the drive turns round
 _WINDOWS = (400, 100, 25)  # samples over those of the windows in which steps are looked for
+_TRIED = 20  # starts and ends of a ramp that are tried to either side
 _TAIL = 0.05  # share of the values at either end that a level draws in
 _QUIET = 0.25  # share of its usual range over five samples within which a force stands still
 _PULLED = 0.9  # share of the fall to a quiet end above which the drive still pulls
@@ -292,8 +292,24 @@ def _passage(values: FloatArray, one: tuple[int, int, float], other: tuple[int, 
     leaves, arrives = np.flatnonzero(share[:middle] < _QUARTER), np.flatnonzero(share[middle:] > 1.0 - _QUARTER)
     left = int(leaves[-1]) + 1 if leaves.size else 0
     there = middle + int(arrives[0]) if arrives.size else last - first
-    if there - left < FEWEST_AT_REST:
+    if there - left < FEWEST_AT_REST // 2:
         return first + left, first + max(there, left + 1)
-    slope, at, height = line(np.arange(left, there, dtype=float), share[left:there])  # a ramp is a straight line
-    start, end = (at - height / slope, at + (1.0 - height) / slope) if slope > 0 else (left, there)
-    return first + max(round(start), 0), min(first + max(round(end), round(start) + 1), other[1])
+    start, end = _ramp(share, left, there)
+    return first + start, min(first + end, other[1])
+
+
+def _ramp(share: FloatArray, left: int, there: int) -> Range:
+    """Start and end of the ramp from 0 to 1 that lies nearest a passage, its middle half from ``left`` to ``there``."""
+    n, reach = share.size, max(2 * FEWEST_AT_REST, there - left)
+    step = max(1, reach // _TRIED)
+    starts = np.unique(np.clip(np.arange(left - reach, left + reach + 1, step), 0, n - 1))
+    ends = np.unique(np.clip(np.arange(there - reach, there + reach + 1, step), 1, n))
+    total = np.concatenate(([0.0], np.cumsum(share)))
+    moment = np.concatenate(([0.0], np.cumsum(share * np.arange(n))))
+    s, e = starts[:, None], ends[None, :]
+    length = np.maximum(e - s, 1)
+    along = (moment[e] - moment[s] - s * (total[e] - total[s])) / length
+    ramp = (length - 1.0) * (2.0 * length - 1.0) / (6.0 * length) - 2.0 * along
+    misfit = np.where(e > s, ramp - 2.0 * (total[n] - total[e]) + (n - e), np.inf)
+    best = np.unravel_index(int(np.argmin(misfit)), misfit.shape)
+    return int(starts[best[0]]), int(ends[best[1]])
