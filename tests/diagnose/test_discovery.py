@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from blind.tribometer import Design
 
 from tribo.cache.kept_results import decoded, encoded
 from tribo.diagnostics.candidates import refitted
@@ -23,6 +24,7 @@ from tribo.lawsearch.diagnosis_with_laws import law_layers, searched_laws, separ
 from tribo.lawsearch.grammar import ADHESION_TERM, LOAD_TERM, UNITS, Shape, WrittenLaw, scopes_of, shapes_of
 from tribo.lawsearch.known_laws import validate_law
 from tribo.lawsearch.law_file import law_text, read_law
+from tribo.lawsearch.model_choice import FoundLaw
 from tribo.lawsearch.scoring import Grammar, Projection
 from tribo.lawsearch.search import RESCORED, Discovery, best_of, discover_laws
 from tribo.mechanisms.record import Base, Conditions
@@ -343,3 +345,41 @@ def test_a_law_that_would_be_chance_even_as_the_only_one_is_not_compared_with_si
     assert calls == []
     discover_laws(model, level=0.5, replicates=20, progress=lambda stage, *_: calls.append(stage))
     assert calls
+
+
+FIVE = Design(samples=("F", "A", "B"), masses_g=(12.0, 50.0, 138.5), speeds_mm_s=(0.02, 0.06, 0.2, 0.5, 1.0))
+THREE = replace(FIVE, speeds_mm_s=(0.05, 0.2, 0.8))
+
+
+def by_values(at_speed: Callable[[np.ndarray], np.ndarray], design: Design, seed: int = 3) -> FoundLaw:
+    """The law of a campaign whose sliding friction changes with the speed (mm/s) in this way, and with nothing else."""
+
+    def change(s: Setup) -> np.ndarray:
+        return at_speed(s.observations.conditions.speed_m_s * 1e3)[:, None] * np.array([0.0, 1.0])
+
+    (law,) = with_laws(examine(made(change, seed=seed, design=design), replicates=(40, 20))).laws.laws
+    return law
+
+
+def test_a_column_of_few_values_is_told_by_its_values_whatever_the_shape() -> None:
+    dip = by_values(lambda v: -0.14 * np.isclose(v, 0.2), THREE)
+    true = {"0.05": 0.14 / 3, "0.2": -0.14 * 2 / 3, "0.8": 0.14 / 3}
+    assert dip.levels.keys() == true.keys()
+    for value, change in true.items():
+        assert dip.levels[value].low < 100 * (np.exp(change) - 1) < dip.levels[value].high
+    assert "speed: " in law_sentence(dip)
+    assert "above" not in law_sentence(dip)
+
+
+def test_the_formulas_that_pass_through_the_values_are_listed_and_no_other() -> None:
+    kinds = {tie.shapes[0].kind for tie in by_values(lambda v: -0.05 * np.log(v / 0.1) ** 2, FIVE).ties}
+    assert "log optimum" in kinds
+    assert not {"linear", "log", "step"} & kinds
+
+
+def test_a_law_by_values_is_written_and_read_again(tmp_path: Path) -> None:
+    dip = by_values(lambda v: -0.14 * np.isclose(v, 0.2), THREE)
+    (tmp_path / "law.toml").write_text(law_text(dip.law, dip.parameters, "three speeds"), encoding="utf-8")
+    again = read_law(tmp_path / "law.toml")
+    assert exact_text(again.law) == exact_text(dip.law)
+    assert again.parameters == dip.parameters

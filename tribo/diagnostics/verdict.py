@@ -125,7 +125,8 @@ class Layer:
     the sample, regime and load at which a cause acts most, ``choice`` the specimen, pattern or value it concerns.
     ``over`` says, of a cause that follows a recorded column, by how much T changes from its lowest to its highest
     recorded values: the ``column``, the values ``from`` and ``to``, and the change in ``percent`` from ``low`` to
-    ``high``.
+    ``high``. ``levels`` are the values of a column of few, each with the change of T there relative to its mean over
+    them (percent).
     """
 
     kind: LayerKind
@@ -145,6 +146,7 @@ class Layer:
     choice: str = ""
     most: tuple[str, str, float] | None = None  # regime, sample and load (N) of ``at``
     over: Mapping[str, Any] | None = None
+    levels: Mapping[str, Estimate] = field(default_factory=dict)
     shows: Any = field(default=None, compare=False, repr=False)
 
 
@@ -269,7 +271,7 @@ KEPT = {  # fields of the records in verdict.json, in the order of its schema
     Excluded: ("mechanism", "reason"),
     Layer: (
         "kind", "name", "samples", "regimes", "p_adjusted", "effect_percent", "low", "high", "parameters", "formula",
-        "tied_with", "gain", "text", "at", "choice", "over",
+        "tied_with", "gain", "text", "at", "choice", "over", "levels",
     ),
     NextTest: ("text", "separates", "design", "expected_bits"),
 }  # fmt: skip

@@ -181,7 +181,7 @@ def _abscissa(found: FoundLaw) -> tuple[np.ndarray, np.ndarray]:
     nameless = np.full(len(c.sample), "")
     if len(law.shapes) > 1:
         return law.course(c)[:, 0], nameless
-    if law.shapes[0].kind == "level":
+    if law.shapes[0].level or isinstance((law.shapes[0].values or (0.0,))[0], str):
         names = c.columns[law.columns[0]]
         return np.unique(names, return_inverse=True)[1].astype(float), names
     return column_values(c, law.columns[0]), nameless

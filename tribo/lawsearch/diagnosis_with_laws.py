@@ -18,7 +18,7 @@ from tribo.lawsearch.across_patterns import CERTAIN, across_patterns, deviations
 from tribo.lawsearch.grammar import PRESSURES, WrittenLaw, column_values
 from tribo.lawsearch.known_laws import Validation, law_layer, validate_law, validate_laws
 from tribo.lawsearch.law_file import KnownLaw
-from tribo.lawsearch.model_choice import without_refuted_causes
+from tribo.lawsearch.model_choice import levels_of_cause, without_refuted_causes
 from tribo.lawsearch.search import Discovery, Progress, discover_laws
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray, Ingested
@@ -48,7 +48,7 @@ def with_laws(
     """
     rng = np.random.default_rng(seed)
     standing, lost, forms = without_refuted_causes(explained(d))
-    d = replace(d, verdict=with_forms_of_causes(d.verdict, forms, standing))
+    d = replace(d, verdict=with_levels_of_causes(with_forms_of_causes(d.verdict, forms, standing), standing))
     with_known, answers, held, replaced = validate_laws(standing, known, rng)
     if answers:
         d = replace(d, verdict=replace(d.verdict, shows=replace(d.verdict.shows, known=answers)))
@@ -74,7 +74,8 @@ def with_laws(
         *nuisance_layers(model, of_nuisance),
     )  # fmt: skip
     next_test = verdict.next_test
-    ties = [(law.law, law.ties[0]) for law in found.laws if law.ties]
+    alike = [law.ties if law.levels else (law.law, *law.ties) for law in found.laws]
+    ties = [(first, second) for first, second, *_ in (laws for laws in alike if len(laws) > 1)]
     if ties and not verdict.equivalent:
         next_test = separating_test(*ties[0], model.setup.observations.conditions)
     shows = replace(verdict.shows, within_chance=bool(left.p.min() >= level))
@@ -132,6 +133,16 @@ def with_forms_of_causes(v: Verdict, forms: Mapping[str, tuple[WrittenLaw, ...]]
     return replace(v, layers=layers, next_test=next_test)
 
 
+def with_levels_of_causes(v: Verdict, model: ModelFit) -> Verdict:
+    """The verdict with the values of the columns of few values that its causes follow."""
+    told = {a.name: levels_of_cause(model, a) for a in model.acting}
+    layers = tuple(
+        replace(layer, levels=told[layer.name]) if layer.kind == "cause" and told.get(layer.name) else layer
+        for layer in v.layers
+    )  # fmt: skip
+    return replace(v, layers=layers)
+
+
 def with_misfits(v: Verdict, found: Discovery) -> Verdict:
     """The verdict with the laws found as its misfits, where it had none beside its causes."""
     outcome = AS_MISFIT.get(v.verdict)
@@ -151,7 +162,7 @@ def law_layers(d: Discovery) -> list[Layer]:
     return [
         replace(
             law_layer(f.law, f.model, f.parameters, f.effect_percent), p_adjusted=f.p,
-            tied_with=tuple(t.formula() for t in f.ties), gain=f.gain, shows=f,
+            tied_with=tuple(t.formula() for t in f.ties), gain=f.gain, shows=f, levels=f.levels,
         )
         for f in d.laws
     ]  # fmt: skip
@@ -215,7 +226,7 @@ def _difference(law: WrittenLaw, other: WrittenLaw, c: Conditions) -> tuple[Diff
         return "terms", {"normal_load_N": [float(c.normal_load_N.min()), float(c.normal_load_N.max())]}
     if law.regime != other.regime:
         return "regimes", {"vary": list(law.columns)}
-    if len(law.shapes) > 1 or law.shapes[0].kind == "level":
+    if len(law.shapes) > 1 or law.shapes[0].level or other.shapes[0].level:
         return "corners", {"vary": list(law.columns)}
     name = law.columns[0]
     return "place", {name: _apart(law, other, column_values(c, name))}

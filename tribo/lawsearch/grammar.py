@@ -28,6 +28,8 @@ UNITS = {
     "temperature_C": "°C", "humidity_pct": "%", "speed_m_s": "m/s", "hold_s": "s",
 }  # fmt: skip
 LARGEST = 3.0  # of an amplitude in ln T
+AMPLITUDES = "abcde"  # of a wave two, of levels one less than there are values
+MOST_VALUES = len(AMPLITUDES) + 1  # of a column that is told by its values
 
 
 @displayed()
@@ -40,8 +42,9 @@ class Shape:
     ``place`` and runs to 1 at ``high``, which may lie on either side; ``optimum`` is a parabola with 0 at ``place`` and
     -1 at the farther end; ``hump`` is a Gaussian of standard deviation ``width`` at ``place``; ``saturating`` is
     -exp(-(x - low) / width), from ``low`` upwards or, with a negative ``width``, downwards; ``window`` is 1 from
-    ``place`` to ``place`` + ``width``; ``wave`` is sin and cos of the period ``width``; ``level`` is 1 where a column
-    of names has the value ``level``.
+    ``place`` to ``place`` + ``width``; ``wave`` is sin and cos of the period ``width``; ``log optimum`` is a parabola
+    of the logarithm; ``level`` is 1 where a column of names has the value ``level``, or one of numbers the value
+    ``place``; ``levels`` is 1 at the second of the ``values`` of a column, 1 at the third, and so on: a column each.
     """
 
     kind: str
@@ -51,6 +54,7 @@ class Shape:
     place: float = float("nan")
     width: float = float("nan")
     level: str = ""
+    values: tuple[float | str, ...] = ()
 
     @property
     def zero(self) -> float:
@@ -58,9 +62,14 @@ class Shape:
         return self.low if math.isnan(self.place) else self.place
 
     def of(self, c: Conditions) -> FloatArray:
-        """Values of shape (n, 1), or (n, 2) of a wave; where the column has no value, what is expected of the shape
-        given what is known of the value, or the mean over the recorded ones where nothing is."""
-        if self.kind == "level":
+        """Values of shape (n, 1), (n, 2) of a wave, (n, values - 1) of levels.
+
+        Where the column has no value, it is what is expected of the shape given what is known of the value, or the mean
+        over the recorded ones where nothing is.
+        """
+        if self.kind == "levels":
+            return np.concatenate([level.of(c) for level in self.at_each[1:]], axis=1)
+        if self.level:
             return is_level(c.columns[self.column], self.level)[:, None]
         if self.column in c.gaps:
             return c.gaps[self.column].mean_of(self.of_numbers)
@@ -68,8 +77,23 @@ class Shape:
         values, known = self.of_numbers(x), np.isfinite(x)
         return np.where(known[:, None], values, values[known].mean(axis=0) if known.any() else 0.0)
 
+    @property
+    def at_each(self) -> tuple[Shape, ...]:
+        """The values of ``levels``, each as a level of its own."""
+        return tuple(
+            replace(self, kind="level", values=(), **({"level": v} if isinstance(v, str) else {"place": v}))
+            for v in self.values
+        )
+
     def of_numbers(self, x: FloatArray) -> FloatArray:
         """Values at numbers x (n,), NaN where x is."""
+        if self.kind == "levels":
+            return np.concatenate([level.of_numbers(x) for level in self.at_each[1:]], axis=1)
+        if self.kind == "level":
+            return np.where(np.isnan(x), np.nan, np.isclose(x, self.place, rtol=1e-6, atol=0.0) * 1.0)[:, None]
+        if self.kind == "log optimum":
+            half = max(np.log(self.high / self.place), np.log(self.place / self.low))
+            return (-((np.log(np.maximum(x, 1e-300) / self.place) / half) ** 2))[:, None]
         if self.kind == "linear":
             return ((x - self.zero) / (self.high - self.low))[:, None]
         if self.kind == "log":
@@ -149,9 +173,9 @@ class WrittenLaw:
     def mechanism(self) -> Mechanism:
         """The law as a mechanism: its amplitude is free (two of a wave), its places and widths are as written."""
         first = amplitude("a", "", -LARGEST, LARGEST, 0.1, "change of ln T at 1 of the shape")
-        d = 2 if self.shapes[0].kind == "wave" else 1
-        parameters = [first, *(amplitude("b", "", -LARGEST, LARGEST, 0.1, "of the cosine") for _ in range(d - 1))]
-
+        of_each = {"wave": ("of the cosine",), "levels": tuple(f"at {v}" for v in self.shapes[0].values[2:])}
+        names = zip(AMPLITUDES[1:], of_each.get(self.shapes[0].kind, ()), strict=False)
+        parameters = [first, *(amplitude(name, "", -LARGEST, LARGEST, 0.1, what) for name, what in names)]
         needs = tuple(name for name in self.columns if name in UNITS and not name.endswith("pressure_Pa"))
         return Mechanism(
             name=f"law {self.formula()} ({self.regime}, {self.where})", kind="any", formula=self.formula(),
@@ -188,6 +212,9 @@ class WrittenLaw:
             s = self.shapes[0]
             turns = f"2 pi {s.column} / {s.width:.4g}"
             return f"{self.acts_on} * exp(a sin({turns}) + b cos({turns}))"
+        if self.shapes[0].kind == "levels":
+            each = zip(AMPLITUDES, self.shapes[0].at_each[1:], strict=False)
+            return f"{self.acts_on} * exp({' + '.join(f'{name} {_formula(s)}{weight}' for name, s in each)})"
         inner = " * ".join(_formula(s) for s in self.shapes)
         return f"{self.acts_on} * exp({a} {inner}{weight})"
 
@@ -214,7 +241,10 @@ def _formula(s: Shape) -> str:
         return f"1 / (1 + exp(-({x} - {s.place:.4g}) / {s.width:.4g}))"
     if s.kind == "window":
         return f"[{s.place:.4g} <= {x} <= {s.place + s.width:.4g}]"
-    return f"[{x} = {s.level}]"
+    if s.kind == "log optimum":
+        half = max(math.log(s.high / s.place), math.log(s.place / s.low))
+        return f"(-(ln({x} / {s.place:.4g}) / {half:.4g})^2)"
+    return f"[{x} = {s.level or f'{s.place:.4g}'}]"
 
 
 def column_values(c: Conditions, name: str) -> FloatArray:
@@ -295,6 +325,11 @@ def _of_column(name: str, x: FloatArray) -> Iterator[Shape]:
         between = 0.5 * (distinct[1:] + distinct[:-1])
         places = between if len(between) <= 9 else np.unique(np.quantile(x, np.arange(1, 10) / 10))
         yield from (Shape("step", name, low, high, place=float(p)) for p in places)
+    if 2 < len(distinct) <= MOST_VALUES:
+        yield from (Shape("level", name, low, high, place=float(v)) for v in distinct[1:-1])
+    if len(distinct) > 4 and low > 0 and high / low > WIDE:
+        for share in (0.2, 0.35, 0.5, 0.65, 0.8):
+            yield Shape("log optimum", name, low, high, place=float(low * (high / low) ** share))
     if len(distinct) > 4:
         for p in np.quantile(x, (0.2, 0.35, 0.5, 0.65, 0.8)):
             yield Shape("optimum", name, low, high, place=float(p))
@@ -344,7 +379,7 @@ def _windows(name: str, low: float, high: float, parts: int) -> Iterator[Shape]:
 
 def fine_shapes(s: Shape, c: Conditions) -> list[Shape]:
     """The shapes of the same kind on the same column with places and widths on a fine grid."""
-    if s.kind in ("linear", "log", "level"):
+    if s.kind in ("linear", "log", "level", "levels"):
         return [s]
     x = recorded_values(c, s.column)
     low, high, distinct = float(x.min()), float(x.max()), np.unique(x)
@@ -359,6 +394,8 @@ def fine_shapes(s: Shape, c: Conditions) -> list[Shape]:
         return list(_saturating(s.column, low, high, (40.0, 25.0, 16.0, 10.0, 7.0, 5.0, 3.5, 2.5, 1.7, 1.2)))
     if s.kind == "optimum":
         return [Shape("optimum", s.column, low, high, place=float(p)) for p in np.linspace(low, high, FINE)]
+    if s.kind == "log optimum":
+        return [replace(s, place=float(p)) for p in np.geomspace(low, high, FINE)]
     if s.kind == "window":
         return list(_windows(s.column, low, high, 4 * TENTHS))
     if s.kind == "wave":

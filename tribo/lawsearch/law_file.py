@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from tribo.diagnostics.verdict import Estimate
 from tribo.errors import CampaignError, Problem
 from tribo.files import text_of
-from tribo.lawsearch.grammar import ADHESION_TERM, BOTH, LOAD_TERM, Shape, T, WrittenLaw
+from tribo.lawsearch.grammar import ADHESION_TERM, AMPLITUDES, BOTH, LOAD_TERM, MOST_VALUES, Shape, T, WrittenLaw
 
 SCHEMA = "tribo.law/1"
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -29,7 +29,8 @@ class ShapeTable(_Strict):
     """[[shape]]: a function of one column."""
 
     kind: Literal[
-        "linear", "log", "step", "soft step", "ramp", "optimum", "hump", "saturating", "window", "wave", "level"
+        "linear", "log", "step", "soft step", "ramp", "optimum", "log optimum", "hump", "saturating", "window", "wave",
+        "level", "levels",
     ]
     column: str
     low: Finite = 0.0
@@ -37,12 +38,13 @@ class ShapeTable(_Strict):
     place: Finite | None = None
     width: Finite | None = None
     level: str = ""
+    values: list[Finite | str] = Field(default=[], max_length=MOST_VALUES)
 
     def shape(self) -> Shape:
         nan = float("nan")
         place = nan if self.place is None else self.place
         width = nan if self.width is None else self.width
-        return Shape(self.kind, self.column, self.low, self.high, place, width, self.level)
+        return Shape(self.kind, self.column, self.low, self.high, place, width, self.level, tuple(self.values))
 
 
 class ParameterTable(_Strict):
@@ -69,8 +71,11 @@ class LawTable(_Strict):
 
     @model_validator(mode="after")
     def _has_amplitudes(self) -> LawTable:
-        wanted = ("a", "b") if self.shape[0].kind == "wave" else ("a",)
-        if missing := [name for name in wanted if name not in self.parameters]:
+        shape = self.shape[0]
+        if (shape.kind == "levels") != (len(shape.values) > 1):
+            raise ValueError("levels, and they alone, have two values or more")
+        wanted = 2 if shape.kind == "wave" else max(len(shape.values) - 1, 1)
+        if missing := [name for name in AMPLITUDES[:wanted] if name not in self.parameters]:
             raise ValueError(f"[parameters.{missing[0]}] is missing")
         return self
 
@@ -91,6 +96,7 @@ def law_text(law: WrittenLaw, parameters: Mapping[str, Estimate], found_in: str)
         lines += [f"low = {s.low!r}", f"high = {s.high!r}"]
         lines += [f"{name} = {value!r}" for name, value in (("place", s.place), ("width", s.width)) if value == value]
         lines += [f"level = {quoted(s.level)}"] if s.level else []
+        lines += [f"values = {json.dumps(list(s.values))}"] if s.values else []
     for name, e in parameters.items():
         lines += ["", f"[parameters.{name}]", f"value = {e.value!r}", f"low = {e.low!r}", f"high = {e.high!r}"]
         lines += [f"unit = {quoted(e.unit)}"]

@@ -8,11 +8,12 @@ way.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
 
 import numpy as np
+from scipy.stats import chi2
 
 from tribo.diagnostics.candidates import PER_PARAMETER, refitted
 from tribo.diagnostics.contrasts import FORM
@@ -22,7 +23,10 @@ from tribo.diagnostics.inference import estimates, gain, informed_share
 from tribo.diagnostics.model import Acting, effect_of
 from tribo.diagnostics.verdict import Estimate, Gain
 from tribo.lawsearch.grammar import (
+    BOTH,
     LOAD_TERM,
+    MOST_VALUES,
+    PRESSURES,
     UNITS,
     Shape,
     WrittenLaw,
@@ -34,14 +38,17 @@ from tribo.lawsearch.grammar import (
     shapes_of,
 )
 from tribo.lawsearch.scoring import Courses, Grammar, Projection, acts_of, effects_of, terms_of
+from tribo.mechanisms.conditions import levels_of
 from tribo.mechanisms.record import Conditions
 from tribo.records import FloatArray
+from tribo.vocabulary import COLUMNS
 
 CLOSE = 3.0  # log likelihood within which laws cannot be told apart: odds of 20 to 1
 IN_REACH = 8.0  # below the best on the coarse grid, within which a form is looked at on the fine one
 LOOKED_AT = 40  # forms at most on the fine grid
 WEIGHTLESS = 1e-3  # of the likeliest, below which a law does not count in the band
-PLACED = ("step", "soft step", "ramp", "optimum", "hump", "window")  # kinds with a place
+CONTRADICTED = 0.05  # chance of a formula that fits the values of a column worse, if it is true
+PLACED = ("step", "soft step", "ramp", "optimum", "log optimum", "hump", "window")  # kinds with a place
 WIDE = ("hump", "saturating", "soft step", "window")  # kinds with a width
 FITTED = 3  # of the best forms, with the weights of the tests and without
 ROUNDS = 3  # of finding the best form at the noise that the one before leaves
@@ -67,7 +74,8 @@ class FoundLaw:
     ``p`` is the chance that the best of all laws gains as much with nothing hidden. ``ties`` are the other forms within
     CLOSE of it, the likeliest first. ``model`` is the fit with all laws so far. ``band`` (3, n, 2) is the change of
     ln T of every test beyond what flat law and patterns can absorb (:func:`centred`), averaged over all laws that the
-    design cannot tell apart: value and 90 % band.
+    design cannot tell apart: value and 90 % band. ``levels`` are the values of a column that has few, each with the
+    change of T there in percent of its mean over the values.
     """
 
     law: WrittenLaw
@@ -78,6 +86,7 @@ class FoundLaw:
     ties: tuple[WrittenLaw, ...]
     model: ModelFit
     band: FloatArray
+    levels: dict[str, Estimate] = field(default_factory=dict)
 
 
 class Background:
@@ -162,6 +171,8 @@ def choose_form(
         Of the resamples behind the error of the gain.
     """
     background, forms = _best_forms(model, grammar, first)
+    if levels := levels_of_law(forms[0].best, background.conditions):
+        return _by_levels(model, replace(forms[0].scope, shapes=(levels,)), p, rng)
     after, form = background.after, forms[0]
     parameters = estimates(after, len(after.acting) - 1) | _place_and_width(form)
     wider = 1.0
@@ -175,6 +186,123 @@ def choose_form(
         tuple(f.best for f in forms[1:] if f.evidence > form.evidence - CLOSE), after,
         _band(background, forms, wider),
     )  # fmt: skip
+
+
+def levels_of_law(law: WrittenLaw, c: Conditions) -> Shape | None:
+    """The values of the column of a law, each with a change of its own, where these are few; None elsewhere. Loads are
+    left out: the flat law follows them."""
+    (column, *others) = law.columns
+    if others or column in PRESSURES:
+        return None
+    acts = law.weight(c) != 0.0
+    there = column_values(c, column)
+    if column in c.gaps:
+        there = np.where(c.gaps[column].missing, np.nan, there)
+    numbers = np.unique(there[acts & np.isfinite(there)]).tolist()
+    values: list[float | str] = [*numbers] if numbers else [*levels_of(c.columns[column][acts])]
+    if not 2 <= len(values) <= MOST_VALUES:
+        return None
+    low, high = (numbers[0], numbers[-1]) if numbers else (0.0, 1.0)
+    return Shape("levels", column, low, high, values=tuple(values))
+
+
+def _by_levels(model: ModelFit, law: WrittenLaw, p: float, rng: np.random.Generator) -> FoundLaw:
+    """A law of a column of few values: the change at each, and the simplest formulas that pass through all of them."""
+    at = Background(model, law)
+    after, shape, c = at.after, law.shapes[0], at.conditions
+    parameters, covariance = _amplitudes_at_values(at)
+    changes, every = _at_every_value(at, covariance)
+    effect = _percents(changes, every)[int(np.argmax(np.abs(changes)))]
+    columns = law.course(c)[:, None, :] * at.effects(law)[0][:, :, None]
+    beyond = np.stack([centred(columns[:, :, k], c, at.terms[LOAD_TERM]) for k in range(columns.shape[2])], axis=2)
+    mean = beyond @ after.values[-1]
+    half = NORMAL_90 * np.sqrt(np.einsum("nri,ij,nrj->nr", beyond, covariance, beyond))
+    return FoundLaw(
+        law, parameters, (effect.value, effect.low, effect.high), p, gain(model, after, rng),
+        _through_levels(at, law, at.projected.joint_gain(columns)), after, np.stack([mean, mean - half, mean + half]),
+        _about_their_mean(shape, changes, every),
+    )  # fmt: skip
+
+
+def levels_of_cause(model: ModelFit, acting: Acting) -> dict[str, Estimate]:
+    """The values of the recorded column that a mechanism of a fit follows, each with the change of T there relative to
+    its mean over them, by no formula; empty where the column has many values, or where the mechanism has none."""
+    m, c = acting.mechanism, model.setup.observations.conditions
+    columns = _followed(acting) & {*UNITS, *c.columns}
+    if not (m.any_column or m.needs) or len(columns) != 1:
+        return {}
+    (column,) = columns
+    regime = BOTH if len(m.regimes) > 1 else m.regimes[0]
+    scope = WrittenLaw((Shape("linear", column),), regime=regime)
+    if (levels := levels_of_law(scope, c)) is None:
+        return {}
+    without = refitted(model, [a for a in model.acting if _followed(a) != columns])
+    at = Background(without, replace(scope, shapes=(levels,)))
+    return _about_their_mean(levels, *_at_every_value(at, _amplitudes_at_values(at)[1]))
+
+
+def _amplitudes_at_values(at: Background) -> tuple[dict[str, Estimate], FloatArray]:
+    """The amplitudes of a law of the values of a column, and their covariance, no narrower than their intervals."""
+    after = at.after
+    parameters = estimates(after, len(after.acting) - 1)
+    last = slice(after.columns.parameters - len(parameters), after.columns.parameters)
+    covariance = after.inverse.border[0][last, last] / at.informed
+    told = np.array([(e.high - e.low) / (2.0 * NORMAL_90) for e in parameters.values()])
+    wider = np.maximum(told / np.sqrt(np.maximum(np.diag(covariance), 1e-300)), 1.0)
+    return parameters, covariance * np.outer(wider, wider)
+
+
+def _at_every_value(at: Background, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The change of ln T at each value where the law acts fully, none at the first, (k,), and its covariance."""
+    full = float(np.abs(at.law.weight(at.conditions)).max())
+    changes = np.concatenate([[0.0], at.after.values[-1]]) * full
+    every = np.zeros((len(changes), len(changes)))
+    every[1:, 1:] = covariance * full**2
+    return changes, every
+
+
+def _about_their_mean(shape: Shape, changes: FloatArray, covariance: FloatArray) -> dict[str, Estimate]:
+    about = np.eye(len(changes)) - 1.0 / len(changes)
+    told = _percents(about @ changes, about @ covariance @ about.T)
+    return {_as_read(shape.column, v): e for v, e in zip(shape.values, told, strict=True)}
+
+
+def _percents(values: FloatArray, covariance: FloatArray) -> list[Estimate]:
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    low, high = values - NORMAL_90 * sd, values + NORMAL_90 * sd
+    value, low, high = (100.0 * np.expm1(x) for x in (values, low, high))
+    return [Estimate(float(v), float(a), float(b), "%") for v, a, b in zip(value, low, high, strict=True)]
+
+
+def _as_read(column: str, value: float | str) -> str:
+    """A value of a column in the unit in which it is read."""
+    if isinstance(value, str):
+        return value
+    return f"{value * (COLUMNS[column].factor if column in COLUMNS else 1.0):.4g}"
+
+
+def _through_levels(at: Background, law: WrittenLaw, gained: float) -> tuple[WrittenLaw, ...]:
+    """The formulas that the values do not contradict (5 %, likelihood ratio), those with the fewest numbers first."""
+    shape = law.shapes[0]
+    low, high, column = shape.low, shape.high, shape.column
+    tried = [level for level in shape.at_each if len(shape.values) > 2]
+    if not isinstance(shape.values[0], str):
+        tried = [*tried[1:-1], Shape("linear", column, low, high, place=0.5 * (low + high))]
+        tried += [Shape("step", column, low, high, place=0.5 * (low + high))] if len(shape.values) > 2 else []
+        if low > 0.0:
+            tried.append(Shape("log", column, low, high, place=float(np.sqrt(low * high))))
+        if len(shape.values) > 2:
+            tried += [Shape("optimum", column, low, high, place=0.5 * (low + high))]
+            tried += [Shape("log optimum", column, low, high, place=float(np.sqrt(low * high)))] if low > 0.0 else []
+            tried.append(Shape("saturating", column, low, high, width=high - low))
+    found = []
+    for one in tried:
+        form = _on_fine_grid(at, at.projected, replace(law, shapes=()), (one,), (0.0, 0.0))
+        numbers = 1 + (one.kind in PLACED) + (one.kind in WIDE)
+        lost = 2.0 * (gained - float(form.gains.max()))
+        if lost <= chi2.isf(CONTRADICTED, max(len(shape.values) - 1 - numbers, 1)):
+            found.append((numbers, lost, form.best))
+    return tuple(best for _, _, best in sorted(found, key=lambda each: each[:2]))
 
 
 def forms_in_reach(model: ModelFit, grammar: Grammar) -> tuple[Background, list[Form]]:

@@ -27,8 +27,25 @@ WHERE = {
 
 def law_sentence(found: FoundLaw) -> str:
     """What follows what, where, in which regime and by how much."""
+    if found.levels:
+        return f"{level_sentence(found.law, found.levels)} (adjusted p {p_text(found.p)})."
     said = size_sentence(found.law, found.parameters, found.effect_percent)
     return f"{said} (adjusted p {p_text(found.p)})."
+
+
+def level_sentence(law: WrittenLaw, levels: Mapping[str, Estimate]) -> str:
+    """ "Sliding friction depends on the pull speed: −10 % (90 % interval −12 to −8 %) at 0.05 mm/s, ..."."""
+    column = law.columns[0]
+    unit = COLUMNS[column].unit if column in COLUMNS else ""
+    return f"{subject(law)} depends on {in_words(column)}: {each_value(levels, unit)}"
+
+
+def each_value(levels: Mapping[str, Estimate], unit: str = "") -> str:
+    """ "+5 % (+2 to +8 %) at 0.05 mm/s, ...", relative to what."""
+    each = [
+        f"{e.value:+.0f} % ({e.low:+.0f} to {e.high:+.0f} %) at {value} {unit}".rstrip() for value, e in levels.items()
+    ]
+    return f"{', '.join(each)}, each relative to the mean over these values, with 90 % intervals".replace("-", "−")
 
 
 def size_sentence(
@@ -37,6 +54,8 @@ def size_sentence(
     """The same of any law with these parameters, without evidence and full stop."""
     value, low, high = effect_percent
     size = f"{value:+.0f} %, 90 % interval {low:+.0f} to {high:+.0f} %"
+    if law.shapes[0].kind == "levels":
+        return f"{subject(law)} changes with {in_words(law.columns[0])} from value to value by up to {size}"
     if law.shapes[0].kind == "wave":
         return f"{subject(law)} {_wave(law.shapes[0])}; highest relative to lowest: {size}"
     return f"{subject(law)} {'is higher' if value > 0 else 'is lower'} ({size}) {_where(law, parameters)}"
@@ -61,10 +80,10 @@ def _where(law: WrittenLaw, parameters: Mapping[str, Estimate]) -> str:
         side = "above" if s.high > s.place else "below"
         return f"at {in_words(s.column)} = {_value(s, s.high)}, growing {side} {_value(s, s.place)}"
     if s.kind == "level":
-        return f"where {in_words(s.column)} is {s.level}"
+        return f"where {in_words(s.column)} is {s.level or _value(s, s.place)}"
     if s.kind in ("step", "soft step"):
         return f"where {in_words(s.column)} is above {_value(s, s.place)}"
-    if s.kind in ("optimum", "hump"):
+    if s.kind in ("optimum", "log optimum", "hump"):
         place = parameters["place"]
         factor, _ = _readable(s.column)
         near = f"{_value(s, place.value)} (90 % interval {factor * place.low:.4g} to {factor * place.high:.4g})"
@@ -87,20 +106,22 @@ def _readable(column: str) -> tuple[float, str]:
     return (COLUMNS[column].factor, COLUMNS[column].unit) if column in COLUMNS else (1.0, "")
 
 
-def tied_laws(ties: Sequence[WrittenLaw]) -> str:
-    """The laws that the design cannot distinguish from one, as a sentence; nothing without any."""
+def tied_laws(ties: Sequence[WrittenLaw], *, by_values: bool = False) -> str:
+    """The laws that the design cannot distinguish from one, or that the values of a column do not contradict, as a
+    sentence; nothing without any."""
     if not ties:
         return ""
+    opening = "Formulas that these values do not contradict" if by_values else "This design cannot distinguish it from"
     names = "; ".join(f"{tie.formula()} ({subject(tie)})" for tie in ties[:NAMED])
     more = f"; and {len(ties) - NAMED} more" if len(ties) > NAMED else ""
-    return f"This design cannot distinguish it from: {names}{more}."
+    return f"{opening}: {names}{more}."
 
 
 def discovery_sentence(d: Discovery) -> str:
     """What was found, or that nothing was."""
     if not d.laws:
         return f"None of the {d.searched} laws that were tried explains more than chance does."
-    said = [text for f in d.laws for text in (law_sentence(f), tied_laws(f.ties)) if text]
+    said = [text for f in d.laws for text in (law_sentence(f), tied_laws(f.ties, by_values=bool(f.levels))) if text]
     return f"{' '.join(said)} {d.searched} laws were tried."
 
 

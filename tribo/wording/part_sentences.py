@@ -19,7 +19,7 @@ from tribo.lawsearch.model_choice import FoundLaw
 from tribo.mechanisms.record import Mechanism, TraceEvidence
 from tribo.mechanisms.table import MECHANISMS, mechanism
 from tribo.vocabulary import COLUMNS, OBSERVABLES, ColumnWords, in_words
-from tribo.wording.law_sentences import law_sentence, law_test, size_sentence, tied_laws
+from tribo.wording.law_sentences import each_value, law_sentence, law_test, size_sentence, tied_laws
 from tribo.wording.numerals import counted, joined, p_text, sentence_case
 
 BETWEEN = {
@@ -187,6 +187,10 @@ def layer_sentence(layer: Layer) -> str:
         return _offset(layer) if layer.name == OFFSET else without_model_sentence(shows)
     if layer.kind != "cause" or layer.most is None:
         return layer.text
+    if layer.levels and layer.kind == "cause":
+        words = COLUMNS.get(layer.over["column"], None) if layer.over else None
+        said = f"{sentence_case(name_in_words(layer.name))}: {each_value(layer.levels, words.unit if words else '')}."
+        return f"{said} {tied_laws(shows)}" if tied else said
     if layer.over:
         said = f"{sentence_case(mechanism(layer.name).in_words)} changes T by {change_over_range(layer.over)}."
         return f"{said} {tied_laws(shows)}" if tied else said

@@ -303,7 +303,7 @@ def _evidence(v: Verdict) -> Iterator[str]:
     for law in laws:
         if law is not stated:
             yield law.text
-        yield tied_laws(getattr(law.shows, "ties", ()))
+        yield tied_laws(getattr(law.shows, "ties", ()), by_values=bool(law.levels))
     if shows.within_chance is not None and v.verdict not in ("no_misfit", "named"):
         within = "With this included, the remaining differences are within chance."
         yield within if shows.within_chance else "A misfit remains."
