@@ -45,6 +45,7 @@ from tribo.files import LEADS_OUT, found_below, leads_out, paths_below
 from tribo.input_files import hashes_of_reads, unpack
 from tribo.records import STANDARD_GRAVITY, Campaign, Pattern, SetAside, Test
 from tribo.temporary import temporary_folder
+from tribo.units import quantity_named
 from tribo.user_text import did_you_mean, nearest, well_formed
 from tribo.zeroing import DEFAULT, ZeroChoice, zero_choice
 
@@ -108,7 +109,12 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
         raise CampaignError(problems)
     patterns = {name: table.pattern(name) for name, table in described.patterns.items()}
     order = order_of(row.cells.get("started_at", "") for row in rows)
-    usable, set_aside = _sort_rows(root, rows, patterns, order, measured)
+    in_columns = any(
+        quantity_named(key) == "normal force"
+        for stated in (described.columns, *(c for c in described.columns.values() if isinstance(c, dict)))
+        for key in stated
+    )
+    usable, set_aside = _sort_rows(root, rows, patterns, order, measured, in_columns)
     problems += [p for s in set_aside for p in s.problems]
     if not usable:
         file = rows[0].file if rows else TABLES[0]
@@ -151,7 +157,7 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
 
 
 def _sort_rows(
-    root: Path, rows: Sequence[TestRow], patterns: Mapping[str, Pattern], order: str, measured: bool
+    root: Path, rows: Sequence[TestRow], patterns: Mapping[str, Pattern], order: str, measured: bool, in_columns: bool
 ) -> tuple[list[TestRow], tuple[SetAside, ...]]:
     """Usable rows, and the others with all their faults; rows that share a test_id are one set-aside test."""
     places: dict[str, list[int]] = {}
@@ -160,7 +166,8 @@ def _sort_rows(
         places.setdefault(row.test_id, []).append(row.row)
         path, choice = export_of(row)
         users.setdefault(path, []).append((row.test_id, choice))
-    recorded = not any(row.cells.get(column) for row in rows for column in LOADS)  # by all exports
+    # by all exports, or in a column that campaign.toml names
+    recorded = in_columns or not any(row.cells.get(column) for row in rows for column in LOADS)
     usable, set_aside = [], []
     for row in rows:
         test_id = row.test_id

@@ -36,7 +36,7 @@ from tribo.input_files import (
     SMALLEST_NUMBER,
 )
 from tribo.records import Correction, Pattern
-from tribo.units import CAMPAIGN_COLUMNS
+from tribo.units import CAMPAIGN_COLUMNS, match_quantity, plain_name
 from tribo.user_text import are_numbers, did_you_mean, is_number
 from tribo.zeroing import ALLOWED, zero_choice
 
@@ -50,6 +50,10 @@ _UNCERTAINTIES = of_kind("uncertainty")
 _FORCES = ("static_N", "sliding_N")
 _RATIOS = {"static_mu": "static_N", "sliding_mu": "sliding_N", "coefficient": "sliding_N"}
 _MM = 1e-3
+_HEAD_BYTES = 20_000
+_ENCODINGS = ("utf-8", "cp932", "gb18030", "cp1250")
+_LOAD_WORDS = {"load", "last", "charge", "carga", "obciazenie", "нагрузка", "载荷", "负荷", "荷重", "하중"}
+_UNIT_BEHIND = re.compile(r"[\s_/]*\(?(?:[mkµu]?N|k?gf|k?g|lbf?)\)?$")
 
 Columns = Mapping[str, str | list[str]]
 
@@ -76,7 +80,8 @@ def row_faults(
         except ValueError:
             problems.append(Problem("unknown_zero", "not a zero", row.file, row.row, column, cell, ALLOWED))
     problems += _stated_faults(row, numbers)
-    problems += _load_faults(row, numbers, load_in_export=measured and (recorded or bool(export_of(row)[1])))
+    in_export = measured and (recorded or bool(export_of(row)[1]) or _names_a_load(root, row))
+    problems += _load_faults(row, numbers, load_in_export=in_export)
     given = [column for column in (*_FORCES, *_RATIOS) if row.cells.get(column)]
     if given:
         return [*problems, *_force_faults(row, given)]
@@ -230,6 +235,32 @@ def _stated_faults(row: TestRow, numbers: Mapping[str, float]) -> Iterator[Probl
             yield Problem("not_positive", "must be positive", *at, "more than 0; a reversed direction is sign = -1")
 
 
+def _names_a_load(root: Path, row: TestRow) -> bool:
+    """Whether a row without a load has an export whose head holds a word for it, or is no text: reading decides."""
+    path = relative_path(row.cells.get("file", ""))
+    if path is None or any(row.cells.get(column) for column in LOADS):
+        return False
+    export = root / path
+    try:
+        if leads_out(root, export):
+            return False
+        if not export.is_file():  # an entry of a .zip; never a pipe, which would be waited for
+            return any(p.is_file() for p in export.parents)
+        with export.open("rb") as stream:
+            head = stream.read(_HEAD_BYTES)
+    except (OSError, ValueError, RuntimeError):
+        return False
+    if b"\0" in head or head[:2] in (b"PK", b"\x1f\x8b"):
+        return True
+    for encoding in _ENCODINGS:
+        for cell in re.split(r'[\t;,|"\n]', head.decode(encoding, errors="replace")):
+            name = _UNIT_BEHIND.sub("", cell.strip())
+            quantity = (match_quantity(cell.strip()) or match_quantity(name) or ("",))[0]
+            if quantity in ("normal force", "normal stress") or plain_name(name) in _LOAD_WORDS:
+                return True
+    return False
+
+
 def _load_faults(row: TestRow, numbers: Mapping[str, float], load_in_export: bool) -> list[Problem]:
     """normal_load_N must be positive; a sled may carry no mass of its own, but none may be negative.
 
@@ -237,7 +268,8 @@ def _load_faults(row: TestRow, numbers: Mapping[str, float], load_in_export: boo
     """
     at = (row.file, row.row)
     if not any(row.cells.get(column) for column in LOADS):
-        allowed = "mass_g, normal_load_N or normal_stress_Pa"
+        file = row.cells.get("file", "") or "raw/a.csv"
+        allowed = f"mass_g, normal_load_N or normal_stress_Pa; or {file}#1 in file, if the export records the load"
         missing = Problem("no_load", "the load is missing", *at, " or ".join(LOADS[:2]), None, allowed)
         return [] if load_in_export else [missing]
     for column, unit in (("normal_stress_Pa", "Pa"), ("normal_load_N", "N")):
