@@ -109,11 +109,9 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
         raise CampaignError(problems)
     patterns = {name: table.pattern(name) for name, table in described.patterns.items()}
     order = order_of(row.cells.get("started_at", "") for row in rows)
-    in_columns = any(
-        quantity_named(key) == "normal force"
-        for stated in (described.columns, *(c for c in described.columns.values() if isinstance(c, dict)))
-        for key in stated
-    )
+    by_file = {key: value for key, value in described.columns.items() if isinstance(value, dict)}
+    stated = [*described.columns, *(key for columns in by_file.values() for key in columns)]
+    in_columns = any(quantity_named(key) == "normal force" for key in stated)
     usable, set_aside = _sort_rows(root, rows, patterns, order, measured, in_columns)
     problems += [p for s in set_aside for p in s.problems]
     if not usable:
@@ -130,7 +128,6 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
     tests = tuple(_test(row, described, order, area_m2) for row in usable)
     tests = _each_quantity_once(tests, problems, rows[0].file)
     names = sorted({t.sample for t in tests}, key=lambda n: (list(patterns).index(pattern_of(n, patterns)), n))
-    by_file = {key: value for key, value in described.columns.items() if isinstance(value, dict)}
     return Campaign(
         title=general.title,
         root=root,
