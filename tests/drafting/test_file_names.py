@@ -32,6 +32,9 @@ def folder_of(tmp_path: Path, *names: str) -> Path:
         (["A_500mN_1", "A_2N_2"], "{sample}_{normal_load}_{repeat}"),
         (["0.5Hz20lbtension", "1Hz80lbtension"], "{frequency_Hz}Hz{lbtension_number}lbtension"),
         (["T001", "T002"], "{test_id}"),
+        (["T001 steel", "T002 brass"], "T{test_id} {sample}"),
+        (["2021-03-04_PTFE_5N", "2021-03-05_PTFE_5N"], "{started_at}_PTFE_{normal_load_N}N"),
+        (["PTFE-5N-1", "PTFE-10N-2", "PEEK-5N-1"], "{sample}-{normal_load_N}N-{repeat}"),
     ],
 )  # fmt: skip
 def test_a_pattern_reads_every_part_that_differs(names: list[str], pattern: str) -> None:
@@ -187,3 +190,42 @@ def test_real_exports_are_drafted_into_campaigns_that_run_without_edits(shared: 
         campaign = load_campaign(folder)
         assert len(campaign.tests) == tests, name
         assert not campaign.set_aside, name
+
+
+def filled_in(folder: Path, line: str, value: str) -> None:
+    """A key of campaign.toml in [campaign], in place of the line that stands in for it where there is one."""
+    toml = folder / "campaign.toml"
+    lines = [one for one in toml.read_text(encoding="utf-8").splitlines() if not one.startswith(f"{line} =")]
+    lines.insert(lines.index("[campaign]") + 1, f"{line} = {value}")
+    toml.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def test_what_a_draft_asks_to_fill_in_is_all_that_it_takes(tmp_path: Path) -> None:
+    raw = raw_folder(tmp_path / "raw", {"A_1.txt": pull().replace("Force [N]", "Torque [N mm]")})
+    asked = " ".join(run("init", tmp_path / "c", "--from", raw).output.split())
+    assert "to fill in: lever_arm_mm in campaign.toml, for which 1 was written" in asked
+    assert "to fill in: the load of 1 rows: normal_load_N or mass_g in tests.csv" in asked
+    assert "to fill in: the speed: pull_speed_mm_s in campaign.toml" in asked
+    filled_in(tmp_path / "c", "lever_arm_mm", "2.5")
+    filled_in(tmp_path / "c", "pull_speed_mm_s", "3")
+    table = tmp_path / "c" / "tests.csv"
+    (row,) = rows_of(tmp_path / "c")
+    row["normal_load_N"] = "7"
+    table.write_text(",".join(row) + "\n" + ",".join(row.values()) + "\n", encoding="utf-8")
+    found = stages.ingest(load_campaign(tmp_path / "c"))
+    (test,), (read,) = found.campaign.tests, found.pulls.values()
+    assert (test.normal_load_N, test.speed_m_s) == (7.0, pytest.approx(3e-3))
+    assert read.sliding_N == pytest.approx(2.0 / 2.5, rel=0.01)
+
+
+def test_a_force_of_both_signs_is_asked_about_and_the_zero_that_is_stated_settles_it(tmp_path: Path) -> None:
+    time = np.arange(0, 20, 0.02)
+    force = np.interp(time, [0, 4, 7, 7.1, 20], [-1.5, -1.5, 1.5, 0.5, 0.5])
+    force += np.random.default_rng(2).normal(0, 0.005, time.size)
+    rows = "\n".join(f"{t:.2f}\t{f:.4f}" for t, f in zip(time, force, strict=True))
+    raw = raw_folder(tmp_path / "raw", {"A_5N_1.txt": f"Time [s]\tFriction [N]\n{rows}\n"})
+    done = run("init", tmp_path / "c", "--from", raw)
+    assert "state its zero in campaign.toml" in " ".join(done.output.split())
+    filled_in(tmp_path / "c", "zero", '"before contact"')
+    (read,) = stages.ingest(load_campaign(tmp_path / "c")).pulls.values()
+    assert read.sliding_N == pytest.approx(2.0, rel=0.01)

@@ -49,8 +49,10 @@ _IS_PIECES = re.compile(rf"[A-Za-z]{{0,4}}(?:{_PIECE})+")
 _PARTS = re.compile(r"(?:\{[^{}]*\}|[^_ ])+")
 _FEWEST_FITTING = 2
 _REPEATS = {"", "r", "rep", "run", "test", "t", "no", "stroke"}
+_DATE = re.compile(r"\d{4}[-.]\d{1,2}[-.]\d{1,2}|\d{1,2}[-.]\d{1,2}[-.]\d{4}")
 _NUMBERED = re.compile(r"[A-Za-z]{0,4}-?\d+")
 _SEPARATOR = re.compile(r"[_ ]+")
+_DASHES = re.compile("-")
 _SHOWN = 5
 
 
@@ -211,26 +213,45 @@ def proposed_patterns(names: Sequence[str]) -> tuple[str, ...]:
     """
     alike: dict[int, list[str]] = {}
     for name in names:
-        alike.setdefault(len(_SEPARATOR.split(name)), []).append(name)
+        alike.setdefault(len(_split(name)), []).append(name)
     fewest = min(_FEWEST_FITTING, len(names))  # a pattern that only one of many names fits says nothing
     groups = sorted((group for group in alike.values() if len(group) >= fewest), key=len, reverse=True)
     found = (_pattern_of(group) for group in groups)
     return tuple(pattern for pattern in found if "{" in pattern and pattern != "{sample}")
 
 
+def _separator(name: str) -> re.Pattern[str]:
+    """What stands between the parts of a name: ``_`` or blanks; ``-`` where neither does and it is no decimal mark."""
+    dashes = not _SEPARATOR.search(name) and not _IS_PIECES.fullmatch(name) and not _DATE.fullmatch(name)
+    return _DASHES if dashes else _SEPARATOR
+
+
+def _split(name: str) -> list[str]:
+    return _separator(name).split(name)
+
+
+def _pieces_of(pattern: str) -> list[str]:
+    """The pieces of a proposed pattern, one for each part of the names."""
+    marks = _MARKS.sub("x", pattern)  # without the _ within fields
+    return _PARTS.findall(pattern) if _SEPARATOR.search(marks) or "-" not in marks else pattern.split("-")
+
+
 def _pattern_of(names: Sequence[str]) -> str:
     """One pattern for names of as many parts."""
     if len(set(names)) == len(names) > 1 and all(map(_NUMBERED.fullmatch, names)):
         return "{test_id}"
-    parts = list(zip(*map(_SEPARATOR.split, names), strict=True))
-    between = [*_SEPARATOR.findall(names[0]), ""]
-    texts = [k for k, values in enumerate(parts) if not _numbers(values)]
+    parts = list(zip(*map(_split, names), strict=True))
+    between = [*_separator(names[0]).findall(names[0]), ""]
+    dates = [k for k, values in enumerate(parts) if all(map(_DATE.fullmatch, values))][:1]
+    texts = [k for k, values in enumerate(parts) if not _numbers(values) and k not in dates]
     differing = [k for k in texts if len(set(parts[k])) > 1]
     sample = differing[0] if differing else (0 if 0 in texts and len(parts) > 1 else -1)
     taken: set[str] = set()
     found: list[str] = []
     for k, values in enumerate(parts):
-        if k in texts:
+        if k in dates:
+            found.append("{started_at}")
+        elif k in texts:
             name = "sample" if k == sample else f"part{k + 1}"
             found.append(f"{{{name}}}" if k == sample or k in differing else _bare(values[0]))
         else:
@@ -290,9 +311,9 @@ def parts_in_words(names: Sequence[str], patterns: Sequence[str]) -> list[str]:
     """What stands in each part of the names, and the piece of the pattern that it is proposed to be."""
     lines = []
     for pattern in patterns:
-        fitting = [_SEPARATOR.split(name) for name in names if name_expression(pattern).fullmatch(name)]
+        fitting = [_split(name) for name in names if name_expression(pattern).fullmatch(name)]
         alike = []
-        for k, piece in enumerate(_PARTS.findall(pattern)):
+        for k, piece in enumerate(_pieces_of(pattern)):
             values = list(dict.fromkeys(parts[k] for parts in fitting))
             if "{" in piece:
                 lines.append(f"part {k + 1} of the names: {listed(values)}, read as {piece}")
@@ -312,7 +333,7 @@ def question(names: Sequence[str], patterns: Sequence[str], fits: Mapping[str, o
     if several:
         pattern = several[0]
         others = re.findall(r"\{(part\d+)\}", pattern)
-        first = next(k for k, piece in enumerate(_PARTS.findall(pattern), start=1) if "{sample}" in piece)
+        first = next(k for k, piece in enumerate(_pieces_of(pattern), start=1) if "{sample}" in piece)
         without = pattern.replace("{sample}", f"{{part{first}}}")
         chosen = [pattern, *(without.replace(f"{{{name}}}", "{sample}") for name in others)]
         what = "the names of the files differ in more than one text, and one of them is the sample"
