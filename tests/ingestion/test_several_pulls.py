@@ -147,6 +147,14 @@ def test_a_ladder_of_loads_is_one_test_a_level_and_says_which_way_each_was_reach
     assert stages.ingest(alone).pulls["one"].sliding_N == found.pulls["R1#1/3"].sliding_N
 
 
+def test_ladders_that_start_at_one_load_give_a_law_of_sliding_and_none_of_static_friction(tmp_path: Path) -> None:
+    campaign = write_campaign(tmp_path, ["R1,raw/F1.csv,F,F1,1", "R2,raw/F2.csv,F,F2,1"])
+    for k in (1, 2):
+        (tmp_path / "raw" / f"F{k}.csv").write_text(ladder_log((1.0, 1.5, 2.0, 3.0), 0.1 * k))
+    (law,) = stages.fit(stages.ingest(campaign))
+    assert (law.regime, law.value("mu")) == ("sliding", pytest.approx(MU, rel=0.02))
+
+
 def test_a_pull_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) -> None:
     campaign = write_campaign(tmp_path, ["R1,raw/F1.csv#2/1,F,F1,", "R2,raw/F2.csv#*,F,F2,"])
     (aside,) = stages.ingest(campaign, rule="middle_share").set_aside

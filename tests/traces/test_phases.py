@@ -238,3 +238,13 @@ def test_the_speed_of_a_phase_comes_from_the_displacement_where_no_speed_was_rec
     x = np.where(time < 200, 1e-6 * time, 2e-4 + 3e-6 * (time - 200))
     found = phases_of(Trace("gouge", time, 10.0 + noise(4000), displacement_m=x))
     assert [p.speed_m_s for p in (found[0], found[-1])] == pytest.approx([1e-6, 3e-6], rel=1e-3)
+
+
+def test_the_static_force_of_a_ladder_read_as_one_is_that_of_its_start() -> None:
+    time = np.arange(6000) / 50
+    load = np.interp(time, [0, 30, 31, 60, 61, 90, 91, 120], [1, 1, 2, 2, 3, 3, 4, 4])
+    force = load * np.clip((time - 5) / 2, 0, 1) * np.where((time > 6.5) & (time < 7.2), 1.1, 1.0)
+    trace = Trace("ladder", time, force + noise(6000), columns={"normal_force_N": load + noise(6000, 1)})
+    pull = read_pull(trace, test=TEST)
+    assert not pull.static_N > 1.2
+    assert "rise" not in [p.name for p in pull.phases if p.start_s > 10]

@@ -30,6 +30,8 @@ LACK_OF_FIT_LEVEL = 0.01
 def fit_regimes(table: pd.DataFrame, nominal_area_m2: float | None, *, weights: str = "relative") -> tuple[LawFit, ...]:
     """The fits of :func:`fit_samples` to static and to sliding friction; a regime that no pull shows has none.
 
+    Nor has one that is known at too few loads, as the static friction of ladders: each has one start from rest.
+
     Raises
     ------
     FitError
@@ -41,7 +43,8 @@ def fit_regimes(table: pd.DataFrame, nominal_area_m2: float | None, *, weights: 
         try:
             found += fit_samples(table, regime, nominal_area_m2, weights=weights)
         except FitError as why:
-            if np.isfinite(table[f"{regime}_N"]).any():
+            too_few = {problem.kind for problem in why.problems} == {"too_few_loads"}
+            if np.isfinite(table[f"{regime}_N"]).any() and not too_few:
                 raise
             problems += why.problems  # a log of steps while sliding has no static peaks, and a law all the same
     if not found:

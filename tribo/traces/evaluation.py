@@ -51,6 +51,10 @@ _LONGEST_STRETCH_M = 0.5  # the softest springs of sleds stretch by a tenth of a
 _STRETCH_M = 5e-3  # a sled, a pin or its spring gives way by less before it slides; a disc goes further in a second
 _NO_PEAK = {"stopped_before_peak", "sign_flipped", "spike"}  # problems of a piece that only slides
 _UNPULLED = 0.3  # share of its later force below which a piece begins with nothing pulled
+_OF_STATIC = (
+    "static_N", "static_u_N", "onset_s", "peak_s", "rise_N_per_s", "rise_stiffness_N_per_m", "first_maximum_N",
+    "highest_N", "first_drop_N",
+)  # what a pull without a static force does not have  # fmt: skip
 _OFF_LOAD = 0.02  # share by which the recorded load may differ from that of the test
 _OFF_SPEED = 0.2  # share by which the travel while sliding may differ from the speed of the test times the time
 
@@ -329,12 +333,26 @@ def _first_motion(
         window_s = None
     try:
         pull = _from_rest(piece, zero, rule, options.test, options.peak_s, window_s)
+        if not options.begins and options.peak_s is None:
+            pull = _with_first_static(pull, trace, options)
         return _without_static(pull) if _slid_unseen(trace, pull, options.test) else pull
     except TraceError as fault:
         kinds = {p.kind for p in fault.problems}
         if not (options.begins or (options.window_s and options.peak_s is None)) or not kinds <= _NO_PEAK:
             raise
     return _sliding(signal, (start, end), zero, options)
+
+
+def _with_first_static(pull: Pull, trace: Trace, options: PullOptions) -> Pull:
+    """A pull whose static force is read before the first step of load or speed, where its record has several levels."""
+    first = split_pulls(trace)[0]
+    if not pull.peak_s > first.time_s[-1]:
+        return pull
+    try:
+        start = evaluate(first, replace(options, begins="", window_s=None, phases=()))
+    except TraceError:
+        return _without_static(pull)
+    return replace(pull, **{name: getattr(start, name) for name in _OF_STATIC})
 
 
 def _slid_unseen(trace: Trace, pull: Pull, test: Test | None) -> bool:
@@ -367,11 +385,7 @@ def _slid_unseen(trace: Trace, pull: Pull, test: Test | None) -> bool:
 def _without_static(pull: Pull) -> Pull:
     """A pull whose first maximum is none of a start from rest."""
     flags = [flag for flag in pull.flags if not flag.startswith("peak_") and flag not in ("rounded_peak", "no_drop")]
-    unknown = (
-        "static_N", "static_u_N", "onset_s", "peak_s", "rise_N_per_s", "rise_stiffness_N_per_m", "first_maximum_N",
-        "highest_N", "first_drop_N",
-    )  # fmt: skip
-    return replace(pull, **dict.fromkeys(unknown, math.nan), flags=("no_static", *flags))  # type: ignore[arg-type]
+    return replace(pull, **dict.fromkeys(_OF_STATIC, math.nan), flags=("no_static", *flags))  # type: ignore[arg-type]
 
 
 def _from_rest(
