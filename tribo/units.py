@@ -118,6 +118,11 @@ QUANTITIES: dict[str, Quantity] = {
             radius, track radius, wear track radius, disc track radius, sliding radius, bahnradius, laufradius, rayon,
             raggio, radio, promien, polomer, радиус, 半径, 반경
         """),
+        _quantity("shear stress", "tau", "Pa", "shear_stress_Pa", """
+            shear stress, shearstress, shear traction, friction stress, scherspannung, schubspannung,
+            contrainte de cisaillement, contrainte tangentielle, naprezenie styczne, 剪应力, 剪切应力, せん断応力,
+            전단응력
+        """),
         _quantity("normal stress", "sigma", "Pa", "normal_stress_Pa", """
             normal stress, effective normal stress, normalspannung, contrainte normale, naprezenie normalne, 正应力,
             法向应力, 垂直応力, 수직응력

@@ -71,6 +71,15 @@ def test_a_coefficient_and_a_stress_are_forces_on_the_nominal_area(tmp_path: Pat
     np.testing.assert_allclose(trace.force_N, 75e3 * MU, rtol=1e-5)
 
 
+def test_a_shear_stress_is_a_force_on_the_nominal_area(tmp_path: Path) -> None:
+    path = saved(tmp_path, "Time [s];Shear stress [MPa];Normal stress [MPa];Friction", 30 * MU, np.full(N, 30.0), MU)
+    with pytest.raises(ReadError, match="nominal_area_mm2"):
+        read_export(path)
+    trace = read_export(path, correction=Correction(area_m2=1e-4))
+    np.testing.assert_allclose(trace.force_N, 3000 * MU, rtol=1e-5)
+    np.testing.assert_allclose(load_of(trace), 3000.0)
+
+
 def test_a_torque_is_divided_by_the_radius_of_its_row(tmp_path: Path) -> None:
     radius = np.linspace(6.0, 15.0, N)
     path = saved(tmp_path, "Time [s];Torque [N mm];Radius [mm];Load [N];Speed [rpm]", 2.0 * radius, radius, LOAD,

@@ -54,7 +54,7 @@ _HEADERS = (  # words of a header, quantity, column of tests.csv, its unit in SI
 _FEWEST_ROWS = 8
 _SIZES = {  # fault of exports that say no size: key of campaign.toml, and what stands in for it
     "missing_load": ("", ""),
-    "missing_area": ("nominal_area_mm2", "a coefficient and a stress are recorded; forces are those on 1 mm2"),
+    "missing_area": ("nominal_area_mm2", "a stress is recorded in place of a force; forces are those on 1 mm2"),
     "missing_lever": ("lever_arm_mm", "a torque is recorded; friction forces are those on an arm of 1 mm"),
 }
 _BLOCKS = 200  # of a record, whose median speeds are those of the drive without the noise of its tachometer

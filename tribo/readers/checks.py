@@ -102,6 +102,9 @@ def _forces(arrays: Arrays, columns: list[Column], stated: Correction, file: str
     if how == "torque over lever arm":
         reason = f"torque over the lever arm of {(stated.lever_arm_m or 0.0) * 1e3:g} mm, as given"
         add("friction force", arrays["torque"] / (stated.lever_arm_m or 1.0), "torque", reason)
+    elif how == "shear stress times area":
+        reason = f"shear stress times the nominal area of {(stated.area_m2 or 0.0) * 1e6:g} mm2"
+        add("friction force", arrays["shear stress"] * float(stated.area_m2 or 0.0), "shear stress", reason)
     elif how == "torque over recorded radius":
         if not np.all(arrays["radius"] > 0):
             what, allowed = "a torque needs a radius above zero in every row", "lever_arm_mm = 2.5, or radius = none"

@@ -29,7 +29,7 @@ _MEANS_NORMAL_BESIDE_FRICTION = {  # beside a friction force, a friction coeffic
 }  # fmt: skip
 _A_RATIO_BESIDE_STRESS = {"friction", "friktion", "frottement", "tarcie", "reibung"}  # without a unit
 _LOAD_AND_PATH = ("normal force", "displacement")  # what a test is about: an unknown unit of theirs is a fault
-_ONLY_WITH_UNIT = ("radius", "normal stress")  # of no use without one, and missed by nobody
+_ONLY_WITH_UNIT = ("radius", "normal stress", "shear stress")  # of no use without one, and missed by nobody
 _A_RATIO = re.compile(r"\b(?:cof|coeff?|coefficient|koeffizient|coefficiente?)\b|friction factor|reibwert|reibzahl")
 _RPM = ("rpm", "RPM", "rev/min", "r/min", "1/min", "U/min", "tr/min", "obr/min", "об/мин", "转/分")
 _ACCELERATION = re.compile(r"m\s*/\s*s(?:ec)?\s*(?:\^?2|²)|m/s/s|m·?s(?:\^?-2|⁻²)")
@@ -251,13 +251,15 @@ def force_follows(there: Collection[str], stated: Correction) -> str:
     """How the friction force follows from the quantities of a table and what was stated; "" where it does not."""
     if "torque" in there and stated.lever_arm_m is not None:
         return "torque over lever arm"
-    if "friction coefficient" in there:
-        if "normal force" in there:
-            return "coefficient times recorded load"
-        if "normal stress" in there and stated.area_m2 is not None:
-            return "coefficient times recorded stress"
-        if stated.load_N is not None:
-            return "coefficient times stated load"
+    ratio = "friction coefficient" in there
+    if ratio and "normal force" in there:
+        return "coefficient times recorded load"
+    if "shear stress" in there and stated.area_m2 is not None:
+        return "shear stress times area"
+    if ratio and "normal stress" in there and stated.area_m2 is not None:
+        return "coefficient times recorded stress"
+    if ratio and stated.load_N is not None:
+        return "coefficient times stated load"
     return "torque over recorded radius" if {"torque", "radius"} <= set(there) else ""
 
 
@@ -403,8 +405,8 @@ def _missing(quantity: str, names: Sequence[str], there: set[str]) -> Problem:
         what = "the friction is recorded as a torque, without a friction force"
         ways = ["lever_arm_mm = 2.5, the distance of the contact from the axis"]
         return Problem("missing_lever", what, allowed="; ".join([*ways, here]))
-    elif {"friction coefficient", "normal stress"} <= there:
-        what = "a friction coefficient and a stress are recorded; the forces need the nominal area"
+    elif "shear stress" in there or {"friction coefficient", "normal stress"} <= there:
+        what = "the friction is recorded as a stress, or as a coefficient beside one; the forces need the nominal area"
         return Problem("missing_area", what, allowed="nominal_area_mm2 = 100, in campaign.toml or with --set")
     elif "friction coefficient" in there:
         what = "a friction coefficient is recorded, without a friction force or a load"
