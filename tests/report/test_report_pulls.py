@@ -11,7 +11,7 @@ import pytest
 
 from tribo.errors import Problem
 from tribo.figures.one_pull import pull_numbers
-from tribo.records import Phase, Study
+from tribo.records import Override, Phase, Study
 from tribo.report.pulls import trace_data, trace_picture
 from tribo.report.shell import script_json
 from tribo.report.tables import phases_table
@@ -81,3 +81,13 @@ def test_the_phases_of_a_pull_are_in_its_picture_its_figure_and_their_table(stud
     row = table[(table["test_id"] == "T0001") & (table["phase"] == "steady sliding")].iloc[0]
     assert (row["speed_mm_s"], row["normal_load_N"], row["force_N"], row["u_N"]) == (2.0, 5.0, 1.5, 0.01)
     assert row["evidence"] == "the drive moves"
+
+
+def test_stated_phases_are_a_peak_and_a_window_for_the_page(study: Study) -> None:
+    phases = (Phase("rise", 0.5, 1.0), Phase("steady sliding", 2.0, 9.0))
+    decided = Override(
+        "T0001", "phase", study.ingested.pulls["T0001"], study.ingested.traces["T0001"], "seen", phases=phases
+    )
+    changed = replace(study, ingested=replace(study.ingested, by_hand={"T0001": decided}))
+    record = json.loads(trace_data(changed, ["T0001"]))["T0001"]
+    assert record["decided"] == {"action": "move", "reason": "seen", "peak": 1.0, "window": [2.0, 9.0]}

@@ -158,10 +158,19 @@ def _pull_record(study: Study, test_id: str, points: int) -> dict[str, Any]:
         record["doubts"] = [[_short(time), "; ".join(what)] for time, what in doubts.items()]
     if decided is not None:
         record["automatic"] = _marks(decided.automatic)
-        record["decided"] = {
-            "action": decided.action, "reason": decided.reason, "peak": decided.peak_s, "window": decided.window_s,
-        }  # fmt: skip
+        record["decided"] = _decision(decided)
     return record
+
+
+def _decision(decided: Override) -> dict[str, Any]:
+    """A decision as the page takes it up: of stated phases the peak and the window that they give."""
+    rises = [phase.end_s for phase in decided.phases if phase.name == "rise"]
+    slides = [(phase.start_s, phase.end_s) for phase in decided.phases if phase.name == "steady sliding"]
+    return {
+        "action": "exclude" if decided.action == "exclude" else "move", "reason": decided.reason,
+        "peak": decided.peak_s if decided.peak_s is not None else next(iter(rises), None),
+        "window": decided.window_s or next(iter(slides), None),
+    }  # fmt: skip
 
 
 def _trace_record(trace: Trace, pull: Pull, points: int) -> dict[str, Any]:
