@@ -248,3 +248,19 @@ def test_the_static_force_of_a_ladder_read_as_one_is_that_of_its_start() -> None
     pull = read_pull(trace, test=TEST)
     assert not pull.static_N > 1.2
     assert "rise" not in [p.name for p in pull.phases if p.start_s > 10]
+
+
+def test_the_dead_time_at_the_end_of_each_stroke_is_a_hold_and_no_sliding_where_only_the_force_tells() -> None:
+    """Strokes of 2 N for 4 s; then the drive waits 2 s, the force relaxes to 1.6 N and is quiet."""
+    slide = [2.0 + noise(200, k, 0.03) for k in range(6)]
+    waits = 1.6 + 0.4 * np.exp(-np.arange(100) / 3)
+    force = np.concatenate([(-1) ** k * np.concatenate([one, waits]) for k, one in enumerate(slide)]) + noise(
+        1800, 9, 1e-4
+    )
+    record = Trace("rig", np.arange(1800) / 50, force)
+    assert [p.name for p in phases_of(record)].count("hold") == 5
+    assert {p.cycle for p in phases_of(record) if p.name == "stroke"} == {1, 2, 3}
+    for piece, options in pieces_of(record).values():
+        pull = evaluate(piece, replace(options, test=TEST))
+        assert pull.window_s[1] - piece.time_s[0] <= 4.1
+        assert pull.sliding_N == pytest.approx(2.0, abs=0.03)

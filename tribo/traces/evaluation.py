@@ -361,7 +361,7 @@ def _slid_unseen(trace: Trace, pull: Pull, test: Test | None) -> bool:
     Where fewer than four samples resolve the rise, the way from one of them to the next counts.
     """
     time, speed = trace.time_s, trace.columns.get("speed_m_s")
-    first, at = (int(k) for k in np.searchsorted(time, (pull.onset_s, pull.peak_s)))
+    first, at = (min(int(k), time.size - 1) for k in np.searchsorted(time, (pull.onset_s, pull.peak_s)))
     between_samples = "peak_between_samples" in pull.flags
     if between_samples:
         first = at - 1

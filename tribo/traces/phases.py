@@ -131,7 +131,11 @@ def course_of(trace: Trace, signal: Signal, contact_kind: str = "") -> Course:
         at_once = False
     if moving is None:
         stops, end = force_stops(signal, contact, in_motion=at_once), contact[1]
-        end = min(end, int(np.flatnonzero(drive.moving)[-1]) + 1 if drive else quiet_end(signal.force_N))
+        if drive is not None and drive.moving.any():
+            end = min(end, int(np.flatnonzero(drive.moving)[-1]) + 1)
+        else:
+            last = max(reversals(signal.force_N), default=0)
+            end = min(end, last + quiet_end(signal.force_N[last:]))
         end = max(end, stops[-1][1] + 1) if stops else end
     rests += [(a, b) for a, b in ((0, contact[0]), (contact[1], samples)) if b - a >= FEWEST_AT_REST]
     return Course(contact, end, tuple(stops), tuple(sorted(rests)), at_once)
@@ -144,8 +148,17 @@ def course_of_piece(trace: Trace, signal: Signal, *, starts_sliding: bool) -> Co
         end = int(np.flatnonzero(drive.moving)[-1]) + 1
         end = end if whole[1] - end >= FEWEST_AT_REST else whole[1]
     else:
-        end = quiet_end(signal.force_N)
+        held = _before_it_turns(signal.calm_N)
+        end = quiet_end(signal.force_N[:held])
+        end = end if end < held else whole[1]
     return Course(whole, end, (), (), starts_sliding)
+
+
+def _before_it_turns(force_N: FloatArray) -> int:
+    """The end of a stroke before its force goes over to the other direction."""
+    level = float(np.median(force_N[force_N.size // 2 :]))
+    held = np.flatnonzero(force_N * np.sign(level) >= (1.0 - _LEFT) * abs(level))
+    return int(held[-1]) + 1 if held.size else force_N.size
 
 
 def as_stated(course: Course, signal: Signal, phases: Sequence[Phase]) -> Course:
@@ -471,10 +484,12 @@ def _strokes(signal: Signal, drive: Drive | None, span: Range) -> list[_Span]:
             found += _between_strokes(found, first, last - first, "the drive")
         else:
             first = _reversal(signal, (begin, end), a)[1] if k else a
-            last = a + quiet_end(signal.force_N[a:b])
-            last = min(last, _reversal(signal, (begin, end), b)[0]) if b < end else last
+            turns_at = _reversal(signal, (begin, end), b)[0] if b < end else b
+            last = min(first + quiet_end(signal.force_N[first:turns_at]), turns_at)
             found += _between_strokes(found, first, last - first, "the force")
         found.append(_Span("stroke", first, last, "the drive moves" if told else "the force", cycle=cycle))
+        if not told and b < end and turns_at - last >= FEWEST_AT_REST:
+            found.append(_Span("hold", last, turns_at, "the force relaxes and is no longer rough"))
         cycle += k % 2
     if found and found[-1].last < end:
         found.append(_Span("end of the drive", found[-1].last, end, "the drive stands still"))
