@@ -255,7 +255,9 @@ def levels_of(values: FloatArray) -> list[tuple[int, int, float]]:
         jump = np.abs(after - before)
         noise = max(single * math.sqrt(2.0 / width), float(np.median(jump)))
         least = np.maximum(_STEP * np.minimum(np.abs(before), np.abs(after)), _OF_NOISE * noise)
-        for a, b in zip(*runs_of(jump > least), strict=True):
+        above = jump > least
+        del least  # a long record is not held once more
+        for a, b in zip(*runs_of(above), strict=True):
             first, last = int(a) + width, int(b) + width  # the middles of the windows
             if changing[max(first - width, 0) : last + width].any():
                 continue  # a narrower window has placed it
