@@ -12,7 +12,7 @@ import pytest
 
 from tribo import read_pull
 from tribo.readers import read_blocks
-from tribo.records import Pull, Test, Trace
+from tribo.records import PHASES, Pull, Test, Trace
 from tribo.traces import PullOptions, evaluate, phases_of, pieces_of, split_pulls
 from tribo.traces.drive import level_cuts, quiet_end, speed_level_m_s
 
@@ -264,3 +264,27 @@ def test_the_dead_time_at_the_end_of_each_stroke_is_a_hold_and_no_sliding_where_
         pull = evaluate(piece, replace(options, test=TEST))
         assert pull.window_s[1] - piece.time_s[0] <= 4.1
         assert pull.sliding_N == pytest.approx(2.0, abs=0.03)
+
+
+def any_channel(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Nothing, one value, noise, a walk, a step, a wave, a coarse resolution or one impulse, at any scale."""
+    k = np.arange(n)
+    shapes = [
+        np.zeros(n), np.full(n, rng.normal()), rng.standard_normal(n), np.cumsum(rng.standard_normal(n)),
+        np.where(k < rng.integers(n), 0.0, rng.normal()), np.sin(k / rng.uniform(1, 50)),
+        np.repeat(rng.standard_normal(n // 5 + 1), 5)[:n], np.where(k == rng.integers(n), 1.0, 0.0),
+    ]  # fmt: skip
+    return np.asarray(shapes[rng.integers(len(shapes))] * 10 ** rng.uniform(-6, 3))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_phases_of_any_record_follow_each_other_from_its_first_sample_to_its_last(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    for _ in range(40):
+        n = int(rng.choice([20, 25, 40, 100, 300]))
+        columns = {c: any_channel(rng, n) for c in ("speed_m_s", "normal_force_N") if rng.random() < 0.5}
+        x = any_channel(rng, n) if rng.random() < 0.5 else None
+        found = phases_of(Trace("any", np.arange(n) / 10, any_channel(rng, n), x, columns))
+        assert (found[0].start_s, found[-1].end_s) == (0.0, (n - 1) / 10)
+        assert all(one.end_s == other.start_s for one, other in pairwise(found))
+        assert all(phase.end_s > phase.start_s and phase.name in PHASES for phase in found)

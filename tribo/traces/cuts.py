@@ -35,8 +35,9 @@ def split_pulls(trace: Trace) -> tuple[Trace, ...]:
     load = trace.columns.get("normal_force_N")
     speed = trace.columns.get("speed_m_s", trace.columns.get("rotation_rev_per_s"))
     find = steps if cuts else _steps_or_levels
-    if load is not None:
+    if load is not None and np.isfinite(load).all():
         cuts += find(load)
+    speed = speed if speed is not None and np.isfinite(speed).all() else None
     if speed is not None:
         moving = np.abs(speed)
         rest = min(_AT_REST * float(moving.max()), at_rest_below(moving))

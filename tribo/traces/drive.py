@@ -113,6 +113,8 @@ def _slowest(pace: FloatArray, top: float) -> float:
     Levels of a ladder may lie far apart; each is less than twenty times the next lower one.
     """
     least = _AT_REST * top
+    if not top > 0:
+        return 0.0
     bins = np.floor(_BINS * np.log10(np.maximum(pace, 1e-9 * top) / top)).astype(int)
     while True:
         levels = np.bincount(bins[pace > least] + 9 * _BINS + 1)

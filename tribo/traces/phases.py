@@ -384,9 +384,19 @@ def phases_of(
     for phase in stated:
         first, last = (int(k) for k in np.searchsorted(signal.time_s, (phase.start_s, phase.end_s)))
         spans = [*_without(spans, first, last), _Span(phase.name, first, last, BY_HAND)]
-    spans.sort(key=lambda span: span.first)
     gaps = _gaps(signal.time_s)
-    return tuple(_phase(trace, signal, drive, gaps, span) for span in spans if span.last > span.first)
+    return tuple(_phase(trace, signal, drive, gaps, span) for span in _one_after_another(spans, samples))
+
+
+def _one_after_another(spans: Sequence[_Span], samples: int) -> Iterator[_Span]:
+    """Spans in their order, each from the end of the one before: strokes shorter than their reversals overlap."""
+    ordered = sorted((span for span in spans if span.last > span.first), key=lambda span: span.first)
+    begin = 0
+    for span, after in zip(ordered, [*ordered[1:], None], strict=True):
+        last = samples if after is None else after.first
+        if last > begin and begin < samples - 1:
+            yield replace(span, first=begin, last=last)
+            begin = last
 
 
 def _without(spans: Sequence[_Span], first: int, last: int) -> Iterator[_Span]:
@@ -470,6 +480,8 @@ def _start_from_rest(
 def _strokes(signal: Signal, drive: Drive | None, span: Range) -> list[_Span]:
     """The strokes of a motion to and fro, by the turns of the drive, else by the reversals of the force."""
     begin, end = span
+    if end - begin < MINIMUM_SAMPLES:
+        return []
     told = drive is not None and bool(drive.turns)
     turns = [turn for turn in drive.turns if begin < turn < end] if drive and told else []
     if not told:

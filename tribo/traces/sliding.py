@@ -93,6 +93,8 @@ def transient_end(force: FloatArray) -> int:
     is smallest; d at most half the record. It trades the bias of a transient against the loss of samples and
     has no threshold.
     """
+    if force.size == 0:
+        return 0
     batch = max(_BATCH, force.size // _MOST_BATCHES)
     means = condense(force, batch) if force.size >= 4 * batch else force
     step = batch if force.size >= 4 * batch else 1
