@@ -313,9 +313,10 @@ FEW = (60, 25)  # simulated campaigns that stand for chance
 
 
 def steps(s: Setup) -> np.ndarray:
-    """Twelve percent up for twelve tests, twelve percent down for the next twelve, and so on: no mechanism does it."""
+    """Sixteen percent up for twelve tests, as much down for the next twelve, and so on: no mechanism does it, and drift
+    does not either."""
     there = np.sin(2 * np.pi * s.observations.conditions.run_order / 24) > 0
-    return np.where(there, 0.12, -0.12)[:, None] * np.ones(2)
+    return np.where(there, 0.16, -0.16)[:, None] * np.ones(2)
 
 
 def half_and_half(s: Setup) -> np.ndarray:

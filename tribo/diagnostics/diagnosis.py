@@ -120,7 +120,9 @@ def examine(
 
     effects, screened, barred = screened_at(s)
     still, offset = held_still(s, s.group > PATTERN)
-    share = BESIDE_DRIFT if effects.model.score - (fit(still).score + offset) > FOR_A_CAUSE else 1.0
+    certain = effects.model.score - (fit(still).score + offset) > FOR_A_CAUSE
+    strongest = screened.contrasts[int(np.argmax(screened.strength))].column
+    share = BESIDE_DRIFT if certain and strongest != "time of day" else 1.0  # what comes back every day is no drift
     level, of_nuisance = share * level, level
     if screened.p.min() >= level:
         without = screened_at(still)
