@@ -18,7 +18,7 @@ import numpy as np
 from tribo.display import displayed
 from tribo.errors import Problem, TraceError
 from tribo.records import STANDARD_GRAVITY, FloatArray, Phase, Pull, Restart, Test, Trace
-from tribo.traces.cuts import directions_of, piece_of, split_pulls
+from tribo.traces.cuts import directions_of, piece_of, reversals, split_pulls
 from tribo.traces.drive import FEWEST_AT_REST, drive_of, speed_level_m_s
 from tribo.traces.loading import Zero, loading_of, starting_level
 from tribo.traces.oscillation import oscillation_of
@@ -345,7 +345,7 @@ def _first_motion(
 
 def _with_first_static(pull: Pull, trace: Trace, options: PullOptions) -> Pull:
     """A pull whose static force is read before the first step of load or speed, where its record has several levels."""
-    first = split_pulls(trace)[0]
+    first = trace if reversals(trace.force_N) else split_pulls(trace)[0]
     if not pull.peak_s > first.time_s[-1]:
         return pull
     try:
