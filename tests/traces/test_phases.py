@@ -288,3 +288,9 @@ def test_the_phases_of_any_record_follow_each_other_from_its_first_sample_to_its
         assert (found[0].start_s, found[-1].end_s) == (0.0, (n - 1) / 10)
         assert all(one.end_s == other.start_s for one, other in pairwise(found))
         assert all(phase.end_s > phase.start_s and phase.name in PHASES for phase in found)
+
+
+def test_a_pull_that_begins_below_zero_is_no_stroke() -> None:
+    time = np.arange(1000) / 50
+    force = np.interp(time, [0, 3, 5, 5.5, 20], [-1.0, -1.0, 1.0, 0.5, 0.5]) + noise(1000)
+    assert [p.name for p in phases_of(Trace("pull", time, force))] == ["rest", "rise", "slip", "steady sliding"]

@@ -486,6 +486,7 @@ def _strokes(signal: Signal, drive: Drive | None, span: Range) -> list[_Span]:
     turns = [turn for turn in drive.turns if begin < turn < end] if drive and told else []
     if not told:
         turns = [begin + k for k in reversals(signal.force_N[begin:end])]
+        turns = turns if len(turns) > 1 else []  # a pull that begins below zero passes it once
     found: list[_Span] = []
     cycle = 1
     for k, (a, b) in enumerate(pairwise([begin, *turns, end] if turns else [])):
