@@ -462,8 +462,8 @@ def diagnose(
     True
     """
     from tribo.diagnostics import examine, predictor as pattern_table, with_simulation
+    from tribo.diagnostics.conclusion import cannot_tell
     from tribo.diagnostics.diagnosis import DiagnosisWithoutModel
-    from tribo.diagnostics.too_little import cannot_tell
     from tribo.lawsearch.diagnosis_with_laws import with_law_across, with_laws
     from tribo.lawsearch.known_laws import read_laws
     from tribo.wording.verdict_sentences import worded

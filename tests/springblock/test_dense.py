@@ -17,7 +17,7 @@ from tribo.springblock.engines import ENGINES, state as k, strips
 from tribo.springblock.engines.active import advance
 from tribo.springblock.engines.fast import active_set, at_rest, integrate as run_fast, put_back, refuse_not_finite
 from tribo.springblock.engines.jit import VECTOR_OPTIONS
-from tribo.springblock.engines.start import Drive, Thresholds, drive_of, lattice_of, thresholds_of
+from tribo.springblock.engines.start import SliderDrive, Thresholds, drive_of, lattice_of, thresholds_of
 from tribo.springblock.engines.state import sliding_threshold, static_threshold
 from tribo.springblock.lattice import Lattice
 
@@ -40,7 +40,7 @@ def friction_of_block(cell: FloatArray, drive: FloatArray, t: float, c: k.Numeri
     return drive * strips.last_stretch(before, size, sliding), True
 
 
-def plain_steps(cells: FloatArray, steps: int, lattice: Lattice, drive_: Drive, c: k.Numerics) -> float:
+def plain_steps(cells: FloatArray, steps: int, lattice: Lattice, drive_: SliderDrive, c: k.Numerics) -> float:
     """The model block by block, counted from the quasi-static motion; returns the friction work."""
     work = 0.0
     drag = -c.mass * c.damping * drive_.follow

@@ -17,9 +17,10 @@ from scipy.stats import f as f_distribution, t as t_distribution
 
 from tribo.diagnostics.contrasts import share_beyond
 from tribo.diagnostics.gaps import enough_recorded
+from tribo.diagnostics.verdict import RepeatScatter
 from tribo.mechanisms.conditions import is_level
 from tribo.mechanisms.record import StringArray
-from tribo.records import FloatArray, Ingested, Pull, Regime, Test
+from tribo.records import REGIMES, FloatArray, Ingested, Pull, Regime, Test
 
 FEWEST_TESTS = 12
 SAME_LOAD = 0.02  # relative distance of loads that were meant to be one
@@ -484,3 +485,24 @@ def _ends(column: Regressor, size: FloatArray) -> tuple[FloatArray, FloatArray, 
     heights = levels @ size
     first, last = int(np.argmin(heights)), int(np.argmax(heights))
     return levels[first], levels[last], (column.levels[first], column.levels[last])
+
+
+def most_scattered(ingested: Ingested) -> RepeatScatter | None:
+    """The repeats that scatter most: tests of one sample at one load, speed and hold; None where nothing was repeated.
+    """
+    tests = [t for t in ingested.campaign.tests if t.test_id in ingested.pulls and t.normal_load_N > 0]
+    found = []
+    for sample in dict.fromkeys(t.sample for t in tests):
+        of_sample = [t for t in tests if t.sample == sample]
+        levels = load_levels(np.array([t.normal_load_N for t in of_sample]))
+        kinds = [(int(level), t.speed_m_s, t.hold_s) for level, t in zip(levels, of_sample, strict=True)]
+        for kind in dict.fromkeys(kinds):
+            repeats = [t for t, own in zip(of_sample, kinds, strict=True) if own == kind]
+            load = float(np.median([t.normal_load_N for t in repeats]))
+            for regime in REGIMES:
+                forces = np.array([getattr(ingested.pulls[t.test_id], f"{regime}_N") for t in repeats], float)
+                forces = forces[forces > 0]
+                if forces.size > 1:
+                    factor = float(forces.max() / forces.min())
+                    found.append(RepeatScatter(sample, regime, load, forces.size, factor))
+    return max(found, key=lambda scatter: scatter.factor, default=None)

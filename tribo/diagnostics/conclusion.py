@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from tribo.diagnostics.candidates import CauseCandidate, Named, judged, refitted, weights_of
+from tribo.diagnostics.column_search import most_scattered
 from tribo.diagnostics.contrasts import Screen
 from tribo.diagnostics.direct_evidence import Evidence, stated_evidence
 from tribo.diagnostics.effect_sizes import effect_of_contrast, percent
@@ -22,7 +23,8 @@ from tribo.diagnostics.inference import (
     pattern_excess,
 )
 from tribo.diagnostics.model import effect_of
-from tribo.diagnostics.planning import next_test_of
+from tribo.diagnostics.observations import observe, too_little
+from tribo.diagnostics.planning import more_tests, next_test_of
 from tribo.diagnostics.recorded_in_part import recorded_in_part
 from tribo.diagnostics.score_statistics import Absorption, StartEffects
 from tribo.diagnostics.verdict import (
@@ -40,7 +42,7 @@ from tribo.diagnostics.verdict import (
 )
 from tribo.mechanisms.record import Conditions, Mechanism
 from tribo.mechanisms.table import MECHANISMS
-from tribo.records import REGIMES, FloatArray
+from tribo.records import REGIMES, FloatArray, Ingested
 
 Weighed = tuple[CauseCandidate, float, Mapping[str, Estimate]]  # with its share and its parameters
 SHOWN = 8
@@ -318,6 +320,15 @@ def conclude(
             in_part=recorded_in_part(model, level),
         ),
     )
+
+
+def cannot_tell(ingested: Ingested) -> Verdict | None:
+    """The verdict on a campaign that is too small to be compared with the model; None where it is not."""
+    lack = too_little(observe(ingested))
+    if lack is None:
+        return None
+    lack = replace(lack, scatter=most_scattered(ingested))
+    return Verdict("cannot_tell", set_aside=ingested.set_aside, next_test=more_tests(lack), shows=lack)
 
 
 def _outcome(named: Named | None, excess: bool, direct: bool, level: float) -> Outcome:

@@ -20,7 +20,7 @@ from tribo.diagnostics.observations import NO_FLAT, Observations, conditions_of
 from tribo.diagnostics.predictor import Predictor, tabled_predictor
 from tribo.diagnostics.scatter import SIZE_PRIORS, Noise
 from tribo.diagnostics.score_statistics import start_effects
-from tribo.diagnostics.verdict import Misfit, NextTest, Outcome
+from tribo.diagnostics.verdict import Misfit, NextTest, Outcome, TooLittle
 from tribo.display import displayed
 from tribo.mechanisms.record import Conditions, Mechanism
 from tribo.mechanisms.table import MECHANISMS
@@ -239,6 +239,12 @@ def first_test_of(covariate: str) -> NextTest:
     """For a misfit that follows a column but no law: vary that column alone."""
     design = {"covariate": covariate, "pulls": PULLS, "hours": PULLS * HOURS_PER_PULL}
     return NextTest("vary one column", (covariate,), design)
+
+
+def more_tests(lack: TooLittle) -> NextTest:
+    """The fewest tests, loads and samples that can be tested."""
+    design = {"pulls": lack.fewest_tests, "loads": lack.fewest_loads, "samples": lack.fewest_samples}
+    return NextTest("measure more", (), design)
 
 
 def widening_test(conditions: Conditions, sample: str = "", hidden: Collection[str] = ()) -> NextTest | None:

@@ -16,10 +16,11 @@ from tribo.diagnostics.column_search import (
     ColumnEffect,
     RegimeTests,
     load_levels,
+    most_scattered,
     regime_tests,
     search_columns,
 )
-from tribo.diagnostics.too_little import more_tests, most_scattered
+from tribo.diagnostics.planning import more_tests
 from tribo.diagnostics.verdict import Cause, Estimate, Excluded, Layer, Misfit, NextTest, Outcome, TooLittle, Verdict
 from tribo.diagnostics.within_records import RunningIn, running_in, stroke_offset
 from tribo.mechanisms.record import ALONG_RECORDS, STROKES_APART

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tribo.mechanisms.days import days_of, in_one_run, is_day, on_its_day
+from tribo.mechanisms.covariate import days_of, in_one_run, is_day, on_its_day
 from tribo.mechanisms.record import (
     Base,
     Choosing,

@@ -11,7 +11,7 @@ from tribo.springblock.config import SimConfig
 from tribo.springblock.engines import state as k
 from tribo.springblock.engines.active import Active, active_of, advance, assist
 from tribo.springblock.engines.jit import uncollected
-from tribo.springblock.engines.start import Drive, Thresholds, Trajectory, drive_of, first_failure_s, once
+from tribo.springblock.engines.start import SliderDrive, Thresholds, Trajectory, drive_of, first_failure_s, once
 from tribo.springblock.engines.state import packed
 from tribo.springblock.engines.strips import places_of, planes_of
 from tribo.springblock.engines.team import helped
@@ -65,7 +65,7 @@ def in_chunks(
 
 
 def active_set(
-    state: k.State, numerics: k.Numerics, lattice: Lattice, drive: Drive, config: SimConfig, threads: int = 1
+    state: k.State, numerics: k.Numerics, lattice: Lattice, drive: SliderDrive, config: SimConfig, threads: int = 1
 ) -> Active:
     """What the compiled loop of the fast engine works on."""
     drag = -config.mass_kg * config.damping_per_s * drive.follow
@@ -84,7 +84,7 @@ def put_back(active: Active, state: k.State, numerics: k.Numerics) -> None:
 
 
 def at_rest(
-    config: SimConfig, lattice: Lattice, thresholds: Thresholds, drive: Drive, start_s: float
+    config: SimConfig, lattice: Lattice, thresholds: Thresholds, drive: SliderDrive, start_s: float
 ) -> tuple[k.State, k.Numerics]:
     """Everything at rest shortly before the first failure, and the constants of the run.
 
@@ -163,7 +163,7 @@ def refuse_not_finite(state: k.State, numerics: k.Numerics) -> None:
 
 
 def trajectory_of(
-    chunks: list[k.Samples], state: k.State, numerics: k.Numerics, drive: Drive, failure: float
+    chunks: list[k.Samples], state: k.State, numerics: k.Numerics, drive: SliderDrive, failure: float
 ) -> Trajectory:
     """The run as an engine returns it; SimulationError where it met a number that is not finite."""
     refuse_not_finite(state, numerics)

@@ -25,7 +25,7 @@ class Thresholds:
 
 
 @dataclass(frozen=True)
-class Drive:
+class SliderDrive:
     """Forces while everything sticks: on block i it is ``rate[i] * t``, the cavities moving at ``follow``."""
 
     velocity: FloatArray  # (2,) of the slider
@@ -86,7 +86,7 @@ def thresholds_of(config: SimConfig, lattice: Lattice) -> Thresholds:
     return Thresholds(holding, rubbing, rubbing + config.restrengthening * np.maximum(holding - rubbing, 0.0))
 
 
-def drive_of(config: SimConfig, lattice: Lattice) -> Drive:
+def drive_of(config: SimConfig, lattice: Lattice) -> SliderDrive:
     """Force rates under the slider's velocity, the cavities condensed quasi-statically."""
     angle = np.deg2rad(config.angle_deg)
     direction = np.array([np.cos(angle), np.sin(angle)])
@@ -96,10 +96,10 @@ def drive_of(config: SimConfig, lattice: Lattice) -> Drive:
     rate[~lattice.contact] = 0.0
     lag = -config.mass_kg * config.damping_per_s / config.stiffness_N_m * (lattice.lag[:-1] @ velocity)
     pulled = lattice.contact.size * config.speed_m_s - float((follow @ direction).sum())
-    return Drive(velocity, follow, rate, lag, config.shear_stiffness_N_m * pulled)
+    return SliderDrive(velocity, follow, rate, lag, config.shear_stiffness_N_m * pulled)
 
 
-def first_failure_s(lattice: Lattice, thresholds: Thresholds, drive: Drive, stiffness_N_m: float) -> float:
+def first_failure_s(lattice: Lattice, thresholds: Thresholds, drive: SliderDrive, stiffness_N_m: float) -> float:
     """Time at which the first contact block reaches its static threshold, exact for small rotations."""
     force = stiffness_N_m * lattice.spring_forces(drive.lag)[lattice.contact]
     rate = drive.rate[lattice.contact]
