@@ -256,3 +256,16 @@ def test_a_choice_does_not_lead_out_of_the_campaign(tmp_path: Path, file: str) -
     campaign = write_campaign(tmp_path, [f"R1,{file},F,F1,1", "R2,raw/F2.csv#*,F,F2,"])
     (aside,) = campaign.set_aside
     assert [p.kind for p in aside.problems] == ["path_outside_campaign"]
+
+
+def test_neither_an_approach_nor_a_load_that_is_not_held_exactly_makes_a_ladder(tmp_path: Path) -> None:
+    """Before contact the cell shows a fifth of the small load; under load it creeps by a tenth."""
+    campaign = write_campaign(tmp_path, ["R1,raw/F1.csv,F,F1,1"])
+    time = np.arange(0, 80, 0.05)
+    load = np.interp(time, [0, 15, 18, 40, 41, 60, 62, 80], [0.2, 0.2, 1.0, 1.0, 1.1, 1.1, 0.2, 0.2])
+    force = np.where((time > 15) & (time < 60), MU * load, 0.0)
+    scatter = 0.002 * np.random.default_rng(6).standard_normal((time.size, 2))
+    (tmp_path / "raw" / "F1.csv").write_text(
+        umt_text(np.column_stack([time, force, -load]) + np.pad(scatter, ((0, 0), (1, 0))))
+    )
+    assert list(stages.ingest(campaign).pulls) == ["R1"]

@@ -33,7 +33,7 @@ CHUNK = 16
 _UNLOADED = 0.05  # share of the largest load of an export below which a piece of it carries none
 _LABELLED = 0.9  # share of exports that name their own test from which on a header that names another one counts
 _FEWEST = 5
-_LEVELS_DIFFER = 0.08  # share by which the highest level of a speed or load exceeds the lowest where they make a ladder
+_LEVELS_DIFFER = 0.2  # share by which the highest level of a speed or load exceeds the lowest where they make a ladder
 _WORD = re.compile(r"[\w.+-]+")
 
 Progress = Callable[[str, int, int], None]
@@ -245,6 +245,7 @@ def _levels(trace: Trace, options: PullOptions) -> list[tuple[Trace | None, Pull
     """
     from tribo.traces import load_of, pieces_of
     from tribo.traces.drive import speed_level_m_s
+    from tribo.traces.phases import under_load_s
 
     test = options.test
     if "several_pulls" not in trace.flags or test is None:
@@ -256,6 +257,10 @@ def _levels(trace: Trace, options: PullOptions) -> list[tuple[Trace | None, Pull
         return []  # strokes
     loaded = dict(zip(pieces, _carry_load([piece for piece, _ in pieces.values()]), strict=True))
     pieces = {address: found for address, found in pieces.items() if loaded[address]}
+    begin_s, end_s = under_load_s(plain, options.contact)  # neither an approach nor a rest after the slide is a level
+    pieces = {a: found for a, found in pieces.items() if begin_s <= float(np.median(found[0].time_s)) <= end_s}
+    if len(pieces) < 2:
+        return []
     speeds, loads = (
         [of(piece) for piece, _ in pieces.values()] for of in (speed_level_m_s, lambda piece: load_of(piece)[0])
     )

@@ -174,7 +174,7 @@ def evaluate(trace: Trace | None, options: PullOptions = WHOLE) -> Pull:
         pull = _with_oscillation(replace(pull, recorded_load_N=load_N, recorded_load_u_N=load_u_N), trace, signal, test)
     except TraceError as fault:
         raise TraceError([p.at(file=trace.file or None, test_id=test.test_id) for p in fault.problems]) from None
-    doubts = _doubts(trace, pull, test)
+    doubts = _doubts(trace, pull, test, one_speed=options.begins != "reversal")
     flags = [*trace.flags, *(doubt.kind for doubt in doubts), *pull.flags]
     flags += ["impulsive"] if signal.impulsive else []
     flags += ["phases_by_hand"] if options.phases else []
@@ -610,10 +610,10 @@ def _with_oscillation(pull: Pull, trace: Trace, signal: Signal, test: Test) -> P
     )
 
 
-def _doubts(trace: Trace, pull: Pull, test: Test) -> list[Problem]:
+def _doubts(trace: Trace, pull: Pull, test: Test, *, one_speed: bool) -> list[Problem]:
     """Where what was recorded while sliding does not match the load or the speed of the test."""
     found = []
-    if trace.displacement_m is not None and test.speed_m_s and math.isfinite(pull.window_s[0]):
+    if one_speed and trace.displacement_m is not None and test.speed_m_s and math.isfinite(pull.window_s[0]):
         start, end = np.searchsorted(trace.time_s, pull.window_s)
         time_s = float(trace.time_s[end] - trace.time_s[start])
         travel_m = abs(float(trace.displacement_m[end] - trace.displacement_m[start]))

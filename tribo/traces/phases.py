@@ -421,6 +421,13 @@ def _under_load(trace: Trace, course: Course) -> Range:
     return begin, min(last, _falls_from(trace, course, begin))
 
 
+def under_load_s(trace: Trace, contact: str = "") -> tuple[float, float]:
+    """The times between which the bodies touch under load and the drive has not stopped for good."""
+    course = course_of(trace, signal_of(trace), contact)
+    begin, end = _under_load(trace, course)
+    return float(trace.time_s[begin]), float(trace.time_s[min(end, trace.time_s.size - 1)])
+
+
 def _reached(load: FloatArray, level: float) -> float:
     """The load from which on a level counts as reached."""
     return min(_LOADED * level, level - 2.0 * sample_noise(load))
