@@ -93,7 +93,7 @@ def _by_speed(speed: FloatArray, channel: str) -> Drive:
         if 0 < a < b < moving.size and b - a <= max(width // 4, 1) < width:
             moving[a:b] = True
     if width > 1:
-        moving = _narrowed(moving, int(width // 2 * (1.0 - 2.0 * min(least / top, 0.5))))
+        moving = _narrowed(moving, round(width // 2 * (1.0 - 2.0 * min(least / top, 0.5))))
     side = np.sign(pace) * (np.abs(pace) > max(least, _TURNED * top))
     decided = np.flatnonzero(side)
     turned = np.flatnonzero(np.diff(side[decided]))
