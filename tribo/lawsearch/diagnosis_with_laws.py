@@ -53,9 +53,8 @@ def with_laws(
     if answers:
         d = replace(d, verdict=replace(d.verdict, shows=replace(d.verdict.shows, known=answers)))
     settled = {name for law, told in answers if told.answer == "held" for name in law.law.columns}
-    strict, share = LEVEL_OF_LAWS * level, d.share_of_level
-    level, of_nuisance = share * level, level
-    found = discover_laws(with_known, level=strict, share_of_level=share, rng=rng, progress=progress, without=settled)
+    level, of_nuisance = d.share_of_level * level, level
+    found = discover_laws(with_known, level=LEVEL_OF_LAWS * level, rng=rng, progress=progress, without=settled)
     found = replace(found, of_causes=forms)
     if not found.laws and not held:
         return replace(d, laws=found)
@@ -97,10 +96,8 @@ def searched_laws(d: Diagnosis, *, seed: int = 0, level: float = 0.01, progress:
     ``level`` is that of a misfit; a law has to be beyond chance at LEVEL_OF_LAWS times it.
     """
     model, _, forms = without_refuted_causes(explained(d))
-    found = discover_laws(
-        model, level=LEVEL_OF_LAWS * level, share_of_level=d.share_of_level, rng=np.random.default_rng(seed),
-        progress=progress,
-    )  # fmt: skip
+    strict = LEVEL_OF_LAWS * d.share_of_level * level
+    found = discover_laws(model, level=strict, rng=np.random.default_rng(seed), progress=progress)
     return replace(found, of_causes=forms)
 
 

@@ -50,7 +50,6 @@ def discover_laws(
     rng: np.random.Generator | None = None,
     progress: Progress | None = None,
     without: Collection[str] = (),
-    share_of_level: float = 1.0,
 ) -> Discovery:
     """Add the best law of the grammar while it is beyond what chance gives the best of all laws.
 
@@ -71,8 +70,6 @@ def discover_laws(
         Called with the stage, the simulated campaigns done and their number.
     without : collection of str
         Columns that have a law already.
-    share_of_level : float
-        Of the level, for laws that are none of time alone: these have to predict sessions left out instead.
     """
     rng = rng or np.random.default_rng(0)
     found: list[FoundLaw] = []
@@ -87,14 +84,13 @@ def discover_laws(
             break
         scored = _scored(model, grammar)
         best, _, strongest = scored[0]
-        here = level if set(best.columns) <= TIMES else share_of_level * level
         table, searched = table or tuple(scored[:SHOWN]), searched or grammar.size
         # after Wilks, the chance that a law gains so much if it is the only one tried: less than that of the best of
         # all, so that a law which fails here needs no simulated campaigns
-        if float(chdtrc(1, 2.0 * max(strongest, 0.0))) >= here:
+        if float(chdtrc(1, 2.0 * max(strongest, 0.0))) >= level:
             break
         p = share_beyond(_best_by_chance(model, grammar, strongest, (replicates, rng), progress), strongest)
-        if p >= here:
+        if p >= level:
             break
         law = choose_form(model, grammar, best, p, rng)
         if set(law.law.columns) <= TIMES and not _predicts_sessions(model, law.model):
