@@ -249,7 +249,10 @@ def budget(w: Written, text: str, context: dict[str, str]) -> str:
 
     def share(found: re.Match[str]) -> str:
         here = (table["sample"].astype(str) == context["row"]) & (table["regime"] == context["cell"])
-        row = table[here & (table["component"] == found[2])]
+        name = found[2].removesuffix(", assumed")
+        row = table[here & (table["component"] == name)]
+        assumed = str(row["origin"].iloc[0]).startswith("default")
+        w.equal(f"{context['row']}, part of the uncertainty", found[2], f"{name}, assumed" if assumed else name)
         mu, tau0 = (float(row[f"share_pct_{n}"].iloc[0]) for n in ("mu", "tau0_kPa"))
         if found[1]:
             expected = f"{mu if found[1] == 'μ: ' else tau0:.0f}"
