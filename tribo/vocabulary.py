@@ -38,6 +38,7 @@ COLUMNS = {
     "humidity_pct": ColumnWords("the humidity", "humidity", "Relative humidity (%)", "%"),
     # quantities that follow from what is recorded
     "elapsed_s": ColumnWords("the time since the first pull", unit="h", factor=1 / 3600),
+    "clock_h": ColumnWords("the time of day", unit="h"),
     "speed_m_s": ColumnWords("the pull speed", unit="mm/s", factor=1e3),
     "pressure_Pa": ColumnWords("the nominal pressure", unit="kPa", factor=1e-3),
     "contact_pressure_Pa": ColumnWords("the contact pressure", unit="kPa", factor=1e-3),

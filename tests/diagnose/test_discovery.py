@@ -21,8 +21,17 @@ from tribo.errors import CampaignError
 from tribo.figures.extended_model import draw_law, law_numbers, law_numbers_of
 from tribo.lawsearch import diagnosis_with_laws
 from tribo.lawsearch.diagnosis_with_laws import law_layers, searched_laws, separating_test, with_laws, with_misfits
-from tribo.lawsearch.grammar import ADHESION_TERM, LOAD_TERM, UNITS, Shape, WrittenLaw, scopes_of, shapes_of
-from tribo.lawsearch.known_laws import validate_law
+from tribo.lawsearch.grammar import (
+    ADHESION_TERM,
+    LOAD_TERM,
+    UNITS,
+    Shape,
+    WrittenLaw,
+    fine_shapes,
+    scopes_of,
+    shapes_of,
+)
+from tribo.lawsearch.known_laws import validate_law, why_not_testable
 from tribo.lawsearch.law_file import law_text, read_law
 from tribo.lawsearch.model_choice import FoundLaw
 from tribo.lawsearch.scoring import Grammar, Projection
@@ -86,6 +95,45 @@ def test_laws_of_the_two_pressures_are_told_apart_at_equal_contact_pressures() -
 
 def nothing(s: Setup) -> np.ndarray:
     return np.zeros((s.observations.n, 2))
+
+
+DAYS = Design(repeats=2)
+
+
+def afternoons(s: Setup) -> np.ndarray:
+    """Sliding and static friction are higher by 20 % after 13 h, on every day."""
+    return np.where(s.observations.conditions.clock_h[:, None] > 13.0, 0.2, 0.0) * np.ones(2)
+
+
+def test_an_effect_of_afternoons_is_told_as_a_step_of_the_time_of_day() -> None:
+    law, *_ = discover_laws(baseline(made(afternoons, seed=5, design=DAYS)), replicates=20).laws
+    assert law.law.columns == ("clock_h",)
+    assert law.law.shapes[0].kind == "step"
+    assert law.law.shapes[0].place == pytest.approx(13.0, abs=0.25)
+    assert "where the time of day is above 1" in law_sentence(law)
+
+
+def test_a_law_of_the_time_of_day_is_not_tested_where_no_time_was_recorded() -> None:
+    c = replace(baseline(made(nothing, seed=1)).setup.observations.conditions, clock_h=np.array([]))
+    assert why_not_testable(c, WrittenLaw((Shape("step", "clock_h", 8.0, 17.0, place=13.0),))) is not None
+
+
+def one_afternoon(s: Setup) -> np.ndarray:
+    """Friction is higher by 80 % after 13 h of the first day alone."""
+    return afternoons(s) * 3.0 * (s.observations.conditions.elapsed_s[:, None] < 43_200.0)
+
+
+def test_one_afternoon_is_no_law_of_the_time_of_day() -> None:
+    others = {"run_order", "specimen_run", "elapsed_s", "date"}
+    found = discover_laws(baseline(made(one_afternoon, seed=5, design=DAYS)), replicates=20, without=others)
+    assert "clock_h" not in {name for law in found.laws for name in law.law.columns}
+
+
+def test_no_wave_of_the_time_since_the_first_pull_stands_for_a_day() -> None:
+    c = baseline(made(nothing, seed=1, design=DAYS)).setup.observations.conditions
+    waves = {(s.column, s.width) for (s, *_), _ in shapes_of(c) if s.kind == "wave" and s.column != "run_order"}
+    assert waves == {("clock_h", 24.0), ("clock_h", 12.0), ("clock_h", 8.0)}
+    assert {len(fine_shapes(Shape("wave", name, width=width), c)) for name, width in waves} == {1}
 
 
 @pytest.fixture(scope="module")

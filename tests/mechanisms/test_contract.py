@@ -36,6 +36,7 @@ def conditions() -> Conditions:
         temperature_C=rng.normal(23.0, 1.0, n),
         humidity_pct=rng.normal(50.0, 4.0, n),
         clip_N=np.full(n, 0.02),
+        clock_h=8.0 + 420.0 / 3600.0 * np.arange(n),
         columns={
             "operator": np.where(np.arange(n) % 2 == 0, "ann", "bo"),
             "date": np.where(np.arange(n) % 24 < 13, "2026-03-04", "2026-03-05"),

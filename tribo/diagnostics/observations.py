@@ -84,9 +84,10 @@ def observe(ingested: Ingested) -> Observations:
     traces = [ingested.traces.get(t.test_id) for t in tests]
     force = np.array([[p.static_N, p.sliding_N] for p in pulls]).reshape(-1, 2)
     error = np.array([[p.static_u_N, p.sliding_u_N] for p in pulls]).reshape(-1, 2)
+    conditions = conditions_of(campaign, tests, pulls, traces)
     return Observations(
         test_ids=np.array([t.test_id for t in tests], str),
-        conditions=conditions_of(campaign, tests, pulls, traces),
+        conditions=conditions,
         patterns=dict(campaign.samples),
         log_force=np.log(force),
         reading=np.nan_to_num(error / force, nan=0.0, posinf=0.0),
@@ -95,7 +96,7 @@ def observe(ingested: Ingested) -> Observations:
         rise_N_per_m=np.array([p.rise_stiffness_N_per_m for p in pulls]),
         stick_slip_N=np.array([p.stick_slip_amplitude_N for p in pulls]),
         noise_N=np.array([p.noise_N for p in pulls]),
-        clock_h=np.array([_clock_h(t.started_at) for t in tests]),
+        clock_h=conditions.clock_h,
         flat=campaign.flat_sample or NO_FLAT,
         set_aside=(*ingested.set_aside, *left_out),
         measured=dict(campaign.measured),
@@ -167,6 +168,7 @@ def conditions_of(
         pattern=np.array([p.name for p in patterns], str),
         without=_without(tests),
         mass_kg=_numbers([t.mass_kg for t in tests] if any(t.mass_kg for t in tests) else []),
+        clock_h=np.array([_clock_h(t.started_at) for t in tests]),
     )
     return with_gaps_filled(recorded, np.array([t.started_at[:10] for t in tests], str))
 

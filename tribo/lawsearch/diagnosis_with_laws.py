@@ -64,6 +64,8 @@ def with_laws(
     gone = {**(lost if found.laws else {}), **replaced}
     verdict = with_misfits(without_causes(d.verdict, gone), found)
     explained_by_laws = settled | {name for law in found.laws for name in law.law.columns}
+    if "clock_h" in explained_by_laws:
+        explained_by_laws.add("time of day")  # its name among the contrasts
     open_columns = {
         contrast.column for contrast, p in zip(left.contrasts, left.p, strict=True)
         if p < level and contrast.kind != "mechanism" and contrast.column not in explained_by_laws

@@ -26,6 +26,7 @@ ALL, PATTERNED, FLAT, CAVITY_SHARE, RIM, ELONGATION = "all", "patterned", "flat"
 UNITS = {
     "pressure_Pa": "Pa", "contact_pressure_Pa": "Pa", "run_order": "", "specimen_run": "", "elapsed_s": "s",
     "temperature_C": "°C", "humidity_pct": "%", "speed_m_s": "m/s", "hold_s": "s",
+    "clock_h": "h",
 }  # fmt: skip
 LARGEST = 3.0  # of an amplitude in ln T
 AMPLITUDES = "abcde"  # of a wave two, of levels one less than there are values
@@ -256,7 +257,8 @@ def column_values(c: Conditions, name: str) -> FloatArray:
         The campaign has no such column.
     """
     if name in UNITS:
-        return np.asarray(getattr(c, name), float)
+        known = np.asarray(getattr(c, name), float)
+        return known if len(known) else np.full(len(c.sample), np.nan)
     values = np.full(len(c.columns[name]), np.nan)
     for k, text in enumerate(c.columns[name]):
         with suppress(ValueError):
@@ -271,7 +273,8 @@ def recorded_values(c: Conditions, name: str) -> FloatArray:
     return values[known & ~c.gaps[name].missing] if name in c.gaps else values[known]
 
 
-DAY_S = 86400.0
+DAY_H = 24.0
+FEWEST_HOURS = 2.0  # of the day in which pulls were made: a shorter time has no afternoon
 WIDE = 3.0  # ratio of the largest to the smallest value above which a logarithm differs from a line
 LEVELS = 12  # names of a column that may each have an effect of its own
 CYCLES = 12  # of a wave over the series
@@ -318,6 +321,11 @@ def shapes_of(c: Conditions, without: Collection[str] = ()) -> list[tuple[tuple[
 
 def _of_column(name: str, x: FloatArray) -> Iterator[Shape]:
     low, high, distinct = float(x.min()), float(x.max()), np.unique(x)
+    if name == "clock_h":
+        if high - low > FEWEST_HOURS:
+            yield from (Shape("step", name, low, high, place=float(p)) for p in _hours_between(distinct))
+            yield from _waves(name, low, high, 1.0)
+        return
     yield Shape("linear", name, low, high, place=0.5 * (low + high))
     if low > 0 and high / low > WIDE:
         yield Shape("log", name, low, high, place=float(np.sqrt(low * high)))
@@ -343,13 +351,17 @@ def _of_column(name: str, x: FloatArray) -> Iterator[Shape]:
     if name == "run_order" and len(distinct) > 18:
         yield from _waves(name, low, high, 0.5)
         yield from _windows(name, low, high, TENTHS)
-    if name == "elapsed_s" and high - low > DAY_S:
-        yield from _waves(name, low, high, 1.0)
+
+
+def _hours_between(hours: FloatArray) -> FloatArray:
+    """Half hours between the first and the last pull of a day: what begins at an hour begins at it on every day."""
+    halves = np.arange(np.ceil(2.0 * hours[0]), np.floor(2.0 * hours[-1]) + 1.0) / 2.0
+    return np.asarray(halves[(halves > hours[0]) & (halves < hours[-1])])
 
 
 def _waves(name: str, low: float, high: float, step: float) -> Iterator[Shape]:
-    """Periods of whole steps of the turns: in the series, up to so many; of the time, in one day, up to three."""
-    whole, most = (DAY_S, 3.0) if name == "elapsed_s" else (high - low + 1, CYCLES - 0.5)
+    """Periods of whole steps of the turns: in the series, up to so many; in one day, up to three."""
+    whole, most = (DAY_H, 3.0) if name == "clock_h" else (high - low + 1, CYCLES - 0.5)
     turns = np.arange(1.0, most + 0.5 * step, step)
     yield from (Shape("wave", name, low, high, width=float(whole / k)) for k in turns)
 
@@ -379,8 +391,8 @@ def _windows(name: str, low: float, high: float, parts: int) -> Iterator[Shape]:
 
 def fine_shapes(s: Shape, c: Conditions) -> list[Shape]:
     """The shapes of the same kind on the same column with places and widths on a fine grid."""
-    if s.kind in ("linear", "log", "level", "levels"):
-        return [s]
+    if s.kind in ("linear", "log", "level", "levels") or (s.kind == "wave" and s.column == "clock_h"):
+        return [s]  # a day has 24 hours
     x = recorded_values(c, s.column)
     low, high, distinct = float(x.min()), float(x.max()), np.unique(x)
     reach = high - low
@@ -420,6 +432,8 @@ def _from_zero(s: Shape, share: float) -> Shape:
 def refined_shapes(s: Shape, c: Conditions) -> list[Shape]:
     """Shapes about one of the fine grid, with places between its neighbours; none where the grid says all there is."""
     if s.kind not in ("step", "ramp", "optimum", "hump", "soft step", "window", "wave"):
+        return []
+    if s.column == "clock_h" and s.kind == "wave":
         return []
     x = np.unique(recorded_values(c, s.column))
     near = 2.0 * float(np.ptp(x)) / (FINE - 1)

@@ -22,7 +22,7 @@ CAMPAIGNS_AT_ONCE = 20
 RESCORED, RESCORED_MEASURED = 60, 400  # best laws at the fitted noise that are scored with each campaign's own noise
 SHOWN = 25  # of the best laws, in the table
 MOST_LAWS = 3
-TIMES = {"run_order", "elapsed_s", "date"}  # what days and drift follow as well
+TIMES = {"run_order", "elapsed_s", "clock_h", "date"}  # what days and drift follow as well
 BEYOND_DRIFT = 2.0  # standard errors by which a law of time has to predict sessions left out better than drift
 
 

@@ -123,10 +123,11 @@ def names_in(cell: str) -> list[str]:
 class Conditions:
     """What is recorded about every test, arrays of shape (n,); NaN where a column is not recorded.
 
-    ``rim_per_m`` is rim length per nominal area, ``cavity_width_m`` the smaller cavity size (0 on a flat
-    sample), ``elongation`` ln(long/short) of the cavity, positive when pulled along its long side and
-    negative across it, ``specimen_run`` counts the pulls of a specimen from 1, ``elapsed_s`` the time since
-    the first pull, ``clip_N`` = k v / (2 f_s), the mean loss of a peak between two samples of the recorder.
+    ``rim_per_m`` is rim length per nominal area, ``cavity_width_m`` the smaller cavity size (0 on a flat sample),
+    ``elongation`` ln(long/short) of the cavity, positive when pulled along its long side and negative across it,
+    ``specimen_run`` counts the pulls of a specimen from 1, ``elapsed_s`` the time since the first pull, ``clock_h`` the
+    time of day (empty where no time was recorded), ``clip_N`` = k v / (2 f_s), the mean loss of a peak between two
+    samples of the recorder.
     ``columns`` holds every further recorded column as text, names that were not recorded being empty. ``gaps`` are the
     cells of columns of numbers that were filled, by the name of the field or column. ``pattern`` names the pattern of
     each test: ``Sx`` and ``Sy`` may be S along x and y, or patterns of these names. ``without`` names the mechanisms
@@ -155,6 +156,7 @@ class Conditions:
     without: StringArray = field(default_factory=lambda: np.array([], str))
     gaps: Mapping[str, Gaps] = field(default_factory=dict)
     mass_kg: FloatArray = field(default_factory=lambda: np.array([]))
+    clock_h: FloatArray = field(default_factory=lambda: np.array([]))
 
     def recorded(self, name: str) -> FloatArray:
         """A column of numbers by the name of its field, (n,), NaN where none was recorded."""
