@@ -216,3 +216,12 @@ def test_intervals_of_a_combined_fit_take_the_degrees_of_freedom_of_both_parts(s
     low, high = fit.interval("mu")
     assert fit.effective_dof(np.array([1.0, 0.0])) == pytest.approx(study.fits[0].dof * 100**2)
     assert (high - low) / 2 == pytest.approx(1.96 * fit.standard_uncertainty("mu"), rel=1e-3)
+
+
+def test_the_card_says_that_the_interval_of_a_cause_holds_if_its_formula_is_right(study: Study) -> None:
+    said = "The 90 % interval of the size holds if the formula is right (suction under the cavities)."
+    cause = LAYER | {"formula": MECHANISMS["suction"].formula}
+    assert said in card_of(study, verdict_of(FOUND | {"layers": [cause]})).to_know
+    without_formula = [cause | {"kind": "remainder"}, cause | {"formula": ""}, cause | {"low": float("nan")}]
+    for layer in without_formula:
+        assert not any("formula is right" in s for s in card_of(study, verdict_of(FOUND | {"layers": [layer]})).to_know)

@@ -137,6 +137,10 @@ def to_know(study: Study, verdict: Verdict | None) -> Iterator[str]:
         if ties := [names for names in verdict.equivalent if len(names) > 1]:
             tied = "; ".join(" or ".join(map(name_in_words, names)) for names in ties)
             yield f"The data fit each of these equally well: {tied}."
+        sized = [n.name for n in verdict.layers if n.kind == "cause" and n.formula and np.isfinite(n.low)]
+        if sized:
+            causes = joined([name_in_words(n) for n in dict.fromkeys(sized)])
+            yield f"The 90 % interval of the size holds if the formula is right ({causes})."
         if untested := dict.fromkeys(e.mechanism for e in verdict.not_testable):
             yield f"This design cannot test {joined([name_in_words(n) for n in untested])}."
     moved = sum(1 for t in study.ingested.by_hand if t in study.ingested.pulls)
