@@ -75,7 +75,11 @@ class SledLaw:
 
 @dataclass(frozen=True)
 class SledDesign:
-    """What is pulled: samples, loads, specimens and repeats, in an order drawn at random."""
+    """What is pulled: samples, loads, specimens and repeats, in an order drawn at random.
+
+    With ``holds_s`` the time at rest of each pull is drawn from them. ``ageing`` multiplies the static force by a
+    factor of that time.
+    """
 
     laws: Mapping[str, SledLaw]
     masses_g: Sequence[float] = (5.0, 25.0, 50.0, 138.5)
@@ -85,6 +89,8 @@ class SledDesign:
     nominal_area_mm2: float = 55.0
     speed_mm_s: float = 0.2
     hold_s: float = 10.0
+    holds_s: Sequence[float] = ()
+    ageing: Callable[[float], float] = field(default=lambda _: 1.0)
     specimen_scatter: float = 0.04
     repeat_scatter: float = 0.03
     tribometer: SledTribometer = field(default_factory=SledTribometer)
@@ -168,6 +174,8 @@ def write_campaign(
         load_N = (mass_g + design.slider_mass_g) * 1e-3 * STANDARD_GRAVITY
         forces = design.laws[sample].forces_N(load_N, design.nominal_area_mm2 * 1e-6)
         static_N, sliding_N = (f * gain * rng.normal(1.0, design.repeat_scatter) for f in forces)
+        hold_s = float(rng.choice(design.holds_s)) if design.holds_s else design.hold_s
+        static_N *= design.ageing(hold_s)
         test_id = f"T{order:03d}"
         signals = design.tribometer.pull(
             max(static_N, sliding_N), sliding_N, design.speed_mm_s * 1e-3, rng
@@ -182,7 +190,7 @@ def write_campaign(
                 "direction": direction,
                 "mass_g": f"{mass_g:g}",
                 "speed_mm_s": f"{design.speed_mm_s:g}",
-                "hold_s": f"{design.hold_s:g}",
+                "hold_s": f"{hold_s:g}",
                 "repeat": repeat,
                 "run_order": order,
                 "started_at": (start + timedelta(minutes=8 * (order - 1))).isoformat(),

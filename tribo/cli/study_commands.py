@@ -246,18 +246,41 @@ def report(console: Console, campaign: Path, out: Path, dry_run: bool, **options
 @model_options
 @command_options
 def demo(console: Console, out: Path, **options: Any) -> int:
-    """Write the report on the bundled example."""
-    from tribo.files import data_dir
+    """Write the reports on the two bundled examples.
 
-    status = _run_stages(console, data_dir() / "example", out, "report", False, **options)
-    console.say(f"open {out / 'report.html'}")
-    return status
+    The samples of the first obey the laws that Berardo et al. measured: the known physics does not explain all of it
+    (OUT/report.html). In the exports of the second a cause is hidden, and found (OUT/cause-found/report.html).
+    OUT/index.html leads to both.
+    """
+    from tribo.files import data_dir
+    from tribo.report.demo_page import SECOND, write_demo_page
+    from tribo.wording.terminal import card_text
+
+    cards: list[Card] = []
+
+    def conclude(console: Console, study: Study, folder: Path, verdict: Verdict | None, card: Card | None) -> int:
+        assert card is not None
+        cards.append(card)
+        return console.status_after(study.ingested.set_aside)
+
+    folders = {out: data_dir() / "example", out / SECOND: data_dir() / "second_example"}
+    statuses = [
+        _run_stages(console, campaign, folder, "report", False, conclude=conclude, **options)
+        for folder, campaign in folders.items()
+    ]
+    page = write_demo_page(out)
+    reports = {folder / "report.html": card for folder, card in zip(folders, cards, strict=True)}
+    record = {"out": str(out), "page": str(page), "cards": {str(r): card.as_dict() for r, card in reports.items()}}
+    console.result(record, "\n\n".join(f"{path}\n{card_text(card)}" for path, card in reports.items()))
+    console.say(f"open {page}")
+    return max(statuses)
 
 
 def _run_stages(
-    console: Console, path: Path, out: Path, until: Until, dry_run: bool, columns: str, **options: Any
-) -> int:
-    """Run the stages up to ``until`` on one campaign and write their results."""
+    console: Console, path: Path, out: Path, until: Until, dry_run: bool, columns: str,
+    conclude: Callable[[Console, Study, Path, Verdict | None, Card | None], int] | None = None, **options: Any,
+) -> int:  # fmt: skip
+    """Run the stages up to ``until`` on one campaign, write their results and tell of them: by ``conclude``, or all."""
     from tribo import stages
     from tribo.campaign import open_campaign
     from tribo.report import write_until
@@ -275,7 +298,7 @@ def _run_stages(
         verdict = found.verdict if found else None
         card = card_of(study, verdict) if until == "report" else None
         write_until(study, out, until, drawing, provenance_of_run(study, path, chosen), found, card)
-    return _conclude(console, study, out, verdict, card)
+    return (conclude or _conclude)(console, study, out, verdict, card)
 
 
 def _diagnosed(
