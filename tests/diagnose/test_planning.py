@@ -20,15 +20,17 @@ from tribo.diagnostics import (
 from tribo.diagnostics.candidates import CauseCandidate, weigh
 from tribo.diagnostics.model import PATTERN, Acting, candidates, effect_of
 from tribo.diagnostics.observations import enough, observe
-from tribo.diagnostics.planning import Finding, Plan, next_test
+from tribo.diagnostics.planning import Finding, Plan, first_test_of, next_test
 from tribo.diagnostics.scatter import first_noise
 from tribo.diagnostics.score_statistics import start_effects
 from tribo.errors import FitError
 from tribo.mechanisms.table import MECHANISMS
 from tribo.records import Ingested
+from tribo.wording.part_sentences import next_test_sentence
+from tribo.wording.verdict_sentences import worded
 
 from .known import LAW, acting, baseline, made, setup_of
-from .synthetic import Design, hidden
+from .synthetic import SMALL, Design, hidden
 
 LADDER = Design(speeds_mm_s=(0.05, 0.2, 0.8), holds_s=(1.0, 10.0, 300.0))
 
@@ -176,3 +178,40 @@ def test_the_design_of_a_next_test_says_in_full_what_to_make() -> None:
     assert pulls.design["without"] == "suction" or pulls.design["normal_load_N"] > 0
     vented = set(pulls.design.get("repeat_tests", ()))
     assert vented <= {t.test_id for t in campaign().campaign.tests if t.sample == pulls.design["sample"]}
+
+
+@pytest.fixture(scope="module")
+def faster() -> Diagnosis:
+    design = replace(SMALL, speeds_mm_s=(0.1, 0.2, 0.8))
+    return examine(hidden(("velocity_dependence", 3.0), design=design), replicates=(20, 10))
+
+
+def test_a_cause_without_a_rival_is_confirmed_at_values_that_were_not_measured(faster: Diagnosis) -> None:
+    (cause,) = faster.verdict.causes
+    assert cause.mechanism == "velocity_dependence"
+    test = faster.verdict.next_test
+    assert test is not None
+    assert (test.separates, test.design["covariate"]) == (("velocity_dependence",), "speed_m_s")
+    low, middle, high = test.design["values"]
+    assert low < 1e-4 < 2e-4 < middle < 8e-4 < high
+    assert 0.1 < test.expected_bits <= 1.0
+    text = worded(faster.verdict)
+    assert text.next_test is not None
+    assert "the pull speed at 0.05, 0.4 and 1.6 mm/s" in text.next_test.text
+
+
+def test_the_predicted_change_of_a_confirming_test_is_that_of_the_formula(faster: Diagnosis) -> None:
+    test = faster.verdict.next_test
+    assert test is not None
+    a = faster.verdict.causes[0].parameters["a"].value
+    low, _, high = test.design["values"]
+    by_formula = (1 + a * np.log(high / 2e-4)) / (1 + a * np.log(low / 2e-4))
+    assert test.design["expected_percent"] == pytest.approx(100 * (by_formula - 1), rel=1e-3)
+
+
+def test_two_columns_that_act_together_are_varied_each_with_each() -> None:
+    words = next_test_sentence(first_test_of("humidity_pct", "hold_s"))
+    assert words == (
+        "Set the humidity and the hold time to their lowest and highest value, each with each, in random order, "
+        "on one sample at one load: 18 pulls."
+    )

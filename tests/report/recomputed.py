@@ -314,7 +314,8 @@ def figures(w: Written) -> None:
     table, cells, points = w.table("diagnosis"), w.table("figures/misfit"), w.table("figures/finding")
     if not len(table):
         return
-    means = table.groupby(["regime", "sample"])["residual_calibrated_percent"].mean()
+    ratios = np.log1p(table["residual_calibrated_percent"] / 100)
+    means = 100 * np.expm1(ratios.groupby([table["regime"], table["sample"]]).mean())
     for cell in cells[(cells["covariate"] == "mean") & cells["observable"].isin(["static", "sliding"])].itertuples():
         w.equal(f"heat map {cell.row}", f"{cell.effect_percent:.4f}", f"{means[cell.observable, cell.row]:.4f}")
     by_test = table.set_index([table["regime"], table["test_id"].astype(str)])["residual_calibrated_percent"]

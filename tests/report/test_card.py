@@ -225,3 +225,16 @@ def test_the_card_says_that_the_interval_of_a_cause_holds_if_its_formula_is_righ
     without_formula = [cause | {"kind": "remainder"}, cause | {"formula": ""}, cause | {"low": float("nan")}]
     for layer in without_formula:
         assert not any("formula is right" in s for s in card_of(study, verdict_of(FOUND | {"layers": [layer]})).to_know)
+
+
+@pytest.mark.parametrize("notes", [0, 3, 5, 20])
+def test_the_card_in_a_terminal_has_at_most_eight_lines_with_the_next_test_last(card: Card, notes: int) -> None:
+    assert card.next_test is not None
+    full = replace(card, to_know=tuple(f"Note {k}." for k in range(notes)))
+    lines = card_text(full).split("\n")
+    assert len(lines) <= 8
+    assert lines[:2] == [card.sentence, card.counts]
+    assert lines[-1].startswith("Next test: ")
+    left_out = notes + len(card.meanings) - sum(line.startswith("Note ") for line in lines)
+    left_out -= sum(any(line.startswith(f"{name}:") for name, _ in card.meanings) for line in lines)
+    assert (f"The report has {left_out} further notes." in lines) == (left_out > 0)

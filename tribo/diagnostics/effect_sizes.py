@@ -25,8 +25,8 @@ def percent(log_ratio: FloatArray | float) -> FloatArray:
 
 
 def mean_percent(log_ratio: FloatArray) -> float:
-    """The mean over tests of 100 (measured / model - 1)."""
-    return float(percent(log_ratio).mean())
+    """The geometric mean over tests of measured over modelled T, less one, in percent."""
+    return float(percent(log_ratio.mean()))
 
 
 def rms_percent(log_ratio: FloatArray) -> float:

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.linalg import block_diag
 
-from tribo.diagnostics.candidates import ALIKE, CauseCandidate, Named
+from tribo.diagnostics.candidates import ALIKE, CauseCandidate, Named, weights_of
 from tribo.diagnostics.fit import ModelFit, scored, solved, state_at
 from tribo.diagnostics.model import Target, added, effect_of, predict, setup
 from tribo.diagnostics.normal_equations import model_columns
@@ -24,7 +24,7 @@ from tribo.diagnostics.verdict import Misfit, NextTest, Outcome, TooLittle
 from tribo.display import displayed
 from tribo.mechanisms.record import Conditions, Mechanism
 from tribo.mechanisms.table import MECHANISMS
-from tribo.records import Campaign, FloatArray
+from tribo.records import REGIMES, Campaign, FloatArray
 
 PAPER_LAW = np.array([4.78, 23.44, 2.879, 11.89])  # mu and tau0 in kPa of the flat sample, Berardo 2019, Table 2
 TYPICAL = Noise(np.diag([0.09**2, 0.07**2]), SIZE_PRIORS[:, 0])
@@ -32,6 +32,10 @@ FOUND = 3.6  # strength that chance reaches in one campaign of a hundred, over a
 NINE_IN_TEN = FOUND + 1.28
 HOURS_PER_PULL = 7.0 / 60.0
 PULLS = 18
+CERTAIN = 0.99  # share of a cause beside its rivals from which a test between them would tell next to nothing
+CHOSEN: dict[str, Literal["ratio", "interval"]] = {  # conditions that can be set, with their scale
+    "speed_m_s": "ratio", "hold_s": "ratio", "temperature_C": "interval", "humidity_pct": "interval",
+}  # fmt: skip
 
 
 WhyNot = Literal["", "absorbed", "hidden", "not varied", "in the trace"]
@@ -184,7 +188,8 @@ def next_test_of(
             return next_test(alike)
     best = named.causes[-1][0]
     others = [*named.rivals, *(c for c in named.weighed if c.name != best.name and len(named.causes) == 1)]
-    return next_test([best, *others])
+    certain = weights_of([best, *others])[0] >= CERTAIN
+    return (confirming_test(best) if certain else None) or next_test([best, *others])
 
 
 def next_test(tied: Sequence[CauseCandidate]) -> NextTest | None:
@@ -226,7 +231,9 @@ def next_test(tied: Sequence[CauseCandidate]) -> NextTest | None:
     for name in np.unique(conditions.sample):
         rows = np.resize(np.flatnonzero(conditions.sample == name), PULLS)
         for load in (loads[0] / 2, loads[0], loads[-1], loads[-1] * 2):
-            difference = _predicted_at(first.fit, rows, load) - _predicted_at(second.fit, rows, load)
+            loaded = np.full(PULLS, load)
+            difference = _predicted(first.fit, rows, normal_load_N=loaded)
+            difference = difference - _predicted(second.fit, rows, normal_load_N=loaded)
             design = {"sample": str(name), "normal_load_N": float(load), "pulls": PULLS}
             design["hours"] = PULLS * HOURS_PER_PULL
             options.append(
@@ -235,10 +242,54 @@ def next_test(tied: Sequence[CauseCandidate]) -> NextTest | None:
     return max(options, key=lambda option: option.expected_bits / float(option.design["hours"]))
 
 
-def first_test_of(covariate: str) -> NextTest:
-    """For a misfit that follows a column but no law: vary that column alone."""
-    design = {"covariate": covariate, "pulls": PULLS, "hours": PULLS * HOURS_PER_PULL}
-    return NextTest("vary one column", (covariate,), design)
+def confirming_test(cause: CauseCandidate) -> NextTest | None:
+    """For a cause without a rival that follows a recorded column: pulls at values that were not measured, below,
+    between and above those that were; None for any other cause.
+
+    The bits part an effect that goes on as its formula says from one that ends where the measured values end.
+    """
+    f, acting = cause.fit, cause.acting
+    c = f.setup.observations.conditions
+    column = next((name for name in acting.mechanism.needs if name in CHOSEN), "")
+    if not column:
+        return None
+    change = np.abs(effect_of(f.setup, f.law, acting, cause.values))
+    sample = max(np.unique(c.sample).tolist(), key=lambda name: change[c.sample == name].mean())
+    rows = np.resize(np.flatnonzero(c.sample == sample), PULLS)
+    recorded = np.unique(c.recorded(column))
+    recorded = recorded[np.isfinite(recorded)]
+    further = _further_values(recorded, CHOSEN[column])
+    values = np.resize(further, PULLS)
+    beyond = _predicted(f, rows, **{column: values})
+    ended = _predicted(f, rows, **{column: np.clip(values, recorded[0], recorded[-1])})
+    low, high = (_predicted(f, rows, **{column: np.full(PULLS, end)}) for end in (further[0], further[-1]))
+    regime = int(np.argmax(change.mean(axis=0)))
+    percent = 100.0 * float(np.expm1((high - low)[:, regime].mean()))
+    design = {
+        "covariate": column, "values": further.tolist(), "sample": str(sample), "regime": REGIMES[regime],
+        "expected_percent": percent, "pulls": PULLS, "hours": PULLS * HOURS_PER_PULL,
+    }  # fmt: skip
+    return NextTest("confirm", (cause.name,), design, bits(_distance2(f, beyond - ended, rows)))
+
+
+def _further_values(recorded: FloatArray, scale: Literal["ratio", "interval"]) -> FloatArray:
+    """Three values to measure next: below the recorded ones, in the widest gap between them, and above.
+
+    On a scale of ratios half the lowest and twice the highest; else a quarter of the range beyond its ends.
+    """
+    x = np.log(np.maximum(recorded, 1e-9)) if scale == "ratio" else recorded
+    aside = np.log(2.0) if scale == "ratio" else np.ptp(x) / 4
+    widest = int(np.argmax(np.diff(x)))
+    further = np.array([x[0] - aside, (x[widest] + x[widest + 1]) / 2, x[-1] + aside])
+    return np.array([float(f"{value:.2g}") for value in (np.exp(further) if scale == "ratio" else further)])
+
+
+def first_test_of(*covariates: str) -> NextTest:
+    """For a misfit that follows a column, or two together, and no mechanism: vary that alone, or every pair of ends."""
+    design: dict[str, Any] = {"pulls": PULLS, "hours": PULLS * HOURS_PER_PULL}
+    if len(covariates) > 1:
+        return NextTest("factorial", covariates, design | {"vary": list(covariates)})
+    return NextTest("vary one column", covariates, design | {"covariate": covariates[0]})
 
 
 def more_tests(lack: TooLittle) -> NextTest:
@@ -275,11 +326,11 @@ def bits(distance2: float) -> float:
     return float(np.clip(1.0 - lost, 0.0, 1.0))
 
 
-def _predicted_at(f: ModelFit, rows: np.ndarray, load_N: float) -> FloatArray:
-    """ln T of the tests ``rows`` had they been made under another load."""
+def _predicted(f: ModelFit, rows: np.ndarray, **changed: FloatArray) -> FloatArray:
+    """ln T of the tests ``rows`` had they been made under other conditions, each an array of shape (rows,)."""
     s = f.setup
     observations = s.observations.take(rows)
-    conditions = replace(observations.conditions, normal_load_N=np.full(len(rows), load_N))
+    conditions = replace(observations.conditions, **changed)
     moved = replace(s, observations=replace(observations, conditions=conditions), shares=s.shares[rows])
     return predict(moved, f.law, f.acting, f.values)
 

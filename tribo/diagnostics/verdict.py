@@ -31,8 +31,8 @@ UNTESTED: frozenset[Why] = frozenset(
 )
 # what a further test does
 NextKind = Literal[
-    "measure", "remove", "pull further", "vary one column", "vary what was fixed", "part laws", "part columns",
-    "part from load", "at the bench", "measure more",
+    "measure", "remove", "confirm", "pull further", "vary one column", "vary what was fixed", "part laws",
+    "part columns", "factorial", "part from load", "at the bench", "measure more",
 ]  # fmt: skip
 CERTAIN_CAUSES: tuple[Outcome, ...] = ("named", "undetermined", "partly")  # verdicts that hold causes
 

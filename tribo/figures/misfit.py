@@ -132,9 +132,10 @@ FAINT = 0.35  # how strongly a cell is coloured that chance explains
 def misfit_numbers(d: Diagnosis) -> pd.DataFrame:
     """Change of measured / modelled T from the low to the high end of each covariate, for each sample and observable.
 
-    The model is the one calibrated on the flat sample alone. The column "mean" is the mean over a sample of
-    100 (measured / model - 1); the flat sample has neither a mean nor a change with load, since the calibration absorbs
-    both. ``strength`` is the signed score in standard deviations once the flat law, the model's own error of a sample
+    The model is the one calibrated on the flat sample alone. The column "mean" is the geometric mean over a sample of
+    measured over modelled T, less one, in percent; the flat sample has neither a mean nor a change with load, since the
+    calibration absorbs both.
+    ``strength`` is the signed score in standard deviations once the flat law, the model's own error of a sample
     and the specimens are taken out; ``p_adjusted`` sets it against the strongest contrast of simulated campaigns. The
     p of a mean is that of the verdict: where the patterned samples differ from the model by more than its stated error,
     that of the difference itself; of both regimes together the larger of the two.
@@ -321,9 +322,10 @@ MISFIT = style.FigureOf(
     "misfit",
     "Where the calibrated model fails",
     "Change of measured over modelled friction, in percent, from the low to the high end of each recorded "
-    "variable (5 to 95 % of its range), for each sample. Column “mean”: mean over the sample of 100 (measured "
-    "/ model − 1). Column “bend with load”: height of the ends of the load range above its middle. Strong "
-    "colours and asterisks (** p < 0.01, * p < 0.05) mark statistically significant deviations. The p values "
+    "variable (5 to 95 % of its range), for each sample. Column “mean”: geometric mean over the sample of "
+    "measured over modelled friction, less one. Column “bend with load”: height of the ends of the load range above "
+    "its middle. Strong colours and asterisks (** p < 0.01, * p < 0.05) mark statistically significant deviations. "
+    "The p values "
     "are adjusted for all comparisons: each is compared with the strongest deviation in simulated campaigns "
     "of the calibrated model; where the patterned samples differ from the model by more than its stated error, "
     "that of a mean is the p value of this difference, and the other columns are judged beside it. Pale cells are "

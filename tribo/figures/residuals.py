@@ -146,14 +146,15 @@ def summaries(
     for rows in _bins(x, here, column):
         centre = float(np.exp(np.log(x[rows]).mean())) if _logarithmic(column) else float(x[rows].mean())
         at = {"x": centre, "x_name": _name(column, centre)}
-        error = float(y[rows].std(ddof=1) / np.sqrt(len(rows))) if len(rows) > 1 else float("nan")
-        mean = float(y[rows].mean())
+        ratio = np.log1p(y[rows] / 100.0)  # geometric means, as the sentences of the verdict
+        error = float(ratio.std(ddof=1) / np.sqrt(len(rows))) if len(rows) > 1 else float("nan")
+        mean, mean_low, mean_high = percent(ratio.mean() + BAND * error * np.array([0.0, -1.0, 1.0]))
         variance = variance_of_mean(d, weight, rows, stated=column.name == "sample")
         low, high = percent(np.array([-BAND, BAND]) * np.sqrt(variance))
-        found.append(at | {"mark": "mean", "y": mean, "y_low": mean - BAND * error, "y_high": mean + BAND * error})
+        found.append(at | {"mark": "mean", "y": float(mean), "y_low": float(mean_low), "y_high": float(mean_high)})
         found.append(at | {"mark": "band", "y": 0.0, "y_low": float(low), "y_high": float(high)})
         if added is not None:
-            found.append(at | {"mark": "curve", "y": float(added[rows].mean())})
+            found.append(at | {"mark": "curve", "y": float(percent(np.log1p(added[rows] / 100.0).mean()))})
     return found
 
 
@@ -411,7 +412,7 @@ FINDING = style.FigureOf(
     "What was found",
     "Measured over modelled friction, less one, in percent, against the quantity that it follows. The model is "
     "calibrated on the flat sample. Points "
-    "with bars: means with twice their standard error. Band: range of 95 % of such means if the model were "
+    "with bars: geometric means with twice their standard error. Band: range of 95 % of such means if the model were "
     "right. Thick line, if a cause is named: what it adds. Small points, if shown: tests.",
     finding_numbers,
     draw_finding,
@@ -421,7 +422,7 @@ RESIDUALS = style.FigureOf(
     "The strongest deviations",
     "100 (measured / model − 1) against the recorded variable with which it varies most strongly; if no "
     "deviation is significant, against the three variables that come closest. Small points: tests; points with "
-    "bars: means with twice their standard error. Band: range of 95 % of such means if the model were right, "
+    "bars: geometric means with twice their standard error. Band: range of 95 % of such means if the model were right, "
     "given the scatter of repeats and specimens and the error of the model: the stated one for the means of the "
     "samples, else that which the samples of this campaign show. Thick line: contribution of the "
     "identified mechanism.",

@@ -80,6 +80,8 @@ def with_laws(
     ties = [(first, second) for first, second, *_ in (laws for laws in alike if len(laws) > 1)]
     if ties and not verdict.equivalent:
         next_test = separating_test(*ties[0], model.setup.observations.conditions)
+    elif found.laws and not any(layer.kind == "cause" for layer in layers):
+        next_test = first_test_of(*found.laws[0].law.columns)
     shows = replace(verdict.shows, within_chance=bool(left.p.min() >= level))
     return replace(d, laws=found, verdict=replace(verdict, layers=layers, next_test=next_test, shows=shows))
 

@@ -43,6 +43,10 @@ ALONE = {
     "normal_load_N": "Pull one specimen at nine loads over the range, first upwards, then downwards",
     "sample": "Pull one fresh specimen of every sample in turn, at one load and within one day",
     "date": "Pull the same specimens of one sample at one load again on several days",
+    "clock_h": "Pull one sample at one load in the morning and in the afternoon of several days",
+    "run_order": "Pull one sample at one load again and again through a series of the same length",
+    "elapsed_s": "Pull one sample at one load again and again over the same time",
+    "specimen_run": "Pull fresh specimens of one sample at one load, each as often as the most-used one",
 }
 
 
@@ -352,10 +356,19 @@ def next_test_sentence(t: NextTest) -> str:
         return f"{sentence_case(mechanism(design['without']).removed_by)}: {pulls} pulls of {design['sample']}."
     if t.kind == "pull further":
         return f"{pulls} further pulls of {design['sample']} at {design['normal_load_N']:.3g} N."
+    if t.kind == "confirm":
+        words = COLUMNS[str(design["covariate"])]
+        values = joined([f"{value * words.factor:.3g}" for value in design["values"]])
+        where = f"{in_words(str(design['covariate']))} at {values} {words.unit}"
+        return f"Pull {design['sample']} {pulls} times in random order with {where}, which were not measured."
     if t.kind == "vary one column":
         column = str(design["covariate"])
         alone = f"Vary {in_words(column)} alone, in random order, on one sample at one load"
         return f"{ALONE.get(column, alone)}: {pulls} pulls."
+    if t.kind == "factorial":
+        varied = joined([in_words(name) for name in design["vary"]])
+        each = f"Set {varied} to their lowest and highest value, each with each, in random order"
+        return f"{each}, on one sample at one load: {pulls} pulls."
     if t.kind == "vary what was fixed":
         varied = [v.text for name in t.separates if (v := mechanism(name).variation) is not None]
         if "sample" not in design:

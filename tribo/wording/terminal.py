@@ -85,12 +85,20 @@ def summary_text(study: Study) -> str:
     return "\n".join(lines)
 
 
+CARD_LINES = 8
+
+
 def card_text(card: Card) -> str:
-    """The sentence, what it means, the tests, what else to know and the next test; the laws have their own table."""
-    lines = [card.sentence, *(f"{name}: {meaning}" for name, meaning in card.meanings), card.counts, *card.to_know]
-    if card.next_test is not None:
-        lines.append(f"Next test: {card.next_test['line']}")
-    return "\n".join(lines)
+    """The sentence, the tests, what else to know, what the names mean and the next test, in at most CARD_LINES lines.
+
+    What does not fit stands in the report. The laws have their own table.
+    """
+    last = [] if card.next_test is None else [f"Next test: {card.next_test['line']}"]
+    more = [*card.to_know, *(f"{name}: {meaning}" for name, meaning in card.meanings)]
+    room = CARD_LINES - 2 - len(last)
+    if len(more) > room:
+        more = [*more[: room - 1], f"The report has {len(more) - room + 1} further notes."]
+    return "\n".join([card.sentence, card.counts, *more, *last])
 
 
 def verdict_text(v: Verdict) -> str:

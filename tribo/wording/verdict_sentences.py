@@ -28,7 +28,7 @@ from tribo.diagnostics.verdict import (
 )
 from tribo.diagnostics.without_model import ColumnsTested
 from tribo.mechanisms.record import TraceEvidence
-from tribo.vocabulary import OBSERVABLES, in_words, short_label
+from tribo.vocabulary import COLUMNS, OBSERVABLES, in_words, short_label
 from tribo.wording.law_sentences import across_sentence, held_sentence, tied_laws
 from tribo.wording.numerals import counted, joined, p_text, sentence_case, significant
 from tribo.wording.part_sentences import (
@@ -446,7 +446,15 @@ def why_next(v: Verdict) -> str:
         return "it is the most informative test"
     if v.next_test is not None and v.next_test.kind == "vary what was fixed":
         return f"this campaign could not test {joined(list(map(name_in_words, separates)))}"
-    if v.verdict == "unknown" and not of_kind(v, "law"):
+    if v.next_test is not None and v.next_test.kind == "confirm":
+        design = v.next_test.design
+        words = COLUMNS[str(design["covariate"])]
+        low, *_, high = (value * words.factor for value in design["values"])
+        change = f"{design['expected_percent']:+.0f} %".replace("-", "−")
+        over = f"{design['regime']} friction from {low:.3g} to {high:.3g} {words.unit}"
+        return f"{name_in_words(separates[0])} predicts {change} in {over}"
+    alone = v.next_test is not None and v.next_test.kind in ("vary one column", "factorial")
+    if alone or (v.verdict == "unknown" and not of_kind(v, "law")):
         return f"to see whether friction follows {joined(list(map(in_words, separates)))} when nothing else changes"
     for law in of_kind(v, "law"):
         if set(separates) <= {law.formula, *law.tied_with}:
