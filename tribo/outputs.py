@@ -25,6 +25,7 @@ FLOAT_FORMAT = "%.8g"
 UNIT_ENDINGS = {
     "_N_per_s": "N/s", "_N_per_m": "N/m", "_m_s": "m/s", "_mm_s": "mm/s", "_u_kPa": "kPa", "_kPa": "kPa", "_Pa": "Pa",
     "_N": "N",
+    "_N_per_decade": "N", "_per_m": "1/m", "_J": "J",
     "_u_N": "N", "_s": "s", "_m": "m", "_kg": "kg", "_deg": "degree", "_C": "degC", "_pct": "percent",
     "_percent": "percent",
 }  # fmt: skip
@@ -37,6 +38,13 @@ def unit_of(column: str) -> str | None:
         return UNITLESS[column]
     endings = [e for e in UNIT_ENDINGS if column.endswith(e)]
     return UNIT_ENDINGS[max(endings, key=len)] if endings else None
+
+
+def end_of(column: str, end: str) -> str:
+    """Name of the column that holds an ``end`` of the interval of another: force_N and low make force_low_N."""
+    endings = [e for e in UNIT_ENDINGS if column.endswith(e)]
+    unit = max(endings, key=len) if endings else ""
+    return f"{column.removesuffix(unit)}_{end}{unit}"
 
 
 @dataclass(frozen=True)
@@ -162,6 +170,49 @@ PHASES = {
     "u_N": "its standard uncertainty",
     "evidence": "what tells of its beginning",
     "doubt": "what is doubtful about it",
+}
+RECORD_READINGS = {
+    "test_id": "the test, or the record whose strokes are tests of their own",
+    "sample": "sample",
+    "reading": "plateau, step of speed, step of load, cycle, running-in, hold or healing",
+    "start_s": "start on the clock of the record",
+    "end_s": "end",
+    "speed_mm_s": "speed of the drive",
+    "normal_load_N": "normal load",
+    "way": "up or down: the way of a ladder by which the level was reached",
+    "cycle": "number of the cycle; 0 for everything else",
+    "hold_s": "time that the drive stood still",
+    "state": "of running-in: steady, still drifts, or cannot tell",
+    "force_N": "friction force: mean of a plateau, of both directions of a cycle, of the steady level after a step or "
+    "running-in, or static force of a restart",
+    "force_low_N": "lower end of its 95 % interval",
+    "force_high_N": "upper end",
+    "coefficient": "the same over the normal load",
+    "coefficient_low": "lower end of its 95 % interval",
+    "coefficient_high": "upper end",
+    "hersey_per_m": "Hersey number: viscosity times speed over normal load",
+    "direct_change_N": "change of force at once after a step of speed",
+    "direct_change_low_N": "lower end of its 95 % interval",
+    "direct_change_high_N": "upper end",
+    "total_change_N": "change of force from one plateau to the next",
+    "total_change_low_N": "lower end of its 95 % interval",
+    "total_change_high_N": "upper end",
+    "asymmetry_N": "half the sum of the forces of both directions of a cycle, as recorded less a measured or stated "
+    "zero",
+    "asymmetry_low_N": "lower end of its 95 % interval",
+    "asymmetry_high_N": "upper end",
+    "energy_J": "friction work of a cycle",
+    "energy_low_J": "lower end of its 95 % interval",
+    "energy_high_J": "upper end",
+    "run_in_s": "time from the beginning of the slide until a tenth of the whole change is left",
+    "run_in_low_s": "lower end of its 95 % interval",
+    "run_in_high_s": "upper end",
+    "run_in_m": "the same as a distance",
+    "run_in_low_m": "lower end of its 95 % interval",
+    "run_in_high_m": "upper end",
+    "healing_N_per_decade": "growth of the static force over that of sliding, per tenfold time of the hold",
+    "healing_low_N_per_decade": "lower end of its 95 % interval",
+    "healing_high_N_per_decade": "upper end",
 }
 FITS = {
     "sample": "sample",
@@ -373,6 +424,12 @@ PRODUCTS = (
         "phases.csv", "ingest",
         "one row per phase of a record, in the order of time: rests, rises, slides, strokes, holds and steps.",
         PHASES, "tribo.report.tables:phases_table", "phases", "phase_row",
+    ),
+    Product(
+        "readings.csv", "ingest",
+        "one row per reading of a record that is more than one pull from rest: plateaus, steps, cycles, running-in and "
+        "holds, with 95 % intervals; see [how a record is read](../concepts/records.md).",
+        RECORD_READINGS, "tribo.report.tables:readings_table", "readings", "reading_row",
     ),
     Product(
         "fits.csv", "fit",

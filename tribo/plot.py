@@ -21,9 +21,10 @@ if TYPE_CHECKING:
     from tribo.records import Ingested, Run, Study
 
 __all__ = [
-    "agreement", "dependence", "evidence", "extended", "finding", "forces", "law", "laws_against_area", "misfit",
-    "oscillations", "power", "published", "published_readings", "pull", "pulls", "ratio_against_pressure", "records",
-    "residuals", "restarts", "run", "simulated_pulls", "sliding_force", "static_force",
+    "agreement", "cycles", "dependence", "evidence", "extended", "finding", "forces", "law", "laws_against_area",
+    "levels", "misfit", "oscillations", "power", "published", "published_readings", "pull", "pulls",
+    "ratio_against_pressure", "records", "residuals", "restarts", "run", "running_in", "simulated_pulls",
+    "sliding_force", "static_force",
 ]  # fmt: skip
 
 
@@ -91,6 +92,9 @@ dependence = _of_study("dependence", "T/N of every test against each recorded va
 forces = _of_study("forces", "Friction force of every test against the load, with the law that the data choose.")
 records = _of_study("records", "T/N along each record.")
 oscillations = _of_study("oscillations", "Force lost in a slip, and period, of every test that oscillates.")
+levels = _of_study("levels", "Mean T/N of the levels of each ladder against Hersey number, speed or load.")
+cycles = _of_study("cycles", "T/N and friction work of each cycle of strokes.")
+running_in = _of_study("running_in", "T/N along records that slide on and on, with the distance of running-in.")
 restarts = _of_study("restarts", "Static friction after each stop of the drive against the time of the hold.")
 misfit = _of_diagnosis("misfit", "Where the calibrated model fails, by sample and recorded variable.")
 finding = _of_diagnosis(

@@ -140,6 +140,59 @@ class Phase:
     doubt: str = ""
 
 
+Interval = tuple[float, float, float]  # a value, the lower and the upper end of its 95 % interval
+
+READINGS_OF_A_RECORD = {
+    "plateau": "sliding at one speed under one load",
+    "step of speed": "from one speed to the next: the new steady state, the change at once and the total change",
+    "step of load": "from one load to the next",
+    "cycle": "two strokes in opposite directions",
+    "running-in": "from the beginning of a slide to its steady level",
+    "hold": "the static force of a restart after the drive stood still",
+    "healing": "how the static force over that of sliding grows with the logarithm of the hold",
+}
+
+
+@displayed(lambda r: f"{r.name}, {r.start_s:.4g} to {r.end_s:.4g} s")
+@dataclass(frozen=True)
+class Reading:
+    """One of several readings of a record, from ``start_s`` to ``end_s`` on its clock.
+
+    Parameters
+    ----------
+    test_id : str
+        The test, or the record whose strokes are tests of their own.
+    name : str
+        What was read: a name in ``READINGS_OF_A_RECORD``.
+    start_s, end_s : float
+        Start and end in s.
+    speed_m_s, normal_load_N : float
+        Speed in m/s and normal load in N, recorded or stated; NaN where neither is known.
+    way : "", "up" or "down"
+        Way of a ladder by which the level was reached.
+    cycle : int
+        Number of the cycle, counted from 1; 0 for everything else.
+    hold_s : float
+        Time in s that the drive stood still.
+    state : "", "steady", "still drifts" or "cannot tell"
+        Of running-in.
+    values : mapping of str to Interval
+        Each quantity by its name and unit, such as "force_N": value, lower and upper end of its 95 % interval.
+    """
+
+    test_id: str
+    name: str
+    start_s: float
+    end_s: float
+    speed_m_s: float = float("nan")
+    normal_load_N: float = float("nan")
+    way: str = ""
+    cycle: int = 0
+    hold_s: float = float("nan")
+    state: str = ""
+    values: Mapping[str, Interval] = field(default_factory=dict)
+
+
 @displayed(lambda r: f"hold {r.hold_s:.4g} s, static {r.static_N:.4g} N")
 @dataclass(frozen=True)
 class Restart:
@@ -474,6 +527,8 @@ class Campaign:
         Stated bounds of a quantity, in the unit that its name ends in, in place of those of the material class.
     measured : mapping of str to tuple of float, shape (2,)
         Amplitude of a mechanism that was measured directly, and its standard uncertainty, in the unit of the mechanism.
+    viscosity_Pa_s : float, optional
+        Viscosity of the lubricant in Pa s, for Hersey numbers.
     inputs : mapping of str to str
         SHA-256 of every file that was read, by its path in the campaign.
 
@@ -505,6 +560,7 @@ class Campaign:
     material_class: str = ""
     plausible: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     measured: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    viscosity_Pa_s: float | None = None
     inputs: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @property
@@ -582,6 +638,8 @@ class Ingested:
     by_hand : mapping of str to Override
         Tests that have a trace, with a decision made by hand: an excluded one is also in ``set_aside``; a moved one has
         its new result in ``pulls``.
+    readings : tuple of Reading
+        Plateaus, steps, cycles, running-in and holds of records that are more than one pull from rest.
 
     Examples
     --------
@@ -595,6 +653,7 @@ class Ingested:
     pulls: Mapping[str, Pull]
     set_aside: tuple[SetAside, ...]
     by_hand: Mapping[str, Override] = field(default_factory=dict)
+    readings: tuple[Reading, ...] = ()
 
     def doubts(self) -> tuple[SetAside, ...]:
         """Tests that were used although their row, export or pull is doubtful, for example because of a spike."""
@@ -765,6 +824,7 @@ __all__ = [
     "CLOSED_TRACK_M",
     "PA_PER_KPA",
     "PHASES",
+    "READINGS_OF_A_RECORD",
     "REGIMES",
     "STANDARD_GRAVITY",
     "UNCORRECTED",
@@ -777,12 +837,14 @@ __all__ = [
     "Fits",
     "FloatArray",
     "Ingested",
+    "Interval",
     "LawFit",
     "Oscillation",
     "Override",
     "Pattern",
     "Phase",
     "Pull",
+    "Reading",
     "Regime",
     "Restart",
     "Run",

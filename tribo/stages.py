@@ -155,13 +155,13 @@ def ingest(
     >>> print(f"{ingested.pulls['T001'].static_N:.2f} N of {len(ingested.pulls)} pulls")
     2.22 N of 144 pulls
     """
-    from tribo.ingestion.exports import ingest_campaign
+    from tribo.ingestion.exports import ingest_campaign, with_readings
     from tribo.ingestion.overrides import apply_overrides
     from tribo.traces.rules import rule_of_today
 
     rule = rule_of_today(rule)
     ingested = ingest_campaign(campaign, rule, jobs, progress)
-    return ingested if overrides is None else apply_overrides(ingested, overrides, rule)
+    return with_readings(ingested if overrides is None else apply_overrides(ingested, overrides, rule))
 
 
 def fit(ingested: Ingested, *, weights: Weights = "relative") -> Fits:

@@ -90,6 +90,7 @@ class CampaignTable(_Strict):
     material_class: Literal["", "elastomer", "polymer", "metal", "ceramic", "lubricated", "granular"] = ""
     slider_mass_g: NotNegative = 0.0
     pull_speed_mm_s: Positive | None = None
+    viscosity_mPa_s: Positive | None = None
     sign: Literal[1, -1] | None = None
     gain: Positive | None = None
     lever_arm_mm: Positive | None = None
@@ -334,6 +335,7 @@ counterface = "polycarbonate"
 nominal_area_mm2 = 55.0   # area of the sample face, including cavities
 slider_mass_g = 1.5       # mass of sled and sample, without the added mass
 pull_speed_mm_s = 0.2     # used for tests without speed_mm_s in tests.csv
+# viscosity_mPa_s = 85.0  # of the lubricant, for Hersey numbers; also a column of tests.csv
 # zero = "none"           # of the force: "before contact", "at rest", "none", a number of newtons, or [from, to] in s
 # load_zero = "none"      # of the recorded normal load, in the same form
 

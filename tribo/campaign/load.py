@@ -147,6 +147,7 @@ def load_campaign(folder: Path | str, *, measured: bool = True) -> Campaign:
         columns={key: value for key, value in described.columns.items() if not isinstance(value, dict)},
         columns_by_file=by_file,
         instrument=described.instrument.model_dump(exclude_none=True),
+        viscosity_Pa_s=None if general.viscosity_mPa_s is None else 1e-3 * general.viscosity_mPa_s,
         zero=zero_choice(general.zero),
         load_zero=zero_choice(general.load_zero),
         inputs={Path(path).name: digest for path, digest in hashes.items()},

@@ -10,6 +10,7 @@ from tribo.figures.load_and_area import AGREEMENT, LAWS_AGAINST_AREA, RATIO, SLI
 from tribo.figures.measured_friction import DEPENDENCE, FORCES, OSCILLATIONS, RECORDS, RESTARTS
 from tribo.figures.misfit import MISFIT
 from tribo.figures.one_pull import EXAMPLE_PULLS
+from tribo.figures.programmes import CYCLES, LEVELS, RUNNING_IN
 from tribo.figures.published_table import PUBLISHED, PUBLISHED_READINGS
 from tribo.figures.residuals import FINDING, RESIDUALS
 from tribo.figures.simulated import SIMULATED_PULLS
@@ -29,7 +30,9 @@ FIGURES: dict[str, StudyFigure] = _by_name(
 )
 """The figures of a study by name."""
 
-FRICTION_FIGURES: dict[str, StudyFigure] = _by_name(FORCES, DEPENDENCE, RECORDS, OSCILLATIONS, RESTARTS)
+FRICTION_FIGURES: dict[str, StudyFigure] = _by_name(
+    FORCES, DEPENDENCE, LEVELS, CYCLES, RUNNING_IN, RECORDS, OSCILLATIONS, RESTARTS
+)
 """Figures of the measured friction by itself, by name."""
 
 DIAGNOSIS_FIGURES: dict[str, FigureOf[Diagnosis]] = _by_name(FINDING, MISFIT, RESIDUALS, EXTENDED, LAW, EVIDENCE, POWER)

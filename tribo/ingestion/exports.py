@@ -83,6 +83,35 @@ def ingest_campaign(campaign: Campaign, rule: str, jobs: int, progress: Progress
     return Ingested(replace(campaign, tests=tuple(tests), inputs=inputs), traces, pulls, tuple(set_aside))
 
 
+def with_readings(ingested: Ingested) -> Ingested:
+    """A campaign with the readings of each of its records, from its pulls as they stand.
+
+    The tests that come from one table of an export are the parts of one record.
+    """
+    from tribo.traces.readings import Part, readings_of
+
+    records: dict[tuple[str, str], list[Part]] = {}
+    for test in ingested.campaign.tests:
+        trace, pull = ingested.traces.get(test.test_id), ingested.pulls.get(test.test_id)
+        if trace is not None and pull is not None:
+            export, choice = split_choice(test.file)
+            records.setdefault((export, choice.partition("/")[0]), []).append(Part(test, trace, pull))
+    found = [
+        reading
+        for parts in records.values()
+        for reading in readings_of(parts, _viscosity_Pa_s(parts[0].test, ingested.campaign))
+    ]
+    return replace(ingested, readings=tuple(found))
+
+
+def _viscosity_Pa_s(test: Test, campaign: Campaign) -> float:
+    """Viscosity of the lubricant, by the row of a test, else by campaign.toml; NaN where neither states one."""
+    try:
+        return 1e-3 * float(test.covariates["viscosity_mPa_s"])
+    except (KeyError, ValueError):
+        return math.nan if campaign.viscosity_Pa_s is None else campaign.viscosity_Pa_s
+
+
 def stated_columns(campaign: Campaign) -> ColumnsFor:
     """The columns that a campaign states for each of its exports."""
     return partial(columns_of, general=campaign.columns, by_file=campaign.columns_by_file)
@@ -125,8 +154,9 @@ def read_row(
                 try:
                     pull = evaluate(one, own)
                     outcomes.append((this if one is None else _with_load(this, pull.recorded_load_N), (one, pull)))
-                except TraceError as why:
-                    outcomes.append((this, _set_aside(this, why.problems)))
+                except TraceError as why:  # strokes that were read as one pull may be why
+                    several = [p for p in (one.problems if one else ()) if p.kind == "several_pulls"]
+                    outcomes.append((this, _set_aside(this, [*why.problems, *several])))
         except TriboError as why:
             outcomes = [(test, _set_aside(test, why.problems))]
         except Exception as why:  # one export must not cost the others

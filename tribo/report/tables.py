@@ -12,6 +12,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 
 from tribo import outputs
@@ -52,7 +53,7 @@ def write_tables(
     Returns
     -------
     list of Path
-        tests.csv, and restarts, phases, fits, other_fits, laws, dependence, budget, differences, comparison,
+        tests.csv, and restarts, phases, readings, fits, other_fits, laws, dependence, budget, differences, comparison,
         diagnosis and layers as far as the study went.
     """
     made = tables_of(study, diagnosis) if tables is None else tables
@@ -151,6 +152,24 @@ def phases_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | Non
         for p in pulls[test.test_id].phases
     ]  # fmt: skip
     return pd.DataFrame(rows, columns=outputs.product("phases.csv").column_names) if rows else None
+
+
+def readings_table(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:
+    """One row per reading of a record that is more than one pull from rest; None where there is none."""
+    samples = {test.test_id: test.sample for test in study.ingested.campaign.tests}
+    samples |= {test_id.partition("#")[0]: sample for test_id, sample in samples.items()}
+    rows = []
+    for r in study.ingested.readings:
+        row: dict[str, object] = {
+            "test_id": r.test_id, "sample": samples.get(r.test_id, ""), "reading": r.name, "start_s": r.start_s,
+            "end_s": r.end_s, "speed_mm_s": 1e3 * r.speed_m_s, "normal_load_N": r.normal_load_N, "way": r.way,
+            "cycle": r.cycle, "hold_s": r.hold_s, "state": r.state,
+        }  # fmt: skip
+        for name, (value, low, high) in r.values.items():
+            row |= {name: value, outputs.end_of(name, "low"): low, outputs.end_of(name, "high"): high}
+        rows.append(row)
+    table = pd.DataFrame(rows, columns=outputs.product("readings.csv").column_names)
+    return table.replace([np.inf, -np.inf], np.nan) if rows else None
 
 
 def fits_of_study(study: Study, _: Diagnosis | None = None) -> pd.DataFrame | None:

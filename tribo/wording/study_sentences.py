@@ -324,7 +324,7 @@ def friction_sentences(study: Study) -> dict[str, list[str]]:
         "samples": list(_samples(study)),
         "laws": list(_chosen_laws(study)),
         "dependence": list(_dependence(study)),
-        "oscillation": [*_directions(study), *_oscillation(study), *_restarts(study)],
+        "oscillation": [*_directions(study), *_oscillation(study), *_restarts(study), *_readings(study)],
     }
 
 
@@ -448,6 +448,27 @@ def _directions(study: Study) -> Iterator[str]:
         f"{significant(float(offsets.std()), 2)} N), which was subtracted. Mean sliding force forward "
         f"{significant(means['forward'])} N, backward {significant(means['backward'])} N."
     )
+
+
+def _readings(study: Study) -> Iterator[str]:
+    """What the records tell that are programmes: levels, cycles, and whether they have run in."""
+    of = {name: [r for r in study.ingested.readings if r.name == name] for name in ("plateau", "cycle", "running-in")}
+    levels = [r for r in of["plateau"] if r.way]
+    if levels:
+        ways = [way for way in ("up", "down") if any(r.way == way for r in levels)]
+        yield (
+            f"{counted(len(levels), 'level')} of speed or load were read on the way {' and '.join(ways)}; readings.csv "
+            "holds the mean of each with its 95 % interval."
+        )
+    if of["cycle"]:
+        yield f"{counted(len(of['cycle']), 'cycle')} of strokes were read, each a line of readings.csv."
+    for state, said in (
+        ("still drifts", "still drift at their end: the mean of their last part is no steady level"),
+        ("cannot tell", "vary too much to tell whether they have reached a steady level"),
+    ):
+        found = [r.test_id for r in of["running-in"] if r.state == state]
+        if found:
+            yield f"{counted(len(found), 'record')} that slide on and on {said}: {', '.join(found)}."
 
 
 def _restarts(study: Study) -> Iterator[str]:

@@ -1,0 +1,470 @@
+"""What a record tells beyond one pull: plateaus, steps, cycles, running-in and holds, each with a 95 % interval.
+
+Noise and drift of a level are told apart by its cosine coefficients (Phillips 2005, Econometric Theory 21, 116; Mueller
+2007, J. Econometrics 141, 1331), which split it by how slowly it changes. A low polynomial takes off the slowest, which
+is drift of the level and no noise; the next ones give the variance of the mean, correlation counted, with as many
+degrees of freedom.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from tribo.records import CLOSED_TRACK_M, FloatArray, Interval, Phase, Pull, Reading, Test, Trace
+from tribo.traces.signal import condense, line, median_of_three
+from tribo.traces.sliding import transient_end
+
+_DEGREES = (1, 3, 5, 7, 9)  # of the polynomial that takes off the drift of a level: the first that leaves none
+_SLOWEST = 3  # coefficients after it in which drift that is left
+_STANDS_OUT = 3.0  # by this many times the variance of all
+_COSINES = 12  # coefficients after it that tell the noise of its mean
+_COSINES_OF_ALL = 20  # the same of a whole slide
+_FEWEST = 12  # samples from which on a mean has an interval
+_MIDDLE = 0.4  # share of a stroke, around its middle, whose force is that of the stroke
+_DIFFER = 0.05  # share by which speeds or loads of two plateaus differ that make a step
+_BLOCKS = 240  # means along a slide by which its running-in is told
+_LATE = 0.2  # share of a slide at its end that is to be level
+_STEADY = 0.01  # share of the force by which it changes at most over that part where it is steady
+_STEADY_STRAIGHT = 0.006  # by which the straight part of this change is at most
+_STEADY_ANYWAY = 0.001  # however clearly it changes
+_SHORTEST_TAU = 0.01  # share of a slide that the time constant of a running-in takes at the least,
+_LONGEST_TAU = 0.3  # share of a slide and of one that is over at the most
+_ARRIVED = 0.1  # share of the whole change that is left where running-in counts as over
+_SURE = 0.975  # probability on either side with which a drift is told
+_FEWEST_HOLDS = 3
+_ABOVE_NOISE = 1.5  # times the largest departure of the later half by which a force goes beyond both levels at a step
+
+
+@dataclass(frozen=True)
+class Part:
+    """A record, or a piece cut from one, as it was read."""
+
+    test: Test
+    trace: Trace
+    pull: Pull
+
+    @property
+    def direction(self) -> int:
+        """The way of a stroke that is a piece: 1, -1 where its force was turned; 0 for anything else."""
+        return 1 if "forward" in self.pull.flags else -1 if "backward" in self.pull.flags else 0
+
+    def between(self, start_s: float, end_s: float) -> slice:
+        """The samples from one time to before another; up to the last one where that is the end of the trace."""
+        first, last = (int(k) for k in np.searchsorted(self.trace.time_s, (start_s, end_s)))
+        return slice(first, last + int(last == self.trace.time_s.size - 1))
+
+
+@dataclass(frozen=True)
+class _Level:
+    """A slide at one speed under one load: the steady part, and where what came before it began."""
+
+    part: Part
+    phase: Phase
+    begin_s: float
+    mean: Interval  # above the zero of the pull, without the uncertainty of that zero
+
+    @property
+    def runs_in(self) -> bool:
+        """Whether a clear running-in comes before the steady part."""
+        return any(p.name == "running-in" and p.start_s == self.begin_s for p in self.part.pull.phases)
+
+    @property
+    def speed_m_s(self) -> float:
+        return self.phase.speed_m_s if math.isfinite(self.phase.speed_m_s) else self.part.test.speed_m_s or math.nan
+
+    @property
+    def load_N(self) -> float:
+        """That of the test; of several loads within one test, the one recorded at this level."""
+        recorded = [p.normal_load_N for p in self.part.pull.phases if p.name == "steady sliding"]
+        stated = self.part.test.normal_load_N
+        several = any(_differ(a, b) for a, b in pairwise(recorded))
+        return self.phase.normal_load_N if several or math.isnan(stated) else stated
+
+
+def readings_of(parts: Sequence[Part], viscosity_Pa_s: float = math.nan) -> tuple[Reading, ...]:
+    """The readings of one record, whose parts are in order of time; none where it is one pull from rest.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        The record as a whole, or the pieces that were cut from it.
+    viscosity_Pa_s : float
+        Of the lubricant in Pa s, for the Hersey number.
+    """
+    strokes = _strokes(parts)
+    if len(strokes) > 1:
+        return tuple(_cycles(strokes))
+    levels = [level for part in parts for level in _levels(part)]
+    found: list[Reading] = []
+    if levels and _slides_long(levels[0]) and (len(levels) == 1 or levels[0].runs_in):
+        found += _running_in(levels[0])
+    if found or len(levels) > 1:
+        ways = _ways(levels)
+        found += [_plateau(level, way, viscosity_Pa_s) for level, way in zip(levels, ways, strict=True)]
+        found += [step for one, other in pairwise(levels) for step in _step(one, other)]
+    for part in parts:
+        found += _holds(part)
+    return tuple(sorted(found, key=lambda reading: reading.start_s))
+
+
+def mean_of_level(force_N: FloatArray) -> Interval:
+    """Mean of a level and its 95 % interval under correlated noise and slow drift; an infinite one of too few samples.
+
+    The interval is of the mean over these samples: how far a level drifts within them is no uncertainty of it.
+    """
+    mean, n = float(force_N.mean()), force_N.size
+    if n < _FEWEST:
+        return mean, -math.inf, math.inf
+    from scipy.stats import t
+
+    along = np.linspace(-1.0, 1.0, n)
+    for degree in _DEGREES:
+        rest = force_N - np.polynomial.legendre.legval(along, np.polynomial.legendre.legfit(along, force_N, degree))
+        variance, dof = _variance(rest, degree + 1)
+        slowest, _ = _variance(rest, degree + 1, _SLOWEST)
+        if slowest < _STANDS_OUT * variance or n < 4 * (degree + dof):
+            break
+    half = float(t.ppf(0.975, dof)) * math.sqrt(variance / n)
+    return mean, mean - half, mean + half
+
+
+def _half(interval: Interval) -> float:
+    return (interval[2] - interval[1]) / 2.0
+
+
+def _about(value: float, *halves: float) -> Interval:
+    """A value with the half widths of independent intervals together."""
+    half = math.hypot(*halves)
+    return value, value - half, value + half
+
+
+def _of_zero(part: Part) -> float:
+    """Half width of the 95 % interval of a zero."""
+    u = part.pull.zero_u_N
+    return 1.96 * u if math.isfinite(u) else 0.0
+
+
+def _levels(part: Part) -> Iterator[_Level]:
+    """Every slide of a part at one speed under one load, from when its force has stabilised."""
+    before: Phase | None = None
+    for phase in part.pull.phases:
+        if phase.name == "steady sliding":
+            samples = part.between(phase.start_s, phase.end_s)
+            force = part.trace.force_N[samples] - part.pull.zero_N
+            settled = transient_end(force)
+            if force.size - settled >= _FEWEST:
+                began = before.start_s if before and before.name in ("running-in", "slip") else phase.start_s
+                level = replace(phase, start_s=float(part.trace.time_s[samples.start + settled]))
+                yield _Level(part, level, began, mean_of_level(force[settled:]))
+        before = phase
+
+
+def _ways(levels: Sequence[_Level]) -> list[str]:
+    """Whether each level was reached on the way "up" or "down" in speed, else in load; empty where neither changes."""
+    if len(levels) < 2:
+        return [""] * len(levels)
+    of_speed, of_load = [level.speed_m_s for level in levels], [level.load_N for level in levels]
+    values = of_speed if any(_differ(a, b) for a, b in pairwise(of_speed)) else of_load
+    rises = [other > one if _differ(one, other) else None for one, other in pairwise(values)]
+    return [{True: "up", False: "down", None: ""}[rise] for rise in (rises[0], *rises)]
+
+
+def _differ(one: float, other: float) -> bool:
+    return abs(other - one) > _DIFFER * min(abs(one), abs(other))
+
+
+def _plateau(level: _Level, way: str, viscosity_Pa_s: float) -> Reading:
+    force = _about(level.mean[0], _half(level.mean), _of_zero(level.part))
+    values: dict[str, Interval] = {"force_N": force}
+    load, speed = level.load_N, level.speed_m_s
+    if load > 0:
+        u = level.part.pull.recorded_load_u_N
+        of_load = 1.96 * u / load if math.isfinite(u) and not level.part.test.load_from else 0.0
+        ratio = force[0] / load
+        values["coefficient"] = _about(ratio, _half(force) / load, ratio * of_load)
+        hersey = viscosity_Pa_s * speed / load
+        values |= {"hersey_per_m": (hersey, hersey, hersey)} if math.isfinite(hersey) else {}
+    phase = level.phase
+    return Reading(
+        level.part.test.test_id, "plateau", phase.start_s, phase.end_s, speed, load, way=way, values=values
+    )
+
+
+def _step(one: _Level, other: _Level) -> Iterator[Reading]:
+    """The change of force from one plateau to the next: at once, and to the new steady state."""
+    of_speed = _differ(one.speed_m_s, other.speed_m_s)
+    if not (of_speed or _differ(one.load_N, other.load_N)):
+        return
+    total = _about(other.mean[0] - one.mean[0], _half(one.mean), _half(other.mean))
+    values = {"force_N": _about(other.mean[0], _half(other.mean), _of_zero(other.part)), "total_change_N": total}
+    direct = _direct(one, other) if of_speed else None
+    if direct is not None:
+        values["direct_change_N"] = direct
+    up = other.speed_m_s > one.speed_m_s if of_speed else other.load_N > one.load_N
+    yield Reading(
+        other.part.test.test_id, "step of speed" if of_speed else "step of load", one.phase.end_s, other.begin_s,
+        other.speed_m_s, other.load_N, way="up" if up else "down", values=values,
+    )  # fmt: skip
+
+
+def _direct(one: _Level, other: _Level) -> Interval | None:
+    """How far the force goes at once after a step of speed before it turns to its steady state; None if it does not.
+
+    A parabola through the force after its extreme, over a quarter of the time that it takes to come half-way down.
+    """
+    samples = other.part.between(max(other.begin_s, one.phase.end_s), other.phase.end_s)
+    force = other.part.trace.force_N[samples] - other.part.pull.zero_N
+    old, new = one.mean[0], other.mean[0]
+    calm = median_of_three(force[: force.size // 2]) if force.size >= 4 * _FEWEST else force[:0]
+    if not calm.size:
+        return None
+    beyond = max(old, new) - calm, calm - min(old, new)
+    below = float(beyond[0].min()), float(beyond[1].min())
+    upward = below[0] < below[1]
+    height = (calm - new) if upward else (new - calm)
+    at = int(np.argmax(height))
+    late = median_of_three(force[force.size // 2 :])
+    if -min(below) < _ABOVE_NOISE * float(np.abs(late - np.median(late)).max()) or height[at] <= 0:
+        return None
+    lower = np.flatnonzero(height[at:] < 0.5 * height[at])
+    width = max(int(lower[0]) // 2 if lower.size else 0, 6)
+    part = force[at : at + width]
+    if part.size < 6:
+        return None
+    along = np.arange(part.size) / part.size
+    design = np.vander(along, 3)
+    best, *_ = np.linalg.lstsq(design, part, rcond=None)
+    fitted = design @ best
+    top = int(np.argmax(fitted) if upward else np.argmin(fitted))
+    spread = math.sqrt(float(((part - fitted) ** 2).sum()) / (part.size - 3))
+    leverage = float(design[top] @ np.linalg.inv(design.T @ design) @ design[top])
+    return _about(float(fitted[top]) - old, 1.96 * spread * math.sqrt(leverage), _half(one.mean))
+
+
+@dataclass(frozen=True)
+class _Stroke:
+    part: Part
+    phase: Phase
+    middle: Interval  # as recorded, signed
+    speed_m_s: float
+
+
+def _strokes(parts: Sequence[Part]) -> list[_Stroke]:
+    """The strokes of a record: its pieces where it was cut at its reversals, else its phases."""
+    found = []
+    for part in parts:
+        phases = [p for p in part.pull.phases if p.name == "stroke"]
+        if part.direction:
+            moved = [p for p in part.pull.phases if p.name in ("slip", "running-in", "steady sliding")]
+            phases = [replace(moved[0], end_s=moved[-1].end_s)] if moved else []
+        for phase in phases:
+            margin = (1.0 - _MIDDLE) / 2.0 * (phase.end_s - phase.start_s)
+            samples = part.between(phase.start_s + margin, phase.end_s - margin)
+            force = part.trace.force_N[samples] * (part.direction or 1)
+            if force.size >= _FEWEST:
+                found.append(_Stroke(part, phase, mean_of_level(force), phase.speed_m_s))
+    return found
+
+
+def _cycles(strokes: Sequence[_Stroke]) -> Iterator[Reading]:
+    """Two strokes in opposite directions each: mean of both, asymmetry, energy."""
+    number, k = 0, 0
+    while k + 1 < len(strokes):
+        one, other = strokes[k], strokes[k + 1]
+        k += 1
+        if one.middle[0] * other.middle[0] >= 0 and (one.middle[0] - one.part.pull.zero_N) * (
+            other.middle[0] - other.part.pull.zero_N
+        ) > 0:
+            continue
+        k, number = k + 1, number + 1
+        half = _half(one.middle) / 2.0, _half(other.middle) / 2.0
+        force = _about(abs(one.middle[0] - other.middle[0]) / 2.0, *half)
+        from_strokes = one.part.pull.zero_rule == "strokes in both directions" or not one.part.direction
+        zero = 0.0 if from_strokes else one.part.pull.zero_N * one.part.direction
+        values = {"force_N": force, "asymmetry_N": _about((one.middle[0] + other.middle[0]) / 2.0 - zero, *half)}
+        loads = [s.phase.normal_load_N for s in (one, other)]
+        load = sum(loads) / 2.0 if math.isfinite(sum(loads)) else one.part.test.normal_load_N
+        if load > 0:
+            values["coefficient"] = tuple(v / load for v in force)  # type: ignore[assignment]
+        energies = [_energy(stroke) for stroke in (one, other)]
+        if all(energies):
+            work, ways = (sum(pair) for pair in zip(*(e for e in energies if e), strict=True))
+            values["energy_J"] = _about(work, _half(force) * ways)
+        record = one.part.test.test_id.partition("#")[0]
+        yield Reading(
+            record, "cycle", one.phase.start_s, other.phase.end_s, one.speed_m_s, load, cycle=number, values=values
+        )
+
+
+def _energy(stroke: _Stroke) -> tuple[float, float] | None:
+    """Work of a stroke in J and its length in m, by the displacement, else by the speed; None without either."""
+    part, samples = stroke.part, stroke.part.between(stroke.phase.start_s, stroke.phase.end_s)
+    force, x = part.trace.force_N[samples], part.trace.displacement_m
+    if x is not None and np.ptp(x[samples]) > 0:
+        steps = np.diff(x[samples])
+    elif "speed_m_s" in part.trace.columns:
+        speed = part.trace.columns["speed_m_s"][samples]
+        steps = (speed[1:] + speed[:-1]) / 2.0 * np.diff(part.trace.time_s[samples])
+    else:
+        return None
+    zero = part.pull.zero_N if part.direction else 0.0
+    middle = (force[1:] + force[:-1]) / 2.0 - zero
+    return abs(float(middle @ steps)), abs(float(steps.sum()))
+
+
+def _slides_long(level: _Level) -> bool:
+    """Whether a slide is one whose running-in is asked for: from the first sample, or over its own track."""
+    way = level.speed_m_s * (level.phase.end_s - level.begin_s)
+    return "no_static" in level.part.pull.flags or way > CLOSED_TRACK_M
+
+
+def _running_in(level: _Level) -> Iterator[Reading]:
+    """Time and distance to the steady level of a slide by an exponential, or that it still drifts.
+
+    It counts as steady where the change over its last fifth is shown to be small and none is seen, or a very small one,
+    and the exponential leaves as little. Where noise is too large to show it, ``state`` is "cannot tell".
+    """
+    part = level.part
+    samples = part.between(level.begin_s, level.phase.end_s)
+    size = max(1, (samples.stop - samples.start) // _BLOCKS)
+    time = condense(part.trace.time_s[samples], size)
+    force = condense(part.trace.force_N[samples] - part.pull.zero_N, size)
+    if time.size < 4 * _FEWEST:
+        return
+    state = _state(time, force)
+    fitted = _exponential(time - level.begin_s, force)
+    values: dict[str, Interval] = {}
+    if fitted is not None:
+        steady, took_s, left = fitted
+        if state == "steady" and left > _STEADY * abs(steady[0]):
+            state = "cannot tell"
+        if state == "steady":
+            values = {"force_N": _about(steady[0], _half(steady), _of_zero(part)), "run_in_s": took_s}
+            if math.isfinite(level.speed_m_s):
+                values["run_in_m"] = tuple(level.speed_m_s * t for t in took_s)  # type: ignore[assignment]
+    elif state == "steady":
+        values = {"force_N": _about(level.mean[0], _half(level.mean), _of_zero(part)), "run_in_s": (0.0, 0.0, 0.0)}
+    yield Reading(
+        part.test.test_id, "running-in", level.begin_s, level.phase.end_s, level.speed_m_s, level.load_N, state=state,
+        values=values,
+    )  # fmt: skip
+
+
+def _state(time_s: FloatArray, force: FloatArray) -> Literal["steady", "still drifts", "cannot tell"]:
+    """What a slide says of its drift: the change over its last fifth by an exponential and a straight line together.
+
+    Every time constant that fits about as well as the best one has its say. A straight line that stands out is drift,
+    however little it changes the force.
+    """
+    from scipy.stats import t
+
+    n = time_s.size
+    along = (time_s - time_s[0]) / float(time_s[-1] - time_s[0])
+    late = 1.0 - _LATE
+    found = []
+    for tau in np.geomspace(_SHORTEST_TAU, _LONGEST_TAU, 200):
+        design = np.column_stack((np.ones(n), along, np.exp(-along / tau)))
+        inverse = np.linalg.inv(design.T @ design)
+        best = inverse @ (design.T @ force)
+        over = np.array((0.0, _LATE, math.exp(-1.0 / tau) - math.exp(-late / tau)))
+        straight = np.array((0.0, _LATE, 0.0))
+        rest = force - design @ best
+        changes = [(abs(float(w @ best)), float(w @ inverse @ w)) for w in (over, straight)]
+        found.append((float(rest @ rest), changes, rest))
+    squares, _, rest = min(found, key=lambda one: one[0])
+    variance, dof = _variance(rest, 3, _COSINES_OF_ALL)
+    variance = max(variance, squares / n)
+    near = [changes for other, changes, _ in found if other <= squares + 4.0 * variance]
+    level = abs(float(force[int(late * n) :].mean()))
+    factor = float(t.ppf(_SURE, dof)) * math.sqrt(variance)
+    most, straight_most = (
+        max(changes[k][0] + factor * math.sqrt(changes[k][1]) for changes in near) for k in (0, 1)
+    )
+    drifts, straight_drifts = (
+        min(changes[k][0] - factor * math.sqrt(changes[k][1]) for changes in near) > 0 for k in (0, 1)
+    )
+    small = most < _STEADY * level and straight_most < _STEADY_STRAIGHT * level
+    if (small and not straight_drifts) or max(most, straight_most) < _STEADY_ANYWAY * level:
+        return "steady"
+    return "still drifts" if drifts else "cannot tell"
+
+
+def _variance(rest: FloatArray, first: int, count: int = _COSINES) -> tuple[float, int]:
+    """Variance of slow noise per sample by so many cosine coefficients of residuals, and their number."""
+    n = rest.size
+    cosines = min(count, n // 4)
+    index = np.arange(first, first + cosines)
+    waves = np.cos(np.pi * np.outer(index, (np.arange(n) + 0.5) / n)) * math.sqrt(2.0 / n)
+    return float(((waves @ rest) ** 2).mean()), cosines
+
+
+def _exponential(time_s: FloatArray, force: FloatArray) -> tuple[Interval, Interval, float] | None:
+    """Steady level, time until a tenth of the change is left, and the largest change left at the end; None without one.
+
+    Least squares over the level, the change and its time constant; the noise is that of the residuals, correlation
+    counted, and the interval of the time that of the profile.
+    """
+    from scipy.stats import f as f_distribution, t
+
+    n, end = time_s.size, float(time_s[-1])
+    low, high = max(float(time_s[1] - time_s[0]), end / n) / 2.0, 10.0 * end
+    for _ in range(3):  # each time over the range that fits
+        taus = np.geomspace(low, high, 160)
+        decay = np.exp(-time_s[None, :] / taus[:, None])
+        centred = decay - decay.mean(axis=1, keepdims=True)
+        change = centred @ (force - force.mean()) / np.maximum((centred**2).sum(axis=1), 1e-300)
+        level = force.mean() - change * decay.mean(axis=1)
+        squares = ((force - level[:, None] - change[:, None] * decay) ** 2).sum(axis=1)
+        best = int(np.argmin(squares))
+        rest = force - level[best] - change[best] * decay[best]
+        variance, dof = _variance(rest, 3, _COSINES_OF_ALL)
+        bound = variance * float(f_distribution.ppf(0.95, 1, dof))
+        near = np.flatnonzero(squares <= squares[best] + bound)
+        low, high = float(taus[max(near[0] - 1, 0)]), float(taus[min(near[-1] + 1, taus.size - 1)])
+    if float(((force - force.mean()) ** 2).sum() - squares[best]) < 3.0 * bound:
+        return None
+    took = -math.log(_ARRIVED)
+    left = max(abs(change[k]) * math.exp(-end / taus[k]) for k in near)
+    u = math.sqrt(variance / n) * float(t.ppf(0.975, dof))
+    steady = float(level[best]), float(level[near].min()) - u, float(level[near].max()) + u
+    return steady, (took * float(taus[best]), took * float(taus[near[0]]), took * float(taus[near[-1]])), float(left)
+
+
+def _holds(part: Part) -> list[Reading]:
+    """One reading a restart, and one of the healing of all: the static force over that of sliding, by log10 of hold."""
+    pull = part.pull
+    found, gained = [], []
+    for restart in pull.restarts:
+        force = _about(restart.static_N, 1.96 * restart.static_u_N)
+        load = part.test.normal_load_N
+        values: dict[str, Interval] = {"force_N": force}
+        if load > 0:
+            values["coefficient"] = tuple(v / load for v in force)  # type: ignore[assignment]
+        about = {"normal_load_N": load, "hold_s": restart.hold_s, "values": values}
+        found.append(Reading(part.test.test_id, "hold", restart.stop_s, restart.peak_s, **about))  # type: ignore[arg-type]
+        if math.isfinite(restart.static_N + pull.sliding_N) and restart.hold_s > 0:
+            gained.append((math.log10(restart.hold_s), restart.static_N - pull.sliding_N))
+    x, y = np.array(gained).reshape(-1, 2).T
+    if x.size >= _FEWEST_HOLDS and np.ptp(x) > math.log10(2.0):
+        found.append(_healing(part, found, x, y))
+    return found
+
+
+def _healing(part: Part, holds: Sequence[Reading], log_s: FloatArray, gain_N: FloatArray) -> Reading:
+    from scipy.stats import t
+
+    slope, x0, y0 = line(log_s, gain_N)
+    rest = gain_N - y0 - slope * (log_s - x0)
+    u = math.sqrt(float(rest @ rest) / (log_s.size - 2) / float(((log_s - x0) ** 2).sum()))
+    half = float(t.ppf(0.975, log_s.size - 2)) * u
+    values: Mapping[str, Interval] = {"healing_N_per_decade": _about(slope, half)}
+    return Reading(
+        part.test.test_id, "healing", holds[0].start_s, holds[-1].end_s, normal_load_N=part.test.normal_load_N,
+        values=values,
+    )  # fmt: skip
